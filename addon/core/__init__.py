@@ -1,0 +1,1 @@
+"""The method, without Blender: numpy, scipy, embreex and OpenEXR only."""

@@ -1,0 +1,56 @@
+"""What was recovered of each object: the description that stands between the core and Blender."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+LAMBERTIAN = "lambertian"
+SPECULAR = "specular"
+METAL = "metal"
+EMITTER = "emitter"
+MODELS = (LAMBERTIAN, SPECULAR, METAL, EMITTER)
+
+
+@dataclass(frozen=True)
+class ObjectMaterial:
+    """The material of one instance.
+
+    Attributes
+    ----------
+    object_id : int
+    class_name : str
+    model : str
+        One of `MODELS`. 'lambertian': diffuse albedo alone. 'specular': diffuse albedo under the seed's microfacet
+        lobe. 'metal': the lobe alone, coloured. 'emitter': gives light; its albedo is unknown.
+    phi : float or None
+        GGX alpha of the lobe, 0...1 (Blender's Roughness is its square root). None where there is no lobe.
+    psi : float or None
+        Specular: reflectance at normal incidence (F0), 0...1.
+    f0 : (3,) tuple of float or None
+        Metal only: coloured F0, linear Rec.709.
+    emission : (3,) tuple of float or None
+        Emitter only: radiance, linear Rec.709.
+    target_frame : str or None
+        Name of the frame that showed the highlight best (assumptions A1, A2).
+    residual : float or None
+        Root mean square of the fit's residual relative to the object's mean radiance.
+    residual_lambertian : float or None
+        The same with no lobe at all; what the lobe had to beat.
+    observations : int
+        Pixels that the fit used.
+    note : str
+        Why a richer model was not taken, or what is doubtful; '' if nothing is.
+    """
+
+    object_id: int
+    class_name: str
+    model: str
+    phi: float | None = None
+    psi: float | None = None
+    f0: tuple[float, float, float] | None = None
+    emission: tuple[float, float, float] | None = None
+    target_frame: str | None = None
+    residual: float | None = None
+    residual_lambertian: float | None = None
+    observations: int = 0
+    note: str = ""

@@ -1,0 +1,79 @@
+"""Every setting of a run, in one frozen value. The command line, the operators and the panel all fill this in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from .errors import BadInputError
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of `recover`. The paper's way is `PAPER`.
+
+    Attributes
+    ----------
+    texel_size : float
+        Edge of a surface element in metres; 0 chooses it from the frames' footprint.
+    atlas_size : int
+        Upper bound on the atlas's edge in pixels.
+    median : str
+        'exact' (batched, bounded buffer), 'p2' (the paper's P-square) or 'mean'.
+    frame_order : str
+        'shuffled' (fixed pseudo-random order) or 'capture' (video order, the paper's).
+    shading : str
+        'aimed' (cosine rays, and rays aimed at bright triangles) or 'uniform' (the paper's uniform hemisphere).
+    shading_rays : int
+        Gather rays for each shading point.
+    emitter_rays : int
+        Rays aimed at bright triangles for each surface element ('aimed' only).
+    interpolate : bool
+        Gather where the indirect light changes and interpolate between; False gathers at each element.
+    specular : str
+        'frames' (several frames at once) or 'target' (the paper's one target frame).
+    specular_rays : int
+        Rays for each observation in the specular fit.
+    refine : int
+        Rounds that take the fitted specular out of the lit diffuse texture again (0: the paper).
+    threads : int
+        0 takes all cores.
+    seed : int
+        Of every pseudo-random choice.
+    """
+
+    texel_size: float = 0.0
+    atlas_size: int = 4096
+    median: str = "exact"
+    frame_order: str = "shuffled"
+    shading: str = "aimed"
+    shading_rays: int = 256
+    emitter_rays: int = 16
+    interpolate: bool = True
+    specular: str = "frames"
+    specular_rays: int = 64
+    refine: int = 1
+    threads: int = 0
+    seed: int = 0
+
+    CHOICES = {
+        "median": ("exact", "p2", "mean"),
+        "frame_order": ("shuffled", "capture"),
+        "shading": ("aimed", "uniform"),
+        "specular": ("frames", "target"),
+    }
+
+    def __post_init__(self):
+        for name, allowed in self.CHOICES.items():
+            if getattr(self, name) not in allowed:
+                raise BadInputError(f"Setting '{name}' is '{getattr(self, name)}'; choose one of {', '.join(allowed)}.")
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if isinstance(value, (int, float)) and not isinstance(value, bool) and not value >= 0:
+                raise BadInputError(f"Setting '{f.name}' is {value}; give a number of at least 0.")
+        if self.shading_rays < 1 or self.specular_rays < 1 or self.atlas_size < 64:
+            raise BadInputError("Settings shading_rays and specular_rays must be at least 1, atlas_size at least 64.")
+
+
+PAPER = Settings(median="p2", frame_order="capture", shading="uniform", shading_rays=10000, emitter_rays=0,
+                 interpolate=False, specular="target", refine=0)
+"""Haefner et al. 2021: P-square in video order, uniform rays, one target frame."""

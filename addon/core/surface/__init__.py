@@ -1,0 +1,1 @@
+"""The room's surface: texel atlas, surface elements, and rays against it."""

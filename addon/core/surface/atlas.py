@@ -1,0 +1,55 @@
+"""The texel atlas: one image over the whole room, and the surface elements that its texels stand for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """The atlas and its n surface elements.
+
+    Images are (size, size, ...) arrays whose row 0 is the bottom (v = 0), as in Blender; files are written top-down.
+
+    Attributes
+    ----------
+    size : int
+        Edge of the square image in texels.
+    uv : (t, 3, 2) float32
+        Atlas coordinates in [0, 1] of each triangle's corners; no two triangles overlap.
+    texel : (n,) int64
+        Flat index (row * size + column) of each element.
+    triangle : (n,) int32
+    position : (n, 3) float32
+        World, metres.
+    normal : (n, 3) float32
+        Unit, the triangle's geometric normal.
+    object_id : (n,) int32
+    area : (n,) float32
+        Surface that the element stands for, square metres.
+    padding : (size * size,) int32
+        The element whose value a texel shows: its own, or the nearest one of the same object within the padding;
+        -1 for empty texels.
+    """
+
+    size: int
+    uv: np.ndarray
+    texel: np.ndarray
+    triangle: np.ndarray
+    position: np.ndarray
+    normal: np.ndarray
+    object_id: np.ndarray
+    area: np.ndarray
+    padding: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.texel)
+
+    def image(self, values: np.ndarray, empty: float = 0.0) -> np.ndarray:
+        """Spread values of the elements ((n,) or (n, c)) over the image, islands padded: (size, size[, c])."""
+        flat = np.full((self.size * self.size, *values.shape[1:]), empty, values.dtype)
+        shown = self.padding >= 0
+        flat[shown] = values[self.padding[shown]]
+        return flat.reshape(self.size, self.size, *values.shape[1:])
