@@ -1,0 +1,110 @@
+"""Guards over the tree itself: who may import what, and that the pinned versions agree everywhere."""
+
+from __future__ import annotations
+
+import ast
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from addon.version import VERSION
+
+ROOT = Path(__file__).resolve().parent.parent
+CODE = [ROOT / "__init__.py", *sorted((ROOT / "addon").rglob("*.py")), *sorted((ROOT / "operators").rglob("*.py"))]
+CORE = sorted((ROOT / "addon" / "core").rglob("*.py"))
+REQUIREMENTS = sorted((ROOT / "requirements").iterdir())
+BLENDER_MODULES = {"bpy", "bmesh", "mathutils", "gpu", "blf", "bl_math", "addon_utils"}
+
+
+def imports(path: Path, nodes=ast.walk) -> list[tuple[int, str]]:
+    """Level and module of every import in `path`."""
+    found = []
+    for node in nodes(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found += [(0, alias.name) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            found.append((node.level, node.module or ""))
+    return found
+
+
+def relative(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+@pytest.mark.parametrize("path", CORE, ids=relative)
+def test_the_core_knows_no_blender(path):
+    assert not {name.split(".")[0] for level, name in imports(path) if level == 0} & BLENDER_MODULES
+
+
+@pytest.mark.parametrize("path", CORE, ids=relative)
+def test_the_core_knows_neither_bridge_nor_operators(path):
+    depth = len(path.relative_to(ROOT / "addon").parts) - 1  # level that reaches addon/
+    assert all(level <= depth for level, _ in imports(path))
+
+
+@pytest.mark.parametrize("path", CODE, ids=relative)
+def test_imports_of_our_own_code_are_relative(path):
+    assert not re.search(r"bl_ext\.", path.read_text(encoding="utf-8"))
+    ours = {"addon", "operators", "scan_relight"}
+    assert not {name.split(".")[0] for level, name in imports(path) if level == 0} & ours
+
+
+def test_nothing_under_addon_reaches_above_it():
+    for path in sorted((ROOT / "addon").rglob("*.py")):
+        depth = len(path.relative_to(ROOT).parts) - 1
+        assert all(level <= depth for level, _ in imports(path)), path
+
+
+@pytest.mark.parametrize("name", ["__init__.py", "addon/cli.py", "operators/__init__.py"])
+def test_no_blender_at_module_level(name):
+    found = imports(ROOT / name, nodes=ast.iter_child_nodes)
+    assert not {module.split(".")[0] for _, module in found} & BLENDER_MODULES
+
+
+@pytest.mark.parametrize("path", REQUIREMENTS, ids=relative)
+def test_requirements_hold_no_address_and_no_path(path):
+    text = path.read_text(encoding="utf-8")
+    assert "://" not in text
+    assert "--find-links" not in text and "index-url" not in text
+    assert not re.search(r"(^|\s)/\w", text)
+
+
+def pinned(name: str) -> dict[str, str]:
+    """Version of each package in a lock."""
+    return dict(re.findall(r"^([A-Za-z0-9_.-]+)==([^\s;]+)", (ROOT / "requirements" / name).read_text(), re.MULTILINE))
+
+
+def test_one_version_everywhere():
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert manifest["version"] == project["version"] == VERSION
+    assert f"## {VERSION}" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_the_bundled_wheels_are_the_locked_ones():
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text())
+    bundled = {}
+    for wheel in manifest["wheels"]:
+        package, version, python, _, platform = Path(wheel).stem.split("-")
+        bundled.setdefault((package, version), set()).add((python, re.sub(r"[_.\d]*\d_", " ", platform).split()[0]))
+    assert {package for package, _ in bundled} == {"scipy", "embreex", "openexr"}
+    for lock in ("blender-4.5.txt", "blender-5.2.txt"):
+        versions = pinned(lock)
+        assert all(versions[package] == version for package, version in bundled)
+    for wheels in bundled.values():
+        assert {python for python, _ in wheels} == {"cp311", "cp313", "cp314"}
+    assert len(manifest["wheels"]) == 3 * 3 * len(manifest["platforms"])
+
+
+def test_the_tagline_is_what_blender_takes():
+    tagline = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["tagline"]
+    assert len(tagline) <= 64 and not tagline.endswith(".")
+
+
+def test_every_module_is_short_and_says_what_it_is():
+    for path in CODE:
+        text = path.read_text(encoding="utf-8")
+        assert ast.get_docstring(ast.parse(text)), f"{relative(path)} has no docstring"
+        assert text.count("\n") <= 400, f"{relative(path)} is too long: is it one thing?"
