@@ -1,0 +1,129 @@
+"""Accumulation: all frames into the lit diffuse texture L_d."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..capture.model import Frame, Mesh, Pixels
+from ..parallel import ordered_map
+from ..progress import Progress
+from ..surface.atlas import Atlas
+from ..surface.elements import triangle_geometry
+from ..surface.rays import RayScene
+from .medians import Summary, make_estimator
+from .visibility import CLEAN, EDGE, SATURATED, FrameView, Observations, observe, view_frame
+
+ENOUGH = 3
+"""Clean observations from which on an element does without those at edges."""
+
+
+@dataclass(frozen=True)
+class LitDiffuse:
+    """L_d and its evidence for n elements.
+
+    Attributes
+    ----------
+    radiance : (n, 3) float32
+        L_d, linear Rec.709; NaN where no frame saw the element.
+    lower, upper : (n, 3) float32
+        Quartiles of the observations.
+    count : (n,) int32
+        Observations that `radiance` rests on.
+    tier : (n,) int8
+        CLEAN, EDGE or SATURATED: the kind of observations it rests on; -1 where there is none.
+    """
+
+    radiance: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    count: np.ndarray
+    tier: np.ndarray
+
+    @property
+    def seen(self) -> np.ndarray:
+        """(n,) bool"""
+        return self.count > 0
+
+
+def frame_order(count: int, name: str, seed: int) -> np.ndarray:
+    """'capture': as filmed. 'shuffled': fixed pseudo-random, which keeps P-square from following slow drifts."""
+    return np.arange(count) if name == "capture" else np.random.default_rng(seed).permutation(count)
+
+
+def _choose(tiers: dict[int, Summary]) -> LitDiffuse:
+    """For each element the best tier that has enough, else the best that has any."""
+    clean, edge, saturated = tiers[CLEAN], tiers[EDGE], tiers[SATURATED]
+    tier = np.select(
+        [clean.count >= ENOUGH, (edge.count > 0) & (edge.count >= clean.count), clean.count > 0, saturated.count > 0],
+        [CLEAN, EDGE, CLEAN, SATURATED],
+        -1,
+    ).astype(np.int8)
+    parts = {name: getattr(clean, name).copy() for name in ("median", "lower", "upper", "count")}
+    for other in (EDGE, SATURATED):
+        chosen = tier == other
+        for name, values in parts.items():
+            values[chosen] = getattr(tiers[other], name)[chosen]
+    return LitDiffuse(parts["median"], parts["lower"], parts["upper"], parts["count"], tier)
+
+
+def accumulate(
+    mesh: Mesh,
+    atlas: Atlas,
+    scene: RayScene,
+    frames: Sequence[Frame],
+    read: Callable[[Frame], Pixels],
+    *,
+    median: str = "exact",
+    order: str = "shuffled",
+    seed: int = 0,
+    threads: int = 0,
+    folder: Path | None = None,
+    also: Callable[[FrameView, Pixels], None] | None = None,
+    progress: Progress | None = None,
+) -> LitDiffuse:
+    """Project every frame onto the elements it sees and take the median (Haefner et al. 2021, sec. 3.1).
+
+    Frames are streamed: a handful is in memory at once.
+
+    Parameters
+    ----------
+    read : callable
+        Gives a frame's pixels.
+    median : str
+        'exact', 'p2' or 'mean'; see `medians`.
+    order : str
+        'shuffled' or 'capture'.
+    folder : Path, optional
+        Where the exact median keeps observations meanwhile.
+    also : callable, optional
+        Called with each frame's view and pixels, in this thread: others who want to see the frames.
+
+    Raises
+    ------
+    BadInputError
+        From `read`.
+    InterruptedRun
+        From `progress`.
+    """
+    normal, _ = triangle_geometry(mesh)
+    estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
+    wanted = [frames[i] for i in frame_order(len(frames), order, seed)]
+
+    def look(frame: Frame) -> tuple[FrameView, Pixels, Observations]:
+        pixels = read(frame)
+        view = view_frame(frame.camera, mesh, scene, normal)
+        return view, pixels, observe(view, pixels, atlas, scene)
+
+    for done, (view, pixels, seen) in enumerate(ordered_map(look, wanted, threads)):
+        for tier, estimator in estimators.items():
+            chosen = seen.tier == tier
+            estimator.add(seen.element[chosen], seen.radiance[chosen])
+        if also is not None:
+            also(view, pixels)
+        if progress is not None:
+            progress.update(0.9 * (done + 1) / len(wanted))
+    return _choose({tier: estimator.result() for tier, estimator in estimators.items()})

@@ -1,0 +1,67 @@
+"""Bright triangles: where a share of the rays is aimed. Lamps, and anything else that shines like one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..surface.elements import triangle_geometry
+from .field import LightField
+
+LUMINANCE = np.float32([0.2126, 0.7152, 0.0722])
+BRIGHT = 8.0
+"""A triangle is bright from this multiple of the surface's mean radiance on. Only the noise depends on it, not the
+expectation: what is not aimed at is still gathered."""
+MAX_TRIANGLES = 4096
+
+
+@dataclass(frozen=True)
+class BrightTriangles:
+    """Triangles that rays are aimed at.
+
+    Attributes
+    ----------
+    corner, edge_u, edge_v : (k, 3) float32
+    normal : (k, 3) float32
+    chance : (k,) float64
+        Of being aimed at; sums to 1. In proportion to area * luminance.
+    density : (t,) float32
+        Chance over area for every triangle of the mesh: density of aimed points per square metre; 0 if not bright.
+    """
+
+    corner: np.ndarray
+    edge_u: np.ndarray
+    edge_v: np.ndarray
+    normal: np.ndarray
+    chance: np.ndarray
+    density: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.chance)
+
+
+def triangle_luminance(field: LightField) -> np.ndarray:
+    """Mean luminance of each triangle over its elements ((t,) float64; 0 where a triangle has none)."""
+    atlas = field.atlas
+    luminance = field.radiance @ LUMINANCE
+    t = len(field.mesh.triangles)
+    count = np.bincount(atlas.triangle, minlength=t)
+    return np.bincount(atlas.triangle, luminance, t) / np.maximum(count, 1)
+
+
+def bright_triangles(field: LightField) -> BrightTriangles:
+    """The triangles that give most of the light for their size."""
+    normal, area = triangle_geometry(field.mesh)
+    luminance = triangle_luminance(field)
+    mean = (luminance * area).sum() / max(area.sum(), 1e-30)
+    power = np.where(luminance > BRIGHT * mean, luminance * area, 0)
+    bright = np.argsort(-power)[:MAX_TRIANGLES]
+    bright = np.sort(bright[power[bright] > 0])
+    chance = power[bright] / max(power[bright].sum(), 1e-30)
+    density = np.zeros(len(area), np.float32)
+    density[bright] = chance / area[bright]
+    corners = field.mesh.vertices[field.mesh.triangles[bright]].astype(np.float32)
+    return BrightTriangles(
+        corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], normal[bright], chance, density
+    )

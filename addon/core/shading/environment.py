@@ -1,0 +1,97 @@
+"""Light from outside: radiance by direction, from the frames' own pixels that see past the mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..capture.model import Pixels
+from ..lit_diffuse.visibility import FrameView
+
+MAX_HEIGHT = 512
+
+
+@dataclass(frozen=True)
+class Environment:
+    """A directional map, infinitely far away.
+
+    Attributes
+    ----------
+    radiance : (h, 2h, 3) float32
+        Equirectangular, row 0 at the bottom; u = 0.5 - atan2(y, x) / (2 pi), v = 0.5 + asin(z) / pi. Linear Rec.709.
+    observations : (h, 2h) int32
+        Pixels behind each direction; 0 where `radiance` was filled in from neighbours.
+    """
+
+    radiance: np.ndarray
+    observations: np.ndarray
+
+    @property
+    def seen(self) -> bool:
+        """Whether any frame saw the outside at all."""
+        return bool(self.observations.any())
+
+    def __call__(self, directions: np.ndarray) -> np.ndarray:
+        """Radiance from unit `directions` ((n, 3) float32, away from the room): (n, 3) float32."""
+        return self.radiance.reshape(-1, 3)[_bin(directions, self.radiance.shape[0])]
+
+
+def _bin(directions: np.ndarray, height: int) -> np.ndarray:
+    """Flat index of the map's cell that each direction falls in."""
+    width = 2 * height
+    u = 0.5 - np.arctan2(directions[:, 1], directions[:, 0]) * np.float32(0.5 / np.pi)
+    v = 0.5 + np.arcsin(np.clip(directions[:, 2], -1, 1)) * np.float32(1 / np.pi)
+    column = np.minimum((u * width).astype(np.int32), width - 1)
+    return np.minimum((v * height).astype(np.int32), height - 1) * width + column
+
+
+def _fill(radiance: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Pull-push: unseen cells take the mean of the nearest coarser neighbourhood that has any."""
+    height, width = weight.shape
+    if height == 1 or (weight > 0).all():
+        if not (weight > 0).any():
+            return np.zeros_like(radiance)
+        mean = (radiance * weight[..., None]).sum((0, 1)) / weight.sum()
+        return np.where(weight[..., None] > 0, radiance, mean).astype(np.float32)
+    seen = (weight > 0).astype(np.float32)
+    small_weight = seen.reshape(height // 2, 2, width // 2, 2).sum((1, 3))
+    summed = (radiance * seen[..., None]).reshape(height // 2, 2, width // 2, 2, 3).sum((1, 3))
+    small = _fill(summed / np.maximum(small_weight, 1)[..., None], small_weight)
+    return np.where(seen[..., None] > 0, radiance, small.repeat(2, 0).repeat(2, 1)).astype(np.float32)
+
+
+class EnvironmentAccumulator:
+    """Collects escaped pixels frame by frame; give `add` to `accumulate(also=...)`.
+
+    Parameters
+    ----------
+    pixel_angle : float
+        Radians that one pixel of the frames covers; sets the map's resolution (at most `MAX_HEIGHT` rows).
+    """
+
+    def __init__(self, pixel_angle: float):
+        wanted = np.pi / max(pixel_angle, 1e-6)
+        self._height = int(min(MAX_HEIGHT, 2 ** np.round(np.log2(max(wanted, 16)))))
+        cells = 2 * self._height**2
+        self._sum = np.zeros((cells, 3))
+        self._count = np.zeros(cells, np.int64)
+
+    def add(self, view: FrameView, pixels: Pixels) -> None:
+        """Take the pixels whose whole neighbourhood escapes (an edge mixes in the window frame)."""
+        outside = (view.triangle < 0) & view.clean & pixels.valid
+        if not outside.any():
+            return
+        directions = view.camera.directions(view.camera.pixel_centres()[outside.ravel()])
+        cells = _bin(directions, self._height)
+        radiance = pixels.radiance[outside]
+        for channel in range(3):
+            self._sum[:, channel] += np.bincount(cells, radiance[:, channel], len(self._count))
+        self._count += np.bincount(cells, minlength=len(self._count))
+
+    def result(self) -> Environment:
+        """The map, unseen directions filled in from their neighbours."""
+        shape = (self._height, 2 * self._height)
+        mean = (self._sum / np.maximum(self._count, 1)[:, None]).astype(np.float32).reshape(*shape, 3)
+        count = self._count.reshape(shape).astype(np.int32)
+        return Environment(_fill(mean, count), count)

@@ -1,0 +1,85 @@
+"""Rays against the room's triangles. The only module that imports embreex."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+
+RELATIVE_OFFSET = 2e-5
+"""Origins are moved off their surface by this share of the scene's diagonal: embreex has no tnear, and without it
+92 % of the rays hit the surface that they leave (none from 1e-6 on, measured in a 6 m room)."""
+
+
+@dataclass(frozen=True)
+class Hits:
+    """First hits of n rays.
+
+    Attributes
+    ----------
+    triangle : (n,) int32
+        -1 where the ray escapes.
+    u, v : (n,) float32
+        Barycentric coordinates of the second and third corner.
+    distance : (n,) float32
+        Along the (unit) direction, metres; inf where the ray escapes.
+    """
+
+    triangle: np.ndarray
+    u: np.ndarray
+    v: np.ndarray
+    distance: np.ndarray
+
+
+class RayScene:
+    """The triangles, ready to be hit.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float
+        World, metres.
+    triangles : (t, 3) int
+    """
+
+    def __init__(self, vertices: np.ndarray, triangles: np.ndarray):
+        low, high = vertices.min(0), vertices.max(0)
+        self.diagonal = float(np.linalg.norm(high - low))
+        self.offset = RELATIVE_OFFSET * self.diagonal
+        self.triangle_count = len(triangles)
+        self._scene = EmbreeScene()
+        self._mesh = TriangleMesh(
+            self._scene, np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(triangles, np.int32)
+        )
+        self._run(np.zeros((1, 3), np.float32), np.float32([[0, 0, 1]]))  # builds the tree now, in one thread
+
+    def _run(self, origins, directions, **options):
+        return self._scene.run(
+            np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32), **options
+        )
+
+    def intersect(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
+        """First hit of each ray.
+
+        Parameters
+        ----------
+        origins, directions : (n, 3) float32
+            Directions of unit length.
+        """
+        if len(origins) == 0:
+            none = np.zeros(0, np.float32)
+            return Hits(np.zeros(0, np.int32), none, none, none)
+        found = self._run(origins, directions, output=True)
+        triangle = found["primID"]
+        return Hits(triangle, found["u"], found["v"], np.where(triangle < 0, np.float32(np.inf), found["tfar"]))
+
+    def occluded(self, origins: np.ndarray, directions: np.ndarray, distances: np.ndarray) -> np.ndarray:
+        """True where something lies between an origin and `distances` ((n,) float32, metres) along its ray."""
+        if len(origins) == 0:
+            return np.zeros(0, bool)
+        return self._run(origins, directions, dists=np.ascontiguousarray(distances, np.float32), query="OCCLUDED") >= 0
+
+    def off_surface(self, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Origins for rays that leave `positions` on the side of `normals` ((n, 3) float32 each)."""
+        return positions + np.float32(self.offset) * normals
