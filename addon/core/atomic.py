@@ -1,0 +1,50 @@
+"""Files that are there whole or not at all: written under a temporary name beside the target, then moved over it."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from .errors import StorageError
+
+TEMPORARY = ".partial-"
+"""What a temporary name begins with; the process id follows, so that the remains of dead runs can be told."""
+
+
+@contextlib.contextmanager
+def replacing(path: Path | str) -> Iterator[Path]:
+    """Hand out a temporary path in `path`'s folder; move it over `path` when the block ends well.
+
+    Whatever goes wrong, the temporary file is removed and `path` stays as it was.
+
+    Raises
+    ------
+    StorageError
+        Where the system refuses to write (disk full, read-only, folder gone).
+    """
+    path = Path(path)
+    temporary = path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
+    try:
+        try:
+            yield temporary
+            os.replace(temporary, path)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                temporary.unlink()
+            raise
+    except OSError as error:
+        raise StorageError(
+            f"'{path}' can't be written ({error.strerror or error}); free some space or choose another result folder."
+        ) from error
+
+
+def write_bytes(path: Path | str, *pieces: bytes | memoryview) -> None:
+    """Write `pieces` one after the other as the content of `path`; raises `StorageError`."""
+    with replacing(path) as temporary, open(temporary, "wb") as file:
+        for piece in pieces:
+            file.write(piece)
+        # Without this a machine that loses power may keep the new name and lose the content.
+        file.flush()
+        os.fsync(file.fileno())

@@ -1,0 +1,252 @@
+"""PLY meshes: text or binary, any order of properties, polygons split into triangles.
+
+A body is taken as one flat array: of bytes where binary, of numbers where text. So both kinds share one way of finding
+the records, and only `_Body.take` knows the difference. Nothing is allocated before the counts that the header claims
+were compared with the size of the file.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import BadInputError
+from .ply_header import Element, parse_header
+
+UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
+INDEX_NAMES = ("vertex_indices", "vertex_index")
+
+
+class PlyMesh(NamedTuple):
+    """What a PLY file holds, unrepaired.
+
+    Attributes
+    ----------
+    vertices : (v, 3) float64
+    triangles : (t, 3) int32
+        In the order of the file's faces; each index is within the vertices.
+    object_id : (t,) int64 or None
+    uv : (t, 3, 2) float32 or None
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    object_id: np.ndarray | None
+    uv: np.ndarray | None
+
+
+class _Body(NamedTuple):
+    """The flat array behind the header."""
+
+    data: np.ndarray  # uint8 where binary, float64 where text
+    order: str  # '<' or '>', '' where text
+
+    def size(self, kind: str) -> int:
+        """How many entries of `data` one value takes."""
+        return np.dtype(kind).itemsize if self.order else 1
+
+    def take(self, at: np.ndarray, kind: str, count: int = 1) -> np.ndarray:
+        """`count` values behind each position `at` ((n,) int), as (n, count)."""
+        size = self.size(kind) * count
+        raw = self.data[at[:, None] + np.arange(size)]
+        return raw.view(self.order + kind) if self.order else raw
+
+
+class _Damaged(Exception):
+    """The text is the second half of a sentence."""
+
+
+def read_ply(path: Path | str) -> PlyMesh:
+    """Read the mesh `path`.
+
+    Polygons become triangles: quads along their shorter diagonal, longer ones as a fan; faces of fewer than 3 corners
+    vanish. Vertex `s t`, `u v` or `texture_u texture_v` become corner texture coordinates.
+
+    Raises
+    ------
+    BadInputError
+        The file is absent, damaged, cut off, holds no mesh, or points to vertices that it doesn't hold.
+    """
+    path = Path(path)
+    try:
+        if not path.is_file():
+            what = "is not a file" if path.exists() else "does not exist"
+            raise BadInputError(f"Mesh '{path}' {what}; a capture needs its mesh there.")
+        return _parse(path.read_bytes())
+    except (_Damaged, ValueError) as error:
+        raise BadInputError(f"Mesh '{path}' {error}; export it again.") from error
+    except MemoryError as error:
+        raise BadInputError(f"Mesh '{path}' does not fit in memory; simplify it.") from error
+    except OSError as error:
+        reason = error.strerror or error
+        raise BadInputError(f"Mesh '{path}' can't be read ({reason}); check the file and its rights.") from error
+
+
+def _parse(content: bytes) -> PlyMesh:
+    order, elements, start = parse_header(content)
+    body = _Body(np.frombuffer(content, np.uint8, offset=start) if order else _numbers(content[start:]), order)
+    at = 0
+    found: dict[str, tuple[Element, np.ndarray, dict[str, np.ndarray]]] = {}
+    for element in elements:
+        starts, lists, at = _records(body, element, at)
+        found[element.name] = element, starts, lists
+        if {"vertex", "face"} <= found.keys():
+            break
+    if "vertex" not in found:
+        raise _Damaged("holds no vertices")
+    element, starts, lists = found["vertex"]
+    values = {name: _scalars(body, element, starts, lists, name)
+              for name in ("x", "y", "z", *sum(UV_NAMES, ()))}
+    if any(values[axis] is None for axis in "xyz"):
+        raise _Damaged("has vertices without x, y and z")
+    vertices = np.stack([values[axis] for axis in "xyz"], -1).astype(np.float64)
+    if "face" not in found:
+        return PlyMesh(vertices, np.zeros((0, 3), np.int32), None, None)
+
+    element, starts, lists = found["face"]
+    name = next((n for n in INDEX_NAMES if n in lists), None)
+    if name is None:
+        raise _Damaged("has faces without vertex_indices")
+    kinds = {p.name: p for p in element.properties}
+    triangles, source = _triangles(body, lists[name], kinds[name].count_kind, kinds[name].kind, vertices)
+    ids = _scalars(body, element, starts, lists, "object_id")
+    if ids is not None:
+        whole = np.nan_to_num(ids, nan=-1.0, posinf=-1.0, neginf=-1.0) if ids.dtype.kind == "f" else ids
+        ids = whole.astype(np.int64)[source]
+    pair = next((pair for pair in UV_NAMES if all(values[n] is not None for n in pair)), None)
+    uv = None if pair is None else np.stack([values[n] for n in pair], -1).astype(np.float32)[triangles]
+    return PlyMesh(vertices, triangles, ids, uv)
+
+
+def _numbers(text: bytes) -> np.ndarray:
+    """All numbers of `text`, up to the first thing that is none, as (n,) float64."""
+    with warnings.catch_warnings():
+        # What stops the parser early is told by the count of numbers, with the file's name.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        return np.fromstring(text.decode("latin-1"), np.float64, sep=" ")
+
+
+def _records(body: _Body, element: Element, at: int) -> tuple[np.ndarray, dict[str, np.ndarray], int]:
+    """Find the records of `element`, the first of which begins at `at`.
+
+    Returns
+    -------
+    starts : (n,) int64
+        Where each record begins.
+    lists : dict of str to (n,) int64
+        Where each list property's length stands.
+    end : int
+    """
+    n, room = element.count, body.data.size - at
+    fixed = sum(body.size(p.count_kind or p.kind) for p in element.properties)
+    if n * max(fixed, 1) > room:
+        raise _Damaged(f"claims {n} of '{element.name}' but ends before them: it is cut off, or its header is wrong")
+    lists = [p for p in element.properties if p.count_kind]
+    if not n or not lists:
+        return at + fixed * np.arange(n), {p.name: np.zeros(0, np.int64) for p in lists}, at + fixed * n
+
+    # The fast path: all lists are as long as those of the first record, which holds for nearly every mesh.
+    where, length = _walk_one(body, element, at)
+    if n * length <= room:
+        starts = at + length * np.arange(n)
+        places = {p.name: starts + offset for p, (offset, _) in zip(lists, where)}
+        if all(np.all(body.take(places[p.name], p.count_kind)[:, 0] == count) for p, (_, count) in zip(lists, where)):
+            return starts, places, at + length * n
+    return _walk(body, element, at)
+
+
+def _walk_one(body: _Body, element: Element, at: int) -> tuple[list[tuple[int, int]], int]:
+    """Offset and length of each list of the record at `at`, and the record's size."""
+    where, begin = [], at
+    for p in element.properties:
+        if not p.count_kind:
+            at += body.size(p.kind)
+            continue
+        if at + body.size(p.count_kind) > body.data.size:
+            raise _Damaged(f"ends within its '{element.name}' records: it is cut off")
+        count = body.take(np.array([at]), p.count_kind)[0, 0]
+        if not 0 <= count <= body.data.size or count != int(count):
+            raise _Damaged(f"holds a list of {count} entries in '{element.name}'")
+        where.append((at - begin, int(count)))
+        at += body.size(p.count_kind) + int(count) * body.size(p.kind)
+    return where, at - begin
+
+
+def _walk(body: _Body, element: Element, at: int) -> tuple[np.ndarray, dict[str, np.ndarray], int]:
+    """As `_records`, for lists of different lengths: where a record begins is known only from the one before.
+
+    All the possible records (one beginning at each entry of the body) are sized at once; then the chain of real ones
+    is followed, doubling: who knows the first 2^k records and the jump over 2^k knows the first 2^(k+1).
+    """
+    data_size, n = body.data.size, element.count
+    begin = np.arange(at, data_size)
+    end, places = begin.astype(np.int64), {}
+    for p in element.properties:
+        if not p.count_kind:
+            end += body.size(p.kind)
+            continue
+        places[p.name] = end.copy()
+        inside = end + body.size(p.count_kind) <= data_size
+        count = np.full(end.shape, -1.0)
+        count[inside] = body.take(end[inside], p.count_kind)[:, 0]
+        # A record that can't be one leads behind the end, where every chain through it stops.
+        good = (count >= 0) & (count <= data_size) & (count == np.floor(count))
+        end = np.where(good, end + body.size(p.count_kind) + np.where(good, count, 0).astype(np.int64)
+                       * body.size(p.kind), data_size + 1)
+    stop = data_size - at + 1  # a place of its own for "went wrong"; data_size - at is the proper end
+    jump = np.append(np.minimum(end - at, stop), [stop, stop])
+    starts = np.zeros(1, np.int64)
+    while len(starts) < n:
+        starts = np.concatenate([starts, jump[starts]])[:n]
+        if len(starts) < n:
+            jump = jump[jump]
+    last = min(int(end[starts[-1]]) if starts[-1] < len(end) else data_size + 1, data_size + 1)
+    if last > data_size:
+        raise _Damaged(f"ends within its '{element.name}' records, or they are damaged")
+    return starts + at, {name: place[starts] for name, place in places.items()}, last
+
+
+def _scalars(body: _Body, element: Element, starts: np.ndarray, lists: dict[str, np.ndarray],
+             name: str) -> np.ndarray | None:
+    """The values of the scalar property `name`, (n,) in its own type (float64 where text); None where absent."""
+    at = starts
+    for p in element.properties:
+        if p.count_kind:
+            counts = body.take(lists[p.name], p.count_kind)[:, 0].astype(np.int64)
+            at = lists[p.name] + body.size(p.count_kind) + counts * body.size(p.kind)
+        elif p.name == name:
+            return body.take(at, p.kind)[:, 0]
+        else:
+            at = at + body.size(p.kind)
+    return None
+
+
+def _triangles(body: _Body, at: np.ndarray, count_kind: str, kind: str,
+               vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Split the polygons whose lists stand at `at`; gives (t, 3) int32 and the face that each came from, (t,)."""
+    counts = body.take(at, count_kind)[:, 0].astype(np.int64)
+    pieces, sources = [np.zeros((0, 3), np.int32)], [np.zeros(0, np.int64)]
+    for corners in np.unique(counts[counts >= 3]):
+        faces = np.flatnonzero(counts == corners)
+        values = body.take(at[faces] + body.size(count_kind), kind, int(corners))
+        bad = ~((values >= 0) & (values < len(vertices)) & (values == np.floor(values)))
+        if bad.any():
+            face, corner = np.argwhere(bad)[0]
+            raise _Damaged(f"has a face ({faces[face]}) that points to vertex {values[face, corner]} "
+                           f"of {len(vertices)}")
+        polygon = values.astype(np.int32)
+        fan = np.stack([np.repeat(polygon[:, :1], corners - 2, 1), polygon[:, 1:-1], polygon[:, 2:]], -1)
+        if corners == 4:
+            a, b, c, d = np.moveaxis(polygon, 1, 0)
+            other = np.stack([np.stack([a, b, d], -1), np.stack([b, c, d], -1)], 1)
+            with np.errstate(invalid="ignore", over="ignore"):
+                shorter = ((vertices[b] - vertices[d]) ** 2).sum(1) < ((vertices[a] - vertices[c]) ** 2).sum(1)
+            fan = np.where(shorter[:, None, None], other, fan)
+        pieces.append(fan.reshape(-1, 3))
+        sources.append(np.repeat(faces, corners - 2))
+    source = np.concatenate(sources)
+    order = np.argsort(source, kind="stable")
+    return np.concatenate(pieces)[order].astype(np.int32), source[order]
