@@ -1,0 +1,29 @@
+"""JSON as captures bring it: read with care, and asked for numbers with care."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from ..errors import BadInputError
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """The object in the file `path`; raises `BadInputError` where it is absent, not JSON, or no object."""
+    try:
+        value = json.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise BadInputError(f"'{path}' can't be read ({error.strerror or error}); check the capture.") from error
+    except (ValueError, RecursionError) as error:
+        raise BadInputError(f"'{path}' is not valid JSON ({error}); export it again.") from error
+    if not isinstance(value, dict):
+        raise BadInputError(f"'{path}' holds no JSON object; export it again.")
+    return value
+
+
+def is_number(value: Any) -> bool:
+    """Whether `value` is a finite number (true and false are none)."""
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300 \
+        and math.isfinite(value)

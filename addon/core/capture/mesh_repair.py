@@ -1,0 +1,70 @@
+"""Take out of a mesh what no later stage can use: triangles without area, vertices that are not finite."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import BadInputError
+from .ply import PlyMesh
+
+MAX_COORDINATE = 1e6
+"""Metres; beyond, single precision (rays, atlas) can't hold a room."""
+THIN = 1e-12
+"""A triangle whose height is below this share of its longest edge has no area."""
+USUAL_EXTENT = (0.1, 1000.0)
+"""Metres; a room outside of this was likely exported in another unit."""
+
+
+def repair(mesh: PlyMesh, name: str) -> tuple[PlyMesh, list[str]]:
+    """Remove the triangles of `mesh` that are degenerate or have vertices that are not finite.
+
+    Parameters
+    ----------
+    name : str
+        The file, for messages.
+
+    Returns
+    -------
+    mesh : PlyMesh
+        Each triangle has an area; every vertex is finite.
+    warnings : list of str
+
+    Raises
+    ------
+    BadInputError
+        No triangle is left.
+    """
+    if not len(mesh.triangles):
+        raise BadInputError(f"Mesh '{name}' has no triangles; export the room's surface with its faces.")
+    warnings = []
+    with np.errstate(invalid="ignore"):
+        finite = (np.abs(mesh.vertices) <= MAX_COORDINATE).all(1)
+    corners_finite = finite[mesh.triangles].all(1)
+    good = corners_finite.copy()
+    good[corners_finite] = _has_area(mesh.vertices, mesh.triangles[corners_finite])
+    broken, flat = int((~corners_finite).sum()), int((corners_finite & ~good).sum())
+    if broken:
+        warnings.append(f"{broken} triangles of '{name}' have vertices that are not finite or over "
+                        f"{MAX_COORDINATE:g} m away, and are left out.")
+    if flat:
+        warnings.append(f"{flat} triangles of '{name}' have no area and are left out.")
+    if not good.any():
+        raise BadInputError(f"Mesh '{name}' has no triangle with an area; export the room's surface again.")
+    vertices, triangles = mesh.vertices, mesh.triangles[good]
+    if not finite.all():
+        number = np.cumsum(finite) - 1
+        vertices, triangles = vertices[finite], number[triangles].astype(np.int32)
+    ids = None if mesh.object_id is None else mesh.object_id[good]
+    uv = None if mesh.uv is None else np.nan_to_num(mesh.uv[good], nan=0.0, posinf=0.0, neginf=0.0)
+    extent = float(np.ptp(vertices[triangles.ravel()], axis=0).max())
+    if not USUAL_EXTENT[0] <= extent <= USUAL_EXTENT[1]:
+        warnings.append(f"Mesh '{name}' is {extent:.3g} m across; captures are in metres.")
+    return PlyMesh(vertices, triangles, ids, uv), warnings
+
+
+def _has_area(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Whether each triangle has three corners apart from one line, (t,) bool."""
+    a, b, c = (vertices[triangles[:, i]] for i in range(3))
+    doubled = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    longest = np.maximum.reduce([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)])
+    return doubled > THIN * longest
