@@ -1,0 +1,1 @@
+"""All code that touches Blender's data: arrays in, objects, images, materials, lamps and cameras out."""

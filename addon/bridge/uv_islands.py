@@ -1,0 +1,129 @@
+"""Islands of a texture layout: which triangles hang together, and cutting those that waste the square."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+_FULL = 0.6
+_HOPELESS = 0.25
+_ROUNDS = 10
+
+
+def corner_ids(triangles: np.ndarray, uv: np.ndarray) -> np.ndarray:
+    """Number the corners so that two have one number where they share vertex and texture coordinate.
+
+    Parameters
+    ----------
+    triangles : (t, 3) int
+    uv : (t, 3, 2) float32
+
+    Returns
+    -------
+    (t, 3) int64
+    """
+    bits = np.ascontiguousarray(uv, np.float32).view(np.int32).reshape(-1, 2)
+    vertex = triangles.ravel()
+    order = np.lexsort((bits[:, 1], bits[:, 0], vertex))
+    new = np.ones(len(order), bool)
+    new[1:] = (np.diff(vertex[order]) != 0) | (np.diff(bits[order], axis=0) != 0).any(1)
+    ids = np.empty(len(order), np.int64)
+    ids[order] = np.cumsum(new) - 1
+    return ids.reshape(-1, 3)
+
+
+def connected(corners: np.ndarray, label: np.ndarray | None = None) -> np.ndarray:
+    """Number the connected pieces of triangles that share a corner and a label.
+
+    Parameters
+    ----------
+    corners : (t, 3) int64
+        See `corner_ids`.
+    label : (t,) int64, optional
+        Triangles of different labels never connect.
+
+    Returns
+    -------
+    (t,) int64, each number from 0 on in use
+    """
+    if label is not None:
+        corners = corners + label[:, None] * (corners.max(initial=0) + 1)
+    names, node = np.unique(corners.ravel(), return_inverse=True)
+    node = node.reshape(-1, 3)
+    rows, columns = np.r_[node[:, 0], node[:, 1]], np.r_[node[:, 1], node[:, 2]]
+    graph = coo_matrix((np.ones(len(rows), np.int8), (rows, columns)), shape=(len(names), len(names)))
+    piece = connected_components(graph, directed=False)[1][node[:, 0]]
+    return np.unique(piece, return_inverse=True)[1].reshape(-1)
+
+
+def areas(uv: np.ndarray) -> np.ndarray:
+    """Area of each triangle in texture space, (t,) float64."""
+    a, b = (uv[:, k].astype(np.float64) - uv[:, 0] for k in (1, 2))
+    return np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+
+
+def boxes(uv: np.ndarray, island: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corner of each island's bounding box, two (i, 2) arrays."""
+    order = np.argsort(island, kind="stable")
+    start = np.searchsorted(island[order], np.arange(island.max() + 1))
+    return np.minimum.reduceat(uv.min(1)[order], start), np.maximum.reduceat(uv.max(1)[order], start)
+
+
+def cut_sparse(uv: np.ndarray, corners: np.ndarray, island: np.ndarray, margin: float) -> np.ndarray:
+    """Cut islands that fill little of their box (window frames, skirting boards) until the boxes get no smaller.
+
+    Parameters
+    ----------
+    uv : (t, 3, 2) float32
+    corners : (t, 3) int64
+    island : (t,) int64
+    margin : float
+        Width that each island needs around itself, in units of `uv`.
+
+    Returns
+    -------
+    (t,) int64, the finer numbering
+    """
+    area = areas(uv)
+    centre = uv.mean(1, dtype=np.float64)
+    settled = np.zeros(len(uv), bool)
+    for _ in range(_ROUNDS):
+        low, high = boxes(uv, island)
+        width = (high - low).astype(np.float64)
+        fill = np.bincount(island, area) / np.maximum(width.prod(1), 1e-12)
+        count = np.bincount(island)
+        worth = (fill < _FULL) & (width.min(1) > 4 * margin) & (count > 1)
+        chosen = np.flatnonzero(worth[island] & ~settled)
+        if not len(chosen):
+            break
+        piece, parent, cost = _halves(uv, corners, island, chosen, centre, width, margin)
+        before = (width + 2 * margin).prod(1)
+        better = np.bincount(parent, cost, len(width)) < 1.02 * before
+        # A ring of a few long triangles gains nothing from one straight cut: take it apart.
+        apart = ~better & (fill < _HOPELESS) & (count <= 64)
+        accepted = better[island[chosen]]
+        settled[chosen[~accepted]] = True
+        finer = island.copy()
+        finer[chosen[accepted]] = island.max() + 1 + piece[accepted]
+        single = chosen[apart[island[chosen]]]
+        finer[single] = finer.max() + 1 + np.arange(len(single))
+        island = np.unique(finer, return_inverse=True)[1].reshape(-1)
+    return island
+
+
+def _halves(uv, corners, island, chosen, centre, width, margin):
+    """Cut the chosen triangles' islands across their longer side: pieces, and parent and box area of each piece."""
+    axis = (width[:, 1] > width[:, 0]).astype(int)[island[chosen]]
+    place = centre[chosen, axis]
+    order = np.lexsort((place, island[chosen]))
+    owner = island[chosen][order]
+    start = np.flatnonzero(np.r_[True, owner[1:] != owner[:-1]])
+    stop = np.r_[start[1:], len(owner)] - 1
+    middle = np.zeros(len(width))
+    middle[owner[start]] = (place[order][start] + place[order][stop]) / 2
+    piece = connected(corners[chosen], island[chosen] * 2 + (place > middle[island[chosen]]))
+    low, high = boxes(uv[chosen], piece)
+    parent = np.empty(len(low), np.int64)
+    parent[piece] = island[chosen]
+    return piece, parent, (high - low + 2 * margin).prod(1)
