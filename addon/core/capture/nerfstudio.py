@@ -107,8 +107,12 @@ def _frame(root: Path, top: dict[str, Any], entry: dict[str, Any], name: str,
            picture_size: Callable[[Path], tuple[int, int]]) -> Frame:
     """One frame; raises `BadInputError` where it can't be used."""
     path = _inside(root, entry.get("file_path"), name)
-    if not path.suffix or not path.exists() and path.with_name(path.name + ENDING).exists():
-        path = path.with_name(path.name + ENDING)
+    ended = path.with_name(path.name + ENDING)
+    try:
+        if not path.is_file() and (not path.suffix or ended.is_file()):
+            path = ended
+    except (OSError, ValueError) as error:  # a name that the system can't even ask for
+        raise BadInputError(f"Frame '{name}' has a file_path that can't be a file; mend it.") from error
     mask = entry.get("mask_path")
     pose = check_pose(entry.get("transform_matrix"), name)
     exposure = _positive(top, entry, "exposure", name, 1.0)

@@ -138,19 +138,20 @@ def read_pixels(frame: Frame) -> Pixels:
         raise BadInputError(f"Frame '{frame.name}': '{frame.path}' changed its size during the run; start again.")
     # A half float overflows to inf: the pixel was bright, but it gives no value at all, not even a bound.
     saturated = (rgb >= frame.saturation).any(-1) | np.isposinf(rgb).any(-1)
-    valid = (np.isfinite(rgb) & (rgb >= -NOISE)).all(-1)
+    seen = np.ones(shape, bool)
     if alpha is not None and (alpha > 0).any():  # some writers leave all of alpha at 0 and mean nothing by it
-        valid &= alpha >= OPAQUE
+        seen &= alpha >= OPAQUE
     if frame.mask_path is not None:
         mask = _read_mask(frame.mask_path)
         if mask.shape != shape:
             raise BadInputError(f"Frame '{frame.name}': mask '{frame.mask_path}' differs in size; make it the frame's.")
-        valid &= mask
+        seen &= mask
+    valid = seen & (np.isfinite(rgb) & (rgb >= -NOISE)).all(-1)
     with np.errstate(over="ignore", invalid="ignore"):
         radiance = np.maximum(rgb, 0) / np.float32(frame.exposure)
         valid &= np.isfinite(radiance).all(-1)
     radiance[~valid] = 0
-    return Pixels(radiance.astype(np.float32, copy=False), valid, saturated)
+    return Pixels(radiance.astype(np.float32, copy=False), valid, saturated & seen)
 
 
 def _read_mask(path: Path) -> np.ndarray:
@@ -215,5 +216,5 @@ def fingerprint(capture: Capture) -> str:
                     name = path.relative_to(root).as_posix()
                     digest.update(f"{name} {stat.st_size} {stat.st_mtime_ns}\n".encode("utf-8", "surrogatepass"))
     except OSError as error:
-        raise BadInputError(f"'{error.filename}' was taken away during the run; put it back and start again.") from error
+        raise BadInputError(f"'{error.filename}' was taken away during the run; put it back and start anew.") from error
     return digest.hexdigest()
