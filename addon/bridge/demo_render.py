@@ -1,0 +1,215 @@
+"""Renders the demo's room with Cycles into a capture folder, exactly as a scanner's would look."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..core.errors import StorageError
+from ..core.progress import Progress
+from .demo_room import Paint, Thing, room, tour
+
+SIZES = {
+    "tiny": (8, 64, 48, 24),
+    "small": (24, 160, 120, 32),
+    "large": (64, 320, 240, 128),
+}
+"""Frames, width, height and samples for each pixel."""
+
+FIELD_OF_VIEW = np.radians(78)
+FORMAT = 1  # raise when the room or its rendering changes, so that an older capture is not taken for this one
+
+
+def render_capture(folder: Path, size: str = "small", progress: Progress | None = None) -> Path:
+    """Render the demo's room into `folder`, unless it is there already.
+
+    Parameters
+    ----------
+    folder : Path
+        Becomes a capture: transforms.json, mesh.ply, info_semantic.json, images/, and truth/materials.json, which
+        only the demo's comparison reads.
+    size : str
+        One of `SIZES`.
+    progress : Progress, optional
+
+    Returns
+    -------
+    Path
+        `folder`.
+    """
+    folder, progress = Path(folder), progress or Progress()
+    stamp = {"format": FORMAT, "size": size}
+    try:
+        if json.loads((folder / "truth" / "demo.json").read_text()) == stamp:
+            return folder
+    except (OSError, ValueError):
+        pass
+    part = folder.with_name(folder.name + ".part")
+    try:
+        shutil.rmtree(part, ignore_errors=True)
+        (part / "images").mkdir(parents=True)
+        (part / "truth").mkdir()
+        things = room()
+        write_mesh(part / "mesh.ply", things)
+        objects = [{"id": thing.object_id, "class_name": thing.class_name} for thing in things]
+        (part / "info_semantic.json").write_text(json.dumps({"objects": objects}, indent=1))
+        (part / "truth" / "materials.json").write_text(json.dumps([truth(thing) for thing in things], indent=1))
+        frames, width, height, samples = SIZES[size]
+        focal = width / 2 / np.tan(FIELD_OF_VIEW / 2)
+        poses = tour(frames)
+        transforms = {
+            "camera_model": "PINHOLE", "w": width, "h": height, "fl_x": focal, "fl_y": focal,
+            "cx": width / 2, "cy": height / 2,
+            "frames": [{"file_path": f"images/frame_{k:04d}.exr", "transform_matrix": poses[k].tolist()}
+                       for k in range(frames)],
+        }
+        (part / "transforms.json").write_text(json.dumps(transforms, indent=1))
+        render_frames(part / "images", things, poses, (width, height), samples, progress)
+        (part / "truth" / "demo.json").write_text(json.dumps(stamp))
+        shutil.rmtree(folder, ignore_errors=True)
+        os.replace(part, folder)
+    except OSError as error:
+        raise StorageError(f"The demo's capture can't be written to '{folder}': {error.strerror or error}.") from error
+    return folder
+
+
+def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int], samples: int, progress: Progress):
+    """Render the room from every pose as half-float EXR in linear Rec.709."""
+    before = {kind: set(getattr(bpy.data, kind)) for kind in KINDS}
+    scene = bpy.data.scenes.new("demo")
+    try:
+        for thing in things:
+            scene.collection.objects.link(build(thing))
+        camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+        camera.data.sensor_fit, camera.data.angle, camera.data.clip_start = "HORIZONTAL", FIELD_OF_VIEW, 0.01
+        scene.collection.objects.link(camera)
+        scene.camera = camera
+        set_up_cycles(scene, size, samples)
+        image = scene.render.image_settings
+        image.file_format, image.color_mode, image.color_depth = "OPEN_EXR", "RGB", "16"
+        for k, pose in enumerate(poses):
+            progress.update(k / len(poses))
+            camera.matrix_world = Matrix(pose.tolist())
+            scene.render.filepath = str(folder / f"frame_{k:04d}.exr")
+            bpy.ops.render.render(write_still=True, scene=scene.name)
+            if not (folder / f"frame_{k:04d}.exr").is_file():
+                raise StorageError(f"The demo's frame {k} can't be written to '{folder}'.")
+        progress.update(1.0)
+    finally:
+        bpy.data.scenes.remove(scene)
+        for kind in KINDS:
+            for block in set(getattr(bpy.data, kind)) - before[kind]:
+                getattr(bpy.data, kind).remove(block)
+
+
+KINDS = ("objects", "meshes", "cameras", "materials", "images")
+
+
+def set_up_cycles(scene, size: tuple[int, int], samples: int) -> None:
+    """Path tracing on the processor, one box filter a pixel, denoised where this Blender can."""
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x, scene.render.resolution_y = size
+    scene.render.resolution_percentage = 100
+    scene.render.use_persistent_data = True
+    scene.render.use_compositing = scene.render.use_sequencer = False
+    cycles = scene.cycles
+    cycles.device, cycles.samples, cycles.use_adaptive_sampling = "CPU", samples, False
+    cycles.pixel_filter_type = "BOX"
+    cycles.sample_clamp_indirect = cycles.sample_clamp_direct = 0
+    cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 10, 10, 10
+    cycles.caustics_reflective, cycles.blur_glossy = True, 0
+    cycles.use_denoising = can_denoise()
+
+
+def can_denoise() -> bool:
+    """Whether this Blender was built with OpenImageDenoise; some distributions' are not."""
+    import _cycles
+
+    return bool(getattr(_cycles, "with_openimagedenoise", False))
+
+
+def build(thing: Thing):
+    """The thing as a mesh object with its true materials."""
+    vertices, faces, uv, slot = thing.faces()
+    mesh = bpy.data.meshes.new(thing.class_name)
+    mesh.from_pydata(vertices.tolist(), [], faces.tolist())
+    mesh.uv_layers.new(name="uv").uv.foreach_set("vector", uv.astype(np.float32).ravel())
+    mesh.polygons.foreach_set("material_index", slot.astype(np.int32))
+    for paint in thing.paints:
+        mesh.materials.append(material(thing.class_name, paint))
+    return bpy.data.objects.new(thing.class_name, mesh)
+
+
+def material(name: str, paint: Paint):
+    """The paint as a Cycles material: emission, or a Principled."""
+    made = bpy.data.materials.new(name)
+    if made.node_tree is None:  # before Blender 5.0
+        made.use_nodes = True
+    nodes, links = made.node_tree.nodes, made.node_tree.links
+    nodes.clear()
+    output = nodes.new("ShaderNodeOutputMaterial")
+    if paint.emission:
+        shader = nodes.new("ShaderNodeEmission")
+        shader.inputs["Color"].default_value = (*paint.emission, 1)
+    else:
+        shader = nodes.new("ShaderNodeBsdfPrincipled")
+        shader.inputs["Roughness"].default_value = paint.roughness
+        root = np.sqrt(paint.f0)
+        shader.inputs["IOR"].default_value = (1 + root) / (1 - root) if root else 1.5
+        shader.inputs["Specular IOR Level"].default_value = 0.5 if root else 0.0
+        if paint.albedo.ndim == 1:
+            shader.inputs["Base Color"].default_value = (*paint.albedo.tolist(), 1)
+        else:
+            texture = nodes.new("ShaderNodeTexImage")
+            texture.image, texture.extension = picture(name, paint.albedo), "EXTEND"
+            links.new(texture.outputs["Color"], shader.inputs["Base Color"])
+    links.new(shader.outputs[0], output.inputs["Surface"])
+    return made
+
+
+def picture(name: str, pixels: np.ndarray):
+    """An image data-block of linear `pixels`, (height, width, 3) float32 with row 0 at the bottom."""
+    height, width = pixels.shape[:2]
+    image = bpy.data.images.new(name, width, height, float_buffer=True)
+    image.colorspace_settings.name = "Linear Rec.709"
+    opaque = np.ones((height, width, 4), np.float32)
+    opaque[..., :3] = pixels
+    image.pixels.foreach_set(opaque.ravel())
+    image.update()
+    return image
+
+
+def truth(thing: Thing) -> dict:
+    """What the room's maker knows of `thing`, for the comparison at the demo's end."""
+    paint = thing.paints[0]
+    return {
+        "id": thing.object_id, "class_name": thing.class_name, "emission": paint.emission,
+        "alpha": paint.roughness ** 2 if paint.f0 else None, "f0": paint.f0, "metallic": 0.0,
+        "base_color": [round(float(c), 4) for c in thing.mean_albedo()],
+    }
+
+
+def write_mesh(path: Path, things: tuple[Thing, ...]) -> None:
+    """All things as one binary PLY with an `object_id` on each face."""
+    corners, faces, first = [], {3: [], 4: []}, 0
+    for thing in things:
+        vertices, index, _, _ = thing.faces()
+        record = np.empty(len(index), [("n", "u1"), ("v", "<i4", index.shape[1]), ("object_id", "<i4")])
+        record["n"], record["v"], record["object_id"] = index.shape[1], index + first, thing.object_id
+        faces[index.shape[1]].append(record)
+        corners.append(vertices.astype("<f4"))
+        first += len(vertices)
+    records = [record for kind in faces.values() for record in kind]
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {first}\n"
+        "property float x\nproperty float y\nproperty float z\n"
+        f"element face {sum(map(len, records))}\nproperty list uchar int vertex_indices\nproperty int object_id\n"
+        "end_header\n"
+    )
+    path.write_bytes(header.encode() + b"".join(c.tobytes() for c in corners) + b"".join(r.tobytes() for r in records))
