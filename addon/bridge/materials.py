@@ -1,0 +1,113 @@
+"""Principled materials. The only module that knows the names of the node's sockets (Blender 4.x and 5.x)."""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+
+from ..core.material import EMITTER, METAL, SPECULAR, ObjectMaterial
+from .mesh_objects import ATLAS_UV
+
+MAX_F0 = 0.9
+"""The index of refraction grows without bound as F0 nears 1; this is an index of 38."""
+
+BASE_COLOR = "Base Color"
+METALLIC = "Metallic"
+ROUGHNESS = "Roughness"
+IOR = "IOR"
+SPECULAR_LEVEL = "Specular IOR Level"
+EMISSION_COLOR = "Emission Color"
+EMISSION_STRENGTH = "Emission Strength"
+
+
+def ior_of(f0: float) -> float:
+    """Index of refraction whose reflectance at normal incidence is `f0` (clamped to 0...`MAX_F0`)."""
+    root = math.sqrt(min(max(f0, 0.0), MAX_F0))
+    return (1 + root) / (1 - root)
+
+
+def make_material(description: ObjectMaterial, base_color: bpy.types.Image | None = None,
+                  emission: bpy.types.Image | None = None) -> bpy.types.Material:
+    """Make the material of one object.
+
+    Parameters
+    ----------
+    description : ObjectMaterial
+    base_color : bpy.types.Image, optional
+        Lambertian and specular: Base Color over the atlas, linear Rec.709; for specular objects already compensated
+        (see `core.specular.compensation`). Without it the colour is mid-grey.
+    emission : bpy.types.Image, optional
+        Emitter: radiance over the atlas; without it the description's one radiance.
+
+    Returns
+    -------
+    bpy.types.Material
+        Its custom properties ``scan_relight_model``, ``_phi``, ``_psi`` tell what was fitted.
+    """
+    material = bpy.data.materials.new(f"{description.class_name or 'Object'} {description.object_id}")
+    nodes, links, principled = _fresh_tree(material)
+    value = {name: principled.inputs[name] for name in (
+        BASE_COLOR, METALLIC, ROUGHNESS, IOR, SPECULAR_LEVEL, EMISSION_COLOR, EMISSION_STRENGTH)}
+    # The fitted lobe is single scattering.
+    principled.distribution = "GGX"
+    value[ROUGHNESS].default_value = 1.0 if description.phi is None else math.sqrt(min(max(description.phi, 0.0), 1.0))
+    value[SPECULAR_LEVEL].default_value = 0.0
+    value[IOR].default_value = 1.5
+    value[BASE_COLOR].default_value = (0.5, 0.5, 0.5, 1)
+    if description.model == SPECULAR:
+        value[SPECULAR_LEVEL].default_value = 0.5
+        value[IOR].default_value = ior_of(description.psi or 0.0)
+    if description.model == METAL:
+        value[METALLIC].default_value = 1.0
+        value[SPECULAR_LEVEL].default_value = 0.5
+        value[BASE_COLOR].default_value = (*(min(max(c, 0.0), 1.0) for c in description.f0 or (0.5,) * 3), 1)
+    elif description.model == EMITTER:
+        # What it reflects is unknown and already part of the radiance that was seen.
+        value[BASE_COLOR].default_value = (0, 0, 0, 1)
+        _emit(nodes, links, value, description.emission or (0.0, 0.0, 0.0), emission)
+    elif base_color is not None:
+        links.new(_texture(nodes, links, base_color, (-400, 200)), value[BASE_COLOR])
+    material["scan_relight_model"] = description.model
+    for name, number in (("phi", description.phi), ("psi", description.psi)):
+        if number is not None:
+            material[f"scan_relight_{name}"] = float(number)
+    return material
+
+
+def _emit(nodes, links, value, radiance, image):
+    """Emit exactly `radiance`, or the image's: strength is the largest component, so that colours stay within 1."""
+    if image is not None:
+        links.new(_texture(nodes, links, image, (-400, -200)), value[EMISSION_COLOR])
+        value[EMISSION_STRENGTH].default_value = 1.0
+        return
+    strength = max(max(radiance), 0.0)
+    value[EMISSION_COLOR].default_value = (*(max(c, 0.0) / strength if strength else 1.0 for c in radiance), 1)
+    value[EMISSION_STRENGTH].default_value = strength
+
+
+def _texture(nodes, links, image, place):
+    """Colour output of an image over the atlas."""
+    coordinates = nodes.new("ShaderNodeUVMap")
+    coordinates.uv_map = ATLAS_UV
+    coordinates.location = (place[0] - 250, place[1])
+    texture = nodes.new("ShaderNodeTexImage")
+    texture.image = image
+    texture.extension = "EXTEND"
+    texture.location = place
+    links.new(coordinates.outputs[0], texture.inputs[0])
+    return texture.outputs["Color"]
+
+
+def _fresh_tree(material):
+    """Nodes, links and the Principled node of an otherwise empty tree."""
+    if material.node_tree is None:
+        # From 5.0 on every material has its tree and the switch is deprecated.
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    principled = nodes.new("ShaderNodeBsdfPrincipled")
+    output = nodes.new("ShaderNodeOutputMaterial")
+    output.location = (300, 0)
+    links.new(principled.outputs[0], output.inputs["Surface"])
+    return nodes, links, principled

@@ -1,0 +1,100 @@
+"""The room's triangles as Blender objects: one for each instance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+import numpy as np
+
+from ..core.capture.model import Instance, Mesh
+
+ATLAS_UV = "ScanRelight"
+"""Name of the texture coordinates that the recovered images use."""
+CAPTURE_UV = "Capture"
+"""Name of the capture's own texture coordinates, where it has any."""
+OBJECT_ID = "object_id"
+"""Custom property (int) of each object: which instance it is."""
+
+
+def make_objects(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray,
+                 collection: bpy.types.Collection) -> dict[int, bpy.types.Object]:
+    """Make one mesh object for each instance and link it to a collection.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        World positions in metres.
+    instances : iterable of Instance
+        One without triangles gets no object.
+    atlas_uv : (t, 3, 2) float32
+        Atlas coordinates of each triangle's corners, in [0, 1].
+    collection : bpy.types.Collection
+
+    Returns
+    -------
+    dict of int to bpy.types.Object
+        By `object_id`. The origin lies in the middle of the object's box; shading is flat, because the scan's
+        geometric normals are what the light was divided by.
+    """
+    order = np.argsort(mesh.object_id, kind="stable")
+    sorted_id = mesh.object_id[order]
+    objects = {}
+    for instance in instances:
+        first, last = np.searchsorted(sorted_id, [instance.object_id, instance.object_id + 1])
+        if first == last:
+            continue
+        own = order[first:last]
+        name = instance.class_name or "Object"
+        vertices, triangles = _compact(mesh.vertices, mesh.triangles[own])
+        middle = (vertices.min(0) + vertices.max(0)) / 2
+        data = mesh_data(name, vertices - middle, triangles)
+        _add_uv(data, ATLAS_UV, atlas_uv[own])
+        if mesh.uv is not None:
+            _add_uv(data, CAPTURE_UV, mesh.uv[own])
+        data.uv_layers.active = data.uv_layers[ATLAS_UV]
+        data.uv_layers[ATLAS_UV].active_render = True
+        thing = bpy.data.objects.new(name, data)
+        thing.location = middle
+        thing[OBJECT_ID] = int(instance.object_id)
+        collection.objects.link(thing)
+        objects[instance.object_id] = thing
+    return objects
+
+
+def mesh_data(name: str, vertices: np.ndarray, triangles: np.ndarray) -> bpy.types.Mesh:
+    """Make a flat-shaded mesh.
+
+    Parameters
+    ----------
+    name : str
+    vertices : (v, 3) float
+        Metres.
+    triangles : (t, 3) int
+
+    Returns
+    -------
+    bpy.types.Mesh
+        Loop k of triangle i is loop 3 i + k.
+    """
+    data = bpy.data.meshes.new(name)
+    data.vertices.add(len(vertices))
+    data.vertices.foreach_set("co", np.ascontiguousarray(vertices, np.float32).ravel())
+    data.loops.add(triangles.size)
+    data.loops.foreach_set("vertex_index", np.ascontiguousarray(triangles, np.int32).ravel())
+    data.polygons.add(len(triangles))
+    data.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
+    data.shade_flat()
+    data.update(calc_edges=True)
+    return data
+
+
+def _compact(vertices, triangles):
+    """Only the vertices in use, renumbered. Triangles that repeat a vertex are dropped by no one: they show nothing."""
+    used, corners = np.unique(triangles.ravel(), return_inverse=True)
+    return vertices[used], corners.reshape(-1, 3)
+
+
+def _add_uv(data, name, uv):
+    layer = data.uv_layers.new(name=name, do_init=False)
+    layer.data.foreach_set("uv", np.ascontiguousarray(uv, np.float32).ravel())

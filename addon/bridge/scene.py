@@ -1,0 +1,205 @@
+"""The recovered room as a Blender scene: built into any scene, or saved as a file that renders when opened."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..core.capture.model import Capture
+from ..core.errors import StorageError
+from ..core.material import EMITTER, LAMBERTIAN, ObjectMaterial
+from .cameras import differing, make_cameras, use_camera
+from .images import load_image, relative_to
+from .materials import make_material
+from .mesh_objects import make_objects
+from .world import set_world
+
+BASE_COLOR, ALBEDO, SHADING, ENVIRONMENT = "base_color.exr", "albedo.exr", "shading.exr", "environment.exr"
+"""Files of the result folder that the scene shows; a missing one is left out."""
+_WRITING = ".scene-being-written.blend"
+_GREY = 0.18
+
+
+@dataclass
+class BuiltScene:
+    """What `build_scene` made.
+
+    Attributes
+    ----------
+    collection : bpy.types.Collection
+        "Scan Relight", linked to the scene; within it "Room", "Lamps" and "Cameras".
+    objects : dict of int to bpy.types.Object
+        By `object_id`.
+    cameras : list of bpy.types.Object
+        In the capture's order.
+    images : list of bpy.types.Image
+        All that refer to files of the result folder.
+    warnings : tuple of str
+    """
+
+    collection: bpy.types.Collection
+    objects: dict[int, bpy.types.Object]
+    cameras: list[bpy.types.Object]
+    images: list[bpy.types.Image] = field(default_factory=list)
+    warnings: tuple[str, ...] = ()
+
+
+def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
+                result_folder: Path | str, median_radiance: float = 0.0, own: bool = False) -> BuiltScene:
+    """Add the recovered room to a scene as a new collection; nothing that is there is changed.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    capture : Capture
+    atlas_uv : (t, 3, 2) float32
+        What `unwrap` gave.
+    materials : iterable of ObjectMaterial
+        An instance without one becomes lambertian.
+    result_folder : Path or str
+        Holds the images, see `BASE_COLOR` and its neighbours.
+    median_radiance : float
+        Of the frames; with `own` it sets the exposure so that this becomes middle grey. 0: unknown.
+    own : bool
+        The scene is ours: also set its world, active camera, render engine and exposure.
+
+    Returns
+    -------
+    BuiltScene
+
+    Raises
+    ------
+    BadInputError
+        An image of the result folder can't be read.
+    """
+    folder = Path(result_folder).absolute()
+    images = {name: load_image(folder / name) for name in (BASE_COLOR, ALBEDO, SHADING) if (folder / name).exists()}
+    top = bpy.data.collections.new("Scan Relight")
+    room, lamps, eyes = (bpy.data.collections.new(name) for name in ("Room", "Lamps", "Cameras"))
+    for part in (room, lamps, eyes):
+        top.children.link(part)
+    scene.collection.children.link(top)
+    objects = make_objects(capture.mesh, capture.instances, atlas_uv, room)
+    descriptions = {m.object_id: m for m in materials}
+    for instance in capture.instances:
+        if instance.object_id not in objects:
+            continue
+        thing = objects[instance.object_id]
+        description = descriptions.get(instance.object_id) or ObjectMaterial(
+            instance.object_id, instance.class_name, LAMBERTIAN, note="no description")
+        thing.data.materials.append(make_material(description, images.get(BASE_COLOR)))
+        if description.model == EMITTER:
+            room.objects.unlink(thing)
+            lamps.objects.link(thing)
+    cameras = make_cameras(capture.frames, eyes)
+    if own:
+        environment = folder / ENVIRONMENT
+        world = set_world(scene, environment if environment.exists() else None)
+        images.update((n.name, n.image) for n in world.node_tree.nodes if n.type == "TEX_ENVIRONMENT")
+        _prepare(scene, median_radiance)
+        if cameras:
+            use_camera(scene, cameras[0])
+    warning = differing(capture.frames)
+    return BuiltScene(top, objects, cameras, list(images.values()), (warning,) if warning else ())
+
+
+def write_scene(path: Path | str, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
+                result_folder: Path | str, median_radiance: float = 0.0,
+                fresh: bool | None = None) -> tuple[str, ...]:
+    """Save the recovered room as a .blend of its own that renders when opened.
+
+    The file appears whole or not at all, and refers to the images by paths relative to itself.
+
+    Parameters
+    ----------
+    path : Path or str
+        Best within `result_folder`, so that both are moved together.
+    capture, atlas_uv, materials, result_folder, median_radiance
+        See `build_scene`.
+    fresh : bool, optional
+        True: start from an empty file; what is open in this process is lost. False: build next to what is open, save
+        that part alone and take it away again. By default fresh in background mode only.
+
+    Returns
+    -------
+    tuple of str
+        Warnings, one sentence each.
+
+    Raises
+    ------
+    BadInputError
+        An image of the result folder can't be read.
+    StorageError
+        The file can't be written.
+    """
+    path = Path(path).absolute()
+    fresh = bpy.app.background if fresh is None else fresh
+    if fresh:
+        # Not read_factory_settings: that would disable the running extension itself.
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        scene = bpy.context.scene
+        scene.name = "Scan Relight"
+    else:
+        before = {kind: set(getattr(bpy.data, kind)) for kind in _KINDS}
+        scene = bpy.data.scenes.new("Scan Relight")
+    try:
+        built = build_scene(scene, capture, atlas_uv, materials, result_folder, median_radiance, own=True)
+        for image in built.images:
+            relative_to(image, path.parent)
+        _save_whole(path, lambda name: _save(name, scene, built, fresh))
+    finally:
+        if not fresh:
+            _remove_new(before)
+    return built.warnings
+
+
+_KINDS = ("scenes", "collections", "objects", "meshes", "cameras", "materials", "worlds", "images")
+
+
+def _save(name, scene, built, fresh):
+    if fresh:
+        bpy.ops.wm.save_as_mainfile(filepath=name, copy=True, compress=True, relative_remap=False)
+    else:
+        bpy.data.libraries.write(name, {scene, *built.images}, path_remap="NONE", compress=True, fake_user=False)
+
+
+def _save_whole(path: Path, save: Callable[[str], None]) -> None:
+    """Save beside `path` and put the whole file in its place."""
+    writing = path.parent / _WRITING
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        writing.unlink(missing_ok=True)
+        save(str(writing))
+        writing.replace(path)
+    except (OSError, RuntimeError) as error:
+        with suppress(OSError):
+            writing.unlink(missing_ok=True)
+        reason = getattr(error, "strerror", None) or str(error).strip().removeprefix("Error: ").rstrip(".")
+        raise StorageError(f"{path} can't be saved ({' '.join(reason.split())}); free some space or choose another "
+                           "folder.") from error
+
+
+def _remove_new(before):
+    """Take away all data that a build made, the owners before what they own."""
+    for kind in _KINDS:
+        new = [item for item in getattr(bpy.data, kind) if item not in before[kind]]
+        if new:
+            bpy.data.batch_remove(new)
+
+
+def _prepare(scene, median_radiance):
+    """Cycles, and an exposure that shows the room's median radiance as middle grey."""
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples = 128
+    scene.cycles.use_denoising = True
+    # Clamping would darken a room that is lit by small bright lamps; closed rooms need more bounces than four.
+    scene.cycles.sample_clamp_indirect = 0.0
+    scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.glossy_bounces = 12, 8, 8
+    if median_radiance > 0 and math.isfinite(median_radiance):
+        scene.view_settings.exposure = min(max(math.log2(_GREY / median_radiance), -32.0), 32.0)
