@@ -36,10 +36,12 @@ class LightField:
         """The element at each hit, (n,) int32; -1 where the ray escaped."""
         element = np.full(len(hits.triangle), -1, np.int32)
         hit = hits.triangle >= 0
-        element[hit] = lookup(
-            self.atlas, self._fallback, self.mesh.object_id, hits.triangle[hit], hits.u[hit], hits.v[hit]
-        )
+        element[hit] = self.lookup(hits.triangle[hit], hits.u[hit], hits.v[hit])
         return element
+
+    def lookup(self, triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """The element at points given by triangle (all >= 0) and barycentric coordinates, (n,) int32."""
+        return lookup(self.atlas, self._fallback, self.mesh.object_id, triangle, u, v)
 
     def along(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Follow rays.

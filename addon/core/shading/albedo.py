@@ -1,0 +1,92 @@
+"""Albedo = pi L_d / E, and what stands in where nothing was seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..surface.atlas import Atlas
+
+FLOOR = 1e-3
+"""Below this share of the room's median irradiance a quotient says nothing."""
+MAX_ALBEDO = 1.0
+
+MEASURED, FILLED, NONE = 2, 1, 0
+"""How an element's albedo came about: measured; filled in from its object; no reflectance (an emitter, or an object
+nobody saw)."""
+
+
+@dataclass(frozen=True)
+class Albedo:
+    """Diffuse albedo of n elements.
+
+    Attributes
+    ----------
+    rho : (n, 3) float32
+        Linear Rec.709, 0...1.
+    origin : (n,) int8
+        MEASURED, FILLED or NONE.
+    above_one : float
+        Share of the measured elements whose quotient was above 1: an alarm that light is missing.
+    """
+
+    rho: np.ndarray
+    origin: np.ndarray
+    above_one: float
+
+
+def quotient(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """pi L_d / E, not clamped, and where it holds.
+
+    Parameters
+    ----------
+    lit_diffuse, irradiance : (n, 3) float32
+        L_d may hold NaN.
+
+    Returns
+    -------
+    (n, 3) float32, (n,) bool
+    """
+    known = np.isfinite(lit_diffuse).all(1)
+    lit = irradiance.mean(1)
+    floor = FLOOR * float(np.median(lit[known])) if known.any() else 0.0
+    valid = known & (lit > max(floor, 1e-20))
+    rho = np.full(lit_diffuse.shape, np.nan, np.float32)
+    # A single channel may be dark under coloured light: it gets the floor, not a division by nothing.
+    rho[valid] = np.pi * lit_diffuse[valid] / np.maximum(irradiance[valid], FLOOR * lit[valid, None])
+    return rho, valid
+
+
+def fill(atlas: Atlas, rho: np.ndarray, valid: np.ndarray, class_of: dict[int, str], emitters: set[int]) -> Albedo:
+    """Clamp, and fill in what was not measured from the nearest measured elements of the same object.
+
+    An object without any takes the median of its class, else of the room.
+    """
+    above = float((rho[valid].max(1) > MAX_ALBEDO).mean()) if valid.any() else 0.0
+    result = np.clip(np.nan_to_num(rho), 0, MAX_ALBEDO)
+    origin = np.where(valid, MEASURED, FILLED).astype(np.int8)
+    reflecting = valid & ~np.isin(atlas.object_id, list(emitters))
+    everywhere = np.median(result[reflecting], 0) if reflecting.any() else np.full(3, 0.5, np.float32)
+    by_class: dict[str, list[np.ndarray]] = {}
+    bare = []
+    for object_id in np.unique(atlas.object_id):
+        own = np.flatnonzero(atlas.object_id == object_id)
+        if object_id in emitters:
+            result[own], origin[own] = 0, NONE
+            continue
+        known, missing = own[valid[own]], own[~valid[own]]
+        if not len(known):
+            bare.append((object_id, own))
+            continue
+        by_class.setdefault(class_of.get(object_id, ""), []).append(np.median(result[known], 0))
+        if len(missing):
+            k = min(8, len(known))
+            near = cKDTree(atlas.position[known]).query(atlas.position[missing], k=k, workers=-1)[1].reshape(-1, k)
+            result[missing] = np.median(result[known[near]], 1)
+    for object_id, own in bare:
+        alike = by_class.get(class_of.get(object_id, ""))
+        result[own] = np.median(alike, 0) if alike else everywhere
+        origin[own] = NONE
+    return Albedo(result.astype(np.float32), origin, above)

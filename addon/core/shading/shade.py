@@ -1,0 +1,199 @@
+"""The shading stage: from the lit diffuse texture to lamps, irradiance and albedo."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..capture.model import Instance, Mesh
+from ..lit_diffuse.accumulate import ENOUGH, LitDiffuse
+from ..lit_diffuse.visibility import CLEAN, SATURATED
+from ..parallel import for_blocks
+from ..progress import Progress
+from ..surface.atlas import Atlas
+from ..surface.elements import triangle_geometry
+from ..surface.rays import RayScene
+from .albedo import Albedo, fill, quotient
+from .emitters import BrightTriangles, bright_triangles
+from .environment import Environment
+from .field import LightField
+from .interpolate import interpolated
+from .irradiance import direct, gather, uniform
+from .lamps import Lamp, find_lamps
+
+ELEMENTS_AT_ONCE = 1 << 13
+FINEST_TEXELS = 2.0
+"""Least distance of two shading points, in texels."""
+
+
+@dataclass(frozen=True)
+class Shading:
+    """What the shading stage finds, for n elements.
+
+    Attributes
+    ----------
+    irradiance : (n, 3) float32
+        E, radiance * steradian.
+    escaped : (n,) float32
+        Share of the hemisphere's rays that left the mesh.
+    radiance : (n, 3) float32
+        L_d with everything filled in: what the light field shows at each element. Lamps have their own radiance.
+    albedo : Albedo
+    lamps : tuple of Lamp
+    points : int
+        Places at which the hemisphere was gathered.
+    """
+
+    irradiance: np.ndarray
+    escaped: np.ndarray
+    radiance: np.ndarray
+    albedo: Albedo
+    lamps: tuple[Lamp, ...]
+    points: int
+
+
+def irradiance(
+    field: LightField,
+    normals: np.ndarray,
+    element: np.ndarray,
+    *,
+    sampler: str,
+    rays: int,
+    emitter_rays: int,
+    interpolate: bool,
+    finest: float,
+    threads: int,
+    seed: int,
+    progress: Progress | None = None,
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """E at chosen elements.
+
+    Parameters
+    ----------
+    normals : (t, 3) float32
+    element : (m,) int
+        The elements wanted.
+    sampler : str
+        'aimed' or 'uniform' (the paper's).
+    finest : float
+        Least distance of two gathering points in metres.
+
+    Returns
+    -------
+    irradiance : (m, 3) float32
+    escaped : (m,) float32
+    points : int
+        How many places were gathered at.
+    """
+    atlas = field.atlas
+    position, normal = atlas.position[element], atlas.normal[element]
+    aimed = sampler == "aimed"
+    bright: BrightTriangles = bright_triangles(field)
+    lamp_rays = emitter_rays if aimed and len(bright) else 0
+    steps = {"count": 0}
+
+    def gathered(index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """E and the escaped share in four channels, and the radius R, at some of the elements."""
+        value, radius = np.zeros((len(index), 4), np.float32), np.ones(len(index), np.float32)
+        steps["count"] += 1
+
+        def run(part: slice) -> None:
+            at = index[part]
+            here = seed + 7919 * steps["count"] + part.start
+            if aimed:
+                found = gather(field, bright, normals, position[at], normal[at], rays, lamp_rays, here)
+                value[part, :3], radius[part], value[part, 3] = found
+            else:
+                value[part, :3], value[part, 3] = uniform(field, position[at], normal[at], rays, here)
+
+        for_blocks(run, len(index), max(ELEMENTS_AT_ONCE * 64 // rays, 64), threads, progress)
+        return value, radius
+
+    if interpolate and aimed:
+        value, chosen = interpolated(position, normal, gathered, finest, threads)
+        points = len(chosen)
+    else:
+        value, _ = gathered(np.arange(len(element)))
+        points = len(element)
+    total, escaped = value[:, :3].copy(), value[:, 3].copy()
+    if lamp_rays:
+
+        def aim(part: slice) -> None:
+            total[part] += direct(field, bright, position[part], normal[part], rays, lamp_rays, seed + part.start + 1)
+
+        for_blocks(aim, len(element), ELEMENTS_AT_ONCE, threads, progress)
+    return total, escaped, points
+
+
+def fill_unseen(atlas: Atlas, radiance: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """L_d with the unseen elements dark, as (n, 3) float32 without NaN."""
+    return np.where(seen[:, None], radiance, np.float32(0)).astype(np.float32)
+
+
+def shade(
+    mesh: Mesh,
+    instances: tuple[Instance, ...],
+    atlas: Atlas,
+    scene: RayScene,
+    lit_diffuse: LitDiffuse,
+    environment: Environment,
+    *,
+    sampler: str = "aimed",
+    rays: int = 256,
+    emitter_rays: int = 16,
+    interpolate: bool = True,
+    threads: int = 0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Shading:
+    """Lamps, irradiance and albedo (Haefner et al. 2021, sec. 3.2, with aimed rays and interpolation by default).
+
+    Raises
+    ------
+    InterruptedRun
+        From `progress`.
+    """
+    normals, _ = triangle_geometry(mesh)
+    class_of = {i.object_id: i.class_name for i in instances}
+    seen = lit_diffuse.seen
+    objects = int(atlas.object_id.max()) + 1
+    surface = np.bincount(atlas.object_id, atlas.area, objects)
+    seen_surface = np.bincount(atlas.object_id, atlas.area * seen, objects)
+    seen_share = {i: float(seen_surface[i] / surface[i]) for i in np.unique(atlas.object_id) if surface[i] > 0}
+    finest = FINEST_TEXELS * float(np.sqrt(np.median(atlas.area)))
+    how = {"sampler": sampler, "threads": threads, "seed": seed}
+
+    # 1. Lamps. What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
+    field = LightField(mesh, atlas, scene, fill_unseen(atlas, lit_diffuse.radiance, seen), environment)
+    good = seen & (((lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= ENOUGH)) | (lit_diffuse.tier == SATURATED))
+    lamps = find_lamps(field, normals, good if good.any() else seen, seen_share, instances, seed)
+    radiance = field.radiance.copy()
+    for lamp in lamps:
+        own = atlas.object_id == lamp.object_id
+        radiance[own & ~seen if lamp.seen else own] = lamp.radiance
+    emitters = {lamp.object_id for lamp in lamps}
+    field = field.with_radiance(radiance)
+
+    # 2. What nobody saw reflects like the rest of its object under the light that reaches it: a rough first pass.
+    dark = np.flatnonzero(~seen & ~np.isin(atlas.object_id, list(emitters)))
+    lit = np.flatnonzero(seen)
+    if len(dark):
+        rough = dict(how, rays=64, emitter_rays=4, interpolate=True, finest=8 * finest) | {"sampler": "aimed"}
+        coarse_lit, _, _ = irradiance(field, normals, lit, **rough)
+        coarse_dark, _, _ = irradiance(field, normals, dark, **rough)
+        everywhere = np.zeros((len(atlas), 3), np.float32)
+        everywhere[lit], everywhere[dark] = coarse_lit, coarse_dark
+        rho, valid = quotient(lit_diffuse.radiance, everywhere)
+        guess = fill(atlas, rho, valid, class_of, emitters)
+        radiance[dark] = guess.rho[dark] * everywhere[dark] / np.float32(np.pi)
+        field = field.with_radiance(radiance)
+
+    # 3. The real thing.
+    E, escaped, points = irradiance(
+        field, normals, np.arange(len(atlas)), rays=rays, emitter_rays=emitter_rays,
+        interpolate=interpolate, finest=finest, progress=progress, **how,
+    )  # fmt: skip
+    rho, valid = quotient(lit_diffuse.radiance, E)
+    albedo = fill(atlas, rho, valid & seen, class_of, emitters)
+    return Shading(E, escaped, field.radiance, albedo, tuple(lamps), points)
