@@ -14,6 +14,8 @@ from mathutils import Matrix
 from ..core.errors import StorageError
 from ..core.progress import Progress
 from .demo_room import Paint, Thing, room, tour
+from .images import array_image
+from .materials import BASE_COLOR, IOR, ROUGHNESS, SPECULAR_LEVEL, ior_of
 
 SIZES = {
     "tiny": (8, 64, 48, 24),
@@ -44,7 +46,7 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
         `folder`.
     """
     folder, progress = Path(folder), progress or Progress()
-    stamp = {"format": FORMAT, "size": size}
+    stamp = {"format": FORMAT, "size": list(SIZES[size])}
     try:
         if json.loads((folder / "truth" / "demo.json").read_text()) == stamp:
             return folder
@@ -159,30 +161,18 @@ def material(name: str, paint: Paint):
         shader.inputs["Color"].default_value = (*paint.emission, 1)
     else:
         shader = nodes.new("ShaderNodeBsdfPrincipled")
-        shader.inputs["Roughness"].default_value = paint.roughness
-        root = np.sqrt(paint.f0)
-        shader.inputs["IOR"].default_value = (1 + root) / (1 - root) if root else 1.5
-        shader.inputs["Specular IOR Level"].default_value = 0.5 if root else 0.0
+        shader.distribution = "GGX"
+        shader.inputs[ROUGHNESS].default_value = paint.roughness
+        shader.inputs[IOR].default_value = ior_of(paint.f0) if paint.f0 else 1.5
+        shader.inputs[SPECULAR_LEVEL].default_value = 0.5 if paint.f0 else 0.0
         if paint.albedo.ndim == 1:
-            shader.inputs["Base Color"].default_value = (*paint.albedo.tolist(), 1)
+            shader.inputs[BASE_COLOR].default_value = (*paint.albedo.tolist(), 1)
         else:
             texture = nodes.new("ShaderNodeTexImage")
-            texture.image, texture.extension = picture(name, paint.albedo), "EXTEND"
-            links.new(texture.outputs["Color"], shader.inputs["Base Color"])
+            texture.image, texture.extension = array_image(name, paint.albedo), "EXTEND"
+            links.new(texture.outputs["Color"], shader.inputs[BASE_COLOR])
     links.new(shader.outputs[0], output.inputs["Surface"])
     return made
-
-
-def picture(name: str, pixels: np.ndarray):
-    """An image data-block of linear `pixels`, (height, width, 3) float32 with row 0 at the bottom."""
-    height, width = pixels.shape[:2]
-    image = bpy.data.images.new(name, width, height, float_buffer=True)
-    image.colorspace_settings.name = "Linear Rec.709"
-    opaque = np.ones((height, width, 4), np.float32)
-    opaque[..., :3] = pixels
-    image.pixels.foreach_set(opaque.ravel())
-    image.update()
-    return image
 
 
 def truth(thing: Thing) -> dict:

@@ -1,0 +1,143 @@
+"""The console's side of a run: one line that is rewritten, or plain lines in a log; and the wish to stop."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from typing import TextIO
+
+from .core.progress import ProgressEvent
+
+LOG_SECONDS = 15.0
+"""A log gets a line at each stage's start and end, and after this many seconds within one."""
+TTY_SECONDS = 0.1
+
+
+def duration(seconds: float) -> str:
+    """Seconds as people say them: '8 s', '2 min 05 s', '1 h 10 min'."""
+    seconds = int(round(seconds))
+    if seconds < 60:
+        return f"{seconds} s"
+    if seconds < 3600:
+        return f"{seconds // 60} min {seconds % 60:02d} s"
+    return f"{seconds // 3600} h {seconds % 3600 // 60:02d} min"
+
+
+class ConsoleProgress:
+    """A listener for `Progress` that writes to `stream`.
+
+    Parameters
+    ----------
+    stream : text file
+        Where it is a terminal, one line is rewritten; else plain lines are added.
+    quiet : bool
+        Write nothing at all.
+    """
+
+    def __init__(self, stream: TextIO, quiet: bool = False):
+        self._stream, self._quiet = stream, quiet
+        self._tty = stream.isatty()
+        self._stage, self._share, self._said, self._width = None, 0.0, 0.0, 0
+
+    def __call__(self, event: ProgressEvent) -> None:
+        """Take in one event."""
+        if self._quiet or not event.stage:
+            return
+        new, now = event.stage != self._stage, time.monotonic()
+        ended = event.share >= 1.0 and (new or self._share < 1.0)
+        due = now - self._said >= (TTY_SECONDS if self._tty else LOG_SECONDS)
+        self._stage, self._share = event.stage, event.share
+        if not (new or ended or due):
+            return
+        self._said = now
+        text = f"{event.stage.replace('_', ' '):<12} {event.share:4.0%}   whole {event.overall:4.0%}"
+        if event.seconds_left is not None and event.overall < 1:
+            text += f"   about {duration(event.seconds_left)} left"
+        if self._tty:
+            filled = int(event.overall * 20)
+            text = f"[{'#' * filled}{'.' * (20 - filled)}] {text}"
+            self._stream.write("\r" + text.ljust(self._width))
+            self._width = len(text)
+        else:
+            self._stream.write(text + "\n")
+        self._stream.flush()
+
+    def close(self) -> None:
+        """Leave the line that was rewritten."""
+        if self._tty and self._width:
+            self._stream.write("\n")
+            self._stream.flush()
+            self._width = 0
+
+
+class StopWish:
+    """While entered, Ctrl-C and a polite kill are noted instead of obeyed; a second one is obeyed at once."""
+
+    def __init__(self):
+        self.wished = False
+        self._before = {}
+
+    def __call__(self) -> bool:
+        """Whether a stop was asked for."""
+        return self.wished
+
+    def __enter__(self) -> StopWish:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            with contextlib.suppress(ValueError):  # not the main thread: then nobody sends it signals
+                self._before[number] = signal.signal(number, self._note)
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler if handler is not None else signal.SIG_DFL)
+        self._before.clear()
+
+    def _note(self, number, frame):
+        if self.wished:
+            raise KeyboardInterrupt
+        self.wished = True
+
+
+@contextlib.contextmanager
+def own_stdout(keep_blender: bool = False) -> Iterator[TextIO]:
+    """Hand out the real standard output and keep Blender's own chatter off it, which it writes below Python.
+
+    Parameters
+    ----------
+    keep_blender : bool
+        Let the chatter through.
+    """
+    try:
+        direct = sys.stdout.fileno() == 1 and not keep_blender
+    except (AttributeError, OSError, ValueError):
+        direct = False
+    if not direct:
+        yield sys.stdout
+        return
+    sys.stdout.flush()
+    _flush_c()
+    kept = os.dup(1)
+    stream = os.fdopen(os.dup(kept), "w", encoding=sys.stdout.encoding, errors="replace")
+    null = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(null, 1)
+        yield stream
+    finally:
+        with contextlib.suppress(OSError):
+            stream.close()
+        sys.stdout.flush()
+        _flush_c()
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(null)
+
+
+def _flush_c() -> None:
+    """Empty the C library's output buffers, which Blender's prints stand in."""
+    with contextlib.suppress(OSError, AttributeError, TypeError):
+        (ctypes.cdll.ucrtbase if os.name == "nt" else ctypes.CDLL(None)).fflush(None)

@@ -1,0 +1,58 @@
+"""What there is to say about each setting, read off the `Settings` dataclass: the one source for every interface."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import typing
+from dataclasses import dataclass, fields
+
+from .core.settings import Settings
+
+
+@dataclass(frozen=True)
+class SettingInfo:
+    """One field of `Settings`.
+
+    Attributes
+    ----------
+    name : str
+    kind : type
+        bool, int, float or str.
+    default : bool, int, float or str
+    help : str
+        One or two sentences, without the closing full stop.
+    choices : tuple of str
+        Empty where any value goes.
+    """
+
+    name: str
+    kind: type
+    default: object
+    help: str
+    choices: tuple[str, ...]
+
+
+def setting_infos() -> tuple[SettingInfo, ...]:
+    """All settings in the dataclass's order."""
+    helps = _helps(inspect.getdoc(Settings) or "")
+    kinds = typing.get_type_hints(Settings)
+    return tuple(
+        SettingInfo(f.name, kinds[f.name], f.default, helps.get(f.name, ""), Settings.CHOICES.get(f.name, ()))
+        for f in fields(Settings)
+    )
+
+
+def _helps(docstring: str) -> dict[str, str]:
+    """The texts below a NumPy-style docstring's 'Attributes', by name."""
+    _, _, attributes = docstring.partition("Attributes\n----------\n")
+    found: dict[str, list[str]] = {}
+    name = None
+    for line in attributes.splitlines():
+        head = re.match(r"(\w+) : ", line)
+        if head:
+            name = head[1]
+            found[name] = []
+        elif name and line.startswith(" "):
+            found[name].append(line.strip())
+    return {name: " ".join(lines).rstrip(".") for name, lines in found.items()}
