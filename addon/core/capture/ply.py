@@ -18,6 +18,8 @@ from .ply_header import Element, parse_header
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 INDEX_NAMES = ("vertex_indices", "vertex_index")
+WINDOW = 1 << 20
+"""Entries of the body that are looked at together; bounds the memory, as each takes some dozens of bytes."""
 
 
 class PlyMesh(NamedTuple):
@@ -178,35 +180,50 @@ def _walk_one(body: _Body, element: Element, at: int) -> tuple[list[tuple[int, i
 def _walk(body: _Body, element: Element, at: int) -> tuple[np.ndarray, dict[str, np.ndarray], int]:
     """As `_records`, for lists of different lengths: where a record begins is known only from the one before.
 
-    All the possible records (one beginning at each entry of the body) are sized at once; then the chain of real ones
-    is followed, doubling: who knows the first 2^k records and the jump over 2^k knows the first 2^(k+1).
+    Within a window of the body, all possible records (one beginning at each entry) are sized at once; then the chain
+    of real ones is followed, doubling: who knows the first 2^k records and the jump over 2^k knows the first 2^(k+1).
     """
-    data_size, n = body.data.size, element.count
-    begin = np.arange(at, data_size)
-    end, places = begin.astype(np.int64), {}
+    found: list[np.ndarray] = []
+    places: dict[str, list[np.ndarray]] = {p.name: [] for p in element.properties if p.count_kind}
+    missing = element.count
+    while missing:
+        begin = np.arange(at, min(at + WINDOW, body.data.size))
+        end, where = _possible(body, element, begin)
+        outside = len(begin)
+        jump = np.append(np.minimum(end - at, outside), outside)
+        chain = np.zeros(1, np.int64)
+        while chain[-1] < outside and len(chain) < missing:
+            chain = np.concatenate([chain, jump[chain]])
+            jump = jump[jump]
+        chain = chain[chain < outside][:missing]
+        if not len(chain) or (at := int(end[chain[-1]])) > body.data.size:
+            raise _Damaged(f"ends within its '{element.name}' records, or they are damaged")
+        found.append(begin[chain])
+        for name, place in where.items():
+            places[name].append(place[chain])
+        missing -= len(chain)
+    return np.concatenate(found), {name: np.concatenate(place) for name, place in places.items()}, at
+
+
+def _possible(body: _Body, element: Element, begin: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Where a record that begins at each of `begin` would end, and where its lists' lengths would stand.
+
+    What can't be a record ends behind the body, where every chain through it stops.
+    """
+    size = body.data.size
+    end, places = begin.copy(), {}
     for p in element.properties:
         if not p.count_kind:
             end += body.size(p.kind)
             continue
         places[p.name] = end.copy()
-        inside = end + body.size(p.count_kind) <= data_size
+        inside = end + body.size(p.count_kind) <= size
         count = np.full(end.shape, -1.0)
         count[inside] = body.take(end[inside], p.count_kind)[:, 0]
-        # A record that can't be one leads behind the end, where every chain through it stops.
-        good = (count >= 0) & (count <= data_size) & (count == np.floor(count))
-        end = np.where(good, end + body.size(p.count_kind) + np.where(good, count, 0).astype(np.int64)
-                       * body.size(p.kind), data_size + 1)
-    stop = data_size - at + 1  # a place of its own for "went wrong"; data_size - at is the proper end
-    jump = np.append(np.minimum(end - at, stop), [stop, stop])
-    starts = np.zeros(1, np.int64)
-    while len(starts) < n:
-        starts = np.concatenate([starts, jump[starts]])[:n]
-        if len(starts) < n:
-            jump = jump[jump]
-    last = min(int(end[starts[-1]]) if starts[-1] < len(end) else data_size + 1, data_size + 1)
-    if last > data_size:
-        raise _Damaged(f"ends within its '{element.name}' records, or they are damaged")
-    return starts + at, {name: place[starts] for name, place in places.items()}, last
+        good = (count >= 0) & (count <= size) & (count == np.floor(count))
+        length = body.size(p.count_kind) + np.where(good, count, 0).astype(np.int64) * body.size(p.kind)
+        end = np.where(good, end + length, size + 1)
+    return end, places
 
 
 def _scalars(body: _Body, element: Element, starts: np.ndarray, lists: dict[str, np.ndarray],
