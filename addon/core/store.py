@@ -105,7 +105,8 @@ class Store:
         if meta is None or meta.get("key") != key:
             return None
         try:
-            with np.load(path, allow_pickle=False) as archive:  # checks each array's CRC
+            # Opened here: given a path, np.load leaves a damaged file open. Reading checks each array's CRC.
+            with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
                 return {array: archive[array] for array in archive.files if array != META}
         except DAMAGE:
             return None
@@ -199,7 +200,7 @@ def _plain(value: Any) -> Any:
 def _read_meta(path: Path) -> dict[str, Any] | None:
     """The key and the meta of a stage's file; None where it is absent or damaged."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
             meta = json.loads(archive[META].tobytes())
     except DAMAGE:
         return None

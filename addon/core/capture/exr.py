@@ -112,7 +112,7 @@ def write_exr(path: Path | str, array: np.ndarray, half: bool = False) -> None:
         OpenEXR.File(header, planes).write(stream)
     except RuntimeError as error:
         raise StorageError(f"'{path}' can't be written ({error}); try again with less in memory.") from error
-    write_bytes(path, stream.getbuffer())
+    write_bytes(path, stream.getvalue())
 
 
 def _wanted(header: ExrHeader) -> list[str]:

@@ -1,3 +1,5 @@
+"""OpenEXR: what is read and written, and that nothing damaged gets through or brings the process down."""
+
 from __future__ import annotations
 
 import errno

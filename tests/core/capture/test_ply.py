@@ -1,3 +1,5 @@
+"""PLY: every kind of mesh that a capture may bring, and one sentence for what is none."""
+
 from __future__ import annotations
 
 import struct
@@ -6,8 +8,6 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from addon.core.capture import ply
 from addon.core.capture.ply import read_ply
@@ -145,13 +145,13 @@ def test_a_hostile_count_takes_no_memory(tmp_path):
     assert peak < 1_000_000
 
 
-@settings(max_examples=150, deadline=None)
-@given(data=st.data())
-def test_a_few_wrong_bytes_never_raise_anything_else(data, tmp_path_factory):
+@pytest.mark.parametrize("seed", range(100))
+def test_a_few_wrong_bytes_never_raise_anything_else(tmp_path, seed):
+    random = np.random.default_rng(seed)
     content = bytearray(binary(FACES, IDS))
-    for _ in range(data.draw(st.integers(1, 4))):
-        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
-    path = write(tmp_path_factory.getbasetemp(), bytes(content))
+    for _ in range(random.integers(1, 5)):
+        content[random.integers(len(content))] = random.integers(256)
+    path = write(tmp_path, bytes(content))
     try:
         mesh = read_ply(path)
     except BadInputError:
