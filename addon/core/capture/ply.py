@@ -128,7 +128,10 @@ def _numbers(text: bytes) -> np.ndarray:
     with warnings.catch_warnings():
         # What stops the parser early is told by the count of numbers, with the file's name.
         warnings.simplefilter("ignore", DeprecationWarning)
-        return np.fromstring(text.decode("latin-1"), np.float64, sep=" ")
+        try:
+            return np.fromstring(text.decode("latin-1"), np.float64, sep=" ")
+        except ValueError as error:  # newer NumPy raises where the older stops
+            raise _Damaged("holds something that is no number") from error
 
 
 def _records(body: _Body, element: Element, at: int) -> tuple[np.ndarray, dict[str, np.ndarray], int]:

@@ -102,7 +102,7 @@ HEADER = "ply\nformat {0} 1.0\nelement vertex {1}\nproperty float x\nproperty fl
     (HEADER.format("ascii", 3, 1, "uchar") + "0 0 0 1 0 0 1 1 0 3 0 1 -1", "vertex -1"),
     (HEADER.format("ascii", 3, 1, "uchar") + "0 0 0 1 0 0 1 1 0 3 0 1 nan", "vertex nan"),
     (HEADER.format("ascii", 3, 1, "uchar") + "0 0 0 1 0 0 1 1 0 3 0 1 1.5", "vertex 1.5"),
-    (HEADER.format("ascii", 3, 1, "uchar") + "0 0 0 1 0 zero 1 1 0 3 0 1 2", "claims 3"),
+    (HEADER.format("ascii", 3, 1, "uchar") + "0 0 0 1 0 zero 1 1 0 3 0 1 2", "claims 3|no number"),
     (HEADER.format("ascii", 3, 1, "uchar") + "0 0 0 1 0 0 1 1 0 3 0 1", "cut off|damaged"),
     (HEADER.format("ascii", 3, 1, "uchar") + "0 0 0 1 0 0 1 1 0 -3 0 1 2", "list of -3"),
     (HEADER.format("ascii", 3, 2, "uchar") + "0 0 0 1 0 0 1 1 0 3 0 1 2 -3 0 1 2", "damaged"),
