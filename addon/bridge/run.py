@@ -1,0 +1,82 @@
+"""A whole run: capture in, result folder out. The command line and the operators both call this."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from ..core.capture.read import read_capture
+from ..core.errors import BadInputError
+from ..core.progress import Progress, ProgressEvent
+from ..core.recover import Recovery
+from ..core.settings import Settings
+from ..core.store import Store
+from .scene import write_scene
+from .unwrap import unwrap
+
+STAGES = ("surface", "lit_diffuse", "environment", "shading", "specular")
+WRITE = "write"
+WEIGHTS = {"read": 1, "surface": 8, "lit_diffuse": 14, "environment": 1, "shading": 20, "specular": 25, WRITE: 5}
+"""Rough cost of the stages, for the estimate of the time left."""
+
+
+def progress_for(settings: Settings, listener: Callable[[ProgressEvent], None] | None = None,
+                 should_stop: Callable[[], bool] | None = None) -> Progress:
+    """A `Progress` that knows what the stages of a run cost under `settings`."""
+    return Progress(listener, should_stop, WEIGHTS)
+
+
+def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, progress: Progress,
+        until: str = WRITE) -> dict:
+    """Recover a capture up to a stage; stages that the result folder holds already are not done again.
+
+    Parameters
+    ----------
+    capture_folder : path
+    out_folder : path
+        Made where absent.
+    settings : Settings
+    progress : Progress
+    until : str
+        One of `STAGES`, or `WRITE` for all of them, the images and scene.blend.
+
+    Returns
+    -------
+    dict
+        What report.json holds.
+
+    Raises
+    ------
+    ScanRelightError
+        One sentence for the user.
+    """
+    if until not in (*STAGES, WRITE):
+        raise BadInputError(f"There is no stage '{until}'; choose one of {', '.join((*STAGES, WRITE))}.")
+    capture_folder, out_folder = Path(capture_folder), Path(out_folder)
+    if out_folder.resolve() == capture_folder.resolve():
+        raise BadInputError(f"Result folder '{out_folder}' is the capture itself; choose another.")
+    started = time.monotonic()
+    progress.stage("read")
+    capture = read_capture(capture_folder)
+    progress.done()
+    with Store(out_folder) as store:
+        recovery = Recovery(capture, store, settings, progress, partial(unwrap, size=settings.atlas_size))
+        for stage in STAGES:
+            getattr(recovery, stage)()
+            if stage == until:
+                break
+        warnings: tuple[str, ...] = ()
+        if until == WRITE:
+            progress.stage(WRITE)
+            recovery.write_images()
+            progress.update(0.5)
+            warnings = write_scene(store.path("scene.blend"), capture, recovery.surface().uv, recovery.materials(),
+                                   store.folder, recovery.median_radiance())
+            progress.done()
+        report = recovery.report()
+        report["warnings"] = [*report.get("warnings", ()), *warnings]
+        report["seconds"] = round(time.monotonic() - started, 2)
+        store.write_json("report.json", report)
+    return report

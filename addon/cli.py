@@ -1,0 +1,248 @@
+"""The command line: arguments to settings, errors to exit codes. One program for both homes.
+
+As `scan-relight` in a Python environment with Blender's bpy, and as `blender --command scan_relight` once the
+extension is installed. Nothing of Blender or the method is imported before it is needed, so that `--help` is quick.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TextIO
+
+from .console import ConsoleProgress, StopWish, duration, own_stdout
+from .core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_OK, BadInputError, ScanRelightError
+from .core.settings import PAPER, Settings
+from .settings_info import setting_infos
+from .version import VERSION
+
+COMMAND = "scan_relight"
+PRESETS = {"default": Settings(), "paper": PAPER}
+DEMO_SIZES = ("tiny", "small", "large")
+EXIT_CODES = """\
+exit codes: 0 done, 1 failure, 2 bad input, 130 interrupted (what is finished is kept; the same command goes on from
+there)"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        The arguments after the program's name; those of this process if not given.
+
+    Returns
+    -------
+    int
+        The exit code: 0 done, 1 failure, 2 bad input, 130 interrupted.
+    """
+    try:
+        arguments = make_parser().parse_args(argv)
+    except SystemExit as end:  # argparse has printed help, the version, or what is wrong
+        return end.code if isinstance(end.code, int) else EXIT_BAD_INPUT
+    try:
+        with own_stdout(keep_blender=arguments.debug) as stream:
+            return arguments.function(arguments, stream)
+    except ScanRelightError as error:
+        if arguments.debug:
+            traceback.print_exc()
+        return complain(str(error), error.exit_code)
+    except KeyboardInterrupt:
+        return complain("Interrupted; the finished stages are kept.", EXIT_INTERRUPTED)
+    except BrokenPipeError:  # whoever read our output has gone
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_FAILURE
+    except MemoryError:
+        return complain("The memory is used up; a greater --texel-size or a smaller --atlas-size takes less.",
+                        EXIT_FAILURE)
+    except Exception as error:  # the last line of defence: a sentence, never a bare traceback
+        return complain(unexpected(error, getattr(arguments, "out", None), arguments.debug), EXIT_FAILURE)
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The parser for every command."""
+    parser = argparse.ArgumentParser(
+        prog="scan-relight", epilog=EXIT_CODES,
+        description="Recover albedo, roughness and lamps from a scanned room and write a Blender scene to relight.")
+    parser.add_argument("--version", action="version", version=f"scan-relight {VERSION}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    recover = commands.add_parser(
+        "recover", help="recover a capture into a relightable scene", epilog=EXIT_CODES,
+        description="Recover a capture and write scene.blend, its images and a report. A stopped or repeated run goes "
+                    "on from the finished stages in RESULT.")
+    recover.add_argument("capture", metavar="CAPTURE", type=Path,
+                         help="folder with transforms.json, mesh.ply, info_semantic.json and the frames")
+    recover.add_argument("--out", metavar="RESULT", type=Path, required=True, help="folder to write, made if missing")
+    add_settings(recover)
+    add_common(recover, recover_command)
+
+    info = commands.add_parser("info", help="say what a capture holds, and what is wrong with it",
+                               description="Read and check a capture without recovering anything.", epilog=EXIT_CODES)
+    info.add_argument("capture", metavar="CAPTURE", type=Path, help="folder of the capture")
+    info.add_argument("--json", action="store_true", help="machine-readable")
+    add_common(info, info_command)
+
+    demo = commands.add_parser(
+        "demo", help="render a small room, recover it, compare, relight", epilog=EXIT_CODES,
+        description="Render a small furnished room whose materials are known, recover it, print recovered against "
+                    "true values, and leave scene.blend and before_after.png in RESULT.")
+    demo.add_argument("--out", metavar="RESULT", type=Path, required=True, help="folder to write, made if missing")
+    demo.add_argument("--size", choices=DEMO_SIZES, default="small", help="number and size of frames (default small)")
+    add_settings(demo)
+    add_common(demo, demo_command)
+    return parser
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """One option for each field of `Settings`."""
+    group = parser.add_argument_group("settings")
+    group.add_argument("--preset", choices=tuple(PRESETS), default="default",
+                       help="what the settings below start from; 'paper' is the published method (default default)")
+    for info in setting_infos():
+        text = f"{info.help} (default {info.default})".replace("%", "%%")
+        option = f"--{info.name.replace('_', '-')}"
+        if info.kind is bool:
+            group.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=text)
+        elif info.choices:
+            group.add_argument(option, choices=info.choices, help=text)
+        else:
+            group.add_argument(option, type=info.kind, metavar=info.kind.__name__.upper(), help=text)
+
+
+def add_common(parser: argparse.ArgumentParser, function) -> None:
+    """Options of every command, and what runs it."""
+    if function is not info_command:
+        parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    parser.add_argument("--debug", action="store_true", help="also print Blender's messages and tracebacks of errors")
+    parser.set_defaults(function=function)
+
+
+def settings_from(arguments: argparse.Namespace) -> Settings:
+    """The preset with everything that was given."""
+    given = {info.name: getattr(arguments, info.name) for info in setting_infos()}
+    return replace(PRESETS[arguments.preset], **{name: value for name, value in given.items() if value is not None})
+
+
+@contextlib.contextmanager
+def console_run(arguments: argparse.Namespace, stream: TextIO):
+    """The listener and the wish to stop of a long command, as keywords of `run.progress_for`."""
+    listener = ConsoleProgress(stream, quiet=arguments.quiet)
+    with StopWish() as wish:
+        try:
+            yield {"listener": listener, "should_stop": wish}
+        finally:
+            listener.close()
+
+
+def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+    """`recover CAPTURE --out RESULT`."""
+    settings = settings_from(arguments)
+    run = need("run")
+    with console_run(arguments, stream) as console:
+        report = run.run(arguments.capture, arguments.out, settings, run.progress_for(settings, **console))
+    if not arguments.quiet:
+        for warning in report.get("warnings", ()):
+            print(f"Warning: {warning}", file=stream)
+        print(f"Done in {duration(report['seconds'])}: {arguments.out / 'scene.blend'}", file=stream)
+    return EXIT_OK
+
+
+def demo_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+    """`demo --out RESULT`."""
+    settings = settings_from(arguments)
+    demo = need("demo")
+    with console_run(arguments, stream) as console:
+        table = demo.run_demo(arguments.out, arguments.size, settings, **console)
+    if not arguments.quiet:
+        print(table, file=stream)
+        print(f"\nOpen {arguments.out / 'scene.blend'} in Blender; the pictures: {arguments.out / 'before_after.png'}",
+              file=stream)
+    return EXIT_OK
+
+
+def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+    """`info CAPTURE`."""
+    from .core.capture.read import describe, read_capture
+
+    facts = describe(read_capture(arguments.capture))
+    if arguments.json:
+        print(json.dumps(facts, indent=1), file=stream)
+        return EXIT_OK
+    extent = " x ".join(f"{length:.2f}" for length in facts["extent_m"])
+    sizes = ", ".join(f"{count} of {size}" for size, count in facts["resolutions"].items())
+    print(f"{facts['capture']} ({facts['format']})", file=stream)
+    print(f"  frames     {facts['frames']}: {sizes} pixels; {facts['masks']} with a mask", file=stream)
+    print(f"  mesh       {facts['triangles']} triangles, {facts['vertices']} vertices, {facts['area_m2']:.1f} m2, "
+          f"{extent} m", file=stream)
+    print(f"  instances  {len(facts['instances'])}", file=stream)
+    for one in facts["instances"]:
+        print(f"    {one['object_id']:>5}  {one['class_name']:<24} {one['triangles']:>8} triangles", file=stream)
+    for warning in facts["warnings"]:
+        print(f"  warning    {warning}", file=stream)
+    return EXIT_OK
+
+
+def need(module: str):
+    """A module of the bridge; where there is no Blender, say so in one sentence."""
+    import importlib
+
+    try:
+        return importlib.import_module(f".bridge.{module}", __package__)
+    except ModuleNotFoundError as error:
+        if error.name and error.name.split(".")[0] in ("bpy", "numpy", "scipy", "embreex", "OpenEXR"):
+            raise BadInputError(f"The Python package '{error.name}' is missing; install Scan Relight with "
+                                "scripts/demo.py or as a Blender extension.") from error
+        raise
+
+
+def complain(sentence: str, code: int) -> int:
+    """Say what went wrong on standard error; returns `code`."""
+    with contextlib.suppress(OSError, ValueError):
+        print(f"scan-relight: {sentence}", file=sys.stderr, flush=True)
+    return code
+
+
+def unexpected(error: Exception, out: Path | None, debug: bool) -> str:
+    """One sentence for an error that nobody foresaw; its traceback goes into RESULT/error.log."""
+    sentence = f"Unexpected error ({type(error).__name__}: {' '.join(str(error).split())})"
+    if debug:
+        traceback.print_exc()
+        return f"{sentence}."
+    if out is not None:
+        try:
+            (out / "error.log").write_text("".join(traceback.format_exception(error)), encoding="utf-8")
+            return f"{sentence}; please report it with '{out / 'error.log'}'."
+        except OSError:
+            pass
+    return f"{sentence}; run again with --debug to see where."
+
+
+_handle = None
+
+
+def register() -> None:
+    """Make `blender --command scan_relight` known."""
+    global _handle
+    import bpy
+
+    _handle = bpy.utils.register_cli_command(COMMAND, main)
+
+
+def unregister() -> None:
+    """Take the command back."""
+    global _handle
+    import bpy
+
+    if _handle is not None:
+        bpy.utils.unregister_cli_command(_handle)
+        _handle = None

@@ -1,0 +1,143 @@
+"""Build the installable zip of each platform from the locked wheels, with Blender's own extension builder.
+
+    .venv/bin/python scripts/build_extension.py [--platform linux-x64 ...] [--python 3.11 ...] [--out dist]
+
+Fetches into wheels/ exactly the wheels that blender_manifest.toml lists and requirements/ pins by hash; a wheel that
+is there already is checked, not fetched again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+LOCK = ROOT / "requirements" / "blender-5.2.txt"
+WHEELS = ROOT / "wheels"
+CONTENT = ("__init__.py", "LICENSE", "README.md", "CHANGELOG.md", "addon", "operators")
+"""What goes into the zip, besides the manifest and the wheels."""
+PIP_PLATFORMS = {
+    "linux-x64": "manylinux_2_28_x86_64",
+    "windows-x64": "win_amd64",
+    "macos-arm64": "macosx_14_0_arm64",
+    "macos-x64": "macosx_13_0_x86_64",
+}
+WHEEL_PLATFORMS = {
+    "linux-x64": r"manylinux.*x86_64",
+    "windows-x64": r"win_amd64",
+    "macos-arm64": r"macosx.*arm64",
+    "macos-x64": r"macosx.*x86_64",
+}
+
+
+def main() -> int:
+    """Fetch, stage, build."""
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--platform", action="append", choices=manifest["platforms"], help="default: all")
+    parser.add_argument("--python", action="append", metavar="X.Y", help="default: all that the manifest has wheels for")
+    parser.add_argument("--out", type=Path, default=ROOT / "dist")
+    arguments = parser.parse_args()
+    platforms = arguments.platform or manifest["platforms"]
+    builder = blender_ext()
+    hashes = locked_hashes({Path(wheel).name.split("-")[0].lower() for wheel in manifest["wheels"]})
+    tags = {f"cp{version.replace('.', '')}" for version in arguments.python or ()}
+    wanted = {platform: [Path(wheel).name for wheel in manifest["wheels"]
+                         if re.search(WHEEL_PLATFORMS[platform] + r"\.whl$", wheel)
+                         and (not tags or wheel.split("-")[2] in tags)] for platform in platforms}
+    for platform, names in wanted.items():
+        fetch(platform, names, hashes)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        stage(Path(scratch), platforms, {name for names in wanted.values() for name in names})
+        subprocess.run([sys.executable, builder, "build", "--split-platforms", "--source-dir", scratch,
+                        "--output-dir", arguments.out.resolve()], check=True)
+    for platform in platforms:
+        made = arguments.out / f"{manifest['id']}-{manifest['version']}-{platform.replace('-', '_')}.zip"
+        print(f"{made}  {made.stat().st_size / 1e6:.1f} MB")
+    return 0
+
+
+def blender_ext() -> Path:
+    """Blender's extension builder, which also runs under plain Python."""
+    bpy = importlib.util.find_spec("bpy")
+    found = sorted(Path(bpy.origin).parent.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")) if bpy else []
+    if not found:
+        sys.exit("This Python has no bpy, which brings the extension builder; run it as: "
+                 ".venv/bin/python scripts/build_extension.py")
+    return found[-1]
+
+
+def locked_hashes(packages: set[str]) -> dict[str, tuple[str, set[str]]]:
+    """Each package's pinned requirement and its allowed hashes."""
+    found = {}
+    for block in re.split(r"^(?=\S)", LOCK.read_text(encoding="utf-8"), flags=re.MULTILINE):
+        requirement = block.split(" ")[0]
+        name = requirement.split("==")[0]
+        if name in packages:
+            found[name] = requirement, set(re.findall(r"--hash=sha256:([0-9a-f]{64})", block))
+    if missing := packages - set(found):
+        sys.exit(f"{LOCK.name} does not pin {', '.join(sorted(missing))}.")
+    return found
+
+
+def fetch(platform: str, names: list[str], hashes: dict[str, tuple[str, set[str]]]) -> None:
+    """Have every wheel of `names` in wheels/, with an allowed hash."""
+    WHEELS.mkdir(exist_ok=True)
+    for name in names:
+        package, _, tag = name.split("-")[:3]
+        requirement, allowed = hashes[package]
+        wheel = WHEELS / name
+        if not (wheel.is_file() and sha256(wheel) in allowed):
+            wheel.unlink(missing_ok=True)
+            with tempfile.TemporaryDirectory() as scratch:
+                # Hashes are taken from a requirements file alone.
+                lines = [requirement, *(f"--hash=sha256:{value}" for value in sorted(allowed))]
+                (Path(scratch) / "wheel.txt").write_text(" ".join(lines) + "\n")
+                subprocess.run([sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet",
+                                "--no-deps", "--only-binary=:all:", "--require-hashes", "--dest", WHEELS,
+                                "--platform", PIP_PLATFORMS[platform], "--python-version", f"{tag[2]}.{tag[3:]}",
+                                "-r", Path(scratch) / "wheel.txt"], check=True)
+        if not wheel.is_file():
+            sys.exit(f"pip fetched another wheel of {requirement} than the manifest's {name}; mend the manifest.")
+
+
+def sha256(path: Path) -> str:
+    """Hash of a file's content."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def stage(folder: Path, platforms: list[str], wheels: set[str]) -> None:
+    """Put what belongs into the zips into `folder`, with a manifest that names only `platforms` and `wheels`."""
+    leave = shutil.ignore_patterns("__pycache__", "*.pyc", ".*")
+    for name in CONTENT:
+        source = ROOT / name
+        if source.is_dir():
+            shutil.copytree(source, folder / name, ignore=leave)
+        else:
+            shutil.copy2(source, folder / name)
+    (folder / "wheels").mkdir()
+    for name in sorted(wheels):
+        try:
+            os.link(WHEELS / name, folder / "wheels" / name)
+        except OSError:
+            shutil.copy2(WHEELS / name, folder / "wheels" / name)
+    text = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if ".whl" not in line or line.strip(' ",').split("/")[-1] in wheels]
+    listed = ", ".join(f'"{platform}"' for platform in platforms)
+    text = re.sub(r"^platforms = .*$", f"platforms = [{listed}]", "\n".join(lines), flags=re.MULTILINE)
+    (folder / "blender_manifest.toml").write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
