@@ -166,6 +166,8 @@ def _save(name, scene, built, fresh):
     if fresh:
         bpy.ops.wm.save_as_mainfile(filepath=name, copy=True, compress=True, relative_remap=False)
     else:
+        # Blender 5.2 crashes on a scene whose view layer was never brought up to date.
+        scene.view_layers[0].update()
         bpy.data.libraries.write(name, {scene, *built.images}, path_remap="NONE", compress=True, fake_user=False)
 
 
