@@ -1,0 +1,194 @@
+"""The demo: a room whose truth is known is rendered, recovered, compared and lit anew."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..core.errors import StorageError
+from ..core.material import EMITTER
+from ..core.progress import Progress, ProgressEvent
+from ..core.settings import Settings
+from ..core.store import Store
+from .demo_render import can_denoise, render_capture
+from .demo_room import look_at
+from .images import image_array
+from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, METALLIC, ROUGHNESS
+from .mesh_objects import ATLAS_UV, OBJECT_ID
+from .run import WEIGHTS, run
+
+PICTURES = {"tiny": (96, 72, 16), "small": (480, 360, 40), "large": (960, 720, 128)}
+"""Width, height and samples of the before and the relit picture."""
+VIEW = look_at((0.42, 0.35, 1.62), (2.75, 2.5, 0.72))
+LIGHTS = (
+    ((3.4, 0.5, 2.3), (2.2, 2.4, 0.4), (1.0, 0.36, 0.10), 130.0),
+    ((0.5, 3.1, 2.2), (2.4, 1.2, 0.6), (0.12, 0.30, 1.0), 90.0),
+)
+"""Of the relit picture: where, where to, colour, watts."""
+
+
+def run_demo(out: Path | str, size: str, settings: Settings, listener: Callable[[ProgressEvent], None] | None = None,
+             should_stop: Callable[[], bool] | None = None) -> str:
+    """Render the known room into OUT/capture, recover it into OUT, and compare.
+
+    Parameters
+    ----------
+    out : path
+    size : str
+        One of `demo_render.SIZES`.
+    settings : Settings
+    listener, should_stop
+        See `Progress`.
+
+    Returns
+    -------
+    str
+        The table of recovered against true values; OUT/comparison.txt holds it too.
+    """
+    out = Path(out)
+    Store(out).close()  # a folder that can't be written is told now, not after the rendering
+    progress = Progress(listener, should_stop, {"render": 60, **WEIGHTS, "pictures": 30})
+    progress.stage("render")
+    capture = render_capture(out / "capture", size, progress)
+    progress.done()
+    run(capture, out, settings, progress)
+    progress.stage("pictures")
+    bpy.ops.wm.open_mainfile(filepath=str((out / "scene.blend").absolute()))
+    table = comparison(json.loads((capture / "truth" / "materials.json").read_text()))
+    try:
+        (out / "comparison.txt").write_text(table + "\n", encoding="utf-8")
+    except OSError as error:
+        raise StorageError(f"'{out / 'comparison.txt'}' can't be written ({error.strerror}).") from error
+    pictures(out, size, progress)
+    progress.done()
+    return table
+
+
+def comparison(truth: list[dict]) -> str:
+    """A table of what the open scene says of each object beside what is true."""
+    things = {thing[OBJECT_ID]: thing for thing in bpy.data.objects if OBJECT_ID in thing}
+    rows = [("object", "model", "base colour", "(true)", "roughness", "(true)", "F0", "(true)", "lamp", "(true)")]
+    for known in truth:
+        thing = things.get(known["id"])
+        if thing is None:
+            rows.append((known["class_name"], "missing", *[""] * 8))
+            continue
+        found = describe(thing)
+        emitter, gloss = known["emission"] is not None, known["alpha"] is not None
+        rows.append((
+            known["class_name"], found["model"],
+            colour(found["base_color"]), "" if emitter else colour(known["base_color"]),
+            number(found["roughness"]), number(known["alpha"] ** 0.5) if gloss else "",
+            number(found["f0"]), number(known["f0"]) if gloss else "",
+            colour(found["emission"]), colour(known["emission"]),
+        ))
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows)
+
+
+def colour(value) -> str:
+    """Three numbers, or nothing."""
+    return "" if value is None else " ".join(f"{c:.2f}" for c in value)
+
+
+def number(value) -> str:
+    """One number, or nothing."""
+    return "" if value is None else f"{value:.2f}"
+
+
+def describe(thing) -> dict:
+    """What the material of a recovered object says: model, mean base colour, roughness, F0, radiance."""
+    material = thing.data.materials[0]
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    model = material["scan_relight_model"]
+    glossy = material.get("scan_relight_phi") is not None
+    emission = shader.inputs[EMISSION_COLOR].default_value[:3]
+    strength = shader.inputs[EMISSION_STRENGTH].default_value
+    return {
+        "model": model,
+        "base_color": None if model == EMITTER else mean_base_color(thing, shader.inputs[BASE_COLOR]),
+        "roughness": shader.inputs[ROUGHNESS].default_value if glossy else None,
+        "f0": material.get("scan_relight_psi") if not shader.inputs[METALLIC].default_value else None,
+        "emission": tuple(c * strength for c in emission) if model == EMITTER else None,
+    }
+
+
+def mean_base_color(thing, socket) -> np.ndarray:
+    """Base colour averaged over an object's surface as its texture shows it, (3,) float."""
+    if not socket.links:
+        return np.array(socket.default_value[:3])
+    pixels = image_array(socket.links[0].from_node.image)
+    mesh = thing.data
+    uv = np.empty(len(mesh.loops) * 2, np.float32)
+    mesh.uv_layers[ATLAS_UV].uv.foreach_get("vector", uv)
+    area = np.array([polygon.area for polygon in mesh.polygons])
+    weights = np.array([(a, b, 8 - a - b) for a in range(9) for b in range(9 - a)]) / 8
+    weights = 0.97 * weights + 0.01  # stay clear of the islands' edges
+    at = np.einsum("tkc,wk->twc", uv.reshape(-1, 3, 2), weights)
+    index = np.clip((at * pixels.shape[1::-1]).astype(int), 0, np.array(pixels.shape[1::-1]) - 1)
+    colours = pixels[index[..., 1], index[..., 0], :3].mean(1)
+    return (colours * area[:, None]).sum(0) / max(area.sum(), 1e-12)
+
+
+def pictures(out: Path, size: str, progress: Progress) -> None:
+    """Render the open scene as found and under new lights: before.png, relit.png, before_after.png."""
+    scene = bpy.context.scene
+    width, height, samples = PICTURES[size]
+    scene.render.engine, scene.cycles.device, scene.cycles.samples = "CYCLES", "CPU", samples
+    scene.cycles.use_denoising = can_denoise()
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = width, height, 100
+    scene.render.pixel_aspect_x = scene.render.pixel_aspect_y = 1
+    scene.view_settings.view_transform = "Standard"
+    image = scene.render.image_settings
+    image.file_format, image.color_mode, image.color_depth = "PNG", "RGB", "8"
+    camera = bpy.data.objects.new("Demo view", bpy.data.cameras.new("Demo view"))
+    camera.data.angle, camera.data.clip_start = np.radians(80), 0.01
+    camera.matrix_world = Matrix(VIEW.tolist())
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    shoot(scene, out / "before.png")
+    progress.update(0.5)
+    switch_off_the_lamps(scene)
+    for place, target, tint, power in LIGHTS:
+        light = bpy.data.lights.new("Demo light", "AREA")
+        light.color, light.energy, light.size = tint, power, 0.5
+        thing = bpy.data.objects.new("Demo light", light)
+        thing.matrix_world = Matrix(look_at(place, target).tolist())
+        scene.collection.objects.link(thing)
+    shoot(scene, out / "relit.png")
+    beside(out / "before.png", out / "relit.png", out / "before_after.png")
+
+
+def switch_off_the_lamps(scene) -> None:
+    """Every recovered lamp and the light from outside."""
+    for material in bpy.data.materials:
+        if material.get("scan_relight_model") == EMITTER:
+            for node in material.node_tree.nodes:
+                if node.type == "BSDF_PRINCIPLED":
+                    node.inputs[EMISSION_STRENGTH].default_value = 0.0
+    scene.world = None
+
+
+def shoot(scene, path: Path) -> None:
+    """Render to the file `path`."""
+    scene.render.filepath = str(path.absolute())
+    bpy.ops.render.render(write_still=True, scene=scene.name)
+    if not path.is_file():
+        raise StorageError(f"'{path}' can't be written; free some space or choose another result folder.")
+
+
+def beside(left: Path, right: Path, out: Path) -> None:
+    """Put two pictures of one size beside each other."""
+    images = [bpy.data.images.load(str(path.absolute())) for path in (left, right)]
+    pixels = [image_array(image) for image in images]
+    gap = np.ones((pixels[0].shape[0], max(pixels[0].shape[1] // 80, 1), 4), np.float32)
+    joined = np.concatenate([pixels[0], gap, pixels[1]], 1)
+    made = bpy.data.images.new("before_after", joined.shape[1], joined.shape[0])
+    made.pixels.foreach_set(joined.astype(np.float32).ravel())
+    made.filepath_raw, made.file_format = str(out.absolute()), "PNG"
+    made.save()
