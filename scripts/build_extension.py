@@ -44,7 +44,7 @@ def main() -> int:
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--platform", action="append", choices=manifest["platforms"], help="default: all")
-    parser.add_argument("--python", action="append", metavar="X.Y", help="default: all that the manifest has wheels for")
+    parser.add_argument("--python", action="append", metavar="X.Y", help="default: all that have wheels")
     parser.add_argument("--out", type=Path, default=ROOT / "dist")
     arguments = parser.parse_args()
     platforms = arguments.platform or manifest["platforms"]

@@ -7,12 +7,15 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import bpy
+
 from ..core.capture.read import read_capture
 from ..core.errors import BadInputError
 from ..core.progress import Progress, ProgressEvent
 from ..core.recover import Recovery
 from ..core.settings import Settings
 from ..core.store import Store
+from .apply import apply_recovery, import_capture, imported
 from .scene import write_scene
 from .unwrap import unwrap
 
@@ -29,7 +32,7 @@ def progress_for(settings: Settings, listener: Callable[[ProgressEvent], None] |
 
 
 def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, progress: Progress,
-        until: str = WRITE) -> dict:
+        until: str = WRITE, scene: bpy.types.Scene | None = None, import_first: bool = True) -> dict:
     """Recover a capture up to a stage; stages that the result folder holds already are not done again.
 
     Parameters
@@ -41,6 +44,11 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     progress : Progress
     until : str
         One of `STAGES`, or `WRITE` for all of them, the images and scene.blend.
+    scene : bpy.types.Scene, optional
+        With `WRITE`: also put the materials onto the capture's objects in this scene, and leave all else that is open
+        as it is. Without one, scene.blend is made from an empty file.
+    import_first : bool
+        Bring the capture into `scene` before; False takes the objects that are there.
 
     Returns
     -------
@@ -60,6 +68,8 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     started = time.monotonic()
     progress.stage("read")
     capture = read_capture(capture_folder)
+    if scene is not None and not import_first:
+        imported(scene, capture)  # its absence is told now, not after the work
     progress.done()
     with Store(out_folder) as store:
         recovery = Recovery(capture, store, settings, progress, partial(unwrap, size=settings.atlas_size))
@@ -72,8 +82,13 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
             progress.stage(WRITE)
             recovery.write_images()
             progress.update(0.5)
-            warnings = write_scene(store.path("scene.blend"), capture, recovery.surface().uv, recovery.materials(),
-                                   store.folder, recovery.median_radiance())
+            uv, materials = recovery.surface().uv, recovery.materials()
+            warnings = write_scene(store.path("scene.blend"), capture, uv, materials, store.folder,
+                                   recovery.median_radiance(), fresh=scene is None)
+            if scene is not None:
+                if import_first:
+                    import_capture(scene, capture)
+                warnings += apply_recovery(scene, capture, uv, materials, store.folder)
             progress.done()
         report = recovery.report()
         report["warnings"] = [*report.get("warnings", ()), *warnings]

@@ -1,0 +1,116 @@
+"""The two halves of a recovery in the user's own scene: the capture comes in, later its materials are put on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..core.capture.model import Capture
+from ..core.errors import MissingStageError
+from ..core.material import EMITTER, LAMBERTIAN, ObjectMaterial
+from .cameras import make_cameras
+from .images import load_image
+from .materials import make_material
+from .mesh_objects import ATLAS_UV, OBJECT_ID, make_objects
+from .scene import ALBEDO, BASE_COLOR, SHADING
+
+CAPTURE = "scan_relight_capture"
+"""Custom property of the collection: the folder of the capture that it came from."""
+
+
+def import_capture(scene: bpy.types.Scene, capture: Capture) -> bpy.types.Collection:
+    """Add a capture's objects and cameras, each with its frame behind it, to a scene; an earlier import stays.
+
+    Returns
+    -------
+    bpy.types.Collection
+        "Scan Relight" with "Room", "Lamps" and "Cameras" within, linked to the scene.
+    """
+    top = bpy.data.collections.new("Scan Relight")
+    top[CAPTURE] = str(capture.root.absolute())
+    room, lamps, eyes = (bpy.data.collections.new(name) for name in ("Room", "Lamps", "Cameras"))
+    for part in (room, lamps, eyes):
+        top.children.link(part)
+    scene.collection.children.link(top)
+    make_objects(capture.mesh, capture.instances, np.zeros((len(capture.mesh.triangles), 3, 2), np.float32), room)
+    for thing, frame in zip(make_cameras(capture.frames, eyes), capture.frames):
+        show_frame(thing.data, frame.path)
+    return top
+
+
+def show_frame(camera: bpy.types.Camera, path: Path) -> None:
+    """Lay a frame's picture behind what its camera sees."""
+    with suppress(RuntimeError):  # a picture that Blender can't show is no reason to fail
+        background = camera.background_images.new()
+        background.image = bpy.data.images.load(str(Path(path).absolute()), check_existing=True)
+        background.alpha = 1.0
+        camera.show_background_images = True
+
+
+def imported(scene: bpy.types.Scene, capture: Capture) -> bpy.types.Collection:
+    """The collection that `import_capture` made of `capture` in `scene`; raises `MissingStageError` without one."""
+    root = str(capture.root.absolute())
+    for collection in reversed(scene.collection.children_recursive):
+        if collection.get(CAPTURE) == root:
+            return collection
+    raise MissingStageError(f"Capture '{capture.root}' is not in this scene; import it first.")
+
+
+def apply_recovery(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray,
+                   materials: Iterable[ObjectMaterial], result_folder: Path | str) -> tuple[str, ...]:
+    """Put atlas coordinates, images and materials onto the imported objects; what they wore before is replaced.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    capture : Capture
+        Imported into `scene`.
+    atlas_uv : (t, 3, 2) float32
+    materials : iterable of ObjectMaterial
+    result_folder : path
+        Holds the images.
+
+    Returns
+    -------
+    tuple of str
+        Warnings, one sentence each.
+
+    Raises
+    ------
+    MissingStageError
+        The capture was not imported into the scene.
+    BadInputError
+        An image can't be read.
+    """
+    top = imported(scene, capture)
+    folder = Path(result_folder).absolute()
+    images = {name: load_image(folder / name) for name in (BASE_COLOR, ALBEDO, SHADING) if (folder / name).exists()}
+    things = {thing[OBJECT_ID]: thing for thing in top.all_objects if OBJECT_ID in thing}
+    parts = {part.name.split(".")[0]: part for part in top.children}
+    descriptions = {one.object_id: one for one in materials}
+    warnings = []
+    for instance in capture.instances:
+        thing = things.get(instance.object_id)
+        own = np.flatnonzero(capture.mesh.object_id == instance.object_id)
+        if thing is None or len(thing.data.polygons) != len(own):
+            what = "was deleted" if thing is None else "was edited"
+            warnings.append(f"Object {instance.object_id} ({instance.class_name}) {what} and is left as it is.")
+            continue
+        layers = thing.data.uv_layers
+        layer = layers.get(ATLAS_UV) or layers.new(name=ATLAS_UV)
+        layer.uv.foreach_set("vector", atlas_uv[own].astype(np.float32).ravel())
+        layers.active, layer.active_render = layer, True
+        description = descriptions.get(instance.object_id) or ObjectMaterial(
+            instance.object_id, instance.class_name, LAMBERTIAN, note="no description")
+        thing.data.materials.clear()
+        thing.data.materials.append(make_material(description, images.get(BASE_COLOR)))
+        if description.model == EMITTER and "Lamps" in parts and thing.name not in parts["Lamps"].objects:
+            for part in parts.values():
+                if thing.name in part.objects:
+                    part.objects.unlink(thing)
+            parts["Lamps"].objects.link(thing)
+    return tuple(warnings)

@@ -1,0 +1,20 @@
+"""`bpy.ops.scan_relight.accumulate`: the frames become the lit diffuse texture; stored in the result folder."""
+
+from __future__ import annotations
+
+import bpy
+
+from .settings_props import StageOperator, with_settings
+
+
+@with_settings
+class SCANRELIGHT_OT_accumulate(StageOperator, bpy.types.Operator):
+    """Project the frames onto the surface and take each element's median."""
+
+    bl_idname = "scan_relight.accumulate"
+    bl_label = "Accumulate"
+    bl_description = "Project the frames onto the surface and take each element's median"
+
+    def work(self, context):
+        """Run the stages up to this one."""
+        return self.run(context, "lit_diffuse")

@@ -1,0 +1,20 @@
+"""`bpy.ops.scan_relight.fit`: roughness and specular of each object; stored in the result folder."""
+
+from __future__ import annotations
+
+import bpy
+
+from .settings_props import StageOperator, with_settings
+
+
+@with_settings
+class SCANRELIGHT_OT_fit(StageOperator, bpy.types.Operator):
+    """Fit roughness and specular of each object."""
+
+    bl_idname = "scan_relight.fit"
+    bl_label = "Fit"
+    bl_description = "Fit roughness and specular of each object"
+
+    def work(self, context):
+        """Run the stages up to this one."""
+        return self.run(context, "specular")

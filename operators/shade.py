@@ -1,0 +1,20 @@
+"""`bpy.ops.scan_relight.shade`: the light on each element, and its albedo; stored in the result folder."""
+
+from __future__ import annotations
+
+import bpy
+
+from .settings_props import StageOperator, with_settings
+
+
+@with_settings
+class SCANRELIGHT_OT_shade(StageOperator, bpy.types.Operator):
+    """Gather the light that falls on each element and divide it out."""
+
+    bl_idname = "scan_relight.shade"
+    bl_label = "Shade"
+    bl_description = "Gather the light that falls on each element and divide it out"
+
+    def work(self, context):
+        """Run the stages up to this one."""
+        return self.run(context, "shading")
