@@ -20,8 +20,6 @@ OVERLAP_TEXELS = 0.02
 
 _PROJECTION_ANGLE = 1.15
 _LAYER = "ScanRelight"
-# Concave packing fills frames and corners, but its time grows with the square of the islands' number.
-_CONCAVE_TRIANGLES = 400_000
 _EXPECTED_FILL = 0.6
 
 
@@ -74,22 +72,27 @@ def _unwrapped(vertices, triangles, object_id, size, margin_texels):
 
 
 def _packed(points, corners, uv, size, margin_texels):
-    """Place the islands; Blender's margin is one before its own scaling, so the scale is guessed, and mended once."""
+    """Place the islands, turned freely or by right angles, whichever fills more.
+
+    Boxes are packed, not outlines: now that sparse islands are cut, outlines fill no more and can take minutes.
+    """
     uv = (uv * np.sqrt(_EXPECTED_FILL / max(areas(uv).sum(), 1e-12))).astype(np.float32)
-    wanted = margin_texels / 2 / size
-    margin = wanted
-    shape = "CONCAVE" if len(corners) <= _CONCAVE_TRIANGLES else "AABB"
-    for _ in range(3):
-        with _temporary(points, corners) as data:
-            data.uv_layers[0].data.foreach_set("uv", uv.ravel())
-            _operate(data, bpy.ops.uv.pack_islands, rotate=True, rotate_method="ANY", scale=True, margin_method="ADD",
-                     margin=margin, shape_method=shape, udim_source="CLOSEST_UDIM")
-            packed = _layout(data)
-        border = packed.min()
-        if border >= 0.97 * wanted or border <= 0:
-            break
-        margin *= 1.05 * wanted / border
-    return packed
+    found = []
+    for turn in ("ANY", "CARDINAL"):
+        # Blender's margin is one before its own scaling: the scale is guessed, and mended once or twice.
+        wanted = margin = margin_texels / 2 / size
+        for _ in range(3):
+            with _temporary(points, corners) as data:
+                data.uv_layers[0].data.foreach_set("uv", uv.ravel())
+                _operate(data, bpy.ops.uv.pack_islands, rotate=True, rotate_method=turn, scale=True, margin=margin,
+                         margin_method="ADD", shape_method="AABB", udim_source="CLOSEST_UDIM")
+                packed = np.nan_to_num(_layout(data), nan=0.0, posinf=0.0, neginf=0.0)
+            border = packed.min()
+            if border >= 0.97 * wanted or border <= 0:
+                break
+            margin *= 1.05 * wanted / border
+        found.append(packed)
+    return max(found, key=lambda packed: areas(packed).sum())
 
 
 def _without_repeats(triangles):
@@ -144,7 +147,8 @@ def _operate(data, operator, **settings):
     layer = scene.view_layers[0]
     layer.objects.active = thing
     thing.select_set(True, view_layer=layer)
-    context = {"scene": scene, "view_layer": layer, "object": thing, "active_object": thing, "selected_objects": [thing]}
+    context = {"scene": scene, "view_layer": layer, "object": thing, "active_object": thing,
+               "selected_objects": [thing]}
     with bpy.context.temp_override(**context):
         bpy.ops.object.mode_set(mode="EDIT")
     try:
