@@ -82,7 +82,7 @@ def accumulate(
     seed: int = 0,
     threads: int = 0,
     folder: Path | None = None,
-    also: Callable[[FrameView, Pixels], None] | None = None,
+    also: Callable[[int, FrameView, Pixels, Observations], None] | None = None,
     progress: Progress | None = None,
 ) -> LitDiffuse:
     """Project every frame onto the elements it sees and take the median (Haefner et al. 2021, sec. 3.1).
@@ -100,7 +100,7 @@ def accumulate(
     folder : Path, optional
         Where the exact median keeps observations meanwhile.
     also : callable, optional
-        Called with each frame's view and pixels, in this thread: others who want to see the frames.
+        Called with each frame's index, view, pixels and observations, in this thread: others who want to see them.
 
     Raises
     ------
@@ -111,19 +111,20 @@ def accumulate(
     """
     normal, _ = triangle_geometry(mesh)
     estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
-    wanted = [frames[i] for i in frame_order(len(frames), order, seed)]
+    wanted = frame_order(len(frames), order, seed)
 
-    def look(frame: Frame) -> tuple[FrameView, Pixels, Observations]:
+    def look(index: int) -> tuple[int, FrameView, Pixels, Observations]:
+        frame = frames[index]
         pixels = read(frame)
         view = view_frame(frame.camera, mesh, scene, normal)
-        return view, pixels, observe(view, pixels, atlas, scene)
+        return int(index), view, pixels, observe(view, pixels, atlas, scene)
 
-    for done, (view, pixels, seen) in enumerate(ordered_map(look, wanted, threads)):
+    for done, (index, view, pixels, seen) in enumerate(ordered_map(look, wanted, threads)):
         for tier, estimator in estimators.items():
             chosen = seen.tier == tier
             estimator.add(seen.element[chosen], seen.radiance[chosen])
         if also is not None:
-            also(view, pixels)
+            also(index, view, pixels, seen)
         if progress is not None:
             progress.update(0.9 * (done + 1) / len(wanted))
     return _choose({tier: estimator.result() for tier, estimator in estimators.items()})

@@ -13,11 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..parallel import for_blocks, thread_count
+from ..parallel import for_blocks
 
-ALLOWED = 0.3
+ALLOWED = 0.2
 """Error bound (Ward's epsilon) under which an element is interpolated."""
+REACH = 2 * ALLOWED
+"""Error bound at which a point's weight has fallen to 0."""
+CONTRAST = 0.1
+"""Mean relative deviation between an element's neighbours up to which it is interpolated."""
 NEIGHBOURS = 8
+TURN = 1.5
 COARSEST = 0.15
 """First spacing, as a share of the elements' extent (root of the bounding box's largest face)."""
 BLOCK = 1 << 15
@@ -81,53 +86,65 @@ def interpolated(
     todo = np.arange(len(position))
     chosen = np.zeros(0, np.int64)
     points = None
+    result = None
     while len(todo):
         new = todo[_one_per_cell(position[todo], normal[todo], spacing)]
         value, radius = evaluate(new)
-        # R is held between the spacing that lies ahead and that of today: a lone close hit must not ask for
-        # endless points, nor a large hall for none.
-        radius = np.clip(radius, 1.5 * finest / ALLOWED, 2 * spacing / ALLOWED)
+        # R is held between today's spacing and the finest: a lone close hit must not ask for endless points, nor a
+        # large hall for none.
+        radius = np.clip(radius, finest / ALLOWED, 2 * spacing / ALLOWED)
         batch = _Points(position[new], normal[new], value, radius)
         points = batch if points is None else _Points(
             *(np.concatenate([getattr(points, f), getattr(batch, f)]) for f in ("position", "normal", "value", "radius"))
         )  # fmt: skip
         chosen = np.concatenate([chosen, new])
-        if spacing <= finest:
+        if result is None:
+            result = np.empty((len(position), value.shape[1]), np.float32)
+        last = spacing <= finest
+        covered = _spread(points, position, normal, todo, spacing, result, threads)
+        if last:
             break
-        spacing = max(spacing / 2, finest)
-        # Distance in place and in orientation as one space: a turn by 40 degrees counts like one spacing.
-        tree = cKDTree(np.concatenate([points.position / spacing, points.normal * 1.5], 1))
-        covered = np.zeros(len(todo), bool)
-
-        def check(part: slice, todo=todo, tree=tree, points=points, spacing=spacing, covered=covered) -> None:
-            p, n = position[todo[part]], normal[todo[part]]
-            k = min(4, len(points.radius))
-            _, index = tree.query(np.concatenate([p / spacing, n * 1.5], 1), k=k)
-            covered[part] = _bound(points, index.reshape(len(p), k), p, n).min(1) <= ALLOWED
-
-        for_blocks(check, len(todo), BLOCK, threads)
         todo = todo[~covered]
-    return _spread(points, position, normal, threads), chosen
+        spacing = max(spacing / 2, finest)
+    return result, chosen
 
 
-def _spread(points: _Points, position: np.ndarray, normal: np.ndarray, threads: int) -> np.ndarray:
-    """Weighted mean of the nearest points for every element; weights fall to 0 at twice the allowed error."""
-    scale = float(np.median(points.radius)) * ALLOWED
-    tree = cKDTree(np.concatenate([points.position / scale, points.normal * 1.5], 1))
-    result = np.empty((len(position), points.value.shape[1]), np.float32)
+def _spread(
+    points: _Points,
+    position: np.ndarray,
+    normal: np.ndarray,
+    todo: np.ndarray,
+    spacing: float,
+    result: np.ndarray,
+    threads: int,
+) -> np.ndarray:
+    """Write the weighted mean of the nearest points for the elements `todo`; returns which of them are good enough.
+
+    Done level by level: where the points are this dense, the nearest few surround an element on all sides.
+    """
+    # Distance in place and in orientation as one space: a turn by 40 degrees counts like one spacing.
+    tree = cKDTree(np.concatenate([points.position / spacing, points.normal * TURN], 1))
     k = min(NEIGHBOURS, len(points.radius))
+    covered = np.zeros(len(todo), bool)
 
     def fill(part: slice) -> None:
-        p, n = position[part], normal[part]
-        _, index = tree.query(np.concatenate([p / scale, n * 1.5], 1), k=k)
+        at = todo[part]
+        p, n = position[at], normal[at]
+        _, index = tree.query(np.concatenate([p / spacing, n * TURN], 1), k=k)
         index = index.reshape(len(p), k)
         bound = _bound(points, index, p, n)
-        weight = np.maximum(1 - bound / (2 * ALLOWED), 0) ** 2
+        weight = np.maximum(1 - bound / REACH, 0) ** 2
         # Where nothing is near enough, the best of what there is.
         lost = weight.sum(1) <= 1e-6
         weight[lost, bound[lost].argmin(1)] = 1
-        weight /= weight.sum(1, keepdims=True)
-        result[part] = np.einsum("nk,nkc->nc", weight.astype(np.float32), points.value[index])
+        weight = (weight / weight.sum(1, keepdims=True)).astype(np.float32)
+        near = points.value[index]
+        result[at] = np.einsum("nk,nkc->nc", weight, near)
+        # Ward's bound knows how near the walls are, not how bright: what the points themselves say decides too.
+        level = near.mean(2)
+        mean = np.einsum("nk,nk->n", weight, level)
+        contrast = np.einsum("nk,nk->n", weight, np.abs(level - mean[:, None])) / np.maximum(mean, 1e-20)
+        covered[part] = (bound.min(1) <= ALLOWED) & (contrast <= CONTRAST)
 
-    for_blocks(fill, len(position), BLOCK, thread_count(threads))
-    return result
+    for_blocks(fill, len(todo), BLOCK, threads)
+    return covered
