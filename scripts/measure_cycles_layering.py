@@ -16,11 +16,11 @@ from pathlib import Path
 
 os.environ.setdefault("BLENDER_USER_EXTENSIONS", tempfile.mkdtemp())
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-import bpy  # noqa: E402
-import numpy as np  # noqa: E402
+import bpy
+import numpy as np
 
-from addon.bridge.materials import make_material  # noqa: E402
-from addon.core.material import SPECULAR, ObjectMaterial  # noqa: E402
+from addon.bridge.materials import make_material
+from addon.core.material import SPECULAR, ObjectMaterial
 
 PHI = np.linspace(0.1, 1.0, 10) ** 2
 PSI = np.array([0.0025, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.6, 0.9])
