@@ -13,6 +13,7 @@ from mathutils import Matrix
 
 from ..core.errors import StorageError
 from ..core.progress import Progress
+from .demo_capture import FIELD_OF_VIEW, frame_path, write_all_but_frames
 from .demo_room import Paint, Thing, room, tour
 from .images import array_image
 from .materials import BASE_COLOR, IOR, ROUGHNESS, SPECULAR_LEVEL, ior_of
@@ -24,7 +25,6 @@ SIZES = {
 }
 """Frames, width, height and samples for each pixel."""
 
-FIELD_OF_VIEW = np.radians(78)
 FORMAT = 2  # raise when the room or its rendering changes, so that an older capture is not taken for this one
 
 
@@ -55,24 +55,11 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
     part = folder.with_name(folder.name + ".part")
     try:
         shutil.rmtree(part, ignore_errors=True)
-        (part / "images").mkdir(parents=True)
-        (part / "truth").mkdir()
         things = room()
-        write_mesh(part / "mesh.ply", things)
-        objects = [{"id": thing.object_id, "class_name": thing.class_name} for thing in things]
-        (part / "info_semantic.json").write_text(json.dumps({"objects": objects}, indent=1))
-        (part / "truth" / "materials.json").write_text(json.dumps([truth(thing) for thing in things], indent=1))
         frames, width, height, samples = SIZES[size]
-        focal = width / 2 / np.tan(FIELD_OF_VIEW / 2)
         poses = tour(frames)
-        transforms = {
-            "camera_model": "PINHOLE", "w": width, "h": height, "fl_x": focal, "fl_y": focal,
-            "cx": width / 2, "cy": height / 2,
-            "frames": [{"file_path": f"images/frame_{k:04d}.exr", "transform_matrix": poses[k].tolist()}
-                       for k in range(frames)],
-        }
-        (part / "transforms.json").write_text(json.dumps(transforms, indent=1))
-        render_frames(part / "images", things, poses, (width, height), samples, progress)
+        write_all_but_frames(part, things, poses, (width, height))
+        render_frames(part, things, poses, (width, height), samples, progress)
         (part / "truth" / "demo.json").write_text(json.dumps(stamp))
         shutil.rmtree(folder, ignore_errors=True)
         os.replace(part, folder)
@@ -82,7 +69,7 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
 
 
 def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int], samples: int, progress: Progress):
-    """Render the room from every pose as half-float EXR in linear Rec.709."""
+    """Render the room from every pose into the capture `folder`, as half-float EXR in linear Rec.709."""
     before = {kind: set(getattr(bpy.data, kind)) for kind in KINDS}
     scene = bpy.data.scenes.new("demo")
     try:
@@ -98,9 +85,9 @@ def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int]
         for k, pose in enumerate(poses):
             progress.update(k / len(poses))
             camera.matrix_world = Matrix(pose.tolist())
-            scene.render.filepath = str(folder / f"frame_{k:04d}.exr")
+            scene.render.filepath = str(folder / frame_path(k))
             bpy.ops.render.render(write_still=True, scene=scene.name)
-            if not (folder / f"frame_{k:04d}.exr").is_file():
+            if not (folder / frame_path(k)).is_file():
                 raise StorageError(f"The demo's frame {k} can't be written to '{folder}'.")
         progress.update(1.0)
     finally:
@@ -174,33 +161,3 @@ def material(name: str, paint: Paint):
             links.new(texture.outputs["Color"], shader.inputs[BASE_COLOR])
     links.new(shader.outputs[0], output.inputs["Surface"])
     return made
-
-
-def truth(thing: Thing) -> dict:
-    """What the room's maker knows of `thing`, for the comparison at the demo's end."""
-    paint = thing.paints[0]
-    return {
-        "id": thing.object_id, "class_name": thing.class_name, "emission": paint.emission,
-        "alpha": paint.roughness ** 2 if paint.f0 else None, "f0": paint.f0, "metallic": 0.0,
-        "base_color": [round(float(c), 4) for c in thing.mean_albedo()],
-    }
-
-
-def write_mesh(path: Path, things: tuple[Thing, ...]) -> None:
-    """All things as one binary PLY with an `object_id` on each face."""
-    corners, faces, first = [], {3: [], 4: []}, 0
-    for thing in things:
-        vertices, index, _, _ = thing.faces()
-        record = np.empty(len(index), [("n", "u1"), ("v", "<i4", index.shape[1]), ("object_id", "<i4")])
-        record["n"], record["v"], record["object_id"] = index.shape[1], index + first, thing.object_id
-        faces[index.shape[1]].append(record)
-        corners.append(vertices.astype("<f4"))
-        first += len(vertices)
-    records = [record for kind in faces.values() for record in kind]
-    header = (
-        f"ply\nformat binary_little_endian 1.0\nelement vertex {first}\n"
-        "property float x\nproperty float y\nproperty float z\n"
-        f"element face {sum(map(len, records))}\nproperty list uchar int vertex_indices\nproperty int object_id\n"
-        "end_header\n"
-    )
-    path.write_bytes(header.encode() + b"".join(c.tobytes() for c in corners) + b"".join(r.tobytes() for r in records))

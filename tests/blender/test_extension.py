@@ -1,0 +1,102 @@
+"""The built zip: what is in it, and that Blender installs, enables and runs it under its installed name."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import sys
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("bpy")
+
+PLATFORMS = {("Linux", "x86_64"): "linux-x64", ("Windows", "AMD64"): "windows-x64",
+             ("Darwin", "arm64"): "macos-arm64", ("Darwin", "x86_64"): "macos-x64"}
+INSTALLED = """
+import importlib, sys
+from pathlib import Path
+import bpy
+
+archive, capture = sys.argv[-2:]
+bpy.ops.extensions.package_install_files(filepath=archive, repo="user_default", enable_on_install=True)
+name = "bl_ext.user_default.scan_relight"
+assert name in bpy.context.preferences.addons, list(bpy.context.preferences.addons.keys())
+resources = Path(bpy.utils.resource_path("USER"))
+# Blender looks here first; pip's bpy looks into its own environment first, which has the same packages.
+[local] = (resources / "extensions" / ".local" / "lib").glob("python*/site-packages")
+assert str(local) in sys.path
+sys.path.insert(0, str(local))
+for package in ("scipy", "embreex", "OpenEXR"):
+    where = Path(importlib.import_module(package).__file__)
+    assert resources in where.parents, f"{package} comes from {where}, not from the zip"
+import numpy
+assert resources not in Path(numpy.__file__).parents
+assert bpy.ops.scan_relight.import_capture(capture_folder=capture) == {"FINISHED"}
+assert sum("object_id" in thing for thing in bpy.context.scene.objects) == 15
+try:
+    bpy.ops.scan_relight.recover(capture_folder=capture + "-not-there", result_folder=capture + "-result")
+except RuntimeError as error:
+    assert "not-there" in str(error), error
+else:
+    raise AssertionError("a missing capture was not told")
+handler = importlib.import_module(name + ".addon.cli").main
+assert handler(["info", capture]) == 0
+assert handler(["info", capture + "-not-there"]) == 2
+import addon_utils
+addon_utils.disable(name)
+assert not hasattr(bpy.types, "SCANRELIGHT_OT_recover")
+addon_utils.enable(name)
+assert hasattr(bpy.types, "SCANRELIGHT_OT_recover")
+print("INSTALLED AND RUN")
+"""
+
+
+@pytest.fixture(scope="module")
+def archive(root, tmp_path_factory) -> Path:
+    """The zip for this machine: the one that SCAN_RELIGHT_ZIP names, or a fresh one with this Python's wheels."""
+    if given := os.environ.get("SCAN_RELIGHT_ZIP"):
+        return Path(given).resolve()
+    key = platform.system(), platform.machine()
+    if key not in PLATFORMS:
+        pytest.skip(f"no wheels for {' '.join(key)}")
+    out = tmp_path_factory.mktemp("dist")
+    subprocess.run([sys.executable, root / "scripts" / "build_extension.py", "--platform", PLATFORMS[key],
+                    "--python", f"{sys.version_info[0]}.{sys.version_info[1]}", "--out", out], check=True)
+    return next(out.glob("*.zip"))
+
+
+def test_content(archive, root):
+    with zipfile.ZipFile(archive) as content:
+        names = content.namelist()
+        manifest = tomllib.loads(content.read("blender_manifest.toml").decode())
+    code = [name for name in names if not name.endswith(".whl")]
+    assert {"__init__.py", "LICENSE", "addon/cli.py", "operators/recover.py"} <= set(code)
+    assert {name.split("/")[0] for name in code} == {
+        "__init__.py", "LICENSE", "README.md", "CHANGELOG.md", "blender_manifest.toml", "addon", "operators"}
+    wheels = {name for name in names if name.endswith(".whl")}
+    assert wheels == {wheel.removeprefix("./") for wheel in manifest["build"]["generated"]["wheels"]}
+    assert not any("numpy" in name for name in wheels)
+    assert not any("__pycache__" in name for name in names)
+    tracked = {path.relative_to(root).as_posix() for part in ("addon", "operators")
+               for path in (root / part).rglob("*.py")}
+    assert tracked <= set(code)
+
+
+def test_blender_takes_it_as_valid(archive):
+    import bpy
+
+    cli = next(Path(bpy.utils.system_resource("SCRIPTS")).glob("addons_core/bl_pkg/cli/blender_ext.py"))
+    done = subprocess.run([sys.executable, cli, "validate", archive], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_installs_enables_and_runs(archive, grey_capture, tmp_path):
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("BLENDER_", "PYTHONPATH"))}
+    environment["BLENDER_USER_RESOURCES"] = str(tmp_path)
+    done = subprocess.run([sys.executable, "-c", INSTALLED, archive, grey_capture], env=environment, cwd=tmp_path,
+                          capture_output=True, text=True)
+    assert done.returncode == 0 and "INSTALLED AND RUN" in done.stdout, done.stdout + done.stderr

@@ -1,0 +1,43 @@
+"""Captures of the demo's room for every layer: with flat grey frames at once, or rendered with Cycles."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+os.environ.setdefault("BLENDER_USER_EXTENSIONS", tempfile.mkdtemp())  # no installed extension shadows the checkout
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The checkout."""
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def grey_capture(tmp_path_factory) -> Path:
+    """The demo's room seen by three frames of flat grey: a valid capture, made in no time."""
+    from addon.bridge.demo_capture import frame_path, write_all_but_frames
+    from addon.bridge.demo_room import room, tour
+    from addon.core.capture.exr import write_exr
+
+    folder = tmp_path_factory.mktemp("grey") / "capture"
+    write_all_but_frames(folder, room(), tour(3), (32, 24))
+    for k in range(3):
+        write_exr(folder / frame_path(k), np.full((24, 32, 3), 0.5, np.float32), half=True)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def tiny_capture(tmp_path_factory) -> Path:
+    """The demo's room in its smallest size, rendered with Cycles."""
+    pytest.importorskip("bpy")
+    from addon.bridge.demo_render import render_capture
+
+    return render_capture(tmp_path_factory.mktemp("tiny") / "capture", "tiny")
