@@ -58,7 +58,7 @@ def prepare(tools: bool = False, folder: Path = ROOT / ".venv") -> Path:
         return python
     locks = with_tools if tools else [lock]
     print(f"Installing {', '.join(path.name for path in locks)} into {folder.relative_to(ROOT)} "
-          "(about 600 MB the first time) ...", flush=True)
+          "(about 600 MB the first time) ...", file=sys.stderr, flush=True)
     stamp.unlink(missing_ok=True)
     venv.create(folder, with_pip=True, clear=not found)
     pip = [str(python), "-m", "pip", "--disable-pip-version-check", "--quiet"]
@@ -85,3 +85,8 @@ def hand_over(command: list[str]) -> int:
             return process.wait()
         except KeyboardInterrupt:
             continue
+
+
+if __name__ == "__main__":
+    # For .ci/run: make the environment in the folder that is named and say where its Python is.
+    print(prepare(tools=True, folder=ROOT / sys.argv[1]))
