@@ -14,6 +14,7 @@ from ..progress import Progress
 from ..surface.atlas import Atlas
 from ..surface.elements import triangle_geometry
 from ..surface.rays import RayScene
+from .groups import ElementGroups
 from .medians import Summary, make_estimator
 from .visibility import CLEAN, EDGE, SATURATED, FrameView, Observations, observe, view_frame
 
@@ -110,6 +111,7 @@ def accumulate(
         From `progress`.
     """
     normal, _ = triangle_geometry(mesh)
+    groups = ElementGroups(atlas)
     estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
     wanted = frame_order(len(frames), order, seed)
 
@@ -117,7 +119,7 @@ def accumulate(
         frame = frames[index]
         pixels = read(frame)
         view = view_frame(frame.camera, mesh, scene, normal)
-        return int(index), view, pixels, observe(view, pixels, atlas, scene)
+        return int(index), view, pixels, observe(view, pixels, atlas, scene, groups.candidates(view))
 
     for done, (index, view, pixels, seen) in enumerate(ordered_map(look, wanted, threads)):
         for tier, estimator in estimators.items():

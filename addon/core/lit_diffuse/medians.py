@@ -139,58 +139,82 @@ def _between(ordered: np.ndarray, rank: float) -> np.ndarray:
 class Exact:
     """The exact median and quartiles in bounded memory.
 
-    Observations go to one file for each `BUCKET` elements; at the end each file is sorted by itself. Non-negative
-    floats order like their bits, so element and value make one 64-bit key, and one sort gives every order statistic.
+    Observations are held until there are `HELD`, then go to one file, grouped by buckets of `BUCKET` elements; at the
+    end each bucket is read and sorted by itself.
     """
 
     BUCKET = 1 << 16
+    HELD = 1 << 22
+    RECORD = np.dtype([("element", "<u4"), ("value", "<f4", 3)])
 
     def __init__(self, count: int, folder: Path | str | None = None, threads: int = 0):
         self._count = count
         self._threads = threads
+        self._buckets = -(-count // self.BUCKET)
         self._folder = tempfile.TemporaryDirectory(dir=folder, prefix="tmp-observations-")
-        buckets = range(0, max(count, 1), self.BUCKET)
-        self._files = [open(Path(self._folder.name) / f"{start}", "w+b") for start in buckets]  # noqa: SIM115
-        self._record = np.dtype([("element", "<u4"), ("value", "<f4", 3)])
+        self._path = Path(self._folder.name) / "observations"
+        self._held: list[tuple[np.ndarray, np.ndarray]] = []  # records, and where each bucket starts in them
+        self._flushed: list[np.ndarray] = []  # for each flush where each bucket starts in the file, in records
 
     def add(self, element: np.ndarray, values: np.ndarray) -> None:
-        record = np.empty(len(element), self._record)
+        if not len(element):
+            return
+        record = np.empty(len(element), self.RECORD)
         record["element"], record["value"] = element, values
-        edges = np.searchsorted(element, np.arange(len(self._files) + 1) * self.BUCKET)
-        for file, start, stop in zip(self._files, edges[:-1], edges[1:], strict=True):
-            if stop > start:
-                file.write(record[start:stop].tobytes())
+        self._held.append((record, np.searchsorted(element, np.arange(self._buckets + 1) * self.BUCKET)))
+        if sum(len(held) for held, _ in self._held) >= self.HELD:
+            self._flush()
+
+    def _flush(self) -> None:
+        starts = [self._flushed[-1][-1] if self._flushed else 0]
+        with open(self._path, "ab") as file:
+            for bucket in range(self._buckets):
+                parts = self._held_of(bucket)
+                for part in parts:
+                    part.tofile(file)
+                starts.append(starts[-1] + sum(map(len, parts)))
+        self._flushed.append(np.array(starts, np.int64))
+        self._held.clear()
+
+    def _held_of(self, bucket: int) -> list[np.ndarray]:
+        return [record[start[bucket] : start[bucket + 1]] for record, start in self._held]
+
+    def _records(self, bucket: int) -> np.ndarray:
+        """All observations of one bucket."""
+        parts = self._held_of(bucket)
+        if self._flushed:
+            with open(self._path, "rb") as file:
+                for start in self._flushed:
+                    file.seek(int(start[bucket]) * self.RECORD.itemsize)
+                    parts.append(np.fromfile(file, self.RECORD, int(start[bucket + 1] - start[bucket])))
+        return np.concatenate(parts) if parts else np.zeros(0, self.RECORD)
 
     def _summarise(self, bucket: int) -> tuple[np.ndarray, np.ndarray]:
         """Quartiles ((k, 3, 3) float32: element, channel, quartile) and counts of one bucket."""
-        file = self._files[bucket]
-        file.flush()
-        record = np.fromfile(file.name, self._record)
+        record = self._records(bucket)
         size = min(self.BUCKET, self._count - bucket * self.BUCKET)
-        local = (record["element"] - np.uint32(bucket * self.BUCKET)).astype(np.uint64)
-        count = np.bincount(local.astype(np.int64), minlength=size)
-        start = np.concatenate([[0], np.cumsum(count)[:-1]])
+        local = (record["element"] - np.uint32(bucket * self.BUCKET)).astype(np.uint16)  # BUCKET fits: a radix sort
+        value = record["value"][np.argsort(local, kind="stable")]
+        count = np.bincount(local, minlength=size)
+        start = np.cumsum(count) - count
         quartiles = np.full((size, 3, len(QUARTILES)), np.nan, np.float32)
-        seen = count > 0
-        for channel in range(3):
-            bits = np.ascontiguousarray(record["value"][:, channel]).view(np.uint32).astype(np.uint64)
-            key = np.sort(local << np.uint64(32) | bits)
-            values = (key & np.uint64(0xFFFFFFFF)).astype(np.uint32).view(np.float32)
+        # Elements with equally many observations make one array, whose rows are sorted at once.
+        by_count = np.argsort(count, kind="stable")
+        for seen in np.unique(count[count > 0]):
+            low, high = np.searchsorted(count, (seen, seen + 1), sorter=by_count)
+            alike = by_count[low:high]
+            rows = value[start[alike, None] + np.arange(seen)].transpose(2, 0, 1).copy()
+            rows.sort(axis=-1)
             for which, share in enumerate(QUARTILES):
-                rank = share * (count[seen] - 1)
-                low = np.floor(rank).astype(np.int64)
-                at = start[seen] + low
-                a, b = values[at], values[at + (low + 1 < count[seen])]
-                quartiles[seen, channel, which] = a + (rank - low).astype(np.float32) * (b - a)
+                quartiles[alike, :, which] = _between(rows, share * (seen - 1)).T
         return quartiles, count
 
     def result(self) -> Summary:
-        parts = list(ordered_map(self._summarise, range(len(self._files)), self._threads))
-        for file in self._files:
-            file.close()
+        parts = list(ordered_map(self._summarise, range(self._buckets), self._threads))
+        self._held.clear()
         self._folder.cleanup()
-        quartiles = np.concatenate([q for q, _ in parts])
-        count = np.concatenate([c for _, c in parts]).astype(np.int32)
+        quartiles = np.concatenate([np.zeros((0, 3, 3), np.float32)] + [q for q, _ in parts])
+        count = np.concatenate([np.zeros(0, np.int64)] + [c for _, c in parts]).astype(np.int32)
         return Summary(quartiles[..., 1], quartiles[..., 0], quartiles[..., 2], count)
 
 

@@ -118,8 +118,8 @@ def _bilinear(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     b = np.clip(y - y0, 0, 1)[:, None].astype(np.float32)
     flat = image.reshape(-1, image.shape[2])
     at = y0 * width + x0
-    top = flat[at] * (1 - a) + flat[at + 1] * a
-    bottom = flat[at + width] * (1 - a) + flat[at + width + 1] * a
+    top = flat.take(at, 0) * (1 - a) + flat.take(at + 1, 0) * a
+    bottom = flat.take(at + width, 0) * (1 - a) + flat.take(at + width + 1, 0) * a
     return top * (1 - b) + bottom * b
 
 
@@ -139,42 +139,42 @@ def observe(
     camera = view.camera
     centre = camera.centre.astype(np.float32)
     index = np.arange(len(atlas), dtype=np.int32) if elements is None else elements.astype(np.int32)
-    position = atlas.position if elements is None else atlas.position[index]
-    normal = atlas.normal if elements is None else atlas.normal[index]
+    position = atlas.position if elements is None else atlas.position.take(index, 0)
+    normal = atlas.normal if elements is None else atlas.normal.take(index, 0)
 
-    # Cheapest tests first: the side that faces the camera, then the frustum.
-    facing = np.einsum("ij,ij->i", centre - position, normal) > 0
-    index, position, normal = index[facing], position[facing], normal[facing]
-    xy, depth = camera.project(position)
+    # Cheapest tests first: the side that faces the camera, then the frustum, then what the pixel shows.
+    at = np.flatnonzero(np.einsum("ij,ij->i", centre - position, normal) > 0)
+    xy, depth = camera.project(position.take(at, 0))
     margin = 0.5
-    inside = (
+    inside = np.flatnonzero(
         (depth > 0)
         & (xy[:, 0] >= margin) & (xy[:, 0] < camera.width - margin)
         & (xy[:, 1] >= margin) & (xy[:, 1] < camera.height - margin)
     )  # fmt: skip
-    index, position, normal, xy = index[inside], position[inside], normal[inside], xy[inside]
+    at, xy = at[inside], xy.take(inside, 0)
+    pixel = xy[:, 1].astype(np.int32) * camera.width + xy[:, 0].astype(np.int32)
+    shows = (view.object_id.ravel()[pixel] == atlas.object_id[index[at]]) & pixels.valid.ravel()[pixel]
+    keep = np.flatnonzero(shows)
+    at, xy, pixel = at[keep], xy.take(keep, 0), pixel[keep]
+    position, normal = position.take(at, 0), normal.take(at, 0)
     to_camera = centre - position
     distance = np.linalg.norm(to_camera, axis=1)
     direction = to_camera / np.maximum(distance, 1e-12)[:, None]
-    column, row = xy[:, 0].astype(np.int32), xy[:, 1].astype(np.int32)
-    keep = (
-        (np.einsum("ij,ij->i", direction, normal) >= MIN_COSINE)
-        & (view.object_id[row, column] == atlas.object_id[index])
-        & pixels.valid[row, column]
-    )
-    index, position, normal, xy = index[keep], position[keep], normal[keep], xy[keep]
-    direction, distance, row, column = direction[keep], distance[keep], row[keep], column[keep]
-    origins = scene.off_surface(position, normal)
-    free = ~scene.occluded(origins, direction, distance - 2 * scene.offset)
-    index, xy, direction, row, column = index[free], xy[free], direction[free], row[free], column[free]
+    keep = np.flatnonzero(np.einsum("ij,ij->i", direction, normal) >= MIN_COSINE)
+    origins = scene.off_surface(position.take(keep, 0), normal.take(keep, 0))
+    direction = direction.take(keep, 0)
+    free = np.flatnonzero(~scene.occluded(origins, direction, distance[keep] - 2 * scene.offset))
+    keep, direction = keep[free], direction.take(free, 0)
+    index, xy, pixel = index[at[keep]], xy.take(keep, 0), pixel[keep]
 
     # A bilinear sample needs four good pixels, which only a clean neighbourhood grants; else the one pixel counts.
     usable = pixels.valid & ~pixels.saturated
     around = usable.copy()
     for other in _neighbours(usable):
         around &= other
-    clean = view.clean[row, column] & around[row, column]
-    radiance = pixels.radiance[row, column]
-    radiance[clean] = _bilinear(pixels.radiance, xy[clean])
-    tier = np.where(clean, CLEAN, np.where(pixels.saturated[row, column], SATURATED, EDGE)).astype(np.int8)
+    clean = (view.clean & around).ravel()[pixel]
+    radiance = pixels.radiance.reshape(-1, 3).take(pixel, 0)
+    smooth = np.flatnonzero(clean)
+    radiance[smooth] = _bilinear(pixels.radiance, xy.take(smooth, 0))
+    tier = np.where(clean, CLEAN, np.where(pixels.saturated.ravel()[pixel], SATURATED, EDGE)).astype(np.int8)
     return Observations(index, radiance, tier, direction)
