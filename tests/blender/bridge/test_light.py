@@ -93,7 +93,8 @@ def test_furnace_specular(scene, shoot, look, white_world, phi, psi):
     specular = disc_mean(shoot(16, 16, 400))
     np.testing.assert_allclose(whole - specular, albedo, rtol=0.01)
     expected = albedo + lobe_reflectance(phi, psi)
-    print(f"phi {phi} psi {psi}: specular {specular.mean():.4f}, method {expected[0] - 0.2:.4f}; whole {whole / expected}")
+    print(f"phi {phi} psi {psi}: specular {specular.mean():.4f}, method {expected[0] - 0.2:.4f}; "
+          f"whole {whole / expected}")
     np.testing.assert_allclose(whole, expected, rtol=0.03)
 
 
@@ -165,6 +166,6 @@ def test_highlight_profile(scene, shoot, look, phi, psi):
         expected = (lobe(w, view, normal, phi, psi, fresnel) * light).sum(-1).reshape(size, 2, size, 2).mean((1, 3))
         rms = np.sqrt(np.mean((got - expected) ** 2)) / expected.max()
         total = got.sum() / expected.sum()
-        print(f"phi {phi} psi {psi} {name}: peak {got.max() / expected.max():.3f}, sum {total:.3f}, rms {rms:.4f} of peak")
+        print(f"phi {phi} psi {psi} {name}: peak {got.max() / expected.max():.3f}, sum {total:.3f}, rms {rms:.4f}")
         assert rms < (0.07 if name == "Schlick" else 0.01)
         assert total == pytest.approx(1, abs=0.2 if name == "Schlick" else 0.02)

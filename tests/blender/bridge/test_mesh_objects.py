@@ -1,0 +1,56 @@
+"""One object for each instance, with every triangle where it was."""
+
+import numpy as np
+import pytest
+
+from addon.core.capture.model import Instance, Mesh
+
+bpy = pytest.importorskip("bpy")
+
+from addon.bridge.mesh_objects import ATLAS_UV, CAPTURE_UV, make_objects  # noqa: E402
+
+INSTANCES = (Instance(2, "Sofa"), Instance(5, "Sofa"), Instance(7, "Wall"), Instance(8, "Ghost"))
+
+
+@pytest.fixture
+def mesh():
+    rng = np.random.default_rng(0)
+    return Mesh(rng.uniform(-4, 4, (40, 3)) + (100, 0, 0), rng.integers(0, 40, (60, 3)).astype(np.int32),
+                rng.permutation(np.repeat([2, 5, 7], 20)).astype(np.int32), rng.random((60, 3, 2)).astype(np.float32))
+
+
+def read(data, name):
+    uv = np.empty(len(data.loops) * 2, np.float32)
+    data.uv_layers[name].data.foreach_get("uv", uv)
+    return uv.reshape(-1, 3, 2)
+
+
+def test_triangles_and_coordinates_come_back(scene, mesh):
+    atlas = np.random.default_rng(1).random((60, 3, 2)).astype(np.float32)
+    objects = make_objects(mesh, INSTANCES, atlas, scene.collection)
+    bpy.context.view_layer.update()
+    assert list(objects) == [2, 5, 7]
+    for object_id, thing in objects.items():
+        data, own = thing.data, mesh.object_id == object_id
+        place = np.empty(len(data.vertices) * 3, np.float32)
+        data.vertices.foreach_get("co", place)
+        corner = np.empty(len(data.loops), np.int32)
+        data.loops.foreach_get("vertex_index", corner)
+        world = place.reshape(-1, 3)[corner].reshape(-1, 3, 3) + np.array(thing.matrix_world.translation)
+        np.testing.assert_allclose(world, mesh.vertices[mesh.triangles[own]], atol=2e-5)
+        np.testing.assert_array_equal(read(data, ATLAS_UV), atlas[own])
+        np.testing.assert_array_equal(read(data, CAPTURE_UV), mesh.uv[own])
+        assert len(data.vertices) == len(np.unique(mesh.triangles[own]))
+        assert data.uv_layers.active.name == ATLAS_UV and data.uv_layers[ATLAS_UV].active_render
+        assert thing["object_id"] == object_id and not any(p.use_smooth for p in data.polygons)
+        assert np.abs(np.array(data.vertices[0].co)).max() < 8.1
+
+
+def test_names(scene, mesh):
+    objects = make_objects(mesh, INSTANCES, mesh.uv, scene.collection)
+    assert [o.name for o in objects.values()] == ["Sofa", "Sofa.001", "Wall"]
+
+
+def test_without_own_coordinates(scene, mesh):
+    bare = Mesh(mesh.vertices, mesh.triangles, mesh.object_id)
+    assert [u.name for u in make_objects(bare, INSTANCES, mesh.uv, scene.collection)[2].data.uv_layers] == [ATLAS_UV]

@@ -1,0 +1,134 @@
+"""The saved scene: complete, movable, renders when opened; nothing of the user's is touched."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from addon.core.capture.exr import write_exr
+from addon.core.capture.model import Camera, Capture, Frame, Instance, Mesh
+from addon.core.errors import StorageError
+from addon.core.material import EMITTER, LAMBERTIAN, ObjectMaterial
+
+bpy = pytest.importorskip("bpy")
+
+from addon.bridge import scene as bridge_scene  # noqa: E402
+from addon.bridge.scene import build_scene, write_scene  # noqa: E402
+
+KINDS = ("scenes", "collections", "objects", "meshes", "cameras", "materials", "worlds", "images")
+
+
+@pytest.fixture
+def result(tmp_path):
+    folder = tmp_path / "result"
+    folder.mkdir()
+    write_exr(folder / "base_color.exr", np.broadcast_to(np.float32([0.2, 0.5, 0.8]), (8, 8, 3)))
+    write_exr(folder / "albedo.exr", np.full((8, 8, 3), 0.25, np.float32))
+    write_exr(folder / "shading.exr", np.full((8, 8, 3), 3, np.float32))
+    write_exr(folder / "environment.exr", np.ones((4, 8, 3), np.float32))
+    return folder
+
+
+@pytest.fixture
+def capture(tmp_path):
+    """A floor and a lamp, seen from straight above by a camera whose picture is half floor, half lamp."""
+    quad = np.array([[-1, -1, 0], [0, -1, 0], [0, 1, 0], [-1, 1, 0]], float)
+    pose = np.eye(4)
+    pose[2, 3] = 1
+    triangles = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]], np.int32)
+    mesh = Mesh(np.concatenate([quad, quad + (1, 0, 0)]), triangles, np.array([4, 4, 9, 9], np.int32))
+    frames = tuple(Frame(f"frame {i}", tmp_path, Camera(8, 4, 8, 8, 4, 2, pose)) for i in range(2))
+    return Capture(tmp_path, mesh, (Instance(4, "Floor"), Instance(9, "Lamp")), frames)
+
+
+ATLAS = np.tile(np.float32([[0, 0], [1, 0], [1, 1]]), (4, 1, 1))
+MATERIALS = [ObjectMaterial(4, "Floor", LAMBERTIAN), ObjectMaterial(9, "Lamp", EMITTER, emission=(6.0, 3.0, 1.5))]
+
+
+def counts():
+    return {kind: sorted(x.name for x in getattr(bpy.data, kind)) for kind in KINDS}
+
+
+@pytest.mark.parametrize("fresh", [True, False])
+def test_it_renders_when_opened_elsewhere(scene, tmp_path, result, capture, fresh):
+    assert write_scene(result / "scene.blend", capture, ATLAS, MATERIALS, result, 0.36, fresh=fresh) == ()
+    assert sorted(p.name for p in result.iterdir()) == [
+        "albedo.exr", "base_color.exr", "environment.exr", "scene.blend", "shading.exr"]
+    shutil.move(result, tmp_path / "moved")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "moved" / "scene.blend"))
+    opened = bpy.context.scene
+    assert {i.name for i in bpy.data.images if i.size[0]} == {i.name for i in bpy.data.images}
+    assert sorted(i.filepath for i in bpy.data.images) == [
+        "//albedo.exr", "//base_color.exr", "//environment.exr", "//shading.exr"]
+    room, lamps, eyes = (opened.collection.children["Scan Relight"].children[n] for n in ("Room", "Lamps", "Cameras"))
+    assert [o["object_id"] for o in room.objects] == [4] and [o["object_id"] for o in lamps.objects] == [9]
+    assert [o.name for o in eyes.objects] == ["frame 0", "frame 1"] and opened.camera == eyes.objects["frame 0"]
+    assert opened.render.engine == "CYCLES" and opened.view_settings.exposure == pytest.approx(-1)
+    opened.cycles.samples, opened.cycles.use_denoising = 64, False
+    opened.render.image_settings.file_format = "OPEN_EXR"
+    opened.render.image_settings.color_depth = "32"
+    opened.render.filepath = str(tmp_path / "render.exr")
+    bpy.ops.render.render(write_still=True)
+    picture = np.array(bpy.data.images.load(opened.render.filepath).pixels[:]).reshape(4, 8, 4)[..., :3]
+    # Floor and lamp lie in one plane: the floor sees the white world alone.
+    np.testing.assert_allclose(picture[:, 1:3].mean((0, 1)), [0.2, 0.5, 0.8], rtol=0.02)
+    np.testing.assert_allclose(picture[:, 5:7].mean((0, 1)), [6, 3, 1.5], rtol=1e-3)
+
+
+def test_the_open_file_is_left_alone(scene, result, capture):
+    bpy.ops.mesh.primitive_cube_add()
+    before, world = counts(), scene.world
+    write_scene(result / "scene.blend", capture, ATLAS, MATERIALS, result, fresh=False)
+    assert counts() == before and bpy.context.scene == scene and scene.world == world and bpy.data.filepath == ""
+
+
+def test_building_into_the_users_scene_adds_one_collection(scene, result, capture):
+    bpy.ops.mesh.primitive_cube_add()
+    cube, engine, exposure = bpy.context.object, scene.render.engine, scene.view_settings.exposure
+    built = build_scene(scene, capture, ATLAS, MATERIALS, result, 0.01)
+    assert {c.name for c in scene.collection.children} == {"Scan Relight"} and cube.name in scene.collection.objects
+    assert scene.world is None and scene.camera is None and scene.render.engine == engine
+    assert scene.view_settings.exposure == exposure and bpy.context.object == cube
+    assert sorted(built.objects) == [4, 9] and len(built.cameras) == 2
+
+
+def test_images_that_are_missing_are_left_out(scene, tmp_path, capture):
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    write_scene(empty / "scene.blend", capture, ATLAS, [], empty, fresh=False)
+    assert [p.name for p in empty.iterdir()] == ["scene.blend"]
+
+
+def test_an_old_file_is_replaced_whole_or_kept(scene, result, capture, monkeypatch):
+    path = result / "scene.blend"
+    path.write_bytes(b"old")
+
+    def half_written(name, *_):
+        with open(name, "wb") as file:
+            file.write(b"half")
+        raise RuntimeError("Error: No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(bridge_scene, "_save", half_written)
+        with pytest.raises(StorageError, match=r"scene\.blend can't be saved \(No space left on device\); free"):
+            write_scene(path, capture, ATLAS, MATERIALS, result, fresh=False)
+    assert path.read_bytes() == b"old" and len(list(result.iterdir())) == 5
+    write_scene(path, capture, ATLAS, MATERIALS, result, fresh=False)
+    write_scene(path, capture, ATLAS, MATERIALS, result, fresh=False)
+    assert path.stat().st_size > 10_000 and len(list(result.iterdir())) == 5
+
+
+@pytest.mark.parametrize("fresh", [True, False])
+def test_a_folder_that_cannot_be_made_is_told(scene, tmp_path, result, capture, fresh):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StorageError, match="can't be saved"):
+        write_scene(tmp_path / "file" / "scene.blend", capture, ATLAS, MATERIALS, result, fresh=fresh)
+
+
+@pytest.mark.parametrize("fresh", [True, False])
+def test_a_file_that_blender_cannot_write_is_told(scene, tmp_path, result, capture, fresh):
+    (tmp_path / "file.blend").mkdir()
+    (tmp_path / "file.blend" / "x").write_text("")
+    with pytest.raises(StorageError, match="can't be saved"):
+        write_scene(tmp_path / "file.blend", capture, ATLAS, MATERIALS, result, fresh=fresh)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["file.blend", "result"]
