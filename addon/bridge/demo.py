@@ -15,7 +15,7 @@ from ..core.material import EMITTER
 from ..core.progress import Progress, ProgressEvent
 from ..core.settings import Settings
 from ..core.store import Store
-from .demo_render import can_denoise, render_capture
+from .demo_render import can_denoise, is_rendered, render_capture
 from .demo_room import look_at
 from .images import image_array
 from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, METALLIC, ROUGHNESS
@@ -26,8 +26,8 @@ PICTURES = {"tiny": (96, 72, 16), "small": (480, 360, 40), "large": (960, 720, 1
 """Width, height and samples of the before and the relit picture."""
 VIEW = look_at((0.42, 0.35, 1.62), (2.75, 2.5, 0.72))
 LIGHTS = (
-    ((3.4, 0.5, 2.3), (2.2, 2.4, 0.4), (1.0, 0.36, 0.10), 130.0),
-    ((0.5, 3.1, 2.2), (2.4, 1.2, 0.6), (0.12, 0.30, 1.0), 90.0),
+    ((2.9, 0.7, 2.3), (1.9, 2.9, 0.2), (1.0, 0.42, 0.14), 75.0),
+    ((0.4, 2.3, 2.0), (3.0, 1.6, 0.4), (0.16, 0.36, 1.0), 45.0),
 )
 """Of the relit picture: where, where to, colour, watts."""
 
@@ -53,9 +53,11 @@ def run_demo(out: Path | str, size: str, settings: Settings, listener: Callable[
     out = Path(out)
     Store(out).close()  # a folder that can't be written is told now, not after the rendering
     progress = Progress(listener, should_stop, {"render": 60, **WEIGHTS, "pictures": 30})
+    capture = out / "capture"
+    stored = is_rendered(capture, size)
     progress.stage("render")
-    capture = render_capture(out / "capture", size, progress)
-    progress.done()
+    render_capture(capture, size, progress)
+    progress.done(stored)
     run(capture, out, settings, progress)
     progress.stage("pictures")
     bpy.ops.wm.open_mainfile(filepath=str((out / "scene.blend").absolute()))

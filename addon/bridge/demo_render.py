@@ -46,12 +46,8 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
         `folder`.
     """
     folder, progress = Path(folder), progress or Progress()
-    stamp = {"format": FORMAT, "size": list(SIZES[size])}
-    try:
-        if json.loads((folder / "truth" / "demo.json").read_text()) == stamp:
-            return folder
-    except (OSError, ValueError):
-        pass
+    if is_rendered(folder, size):
+        return folder
     part = folder.with_name(folder.name + ".part")
     try:
         shutil.rmtree(part, ignore_errors=True)
@@ -60,12 +56,25 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
         poses = tour(frames)
         write_all_but_frames(part, things, poses, (width, height))
         render_frames(part, things, poses, (width, height), samples, progress)
-        (part / "truth" / "demo.json").write_text(json.dumps(stamp))
+        (part / "truth" / "demo.json").write_text(json.dumps(stamp_of(size)))
         shutil.rmtree(folder, ignore_errors=True)
         os.replace(part, folder)
     except OSError as error:
         raise StorageError(f"The demo's capture can't be written to '{folder}': {error.strerror or error}.") from error
     return folder
+
+
+def is_rendered(folder: Path, size: str) -> bool:
+    """Whether `folder` holds the demo's capture of this size already."""
+    try:
+        return json.loads((Path(folder) / "truth" / "demo.json").read_text()) == stamp_of(size)
+    except (OSError, ValueError):
+        return False
+
+
+def stamp_of(size: str) -> dict:
+    """What a finished capture is marked with."""
+    return {"format": FORMAT, "size": list(SIZES[size])}
 
 
 def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int], samples: int, progress: Progress):
