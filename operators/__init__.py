@@ -5,15 +5,15 @@ from __future__ import annotations
 
 def classes() -> tuple[type, ...]:
     """Every operator, in the order of the method."""
-    from .accumulate import SCANRELIGHT_OT_accumulate
-    from .fit import SCANRELIGHT_OT_fit
-    from .import_capture import SCANRELIGHT_OT_import_capture
-    from .recover import SCANRELIGHT_OT_recover
-    from .shade import SCANRELIGHT_OT_shade
-    from .write import SCANRELIGHT_OT_write
+    from .accumulate import SCAN_RELIGHT_OT_accumulate
+    from .fit import SCAN_RELIGHT_OT_fit
+    from .import_capture import SCAN_RELIGHT_OT_import_capture
+    from .recover import SCAN_RELIGHT_OT_recover
+    from .shade import SCAN_RELIGHT_OT_shade
+    from .write import SCAN_RELIGHT_OT_write
 
-    return (SCANRELIGHT_OT_import_capture, SCANRELIGHT_OT_accumulate, SCANRELIGHT_OT_shade, SCANRELIGHT_OT_fit,
-            SCANRELIGHT_OT_write, SCANRELIGHT_OT_recover)
+    return (SCAN_RELIGHT_OT_import_capture, SCAN_RELIGHT_OT_accumulate, SCAN_RELIGHT_OT_shade, SCAN_RELIGHT_OT_fit,
+            SCAN_RELIGHT_OT_write, SCAN_RELIGHT_OT_recover)
 
 
 def register():

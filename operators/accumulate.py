@@ -8,7 +8,7 @@ from .settings_props import StageOperator, with_settings
 
 
 @with_settings
-class SCANRELIGHT_OT_accumulate(StageOperator, bpy.types.Operator):
+class SCAN_RELIGHT_OT_accumulate(StageOperator, bpy.types.Operator):
     """Project the frames onto the surface and take each element's median."""
 
     bl_idname = "scan_relight.accumulate"

@@ -8,7 +8,7 @@ from .settings_props import StageOperator, with_settings
 
 
 @with_settings
-class SCANRELIGHT_OT_fit(StageOperator, bpy.types.Operator):
+class SCAN_RELIGHT_OT_fit(StageOperator, bpy.types.Operator):
     """Fit roughness and specular of each object."""
 
     bl_idname = "scan_relight.fit"

@@ -7,7 +7,7 @@ import bpy
 from .settings_props import CaptureOperator
 
 
-class SCANRELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
+class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
     """Import a capture."""
 
     bl_idname = "scan_relight.import_capture"

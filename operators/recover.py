@@ -8,7 +8,7 @@ from .settings_props import StageOperator, with_settings
 
 
 @with_settings
-class SCANRELIGHT_OT_recover(StageOperator, bpy.types.Operator):
+class SCAN_RELIGHT_OT_recover(StageOperator, bpy.types.Operator):
     """Recover a capture from the first stage to the last."""
 
     bl_idname = "scan_relight.recover"

@@ -8,7 +8,7 @@ from .settings_props import StageOperator, with_settings
 
 
 @with_settings
-class SCANRELIGHT_OT_shade(StageOperator, bpy.types.Operator):
+class SCAN_RELIGHT_OT_shade(StageOperator, bpy.types.Operator):
     """Gather the light that falls on each element and divide it out."""
 
     bl_idname = "scan_relight.shade"

@@ -8,7 +8,7 @@ from .settings_props import StageOperator, with_settings
 
 
 @with_settings
-class SCANRELIGHT_OT_write(StageOperator, bpy.types.Operator):
+class SCAN_RELIGHT_OT_write(StageOperator, bpy.types.Operator):
     """Put materials and baked images onto the objects."""
 
     bl_idname = "scan_relight.write"

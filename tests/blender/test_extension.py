@@ -47,10 +47,11 @@ handler = importlib.import_module(name + ".addon.cli").main
 assert handler(["info", capture]) == 0
 assert handler(["info", capture + "-not-there"]) == 2
 import addon_utils
+assert hasattr(bpy.types, "SCAN_RELIGHT_OT_recover")
 addon_utils.disable(name)
-assert not hasattr(bpy.types, "SCANRELIGHT_OT_recover")
+assert not hasattr(bpy.types, "SCAN_RELIGHT_OT_recover")
 addon_utils.enable(name)
-assert hasattr(bpy.types, "SCANRELIGHT_OT_recover")
+assert hasattr(bpy.types, "SCAN_RELIGHT_OT_recover")
 print("INSTALLED AND RUN")
 """
 
