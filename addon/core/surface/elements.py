@@ -57,13 +57,21 @@ def _cover(uv: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     for row in range(0, size, ROWS_AT_ONCE):
         texels = np.arange(row * size, min(row + ROWS_AT_ONCE, size) * size)
         ask(texels, SUBSAMPLES[0])
-    # Only empty texels beside a covered one, or under a triangle too small for any centre, can be covered in part.
-    covered = (triangle >= 0).reshape(size, size)
-    near = ndimage.binary_dilation(covered, np.ones((3, 3), bool))
+    # Only empty texels beside a covered one, or under a triangle too small for any centre, can be covered in part; what
+    # is found so has neighbours in turn, along a sliver's whole length.
     corners = np.clip((uv.reshape(-1, 2) * size).astype(np.int64), 0, size - 1)
+    near = ndimage.binary_dilation((triangle >= 0).reshape(size, size), np.ones((3, 3), bool))
     near[corners[:, 1], corners[:, 0]] = True
-    for shift in SUBSAMPLES[1:]:
-        ask(np.flatnonzero(near.ravel() & (triangle < 0)), shift)
+    unasked = triangle < 0
+    wanted = np.flatnonzero(near.ravel() & unasked)
+    while len(wanted):
+        unasked[wanted] = False
+        for shift in SUBSAMPLES[1:]:
+            ask(wanted[triangle[wanted] < 0], shift)
+        row, column = np.divmod(wanted[triangle[wanted] >= 0], size)
+        rows, columns = (np.clip(at + np.array([-1, 0, 1])[:, None], 0, size - 1) for at in (row, column))
+        around = np.unique(rows[:, None] * size + columns[None])
+        wanted = around[unasked[around]]
     return triangle, u, v
 
 
@@ -123,7 +131,9 @@ def element_of_triangle(mesh: Mesh, atlas: Atlas) -> np.ndarray:
     return first
 
 
-def lookup(atlas: Atlas, fallback: np.ndarray, object_id: np.ndarray, triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+def lookup(
+    atlas: Atlas, fallback: np.ndarray, object_id: np.ndarray, triangle: np.ndarray, u: np.ndarray, v: np.ndarray
+) -> np.ndarray:
     """The element at points on the surface.
 
     Parameters
