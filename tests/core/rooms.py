@@ -167,7 +167,7 @@ def all_round(eye, width: int = 48, fov: float = 100.0) -> list[Camera]:
 
 
 def picture(room: Room, camera: Camera, radiance: np.ndarray, outside=0.0) -> Pixels:
-    """What a camera sees: the radiance ((n, 3), of the elements) of the element of the same object that lies nearest."""
+    """What a camera sees: at each hit the radiance ((n, 3)) of the nearest element of the same object."""
     directions = camera.directions(camera.pixel_centres())
     hits = room.scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
     image = np.empty((len(directions), 3), np.float32)
@@ -191,7 +191,7 @@ def pixels_of(image: np.ndarray, valid=None, saturated=None) -> Pixels:
 
 
 def polygon_irradiance(points: np.ndarray, normals: np.ndarray, quads: list[Quad]) -> np.ndarray:
-    """E at `points` from each quad at radiance 1 and wholly above their horizon, by Lambert's formula: (n, q) float64."""
+    """E at `points` from each quad at radiance 1, wholly above their horizon (Lambert's formula): (n, q) float64."""
     result = np.zeros((len(points), len(quads)))
     for j, q in enumerate(quads):
         corners = [q.corner, q.corner + q.edge_u, q.corner + q.edge_u + q.edge_v, q.corner + q.edge_v]
@@ -206,7 +206,7 @@ def polygon_irradiance(points: np.ndarray, normals: np.ndarray, quads: list[Quad
 
 
 def radiosity(room: Room, albedo: dict[int, object], emission: dict[int, object], parts: int = 5) -> np.ndarray:
-    """Radiance of every element of a convex closed room, (n, 3) float64: patches by collocation, then one last gather."""
+    """Radiance of every element of a convex closed room: patches by collocation, then one last gather; (n, 3)."""
     patches = [p for q in room.quads for p in (split(q, parts) if np.linalg.norm(q.edge_u) > 1 else [q])]
     ids = np.array([p.object_id for p in patches])
     middle = np.array([p.corner + (p.edge_u + p.edge_v) / 2 for p in patches])
