@@ -22,12 +22,12 @@ from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, METALLIC, 
 from .mesh_objects import ATLAS_UV, OBJECT_ID
 from .run import WEIGHTS, run
 
-PICTURES = {"tiny": (96, 72, 16), "small": (480, 360, 40), "large": (960, 720, 128)}
+PICTURES = {"tiny": (96, 72, 16), "small": (480, 360, 32), "large": (960, 720, 128)}
 """Width, height and samples of the before and the relit picture."""
 VIEW = look_at((0.42, 0.35, 1.62), (2.75, 2.5, 0.72))
 LIGHTS = (
     ((2.9, 0.7, 2.3), (1.9, 2.9, 0.2), (1.0, 0.42, 0.14), 75.0),
-    ((0.4, 2.3, 2.0), (3.0, 1.6, 0.4), (0.16, 0.36, 1.0), 45.0),
+    ((0.4, 2.3, 2.0), (3.0, 1.6, 0.4), (0.16, 0.36, 1.0), 60.0),
 )
 """Of the relit picture: where, where to, colour, watts."""
 
@@ -142,7 +142,7 @@ def pictures(out: Path, size: str, progress: Progress) -> None:
     scene = bpy.context.scene
     width, height, samples = PICTURES[size]
     scene.render.engine, scene.cycles.device, scene.cycles.samples = "CYCLES", "CPU", samples
-    scene.cycles.use_denoising = can_denoise()
+    scene.cycles.use_denoising, scene.cycles.use_light_tree = can_denoise(), False
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = width, height, 100
     scene.render.pixel_aspect_x = scene.render.pixel_aspect_y = 1
     scene.view_settings.view_transform = "Standard"
