@@ -53,7 +53,8 @@ def test_frames_are_lit_and_show_the_room_where_the_camera_says(tiny_capture):
         for shift in ((0, 1), (0, -1), (1, 0), (-1, 0)):
             inside &= np.roll(ids, shift, (0, 1)) == lamp.object_id
         seen.append(pixels.radiance[inside])
-    assert np.median(np.concatenate(seen), axis=0) == pytest.approx(lamp.paints[0].emission, rel=0.04)  # the denoiser adds 2 %
+    # The denoiser adds 2 %.
+    assert np.median(np.concatenate(seen), axis=0) == pytest.approx(lamp.paints[0].emission, rel=0.04)
 
 
 def test_truth_says_what_the_paints_are(tiny_capture):
