@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import bpy
@@ -72,7 +71,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         imported(scene, capture)  # its absence is told now, not after the work
     progress.done()
     with Store(out_folder) as store:
-        recovery = Recovery(capture, store, settings, progress, partial(unwrap, size=settings.atlas_size))
+        recovery = Recovery(capture, store, settings, progress, unwrap)
         for stage in STAGES:
             getattr(recovery, stage)()
             if stage == until:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from ..capture.model import Pixels
 from ..lit_diffuse.visibility import FrameView
 
 MAX_HEIGHT = 512
+NEAR = np.radians(8)
+"""Angle over which what was seen of the sky says something of its surroundings."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,42 @@ class Environment:
     def seen(self) -> bool:
         """Whether any frame saw the outside at all."""
         return bool(self.observations.any())
+
+    @staticmethod
+    def dark() -> Environment:
+        """No light from outside."""
+        return Environment(np.zeros((1, 2, 3), np.float32), np.zeros((1, 2), np.int32))
+
+    @staticmethod
+    def only(zone: np.ndarray) -> Environment:
+        """Radiance as given by the weights `zone` ((h, 2h) float32), in all channels alike."""
+        return Environment(np.repeat(zone[..., None], 3, -1).astype(np.float32), np.zeros(zone.shape, np.int32))
+
+    def unseen_zones(self) -> list[np.ndarray]:
+        """Weights ((h, 2h) float32) of the unseen directions above and below the horizon.
+
+        0 where a frame saw the direction, towards 1 the further it lies from those: near them the neighbours'
+        radiance is as good a guess as any.
+        """
+        unseen = self.observations == 0
+        height, width = unseen.shape
+        wide = np.concatenate([unseen] * 3, 1)  # directions wrap around
+        angle = ndimage.distance_transform_edt(wide)[:, width : 2 * width] * (np.pi / height)
+        weight = (1 - np.exp(-angle / NEAR)).astype(np.float32)
+        above = (np.arange(height) >= height / 2)[:, None]
+        zones = [np.where(side, weight, np.float32(0)) for side in (above, ~above)]
+        return [zone for zone in zones if zone.any()]
+
+    def zone_mean(self, zone: np.ndarray) -> np.ndarray:
+        """Mean radiance over a zone, weighted by solid angle: (3,) float32."""
+        height = len(zone)
+        rows = np.cos((np.arange(height) + 0.5) / height * np.pi - np.pi / 2)[:, None] * zone
+        return (self.radiance * rows[..., None]).sum((0, 1)) / max(rows.sum(), 1e-12)
+
+    def with_zone(self, zone: np.ndarray, radiance: np.ndarray) -> Environment:
+        """The same map with `radiance` ((3,)) mixed in by the weights of a zone."""
+        mixed = self.radiance * (1 - zone[..., None]) + zone[..., None] * radiance
+        return Environment(mixed.astype(np.float32), self.observations)
 
     def __call__(self, directions: np.ndarray) -> np.ndarray:
         """Radiance from unit `directions` ((n, 3) float32, away from the room): (n, 3) float32."""

@@ -25,11 +25,12 @@ class LightField:
         self.radiance = np.ascontiguousarray(radiance, np.float32)
         self._fallback = element_of_triangle(mesh, atlas)
 
-    def with_radiance(self, radiance: np.ndarray) -> LightField:
-        """The same room with another L_d."""
+    def with_light(self, radiance: np.ndarray, environment: Environment | None = None) -> LightField:
+        """The same room with another L_d and, if given, another environment."""
         other = object.__new__(LightField)
         other.__dict__.update(self.__dict__)
         other.radiance = np.ascontiguousarray(radiance, np.float32)
+        other.environment = environment or self.environment
         return other
 
     def elements(self, hits: Hits) -> np.ndarray:

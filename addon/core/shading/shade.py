@@ -20,7 +20,8 @@ from .environment import Environment
 from .field import LightField
 from .interpolate import interpolated
 from .irradiance import direct, gather, uniform
-from .lamps import Lamp, find_lamps
+from .lamps import Lamp
+from .unseen_light import find_light
 
 ELEMENTS_AT_ONCE = 1 << 13
 FINEST_TEXELS = 2.0
@@ -41,6 +42,10 @@ class Shading:
         L_d with everything filled in: what the light field shows at each element. Lamps have their own radiance.
     albedo : Albedo
     lamps : tuple of Lamp
+    environment : Environment
+        With the unseen sky solved for where it could be.
+    notes : tuple of str
+        What was solved for, one sentence each.
     points : int
         Places at which the hemisphere was gathered.
     """
@@ -50,6 +55,8 @@ class Shading:
     radiance: np.ndarray
     albedo: Albedo
     lamps: tuple[Lamp, ...]
+    environment: Environment
+    notes: tuple[str, ...]
     points: int
 
 
@@ -164,16 +171,18 @@ def shade(
     finest = FINEST_TEXELS * float(np.sqrt(np.median(atlas.area)))
     how = {"sampler": sampler, "threads": threads, "seed": seed}
 
-    # 1. Lamps. What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
+    # 1. All light. What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
     field = LightField(mesh, atlas, scene, fill_unseen(atlas, lit_diffuse.radiance, seen), environment)
     good = seen & (((lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= ENOUGH)) | (lit_diffuse.tier == SATURATED))
-    lamps = find_lamps(field, normals, good if good.any() else seen, seen_share, instances, seed)
+    unseen = [object_id for object_id, share in seen_share.items() if share == 0]
+    light = find_light(field, normals, good if good.any() else seen, unseen, instances, seed)
+    lamps = light.lamps
     radiance = field.radiance.copy()
     for lamp in lamps:
         own = atlas.object_id == lamp.object_id
         radiance[own & ~seen if lamp.seen else own] = lamp.radiance
     emitters = {lamp.object_id for lamp in lamps}
-    field = field.with_radiance(radiance)
+    field = field.with_light(radiance, light.environment)
 
     # 2. What nobody saw reflects like the rest of its object under the light that reaches it: a rough first pass.
     dark = np.flatnonzero(~seen & ~np.isin(atlas.object_id, list(emitters)))
@@ -187,7 +196,7 @@ def shade(
         rho, valid = quotient(lit_diffuse.radiance, everywhere)
         guess = fill(atlas, rho, valid, class_of, emitters)
         radiance[dark] = guess.rho[dark] * everywhere[dark] / np.float32(np.pi)
-        field = field.with_radiance(radiance)
+        field = field.with_light(radiance)
 
     # 3. The real thing.
     E, escaped, points = irradiance(
@@ -196,4 +205,4 @@ def shade(
     )  # fmt: skip
     rho, valid = quotient(lit_diffuse.radiance, E)
     albedo = fill(atlas, rho, valid & seen, class_of, emitters)
-    return Shading(E, escaped, field.radiance, albedo, tuple(lamps), points)
+    return Shading(E, escaped, field.radiance, albedo, lamps, light.environment, light.notes, points)

@@ -1,0 +1,342 @@
+"""The stages in their order. The only place that knows all of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .capture.model import Capture, Frame, Mesh, Pixels
+from .capture.read import MAX_BAD_SHARE, fingerprint, read_pixels
+from .errors import BadInputError
+from .lit_diffuse.accumulate import LitDiffuse, accumulate
+from .material import METAL, SPECULAR, ObjectMaterial
+from .memory import peak_memory
+from .progress import Progress
+from .settings import Settings
+from .shading.albedo import Albedo, fill, quotient
+from .shading.environment import Environment, EnvironmentAccumulator
+from .shading.field import LightField
+from .shading.lamps import Lamp
+from .shading.shade import Shading, shade
+from .specular.reflect import Specular, fit_specular
+from .specular.samples import SampleCollector, Samples
+from .store import Store, key
+from .surface.build import Surface, build_surface, from_uv, turned
+
+CODE = 1
+"""Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
+
+
+class Recovery:
+    """One run over one capture. Each stage is computed when it is first asked for, or taken from the store.
+
+    Parameters
+    ----------
+    capture : Capture
+    store : Store
+    settings : Settings
+    progress : Progress
+    unwrap : callable(Mesh, int) -> (t, 3, 2) float32
+        Lays the mesh out in an atlas of so many texels; Blender's, in the extension.
+    """
+
+    def __init__(
+        self,
+        capture: Capture,
+        store: Store,
+        settings: Settings,
+        progress: Progress,
+        unwrap: Callable[[Mesh, int], np.ndarray],
+    ):
+        self.capture, self.store, self.settings, self.progress = capture, store, settings, progress
+        self._unwrap = unwrap
+        self._done: dict[str, Any] = {}
+        self._log: dict[str, dict[str, Any]] = {}
+        self._bad_frames: list[str] = []
+
+    # Each stage's key: the stage before, and the settings that it heeds.
+
+    @cached_property
+    def _keys(self) -> dict[str, str]:
+        s = self.settings
+        surface = key("surface", CODE, fingerprint(self.capture), s.texel_size, s.atlas_size)
+        lit = key("lit_diffuse", surface, s.median, s.frame_order, s.seed)
+        shading = key(
+            "shading", lit, s.shading, s.shading_rays, s.emitter_rays, s.interpolate, s.seed
+        )
+        specular = key("specular", shading, s.specular, s.specular_rays, s.refine)
+        return {"surface": surface, "lit_diffuse": lit, "shading": shading, "specular": specular}
+
+    def _stage(self, name: str, load: Callable[[dict, dict], Any], compute: Callable[[], tuple[Any, dict, dict]]) -> Any:
+        """The value of a stage: kept, stored, or computed now and stored."""
+        if name in self._done:
+            return self._done[name]
+        started = time.monotonic()
+        stored = self.store.load(name, self._keys[name])
+        self.progress.stage(name)
+        if stored is not None:
+            meta = self.store.load_meta(name, self._keys[name]) or {}
+            value = load(stored, meta)
+            self._log[name] = {"seconds": round(time.monotonic() - started, 2), "stored": True}
+        else:
+            value, arrays, meta = compute()
+            self.store.save(name, self._keys[name], arrays, meta)
+            self._log[name] = {"seconds": round(time.monotonic() - started, 2), "stored": False}
+        self._log[name]["peak_memory_bytes"] = peak_memory()
+        self.progress.done(stored=stored is not None)
+        self._done[name] = value
+        return value
+
+    def surface(self) -> Surface:
+        """Surface elements over the room."""
+        capture = self.capture
+
+        def compute():
+            found = build_surface(
+                capture.mesh,
+                [frame.camera for frame in capture.frames],
+                self._unwrap,
+                self.settings.texel_size,
+                self.settings.atlas_size,
+            )
+            sign = np.where((found.mesh.triangles == capture.mesh.triangles).all(1), 1, -1).astype(np.int8)
+            return found, {"uv": found.uv, "sign": sign}, {"size": found.atlas.size}
+
+        def load(arrays, meta):
+            facing = dataclasses.replace(
+                capture.mesh, triangles=turned(capture.mesh.triangles, arrays["sign"]), uv=None
+            )
+            return from_uv(capture.mesh, facing, arrays["sign"], arrays["uv"], int(meta["size"]))
+
+        return self._stage("surface", load, compute)
+
+    def _read(self, frame: Frame) -> Pixels:
+        """A frame's pixels; one that turns out damaged counts as blind, unless too many are."""
+        try:
+            return read_pixels(frame)
+        except BadInputError as error:
+            self._bad_frames.append(f"{error} It was left out.")
+            if len(self._bad_frames) > MAX_BAD_SHARE * len(self.capture.frames):
+                raise BadInputError(
+                    f"{len(self._bad_frames)} of {len(self.capture.frames)} frames can't be read; the first: {error}"
+                ) from error
+            shape = (frame.camera.height, frame.camera.width)
+            return Pixels(np.zeros((*shape, 3), np.float32), np.zeros(shape, bool), np.zeros(shape, bool))
+
+    def _accumulated(self) -> tuple[LitDiffuse, Environment, Samples]:
+        """What the one pass over all frames gives."""
+        surface = self.surface()
+        frames = self.capture.frames
+
+        def compute():
+            sky = EnvironmentAccumulator(float(np.median([1 / f.camera.fx for f in frames])))
+            kept = SampleCollector(surface.atlas, len(frames), self.settings.seed)
+
+            def also(index, view, pixels, seen):
+                sky.add(view, pixels)
+                kept.add(index, seen)
+
+            lit = accumulate(
+                surface.mesh, surface.atlas, surface.scene, frames, self._read,
+                median=self.settings.median, order=self.settings.frame_order, seed=self.settings.seed,
+                threads=self.settings.threads, folder=self.store.folder, also=also, progress=self.progress,
+            )  # fmt: skip
+            if not lit.seen.any():
+                raise BadInputError(
+                    "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; check the frames."
+                )
+            value = (lit, sky.result(), kept.result())
+            arrays = {f"{i}.{f.name}": getattr(v, f.name) for i, v in enumerate(value) for f in dataclasses.fields(v)}
+            return value, arrays, {"bad_frames": self._bad_frames}
+
+        def load(arrays, meta):
+            self._bad_frames = list(meta.get("bad_frames", ()))
+            kinds = (LitDiffuse, Environment, Samples)
+            return tuple(
+                kind(**{f.name: arrays[f"{i}.{f.name}"] for f in dataclasses.fields(kind)})
+                for i, kind in enumerate(kinds)
+            )
+
+        return self._stage("lit_diffuse", load, compute)
+
+    def lit_diffuse(self) -> LitDiffuse:
+        """L_d of every element."""
+        return self._accumulated()[0]
+
+    def environment(self) -> Environment:
+        """Light from outside, as the frames saw it."""
+        return self._accumulated()[1]
+
+    def samples(self) -> Samples:
+        """Observations kept one by one for the specular fit."""
+        return self._accumulated()[2]
+
+    def shading(self) -> Shading:
+        """Lamps, irradiance and albedo."""
+        surface, lit, sky = self.surface(), self.lit_diffuse(), self.environment()
+        s = self.settings
+
+        def compute():
+            found = shade(
+                surface.mesh, self.capture.instances, surface.atlas, surface.scene, lit, sky,
+                sampler=s.shading, rays=s.shading_rays, emitter_rays=s.emitter_rays, interpolate=s.interpolate,
+                threads=s.threads, seed=s.seed, progress=self.progress,
+            )  # fmt: skip
+            arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "radiance")}
+            arrays |= {"rho": found.albedo.rho, "origin": found.albedo.origin}
+            arrays |= {"sky": found.environment.radiance, "sky_seen": found.environment.observations}
+            meta = {
+                "above_one": found.albedo.above_one,
+                "points": found.points,
+                "notes": list(found.notes),
+                "lamps": [dataclasses.asdict(lamp) | {"radiance": lamp.radiance.tolist()} for lamp in found.lamps],
+            }
+            return found, arrays, meta
+
+        def load(a, meta):
+            lamps = tuple(Lamp(**(d | {"radiance": np.float32(d["radiance"])})) for d in meta["lamps"])
+            return Shading(
+                a["irradiance"], a["escaped"], a["radiance"], Albedo(a["rho"], a["origin"], meta["above_one"]),
+                lamps, Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), meta["points"],
+            )  # fmt: skip
+
+        return self._stage("shading", load, compute)
+
+    def specular(self) -> Specular:
+        """phi, psi and the model of every object."""
+        surface, lit, shading = self.surface(), self.lit_diffuse(), self.shading()
+        s = self.settings
+
+        def compute():
+            field = LightField(surface.mesh, surface.atlas, surface.scene, shading.radiance, shading.environment)
+            found = fit_specular(
+                surface.mesh, self.capture.instances, field, lit, shading.lamps, self.samples(),
+                [frame.name for frame in self.capture.frames],
+                way=s.specular, rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
+                progress=self.progress,
+            )  # fmt: skip
+            return found, {"specular": found.specular}, {"materials": [dataclasses.asdict(m) for m in found.materials]}
+
+        def load(arrays, meta):
+            def one(d):
+                return ObjectMaterial(**{k: tuple(v) if isinstance(v, list) else v for k, v in d.items()})
+
+            return Specular(tuple(one(d) for d in meta["materials"]), arrays["specular"])
+
+        return self._stage("specular", load, compute)
+
+    def materials(self) -> list[ObjectMaterial]:
+        """One description for each instance."""
+        return list(self.specular().materials)
+
+    @cached_property
+    def albedo(self) -> Albedo:
+        """The final albedo: of L_d less its specular part."""
+        lit, shading = self.lit_diffuse(), self.shading()
+        specular = self.specular().specular
+        if not specular.any():
+            return shading.albedo
+        rho, valid = quotient(np.maximum(lit.radiance - specular, 0), shading.irradiance)
+        class_of = {i.object_id: i.class_name for i in self.capture.instances}
+        return fill(self.surface().atlas, rho, valid & lit.seen, class_of, {lamp.object_id for lamp in shading.lamps})
+
+    def base_color(self) -> np.ndarray:
+        """Base Color of each element for Cycles' Principled, (n, 3) float32."""
+        from .specular.compensation import base_color
+
+        atlas = self.surface().atlas
+        color = self.albedo.rho.copy()
+        for m in self.materials():
+            own = atlas.object_id == m.object_id
+            if m.model == METAL:
+                color[own] = m.f0
+            elif m.model == SPECULAR:
+                color[own] = base_color(color[own], m.psi, m.phi)
+        return color
+
+    def median_radiance(self) -> float:
+        """Median of L_d over all that was seen: what a picture's exposure is set by."""
+        lit = self.lit_diffuse()
+        return float(np.median(lit.radiance[lit.seen]))
+
+    def write_images(self) -> None:
+        """The result folder's images and materials.json."""
+        atlas, lit, shading = self.surface().atlas, self.lit_diffuse(), self.shading()
+        spread = (lit.upper - lit.lower).mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), 1e-6)
+        coverage = np.stack([lit.count, np.nan_to_num(spread), self.albedo.origin], -1).astype(np.float32)
+        images = {
+            "albedo": self.albedo.rho,
+            "base_color": self.base_color(),
+            "shading": shading.irradiance,
+            "lit_diffuse": np.where(lit.seen[:, None], lit.radiance, 0).astype(np.float32),
+            "coverage": coverage,
+        }
+        for done, (name, values) in enumerate(images.items()):
+            self.store.write_exr(f"{name}.exr", atlas.image(values)[::-1])
+            self.progress.update(0.5 * done / len(images))
+        self.store.write_exr("environment.exr", shading.environment.radiance[::-1])
+        self.store.write_json("materials.json", {"objects": [dataclasses.asdict(m) for m in self.materials()]})
+
+    def report(self) -> dict[str, Any]:
+        """What report.json holds so far: stages, settings, figures and warnings."""
+        result: dict[str, Any] = {
+            "capture": self.capture.root.name,
+            "settings": dataclasses.asdict(self.settings),
+            "stages": self._log,
+            "warnings": list(self.capture.warnings) + self._bad_frames,
+        }
+        figures: dict[str, Any] = {"frames": len(self.capture.frames), "triangles": len(self.capture.mesh.triangles)}
+        if "surface" in self._done:
+            surface = self.surface()
+            figures |= {"atlas_size": surface.atlas.size, "elements": len(surface.atlas), "texel_metres": surface.texel_size}
+        if "lit_diffuse" in self._done:
+            self._report_lit(figures, result["warnings"])
+        if "shading" in self._done:
+            self._report_shading(figures, result["warnings"])
+        if "specular" in self._done:
+            models = [m.model for m in self.materials()]
+            figures["models"] = {model: models.count(model) for model in sorted(set(models))}
+        result["figures"] = figures
+        return result
+
+    def _report_lit(self, figures: dict[str, Any], warnings: list[str]) -> None:
+        lit, atlas = self.lit_diffuse(), self.surface().atlas
+        area = atlas.area.sum()
+        figures["unseen_share"] = float(atlas.area[~lit.seen].sum() / area)
+        figures["observations_median"] = float(np.median(lit.count[lit.seen]))
+        seen = np.bincount(atlas.object_id, lit.seen, int(atlas.object_id.max()) + 1)
+        unseen = [i for i in self.capture.instances if i.object_id >= len(seen) or seen[i.object_id] == 0]
+        if unseen:
+            names = ", ".join(f"{i.class_name} ({i.object_id})" for i in unseen[:5])
+            more = f" and {len(unseen) - 5} more" if len(unseen) > 5 else ""
+            warnings.append(f"No frame sees {names}{more}; their materials are taken from their class or the room.")
+        if not self.environment().seen:
+            figures["outside"] = "no frame sees past the mesh"
+
+    def _report_shading(self, figures: dict[str, Any], warnings: list[str]) -> None:
+        shading, lit = self.shading(), self.lit_diffuse()
+        escaped = float(shading.escaped[lit.seen].mean())
+        figures |= {
+            "escaped_share": escaped,
+            "albedo_above_one_share": shading.albedo.above_one,
+            "shading_points": shading.points,
+            "lamps": [lamp.object_id for lamp in shading.lamps],
+        }
+        warnings += [f"Lamp {lamp.object_id}: {lamp.note}" for lamp in shading.lamps if lamp.note]
+        warnings += shading.notes
+        if shading.albedo.above_one > 0.05:
+            warnings.append(
+                f"{shading.albedo.above_one:.0%} of the seen surface would need an albedo above 1: light is missing "
+                "(an unseen lamp, a clipped one, or a hole that was no window)."
+            )
+        if escaped > 0.02 and not self.environment().seen:
+            warnings.append(
+                f"{escaped:.0%} of the rays leave the mesh, but no frame sees what lies there; it was taken as dark."
+            )
+
+

@@ -1,0 +1,249 @@
+"""Light that no frame looked at, solved for from what it throws onto the surfaces that the frames do see.
+
+A lamp behind the camera, or the sky above what the windows showed, still lights the room. For a trial radiance s the
+albedos would be pi L_d / (E + s G), G being the irradiance thrown at radiance 1. Albedo varies little within an object,
+light a lot: the s under which log albedo varies least within the objects is the one taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from ..capture.model import Instance
+from .emitters import LUMINANCE, bright_triangles
+from .environment import Environment
+from .field import LightField
+from .irradiance import direct, gather
+from .lamps import Lamp, find_seen
+
+SAMPLES = 10000
+"""Elements that the test looks at, spread evenly over the objects."""
+MIN_GAIN = 0.03
+"""A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share."""
+CLASS_AGREES = 0.25
+"""If the solved luminance lies this near (relative) to a seen lamp of the same class, that lamp's radiance is taken."""
+MIN_SKY = 0.01
+"""Part of the received light below which a part of the sky can't be solved for; its neighbours' radiance stays."""
+SWEEPS = 2
+RAYS, EMITTER_RAYS = 256, 32
+
+
+@dataclass(frozen=True)
+class Light:
+    """All light of the room, as far as it can be known.
+
+    Attributes
+    ----------
+    lamps : tuple of Lamp
+    environment : Environment
+        With the unseen parts of the sky solved for where they could be.
+    notes : tuple of str
+        What was solved, one sentence each.
+    """
+
+    lamps: tuple[Lamp, ...]
+    environment: Environment
+    notes: tuple[str, ...]
+
+
+@dataclass
+class _Sample:
+    """m elements with a good L_d; `received` is E from all light known so far and grows as light is found."""
+
+    element: np.ndarray
+    object_id: np.ndarray
+    radiance: np.ndarray
+    received: np.ndarray
+
+    def __post_init__(self):
+        ids, self.group = np.unique(self.object_id, return_inverse=True)
+        count = np.bincount(self.group, minlength=len(ids))
+        start = np.concatenate([[0], np.cumsum(count)[:-1]])
+        self._middle = start + count // 2
+
+    def spread(self, log_albedo: np.ndarray) -> float:
+        """Mean absolute deviation of log albedo ((m,)) from its object's median; outliers count at most 1."""
+        order = np.lexsort((log_albedo, self.group))
+        median = log_albedo[order[self._middle]]
+        return float(np.minimum(np.abs(log_albedo - median[self.group]), 1).mean())
+
+    def best(self, sent: np.ndarray, received: np.ndarray, thrown: np.ndarray) -> tuple[float, float, float] | None:
+        """The radiance s that explains best what is `sent`, with the spread before and after; None if unbounded."""
+        if not (thrown > 0).any():
+            return None
+        sent = np.log(np.maximum(sent, 1e-9))
+
+        def cost(log_s: float) -> float:
+            return self.spread(sent - np.log(received + np.exp(log_s) * thrown + 1e-12))
+
+        # The scale to search around: where the trial light gives as much as all known light together.
+        grid = np.log(max(received.mean(), 1e-9) / thrown.mean()) + np.linspace(-5, 4, 37)
+        costs = [cost(x) for x in grid]
+        at = int(np.argmin(costs))
+        if at == len(grid) - 1:
+            return None  # more is always better: this says nothing about the light
+        found = minimize_scalar(cost, bounds=(grid[max(at - 1, 0)], grid[at + 1]), method="bounded")
+        return float(np.exp(found.x)), self.spread(sent - np.log(received + 1e-12)), float(found.fun)
+
+
+def _pick(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:
+    """At most `SAMPLES` good elements, evenly over the objects that have them."""
+    rng = np.random.default_rng(seed)
+    element = np.flatnonzero(good)
+    objects = field.atlas.object_id[element]
+    each = max(SAMPLES // max(len(np.unique(objects)), 1), 50)
+    chosen = []
+    for object_id in np.unique(objects):
+        own = element[objects == object_id]
+        chosen.append(own if len(own) <= each else rng.choice(own, each, replace=False))
+    return np.sort(np.concatenate(chosen)) if chosen else np.zeros(0, np.int64)
+
+
+def _irradiance(field: LightField, normals: np.ndarray, element: np.ndarray, seed: int) -> np.ndarray:
+    """E of a few elements by both estimators, (m, 3) float64."""
+    bright = bright_triangles(field)
+    position, normal = field.atlas.position[element], field.atlas.normal[element]
+    around, _, _ = gather(field, bright, normals, position, normal, RAYS, EMITTER_RAYS, seed)
+    return (around + direct(field, bright, position, normal, RAYS, EMITTER_RAYS, seed + 1)).astype(np.float64)
+
+
+def _thrown_by_object(field: LightField, normals, element, object_id: int, seed: int) -> np.ndarray:
+    """E from one object at radiance 1 and nothing else, (m,) float64."""
+    alone = np.repeat((field.atlas.object_id == object_id)[:, None], 3, 1).astype(np.float32)
+    lit = field.with_light(alone, Environment.dark())
+    return _irradiance(lit, normals, element, seed)[:, 0]
+
+
+def find_light(
+    field: LightField,
+    normals: np.ndarray,
+    good: np.ndarray,
+    unseen_objects: list[int],
+    instances: tuple[Instance, ...],
+    seed: int = 0,
+) -> Light:
+    """Lamps seen and unseen, and the sky.
+
+    Parameters
+    ----------
+    field : LightField
+        With L_d filled in; what nobody saw must be dark in it, or it would hide the light looked for.
+    normals : (t, 3) float32
+    good : (n,) bool
+        Elements whose L_d rests on enough clean observations, saturated ones included.
+    unseen_objects : list of int
+        Objects of which no frame saw anything.
+    """
+    environment = field.environment
+    element = _pick(field, good, seed)
+    if not len(element):
+        return Light((), environment, ())
+    atlas = field.atlas
+    zones = environment.unseen_zones() if environment.seen else []
+    known = environment
+    for zone in zones:
+        known = known.with_zone(zone, np.zeros(3, np.float32))
+    received = _irradiance(field.with_light(field.radiance, known), normals, element, seed)
+    dark = np.zeros_like(field.radiance)
+    thrown_sky = [
+        _irradiance(field.with_light(dark, Environment.only(zone)), normals, element, seed)[:, 0] for zone in zones
+    ]
+    guess = [environment.zone_mean(zone).astype(np.float64) for zone in zones]
+    filled = received + sum(G[:, None] * s for G, s in zip(thrown_sky, guess, strict=True))
+    seen = find_seen(atlas.object_id[element], field.radiance[element], filled)
+    lit = ~np.isin(atlas.object_id[element], [lamp.object_id for lamp in seen])
+    if lit.sum() < 30:
+        return Light(tuple(seen), environment, ())
+    sample = _Sample(element[lit], atlas.object_id[element[lit]], field.radiance[element[lit]].astype(np.float64), filled[lit])
+    thrown_sky = [G[lit] for G in thrown_sky]
+    thrown = {i: _thrown_by_object(field, normals, sample.element, i, seed) for i in unseen_objects}
+
+    notes: list[str] = []
+    radiances = [g.copy() for g in guess]
+    lamps: list[Lamp] = []
+    for sweep in range(SWEEPS):
+        lamps = _solve_lamps(sample, thrown, instances, seen, radiances, thrown_sky, received[lit])
+        notes = _solve_sky(sample, lamps, thrown, radiances, guess, thrown_sky, received[lit])
+        if not zones or sweep == SWEEPS - 1:
+            break
+    for zone, radiance in zip(zones, radiances, strict=True):
+        environment = environment.with_zone(zone, radiance.astype(np.float32))
+    # With all light known, what looked like a lamp for want of it does so no more.
+    everything = _irradiance(
+        field.with_light(_lit_by(field, lamps), environment), normals, element, seed
+    )
+    sure = find_seen(atlas.object_id[element], field.radiance[element], everything)
+    return Light(tuple(sure) + tuple(lamps), environment, tuple(notes))
+
+
+def _lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
+    """L_d with the radiance of lamps put in, (n, 3) float32."""
+    radiance = field.radiance.copy()
+    for lamp in lamps:
+        radiance[field.atlas.object_id == lamp.object_id] = lamp.radiance
+    return radiance
+
+
+def _all_light(base, lamps, thrown, radiances, thrown_sky, without: int = -1) -> np.ndarray:
+    """E from everything, (m, 3), but for one zone of the sky."""
+    total = base.copy()
+    for lamp in lamps:
+        total += thrown[lamp.object_id][:, None] * lamp.radiance
+    for i, (G, s) in enumerate(zip(thrown_sky, radiances, strict=True)):
+        if i != without:
+            total += G[:, None] * s
+    return total
+
+
+def _solve_lamps(sample: _Sample, thrown, instances, seen, radiances, thrown_sky, base) -> list[Lamp]:
+    """Unseen lamps, the one that explains most first; none once the gain falls below `MIN_GAIN`."""
+    class_of = {i.object_id: i.class_name for i in instances}
+    sent = sample.radiance @ LUMINANCE
+    lamps: list[Lamp] = []
+    left = dict(thrown)
+    while left:
+        received = _all_light(base, lamps, thrown, radiances, thrown_sky) @ LUMINANCE
+        found = {i: sample.best(sent, received, G) for i, G in left.items()}
+        found = {i: f for i, f in found.items() if f is not None and f[2] < (1 - MIN_GAIN) * f[1]}
+        if not found:
+            break
+        object_id = min(found, key=lambda i: found[i][2])
+        lamps.append(_coloured(object_id, *found[object_id], class_of, seen, sample.received))
+        del left[object_id]
+    return lamps
+
+
+def _coloured(object_id, s, before, after, class_of, seen, received) -> Lamp:
+    """Give a solved luminance its colour: a seen lamp's of the same class if they agree, else that of the light."""
+    how = f"No frame sees it; solved from the light it throws (spread of log albedo {before:.3f} to {after:.3f})"
+    alike = [lamp for lamp in seen if class_of.get(lamp.object_id) == class_of.get(object_id)]
+    for lamp in alike:
+        if abs(s / float(lamp.radiance @ LUMINANCE) - 1) < CLASS_AGREES:
+            note = f"{how}: {s:.3g}, near the seen lamp {lamp.object_id} of its class, whose radiance it takes."
+            return Lamp(object_id, lamp.radiance, False, note)
+    white = np.mean([lamp.radiance for lamp in alike or seen], 0) if seen else received.mean(0)
+    return Lamp(object_id, (s * white / max(float(white @ LUMINANCE), 1e-12)).astype(np.float32), False, how + ".")
+
+
+def _solve_sky(sample: _Sample, lamps, thrown, radiances, guess, thrown_sky, base) -> list[str]:
+    """Radiance of the sky's unseen zones, channel by channel, in place; one sentence for each solved zone."""
+    notes = []
+    for i, G in enumerate(thrown_sky):
+        others = _all_light(base, lamps, thrown, radiances, thrown_sky, without=i)
+        if (G[:, None] * guess[i]).mean() < MIN_SKY * others.mean():
+            continue
+        solved = [sample.best(sample.radiance[:, c], others[:, c], G) for c in range(3)]
+        if any(found is None for found in solved):
+            continue
+        # Far from all that was seen of the sky the solution is not believed: it may stand for something else.
+        top = 3 * guess[i].max()
+        radiances[i] = np.minimum([found[0] for found in solved], top)
+        notes.append(
+            f"Part {i + 1} of the sky that no frame sees was solved from the light it throws: radiance "
+            f"{', '.join(f'{x:.3g}' for x in radiances[i])} (its seen neighbours: {', '.join(f'{x:.3g}' for x in guess[i])})."
+        )
+    return notes
+

@@ -1,0 +1,111 @@
+"""The surface stage: normals towards the cameras, the atlas's resolution, the surface elements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..capture.model import Camera, Mesh
+from ..errors import BadInputError
+from .atlas import Atlas
+from .elements import make_atlas, triangle_geometry, uv_scale
+from .orientation import seen_sides
+from .rays import RayScene
+
+TEXELS_A_PIXEL = 1.3
+"""Texels along the edge of what a pixel covers: a little finer than the frames, so that a median over shifted views
+keeps their detail."""
+EXPECTED_FILL = 0.55
+"""Share of the atlas that islands usually cover; only the unwrapping's margin depends on it."""
+SMALLEST, STEP = 64, 64
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The room's surface, ready for the stages.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The capture's, with windings turned so that normals face the cameras.
+    atlas : Atlas
+    scene : RayScene
+    uv : (t, 3, 2) float32
+        The atlas coordinates in the corner order of the capture's own mesh.
+    texel_size : float
+        Edge of a surface element in metres.
+    """
+
+    mesh: Mesh
+    atlas: Atlas
+    scene: RayScene
+    uv: np.ndarray
+    texel_size: float
+
+
+def turned(corners: np.ndarray, sign: np.ndarray) -> np.ndarray:
+    """Per-corner data ((t, 3, ...)) with the winding turned where `sign` is negative."""
+    result = corners.copy()
+    result[sign < 0] = corners[sign < 0][:, [0, 2, 1]]
+    return result
+
+
+def oriented(mesh: Mesh, cameras: Sequence[Camera]) -> tuple[Mesh, np.ndarray, float]:
+    """The mesh with normals towards the cameras, the sign of each triangle, and the frames' footprint in metres."""
+    normal, _ = triangle_geometry(mesh)
+    sign, footprint = seen_sides(mesh, normal, RayScene(mesh.vertices, mesh.triangles), cameras)
+    uv = None if mesh.uv is None else turned(mesh.uv, sign)
+    return replace(mesh, triangles=turned(mesh.triangles, sign), uv=uv), sign, footprint
+
+
+def atlas_size(area: float, texel: float, largest: int) -> int:
+    """Edge of an atlas whose texels measure `texel` metres on `area` square metres, within bounds."""
+    wanted = np.sqrt(area / EXPECTED_FILL) / max(texel, 1e-12)
+    return int(np.clip(np.ceil(wanted / STEP) * STEP, SMALLEST, largest // STEP * STEP))
+
+
+def build_surface(
+    mesh: Mesh,
+    cameras: Sequence[Camera],
+    unwrap: Callable[[Mesh, int], np.ndarray],
+    texel_size: float = 0.0,
+    largest: int = 4096,
+) -> Surface:
+    """Lay out the surface elements.
+
+    Parameters
+    ----------
+    unwrap : callable
+        Gives atlas coordinates ((t, 3, 2) float32 in [0, 1], no overlap) for a mesh and an atlas size in texels.
+    texel_size : float
+        Edge of an element in metres; 0 takes it from the frames' footprint.
+    largest : int
+        Upper bound of the atlas's edge.
+
+    Raises
+    ------
+    BadInputError
+        No camera looks at the mesh.
+    """
+    facing, sign, footprint = oriented(mesh, cameras)
+    if footprint <= 0:
+        raise BadInputError(
+            "No camera of the capture looks at the mesh; check that transforms.json and mesh.ply share one frame."
+        )
+    _, area = triangle_geometry(mesh)
+    texel = texel_size or footprint / TEXELS_A_PIXEL
+    size = atlas_size(float(area.sum()), texel, largest)
+    uv = unwrap(mesh, size)
+    # The islands' true scale sets the size that makes a texel as large as wished.
+    scale = uv_scale(mesh, uv)
+    size = int(np.clip(np.ceil(1 / max(texel * scale, 1e-12) / STEP) * STEP, SMALLEST, largest // STEP * STEP))
+    return from_uv(mesh, facing, sign, uv, size)
+
+
+def from_uv(mesh: Mesh, facing: Mesh, sign: np.ndarray, uv: np.ndarray, size: int) -> Surface:
+    """The surface for a known layout."""
+    atlas = make_atlas(facing, turned(uv, sign), size)
+    scale = uv_scale(mesh, uv)
+    return Surface(facing, atlas, RayScene(facing.vertices, facing.triangles), uv, 1 / max(scale * size, 1e-12))
