@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -121,12 +122,15 @@ def accumulate(
         view = view_frame(frame.camera, mesh, scene, normal)
         return int(index), view, pixels, observe(view, pixels, atlas, scene, groups.candidates(view))
 
-    for done, (index, view, pixels, seen) in enumerate(ordered_map(look, wanted, threads)):
-        for tier, estimator in estimators.items():
-            chosen = seen.tier == tier
-            estimator.add(seen.element[chosen], seen.radiance[chosen])
-        if also is not None:
-            also(index, view, pixels, seen)
-        if progress is not None:
-            progress.update(0.9 * (done + 1) / len(wanted))
-    return _choose({tier: estimator.result() for tier, estimator in estimators.items()})
+    with ExitStack() as stack:
+        for estimator in estimators.values():
+            stack.callback(estimator.close)
+        for done, (index, view, pixels, seen) in enumerate(ordered_map(look, wanted, threads)):
+            for tier, estimator in estimators.items():
+                chosen = seen.tier == tier
+                estimator.add(seen.element[chosen], seen.radiance[chosen])
+            if also is not None:
+                also(index, view, pixels, seen)
+            if progress is not None:
+                progress.update(0.9 * (done + 1) / len(wanted))
+        return _choose({tier: estimator.result() for tier, estimator in estimators.items()})

@@ -48,6 +48,9 @@ class Estimator(Protocol):
     def result(self) -> Summary:
         """The summary of all that was added."""
 
+    def close(self) -> None:
+        """Take back what was written to disk. May be called more than once."""
+
 
 class Mean:
     """Mean and standard deviation, by Welford's update in float32 means and float32 sums of squares."""
@@ -67,6 +70,9 @@ class Mean:
         deviation = np.sqrt(self._squares / np.maximum(self._n - 1, 1)[:, None])
         mean = np.where(self._n[:, None] > 0, self._mean, np.float32(np.nan))
         return Summary(mean, np.maximum(mean - deviation, 0), mean + deviation, self._n)
+
+    def close(self) -> None:
+        pass
 
 
 class PSquare:
@@ -127,6 +133,9 @@ class PSquare:
                 height[few, :, marker] = _between(values, share * (count - 1))
         height[self._n == 0] = np.nan
         return Summary(height[..., 2], height[..., 1], height[..., 3], self._n)
+
+    def close(self) -> None:
+        pass
 
 
 def _between(ordered: np.ndarray, rank: float) -> np.ndarray:
@@ -211,11 +220,14 @@ class Exact:
 
     def result(self) -> Summary:
         parts = list(ordered_map(self._summarise, range(self._buckets), self._threads))
-        self._held.clear()
-        self._folder.cleanup()
+        self.close()
         quartiles = np.concatenate([np.zeros((0, 3, 3), np.float32)] + [q for q, _ in parts])
         count = np.concatenate([np.zeros(0, np.int64)] + [c for _, c in parts]).astype(np.int32)
         return Summary(quartiles[..., 1], quartiles[..., 0], quartiles[..., 2], count)
+
+    def close(self) -> None:
+        self._held.clear()
+        self._folder.cleanup()
 
 
 def make_estimator(name: str, count: int, folder: Path | str | None = None, threads: int = 0) -> Estimator:
