@@ -29,7 +29,7 @@ class Albedo:
     origin : (n,) int8
         MEASURED, FILLED or NONE.
     above_one : float
-        Share of the measured elements whose quotient was above 1: an alarm that light is missing.
+        Share of the measured elements, lamps left out, whose quotient was above 1: an alarm that light is missing.
     """
 
     rho: np.ndarray
@@ -64,10 +64,10 @@ def fill(atlas: Atlas, rho: np.ndarray, valid: np.ndarray, class_of: dict[int, s
 
     An object without any takes the median of its class, else of the room.
     """
-    above = float((rho[valid].max(1) > MAX_ALBEDO).mean()) if valid.any() else 0.0
     result = np.clip(np.nan_to_num(rho), 0, MAX_ALBEDO)
     origin = np.where(valid, MEASURED, FILLED).astype(np.int8)
     reflecting = valid & ~np.isin(atlas.object_id, list(emitters))
+    above = float((rho[reflecting].max(1) > MAX_ALBEDO).mean()) if reflecting.any() else 0.0
     everywhere = np.median(result[reflecting], 0) if reflecting.any() else np.full(3, 0.5, np.float32)
     by_class: dict[str, list[np.ndarray]] = {}
     bare = []
