@@ -1,0 +1,108 @@
+"""Light from outside: directions and cells, what was seen, and what is filled in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon.core.lit_diffuse.visibility import view_frame
+from addon.core.shading.environment import Environment, EnvironmentAccumulator
+from tests.core.rooms import all_round, look_at, make_room, pixels_of, quad
+
+FAR_BELOW = quad((-1, -1, -50), (2, 0, 0), (0, 2, 0), 0)
+
+
+def centres(height: int) -> np.ndarray:
+    """Direction of each cell's middle by docs/architecture.md: u = 0.5 - atan2(y, x) / 2 pi, v = 0.5 + asin(z) / pi."""
+    v, u = ((np.arange(n) + 0.5) / n for n in (height, 2 * height))
+    azimuth, z = (0.5 - u) * 2 * np.pi, np.sin((v - 0.5) * np.pi)
+    ring = np.sqrt(1 - z**2)[:, None]
+    grid = [ring * np.cos(azimuth), ring * np.sin(azimuth), np.broadcast_to(z[:, None], (height, 2 * height))]
+    return np.stack(grid, -1).reshape(-1, 3).astype(np.float32)
+
+
+def add(accumulator, room, camera, image, **masks):
+    view = view_frame(camera, room.mesh, room.scene, room.normals)
+    accumulator.add(view, pixels_of(image, **masks))
+    return view
+
+
+@pytest.mark.parametrize("height", [16, 128])
+def test_each_cell_is_found_by_its_middle(height):
+    cells = np.arange(2 * height**2, dtype=np.float32)
+    radiance = np.repeat(cells[:, None], 3, 1).reshape(height, 2 * height, 3)
+    environment = Environment(radiance, np.ones((height, 2 * height), np.int32))
+    assert np.array_equal(environment(centres(height))[:, 0], cells)
+
+
+def test_known_directions():
+    """+X is the middle column, +Y a quarter to its left, +Z the top row; row 0 is the bottom."""
+    height = 8
+    radiance = np.zeros((height, 16, 3), np.float32)
+    radiance[..., 0], radiance[..., 1] = np.arange(16), np.arange(height)[:, None]
+    environment = Environment(radiance, np.ones((height, 16), np.int32))
+    x, y, right, up, down = environment(np.float32([[1, 0.1, 0.1], [0.1, 1, 0], [0.1, -1, 0], [0, 0, 1], [0, 0, -1]]))
+    assert x[0] == 7 and y[0] == 4 and right[0] == 11
+    assert up[1] == height - 1 and down[1] == 0
+    edge = environment(np.float32([[-1, 0, 0], [-1, -0.0, 0], [-1, 1e-7, 0], [-1, -1e-7, 0]]))
+    assert set(edge[:, 0]) <= {0, 15}
+
+
+def test_the_sky_seen_all_round_comes_back():
+    """A sky whose radiance is a linear function of the direction, seen by six cameras from the room's middle."""
+    room = make_room([FAR_BELOW])
+    accumulator = EnvironmentAccumulator(np.radians(100 / 48))
+    for camera in all_round((0, 0, 0), 48):
+        d = camera.directions(camera.pixel_centres())
+        add(accumulator, room, camera, (2 + d).reshape(48, 48, 3))
+    environment = accumulator.result()
+    height = len(environment.radiance)
+    assert environment.seen and (environment.observations > 0).mean() > 0.7  # at the poles cells are small
+    off = np.abs(environment(centres(height)) - 2 - centres(height))
+    cell = np.pi / height
+    assert off[environment.observations.ravel() > 0].max() < 2 * cell
+    assert off.mean() < cell / 2 and off.max() < 5 * cell
+
+
+def test_filling_in_never_leaves_darkness():
+    room = make_room([FAR_BELOW])
+    accumulator = EnvironmentAccumulator(0.02)
+    add(accumulator, room, look_at((0, 0, 0), (1, 0.3, 0.2), 24, 24, 30), np.full((24, 24, 3), [1.0, 2.0, 3.0]))
+    environment = accumulator.result()
+    assert (environment.observations == 0).mean() > 0.9  # most directions were not seen
+    assert np.allclose(environment.radiance, [1, 2, 3], rtol=1e-5)
+
+
+def test_filled_cells_take_after_their_neighbours():
+    room = make_room([FAR_BELOW])
+    accumulator = EnvironmentAccumulator(0.05)
+    for sign in (1, -1):
+        image = np.full((24, 24, 3), 5.0 if sign > 0 else 1.0)
+        add(accumulator, room, look_at((0, 0, 0), (0, sign, 0.3), 24, 24, 60), image)
+    environment = accumulator.result()
+    low, high = environment(np.float32([[0.3, -0.9, -0.1], [0.3, 0.9, -0.1]]))[:, 0]
+    assert low < 2 and high > 4
+    assert environment.radiance.min() >= 1 - 1e-5 and environment.radiance.max() <= 5 + 1e-5
+
+
+def test_what_hits_the_mesh_or_is_masked_is_not_sky():
+    board = quad((1, 0.3, -0.3), (0, -0.6, 0), (0, 0, 0.6), 0)
+    room = make_room([board])
+    accumulator = EnvironmentAccumulator(0.05)
+    camera = look_at((0, 0, 0), (1, 0, 0), 30, 30, 60)
+    image = np.ones((30, 30, 3))
+    valid = np.ones((30, 30), bool)
+    valid[:3], image[:3] = False, 77
+    view = view_frame(camera, room.mesh, room.scene, room.normals)
+    image[view.triangle >= 0] = 99
+    accumulator.add(view, pixels_of(image, valid))
+    assert (view.triangle >= 0).any()
+    environment = accumulator.result()
+    assert np.allclose(environment.radiance, 1)
+    assert environment.observations.sum() == ((view.triangle < 0) & view.clean & valid).sum()
+
+
+def test_a_closed_room_has_no_sky():
+    environment = EnvironmentAccumulator(0.1).result()
+    assert not environment.seen and not environment.radiance.any()
+    assert not environment(np.float32([[0, 0, 1]])).any()

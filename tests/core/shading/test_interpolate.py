@@ -1,0 +1,94 @@
+"""Interpolation between gathering points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon.core.shading.interpolate import interpolated
+from tests.core.rooms import box_sides, make_room
+
+FINEST = 0.1
+
+
+@pytest.fixture(scope="module")
+def atlas():
+    return make_room(box_sides((4, 3, 2.5)), 0.05).atlas
+
+
+def run(atlas, function, radius=1.5, finest=FINEST):
+    """Values over all elements, the points, and how often an element was asked for."""
+    asked = []
+
+    def evaluate(index):
+        asked.append(index)
+        return function(atlas.position[index], atlas.normal[index]), np.full(len(index), radius, np.float32)
+
+    value, points = interpolated(atlas.position, atlas.normal, evaluate, finest, 2)
+    assert np.array_equal(np.sort(np.concatenate(asked)), np.sort(points))
+    return value, points
+
+
+def test_a_constant_stays(atlas):
+    value, points = run(atlas, lambda p, n: np.tile(np.float32([1, 2, 3, 0.5]), (len(p), 1)))
+    assert np.allclose(value, [1, 2, 3, 0.5], rtol=1e-5) and value.shape == (len(atlas), 4)
+    assert len(points) < len(atlas) / 20
+    assert len(np.unique(points)) == len(points)
+
+
+def test_each_wall_keeps_its_own(atlas):
+    """Value by orientation: nothing leaks round the corner."""
+
+    def by_normal(p, n):
+        return (2 + n).astype(np.float32)
+
+    value, points = run(atlas, by_normal)
+    off = np.abs(value - by_normal(atlas.position, atlas.normal))
+    assert off.max() < 1e-4 and len(points) < len(atlas) / 10
+
+
+def test_a_linear_field_to_a_few_percent(atlas):
+    """Weights without gradients: the error is a part of the change over the distance between points."""
+
+    def linear(p, n):
+        return np.repeat(3 + p @ np.float32([[0.5], [-0.4], [0.3]]), 3, 1)
+
+    wanted = linear(atlas.position, None)
+    value, points = run(atlas, linear)
+    off = np.abs(value / wanted - 1)
+    assert np.sqrt((off**2).mean()) < 0.03 and np.percentile(off, 99) < 0.08
+    assert len(points) < len(atlas) / 10
+
+
+def test_a_shadow_edge_gets_more_points(atlas):
+    def edge(p, n):
+        return np.where(p[:, :1] > 1.7, np.float32(1), np.float32(0.1)).repeat(3, 1)
+
+    value, points = run(atlas, edge)
+    even, few = run(atlas, lambda p, n: np.ones((len(p), 3), np.float32))
+    x = atlas.position[:, 0]
+    along = np.abs(atlas.normal[:, 0]) < 0.5
+    near, far = (np.abs(x - 1.7) < 0.2) & along, (np.abs(x - 1.7) > 0.8) & along
+    asked = np.isin(np.arange(len(atlas)), points)
+    assert asked[near].mean() > 3 * asked[far].mean()
+    assert len(few) < len(points) < len(atlas) / 4
+    assert np.allclose(value[far], edge(atlas.position[far], None), rtol=1e-3)
+
+
+def test_close_walls_ask_for_more_points(atlas):
+    _, few = run(atlas, lambda p, n: np.ones((len(p), 3), np.float32), radius=4)
+    _, many = run(atlas, lambda p, n: np.ones((len(p), 3), np.float32), radius=0.4)
+    assert 4 * len(few) < len(many)
+
+
+def test_points_keep_their_distance(atlas):
+    """A lone close hit (R = 0) must not ask for every element."""
+    _, points = run(atlas, lambda p, n: np.ones((len(p), 3), np.float32), radius=1e-6, finest=0.2)
+    assert len(points) < 4 * 59 / 0.2**2 / 2
+
+
+def test_one_element():
+    one = np.zeros((1, 3), np.float32), np.float32([[0, 0, 1]])
+    ones = np.ones(1, np.float32)
+    value, points = interpolated(*one, lambda index: (np.float32([[7, 8]]), ones), 0.1, 1)
+    assert value.tolist() == [[7, 8]] and points.tolist() == [0]
