@@ -51,11 +51,11 @@ class ConsoleProgress:
         new, now = event.stage != self._stage, time.monotonic()
         ended = event.share >= 1.0 and (new or self._share < 1.0)
         due = now - self._said >= (TTY_SECONDS if self._tty else LOG_SECONDS)
-        self._stage, self._share = event.stage, event.share
+        self._stage, self._share = event.stage, event.share if new else max(event.share, self._share)
         if not (new or ended or due):
             return
         self._said = now
-        text = f"{event.stage.replace('_', ' '):<12} {event.share:4.0%}   whole {event.overall:4.0%}"
+        text = f"{event.stage.replace('_', ' '):<12} {self._share:4.0%}   whole {event.overall:4.0%}"
         if event.seconds_left is not None and event.overall < 1:
             text += f"   about {duration(event.seconds_left)} left"
         if self._tty:

@@ -19,13 +19,13 @@ from .images import array_image
 from .materials import BASE_COLOR, IOR, ROUGHNESS, SPECULAR_LEVEL, ior_of
 
 SIZES = {
-    "tiny": (8, 64, 48, 24),
-    "small": (24, 160, 120, 32),
+    "tiny": (10, 64, 48, 24),
+    "small": (36, 160, 120, 24),
     "large": (64, 320, 240, 128),
 }
 """Frames, width, height and samples for each pixel."""
 
-FORMAT = 2  # raise when the room or its rendering changes, so that an older capture is not taken for this one
+FORMAT = 3  # raise when the room or its rendering changes, so that an older capture is not taken for this one
 
 
 def render_capture(folder: Path, size: str = "small", progress: Progress | None = None) -> Path:

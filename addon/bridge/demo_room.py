@@ -245,7 +245,7 @@ def tour(frames: int) -> np.ndarray:
     middle = np.array([SIZE[0] / 2, SIZE[1] / 2 - 0.1, 0])
     eye = middle + np.stack([1.15 * np.cos(t), 0.8 * np.sin(t), 1.5 + 0.25 * np.sin(3 * t)], -1)
     gaze = t + np.pi + 0.9 * np.sin(2 * t + 0.4)
-    target = middle + np.stack([1.5 * np.cos(gaze), 1.3 * np.sin(gaze), 0.95 + 0.85 * np.sin(5 * t + 1)], -1)
+    target = middle + np.stack([1.5 * np.cos(gaze), 1.3 * np.sin(gaze), 1.2 + 1.15 * np.sin(5 * t + 1)], -1)
     return np.stack([look_at(a, b) for a, b in zip(eye, target)])
 
 

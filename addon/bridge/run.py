@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib.metadata
+import platform
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -10,17 +12,19 @@ import bpy
 
 from ..core.capture.read import read_capture
 from ..core.errors import BadInputError
+from ..core.memory import peak_memory
 from ..core.progress import Progress, ProgressEvent
 from ..core.recover import Recovery
 from ..core.settings import Settings
 from ..core.store import Store
+from ..version import VERSION
 from .apply import apply_recovery, import_capture, imported
 from .scene import write_scene
 from .unwrap import unwrap
 
-STAGES = ("surface", "lit_diffuse", "environment", "shading", "specular")
+STAGES = ("surface", "lit_diffuse", "shading", "specular")
 WRITE = "write"
-WEIGHTS = {"read": 1, "surface": 8, "lit_diffuse": 14, "environment": 1, "shading": 20, "specular": 25, WRITE: 5}
+WEIGHTS = {"read": 1, "surface": 8, "lit_diffuse": 14, "shading": 20, "specular": 25, WRITE: 5}
 """Rough cost of the stages, for the estimate of the time left."""
 
 
@@ -79,6 +83,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         warnings: tuple[str, ...] = ()
         if until == WRITE:
             progress.stage(WRITE)
+            writing = time.monotonic()
             recovery.write_images()
             progress.update(0.5)
             uv, materials = recovery.surface().uv, recovery.materials()
@@ -90,7 +95,18 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
                 warnings += apply_recovery(scene, capture, uv, materials, store.folder)
             progress.done()
         report = recovery.report()
-        report["warnings"] = [*report.get("warnings", ()), *warnings]
+        if until == WRITE:
+            report["stages"][WRITE] = {"seconds": round(time.monotonic() - writing, 2), "stored": False,
+                                       "peak_memory_bytes": peak_memory()}
+        report["warnings"] += warnings
+        report["versions"] = versions()
+        report["peak_memory_bytes"] = peak_memory()
         report["seconds"] = round(time.monotonic() - started, 2)
         store.write_json("report.json", report)
     return report
+
+
+def versions() -> dict[str, str]:
+    """What a report has to name so that a run can be repeated."""
+    packages = {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "embreex", "OpenEXR")}
+    return {"scan_relight": VERSION, "blender": bpy.app.version_string, "python": platform.python_version(), **packages}
