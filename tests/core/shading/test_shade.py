@@ -1,0 +1,95 @@
+"""From pictures to albedo in a box whose light is known by radiosity, an estimate that shares no code with ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from addon.core.capture.model import Frame
+from addon.core.lit_diffuse.accumulate import accumulate
+from addon.core.shading.albedo import MEASURED, NONE
+from addon.core.shading.shade import shade
+from tests.core.rooms import DARK, all_round, lit_box, make_room, picture, radiosity
+
+ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}
+LAMP = (10, 9, 8)
+
+
+@pytest.fixture(scope="module")
+def lit():
+    """A box with a large lamp, and what twelve frames of it give."""
+    room = make_room(lit_box(lamps=(((0.3, 0.7), (0.3, 0.7)),)), 0.2)
+    truth = radiosity(room, ALBEDO, {6: LAMP})
+    cameras = [c for eye in ((1.7, 1.3, 1.1), (2.3, 1.7, 1.4)) for c in all_round(eye, 64)]
+    frames = [Frame(str(i), Path(str(i)), camera) for i, camera in enumerate(cameras)]
+    found = accumulate(
+        room.mesh, room.atlas, room.scene, frames, lambda frame: picture(room, frame.camera, truth), threads=2
+    )
+    return room, truth, found
+
+
+def test_lit_diffuse_is_what_the_frames_show(lit):
+    room, truth, found = lit
+    off = np.abs(found.radiance[found.seen] / truth[found.seen] - 1)
+    assert found.seen.mean() > 0.99 and np.median(off) < 0.01
+
+
+HOW = {
+    "aimed": {"sampler": "aimed", "rays": 128, "emitter_rays": 16},
+    "aimed everywhere": {"sampler": "aimed", "rays": 64, "emitter_rays": 16, "interpolate": False},
+    "uniform": {"sampler": "uniform", "rays": 4096, "emitter_rays": 0, "interpolate": False},
+}
+
+
+@pytest.mark.parametrize("how", HOW)
+def test_albedo_comes_back(lit, how):
+    room, _, found = lit
+    result = shade(room.mesh, room.instances, room.atlas, room.scene, found, DARK, threads=2, **HOW[how])
+    assert [lamp.object_id for lamp in result.lamps] == [6]
+    assert np.allclose(result.lamps[0].radiance, LAMP, rtol=0.01)
+    for object_id, rho in ALBEDO.items():
+        own = room.atlas.object_id == object_id
+        off = result.albedo.rho[own] / np.float32(rho) - 1
+        assert np.abs(np.median(off, 0)).max() < 0.02, object_id
+        assert np.median(np.abs(off)) < (0.03 if how == "aimed" else 0.06), object_id  # noise of single elements
+        assert (result.albedo.origin[own & found.seen] == MEASURED).all()
+    assert (result.albedo.origin[room.atlas.object_id == 6] == NONE).all()
+    assert not result.escaped.any() and np.isfinite(result.radiance).all()
+    points = {"aimed": (len(room.atlas) // 20, len(room.atlas) // 2)}.get(how, (len(room.atlas),) * 2)
+    assert points[0] <= result.points <= points[1]
+
+
+def test_irradiance_agrees_with_radiosity(lit):
+    """E = pi L / rho of the truth, element by element."""
+    room, truth, found = lit
+    result = shade(room.mesh, room.instances, room.atlas, room.scene, found, DARK, rays=256, emitter_rays=32, threads=2)
+    walls = np.isin(room.atlas.object_id, [0, 2, 3, 4, 5])
+    E = np.pi * truth[walls] / room.by_object(ALBEDO, default=1)[walls]
+    assert np.percentile(np.abs(result.irradiance[walls] / E - 1), 90) < 0.05
+
+
+def test_exposure_does_not_matter(lit):
+    """Pictures a thousand times as bright: the same albedo."""
+    room, _, found = lit
+    bright = type(found)(found.radiance * 1000, found.lower * 1000, found.upper * 1000, found.count, found.tier)
+    one, other = (
+        shade(room.mesh, room.instances, room.atlas, room.scene, ld, DARK, rays=32, threads=2) for ld in (found, bright)
+    )
+    assert np.allclose(one.albedo.rho, other.albedo.rho, rtol=1e-3, atol=1e-5)
+    assert np.allclose(one.irradiance * 1000, other.irradiance, rtol=1e-3)
+
+
+def test_what_was_not_seen_is_filled_in(lit):
+    """Half of the floor unseen: its L_d is guessed, so the walls beside it keep their albedo."""
+    room, truth, found = lit
+    gone = (room.atlas.object_id == 0) & (room.atlas.position[:, 0] > 2)
+    radiance = np.where(gone[:, None], np.float32(np.nan), found.radiance)
+    part = type(found)(radiance, radiance, radiance, np.where(gone, 0, found.count).astype(np.int32), found.tier)
+    result = shade(room.mesh, room.instances, room.atlas, room.scene, part, DARK, rays=128, threads=2)
+    off = result.radiance[gone] / truth[gone] - 1  # guessed without the light that it sends itself: too dark
+    assert np.median(np.abs(off)) < 0.12
+    assert np.allclose(np.median(result.albedo.rho[gone], 0), ALBEDO[0], rtol=0.05)
+    wall = room.atlas.object_id == 3  # it stands on the unseen half
+    assert np.allclose(np.median(result.albedo.rho[wall], 0), ALBEDO[3], rtol=0.03)
