@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,11 +14,11 @@ from ..core.material import EMITTER
 from ..core.progress import Progress, ProgressEvent
 from ..core.settings import Settings
 from ..core.store import Store
+from .demo_compare import comparison
 from .demo_render import can_denoise, is_rendered, render_capture
 from .demo_room import look_at
 from .images import image_array
-from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, METALLIC, ROUGHNESS
-from .mesh_objects import ATLAS_UV, OBJECT_ID
+from .materials import EMISSION_STRENGTH
 from .run import WEIGHTS, run
 
 PICTURES = {"tiny": (96, 72, 16), "small": (480, 360, 32), "large": (960, 720, 128)}
@@ -61,7 +60,7 @@ def run_demo(out: Path | str, size: str, settings: Settings, listener: Callable[
     run(capture, out, settings, progress)
     progress.stage("pictures")
     bpy.ops.wm.open_mainfile(filepath=str((out / "scene.blend").absolute()))
-    table = comparison(json.loads((capture / "truth" / "materials.json").read_text()))
+    table = comparison(capture, out)
     try:
         (out / "comparison.txt").write_text(table + "\n", encoding="utf-8")
     except OSError as error:
@@ -69,72 +68,6 @@ def run_demo(out: Path | str, size: str, settings: Settings, listener: Callable[
     pictures(out, size, progress)
     progress.done()
     return table
-
-
-def comparison(truth: list[dict]) -> str:
-    """A table of what the open scene says of each object beside what is true."""
-    things = {thing[OBJECT_ID]: thing for thing in bpy.data.objects if OBJECT_ID in thing}
-    rows = [("object", "model", "base colour", "(true)", "roughness", "(true)", "F0", "(true)", "lamp", "(true)")]
-    for known in truth:
-        thing = things.get(known["id"])
-        if thing is None:
-            rows.append((known["class_name"], "missing", *[""] * 8))
-            continue
-        found = describe(thing)
-        emitter, gloss = known["emission"] is not None, known["alpha"] is not None
-        rows.append((
-            known["class_name"], found["model"],
-            colour(found["base_color"]), "" if emitter else colour(known["base_color"]),
-            number(found["roughness"]), number(known["alpha"] ** 0.5) if gloss else "",
-            number(found["f0"]), number(known["f0"]) if gloss else "",
-            colour(found["emission"]), colour(known["emission"]),
-        ))
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
-    return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows)
-
-
-def colour(value) -> str:
-    """Three numbers, or nothing."""
-    return "" if value is None else " ".join(f"{c:.2f}" for c in value)
-
-
-def number(value) -> str:
-    """One number, or nothing."""
-    return "" if value is None else f"{value:.2f}"
-
-
-def describe(thing) -> dict:
-    """What the material of a recovered object says: model, mean base colour, roughness, F0, radiance."""
-    material = thing.data.materials[0]
-    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    model = material["scan_relight_model"]
-    glossy = material.get("scan_relight_phi") is not None
-    emission = shader.inputs[EMISSION_COLOR].default_value[:3]
-    strength = shader.inputs[EMISSION_STRENGTH].default_value
-    return {
-        "model": model,
-        "base_color": None if model == EMITTER else mean_base_color(thing, shader.inputs[BASE_COLOR]),
-        "roughness": shader.inputs[ROUGHNESS].default_value if glossy else None,
-        "f0": material.get("scan_relight_psi") if not shader.inputs[METALLIC].default_value else None,
-        "emission": tuple(c * strength for c in emission) if model == EMITTER else None,
-    }
-
-
-def mean_base_color(thing, socket) -> np.ndarray:
-    """Base colour averaged over an object's surface as its texture shows it, (3,) float."""
-    if not socket.links:
-        return np.array(socket.default_value[:3])
-    pixels = image_array(socket.links[0].from_node.image)
-    mesh = thing.data
-    uv = np.empty(len(mesh.loops) * 2, np.float32)
-    mesh.uv_layers[ATLAS_UV].uv.foreach_get("vector", uv)
-    area = np.array([polygon.area for polygon in mesh.polygons])
-    weights = np.array([(a, b, 8 - a - b) for a in range(9) for b in range(9 - a)]) / 8
-    weights = 0.97 * weights + 0.01  # stay clear of the islands' edges
-    at = np.einsum("tkc,wk->twc", uv.reshape(-1, 3, 2), weights)
-    index = np.clip((at * pixels.shape[1::-1]).astype(int), 0, np.array(pixels.shape[1::-1]) - 1)
-    colours = pixels[index[..., 1], index[..., 0], :3].mean(1)
-    return (colours * area[:, None]).sum(0) / max(area.sum(), 1e-12)
 
 
 def pictures(out: Path, size: str, progress: Progress) -> None:

@@ -71,25 +71,34 @@ class Thing:
             index, uv, slot = index[:, corners].reshape(-1, 3), uv[:, corners].reshape(-1, 3, 2), np.repeat(slot, 2)
         return vertices, index, uv, slot
 
-    def mean_albedo(self) -> np.ndarray:
-        """Base colour averaged over the surface, (3,) float64."""
-        steps = (np.arange(8) + 0.5) / 8
-        a, b = (x.ravel()[None, :, None] for x in np.meshgrid(steps, steps))
-        c = [self.uv[:, None, k] for k in range(4)]
-        uv = c[0] * (1 - a) * (1 - b) + c[1] * a * (1 - b) + c[2] * a * b + c[3] * (1 - a) * b
-        diagonals = np.cross(self.quads[:, 2] - self.quads[:, 0], self.quads[:, 3] - self.quads[:, 1])
-        area = np.linalg.norm(diagonals, axis=1) / 2
-        colour = np.empty((len(self.quads), 3))
+    def samples(self, count: int = 64) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`count` points on each quad, (q, count, 3), their base colours (q, count, 3) and share of surface (q, count).
+
+        They lie on no grid, so that no stripe of a texture falls between them.
+        """
+        a, b = (((np.arange(count) + 0.5) * step % 1)[None, :, None] for step in (0.7548776662, 0.5698402910))
+        weights = (1 - a) * (1 - b), a * (1 - b), a * b, (1 - a) * b
+        points, uv = (sum(w * corners[:, None, k] for k, w in enumerate(weights)) for corners in (self.quads, self.uv))
+        colours = np.empty(points.shape)
         for k, paint in enumerate(self.paints):
             mine = self.slot == k
             if paint.albedo.ndim == 1:
-                colour[mine] = paint.albedo
+                colours[mine] = paint.albedo
             else:
-                height, width = paint.albedo.shape[:2]
-                x = np.clip((uv[mine, :, 0] * width).astype(int), 0, width - 1)
-                y = np.clip((uv[mine, :, 1] * height).astype(int), 0, height - 1)
-                colour[mine] = paint.albedo[y, x].mean(1)
-        return (colour * area[:, None]).sum(0) / area.sum()
+                size = np.array(paint.albedo.shape[1::-1])
+                x, y = np.moveaxis(np.clip((uv[mine] * size).astype(int), 0, size - 1), -1, 0)
+                colours[mine] = paint.albedo[y, x]
+        area = np.linalg.norm(self.normals(), axis=1)
+        return points, colours, np.repeat((area / area.sum())[:, None] / count, count, 1)
+
+    def normals(self) -> np.ndarray:
+        """Normals of the quads as long as their area, (q, 3) float64."""
+        return np.cross(self.quads[:, 2] - self.quads[:, 0], self.quads[:, 3] - self.quads[:, 1]) / 2
+
+    def mean_albedo(self) -> np.ndarray:
+        """Base colour averaged over the surface, (3,) float64."""
+        _, colours, share = self.samples(max(64, 6000 // len(self.quads)))
+        return np.einsum("qkc,qk->c", colours, share)
 
 
 def grid(origin, across, up, columns=1, rows=1) -> tuple[np.ndarray, np.ndarray]:
