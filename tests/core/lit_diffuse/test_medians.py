@@ -129,9 +129,11 @@ def p_square_of_the_article(x: np.ndarray) -> float:
     return q[2]
 
 
-def test_p_square_is_the_articles_algorithm():
+@pytest.mark.parametrize("ties", [False, True])
+def test_p_square_is_the_articles_algorithm(ties):
     assert p_square_of_the_article(ARTICLE) == pytest.approx(4.44, abs=0.005)
     x = np.random.default_rng(2).lognormal(0, 1.5, (150, 40, 3)).astype(np.float32)
+    x = np.round(4 * x) / 4 if ties else x
     p2, every = PSquare(40), np.arange(40, dtype=np.int32)
     for values in x:
         p2.add(every, values)

@@ -190,6 +190,21 @@ def test_groups_leave_out_only_what_is_not_seen(seed):
     assert left_out > 4 * len(room.atlas)  # of eight frames at most half is looked at
 
 
+def test_groups_know_that_surfaces_curve():
+    """A pillar of 48 strips: within one group normals spread, and at its rim some strips of a group are seen."""
+    at = np.linspace(0, 2 * np.pi, 49)
+    ring = 0.3 * np.stack([np.cos(at), np.sin(at)], 1)
+    strips = [quad((*a, -0.5), (*(b - a), 0), (0, 0, 1), 0) for a, b in zip(ring[:-1], ring[1:])]
+    room = make_room(strips, 0.02)
+    groups = ElementGroups(room.atlas)
+    for angle in np.linspace(0, 2 * np.pi, 12, endpoint=False):
+        camera = look_at((2 * np.cos(angle), 2 * np.sin(angle), 0.1), (0, 0, 0), 64, 64, 40)
+        view, every = sees(room, camera)
+        candidates = groups.candidates(view)
+        assert len(every.element) > 200 and np.isin(every.element, candidates).all()
+        assert len(candidates) < 0.9 * len(room.atlas)
+
+
 def test_escaped_pixels_are_clean_where_all_around_escapes():
     room = make_room(around(WALL, (0.4, 0.6), (0.4, 0.6)), 0.1)  # a hole of 0.8 m
     view, _ = sees(room, CAMERA)
