@@ -17,7 +17,7 @@ from .emitters import LUMINANCE, bright_triangles
 from .environment import Environment
 from .field import LightField
 from .irradiance import direct, gather
-from .lamps import Lamp, find_seen
+from .lamps import EMITTER_ALBEDO, Lamp, find_seen
 
 SAMPLES = 10000
 """Elements that the test looks at, spread evenly over the objects."""
@@ -117,6 +117,12 @@ def _thrown_by_object(field: LightField, normals, element, object_id: int, seed:
     return _irradiance(lit, normals, element, seed)[:, 0]
 
 
+def _most_reflected(field: LightField, normals, object_id: int, seed: int) -> float:
+    """Luminance that an object would send out at an albedo of `EMITTER_ALBEDO`, in the median over its elements."""
+    own = _pick(field, field.atlas.object_id == object_id, seed)[:500]
+    return EMITTER_ALBEDO / np.pi * float(np.median(_irradiance(field, normals, own, seed) @ LUMINANCE))
+
+
 def find_light(
     field: LightField,
     normals: np.ndarray,
@@ -161,11 +167,15 @@ def find_light(
     thrown_sky = [G[lit] for G in thrown_sky]
     thrown = {i: _thrown_by_object(field, normals, sample.element, i, seed) for i in unseen_objects}
 
+    # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
+    lit_room = field.with_light(field.radiance, environment)
+    least = {i: _most_reflected(lit_room, normals, i, seed) for i in unseen_objects}
+
     notes: list[str] = []
     radiances = [g.copy() for g in guess]
     lamps: list[Lamp] = []
     for sweep in range(SWEEPS):
-        lamps = _solve_lamps(sample, thrown, instances, seen, radiances, thrown_sky, received[lit])
+        lamps = _solve_lamps(sample, thrown, least, instances, seen, radiances, thrown_sky, received[lit])
         notes = _solve_sky(sample, lamps, thrown, radiances, guess, thrown_sky, received[lit])
         if not zones or sweep == SWEEPS - 1:
             break
@@ -198,7 +208,7 @@ def _all_light(base, lamps, thrown, radiances, thrown_sky, without: int = -1) ->
     return total
 
 
-def _solve_lamps(sample: _Sample, thrown, instances, seen, radiances, thrown_sky, base) -> list[Lamp]:
+def _solve_lamps(sample: _Sample, thrown, least, instances, seen, radiances, thrown_sky, base) -> list[Lamp]:
     """Unseen lamps, the one that explains most first; none once the gain falls below `MIN_GAIN`."""
     class_of = {i.object_id: i.class_name for i in instances}
     sent = sample.radiance @ LUMINANCE
@@ -207,7 +217,7 @@ def _solve_lamps(sample: _Sample, thrown, instances, seen, radiances, thrown_sky
     while left:
         received = _all_light(base, lamps, thrown, radiances, thrown_sky) @ LUMINANCE
         found = {i: sample.best(sent, received, G) for i, G in left.items()}
-        found = {i: f for i, f in found.items() if f is not None and f[2] < (1 - MIN_GAIN) * f[1]}
+        found = {i: f for i, f in found.items() if f is not None and f[2] < (1 - MIN_GAIN) * f[1] and f[0] > least[i]}
         if not found:
             break
         object_id = min(found, key=lambda i: found[i][2])

@@ -16,7 +16,7 @@ from ..shading.lamps import Lamp
 from ..surface.elements import triangle_geometry
 from .fit import Problem, fit_lobe
 from .lobes import GRID, LobeLight, reflected_light
-from .models import Choice, choose_model, metal_f0
+from .models import Choice, adopt_from_class, choose_model, metal_f0
 from .samples import Samples
 from .separate import specular_in_median, spread_over_object
 from .targets import score_frames, target_frame
@@ -80,13 +80,9 @@ def _slice(light: LobeLight, part: slice) -> LobeLight:
 
 def _target_choice(problem: Problem, in_target: np.ndarray) -> Choice:
     """The paper's fit: one frame, one lobe; no choice of model."""
-    chosen = Problem(
-        problem.element[in_target], problem.radiance[in_target], problem.lit_diffuse[in_target],
-        LobeLight(problem.light.A[in_target], problem.light.B[in_target], problem.light.mirror[in_target]),
-    )  # fmt: skip
     if in_target.sum() < 3:
         return Choice(LAMBERTIAN, None, note="No frame shows enough of it.")
-    return Choice(SPECULAR, fit_lobe(chosen, "target"))
+    return Choice(SPECULAR, fit_lobe(problem.part(in_target), "target"))
 
 
 def fit_specular(
@@ -136,39 +132,45 @@ def fit_specular(
     every = np.concatenate([*picked.values(), np.zeros(0, np.int64)]).astype(np.int64)
     light = reflected_light(
         field, bright, normals, samples.element[every], samples.direction[every],
-        rays=rays, threads=threads, seed=seed, progress=progress,
+        rays=rays, threads=threads, seed=seed,
     )  # fmt: skip
 
-    materials, choices, start = [], {}, 0
+    problems, choices, targets, start = {}, {}, {}, 0
+    for object_id, index in picked.items():
+        part = slice(start, start + len(index))
+        start += len(index)
+        choices[object_id] = Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight.")
+        if not len(index):
+            continue
+        element = samples.element[index]
+        cosine = np.einsum("ij,ij->i", atlas.normal[element], samples.direction[index])
+        problem = Problem(
+            element, samples.radiance[index], lit_diffuse.radiance[element], _slice(light, part), cosine
+        )
+        problems[object_id] = problem
+        scores = score_frames(
+            samples.frame[index], problem.light.A[:, TARGET_PHI], problem.lit_diffuse, np.ones(len(index), bool),
+            len(frame_names),
+        )  # fmt: skip
+        target = targets[object_id] = target_frame(scores)
+        choices[object_id] = (
+            choose_model(problem) if way == "frames" else _target_choice(problem, samples.frame[index] == target)
+        )
+        if progress is not None:
+            progress.update(0.4 + 0.4 * start / max(len(every), 1))
+    if way == "frames":
+        choices = adopt_from_class(choices, problems, {i.object_id: i.class_name for i in instances})
+
+    materials = []
     for i in instances:
         if i.object_id in glowing:
             lamp = glowing[i.object_id]
             radiance = tuple(float(x) for x in lamp.radiance)
             materials.append(ObjectMaterial(i.object_id, i.class_name, EMITTER, emission=radiance, note=lamp.note))
             continue
-        index = picked[i.object_id]
-        part = slice(start, start + len(index))
-        start += len(index)
-        if not len(index):
-            note = "Seen too little to look for a highlight." if len(index) == 0 else ""
-            materials.append(ObjectMaterial(i.object_id, i.class_name, LAMBERTIAN, note=note))
-            continue
-        problem = Problem(
-            samples.element[index],
-            samples.radiance[index],
-            lit_diffuse.radiance[samples.element[index]],
-            _slice(light, part),
-        )
-        scores = score_frames(
-            samples.frame[index], problem.light.A[:, TARGET_PHI], problem.lit_diffuse, np.ones(len(index), bool),
-            len(frame_names),
-        )  # fmt: skip
-        target = target_frame(scores)
-        choice = choose_model(problem) if way == "frames" else _target_choice(problem, samples.frame[index] == target)
-        choices[i.object_id] = choice
-        materials.append(_material(i, choice, problem, frame_names[target] if target >= 0 else None))
-        if progress is not None:
-            progress.update(0.5 + 0.2 * start / max(len(every), 1))
+        target = targets.get(i.object_id, -1)
+        name = frame_names[target] if target >= 0 else None
+        materials.append(_material(i, choices[i.object_id], problems.get(i.object_id), name))
 
     specular = np.zeros((len(atlas), 3), np.float32)
     if refine:
@@ -177,7 +179,7 @@ def fit_specular(
     return Specular(tuple(materials), specular)
 
 
-def _material(instance: Instance, choice: Choice, problem: Problem, target: str | None) -> ObjectMaterial:
+def _material(instance: Instance, choice: Choice, problem: Problem | None, target: str | None) -> ObjectMaterial:
     """The description of what was chosen."""
     fit = choice.fit
     common = {
@@ -185,7 +187,7 @@ def _material(instance: Instance, choice: Choice, problem: Problem, target: str 
         "class_name": instance.class_name,
         "model": choice.model,
         "target_frame": target,
-        "observations": len(problem.element),
+        "observations": 0 if problem is None else len(problem.element),
         "residual": None if fit is None else fit.residual,
         "residual_lambertian": None if fit is None else fit.residual_lambertian,
         "note": choice.note,
@@ -193,7 +195,8 @@ def _material(instance: Instance, choice: Choice, problem: Problem, target: str 
     if choice.model == LAMBERTIAN:
         return ObjectMaterial(**(common | {"residual": common["residual_lambertian"]}))
     if choice.model == METAL:
-        f0 = metal_f0(problem, int(np.argmin(np.abs(GRID - fit.phi))))
+        at = int(np.argmin(np.abs(GRID - fit.phi)))
+        f0 = fit.psi if problem is None else metal_f0(problem, at)
         return ObjectMaterial(**common, phi=fit.phi, f0=tuple(float(x) for x in f0))
     return ObjectMaterial(**common, phi=fit.phi, psi=float(fit.psi.mean()))
 
@@ -212,4 +215,4 @@ def _separate(glossy, field, bright, normals, samples, owner, usable, specular, 
         own = np.flatnonzero(field.atlas.object_id == material.object_id)
         specular[own] = spread_over_object(field.atlas, own, element, part)
         if progress is not None:
-            progress.update(0.7 + 0.3 * (done + 1) / len(glossy))
+            progress.update(0.8 + 0.2 * (done + 1) / len(glossy))
