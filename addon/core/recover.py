@@ -22,6 +22,7 @@ from .shading.albedo import Albedo, fill, quotient
 from .shading.environment import Environment, EnvironmentAccumulator
 from .shading.field import LightField
 from .shading.lamps import Lamp
+from .shading.neighbourhood import doubt
 from .shading.shade import Shading, shade
 from .specular.reflect import Specular, fit_specular
 from .specular.samples import SampleCollector, Samples
@@ -213,7 +214,10 @@ class Recovery:
         s = self.settings
 
         def compute():
-            field = LightField(surface.mesh, surface.atlas, surface.scene, shading.radiance, shading.environment)
+            field = LightField(
+                surface.mesh, surface.atlas, surface.scene, shading.radiance, shading.environment,
+                [lamp.object_id for lamp in shading.lamps],
+            )  # fmt: skip
             found = fit_specular(
                 surface.mesh, self.capture.instances, field, lit, shading.lamps, self.samples(),
                 [frame.name for frame in self.capture.frames],
@@ -243,7 +247,8 @@ class Recovery:
             return shading.albedo
         rho, valid = quotient(np.maximum(lit.radiance - specular, 0), shading.irradiance)
         class_of = {i.object_id: i.class_name for i in self.capture.instances}
-        return fill(self.surface().atlas, rho, valid & lit.seen, class_of, {lamp.object_id for lamp in shading.lamps})
+        emitters = {lamp.object_id for lamp in shading.lamps}
+        return fill(self.surface().atlas, rho, valid & lit.seen, class_of, emitters, doubt(lit))
 
     def base_color(self) -> np.ndarray:
         """Base Color of each element for Cycles' Principled, (n, 3) float32."""

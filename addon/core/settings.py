@@ -46,7 +46,7 @@ class Settings:
     median: str = "exact"
     frame_order: str = "shuffled"
     shading: str = "aimed"
-    shading_rays: int = 256
+    shading_rays: int = 192
     emitter_rays: int = 16
     interpolate: bool = True
     specular: str = "frames"

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..surface.atlas import Atlas
+from .neighbourhood import steadied
 
 FLOOR = 1e-3
 """Below this share of the room's median irradiance a quotient says nothing."""
@@ -59,34 +59,44 @@ def quotient(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> tuple[np.ndarra
     return rho, valid
 
 
-def fill(atlas: Atlas, rho: np.ndarray, valid: np.ndarray, class_of: dict[int, str], emitters: set[int]) -> Albedo:
-    """Clamp, and fill in what was not measured from the nearest measured elements of the same object.
+def fill(
+    atlas: Atlas,
+    rho: np.ndarray,
+    valid: np.ndarray,
+    class_of: dict[int, str],
+    emitters: set[int],
+    error: np.ndarray | None = None,
+) -> Albedo:
+    """Clamp, fill in what was not measured, and steady what was measured badly, from the same object.
 
-    An object without any takes the median of its class, else of the room.
+    An object without any measurement takes the median of its class, else of the room.
+
+    Parameters
+    ----------
+    error : (n,) float32, optional
+        Relative standard error of each quotient (`neighbourhood.doubt`); without it all count as equally good.
     """
     result = np.clip(np.nan_to_num(rho), 0, MAX_ALBEDO)
     origin = np.where(valid, MEASURED, FILLED).astype(np.int8)
     reflecting = valid & ~np.isin(atlas.object_id, list(emitters))
     above = float((rho[reflecting].max(1) > MAX_ALBEDO).mean()) if reflecting.any() else 0.0
     everywhere = np.median(result[reflecting], 0) if reflecting.any() else np.full(3, 0.5, np.float32)
+    error = np.where(valid, 0.0 if error is None else error, np.inf).astype(np.float32)
     by_class: dict[str, list[np.ndarray]] = {}
     bare = []
-    for object_id in np.unique(atlas.object_id):
-        own = np.flatnonzero(atlas.object_id == object_id)
+    order = np.argsort(atlas.object_id, kind="stable")
+    for own in np.split(order, np.flatnonzero(np.diff(atlas.object_id[order])) + 1):
+        object_id = int(atlas.object_id[own[0]])
         if object_id in emitters:
             result[own], origin[own] = 0, NONE
             continue
-        known, missing = own[valid[own]], own[~valid[own]]
-        if not len(known):
+        if not valid[own].any():
             bare.append((object_id, own))
             continue
-        by_class.setdefault(class_of.get(object_id, ""), []).append(np.median(result[known], 0))
-        if len(missing):
-            k = min(8, len(known))
-            near = cKDTree(atlas.position[known]).query(atlas.position[missing], k=k, workers=-1)[1].reshape(-1, k)
-            result[missing] = np.median(result[known[near]], 1)
+        result[own] = steadied(atlas, own, result[own], error[own])
+        by_class.setdefault(class_of.get(object_id, ""), []).append(np.median(result[own][valid[own]], 0))
     for object_id, own in bare:
         alike = by_class.get(class_of.get(object_id, ""))
         result[own] = np.median(alike, 0) if alike else everywhere
         origin[own] = NONE
-    return Albedo(result.astype(np.float32), origin, above)
+    return Albedo(np.clip(result, 0, MAX_ALBEDO).astype(np.float32), origin, above)

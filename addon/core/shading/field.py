@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ..capture.model import Mesh
 from ..surface.atlas import Atlas
-from ..surface.elements import element_of_triangle, lookup
+from ..surface.elements import element_of_triangle, lookup, triangle_geometry
 from ..surface.rays import Hits, RayScene
 from .environment import Environment
 
@@ -18,19 +20,36 @@ class LightField:
     ----------
     radiance : (n, 3) float32
         L_d of each element, no NaN.
+    lamps : iterable of int
+        Objects that give light. They do so on the side that the normals show, which is the side the frames see: a
+        lamp that is a bare rectangle under a ceiling does not light the gap above it.
     """
 
-    def __init__(self, mesh: Mesh, atlas: Atlas, scene: RayScene, radiance: np.ndarray, environment: Environment):
+    def __init__(
+        self,
+        mesh: Mesh,
+        atlas: Atlas,
+        scene: RayScene,
+        radiance: np.ndarray,
+        environment: Environment,
+        lamps: Iterable[int] = (),
+    ):
         self.mesh, self.atlas, self.scene, self.environment = mesh, atlas, scene, environment
         self.radiance = np.ascontiguousarray(radiance, np.float32)
+        self.normal, _ = triangle_geometry(mesh)
+        self.one_sided = np.isin(mesh.object_id, list(lamps))
         self._fallback = element_of_triangle(mesh, atlas)
 
-    def with_light(self, radiance: np.ndarray, environment: Environment | None = None) -> LightField:
-        """The same room with another L_d and, if given, another environment."""
+    def with_light(
+        self, radiance: np.ndarray, environment: Environment | None = None, lamps: Iterable[int] | None = None
+    ) -> LightField:
+        """The same room with another L_d and, if given, another environment and other lamps."""
         other = object.__new__(LightField)
         other.__dict__.update(self.__dict__)
         other.radiance = np.ascontiguousarray(radiance, np.float32)
         other.environment = environment or self.environment
+        if lamps is not None:
+            other.one_sided = np.isin(self.mesh.object_id, list(lamps))
         return other
 
     def elements(self, hits: Hits) -> np.ndarray:
@@ -62,8 +81,16 @@ class LightField:
         """
         hits = self.scene.intersect(origins, directions)
         element = self.elements(hits)
+        return self.arriving(hits, element, directions), hits.distance, element
+
+    def arriving(self, hits: Hits, element: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """Radiance that comes back along rays whose hits and `elements` are known, (n, 3) float32."""
         radiance = self.radiance[element]
-        escaped = element < 0
-        if escaped.any():
+        escaped = np.flatnonzero(element < 0)
+        if len(escaped):
             radiance[escaped] = self.environment(directions[escaped])
-        return radiance, hits.distance, element
+        lamp = np.flatnonzero(self.one_sided[hits.triangle] & (element >= 0))
+        if len(lamp):
+            behind = np.einsum("ij,ij->i", directions[lamp], self.normal[hits.triangle[lamp]]) > 0
+            radiance[lamp[behind]] = 0
+        return radiance

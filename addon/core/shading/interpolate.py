@@ -23,8 +23,9 @@ CONTRAST = 0.1
 """Mean relative deviation between an element's neighbours up to which it is interpolated."""
 NEIGHBOURS = 8
 TURN = 1.5
-COARSEST = 0.15
-"""First spacing, as a share of the elements' extent (root of the bounding box's largest face)."""
+COARSEST = 0.01
+"""First spacing, as a share of the elements' extent (root of the bounding box's largest face). Starting coarser saves
+little and misses what is small: from 0.15 the living room's mean error was 0.094, from 0.01 it is 0.08."""
 BLOCK = 1 << 15
 
 
@@ -50,12 +51,18 @@ def _one_per_cell(position: np.ndarray, normal: np.ndarray, spacing: float) -> n
     return order[np.concatenate([[True], np.diff(key[order]) != 0])]
 
 
-def _bound(points: _Points, index: np.ndarray, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Ward's e_i of each element for each of its neighbours `index` ((n, k)): (n, k) float32."""
+def _bound(
+    points: _Points, index: np.ndarray, position: np.ndarray, normal: np.ndarray, spacing: float
+) -> np.ndarray:
+    """Ward's e_i of each element for each of its neighbours `index` ((n, k)): (n, k) float32.
+
+    No point reaches further than about two of the present spacings: where a level was found too coarse, its points
+    must not outweigh the finer ones between them.
+    """
     away = points.position[index] - position[:, None]
     distance = np.sqrt(np.einsum("nkj,nkj->nk", away, away))
     turned = np.maximum(1 - np.einsum("nkj,nj->nk", points.normal[index], normal), 0)
-    return distance / points.radius[index] + np.sqrt(turned)
+    return distance / np.minimum(points.radius[index], 2 * spacing / ALLOWED) + np.sqrt(turned)
 
 
 def interpolated(
@@ -90,9 +97,8 @@ def interpolated(
     while len(todo):
         new = todo[_one_per_cell(position[todo], normal[todo], spacing)]
         value, radius = evaluate(new)
-        # R is held between today's spacing and the finest: a lone close hit must not ask for endless points, nor a
-        # large hall for none.
-        radius = np.clip(radius, finest / ALLOWED, 2 * spacing / ALLOWED)
+        # A lone close hit must not ask for endless points.
+        radius = np.maximum(radius, finest / ALLOWED)
         batch = _Points(position[new], normal[new], value, radius)
         points = batch if points is None else _Points(
             *(np.concatenate([getattr(points, f), getattr(batch, f)]) for f in ("position", "normal", "value", "radius"))
@@ -132,7 +138,7 @@ def _spread(
         p, n = position[at], normal[at]
         _, index = tree.query(np.concatenate([p / spacing, n * TURN], 1), k=k)
         index = index.reshape(len(p), k)
-        bound = _bound(points, index, p, n)
+        bound = _bound(points, index, p, n, spacing)
         weight = np.maximum(1 - bound / REACH, 0) ** 2
         # Where nothing is near enough, the best of what there is.
         lost = weight.sum(1) <= 1e-6

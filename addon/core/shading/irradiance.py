@@ -71,10 +71,8 @@ def gather(
         origins = np.repeat(field.scene.off_surface(p, n), rays, 0)
         hits = field.scene.intersect(origins, directions)
         element = field.elements(hits)
-        radiance = field.radiance[element]
+        radiance = field.arriving(hits, element, directions)
         out = element < 0
-        if out.any():
-            radiance[out] = field.environment(directions[out])
         if emitter_rays and len(bright):
             aimed = _aimed_density(field, bright, hits.triangle, directions, hits.distance, triangle_normal)
             own = rays * local[..., 2].reshape(-1) / np.float32(np.pi)
@@ -132,8 +130,10 @@ def direct(
         distance = np.sqrt(np.einsum("ij,ij->i", way, way))
         direction = way / np.maximum(distance, 1e-12)[:, None]
         cosine = np.einsum("ijk,ik->ij", direction.reshape(len(p), emitter_rays, 3), n).ravel()
-        facing = np.abs(np.einsum("ij,ij->i", direction, bright.normal[index]))
-        useful = np.flatnonzero((cosine > 0) & (facing > 1e-6) & (distance > 10 * field.scene.offset))
+        facing = -np.einsum("ij,ij->i", direction, bright.normal[index])
+        behind = field.one_sided[triangles[index]] & (facing < 0)
+        facing = np.abs(facing)
+        useful = np.flatnonzero((cosine > 0) & (facing > 1e-6) & (distance > 10 * field.scene.offset) & ~behind)
         hidden = field.scene.occluded(
             origin[useful], direction[useful], distance[useful] * np.float32(1 - 1e-4) - field.scene.offset
         )

@@ -21,6 +21,7 @@ from .field import LightField
 from .interpolate import interpolated
 from .irradiance import direct, gather, uniform
 from .lamps import Lamp
+from .neighbourhood import doubt
 from .unseen_light import find_light
 
 ELEMENTS_AT_ONCE = 1 << 13
@@ -182,15 +183,16 @@ def shade(
         own = atlas.object_id == lamp.object_id
         radiance[own & ~seen if lamp.seen else own] = lamp.radiance
     emitters = {lamp.object_id for lamp in lamps}
-    field = field.with_light(radiance, light.environment)
+    field = field.with_light(radiance, light.environment, emitters)
 
     # 2. What nobody saw reflects like the rest of its object under the light that reaches it: a rough first pass.
-    dark = np.flatnonzero(~seen & ~np.isin(atlas.object_id, list(emitters)))
-    lit = np.flatnonzero(seen)
+    unseen_lamp = ~seen & np.isin(atlas.object_id, list(emitters))
+    dark = np.flatnonzero(~seen & ~unseen_lamp)
+    lit = np.flatnonzero(seen | unseen_lamp)
     if len(dark):
         rough = dict(how, rays=64, emitter_rays=4, interpolate=True, finest=8 * finest) | {"sampler": "aimed"}
         coarse_lit, _, _ = irradiance(field, normals, lit, **rough)
-        coarse_dark, _, _ = irradiance(field, normals, dark, **rough)
+        coarse_dark, escaped_dark, _ = irradiance(field, normals, dark, **rough)
         everywhere = np.zeros((len(atlas), 3), np.float32)
         everywhere[lit], everywhere[dark] = coarse_lit, coarse_dark
         rho, valid = quotient(lit_diffuse.radiance, everywhere)
@@ -198,11 +200,14 @@ def shade(
         radiance[dark] = guess.rho[dark] * everywhere[dark] / np.float32(np.pi)
         field = field.with_light(radiance)
 
-    # 3. The real thing.
-    E, escaped, points = irradiance(
-        field, normals, np.arange(len(atlas)), rays=rays, emitter_rays=emitter_rays,
+    # 3. The real thing, where there is an L_d to divide; elsewhere the rough values do.
+    E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
+    if len(dark):
+        E[dark], escaped[dark] = coarse_dark, escaped_dark
+    E[lit], escaped[lit], points = irradiance(
+        field, normals, lit, rays=rays, emitter_rays=emitter_rays,
         interpolate=interpolate, finest=finest, progress=progress, **how,
     )  # fmt: skip
     rho, valid = quotient(lit_diffuse.radiance, E)
-    albedo = fill(atlas, rho, valid & seen, class_of, emitters)
+    albedo = fill(atlas, rho, valid & seen, class_of, emitters, doubt(lit_diffuse))
     return Shading(E, escaped, field.radiance, albedo, lamps, light.environment, light.notes, points)

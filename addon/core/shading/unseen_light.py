@@ -19,7 +19,7 @@ from .field import LightField
 from .irradiance import direct, gather
 from .lamps import EMITTER_ALBEDO, Lamp, find_seen
 
-SAMPLES = 10000
+SAMPLES = 8000
 """Elements that the test looks at, spread evenly over the objects."""
 MIN_GAIN = 0.03
 """A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share."""
@@ -28,7 +28,7 @@ CLASS_AGREES = 0.25
 MIN_SKY = 0.01
 """Part of the received light below which a part of the sky can't be solved for; its neighbours' radiance stays."""
 SWEEPS = 2
-RAYS, EMITTER_RAYS = 256, 32
+RAYS, EMITTER_RAYS = 128, 16
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def _irradiance(field: LightField, normals: np.ndarray, element: np.ndarray, see
 def _thrown_by_object(field: LightField, normals, element, object_id: int, seed: int) -> np.ndarray:
     """E from one object at radiance 1 and nothing else, (m,) float64."""
     alone = np.repeat((field.atlas.object_id == object_id)[:, None], 3, 1).astype(np.float32)
-    lit = field.with_light(alone, Environment.dark())
+    lit = field.with_light(alone, Environment.dark(), [object_id])
     return _irradiance(lit, normals, element, seed)[:, 0]
 
 
@@ -183,7 +183,7 @@ def find_light(
         environment = environment.with_zone(zone, radiance.astype(np.float32))
     # With all light known, what looked like a lamp for want of it does so no more.
     everything = _irradiance(
-        field.with_light(_lit_by(field, lamps), environment), normals, element, seed
+        field.with_light(_lit_by(field, lamps), environment, [lamp.object_id for lamp in lamps]), normals, element, seed
     )
     sure = find_seen(atlas.object_id[element], field.radiance[element], everything)
     return Light(tuple(sure) + tuple(lamps), environment, tuple(notes))

@@ -101,7 +101,7 @@ class _Solver:
         self.problem = problem
         _, self.group = np.unique(problem.element, return_inverse=True)
         self.groups = int(self.group.max()) + 1
-        self.I = problem.radiance.astype(np.float64)  # noqa: E741 - the paper's name
+        self.I = problem.radiance.astype(np.float64)
         self.Ld = problem.lit_diffuse.astype(np.float64)
         self.count = np.bincount(self.group, minlength=self.groups)
         # Noise and misregistration grow with radiance: residuals count relative to the element's own level, with a

@@ -113,12 +113,7 @@ def reflected_light(
         L = np.zeros((count * k, 3), np.float32)
         density = np.zeros(count * k, np.float32)
         hits = field.scene.intersect(np.repeat(origin, k, 0)[above], flat[above])
-        found = field.elements(hits)
-        light = field.radiance[found]
-        out = found < 0
-        if out.any():
-            light[out] = field.environment(flat[above][out])
-        L[above] = light
+        L[above] = field.arriving(hits, field.elements(hits), flat[above])
         if aimed:
             density[above] = aimed * _aimed(bright, index_of, hits, flat[above], triangle_normal)
         L = L.reshape(count, k, 3)

@@ -14,9 +14,8 @@ from .elements import make_atlas, triangle_geometry, uv_scale
 from .orientation import seen_sides
 from .rays import RayScene
 
-TEXELS_A_PIXEL = 1.3
-"""Texels along the edge of what a pixel covers: a little finer than the frames, so that a median over shifted views
-keeps their detail."""
+TEXELS_A_PIXEL = 1.0
+"""Texels along the edge of what a pixel covers."""
 EXPECTED_FILL = 0.55
 """Share of the atlas that islands usually cover; only the unwrapping's margin depends on it."""
 SMALLEST, STEP = 64, 64

@@ -1,0 +1,93 @@
+"""What an object's albedo is like around a place: the prior that stands in for, or steadies, a poor measurement.
+
+Where the well-measured elements of an object agree among each other, a badly measured one between them (at a depth
+edge, seen once) is drawn towards them; where they differ, as in a texture, it is left as it is. Empirical Bayes on
+log albedo, with the spread of the neighbours as the prior's width.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..lit_diffuse.accumulate import LitDiffuse
+from ..lit_diffuse.visibility import CLEAN, SATURATED
+from ..parallel import blocks
+from ..surface.atlas import Atlas
+
+NEIGHBOURS = 64
+REFERENCES = 4000
+"""Well-measured elements of an object that neighbours are sought among: a thinned set reaches further around."""
+CELL_TEXELS = 6.0
+"""Edge of the cells that share one prior."""
+LEAST_DOUBT = 0.1
+"""Relative error that even the best measured element has: shading, texels against pixels."""
+SURE = 0.2
+"""An element with less doubt than this may speak for its surroundings."""
+FEW = 0.35
+"""Relative error of a single observation, whose spread can't be known."""
+EDGE_DOUBT = 0.4
+"""Added for observations at depth edges, where another surface is mixed in."""
+DARK = 1e-3
+
+
+def doubt(lit: LitDiffuse) -> np.ndarray:
+    """Relative standard error of each element's L_d, from its observations: (n,) float32; inf where there are none."""
+    middle = np.maximum(np.nan_to_num(lit.radiance).mean(1), 1e-12)
+    spread = (np.nan_to_num(lit.upper) - np.nan_to_num(lit.lower)).mean(1) / 1.35 / middle
+    n = np.maximum(lit.count, 1)
+    # The median of n values of standard deviation s has the error 1.25 s / sqrt(n); few values hide their spread.
+    error = np.hypot(1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, FEW)) / np.sqrt(n), LEAST_DOUBT)
+    error = np.where(lit.tier == CLEAN, error, error + EDGE_DOUBT * (1 + (lit.tier == SATURATED)))
+    return np.where(lit.seen, error, np.inf).astype(np.float32)
+
+
+def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Median and width of log albedo around each place, (m, 3) and (m,)."""
+    # At most an eighth of the object: a small object's ends are not each other's surroundings.
+    k = min(NEIGHBOURS, max(len(references) // 8, 3), len(references))
+    near = cKDTree(references).query(position, k=k, workers=-1)[1].reshape(len(position), k)
+    middle = np.empty((len(position), 3), np.float32)
+    width = np.empty(len(position), np.float32)
+    for part in blocks(len(position), 1 << 14):
+        around = log_rho[near[part]]
+        middle[part] = np.median(around, 1)
+        width[part] = 1.4826 * np.median(np.abs(around - middle[part, None]).mean(2), 1)
+    return middle, np.maximum(width, np.float32(0.02))
+
+
+def steadied(atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, seed: int = 0) -> np.ndarray:
+    """Albedo of one object's elements, each drawn towards its neighbourhood as far as it is in doubt.
+
+    Parameters
+    ----------
+    own : (m,) int
+        The object's elements.
+    rho : (m, 3) float32
+        Clamped quotient; anything where `error` is inf.
+    error : (m,) float32
+        Relative standard error; inf: not measured. At least one is finite.
+
+    Returns
+    -------
+    (m, 3) float32
+    """
+    position = atlas.position[own]
+    known = np.flatnonzero(np.isfinite(error))
+    sure = known[error[known] < SURE]
+    if len(sure) < NEIGHBOURS:
+        sure = known
+    if len(sure) > REFERENCES:
+        sure = np.random.default_rng(seed).choice(sure, REFERENCES, replace=False)
+    cell = CELL_TEXELS * float(np.sqrt(np.median(atlas.area[own])))
+    place = np.floor((position - position.min(0)) / max(cell, 1e-9)).astype(np.int64)
+    extent = place.max(0) + 1
+    _, first, index = np.unique(
+        (place[:, 0] * extent[1] + place[:, 1]) * extent[2] + place[:, 2], return_index=True, return_inverse=True
+    )
+    log_rho = np.log(np.maximum(rho, DARK))
+    middle, width = _prior(position[first], position[sure], log_rho[sure])
+    middle, width = middle[index], width[index][:, None]
+    trust = (width**2 / (width**2 + np.minimum(error, 1e3)[:, None] ** 2)).astype(np.float32)
+    trust[~np.isfinite(error)] = 0
+    return np.exp(trust * log_rho + (1 - trust) * middle).astype(np.float32)
