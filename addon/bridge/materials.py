@@ -28,7 +28,7 @@ def ior_of(f0: float) -> float:
 
 
 def make_material(description: ObjectMaterial, base_color: bpy.types.Image | None = None,
-                  emission: bpy.types.Image | None = None) -> bpy.types.Material:
+                  emission: bpy.types.Image | None = None, one_sided: bool = False) -> bpy.types.Material:
     """Make the material of one object.
 
     Parameters
@@ -39,6 +39,8 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
         (see `core.specular.compensation`). Without it the colour is mid-grey.
     emission : bpy.types.Image, optional
         Emitter: radiance over the atlas; without it the description's one radiance.
+    one_sided : bool
+        Emitter: shine on the side of the normals only.
 
     Returns
     -------
@@ -66,6 +68,8 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
         # What it reflects is unknown and already part of the radiance that was seen.
         value[BASE_COLOR].default_value = (0, 0, 0, 1)
         _emit(nodes, links, value, description.emission or (0.0, 0.0, 0.0), emission)
+        if one_sided:
+            _front_only(nodes, links, value[EMISSION_COLOR])
     elif base_color is not None:
         links.new(_texture(nodes, links, base_color, (-400, 200)), value[BASE_COLOR])
     material["scan_relight_model"] = description.model
@@ -84,6 +88,24 @@ def _emit(nodes, links, value, radiance, image):
     strength = max(max(radiance), 0.0)
     value[EMISSION_COLOR].default_value = (*(max(c, 0.0) / strength if strength else 1.0 for c in radiance), 1)
     value[EMISSION_STRENGTH].default_value = strength
+
+
+def _front_only(nodes, links, socket):
+    """Blacken an emission colour where the surface is seen from behind; the strength stays a plain number."""
+    mix = nodes.new("ShaderNodeMix")
+    mix.data_type, mix.location = "RGBA", (-250, -300)
+    # By type, as the node has sockets of the same name for each of its data types.
+    colours = [s for s in mix.inputs if s.type == "RGBA"]
+    factor = next(s for s in mix.inputs if s.type == "VALUE")
+    geometry = nodes.new("ShaderNodeNewGeometry")
+    geometry.location = (-450, -350)
+    links.new(geometry.outputs["Backfacing"], factor)
+    if socket.links:
+        links.new(socket.links[0].from_socket, colours[0])
+    else:
+        colours[0].default_value = tuple(socket.default_value)
+    colours[1].default_value = (0, 0, 0, 1)
+    links.new(next(s for s in mix.outputs if s.type == "RGBA"), socket)
 
 
 def _texture(nodes, links, image, place):

@@ -62,6 +62,13 @@ def make_objects(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray
     return objects
 
 
+def is_open(data: bpy.types.Mesh) -> bool:
+    """Whether a mesh is a sheet: has edges with one face only."""
+    edge = np.empty(len(data.loops), np.int32)
+    data.loops.foreach_get("edge_index", edge)
+    return bool((np.bincount(edge, minlength=len(data.edges)) == 1).any())
+
+
 def mesh_data(name: str, vertices: np.ndarray, triangles: np.ndarray) -> bpy.types.Mesh:
     """Make a flat-shaded mesh.
 

@@ -6,6 +6,7 @@ import importlib.metadata
 import platform
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -86,13 +87,15 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
             writing = time.monotonic()
             recovery.write_images()
             progress.update(0.5)
-            uv, materials = recovery.surface().uv, recovery.materials()
-            warnings = write_scene(store.path("scene.blend"), capture, uv, materials, store.folder,
-                                   recovery.median_radiance(), fresh=scene is None)
+            surface, materials = recovery.surface(), recovery.materials()
+            # The file gets the mesh whose normals face the frames: its lamps shine on that side.
+            facing = replace(capture, mesh=surface.mesh)
+            warnings = write_scene(store.path("scene.blend"), facing, surface.atlas.uv, materials, store.folder,
+                                   recovery.median_radiance(), fresh=scene is None, facing=True)
             if scene is not None:
                 if import_first:
                     import_capture(scene, capture)
-                warnings += apply_recovery(scene, capture, uv, materials, store.folder)
+                warnings += apply_recovery(scene, capture, surface.uv, materials, store.folder)
             progress.done()
         report = recovery.report()
         if until == WRITE:

@@ -17,7 +17,7 @@ from ..core.material import EMITTER, LAMBERTIAN, ObjectMaterial
 from .cameras import differing, make_cameras, use_camera
 from .images import load_image, relative_to
 from .materials import make_material
-from .mesh_objects import make_objects
+from .mesh_objects import is_open, make_objects
 from .world import set_world
 
 BASE_COLOR, ALBEDO, SHADING, ENVIRONMENT = "base_color.exr", "albedo.exr", "shading.exr", "environment.exr"
@@ -51,7 +51,8 @@ class BuiltScene:
 
 
 def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
-                result_folder: Path | str, median_radiance: float = 0.0, own: bool = False) -> BuiltScene:
+                result_folder: Path | str, median_radiance: float = 0.0, own: bool = False,
+                facing: bool = False) -> BuiltScene:
     """Add the recovered room to a scene as a new collection; nothing that is there is changed.
 
     Parameters
@@ -68,6 +69,8 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
         Of the frames; with `own` it sets the exposure so that this becomes middle grey. 0: unknown.
     own : bool
         The scene is ours: also set its world, active camera, render engine and exposure.
+    facing : bool
+        The mesh's normals face the frames: a lamp that is an open sheet then shines on that side only, as it was seen.
 
     Returns
     -------
@@ -93,7 +96,8 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
         thing = objects[instance.object_id]
         description = descriptions.get(instance.object_id) or ObjectMaterial(
             instance.object_id, instance.class_name, LAMBERTIAN, note="no description")
-        thing.data.materials.append(make_material(description, images.get(BASE_COLOR)))
+        one_sided = facing and description.model == EMITTER and is_open(thing.data)
+        thing.data.materials.append(make_material(description, images.get(BASE_COLOR), one_sided=one_sided))
         if description.model == EMITTER:
             room.objects.unlink(thing)
             lamps.objects.link(thing)
@@ -111,7 +115,7 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
 
 def write_scene(path: Path | str, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
                 result_folder: Path | str, median_radiance: float = 0.0,
-                fresh: bool | None = None) -> tuple[str, ...]:
+                fresh: bool | None = None, facing: bool = False) -> tuple[str, ...]:
     """Save the recovered room as a .blend of its own that renders when opened.
 
     The file appears whole or not at all, and refers to the images by paths relative to itself.
@@ -120,7 +124,7 @@ def write_scene(path: Path | str, capture: Capture, atlas_uv: np.ndarray, materi
     ----------
     path : Path or str
         Best within `result_folder`, so that both are moved together.
-    capture, atlas_uv, materials, result_folder, median_radiance
+    capture, atlas_uv, materials, result_folder, median_radiance, facing
         See `build_scene`.
     fresh : bool, optional
         True: start from an empty file; what is open in this process is lost. False: build next to what is open, save
@@ -149,7 +153,8 @@ def write_scene(path: Path | str, capture: Capture, atlas_uv: np.ndarray, materi
         before = {kind: set(getattr(bpy.data, kind)) for kind in _KINDS}
         scene = bpy.data.scenes.new("Scan Relight")
     try:
-        built = build_scene(scene, capture, atlas_uv, materials, result_folder, median_radiance, own=True)
+        built = build_scene(scene, capture, atlas_uv, materials, result_folder, median_radiance, own=True,
+                            facing=facing)
         for image in built.images:
             relative_to(image, path.parent)
         _save_whole(path, lambda name: _save(name, scene, built, fresh))

@@ -73,7 +73,9 @@ class Recovery:
         specular = key("specular", shading, s.specular, s.specular_rays, s.refine)
         return {"surface": surface, "lit_diffuse": lit, "shading": shading, "specular": specular}
 
-    def _stage(self, name: str, load: Callable[[dict, dict], Any], compute: Callable[[], tuple[Any, dict, dict]]) -> Any:
+    def _stage(
+        self, name: str, load: Callable[[dict, dict], Any], compute: Callable[[], tuple[Any, dict, dict]]
+    ) -> Any:
         """The value of a stage: kept, stored, or computed now and stored."""
         if name in self._done:
             return self._done[name]
@@ -109,10 +111,10 @@ class Recovery:
             return found, {"uv": found.uv, "sign": sign}, {"size": found.atlas.size}
 
         def load(arrays, meta):
-            facing = dataclasses.replace(
-                capture.mesh, triangles=turned(capture.mesh.triangles, arrays["sign"]), uv=None
-            )
-            return from_uv(capture.mesh, facing, arrays["sign"], arrays["uv"], int(meta["size"]))
+            mesh, sign = capture.mesh, arrays["sign"]
+            uv = None if mesh.uv is None else turned(mesh.uv, sign)
+            facing = dataclasses.replace(mesh, triangles=turned(mesh.triangles, sign), uv=uv)
+            return from_uv(mesh, facing, sign, arrays["uv"], int(meta["size"]))
 
         return self._stage("surface", load, compute)
 
@@ -149,7 +151,8 @@ class Recovery:
             )  # fmt: skip
             if not lit.seen.any():
                 raise BadInputError(
-                    "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; check the frames."
+                    "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; "
+                    "check the frames."
                 )
             value = (lit, sky.result(), kept.result())
             arrays = {f"{i}.{f.name}": getattr(v, f.name) for i, v in enumerate(value) for f in dataclasses.fields(v)}
@@ -298,7 +301,8 @@ class Recovery:
         figures: dict[str, Any] = {"frames": len(self.capture.frames), "triangles": len(self.capture.mesh.triangles)}
         if "surface" in self._done:
             surface = self.surface()
-            figures |= {"atlas_size": surface.atlas.size, "elements": len(surface.atlas), "texel_metres": surface.texel_size}
+            figures |= {"atlas_size": surface.atlas.size, "elements": len(surface.atlas)}
+            figures["texel_metres"] = surface.texel_size
         if "lit_diffuse" in self._done:
             self._report_lit(figures, result["warnings"])
         if "shading" in self._done:

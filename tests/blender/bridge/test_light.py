@@ -138,6 +138,17 @@ def test_emission_is_exact_from_both_sides(scene, shoot, look, white_world, imag
         np.testing.assert_allclose(shoot(4, 4, 4)[..., :3].reshape(-1, 3).mean(0), radiance, rtol=1e-5, atol=1e-6)
 
 
+@pytest.mark.parametrize("image", [False, True])
+def test_a_one_sided_lamp_is_dark_from_behind(scene, shoot, look, image):
+    radiance = (31.5, 7.25, 0.0)
+    description = ObjectMaterial(0, "Lamp", EMITTER, emission=radiance)
+    add("plane", make_material(description, emission=plain(radiance) if image else None, one_sided=True), size=4)
+    for place, rotation, expected in (((0, 0, 1), (0, 0, 0), radiance), ((0, 0, -1), (np.pi, 0, 0), (0, 0, 0))):
+        look(place, rotation)
+        seen = shoot(4, 4, 4)[..., :3].reshape(-1, 3).mean(0)
+        np.testing.assert_allclose(seen, expected, rtol=1e-5, atol=1e-6)
+
+
 @pytest.mark.parametrize(("phi", "psi"), LOBES)
 def test_highlight_profile(scene, shoot, look, phi, psi):
     """The highlight of a small lamp on a plane, seen at 45 degrees, pixel by pixel against the method's G D F.
