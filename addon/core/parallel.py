@@ -41,7 +41,9 @@ def ordered_map(function: Callable, items: Iterable, threads: int, ahead: int = 
                 future.cancel()
 
 
-def for_blocks(function: Callable[[slice], None], count: int, size: int, threads: int, progress: Progress | None = None) -> None:
+def for_blocks(
+    function: Callable[[slice], None], count: int, size: int, threads: int, progress: Progress | None = None
+) -> None:
     """Run function(block) for every block of range(count); raises what a block raised, or `InterruptedRun`."""
     todo = blocks(count, size)
     with ThreadPoolExecutor(thread_count(threads)) as pool:

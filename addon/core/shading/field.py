@@ -1,4 +1,4 @@
-"""The light field of the captured room: radiance along any ray is L_d where it hits, the environment where it leaves."""
+"""The light field of the captured room: along a ray, radiance is L_d where it hits, the environment where it leaves."""
 
 from __future__ import annotations
 

@@ -100,8 +100,9 @@ def interpolated(
         # A lone close hit must not ask for endless points.
         radius = np.maximum(radius, finest / ALLOWED)
         batch = _Points(position[new], normal[new], value, radius)
+        names = ("position", "normal", "value", "radius")
         points = batch if points is None else _Points(
-            *(np.concatenate([getattr(points, f), getattr(batch, f)]) for f in ("position", "normal", "value", "radius"))
+            *(np.concatenate([getattr(points, name), getattr(batch, name)]) for name in names)
         )  # fmt: skip
         chosen = np.concatenate([chosen, new])
         if result is None:

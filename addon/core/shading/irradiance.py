@@ -1,4 +1,4 @@
-"""Irradiance E(x) = integral of L(x, w) <w, n> dw at surface elements (the paper's shading S, with its units put right).
+"""Irradiance E(x) = integral of L(x, w) <w, n> dw at surface elements (the paper's shading S, its units put right).
 
 Two estimators that add up: rays aimed at bright triangles (`direct`) and rays over the hemisphere (`gather`). Each
 direction's radiance is shared between them by the balance heuristic (Veach and Guibas 1995), so neither the lamp's

@@ -163,7 +163,8 @@ def find_light(
     lit = ~np.isin(atlas.object_id[element], [lamp.object_id for lamp in seen])
     if lit.sum() < 30:
         return Light(tuple(seen), environment, ())
-    sample = _Sample(element[lit], atlas.object_id[element[lit]], field.radiance[element[lit]].astype(np.float64), filled[lit])
+    sent = field.radiance[element[lit]].astype(np.float64)
+    sample = _Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit])
     thrown_sky = [G[lit] for G in thrown_sky]
     thrown = {i: _thrown_by_object(field, normals, sample.element, i, seed) for i in unseen_objects}
 
@@ -253,7 +254,8 @@ def _solve_sky(sample: _Sample, lamps, thrown, radiances, guess, thrown_sky, bas
         radiances[i] = np.minimum([found[0] for found in solved], top)
         notes.append(
             f"Part {i + 1} of the sky that no frame sees was solved from the light it throws: radiance "
-            f"{', '.join(f'{x:.3g}' for x in radiances[i])} (its seen neighbours: {', '.join(f'{x:.3g}' for x in guess[i])})."
+            f"{', '.join(f'{x:.3g}' for x in radiances[i])} "
+            f"(its seen neighbours: {', '.join(f'{x:.3g}' for x in guess[i])})."
         )
     return notes
 

@@ -1,4 +1,4 @@
-"""Which model an object needs: Lambertian, a dielectric lobe over diffuse, or metal. Never richer than the data show."""
+"""Which model an object needs: Lambertian, a dielectric lobe over diffuse, or metal; none richer than the data show."""
 
 from __future__ import annotations
 
