@@ -82,11 +82,13 @@ def steadied(atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, 
     cell = CELL_TEXELS * float(np.sqrt(np.median(atlas.area[own])))
     place = np.floor((position - position.min(0)) / max(cell, 1e-9)).astype(np.int64)
     extent = place.max(0) + 1
-    _, first, index = np.unique(
-        (place[:, 0] * extent[1] + place[:, 1]) * extent[2] + place[:, 2], return_index=True, return_inverse=True
+    _, index, count = np.unique(
+        (place[:, 0] * extent[1] + place[:, 1]) * extent[2] + place[:, 2], return_inverse=True, return_counts=True
     )
+    # The prior is asked for at the middle of a cell's elements: at one of them it would be shifted for the others.
+    centre = np.stack([np.bincount(index, position[:, axis]) for axis in range(3)], 1) / count[:, None]
     log_rho = np.log(np.maximum(rho, DARK))
-    middle, width = _prior(position[first], position[sure], log_rho[sure])
+    middle, width = _prior(centre, position[sure], log_rho[sure])
     middle, width = middle[index], width[index][:, None]
     trust = (width**2 / (width**2 + np.minimum(error, 1e3)[:, None] ** 2)).astype(np.float32)
     trust[~np.isfinite(error)] = 0

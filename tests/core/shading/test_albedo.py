@@ -55,11 +55,15 @@ def test_gaps_are_filled_from_the_same_object_only(atlas):
     assert np.array_equal(result.origin == MEASURED, valid) and (result.origin[~valid] == FILLED).all()
 
 
-def test_gaps_take_the_nearest_value(atlas):
+def test_gaps_take_the_value_around_them():
+    """A third of the elements missing in a gradient of 0.2 a metre; what is filled in comes from at most 0.5 m off."""
+    atlas = make_room(box_sides(), 0.05).atlas
     rho = (0.1 + 0.2 * atlas.position[:, :1].repeat(3, 1)).astype(np.float32)
     valid = np.arange(len(atlas)) % 3 > 0
     result = fill(atlas, np.where(valid[:, None], rho, NAN).astype(np.float32), valid, {}, set())
-    assert np.abs(result.rho - np.minimum(rho, 1)).max() < 0.2 * 0.5
+    off = np.abs(result.rho - np.minimum(rho, 1))
+    assert off.max() < 0.2 * 0.5 and off[valid].max() < 1e-6
+    assert np.median(off[~valid]) < 0.2 * 0.15
 
 
 def test_an_unmeasured_object_looks_to_its_class(atlas):

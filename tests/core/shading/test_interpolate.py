@@ -5,10 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading.interpolate import interpolated
-from tests.core.rooms import box_sides, make_room
+from addon.core.shading import interpolate
+from addon.core.shading.interpolate import CONTRAST, interpolated
+from tests.core.rooms import box_sides, make_room, quad
 
 FINEST = 0.1
+AS_IT_COMES = interpolate.COARSEST
+
+
+@pytest.fixture(autouse=True)
+def several_levels(monkeypatch):
+    """In a room of few elements the first spacing would lie below the finest: start coarser, to have levels at all."""
+    monkeypatch.setattr(interpolate, "COARSEST", 0.15)
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +87,60 @@ def test_close_walls_ask_for_more_points(atlas):
     _, few = run(atlas, lambda p, n: np.ones((len(p), 3), np.float32), radius=4)
     _, many = run(atlas, lambda p, n: np.ones((len(p), 3), np.float32), radius=0.4)
     assert 4 * len(few) < len(many)
+
+
+def test_light_refines_where_walls_are_far(atlas):
+    """The walls are far off (R = 10 m) and ask for nothing; what the points themselves say does, if it is enough."""
+
+    def spot(strength):
+        def value(p, n):
+            near = ((p[:, :2] - (2.1, 1.4)) ** 2).sum(1) < 0.5**2
+            return np.where(near, np.float32(1 + strength), np.float32(1))[:, None].repeat(3, 1)
+
+        return value
+
+    floor = atlas.normal[:, 2] > 0.5
+    apart = np.linalg.norm(atlas.position[:, :2] - (2.1, 1.4), axis=1)
+    edge, away = floor & (np.abs(apart - 0.5) < 0.1), floor & (apart > 1.5)
+    asked = {}
+    for strength in (1.0, CONTRAST / 2):
+        value, points = run(atlas, spot(strength), radius=10)
+        asked[strength] = np.isin(np.arange(len(atlas)), points)
+        inside = floor & (apart < 0.3)
+        assert np.allclose(value[away], 1, rtol=1e-3)
+        if strength == 1:
+            assert np.allclose(value[inside], 2, rtol=CONTRAST) and np.abs(value[inside] / 2 - 1).mean() < 0.01
+    assert asked[1.0][edge].mean() > 4 * asked[1.0][away].mean()
+    assert asked[CONTRAST / 2][edge].mean() < 2 * asked[CONTRAST / 2][away].mean()
+
+
+def test_coarse_points_do_not_outweigh_fine_ones(atlas):
+    """At a shadow's edge the first points lie apart; with R = 100 m they would reach over all that came after."""
+
+    def edge(p, n):
+        return np.where(p[:, :1] > 1.7, np.float32(1), np.float32(0.1)).repeat(3, 1)
+
+    value, _ = run(atlas, edge, radius=100)
+    x, along = atlas.position[:, 0], np.abs(atlas.normal[:, 0]) < 0.5
+    beside = along & (np.abs(x - 1.7) > 2.5 * FINEST)
+    off = np.abs(value / edge(atlas.position, None) - 1).max(1)
+    assert np.percentile(off[beside], 95) < 0.05 and np.percentile(off[along], 75) < 0.01
+
+
+def test_small_things_are_not_stepped_over(monkeypatch):
+    """A patch of light of 3 % of the room's size, walls far off: found, as the first points lie 1 % apart."""
+    monkeypatch.setattr(interpolate, "COARSEST", AS_IT_COMES)
+    atlas = make_room([quad((0, 0, 0), (4, 0, 0), (0, 4, 0), 0)], 0.02).atlas
+    lit = (np.abs(atlas.position[:, :2] - (1.234, 2.345)) < 0.06).all(1)
+    value, points = run(atlas, lambda p, n: spot_of(p), radius=10, finest=0.02)
+    assert len(points) < len(atlas) / 3
+    assert np.abs(value[lit] / 5 - 1).mean() < 0.1
+    dark = (np.abs(atlas.position[:, :2] - (1.234, 2.345)) > 0.12).any(1)
+    assert np.allclose(value[dark], 1, rtol=1e-3)
+
+
+def spot_of(p):
+    return np.where((np.abs(p[:, :2] - (1.234, 2.345)) < 0.06).all(1), np.float32(5), np.float32(1))[:, None]
 
 
 def test_points_keep_their_distance(atlas):

@@ -19,10 +19,11 @@ LAMP = (10, 9, 8)
 
 @pytest.fixture(scope="module")
 def lit():
-    """A box with a large lamp, and what twelve frames of it give."""
-    room = make_room(lit_box(lamps=(((0.3, 0.7), (0.3, 0.7)),)), 0.2)
+    """A box with a large lamp, and what 24 frames of it give: most elements have enough observations to be believed."""
+    room = make_room(lit_box(lamps=(((0.3, 0.7), (0.3, 0.7)),)), 0.1)
     truth = radiosity(room, ALBEDO, {6: LAMP})
-    cameras = [c for eye in ((1.7, 1.3, 1.1), (2.3, 1.7, 1.4)) for c in all_round(eye, 64)]
+    eyes = (1.7, 1.3, 1.1), (2.3, 1.7, 1.4), (1.1, 1.9, 1.6), (2.9, 1.2, 0.9)
+    cameras = [c for eye in eyes for c in all_round(eye, 64)]
     frames = [Frame(str(i), Path(str(i)), camera) for i, camera in enumerate(cameras)]
     found = accumulate(
         room.mesh, room.atlas, room.scene, frames, lambda frame: picture(room, frame.camera, truth), threads=2
@@ -62,12 +63,13 @@ def test_albedo_comes_back(lit, how):
 
 
 def test_irradiance_agrees_with_radiosity(lit):
-    """E = pi L / rho of the truth, element by element."""
+    """E = pi L / rho of the truth, element by element; 0.2 m is the least distance of its points (`FINEST_TEXELS`)."""
     room, truth, found = lit
     result = shade(room.mesh, room.instances, room.atlas, room.scene, found, DARK, rays=256, emitter_rays=32, threads=2)
     walls = np.isin(room.atlas.object_id, [0, 2, 3, 4, 5])
     E = np.pi * truth[walls] / room.by_object(ALBEDO, default=1)[walls]
-    assert np.percentile(np.abs(result.irradiance[walls] / E - 1), 90) < 0.05
+    off = result.irradiance[walls] / E - 1
+    assert np.percentile(np.abs(off), 90) < 0.05 and abs(np.median(off)) < 0.005
 
 
 def test_exposure_does_not_matter(lit):
