@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..core.atomic import replacing, write_bytes
 from ..core.errors import StorageError
 from ..core.material import EMITTER
 from ..core.progress import Progress, ProgressEvent
@@ -61,10 +63,7 @@ def run_demo(out: Path | str, size: str, settings: Settings, listener: Callable[
     progress.stage("pictures")
     bpy.ops.wm.open_mainfile(filepath=str((out / "scene.blend").absolute()))
     table = comparison(capture, out)
-    try:
-        (out / "comparison.txt").write_text(table + "\n", encoding="utf-8")
-    except OSError as error:
-        raise StorageError(f"'{out / 'comparison.txt'}' can't be written ({error.strerror}).") from error
+    write_bytes(out / "comparison.txt", f"{table}\n".encode())
     pictures(out, size, progress)
     progress.done()
     return table
@@ -110,11 +109,22 @@ def switch_off_the_lamps(scene) -> None:
 
 
 def shoot(scene, path: Path) -> None:
-    """Render to the file `path`."""
-    scene.render.filepath = str(path.absolute())
-    bpy.ops.render.render(write_still=True, scene=scene.name)
-    if not path.is_file():
-        raise StorageError(f"'{path}' can't be written; free some space or choose another result folder.")
+    """Render to the file `path`, in whole or not at all."""
+    with _saving(path) as temporary:
+        scene.render.filepath = str(temporary.absolute())
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+
+
+@contextmanager
+def _saving(path: Path) -> Iterator[Path]:
+    """A temporary name beside `path` that Blender saves to, moved over it; one sentence where that fails."""
+    try:
+        with replacing(path) as temporary:
+            yield temporary
+    except RuntimeError as error:
+        reason = " ".join(str(error).split()).removeprefix("Error: ").rstrip(".")
+        raise StorageError(f"'{path}' can't be written ({reason}); free some space or choose another result folder."
+                           ) from error
 
 
 def beside(left: Path, right: Path, out: Path) -> None:
@@ -125,5 +135,6 @@ def beside(left: Path, right: Path, out: Path) -> None:
     joined = np.concatenate([pixels[0], gap, pixels[1]], 1)
     made = bpy.data.images.new("before_after", joined.shape[1], joined.shape[0])
     made.pixels.foreach_set(joined.astype(np.float32).ravel())
-    made.filepath_raw, made.file_format = str(out.absolute()), "PNG"
-    made.save()
+    with _saving(out) as temporary:
+        made.filepath_raw, made.file_format = str(temporary.absolute()), "PNG"
+        made.save()

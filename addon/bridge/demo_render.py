@@ -59,8 +59,12 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
         (part / "truth" / "demo.json").write_text(json.dumps(stamp_of(size)))
         shutil.rmtree(folder, ignore_errors=True)
         os.replace(part, folder)
-    except OSError as error:
-        raise StorageError(f"The demo's capture can't be written to '{folder}': {error.strerror or error}.") from error
+    except (OSError, RuntimeError) as error:  # Blender's own failures to write are RuntimeErrors
+        reason = " ".join(str(getattr(error, "strerror", None) or error).split()).removeprefix("Error: ").rstrip(".")
+        raise StorageError(f"The demo's capture can't be written to '{folder}' ({reason}); free some space or choose "
+                           "another folder.") from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
     return folder
 
 
@@ -97,7 +101,7 @@ def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int]
             scene.render.filepath = str(folder / frame_path(k))
             bpy.ops.render.render(write_still=True, scene=scene.name)
             if not (folder / frame_path(k)).is_file():
-                raise StorageError(f"The demo's frame {k} can't be written to '{folder}'.")
+                raise OSError(f"frame {k} did not appear")
         progress.update(1.0)
     finally:
         bpy.data.scenes.remove(scene)

@@ -53,7 +53,8 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
         BASE_COLOR, METALLIC, ROUGHNESS, IOR, SPECULAR_LEVEL, EMISSION_COLOR, EMISSION_STRENGTH)}
     # The fitted lobe is single scattering.
     principled.distribution = "GGX"
-    value[ROUGHNESS].default_value = 1.0 if description.phi is None else math.sqrt(min(max(description.phi, 0.0), 1.0))
+    if description.phi is not None:  # else Blender's default, which shows nowhere while there is no specular lobe
+        value[ROUGHNESS].default_value = math.sqrt(min(max(description.phi, 0.0), 1.0))
     value[SPECULAR_LEVEL].default_value = 0.0
     value[IOR].default_value = 1.5
     value[BASE_COLOR].default_value = (0.5, 0.5, 0.5, 1)

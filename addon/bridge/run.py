@@ -5,14 +5,15 @@ from __future__ import annotations
 import importlib.metadata
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 import bpy
 
 from ..core.capture.read import read_capture
-from ..core.errors import BadInputError
+from ..core.errors import BadInputError, StorageError
 from ..core.memory import peak_memory
 from ..core.progress import Progress, ProgressEvent
 from ..core.recover import Recovery
@@ -75,7 +76,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     if scene is not None and not import_first:
         imported(scene, capture)  # its absence is told now, not after the work
     progress.done()
-    with Store(out_folder) as store:
+    with Store(out_folder) as store, _told(out_folder):
         recovery = Recovery(capture, store, settings, progress, unwrap)
         for stage in STAGES:
             getattr(recovery, stage)()
@@ -85,6 +86,8 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         if until == WRITE:
             progress.stage(WRITE)
             writing = time.monotonic()
+            for name in ("report.json", "scene.blend"):  # a stopped run must not leave the last one's among new images
+                store.path(name).unlink(missing_ok=True)
             recovery.write_images()
             progress.update(0.5)
             surface, materials = recovery.surface(), recovery.materials()
@@ -107,6 +110,17 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         report["seconds"] = round(time.monotonic() - started, 2)
         store.write_json("report.json", report)
     return report
+
+
+@contextmanager
+def _told(folder: Path) -> Iterator[None]:
+    """Turn what the system refuses while `folder` is written into one sentence."""
+    try:
+        yield
+    except OSError as error:
+        where = f" for '{error.filename}'" if error.filename else ""
+        raise StorageError(f"Result folder '{folder}' can't be written any more ({error.strerror or error}{where}); "
+                           "free some space or choose another.") from error
 
 
 def versions() -> dict[str, str]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import errno
 import math
+import os
+import struct
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -183,6 +186,8 @@ def _save_whole(path: Path, save: Callable[[str], None]) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         writing.unlink(missing_ok=True)
         save(str(writing))
+        if not is_whole(writing):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         writing.replace(path)
     except (OSError, RuntimeError) as error:
         with suppress(OSError):
@@ -190,6 +195,30 @@ def _save_whole(path: Path, save: Callable[[str], None]) -> None:
         reason = getattr(error, "strerror", None) or str(error).strip().removeprefix("Error: ").rstrip(".")
         raise StorageError(f"{path} can't be saved ({' '.join(reason.split())}); free some space or choose another "
                            "folder.") from error
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a compressed .blend was written to its end.
+
+    Blender does not notice a full disk while it compresses (4.5, 5.2). The file's last frame lists the sizes of all
+    others (zstd's seekable format), so it tells what should be there.
+    """
+    with open(path, "rb") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(size - _FOOTER.size, 0))
+        footer = file.read()
+        if len(footer) < _FOOTER.size:
+            return False
+        frames, _, magic = _FOOTER.unpack(footer)
+        table = frames * _FRAME.size
+        if magic != _SEEKABLE or table + _FOOTER.size + 8 > size:
+            return False
+        file.seek(size - _FOOTER.size - table)
+        packed = sum(frame[0] for frame in _FRAME.iter_unpack(file.read(table)))
+    return packed + 8 + table + _FOOTER.size == size
+
+
+_FOOTER, _FRAME, _SEEKABLE = struct.Struct("<IBI"), struct.Struct("<II"), 0x8F92EAB1
 
 
 def _remove_new(before):

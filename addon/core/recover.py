@@ -222,7 +222,7 @@ class Recovery:
                 [lamp.object_id for lamp in shading.lamps],
             )  # fmt: skip
             found = fit_specular(
-                surface.mesh, self.capture.instances, field, lit, shading.lamps, self.samples(),
+                self.capture.instances, field, lit, shading.lamps, self.samples(),
                 [frame.name for frame in self.capture.frames],
                 way=s.specular, rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
                 progress=self.progress,

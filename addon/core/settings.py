@@ -50,7 +50,7 @@ class Settings:
     emitter_rays: int = 16
     interpolate: bool = True
     specular: str = "frames"
-    specular_rays: int = 64
+    specular_rays: int = 384
     refine: int = 1
     threads: int = 0
     seed: int = 0

@@ -14,7 +14,6 @@ def score_frames(
     frame: np.ndarray,
     highlight: np.ndarray,
     diffuse: np.ndarray,
-    usable: np.ndarray,
     frames: int,
 ) -> np.ndarray:
     """How good a target each frame is for one object (Haefner et al. 2021, assumptions A1 and A2).
@@ -22,30 +21,26 @@ def score_frames(
     Parameters
     ----------
     frame : (m,) int
-        Frame of each observation of the object.
+        Frame of each observation of the object; valid and unsaturated ones only (A2).
     highlight : (m, 3) float32
         Radiance that a lobe of middle width would reflect there, by the light field (A1).
     diffuse : (m, 3) float32
         L_d there.
-    usable : (m,) bool
-        Valid and unsaturated (A2).
     frames : int
         Number of frames in the capture.
 
     Returns
     -------
     (frames,) float64
-        0 where a frame shows too little of the object. The product of A1, the standard deviation of highlight over
-        L_d in the frame (a highlight that lies evenly over all pixels can't be told from albedo), and A2, the share
-        of usable pixels.
+        The standard deviation of highlight over L_d in the frame: a highlight that lies evenly over all pixels can't
+        be told from albedo. 0 where a frame shows too little of the object.
     """
     strength = (highlight @ LUMINANCE) / np.maximum(diffuse @ LUMINANCE, 1e-3 * np.median(diffuse @ LUMINANCE) + 1e-9)
     count = np.bincount(frame, minlength=frames).astype(float)
-    good = np.bincount(frame, usable, frames)
     mean = np.bincount(frame, strength, frames) / np.maximum(count, 1)
     square = np.bincount(frame, strength**2, frames) / np.maximum(count, 1)
     spread = np.sqrt(np.maximum(square - mean**2, 0))
-    return np.where(good >= MIN_OBSERVATIONS, spread * good / np.maximum(count, 1), 0.0)
+    return np.where(count >= MIN_OBSERVATIONS, spread, 0.0)
 
 
 def target_frame(scores: np.ndarray) -> int:

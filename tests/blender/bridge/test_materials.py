@@ -23,7 +23,7 @@ def f0(value):
 def test_lambertian(scene):
     image = bpy.data.images.new("base", 4, 4)
     inputs, value = sockets(make_material(ObjectMaterial(3, "Wall", LAMBERTIAN), image))
-    assert f0(value) == 0 and value("Roughness") == 1 and value("Metallic") == 0 and value("Emission Strength") == 0
+    assert f0(value) == 0 and value("Roughness") == 0.5 and value("Metallic") == 0 and value("Emission Strength") == 0
     texture = inputs["Base Color"].links[0].from_node
     assert texture.image == image and texture.inputs[0].links[0].from_node.uv_map == "ScanRelight"
 
