@@ -17,7 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
-from .console import ConsoleProgress, StopWish, duration, own_stdout
+from .console import ConsoleProgress, StopWish, duration, own_console, unexpected
 from .core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_OK, BadInputError, ScanRelightError
 from .core.settings import PAPER, Settings
 from .settings_info import setting_infos
@@ -49,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as end:  # argparse has printed help, the version, or what is wrong
         return end.code if isinstance(end.code, int) else EXIT_BAD_INPUT
     try:
-        with own_stdout(keep_blender=arguments.debug) as stream:
+        with own_console(keep_others=arguments.debug) as stream:
             return arguments.function(arguments, stream)
     except ScanRelightError as error:
         if arguments.debug:
@@ -65,12 +65,22 @@ def main(argv: Sequence[str] | None = None) -> int:
         return complain("The memory is used up; a greater --texel-size or a smaller --atlas-size takes less.",
                         EXIT_FAILURE)
     except Exception as error:  # the last line of defence: a sentence, never a bare traceback
-        return complain(unexpected(error, getattr(arguments, "out", None), arguments.debug), EXIT_FAILURE)
+        if arguments.debug:
+            traceback.print_exc()
+        return complain(unexpected(error, getattr(arguments, "out", None)), EXIT_FAILURE)
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that says what is wrong in one sentence instead of a page of usage."""
+
+    def error(self, message: str):
+        """End with exit code 2."""
+        self.exit(EXIT_BAD_INPUT, f"scan-relight: {message[:1].upper()}{message[1:]}; see '{self.prog} --help'.\n")
 
 
 def make_parser() -> argparse.ArgumentParser:
     """The parser for every command."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="scan-relight", epilog=EXIT_CODES,
         description="Recover albedo, roughness and lamps from a scanned room and write a Blender scene to relight.")
     parser.add_argument("--version", action="version", version=f"scan-relight {VERSION}")
@@ -210,21 +220,6 @@ def complain(sentence: str, code: int) -> int:
     with contextlib.suppress(OSError, ValueError):
         print(f"scan-relight: {sentence}", file=sys.stderr, flush=True)
     return code
-
-
-def unexpected(error: Exception, out: Path | None, debug: bool) -> str:
-    """One sentence for an error that nobody foresaw; its traceback goes into RESULT/error.log."""
-    sentence = f"Unexpected error ({type(error).__name__}: {' '.join(str(error).split())})"
-    if debug:
-        traceback.print_exc()
-        return f"{sentence}."
-    if out is not None:
-        try:
-            (out / "error.log").write_text("".join(traceback.format_exception(error)), encoding="utf-8")
-            return f"{sentence}; please report it with '{out / 'error.log'}'."
-        except OSError:
-            pass
-    return f"{sentence}; run again with --debug to see where."
 
 
 _handle = None

@@ -8,7 +8,10 @@ import os
 import signal
 import sys
 import time
+import traceback
+import warnings
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TextIO
 
 from .core.progress import ProgressEvent
@@ -104,35 +107,52 @@ class StopWish:
 
 
 @contextlib.contextmanager
-def own_stdout(keep_blender: bool = False) -> Iterator[TextIO]:
-    """Hand out the real standard output and keep Blender's own chatter off it, which it writes below Python.
+def own_console(keep_others: bool = False) -> Iterator[TextIO]:
+    """Hand out the real standard output, and keep off the console what libraries write below Python.
+
+    That is Blender's chatter and OpenEXR's remarks on damaged pictures, which the program tells in its own words.
 
     Parameters
     ----------
-    keep_blender : bool
-        Let the chatter through.
+    keep_others : bool
+        Let the others through.
     """
+    if keep_others:
+        yield sys.stdout
+        return
+    with contextlib.ExitStack() as stack:
+        out = stack.enter_context(_alone("stdout", 1))
+        stack.enter_context(contextlib.redirect_stderr(stack.enter_context(_alone("stderr", 2))))
+        if out is not sys.stdout:  # a process of our own: warnings are for developers, and tests see them
+            stack.enter_context(warnings.catch_warnings(action="ignore"))
+        yield out
+
+
+@contextlib.contextmanager
+def _alone(name: str, number: int) -> Iterator[TextIO]:
+    """Hand out the standard stream `name`, while all others who write to its descriptor `number` write to nowhere."""
+    standard = getattr(sys, name)
     try:
-        direct = sys.stdout.fileno() == 1 and not keep_blender
+        direct = standard.fileno() == number
     except (AttributeError, OSError, ValueError):
         direct = False
     if not direct:
-        yield sys.stdout
+        yield standard
         return
-    sys.stdout.flush()
+    standard.flush()
     _flush_c()
-    kept = os.dup(1)
-    stream = os.fdopen(os.dup(kept), "w", encoding=sys.stdout.encoding, errors="replace")
+    kept = os.dup(number)
+    stream = os.fdopen(os.dup(kept), "w", 1 if number == 2 else -1, encoding=standard.encoding, errors="replace")
     null = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(null, 1)
+        os.dup2(null, number)
         yield stream
     finally:
         with contextlib.suppress(OSError):
             stream.close()
-        sys.stdout.flush()
+        standard.flush()
         _flush_c()
-        os.dup2(kept, 1)
+        os.dup2(kept, number)
         os.close(kept)
         os.close(null)
 
@@ -141,3 +161,16 @@ def _flush_c() -> None:
     """Empty the C library's output buffers, which Blender's prints stand in."""
     with contextlib.suppress(OSError, AttributeError, TypeError):
         (ctypes.cdll.ucrtbase if os.name == "nt" else ctypes.CDLL(None)).fflush(None)
+
+
+def unexpected(error: Exception, folder: Path | str | None) -> str:
+    """One sentence for an error that nobody foresaw; its traceback goes into the file error.log in `folder`."""
+    sentence = f"Unexpected error ({type(error).__name__}: {' '.join(str(error).split())})"
+    if folder:
+        log = Path(folder) / "error.log"
+        try:
+            log.write_text("".join(traceback.format_exception(error)), encoding="utf-8")
+            return f"{sentence}; please report it with '{log}'."
+        except OSError:
+            pass
+    return f"{sentence}; please report it."

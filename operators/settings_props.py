@@ -7,6 +7,7 @@ from functools import cache
 
 import bpy
 
+from ..addon.console import unexpected
 from ..addon.core.errors import BadInputError, ScanRelightError
 from ..addon.core.settings import PAPER, Settings
 from ..addon.settings_info import SettingInfo, setting_infos
@@ -72,6 +73,12 @@ class CaptureOperator:
                 self.report({"WARNING"}, sentence)
         except ScanRelightError as error:
             self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        except MemoryError:
+            self.report({"ERROR"}, "The memory is used up; a greater texel size or a smaller atlas size takes less.")
+            return {"CANCELLED"}
+        except Exception as error:  # the last line of defence: a sentence, never a bare traceback
+            self.report({"ERROR"}, unexpected(error, bpy.path.abspath(getattr(self, "result_folder", ""))))
             return {"CANCELLED"}
         return {"FINISHED"}
 

@@ -70,7 +70,8 @@ def test_every_option_arrives():
 ])
 def test_what_argparse_refuses_is_bad_input(argv, capsys):
     assert cli.main(argv) == 2
-    assert "usage" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert err.startswith("scan-relight: ") and err.count("\n") == 1 and "--help'" in err
 
 
 def test_a_setting_out_of_range_is_bad_input(tmp_path, capsys):
