@@ -13,6 +13,8 @@ LEAST_PSI = 0.02
 """No solid dielectric reflects less at normal incidence (n = 1.33); a smaller fitted psi is no lobe at all."""
 METAL_PSI = 0.12
 """No common dielectric reflects more (n = 2.06); what does is a metal or a mirror."""
+METAL_PHI = 0.5
+"""A metal's lobe broader than this can't be told from a diffuse surface."""
 MIN_GAIN = 0.02
 MIN_SIGMAS = 3.0
 """A lobe must lower the cost on elements that its fit has not seen by this share, and by this many standard errors."""
@@ -71,7 +73,7 @@ def choose_model(problem: Problem) -> Choice:
     if len(np.unique(problem.element)) < MIN_ELEMENTS:
         return Choice(LAMBERTIAN, None, note="Too few observations to look for a highlight.")
     metal = fit_lobe(problem, "frames", True)
-    if float(metal.psi.mean()) > METAL_PSI:
+    if float(metal.psi.mean()) > METAL_PSI and metal.phi <= METAL_PHI:
         gain, sigmas = _held_out(problem, True)
         if gain > MIN_GAIN and sigmas > MIN_SIGMAS:
             return Choice(METAL, metal, gain, sigmas)

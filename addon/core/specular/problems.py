@@ -1,4 +1,4 @@
-"""The observations of one object made into a fit's problem: a choice of elements and views, and the light they reflect."""
+"""The observations of one object made into a fit's problem: elements, views, and the light that they reflect."""
 
 from __future__ import annotations
 
