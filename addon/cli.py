@@ -62,8 +62,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_FAILURE
     except MemoryError:
-        return complain("The memory is used up; a greater --texel-size or a smaller --atlas-size takes less.",
-                        EXIT_FAILURE)
+        return complain("The memory is used up; a greater --texel-size, a smaller --atlas-size or fewer rays "
+                        "take less.", EXIT_FAILURE)
     except Exception as error:  # the last line of defence: a sentence, never a bare traceback
         if arguments.debug:
             traceback.print_exc()
