@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
+import json
+import shutil
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -33,6 +37,11 @@ def ops(package):
     """`bpy.ops.scan_relight` over an empty scene."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     return bpy.ops.scan_relight
+
+
+def one_sentence(told) -> bool:
+    """Whether an operator's error is one line without a traceback."""
+    return len(str(told.value).strip().splitlines()) == 1 and "Traceback" not in str(told.value)
 
 
 def things():
@@ -104,6 +113,112 @@ def test_editing_is_told(ops, grey_capture):
 def test_writing_needs_the_import(ops, grey_capture, tmp_path):
     with pytest.raises(RuntimeError, match="import it first"):
         ops.write(capture_folder=str(grey_capture), result_folder=str(tmp_path))
+
+
+@pytest.mark.parametrize("name", NAMES[1:])
+def test_a_capture_that_cant_be_used_is_told(ops, name, grey_capture, tmp_path):
+    """One sentence; the scene stays as it was, and no result is begun."""
+    broken = shutil.copytree(grey_capture, tmp_path / "capture")
+    (broken / "mesh.ply").write_bytes(b"")
+    with pytest.raises(RuntimeError, match="mesh.ply' is empty") as told:
+        getattr(ops, name)(capture_folder=str(broken), result_folder=str(tmp_path / "result"))
+    assert one_sentence(told)
+    assert len(bpy.context.scene.objects) == 0 and not (tmp_path / "result").exists()
+
+
+def test_a_file_in_the_way_is_told(ops, grey_capture, tmp_path):
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(RuntimeError, match="a file is in its way") as told:
+        ops.accumulate(capture_folder=str(grey_capture), result_folder=str(tmp_path / "file"))
+    assert one_sentence(told)
+
+
+def test_the_capture_as_result_is_told(ops, grey_capture):
+    with pytest.raises(RuntimeError, match="is the capture itself"):
+        ops.recover(capture_folder=str(grey_capture), result_folder=str(grey_capture))
+    assert len(bpy.context.scene.objects) == 0
+
+
+def fails_with(package, monkeypatch, error):
+    """Let the whole of the work fail."""
+    def fail(*arguments, **keywords):
+        raise error
+
+    monkeypatch.setattr(importlib.import_module("scan_relight.addon.bridge.run"), "run", fail)
+
+
+def test_an_unforeseen_error_is_told_and_logged(ops, package, grey_capture, tmp_path, monkeypatch):
+    fails_with(package, monkeypatch, ValueError("deep\ninside"))
+    with pytest.raises(RuntimeError, match="Unexpected error .ValueError: deep inside.") as told:
+        ops.recover(capture_folder=str(grey_capture), result_folder=str(tmp_path))
+    assert one_sentence(told)
+    assert "Traceback" in (tmp_path / "error.log").read_text()
+
+
+def test_used_up_memory_is_told(ops, package, grey_capture, tmp_path, monkeypatch):
+    fails_with(package, monkeypatch, MemoryError())
+    with pytest.raises(RuntimeError, match="memory is used up") as told:
+        ops.shade(capture_folder=str(grey_capture), result_folder=str(tmp_path))
+    assert one_sentence(told)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_missing_packages_are_told(ops, name, package, monkeypatch):
+    monkeypatch.setattr(importlib.import_module("scan_relight.operators.settings_props"), "missing_packages",
+                        lambda: ("scipy", "OpenEXR"))
+    with pytest.raises(RuntimeError, match="scipy and OpenEXR missing: install the extension again"):
+        getattr(ops, name)()
+
+
+@pytest.mark.parametrize("name, until", [
+    ("accumulate", "lit_diffuse"), ("shade", "shading"), ("fit", "specular"), ("write", "write"), ("recover", "write")])
+@pytest.mark.parametrize("paper", [False, True])
+def test_what_is_chosen_arrives(ops, name, until, paper, package, tmp_path, monkeypatch):
+    """Folders, settings and the last stage, in the words of the one function that does the work."""
+    asked = []
+    module = importlib.import_module("scan_relight.addon.bridge.run")
+    settings = importlib.import_module("scan_relight.addon.core.settings")
+
+    def remember(capture, result, chosen, progress, until, **where):
+        asked.append((capture, result, chosen, until, where))
+        return {"warnings": ["This was odd."]}
+
+    monkeypatch.setattr(module, "run", remember)
+    done = getattr(ops, name)(capture_folder="a", result_folder="b", paper=paper, seed=5, median="mean")
+    assert done == {"FINISHED"}
+    [(capture, result, chosen, stage, where)] = asked
+    assert (capture, result, stage) == ("a", "b", until)
+    assert chosen == (replace(settings.PAPER, seed=5) if paper else settings.Settings(seed=5, median="mean"))
+    assert where == {"write": {"scene": bpy.context.scene, "import_first": False},
+                     "recover": {"scene": bpy.context.scene}}.get(name, {})
+
+
+@pytest.mark.slow
+def test_each_operator_brings_its_forerunners_and_no_more(ops, grey_capture, tmp_path):
+    folders = {"capture_folder": str(grey_capture), "result_folder": str(tmp_path)}
+    stages = ["surface", "lit_diffuse", "shading", "specular"]
+    before = 0
+    for name, count in (("accumulate", 2), ("shade", 3), ("fit", 4)):
+        assert getattr(ops, name)(**folders, **QUICK) == {"FINISHED"}
+        assert sorted(path.stem for path in (tmp_path / "stages").glob("*.npz")) == sorted(stages[:count])
+        report = json.loads((tmp_path / "report.json").read_text())
+        assert list(report["stages"]) == stages[:count]
+        assert [report["stages"][stage]["stored"] for stage in stages[:count]] == [k < before for k in range(count)]
+        before = count
+    assert not (tmp_path / "scene.blend").exists() and len(bpy.context.scene.objects) == 0
+
+
+@pytest.mark.slow
+def test_an_object_that_was_edited_is_left_alone(ops, grey_capture, tmp_path):
+    folders = {"capture_folder": str(grey_capture), "result_folder": str(tmp_path)}
+    ops.import_capture(capture_folder=str(grey_capture))
+    ball = next(thing for thing in things().values() if thing.name == "ball")
+    ball.data.clear_geometry()
+    bpy.data.objects.remove(next(thing for thing in things().values() if thing.name == "sofa"))
+    assert ops.write(**folders, **QUICK) == {"FINISHED"}
+    assert not ball.data.materials
+    warnings = "\n".join(json.loads((tmp_path / "report.json").read_text())["warnings"])
+    assert "(ball) was edited and is left" in warnings and "(sofa) was deleted" in warnings
 
 
 @pytest.mark.slow
