@@ -42,12 +42,19 @@ class BrightTriangles:
 
 
 def triangle_luminance(field: LightField) -> np.ndarray:
-    """Mean luminance of each triangle over its elements ((t,) float64; 0 where a triangle has none)."""
+    """Mean luminance of each triangle over its elements ((t,) float64).
+
+    A triangle too small for elements of its own, as in a finely meshed bulb, shows those of its object beside it.
+    """
     atlas = field.atlas
     luminance = field.radiance @ LUMINANCE
     t = len(field.mesh.triangles)
     count = np.bincount(atlas.triangle, minlength=t)
-    return np.bincount(atlas.triangle, luminance, t) / np.maximum(count, 1)
+    mean = np.bincount(atlas.triangle, luminance, t) / np.maximum(count, 1)
+    bare = np.flatnonzero(count == 0).astype(np.int32)
+    third = np.full(len(bare), 1 / 3, np.float32)
+    mean[bare] = luminance[field.lookup(bare, third, third)]
+    return mean
 
 
 def bright_triangles(field: LightField) -> BrightTriangles:

@@ -107,7 +107,7 @@ def test_light_refines_where_walls_are_far(atlas):
         value, points = run(atlas, spot(strength), radius=10)
         asked[strength] = np.isin(np.arange(len(atlas)), points)
         inside = floor & (apart < 0.3)
-        assert np.allclose(value[away], 1, rtol=1e-3)
+        assert np.allclose(value[away], 1, rtol=1e-3 if strength == 1 else CONTRAST / 2)
         if strength == 1:
             assert np.allclose(value[inside], 2, rtol=CONTRAST) and np.abs(value[inside] / 2 - 1).mean() < 0.02
     assert asked[1.0][edge].mean() > 4 * asked[1.0][away].mean()

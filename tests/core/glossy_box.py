@@ -1,0 +1,95 @@
+"""A box with one lamp whose reflections are summed up by brute force, sharing no rays with the code under test."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from addon.core.shading.emitters import bright_triangles
+from addon.core.specular.fit import Problem
+from addon.core.specular.lobes import reflected_light
+from tests.core.rooms import lit_box, make_room
+
+SIZE = np.array([4.0, 3.0, 2.5])
+LAMP = (1.6, 2.4), (1.2, 1.8)
+WALLS = np.array([[0.3] * 3, [0.6] * 3, [0.8, 0.3, 0.2], [0.3, 0.7, 0.3], [0.5] * 3, [0.3, 0.4, 0.6]])
+GLOW = np.array([30.0, 28.0, 25.0])
+
+
+class Box:
+    """The floor is looked at from many places; walls of plain radiance, a lamp in the ceiling (object 6)."""
+
+    def __init__(self, walls=WALLS, glow=GLOW):
+        self.walls, self.glow = np.asarray(walls, float), np.asarray(glow, float)
+        self.room = make_room(lit_box(tuple(SIZE)), 0.1)
+
+    @cached_property
+    def field(self):
+        values = {i: self.walls[i] for i in range(6)} | {6: self.glow}
+        return self.room.field(self.room.by_object(values))
+
+    @cached_property
+    def bright(self):
+        return bright_triangles(self.field)
+
+    def arriving(self, origin, w) -> np.ndarray:
+        """Radiance along rays from points within the box, (n, 3)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            far = np.where(w > 0, (SIZE - origin) / w, np.where(w < 0, -origin / w, np.inf))
+        axis = far.argmin(1)
+        distance = far[np.arange(len(w)), axis]
+        where = origin + distance[:, None] * w
+        positive = w[np.arange(len(w)), axis] > 0
+        side = np.array([[2, 3], [4, 5], [0, 1]])[axis, positive.astype(int)]
+        L = self.walls[side].copy()
+        inside = (side == 1) & ((where[:, :2] > [r[0] for r in LAMP]) & (where[:, :2] < [r[1] for r in LAMP])).all(1)
+        L[inside] = self.glow
+        return L
+
+    def views(self, elements: int, views: int, seed: int = 0):
+        """Floor elements, each with views from about head height: element (m,), direction (m, 3), frame (m,)."""
+        rng = np.random.default_rng(seed)
+        atlas = self.room.atlas
+        floor = np.flatnonzero(atlas.object_id == 0)
+        element = np.repeat(rng.choice(floor, elements, replace=False), views)
+        eyes = rng.uniform([0.4, 0.4, 1.0], [3.6, 2.6, 2.2], (views, 3))
+        frame = np.tile(np.arange(views), elements)
+        way = eyes[frame] - atlas.position[element]
+        return element, (way / np.linalg.norm(way, axis=1, keepdims=True)).astype(np.float32), frame
+
+    def lobe(self, element, direction, phi: float, across: int = 40):
+        """A and B, (m, 3) each: the normals' distribution cut into across * across cells of equal weight."""
+        u, v = np.meshgrid(*[(np.arange(across) + 0.5) / across] * 2, indexing="ij")
+        angle, turn = np.arctan(phi * np.sqrt(u.ravel() / (1 - u.ravel()))), 2 * np.pi * v.ravel()
+        h = np.stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)], -1)
+        A, B = np.zeros((len(element), 3)), np.zeros((len(element), 3))
+        position = self.room.atlas.position[element].astype(float)
+        for i, wo in enumerate(direction.astype(float)):
+            cosine = h @ wo
+            w = 2 * cosine[:, None] * h - wo
+            up = (w[:, 2] > 1e-4) & (cosine > 0)
+            w, c, n_h = w[up], cosine[up], h[up, 2]
+
+            def masking(x):
+                return 2 / (1 + np.sqrt(1 + phi**2 * (1 / x**2 - 1)))
+
+            # f cos dw = G2 F / (4 n.w n.wo) D n.w 4 (wo.h) dh, and D (n.h) dh is one cell
+            share = masking(w[:, 2]) * masking(wo[2]) * c / (wo[2] * n_h) / across**2
+            L = self.arriving(np.broadcast_to(position[i], w.shape), w)
+            s = (1 - c) ** 5
+            A[i], B[i] = ((1 - s) * share) @ L, (s * share) @ L
+        return A, B
+
+    def problem(self, element, direction, phi, psi, diffuse, noise=0.02, rays=256, seed=0) -> Problem:
+        """What frames see of a floor with this lobe over `diffuse` ((m, 3)); the lobe's light by the code's own rays."""
+        m = len(element)
+        I = np.array(diffuse, float)
+        if phi is not None:
+            A, B = self.lobe(element, direction, phi)
+            I = I + np.asarray(psi) * A + B
+        I = I * np.exp(np.random.default_rng(seed).normal(0, noise, (m, 3)))
+        light = reflected_light(
+            self.field, self.bright, self.room.normals, element, direction, rays=rays, threads=2, seed=seed
+        )
+        return Problem(element, I, np.array(diffuse, float), light, direction[:, 2])

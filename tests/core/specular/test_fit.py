@@ -1,0 +1,114 @@
+"""phi and psi come back from observations made by brute force."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon.core.specular.fit import fit_lobe, huber, robust_scale
+from addon.core.specular.lobes import GRID
+from tests.core.glossy_box import Box
+
+
+@pytest.fixture(scope="module")
+def box():
+    return Box()
+
+
+def paint(element, seed=1):
+    """A diffuse radiance of its own for each element: a texture."""
+    tone = np.exp(np.random.default_rng(seed).normal(np.log(0.3), 0.3, (element.max() + 1, 3)))
+    return tone[element]
+
+
+def steps(found: float, truth: float) -> int:
+    """Steps of the grid between two phi."""
+    return abs(int(np.argmin(np.abs(GRID - found))) - int(np.argmin(np.abs(GRID - truth))))
+
+
+@pytest.mark.parametrize(("phi", "psi"), [(0.06, 0.04), (0.11, 0.1), (0.2, 0.2), (0.2, 0.04), (0.4, 0.2)])
+def test_several_frames(box, phi, psi):
+    element, direction, _ = box.views(60, 10)
+    fit = fit_lobe(box.problem(element, direction, phi, psi, paint(element)))
+    assert steps(fit.phi, phi) <= 1
+    # A broad lobe differs little from view to view: its psi rests on less.
+    assert fit.psi[0] == pytest.approx(psi, rel=0.15 if phi < 0.3 else 0.25)
+    assert np.ptp(fit.psi) == 0 and fit.cost < fit.cost_lambertian
+    assert fit.cost_by_phi.argmin() == np.argmin(np.abs(GRID - fit.phi)) and fit.cost_by_phi.shape == GRID.shape
+    assert fit.residual < fit.residual_lambertian and fit.signal > 0.005
+
+
+@pytest.mark.parametrize(("phi", "psi"), [(0.06, 0.1), (0.11, 0.04), (0.2, 0.2), (0.4, 0.2)])
+def test_one_target_frame(box, phi, psi):
+    """The paper's way, its L_d known: one view of many elements."""
+    element, direction, _ = box.views(400, 1, seed=4)
+    fit = fit_lobe(box.problem(element, direction, phi, psi, paint(element)), "target")
+    assert steps(fit.phi, phi) <= 1 and fit.psi[0] == pytest.approx(psi, rel=0.15)
+    assert fit.kappa == 0
+
+
+def test_a_metal_has_colour(box):
+    element, direction, _ = box.views(60, 10)
+    f0 = np.array([0.9, 0.6, 0.3])
+    fit = fit_lobe(box.problem(element, direction, 0.11, f0, np.zeros((len(element), 3))), coloured=True)
+    assert steps(fit.phi, 0.11) <= 1 and np.allclose(fit.psi, f0, rtol=0.15)
+    assert fit.diffuse_share < 0.1
+
+
+def test_the_median_may_hold_some_of_the_lobe(box):
+    """'frames' does without L_d: one that is 30 % too bright changes nothing; it would mislead 'target'."""
+    element, direction, _ = box.views(60, 10)
+    problem = box.problem(element, direction, 0.11, 0.1, paint(element))
+    spoilt = type(problem)(
+        problem.element, problem.radiance, 1.3 * problem.lit_diffuse, problem.light, problem.cosine
+    )
+    one, other = fit_lobe(problem), fit_lobe(spoilt)
+    assert one.phi == other.phi and np.array_equal(one.psi, other.psi)
+    assert abs(fit_lobe(spoilt, "target").psi[0] - 0.1) > abs(one.psi[0] - 0.1)
+
+
+def test_outliers_weigh_little(box):
+    """One observation in twenty shows something else."""
+    element, direction, _ = box.views(60, 10)
+    problem = box.problem(element, direction, 0.11, 0.1, paint(element))
+    rng = np.random.default_rng(0)
+    wrong = rng.random(len(element)) < 0.05
+    radiance = np.where(wrong[:, None], problem.radiance * rng.uniform(0.3, 3, (len(element), 1)), problem.radiance)
+    fit = fit_lobe(type(problem)(problem.element, radiance, problem.lit_diffuse, problem.light, problem.cosine))
+    assert steps(fit.phi, 0.11) <= 1 and fit.psi[0] == pytest.approx(0.1, rel=0.25)
+
+
+def test_a_coat_darkens_its_diffuse_part(box):
+    """D (1 - 0.45 (1 - n.wo)^2) under the lobe: kappa is found, and psi in spite of it."""
+    element, direction, _ = box.views(80, 12)
+    dark = 1 - 0.45 * (1 - direction[:, 2:].astype(float)) ** 2
+    fit = fit_lobe(box.problem(element, direction, 0.11, 0.06, paint(element) * dark))
+    assert fit.kappa == pytest.approx(0.45, abs=0.16)
+    assert steps(fit.phi, 0.11) <= 1 and fit.psi[0] == pytest.approx(0.06, rel=0.2)
+
+
+def test_exposure_does_not_matter(box):
+    element, direction, _ = box.views(30, 6)
+    p = box.problem(element, direction, 0.11, 0.1, paint(element))
+    light = type(p.light)(p.light.A * 1000, p.light.B * 1000, p.light.mirror * 1000)
+    one = fit_lobe(p)
+    other = fit_lobe(type(p)(p.element, p.radiance * 1000, p.lit_diffuse * 1000, light, p.cosine))
+    assert one.phi == other.phi and np.allclose(one.psi, other.psi, rtol=1e-4)
+    assert one.cost == pytest.approx(other.cost, rel=1e-3)
+
+
+def test_psi_is_bounded(box):
+    element, direction, _ = box.views(30, 6)
+    flat = box.problem(element, direction, None, 0, paint(element))
+    assert fit_lobe(flat, least_psi=0.02).psi[0] >= 0.02
+    assert 0 <= fit_lobe(flat).psi[0] < 0.02
+    bright = box.problem(element, direction, 0.11, 3.0, paint(element))
+    assert fit_lobe(bright).psi[0] == 1
+
+
+def test_huber_and_scale():
+    assert huber(np.array([0.0, 1.0, 2.0, 4.0]), 1.0).tolist() == [0, 0.5, 2, 6]
+    assert huber(np.array([2.0]), 2.0).tolist() == [0.5]
+    size = np.abs(np.random.default_rng(0).normal(0, 0.3, 20000))
+    assert robust_scale(size) == pytest.approx(0.3, rel=0.03)
+    assert robust_scale(np.zeros(5)) > 0
