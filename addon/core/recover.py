@@ -22,8 +22,10 @@ from .shading.albedo import Albedo, fill, quotient
 from .shading.environment import Environment, EnvironmentAccumulator
 from .shading.field import LightField
 from .shading.lamps import Lamp
+from .shading.mirrors import Mirror
 from .shading.neighbourhood import doubt
 from .shading.shade import Shading, shade
+from .specular.flat_mirrors import find_mirrors
 from .specular.reflect import Specular, fit_specular
 from .specular.samples import SampleCollector, Samples
 from .store import Store, key
@@ -68,7 +70,7 @@ class Recovery:
         surface = key("surface", CODE, fingerprint(self.capture), s.texel_size, s.atlas_size)
         lit = key("lit_diffuse", surface, s.median, s.frame_order, s.seed)
         shading = key(
-            "shading", lit, s.shading, s.shading_rays, s.emitter_rays, s.interpolate, s.seed
+            "shading", lit, s.shading, s.shading_rays, s.emitter_rays, s.interpolate, s.mirrors, s.seed
         )
         specular = key("specular", shading, s.specular, s.specular_rays, s.refine)
         return {"surface": surface, "lit_diffuse": lit, "shading": shading, "specular": specular}
@@ -190,6 +192,7 @@ class Recovery:
                 surface.mesh, self.capture.instances, surface.atlas, surface.scene, lit, sky,
                 sampler=s.shading, rays=s.shading_rays, emitter_rays=s.emitter_rays, interpolate=s.interpolate,
                 threads=s.threads, seed=s.seed, progress=self.progress,
+                find_mirrors=self._find_mirrors if s.mirrors else None,
             )  # fmt: skip
             arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "radiance")}
             arrays |= {"rho": found.albedo.rho, "origin": found.albedo.origin}
@@ -197,6 +200,10 @@ class Recovery:
             meta = {
                 "above_one": found.albedo.above_one,
                 "points": found.points,
+                "mirrors": [
+                    {name: np.asarray(value).tolist() for name, value in dataclasses.asdict(mirror).items()}
+                    for mirror in found.mirrors
+                ],
                 "notes": list(found.notes),
                 "lamps": [dataclasses.asdict(lamp) | {"radiance": lamp.radiance.tolist()} for lamp in found.lamps],
             }
@@ -204,12 +211,22 @@ class Recovery:
 
         def load(a, meta):
             lamps = tuple(Lamp(**(d | {"radiance": np.float32(d["radiance"])})) for d in meta["lamps"])
+            mirrors = tuple(
+                Mirror(d["object_id"], *(np.float32(d[name]) for name in ("point", "normal", "f0")))
+                for d in meta["mirrors"]
+            )
             return Shading(
                 a["irradiance"], a["escaped"], a["radiance"], Albedo(a["rho"], a["origin"], meta["above_one"]),
-                lamps, Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), meta["points"],
+                lamps, Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
             )  # fmt: skip
 
         return self._stage("shading", load, compute)
+
+    def _find_mirrors(self, field: LightField, lamps: tuple[Lamp, ...]) -> tuple[Mirror, ...]:
+        s = self.settings
+        return find_mirrors(
+            field, lamps, self.lit_diffuse(), self.samples(), self.capture.instances, s.threads, s.seed
+        )
 
     def specular(self) -> Specular:
         """phi, psi and the model of every object."""
@@ -220,7 +237,7 @@ class Recovery:
             field = LightField(
                 surface.mesh, surface.atlas, surface.scene, shading.radiance, shading.environment,
                 [lamp.object_id for lamp in shading.lamps],
-            )  # fmt: skip
+            ).with_mirrors(shading.mirrors)  # fmt: skip
             found = fit_specular(
                 self.capture.instances, field, lit, shading.lamps, self.samples(),
                 [frame.name for frame in self.capture.frames],
@@ -335,6 +352,7 @@ class Recovery:
             "albedo_above_one_share": shading.albedo.above_one,
             "shading_points": shading.points,
             "lamps": [lamp.object_id for lamp in shading.lamps],
+            "mirrors": [mirror.object_id for mirror in shading.mirrors],
         }
         warnings += [f"Lamp {lamp.object_id}: {lamp.note}" for lamp in shading.lamps if lamp.note]
         warnings += shading.notes

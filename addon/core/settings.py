@@ -29,6 +29,8 @@ class Settings:
         Rays aimed at bright triangles for each surface element ('aimed' only).
     interpolate : bool
         Gather where the indirect light changes and interpolate between; False gathers at each element.
+    mirrors : bool
+        Find flat mirrors and follow light over them; False takes what they show for L_d (the paper).
     specular : str
         'frames' (several frames at once) or 'target' (the paper's one target frame).
     specular_rays : int
@@ -49,6 +51,7 @@ class Settings:
     shading_rays: int = 192
     emitter_rays: int = 16
     interpolate: bool = True
+    mirrors: bool = True
     specular: str = "frames"
     specular_rays: int = 384
     refine: int = 1
@@ -75,5 +78,5 @@ class Settings:
 
 
 PAPER = Settings(median="p2", frame_order="capture", shading="uniform", shading_rays=10000, emitter_rays=0,
-                 interpolate=False, specular="target", refine=0)
+                 interpolate=False, mirrors=False, specular="target", refine=0)
 """Haefner et al. 2021: P-square in video order, uniform rays, one target frame."""

@@ -72,3 +72,48 @@ def bright_triangles(field: LightField) -> BrightTriangles:
     return BrightTriangles(
         corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], normal[bright], chance, density
     )
+
+
+@dataclass(frozen=True)
+class BrightPoints:
+    """m points drawn on the bright triangles.
+
+    Attributes
+    ----------
+    index : (m,) int
+        Which of the bright triangles.
+    triangle : (m,) int32
+        The same as the mesh's triangle.
+    u, v : (m,) float32
+        Barycentric coordinates.
+    point : (m, 3) float32
+    density : (m,) float32
+        With which the point was drawn, per square metre.
+    """
+
+    index: np.ndarray
+    triangle: np.ndarray
+    u: np.ndarray
+    v: np.ndarray
+    point: np.ndarray
+    density: np.ndarray
+
+
+def sample_bright(bright: BrightTriangles, square: np.ndarray, rng: np.random.Generator) -> BrightPoints:
+    """Draw k points for each of n receivers.
+
+    Parameters
+    ----------
+    square : (n, k, 2) float32
+        Where on its triangle each point lies; the triangles are stratified over the k.
+    """
+    n, k, _ = square.shape
+    strata = (np.arange(k, dtype=np.float32) + 0.5) / k
+    which = (strata + rng.random((n, 1), np.float32)) % 1
+    index = np.minimum(np.searchsorted(np.cumsum(bright.chance), which.ravel()), len(bright) - 1)
+    flat = square.reshape(-1, 2)
+    root = np.sqrt(flat[:, 0])
+    u, v = root * (1 - flat[:, 1]), root * flat[:, 1]  # uniform over the triangle
+    point = bright.corner[index] + u[:, None] * bright.edge_u[index] + v[:, None] * bright.edge_v[index]
+    triangle = np.flatnonzero(bright.density > 0).astype(np.int32)[index]
+    return BrightPoints(index, triangle, u, v, point, bright.density[triangle])

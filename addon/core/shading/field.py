@@ -11,6 +11,10 @@ from ..surface.atlas import Atlas
 from ..surface.elements import element_of_triangle, lookup, triangle_geometry
 from ..surface.rays import Hits, RayScene
 from .environment import Environment
+from .mirrors import Mirror
+
+FLAT = np.cos(np.radians(2.0))
+"""Triangles turned less than this against a mirror's plane belong to it."""
 
 
 class LightField:
@@ -38,6 +42,8 @@ class LightField:
         self.radiance = np.ascontiguousarray(radiance, np.float32)
         self.normal, _ = triangle_geometry(mesh)
         self.one_sided = np.isin(mesh.object_id, list(lamps))
+        self.mirrors: tuple[Mirror, ...] = ()
+        self.mirror_of = np.full(len(mesh.triangles), -1, np.int8)
         self._fallback = element_of_triangle(mesh, atlas)
 
     def with_light(
@@ -50,6 +56,16 @@ class LightField:
         other.environment = environment or self.environment
         if lamps is not None:
             other.one_sided = np.isin(self.mesh.object_id, list(lamps))
+        return other
+
+    def with_mirrors(self, mirrors: tuple[Mirror, ...]) -> LightField:
+        """The same room with flat mirrors that rays go on from."""
+        other = self.with_light(self.radiance)
+        other.mirrors = mirrors
+        other.mirror_of = np.full(len(self.mesh.triangles), -1, np.int8)
+        for i, mirror in enumerate(mirrors):
+            flat = np.abs(self.normal @ mirror.normal) > FLAT
+            other.mirror_of[flat & (self.mesh.object_id == mirror.object_id)] = i
         return other
 
     def elements(self, hits: Hits) -> np.ndarray:
@@ -83,8 +99,25 @@ class LightField:
         element = self.elements(hits)
         return self.arriving(hits, element, directions), hits.distance, element
 
-    def arriving(self, hits: Hits, element: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Radiance that comes back along rays whose hits and `elements` are known, (n, 3) float32."""
+    def arriving(
+        self, hits: Hits, element: np.ndarray, directions: np.ndarray, dark_in_mirrors: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Radiance that comes back along rays whose hits and `elements` are known, (n, 3) float32.
+
+        Parameters
+        ----------
+        dark_in_mirrors : (t,) float32, optional
+            Triangles with a value above 0 count as dark where they are seen in a mirror.
+        """
+        radiance = self._sent(hits, element, directions)
+        if self.mirrors:
+            seen = np.flatnonzero((self.mirror_of[hits.triangle] >= 0) & (element >= 0))
+            if len(seen):
+                radiance[seen] = self._mirrored(hits.part(seen), directions[seen], dark_in_mirrors)
+        return radiance
+
+    def _sent(self, hits: Hits, element: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """L_d at hits, the environment where rays escape; lamps are dark from behind."""
         radiance = self.radiance[element]
         escaped = np.flatnonzero(element < 0)
         if len(escaped):
@@ -94,3 +127,20 @@ class LightField:
             behind = np.einsum("ij,ij->i", directions[lamp], self.normal[hits.triangle[lamp]]) > 0
             radiance[lamp[behind]] = 0
         return radiance
+
+    def _mirrored(self, hits: Hits, directions: np.ndarray, dark: np.ndarray | None) -> np.ndarray:
+        """What a mirror that was hit shows; a second mirror shows its L_d."""
+        a, b, c = (self.mesh.vertices[self.mesh.triangles[hits.triangle, i]] for i in range(3))
+        u, v = hits.u[:, None], hits.v[:, None]
+        turn = ((1 - u - v) * a + u * b + v * c).astype(np.float32)
+        normal = self.normal[hits.triangle]
+        along = np.einsum("ij,ij->i", directions, normal)[:, None]
+        onward = directions - 2 * along * normal
+        origins = self.scene.off_surface(turn, -np.sign(along) * normal)
+        further = self.scene.intersect(origins, onward)
+        element = self.elements(further)
+        radiance = self._sent(further, element, onward)
+        if dark is not None:
+            radiance[(dark[further.triangle] > 0) & (element >= 0)] = 0
+        f0 = np.stack([mirror.f0 for mirror in self.mirrors]).astype(np.float32)
+        return radiance * f0[self.mirror_of[hits.triangle]]

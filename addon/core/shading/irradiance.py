@@ -11,8 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from .directions import cosine_hemisphere, shifted, sobol, to_world, uniform_hemisphere
-from .emitters import BrightTriangles
+from .emitters import BrightTriangles, sample_bright
 from .field import LightField
+from .over_mirrors import direct_over_mirrors
 
 RAYS_AT_ONCE = 1 << 18
 
@@ -71,7 +72,8 @@ def gather(
         origins = np.repeat(field.scene.off_surface(p, n), rays, 0)
         hits = field.scene.intersect(origins, directions)
         element = field.elements(hits)
-        radiance = field.arriving(hits, element, directions)
+        # What a mirror shows of the bright triangles is aimed at below; here it would come as fireflies.
+        radiance = field.arriving(hits, element, directions, bright.density if emitter_rays else None)
         out = element < 0
         if emitter_rays and len(bright):
             aimed = _aimed_density(field, bright, hits.triangle, directions, hits.distance, triangle_normal)
@@ -80,6 +82,8 @@ def gather(
         total[part] = np.float32(np.pi / rays) * radiance.reshape(len(p), rays, 3).sum(1)
         radius[part] = rays / np.maximum((1 / np.maximum(hits.distance, 1e-9)).reshape(len(p), rays).sum(1), 1e-20)
         escaped[part] = out.reshape(len(p), rays).mean(1)
+    if emitter_rays and field.mirrors:
+        total += direct_over_mirrors(field, bright, position, normal, emitter_rays, seed)
     return total, radius, escaped
 
 
@@ -111,37 +115,28 @@ def direct(
         return total
     rng = np.random.default_rng(seed)
     pattern = sobol(emitter_rays, seed)
-    # Which triangle and where on it come from one stratified number and a pair, moved for each receiver.
-    strata = (np.arange(emitter_rays, dtype=np.float32) + 0.5) / emitter_rays
-    cumulative = np.cumsum(bright.chance)
     step = max(RAYS_AT_ONCE // emitter_rays, 1)
-    triangles = np.flatnonzero(bright.density > 0).astype(np.int32)
     for start in range(0, len(position), step):
         part = slice(start, start + step)
         p, n = position[part], normal[part]
-        which = (strata + rng.random((len(p), 1), np.float32)) % 1
-        index = np.minimum(np.searchsorted(cumulative, which.ravel()), len(bright) - 1)
-        square = shifted(pattern, len(p), rng).reshape(-1, 2)
-        root = np.sqrt(square[:, 0])
-        u, v = root * (1 - square[:, 1]), root * square[:, 1]  # uniform over the triangle
-        target = bright.corner[index] + u[:, None] * bright.edge_u[index] + v[:, None] * bright.edge_v[index]
+        pick = sample_bright(bright, shifted(pattern, len(p), rng), rng)
         origin = np.repeat(field.scene.off_surface(p, n), emitter_rays, 0)
-        way = target - origin
+        way = pick.point - origin
         distance = np.sqrt(np.einsum("ij,ij->i", way, way))
         direction = way / np.maximum(distance, 1e-12)[:, None]
         cosine = np.einsum("ijk,ik->ij", direction.reshape(len(p), emitter_rays, 3), n).ravel()
-        facing = -np.einsum("ij,ij->i", direction, bright.normal[index])
-        behind = field.one_sided[triangles[index]] & (facing < 0)
+        facing = -np.einsum("ij,ij->i", direction, bright.normal[pick.index])
+        behind = field.one_sided[pick.triangle] & (facing < 0)
         facing = np.abs(facing)
         useful = np.flatnonzero((cosine > 0) & (facing > 1e-6) & (distance > 10 * field.scene.offset) & ~behind)
         hidden = field.scene.occluded(
             origin[useful], direction[useful], distance[useful] * np.float32(1 - 1e-4) - field.scene.offset
         )
         useful = useful[~hidden]
-        aimed = bright.density[triangles[index[useful]]] * distance[useful] ** 2 / facing[useful]
-        element = field.lookup(triangles[index[useful]], u[useful], v[useful])
+        aimed = pick.density[useful] * distance[useful] ** 2 / facing[useful]
+        element = field.lookup(pick.triangle[useful], pick.u[useful], pick.v[useful])
         share = emitter_rays * aimed + rays * cosine[useful] / np.float32(np.pi)
-        value = np.zeros((len(index), 3), np.float32)
+        value = np.zeros((len(way), 3), np.float32)
         value[useful] = field.radiance[element] * (cosine[useful] / np.maximum(share, 1e-20))[:, None]
         total[part] = value.reshape(len(p), emitter_rays, 3).sum(1)
     return total

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,7 @@ from .field import LightField
 from .interpolate import interpolated
 from .irradiance import direct, gather, uniform
 from .lamps import Lamp
+from .mirrors import Mirror
 from .neighbourhood import doubt
 from .unseen_light import find_light
 
@@ -47,6 +49,8 @@ class Shading:
         With the unseen sky solved for where it could be.
     notes : tuple of str
         What was solved for, one sentence each.
+    mirrors : tuple of Mirror
+        Flat mirrors that light was followed over.
     points : int
         Places at which the hemisphere was gathered.
     """
@@ -58,6 +62,7 @@ class Shading:
     lamps: tuple[Lamp, ...]
     environment: Environment
     notes: tuple[str, ...]
+    mirrors: tuple[Mirror, ...]
     points: int
 
 
@@ -154,8 +159,14 @@ def shade(
     threads: int = 0,
     seed: int = 0,
     progress: Progress | None = None,
+    find_mirrors: Callable[[LightField, tuple[Lamp, ...]], tuple[Mirror, ...]] | None = None,
 ) -> Shading:
     """Lamps, irradiance and albedo (Haefner et al. 2021, sec. 3.2, with aimed rays and interpolation by default).
+
+    Parameters
+    ----------
+    find_mirrors : callable, optional
+        Tells the flat mirrors once the lamps are known; light is then followed over them.
 
     Raises
     ------
@@ -185,6 +196,9 @@ def shade(
     emitters = {lamp.object_id for lamp in lamps}
     field = field.with_light(radiance, light.environment, emitters)
 
+    mirrors = find_mirrors(field, lamps) if find_mirrors else ()
+    field = field.with_mirrors(mirrors)
+
     # 2. What nobody saw reflects like the rest of its object under the light that reaches it: a rough first pass.
     unseen_lamp = ~seen & np.isin(atlas.object_id, list(emitters))
     dark = np.flatnonzero(~seen & ~unseen_lamp)
@@ -210,4 +224,4 @@ def shade(
     )  # fmt: skip
     rho, valid = quotient(lit_diffuse.radiance, E)
     albedo = fill(atlas, rho, valid & seen, class_of, emitters, doubt(lit_diffuse))
-    return Shading(E, escaped, field.radiance, albedo, lamps, light.environment, light.notes, points)
+    return Shading(E, escaped, field.radiance, albedo, lamps, light.environment, light.notes, mirrors, points)

@@ -32,6 +32,10 @@ class Hits:
     v: np.ndarray
     distance: np.ndarray
 
+    def part(self, index: np.ndarray) -> Hits:
+        """The hits of some of the rays."""
+        return Hits(self.triangle[index], self.u[index], self.v[index], self.distance[index])
+
 
 class RayScene:
     """The triangles, ready to be hit.

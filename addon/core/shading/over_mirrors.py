@@ -1,0 +1,70 @@
+"""Irradiance from bright triangles by way of flat mirrors: what a lamp throws on a wall over the glass opposite."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .directions import shifted, sobol
+from .emitters import BrightTriangles, sample_bright
+from .field import LightField
+from .mirrors import reflect
+
+RAYS_AT_ONCE = 1 << 18
+
+
+def direct_over_mirrors(
+    field: LightField, bright: BrightTriangles, position: np.ndarray, normal: np.ndarray, emitter_rays: int, seed: int
+) -> np.ndarray:
+    """E from bright triangles by way of one mirror, (n, 3) float32.
+
+    Rays are aimed at the mirror images of points on the bright triangles; those count that meet the mirror first and
+    are free from there on. The path's length is that to the image.
+
+    Parameters
+    ----------
+    field : LightField
+    position, normal : (n, 3) float32
+    emitter_rays : int
+        For each point and mirror.
+    """
+    total = np.zeros((len(position), 3), np.float32)
+    if not len(bright) or not emitter_rays:
+        return total
+    step = max(RAYS_AT_ONCE // emitter_rays, 1)
+    pattern = sobol(emitter_rays, seed)
+    for mirror in field.mirrors:
+        rng = np.random.default_rng([seed, mirror.object_id])
+        front = np.flatnonzero((position - mirror.point) @ mirror.normal > field.scene.offset)
+        for start in range(0, len(front), step):
+            at = front[start : start + step]
+            p, n = position[at], normal[at]
+            pick = sample_bright(bright, shifted(pattern, len(at), rng), rng)
+            image = pick.point - 2 * ((pick.point - mirror.point) @ mirror.normal)[:, None] * mirror.normal
+            origin = np.repeat(field.scene.off_surface(p, n), emitter_rays, 0)
+            way = image - origin
+            distance = np.sqrt(np.einsum("ij,ij->i", way, way))
+            direction = way / np.maximum(distance, 1e-12)[:, None]
+            cosine = np.einsum("ij,ij->i", direction, np.repeat(n, emitter_rays, 0))
+            after = reflect(direction, mirror.normal)
+            facing = -np.einsum("ij,ij->i", after, bright.normal[pick.index])
+            useful = np.flatnonzero(
+                (cosine > 0)
+                & ((pick.point - mirror.point) @ mirror.normal > 0)
+                & ((facing > 1e-6) | ~field.one_sided[pick.triangle])
+            )
+            hits = field.scene.intersect(origin[useful], direction[useful])
+            met = (hits.triangle >= 0) & (field.mirror_of[hits.triangle] == field.mirrors.index(mirror))
+            useful, travelled = useful[met], hits.distance[met]
+            turn = origin[useful] + travelled[:, None] * direction[useful]
+            rest = distance[useful] - travelled
+            hidden = field.scene.occluded(
+                field.scene.off_surface(turn, np.broadcast_to(mirror.normal, turn.shape)),
+                after[useful], rest * np.float32(1 - 1e-4) - 2 * field.scene.offset,
+            )  # fmt: skip
+            useful = useful[~hidden]
+            element = field.lookup(pick.triangle[useful], pick.u[useful], pick.v[useful])
+            weight = cosine[useful] * np.abs(facing[useful]) / (distance[useful] ** 2 * pick.density[useful])
+            value = np.zeros((len(origin), 3), np.float32)
+            value[useful] = mirror.f0 * field.radiance[element] * weight[:, None]
+            total[at] += value.reshape(len(at), emitter_rays, 3).sum(1) / emitter_rays
+    return total
