@@ -28,7 +28,7 @@ CLASS_AGREES = 0.25
 MIN_SKY = 0.01
 """Part of the received light below which a part of the sky can't be solved for; its neighbours' radiance stays."""
 SWEEPS = 2
-RAYS, EMITTER_RAYS = 128, 16
+RAYS, EMITTER_RAYS = 256, 32
 
 
 @dataclass(frozen=True)
