@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -117,10 +119,12 @@ def shoot(scene, path: Path) -> None:
 
 @contextmanager
 def _saving(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path` that Blender saves to, moved over it; one sentence where that fails."""
+    """A temporary name beside `path` that Blender saves a PNG to, moved over it; one sentence where that fails."""
     try:
         with replacing(path) as temporary:
             yield temporary
+            if temporary.read_bytes()[-8:-4] != b"IEND":  # Blender does not always notice a full disk
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     except RuntimeError as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ").rstrip(".")
         raise StorageError(f"'{path}' can't be written ({reason}); free some space or choose another result folder."

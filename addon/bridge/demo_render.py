@@ -11,7 +11,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..core.errors import StorageError
+from ..core.capture.exr import read_header
+from ..core.errors import BadInputError, StorageError
 from ..core.progress import Progress
 from .demo_capture import FIELD_OF_VIEW, frame_path, write_all_but_frames
 from .demo_room import Paint, Thing, room, tour
@@ -59,7 +60,7 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
         (part / "truth" / "demo.json").write_text(json.dumps(stamp_of(size)))
         shutil.rmtree(folder, ignore_errors=True)
         os.replace(part, folder)
-    except (OSError, RuntimeError) as error:  # Blender's own failures to write are RuntimeErrors
+    except (OSError, RuntimeError, BadInputError) as error:  # Blender's failures to write are RuntimeErrors, or silent
         reason = " ".join(str(getattr(error, "strerror", None) or error).split()).removeprefix("Error: ").rstrip(".")
         raise StorageError(f"The demo's capture can't be written to '{folder}' ({reason}); free some space or choose "
                            "another folder.") from error
@@ -100,8 +101,7 @@ def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int]
             camera.matrix_world = Matrix(pose.tolist())
             scene.render.filepath = str(folder / frame_path(k))
             bpy.ops.render.render(write_still=True, scene=scene.name)
-            if not (folder / frame_path(k)).is_file():
-                raise OSError(f"frame {k} did not appear")
+            read_header(folder / frame_path(k))  # raises where it is absent or cut off
         progress.update(1.0)
     finally:
         bpy.data.scenes.remove(scene)

@@ -13,6 +13,7 @@ from addon.bridge.demo_render import SIZES, is_rendered, render_capture  # noqa:
 from addon.bridge.demo_room import room, tour  # noqa: E402
 from addon.core.capture.exr import read_exr  # noqa: E402
 from addon.core.capture.read import read_capture, read_pixels  # noqa: E402
+from addon.core.errors import StorageError  # noqa: E402
 from addon.core.settings import Settings  # noqa: E402
 from addon.core.surface.rays import RayScene  # noqa: E402
 
@@ -74,6 +75,36 @@ def test_rendering_leaves_nothing_open_and_is_not_repeated(tmp_path):
     assert (folder / "images" / "frame_0000.exr").stat().st_mtime_ns == stamp
     assert is_rendered(folder, "tiny") and not is_rendered(folder, "small")
     assert [path.name for path in tmp_path.iterdir()] == ["capture"]
+
+
+def test_a_full_disk_leaves_no_capture(tmp_path, monkeypatch):
+    """Blender does not always notice: a frame that was cut off is found, and nothing is left behind."""
+    from addon.bridge import demo_render
+
+    def cut_off(folder, things, poses, size, samples, progress):
+        frames(folder, things, poses[:1], size, 1, progress)
+        path = folder / "images" / "frame_0000.exr"
+        path.write_bytes(path.read_bytes()[:-100])
+        demo_render.read_header(path)
+
+    frames = demo_render.render_frames
+    monkeypatch.setattr(demo_render, "render_frames", cut_off)
+    with pytest.raises(StorageError, match="free some space"):
+        render_capture(tmp_path / "capture", "tiny")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("content", [b"", b"\x89PNG half of it"])
+def test_half_a_picture_is_never_taken_for_a_whole_one(content, tmp_path):
+    from addon.bridge.demo import _saving
+
+    with pytest.raises(StorageError, match="relit.png' can't be written .No space left"), \
+            _saving(tmp_path / "relit.png") as temporary:
+        temporary.write_bytes(content)
+    with pytest.raises(StorageError, match="relit.png' can't be written .it fell over"), \
+            _saving(tmp_path / "relit.png") as temporary:
+        raise RuntimeError("Error: it fell over.\n")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
