@@ -82,14 +82,14 @@ class Box:
         return A, B
 
     def problem(self, element, direction, phi, psi, diffuse, noise=0.02, rays=256, seed=0) -> Problem:
-        """What frames see of a floor with this lobe over `diffuse` ((m, 3)); the lobe's light by the code's own rays."""
+        """What frames see of a floor with this lobe over `diffuse` ((m, 3)); A and B by the code under test."""
         m = len(element)
-        I = np.array(diffuse, float)
+        seen = np.array(diffuse, float)
         if phi is not None:
             A, B = self.lobe(element, direction, phi)
-            I = I + np.asarray(psi) * A + B
-        I = I * np.exp(np.random.default_rng(seed).normal(0, noise, (m, 3)))
+            seen = seen + np.asarray(psi) * A + B
+        seen = seen * np.exp(np.random.default_rng(seed).normal(0, noise, (m, 3)))
         light = reflected_light(
             self.field, self.bright, self.room.normals, element, direction, rays=rays, threads=2, seed=seed
         )
-        return Problem(element, I, np.array(diffuse, float), light, direction[:, 2])
+        return Problem(element, seen, np.array(diffuse, float), light, direction[:, 2])

@@ -32,7 +32,7 @@ def run(atlas, function, radius=1.5, finest=FINEST):
         asked.append(index)
         return function(atlas.position[index], atlas.normal[index]), np.full(len(index), radius, np.float32)
 
-    value, points = interpolated(atlas.position, atlas.normal, evaluate, finest, 2)
+    value, points, _ = interpolated(atlas.position, atlas.normal, evaluate, finest, 2)
     assert np.array_equal(np.sort(np.concatenate(asked)), np.sort(points))
     return value, points
 
@@ -152,5 +152,5 @@ def test_points_keep_their_distance(atlas):
 def test_one_element():
     one = np.zeros((1, 3), np.float32), np.float32([[0, 0, 1]])
     ones = np.ones(1, np.float32)
-    value, points = interpolated(*one, lambda index: (np.float32([[7, 8]]), ones), 0.1, 1)
+    value, points, _ = interpolated(*one, lambda index: (np.float32([[7, 8]]), ones), 0.1, 1)
     assert value.tolist() == [[7, 8]] and points.tolist() == [0]

@@ -15,9 +15,9 @@ ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4:
 TWO = (((0.3, 0.7), (0.2, 0.3)), ((0.3, 0.7), (0.7, 0.8)))
 
 
-def measured(room, radiance, hidden=(), noise=0.03, texture=0.0) -> LitDiffuse:
+def measured(room, radiance, hidden=(), noise=0.03, texture=0.0, seed=0) -> LitDiffuse:
     """L_d as frames would give it, but for objects `hidden`. `texture`: spread of log albedo within objects."""
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     n = len(room.atlas)
     cells = np.floor(room.atlas.position * 2.5).astype(int) @ [1, 31, 977]  # patches of 40 cm
     patch = rng.normal(0, texture, cells.max() + 1)[cells][:, None] if texture else 0
@@ -65,9 +65,14 @@ def test_a_lamp_that_no_frame_sees_is_solved_for(two_lamps, hidden, radiance):
 def test_the_only_lamp_may_be_unseen():
     room = make_room(lit_box(), 0.2)
     L = radiosity(room, ALBEDO, {6: (10, 10, 10)})
-    found = run(room, measured(room, L, {6}, texture=0.15)).lamps
-    assert [lamp.object_id for lamp in found] == [6] and not found[0].seen
-    assert found[0].radiance @ LUMINANCE == pytest.approx(10, rel=0.15)
+    # What the texture happens to be moves a single answer by 10 %.
+    solved = []
+    for seed in range(4):
+        found = run(room, measured(room, L, {6}, texture=0.15, seed=seed), rays=32).lamps
+        assert [lamp.object_id for lamp in found] == [6] and not found[0].seen
+        solved.append(float(found[0].radiance @ LUMINANCE))
+    assert np.mean(solved) == pytest.approx(10, rel=0.15)
+    assert np.allclose(solved, 10, rtol=0.25)
 
 
 def test_a_furnace_has_no_lamps():

@@ -1,0 +1,72 @@
+"""The choice of model, and what objects take over from their class."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon.core.material import LAMBERTIAN, METAL, SPECULAR
+from addon.core.specular.fit import fit_lobe
+from addon.core.specular.lobes import GRID
+from addon.core.specular.models import Choice, adopt_from_class, choose_model, metal_f0
+from tests.core.glossy_box import Box
+from tests.core.specular.test_fit import paint, steps
+
+COPPER = np.array([0.9, 0.6, 0.3])
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """Problems of four floors in the same box: as good as matt, glossy, metal, and glossy but hardly seen."""
+    box = Box()
+    element, direction, _ = box.views(60, 10)
+    few = element == element[0]
+    for one in np.unique(element)[:7]:
+        few |= element == one
+    glossy = box.problem(element, direction, 0.11, 0.08, paint(element))
+    return {
+        "matt": box.problem(element, direction, None, 0, paint(element)),
+        "glossy": glossy,
+        "metal": box.problem(element, direction, 0.11, COPPER, np.zeros((len(element), 3))),
+        "few": glossy.part(few),
+    }
+
+
+def test_each_gets_the_simplest_model(seen):
+    chosen = {name: choose_model(problem) for name, problem in seen.items()}
+    models = {name: choice.model for name, choice in chosen.items()}
+    assert models == {"matt": LAMBERTIAN, "glossy": SPECULAR, "metal": METAL, "few": LAMBERTIAN}
+    assert chosen["few"].fit is None and chosen["few"].note and chosen["matt"].note
+    assert not chosen["glossy"].note and not chosen["metal"].note
+    assert steps(chosen["glossy"].fit.phi, 0.11) <= 1 and chosen["glossy"].fit.psi[0] == pytest.approx(0.08, rel=0.15)
+    assert chosen["glossy"].gain > 0.02 and chosen["glossy"].sigmas > 3
+    assert chosen["matt"].gain < 0.02
+
+
+def test_a_metals_colour(seen):
+    at = int(np.argmin(np.abs(GRID - 0.11)))
+    assert np.allclose(metal_f0(seen["metal"], at), COPPER, rtol=0.05)
+
+
+def test_the_class_helps_out(seen):
+    """0 is sure; 1 was seen too little, 2 not at all: both take its lobe. 3 looks different, 4 is of another class."""
+    sure = choose_model(seen["glossy"])
+    weak = Choice(METAL, fit_lobe(seen["metal"], coloured=True), 0.1, sure.sigmas / 2)
+    nothing = Choice(LAMBERTIAN, None, note="too few")
+    matt = choose_model(seen["matt"])
+    choices = {0: sure, 1: nothing, 2: nothing, 3: matt, 4: nothing, 5: weak}
+    problems = {0: seen["glossy"], 1: seen["few"], 3: seen["matt"], 5: seen["metal"]}
+    classes = dict.fromkeys([0, 1, 2, 3, 5], "floor") | {4: "wall"}
+    result = adopt_from_class(choices, problems, classes)
+    assert result[0] is sure and result[5] is weak  # what is sure of itself stays
+    for taker in (1, 2):
+        assert result[taker].model == SPECULAR and result[taker].fit.phi == sure.fit.phi
+        assert "object 0" in result[taker].note and result[taker].sigmas == 0
+    assert result[3] is matt and result[4] is nothing
+    assert choices[1] is nothing  # what was handed in is left alone
+
+
+def test_nobody_to_take_over_from(seen):
+    choices = {0: Choice(LAMBERTIAN, None), 1: Choice(LAMBERTIAN, None)}
+    assert adopt_from_class(choices, {}, {0: "a", 1: "a"}) == choices
+    assert adopt_from_class({}, {}, {}) == {}
