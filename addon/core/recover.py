@@ -194,7 +194,7 @@ class Recovery:
                 threads=s.threads, seed=s.seed, progress=self.progress,
                 find_mirrors=self._find_mirrors if s.mirrors else None,
             )  # fmt: skip
-            arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "radiance")}
+            arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "doubt", "radiance")}
             arrays |= {"rho": found.albedo.rho, "origin": found.albedo.origin}
             arrays |= {"sky": found.environment.radiance, "sky_seen": found.environment.observations}
             meta = {
@@ -216,7 +216,7 @@ class Recovery:
                 for d in meta["mirrors"]
             )
             return Shading(
-                a["irradiance"], a["escaped"], a["radiance"], Albedo(a["rho"], a["origin"], meta["above_one"]),
+                a["irradiance"], a["escaped"], a["doubt"], a["radiance"], Albedo(a["rho"], a["origin"], meta["above_one"]),
                 lamps, Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
             )  # fmt: skip
 
@@ -268,7 +268,8 @@ class Recovery:
         rho, valid = quotient(np.maximum(lit.radiance - specular, 0), shading.irradiance)
         class_of = {i.object_id: i.class_name for i in self.capture.instances}
         emitters = {lamp.object_id for lamp in shading.lamps}
-        return fill(self.surface().atlas, rho, valid & lit.seen, class_of, emitters, doubt(lit))
+        error = np.hypot(doubt(lit), shading.doubt)
+        return fill(self.surface().atlas, rho, valid & lit.seen, class_of, emitters, error)
 
     def base_color(self) -> np.ndarray:
         """Base Color of each element for Cycles' Principled, (n, 3) float32."""

@@ -71,14 +71,15 @@ def interpolated(
     evaluate: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]],
     finest: float,
     threads: int = 0,
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Evaluate a smooth quantity at few elements and interpolate it to all.
 
     Parameters
     ----------
     position, normal : (n, 3) float32
     evaluate : callable
-        Takes the indices ((m,) int) of elements, gives the value ((m, c) float32) and the radius R ((m,) float32).
+        Takes the indices ((m,) int) of elements, gives the value ((m, c) float32; the first three channels are what
+        contrast is judged by) and the radius R ((m,) float32).
     finest : float
         Least spacing in metres: no two points of one orientation lie closer.
 
@@ -87,6 +88,8 @@ def interpolated(
     value : (n, c) float32
     points : (m,) int64
         The elements that were evaluated.
+    contrast : (n,) float32
+        Mean relative deviation between the points around each element: how far its value may be off.
     """
     extent = np.sort(np.ptp(position, axis=0))
     spacing = max(COARSEST * float(np.sqrt(extent[1] * extent[2])), finest)
@@ -94,6 +97,7 @@ def interpolated(
     chosen = np.zeros(0, np.int64)
     points = None
     result = None
+    contrast = np.zeros(len(position), np.float32)
     while len(todo):
         new = todo[_one_per_cell(position[todo], normal[todo], spacing)]
         value, radius = evaluate(new)
@@ -108,12 +112,12 @@ def interpolated(
         if result is None:
             result = np.empty((len(position), value.shape[1]), np.float32)
         last = spacing <= finest
-        covered = _spread(points, position, normal, todo, spacing, result, threads)
+        covered = _spread(points, position, normal, todo, spacing, result, contrast, threads)
         if last:
             break
         todo = todo[~covered]
         spacing = max(spacing / 2, finest)
-    return result, chosen
+    return result, chosen, contrast
 
 
 def _spread(
@@ -123,6 +127,7 @@ def _spread(
     todo: np.ndarray,
     spacing: float,
     result: np.ndarray,
+    contrast: np.ndarray,
     threads: int,
 ) -> np.ndarray:
     """Write the weighted mean of the nearest points for the elements `todo`; returns which of them are good enough.
@@ -148,10 +153,10 @@ def _spread(
         near = points.value[index]
         result[at] = np.einsum("nk,nkc->nc", weight, near)
         # Ward's bound knows how near the walls are, not how bright: what the points themselves say decides too.
-        level = near.mean(2)
+        level = near[..., :3].mean(2)
         mean = np.einsum("nk,nk->n", weight, level)
-        contrast = np.einsum("nk,nk->n", weight, np.abs(level - mean[:, None])) / np.maximum(mean, 1e-20)
-        covered[part] = (bound.min(1) <= ALLOWED) & (contrast <= CONTRAST)
+        contrast[at] = np.einsum("nk,nk->n", weight, np.abs(level - mean[:, None])) / np.maximum(mean, 1e-20)
+        covered[part] = (bound.min(1) <= ALLOWED) & (contrast[at] <= CONTRAST)
 
     for_blocks(fill, len(todo), BLOCK, threads)
     return covered

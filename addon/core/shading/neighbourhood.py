@@ -28,6 +28,8 @@ FEW = 0.35
 """Relative error of a single observation, whose spread can't be known."""
 EDGE_DOUBT = 0.4
 """Added for observations at depth edges, where another surface is mixed in."""
+SURPRISE = 3.0
+"""Deviations of up to so many of an element's own errors are taken for error."""
 DARK = 1e-3
 
 
@@ -73,7 +75,8 @@ def steadied(atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, 
     (m, 3) float32
     """
     position = atlas.position[own]
-    known = np.flatnonzero(np.isfinite(error))
+    measured = np.isfinite(error)
+    known = np.flatnonzero(measured)
     sure = known[error[known] < SURE]
     if len(sure) < NEIGHBOURS:
         sure = known
@@ -90,6 +93,12 @@ def steadied(atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, 
     log_rho = np.log(np.maximum(rho, DARK))
     middle, width = _prior(centre, position[sure], log_rho[sure])
     middle, width = middle[index], width[index][:, None]
-    trust = (width**2 / (width**2 + np.minimum(error, 1e3)[:, None] ** 2)).astype(np.float32)
-    trust[~np.isfinite(error)] = 0
+    error = np.minimum(error, 1e3)[:, None]
+    # An element that lies further off than its own error allows is something else, as a line in a pattern is: the
+    # prior gets the width that makes this element likeliest.
+    # At depth edges it is the other surface that is mixed in, however far off that lies.
+    surprise = np.where(error < EDGE_DOUBT, (log_rho - middle) ** 2 - (SURPRISE * error) ** 2, 0)
+    wide = np.maximum(width**2, surprise)
+    trust = (wide / (wide + error**2)).astype(np.float32)
+    trust[~measured] = 0
     return np.exp(trust * log_rho + (1 - trust) * middle).astype(np.float32)

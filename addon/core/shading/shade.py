@@ -41,6 +41,8 @@ class Shading:
         E, radiance * steradian.
     escaped : (n,) float32
         Share of the hemisphere's rays that left the mesh.
+    doubt : (n,) float32
+        Relative error of `irradiance` by interpolation.
     radiance : (n, 3) float32
         L_d with everything filled in: what the light field shows at each element. Lamps have their own radiance.
     albedo : Albedo
@@ -57,6 +59,7 @@ class Shading:
 
     irradiance: np.ndarray
     escaped: np.ndarray
+    doubt: np.ndarray
     radiance: np.ndarray
     albedo: Albedo
     lamps: tuple[Lamp, ...]
@@ -79,7 +82,7 @@ def irradiance(
     threads: int,
     seed: int,
     progress: Progress | None = None,
-) -> tuple[np.ndarray, np.ndarray, int]:
+) -> tuple[np.ndarray, np.ndarray, int, np.ndarray]:
     """E at chosen elements.
 
     Parameters
@@ -98,6 +101,8 @@ def irradiance(
     escaped : (m,) float32
     points : int
         How many places were gathered at.
+    doubt : (m,) float32
+        Relative error of E by interpolation.
     """
     atlas = field.atlas
     position, normal = atlas.position[element], atlas.normal[element]
@@ -124,11 +129,11 @@ def irradiance(
         return value, radius
 
     if interpolate and aimed:
-        value, chosen = interpolated(position, normal, gathered, finest, threads)
+        value, chosen, contrast = interpolated(position, normal, gathered, finest, threads)
         points = len(chosen)
     else:
         value, _ = gathered(np.arange(len(element)))
-        points = len(element)
+        points, contrast = len(element), np.zeros(len(element), np.float32)
     total, escaped = value[:, :3].copy(), value[:, 3].copy()
     if lamp_rays:
 
@@ -136,7 +141,8 @@ def irradiance(
             total[part] += direct(field, bright, position[part], normal[part], rays, lamp_rays, seed + part.start + 1)
 
         for_blocks(aim, len(element), ELEMENTS_AT_ONCE, threads, progress)
-    return total, escaped, points
+    share = value[:, :3].mean(1) / np.maximum(total.mean(1), 1e-20)
+    return total, escaped, points, contrast * share
 
 
 def fill_unseen(atlas: Atlas, radiance: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -205,8 +211,8 @@ def shade(
     lit = np.flatnonzero(seen | unseen_lamp)
     if len(dark):
         rough = dict(how, rays=64, emitter_rays=4, interpolate=True, finest=8 * finest) | {"sampler": "aimed"}
-        coarse_lit, _, _ = irradiance(field, normals, lit, **rough)
-        coarse_dark, escaped_dark, _ = irradiance(field, normals, dark, **rough)
+        coarse_lit, _, _, _ = irradiance(field, normals, lit, **rough)
+        coarse_dark, escaped_dark, _, _ = irradiance(field, normals, dark, **rough)
         everywhere = np.zeros((len(atlas), 3), np.float32)
         everywhere[lit], everywhere[dark] = coarse_lit, coarse_dark
         rho, valid = quotient(lit_diffuse.radiance, everywhere)
@@ -215,13 +221,14 @@ def shade(
         field = field.with_light(radiance)
 
     # 3. The real thing, where there is an L_d to divide; elsewhere the rough values do.
-    E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
+    E = np.zeros((len(atlas), 3), np.float32)
+    escaped, unsure = np.zeros(len(atlas), np.float32), np.zeros(len(atlas), np.float32)
     if len(dark):
         E[dark], escaped[dark] = coarse_dark, escaped_dark
-    E[lit], escaped[lit], points = irradiance(
+    E[lit], escaped[lit], points, unsure[lit] = irradiance(
         field, normals, lit, rays=rays, emitter_rays=emitter_rays,
         interpolate=interpolate, finest=finest, progress=progress, **how,
     )  # fmt: skip
     rho, valid = quotient(lit_diffuse.radiance, E)
-    albedo = fill(atlas, rho, valid & seen, class_of, emitters, doubt(lit_diffuse))
-    return Shading(E, escaped, field.radiance, albedo, lamps, light.environment, light.notes, mirrors, points)
+    albedo = fill(atlas, rho, valid & seen, class_of, emitters, np.hypot(doubt(lit_diffuse), unsure))
+    return Shading(E, escaped, unsure, field.radiance, albedo, lamps, light.environment, light.notes, mirrors, points)
