@@ -216,7 +216,8 @@ class Recovery:
                 for d in meta["mirrors"]
             )
             return Shading(
-                a["irradiance"], a["escaped"], a["doubt"], a["radiance"], Albedo(a["rho"], a["origin"], meta["above_one"]),
+                a["irradiance"], a["escaped"], a["doubt"], a["radiance"],
+                Albedo(a["rho"], a["origin"], meta["above_one"]),
                 lamps, Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
             )  # fmt: skip
 

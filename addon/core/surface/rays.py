@@ -50,7 +50,9 @@ class RayScene:
     def __init__(self, vertices: np.ndarray, triangles: np.ndarray):
         low, high = vertices.min(0), vertices.max(0)
         self.diagonal = float(np.linalg.norm(high - low))
-        self.offset = RELATIVE_OFFSET * self.diagonal
+        # Far from the origin float32 itself is coarser than that: 1 mm at 10 km.
+        coarse = float(np.spacing(np.float32(np.abs([low, high]).max())))
+        self.offset = max(RELATIVE_OFFSET * self.diagonal, 4 * coarse)
         self.triangle_count = len(triangles)
         self._scene = EmbreeScene()
         self._mesh = TriangleMesh(

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from addon.core.lit_diffuse.accumulate import LitDiffuse
-from addon.core.shading.emitters import LUMINANCE
+from addon.core.shading.emitters import LUMINANCE, bright_triangles
 from addon.core.shading.lamps import find_seen
 from addon.core.shading.shade import shade
-from tests.core.rooms import DARK, Quad, box_sides, cut, lit_box, make_room, quad, radiosity
+from tests.core.rooms import DARK, Quad, box_sides, cut, lit_box, make_room, quad, radiosity, split
 
 ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}
 TWO = (((0.3, 0.7), (0.2, 0.3)), ((0.3, 0.7), (0.7, 0.8)))
@@ -106,3 +106,14 @@ def test_bright_surfaces_under_bright_light_are_no_lamps():
     lamps = find_seen(ids, radiance, np.pi * radiance / needed)
     assert [lamp.object_id for lamp in lamps] == [4]
     assert lamps[0].seen and lamps[0].radiance.tolist() == [1, 1, 1]
+
+
+def test_a_finely_meshed_lamp_is_aimed_at_as_a_whole():
+    """A bulb's triangles are smaller than a texel: those without elements of their own shine like their neighbours."""
+    bulb = quad((1, 1, 2), (0, 0.2, 0), (0.2, 0, 0), 1)
+    room = make_room([quad((0, 0, 0), (2, 0, 0), (0, 2, 0), 0), *split(bulb, 8)], 0.1)
+    bare = np.bincount(room.atlas.triangle, minlength=len(room.mesh.triangles)) == 0
+    assert bare[2:].sum() > 30
+    bright = bright_triangles(room.field(room.by_object({0: 0.1, 1: 50})))
+    assert np.flatnonzero(bright.density > 0).tolist() == list(range(2, 2 + 128))
+    assert np.allclose(bright.chance, 1 / 128, rtol=1e-3)
