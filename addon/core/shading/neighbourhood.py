@@ -20,9 +20,9 @@ REFERENCES = 4000
 """Well-measured elements of an object that neighbours are sought among: a thinned set reaches further around."""
 CELL_TEXELS = 6.0
 """Edge of the cells that share one prior."""
-LEAST_DOUBT = 0.1
+LEAST_DOUBT = 0.06
 """Relative error that even the best measured element has: shading, texels against pixels."""
-SURE = 0.2
+SURE = 0.15
 """An element with less doubt than this may speak for its surroundings."""
 FEW = 0.35
 """Relative error of a single observation, whose spread can't be known."""
@@ -97,7 +97,9 @@ def steadied(atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, 
     # An element that lies further off than its own error allows is something else, as a line in a pattern is: the
     # prior gets the width that makes this element likeliest.
     # At depth edges it is the other surface that is mixed in, however far off that lies.
-    surprise = np.where(error < EDGE_DOUBT, (log_rho - middle) ** 2 - (SURPRISE * error) ** 2, 0)
+    # One verdict for all channels, by their sum: a channel near 0 is all noise in its logarithm.
+    off = np.log(np.exp(log_rho).sum(1, keepdims=True) / np.exp(middle).sum(1, keepdims=True))
+    surprise = np.where(error < EDGE_DOUBT, off**2 - (SURPRISE * error) ** 2, 0)
     wide = np.maximum(width**2, surprise)
     trust = (wide / (wide + error**2)).astype(np.float32)
     trust[~measured] = 0

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from ..surface.atlas import Atlas
 from .samples import Samples
 
-NEIGHBOURS = 6
+NEIGHBOURS = 16
 
 
 def grouped_median(values: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -70,6 +70,7 @@ def spread_over_object(atlas: Atlas, own: np.ndarray, element: np.ndarray, value
     k = min(NEIGHBOURS, len(element))
     distance, near = cKDTree(place(element)).query(place(own), k=k, workers=-1)
     distance, near = distance.reshape(len(own), k), near.reshape(len(own), k)
-    weight = 1 / (distance + 1e-3)
+    # Weights that level off within the neighbourhood: each known value is noisy by itself.
+    weight = 1 / (distance + distance[:, -1:] / 2 + 1e-6)
     weight /= weight.sum(1, keepdims=True)
     return np.einsum("nk,nkc->nc", weight.astype(np.float32), value[near])
