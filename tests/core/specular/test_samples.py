@@ -141,13 +141,16 @@ def test_the_specular_part_of_a_median():
 
 def test_spreading_over_an_object():
     """Known values stay near themselves, what lies between is between, the other side of a board is not asked."""
-    room = make_room([quad((0, 0, 0), (1, 0, 0), (0, 1, 0), 0), quad((0, 0, 0.01), (0, 1, 0), (1, 0, 0), 0)], 0.05)
+    room = make_room([quad((0, 0, 0), (1, 0, 0), (0, 1, 0), 0), quad((0, 0, 0.01), (0, 1, 0), (1, 0, 0), 0)], 0.025)
     atlas = room.atlas
     own = np.arange(len(atlas))
     up = atlas.normal[:, 2] > 0
     truth = np.where(up, 1 + atlas.position[:, 0], 5)[:, None].repeat(3, 1).astype(np.float32)
-    known = np.sort(np.random.default_rng(0).choice(own, 300, replace=False))
+    known = np.sort(np.random.default_rng(0).choice(own, 1200, replace=False))
     found = spread_over_object(atlas, own, known, truth[known])
     assert np.abs(found - truth)[up].max() < 0.15 and np.allclose(found[~up], 5, atol=1e-4)
+    noise = np.random.default_rng(1).normal(0, 0.5, (len(known), 3)).astype(np.float32)
+    noisy = spread_over_object(atlas, own, known, truth[known] + noise)
+    assert (noisy - found).std() < 0.5 * noise.std()  # each known value is noisy by itself
     one = spread_over_object(atlas, own, known[:1], truth[known[:1]])
     assert np.allclose(one, truth[known[0]])
