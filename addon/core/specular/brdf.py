@@ -13,7 +13,7 @@ import numpy as np
 
 def G1(x: np.ndarray, y: float) -> np.ndarray:
     """Smith's masking for GGX with 1 / (2 x) already in it: 1 / (x + sqrt(x^2 + y^2 - x^2 y^2)), y = phi."""
-    return 1 / (x + np.sqrt(x * x + np.float32(y * y) * (1 - x * x)))
+    return 1 / (x + np.sqrt(np.float32(y * y) + np.float32(1 - y * y) * (x * x)))
 
 
 def G(n_w: np.ndarray, n_wo: np.ndarray, phi: float) -> np.ndarray:
@@ -25,7 +25,8 @@ def D(n_h: np.ndarray, phi: float) -> np.ndarray:
     """GGX's distribution of normals, per steradian: phi^2 / (pi (1 + (phi^2 - 1) (n.h)^2)^2)."""
     a = np.float32(phi * phi)
     # 1 - (n.h)^2 is formed first: at phi = 0.01 the sum above would lose all its digits in float32.
-    base = (1 - n_h) * (1 + n_h) + a * n_h * n_h
+    square = n_h * n_h
+    base = (1 - n_h) * (1 + n_h) + a * square
     return a / (np.float32(np.pi) * base * base)
 
 

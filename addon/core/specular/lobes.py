@@ -120,18 +120,20 @@ def reflected_light(
         mirror[part] = L[:, 0]
         L, density = L[:, 1:], density.reshape(count, k)[:, 1:]
         directions, n_w = directions[:, 1:], np.maximum(n_w[:, 1:], 1e-4)
-        n_wo = np.repeat(local_wo[:, 2:], k - 1, 1)
+        n_wo = local_wo[:, 2:]
         h = directions + wo[:, None]
-        h /= np.maximum(np.linalg.norm(h, axis=2, keepdims=True), 1e-9)
+        h /= np.maximum(np.sqrt(np.einsum("mkj,mkj->mk", h, h)), 1e-9)[..., None]
         n_h = np.clip(np.einsum("mkj,mj->mk", h, n), 1e-4, 1)
         s = (1 - np.clip(np.einsum("mkj,mkj->mk", h, directions), 0, 1)) ** 5
         for phi in PROPOSALS:
             density = density + each * brdf.visible_normal_density(n_wo, n_h, phi)
         weighted = L * (n_w / np.maximum(density, 1e-12))[..., None]
+        both = np.concatenate([weighted * (1 - s)[..., None], weighted * s[..., None]], -1)
+        f = np.empty((count, p, k - 1), np.float32)
         for i, phi in enumerate(grid):
-            f = brdf.G(n_w, n_wo, float(phi)) * brdf.D(n_h, float(phi))
-            A[part, i] = np.einsum("mk,mkc->mc", f * (1 - s), weighted)
-            B[part, i] = np.einsum("mk,mkc->mc", f * s, weighted)
+            np.multiply(brdf.G(n_w, n_wo, float(phi)), brdf.D(n_h, float(phi)), out=f[:, i])
+        summed = f @ both
+        A[part], B[part] = summed[..., :3], summed[..., 3:]
 
     for_blocks(run, m, max(RAYS_AT_ONCE // rays, 1), threads, progress)
     return LobeLight(A, B, mirror)
