@@ -33,7 +33,7 @@ class ObjectMaterial:
     target_frame : str or None
         Name of the frame that showed the highlight best (assumptions A1, A2).
     residual : float or None
-        Root mean square of the fit's residual relative to the object's mean radiance.
+        Median size of the fit's residual, relative to the radiance of the element it is seen on.
     residual_lambertian : float or None
         The same with no lobe at all; what the lobe had to beat.
     observations : int

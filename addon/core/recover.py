@@ -31,7 +31,7 @@ from .specular.samples import SampleCollector, Samples
 from .store import Store, key
 from .surface.build import Surface, build_surface, from_uv, turned
 
-CODE = 1
+CODE = 2
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -61,6 +61,7 @@ class Recovery:
         self._done: dict[str, Any] = {}
         self._log: dict[str, dict[str, Any]] = {}
         self._bad_frames: list[str] = []
+        self._blind_frames: list[str] = []
 
     # Each stage's key: the stage before, and the settings that it heeds.
 
@@ -123,7 +124,10 @@ class Recovery:
     def _read(self, frame: Frame) -> Pixels:
         """A frame's pixels; one that turns out damaged counts as blind, unless too many are."""
         try:
-            return read_pixels(frame)
+            pixels = read_pixels(frame)
+            if not pixels.valid.any():
+                self._blind_frames.append(frame.name)
+            return pixels
         except BadInputError as error:
             self._bad_frames.append(f"{error} It was left out.")
             if len(self._bad_frames) > MAX_BAD_SHARE * len(self.capture.frames):
@@ -158,10 +162,11 @@ class Recovery:
                 )
             value = (lit, sky.result(), kept.result())
             arrays = {f"{i}.{f.name}": getattr(v, f.name) for i, v in enumerate(value) for f in dataclasses.fields(v)}
-            return value, arrays, {"bad_frames": self._bad_frames}
+            return value, arrays, {"bad_frames": self._bad_frames, "blind_frames": self._blind_frames}
 
         def load(arrays, meta):
             self._bad_frames = list(meta.get("bad_frames", ()))
+            self._blind_frames = list(meta.get("blind_frames", ()))
             kinds = (LitDiffuse, Environment, Samples)
             return tuple(
                 kind(**{f.name: arrays[f"{i}.{f.name}"] for f in dataclasses.fields(kind)})
@@ -334,6 +339,11 @@ class Recovery:
 
     def _report_lit(self, figures: dict[str, Any], warnings: list[str]) -> None:
         lit, atlas = self.lit_diffuse(), self.surface().atlas
+        if self._blind_frames:
+            count, first = len(self._blind_frames), self._blind_frames[0]
+            warnings.append(f"{count} frames have no valid pixel (the first: {first}); all are NaN, inf or masked.")
+        if not lit.radiance[lit.seen].any():
+            warnings.append("Every frame is black; nothing can be said of any albedo.")
         area = atlas.area.sum()
         figures["unseen_share"] = float(atlas.area[~lit.seen].sum() / area)
         figures["observations_median"] = float(np.median(lit.count[lit.seen]))

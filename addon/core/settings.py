@@ -36,7 +36,7 @@ class Settings:
     specular_rays : int
         Rays for each observation in the specular fit.
     refine : int
-        Rounds that take the fitted specular out of the lit diffuse texture again (0: the paper).
+        1 takes the fitted specular out of the lit diffuse texture again; 0 leaves it (the paper).
     threads : int
         0 takes all cores.
     seed : int
@@ -71,8 +71,8 @@ class Settings:
                 raise BadInputError(f"Setting '{name}' is '{getattr(self, name)}'; choose one of {', '.join(allowed)}.")
         for f in fields(self):
             value = getattr(self, f.name)
-            if isinstance(value, (int, float)) and not isinstance(value, bool) and not value >= 0:
-                raise BadInputError(f"Setting '{f.name}' is {value}; give a number of at least 0.")
+            if isinstance(value, (int, float)) and not isinstance(value, bool) and not 0 <= value < float("inf"):
+                raise BadInputError(f"Setting '{f.name}' is {value}; give a finite number of at least 0.")
         if self.shading_rays < 1 or self.specular_rays < 1 or self.atlas_size < 64:
             raise BadInputError("Settings shading_rays and specular_rays must be at least 1, atlas_size at least 64.")
 

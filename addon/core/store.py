@@ -14,6 +14,7 @@ import json
 import math
 import os
 import re
+import shutil
 import zipfile
 import zlib
 from pathlib import Path, PurePath
@@ -26,6 +27,8 @@ from .capture.exr import write_exr
 from .errors import BadInputError, StorageError
 
 STAGES = "stages"
+SPILLED = "tmp-observations-"
+"""How folders begin that an exact median keeps its observations in (`lit_diffuse.medians`)."""
 LOCK = ".lock"
 META = "__meta__"
 FULL = (errno.ENOSPC, errno.EDQUOT if hasattr(errno, "EDQUOT") else errno.ENOSPC)
@@ -60,6 +63,8 @@ class Store:
             for where in (self.folder, self.folder / STAGES):
                 for remains in where.glob(f"{TEMPORARY}*"):
                     remains.unlink()
+            for remains in self.folder.glob(f"{SPILLED}*"):
+                shutil.rmtree(remains, ignore_errors=True)
             probe = self.folder / f"{TEMPORARY}{os.getpid()}-probe"
             probe.write_bytes(b"probe")
             probe.unlink()

@@ -260,7 +260,7 @@ def test_a_capture_is_refused(name, capture, recover, tmp_path):
 
 @pytest.mark.parametrize("options, told", [
     (("--bogus",), "Unrecognized arguments: --bogus"), (("--median", "middle"), "invalid choice"),
-    (("--shading-rays", "many"), "invalid int value"), (("--seed", "-3"), "at least 0"),
+    (("--shading-rays", "many"), "invalid int value"), (("--seed", "-3"), "of at least 0"),
     (("--texel-size", "nan"), "texel_size"), (("--shading-rays", "0"), "at least 1"),
 ])
 def test_a_bad_option_is_refused(options, told, recover, tmp_path):

@@ -198,7 +198,8 @@ def shade(
     radiance = field.radiance.copy()
     for lamp in lamps:
         own = atlas.object_id == lamp.object_id
-        radiance[own & ~seen if lamp.seen else own] = lamp.radiance
+        # At its edges the surroundings are mixed in.
+        radiance[own & (lit_diffuse.tier != CLEAN) if lamp.seen else own] = lamp.radiance
     emitters = {lamp.object_id for lamp in lamps}
     field = field.with_light(radiance, light.environment, emitters)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 def G1(x: np.ndarray, y: float) -> np.ndarray:
     """Smith's masking for GGX with 1 / (2 x) already in it: 1 / (x + sqrt(x^2 + y^2 - x^2 y^2)), y = phi."""
-    return 1 / (x + np.sqrt(np.float32(y * y) + np.float32(1 - y * y) * (x * x)))
+    return 1 / (x + np.sqrt(y * y + (1 - y * y) * (x * x)))
 
 
 def G(n_w: np.ndarray, n_wo: np.ndarray, phi: float) -> np.ndarray:

@@ -14,7 +14,8 @@ LEAST_PSI = 0.02
 METAL_PSI = 0.12
 """No common dielectric reflects more (n = 2.06); what does is a metal or a mirror."""
 METAL_PHI = 0.5
-"""A metal's lobe broader than this can't be told from a diffuse surface."""
+DIELECTRIC_PHI = 0.7
+"""A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface."""
 MIN_GAIN = 0.02
 MIN_SIGMAS = 3.0
 """A lobe must lower the cost on elements that its fit has not seen by this share, and by this many standard errors."""
@@ -79,7 +80,7 @@ def choose_model(problem: Problem) -> Choice:
             return Choice(METAL, metal, gain, sigmas)
     fit = fit_lobe(problem, "frames", False, LEAST_PSI)
     gain, sigmas = _held_out(problem, False)
-    if gain > MIN_GAIN and sigmas > MIN_SIGMAS and fit.psi[0] <= METAL_PSI:
+    if gain > MIN_GAIN and sigmas > MIN_SIGMAS and fit.psi[0] <= METAL_PSI and fit.phi <= DIELECTRIC_PHI:
         return Choice(SPECULAR, fit, gain, sigmas)
     return Choice(LAMBERTIAN, fit, gain, sigmas, "Roughness and specular are not identifiable from these frames.")
 
