@@ -26,7 +26,7 @@ from .unwrap import unwrap
 
 STAGES = ("surface", "lit_diffuse", "shading", "specular")
 WRITE = "write"
-WEIGHTS = {"read": 1, "surface": 8, "lit_diffuse": 14, "shading": 20, "specular": 25, WRITE: 5}
+WEIGHTS = {"read": 1, "surface": 5, "lit_diffuse": 8, "shading": 30, "specular": 40, WRITE: 4}
 """Rough cost of the stages, for the estimate of the time left."""
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..surface.elements import triangle_geometry
+from ..surface.rays import Hits
 from .field import LightField
 
 LUMINANCE = np.float32([0.2126, 0.7152, 0.0722])
@@ -72,6 +73,32 @@ def bright_triangles(field: LightField) -> BrightTriangles:
     return BrightTriangles(
         corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], normal[bright], chance, density
     )
+
+
+def aimed_density(
+    bright: BrightTriangles, hits: Hits, directions: np.ndarray, triangle_normal: np.ndarray
+) -> np.ndarray:
+    """Solid-angle density with which rays aimed at the bright triangles take given directions.
+
+    Parameters
+    ----------
+    hits : Hits
+        What the directions met first.
+    directions : (n, 3) float32
+    triangle_normal : (t, 3) float32
+
+    Returns
+    -------
+    (n,) float32
+        0 where no bright triangle was met.
+    """
+    if not len(bright):
+        return np.zeros(len(directions), np.float32)
+    density = np.where(hits.triangle >= 0, bright.density[hits.triangle], np.float32(0))
+    on = np.flatnonzero(density > 0)
+    cosine = np.abs(np.einsum("ij,ij->i", directions[on], triangle_normal[hits.triangle[on]]))
+    density[on] *= hits.distance[on] ** 2 / np.maximum(cosine, 1e-6)
+    return density
 
 
 @dataclass(frozen=True)

@@ -11,22 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 from .directions import cosine_hemisphere, shifted, sobol, to_world, uniform_hemisphere
-from .emitters import BrightTriangles, sample_bright
+from .emitters import BrightTriangles, aimed_density, sample_bright
 from .field import LightField
 from .over_mirrors import direct_over_mirrors
 
 RAYS_AT_ONCE = 1 << 18
-
-
-def _aimed_density(field: LightField, bright: BrightTriangles, triangle, direction, distance, normals) -> np.ndarray:
-    """Solid-angle density with which `direct` would have chosen these hits ((n,) float32)."""
-    if not len(bright):
-        return np.zeros(len(triangle), np.float32)
-    density = np.where(triangle >= 0, bright.density[triangle], np.float32(0))
-    hit = density > 0
-    cosine = np.abs(np.einsum("ij,ij->i", direction[hit], normals[triangle[hit]]))
-    density[hit] *= distance[hit] ** 2 / np.maximum(cosine, 1e-6)
-    return density
 
 
 def gather(
@@ -76,7 +65,7 @@ def gather(
         radiance = field.arriving(hits, element, directions, bright.density if emitter_rays else None)
         out = element < 0
         if emitter_rays and len(bright):
-            aimed = _aimed_density(field, bright, hits.triangle, directions, hits.distance, triangle_normal)
+            aimed = aimed_density(bright, hits, directions, triangle_normal)
             own = rays * local[..., 2].reshape(-1) / np.float32(np.pi)
             radiance *= (own / np.maximum(own + emitter_rays * aimed, 1e-20))[:, None]
         total[part] = np.float32(np.pi / rays) * radiance.reshape(len(p), rays, 3).sum(1)

@@ -13,7 +13,7 @@ import numpy as np
 from ..parallel import for_blocks
 from ..progress import Progress
 from ..shading.directions import tangent_frame
-from ..shading.emitters import BrightTriangles
+from ..shading.emitters import BrightTriangles, aimed_density, sample_bright
 from ..shading.field import LightField
 from ..shading.irradiance import RAYS_AT_ONCE
 from . import brdf
@@ -73,8 +73,6 @@ def reflected_light(
     mirror = np.zeros((m, 3), np.float32)
     aimed = max(rays // (len(PROPOSALS) + 1), 1) if len(bright) else 0
     each = max((rays - aimed) // len(PROPOSALS), 1)
-    index_of = np.flatnonzero(bright.density > 0).astype(np.int32)
-    cumulative = np.cumsum(bright.chance)
 
     def run(part: slice) -> None:
         rng = np.random.default_rng([seed, part.start])
@@ -94,16 +92,8 @@ def reflected_light(
             t, b, up = (np.repeat(axis, each, 0) for axis in (tangent, bitangent, n))
             drawn.append((w[:, :1] * t + w[:, 1:2] * b + w[:, 2:] * up).reshape(count, each, 3))
         if aimed:
-            which = (np.arange(aimed, dtype=np.float32) + rng.random((count, aimed), np.float32)) / aimed
-            chosen = np.minimum(np.searchsorted(cumulative, which.ravel()), len(bright) - 1)
-            square = rng.random((len(chosen), 2), np.float32)
-            root = np.sqrt(square[:, :1])
-            target = (
-                bright.corner[chosen]
-                + root * (1 - square[:, 1:]) * bright.edge_u[chosen]
-                + root * square[:, 1:] * bright.edge_v[chosen]
-            )
-            way = target - np.repeat(origin, aimed, 0)
+            pick = sample_bright(bright, rng.random((count, aimed, 2), np.float32), rng)
+            way = pick.point - np.repeat(origin, aimed, 0)
             drawn.append((way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)).reshape(count, aimed, 3))
         directions = np.concatenate(drawn, 1).astype(np.float32)
         k = directions.shape[1]
@@ -115,7 +105,7 @@ def reflected_light(
         hits = field.scene.intersect(np.repeat(origin, k, 0)[above], flat[above])
         L[above] = field.arriving(hits, field.elements(hits), flat[above])
         if aimed:
-            density[above] = aimed * _aimed(bright, index_of, hits, flat[above], triangle_normal)
+            density[above] = aimed * aimed_density(bright, hits, flat[above], triangle_normal)
         L = L.reshape(count, k, 3)
         mirror[part] = L[:, 0]
         L, density = L[:, 1:], density.reshape(count, k)[:, 1:]
@@ -144,12 +134,3 @@ def _stratified(count: int, each: int, rng: np.random.Generator) -> np.ndarray:
     first = (np.arange(each, dtype=np.float32) + rng.random((count, each), np.float32)) / each
     second = (rng.permuted(np.tile(np.arange(each, dtype=np.float32), (count, 1)), axis=1) + 0.5) / each
     return np.stack([first, second], -1).reshape(-1, 2).astype(np.float32)
-
-
-def _aimed(bright: BrightTriangles, index_of, hits, direction, triangle_normal) -> np.ndarray:
-    """Solid-angle density with which a ray aimed at the bright triangles takes each of these directions."""
-    density = np.where(hits.triangle >= 0, bright.density[hits.triangle], np.float32(0))
-    on = density > 0
-    cosine = np.abs(np.einsum("ij,ij->i", direction[on], triangle_normal[hits.triangle[on]]))
-    density[on] *= hits.distance[on] ** 2 / np.maximum(cosine, 1e-6)
-    return density
