@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -116,7 +116,10 @@ def fit_specular(
             continue
         target = targets.get(i.object_id, -1)
         name = frame_names[target] if target >= 0 else None
-        materials.append(_material(i, choices[i.object_id], problems.get(i.object_id), name))
+        material = _material(i, choices[i.object_id], problems.get(i.object_id), name)
+        if material.model == METAL and i.object_id in {mirror.object_id for mirror in field.mirrors}:
+            material = replace(material, phi=0.0, note="A flat mirror; its lobe is narrower than the frames resolve.")
+        materials.append(material)
 
     specular = np.zeros((len(field.atlas), 3), np.float32)
     glossy = [m for m in materials if m.model == SPECULAR] if refine else []
