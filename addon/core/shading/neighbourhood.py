@@ -26,7 +26,7 @@ SURE = 0.15
 """An element with less doubt than this may speak for its surroundings."""
 FEW = 0.35
 """Relative error of a single observation, whose spread can't be known."""
-EDGE_DOUBT = 0.4
+EDGE_DOUBT = 0.3
 """Added for observations at depth edges, where another surface is mixed in."""
 SURPRISE = 3.0
 """Deviations of up to so many of an element's own errors are taken for error."""
@@ -77,7 +77,8 @@ def steadied(atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, 
     position = atlas.position[own]
     measured = np.isfinite(error)
     known = np.flatnonzero(measured)
-    sure = known[error[known] < SURE]
+    # The better half at least: the few that are surer may be all of one kind, the frame of a painting.
+    sure = known[error[known] <= max(SURE, float(np.median(error[known])))]
     if len(sure) < NEIGHBOURS:
         sure = known
     if len(sure) > REFERENCES:
@@ -96,10 +97,9 @@ def steadied(atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, 
     error = np.minimum(error, 1e3)[:, None]
     # An element that lies further off than its own error allows is something else, as a line in a pattern is: the
     # prior gets the width that makes this element likeliest.
-    # At depth edges it is the other surface that is mixed in, however far off that lies.
     # One verdict for all channels, by their sum: a channel near 0 is all noise in its logarithm.
     off = np.log(np.exp(log_rho).sum(1, keepdims=True) / np.exp(middle).sum(1, keepdims=True))
-    surprise = np.where(error < EDGE_DOUBT, off**2 - (SURPRISE * error) ** 2, 0)
+    surprise = off**2 - (SURPRISE * error) ** 2
     wide = np.maximum(width**2, surprise)
     trust = (wide / (wide + error**2)).astype(np.float32)
     trust[~measured] = 0
