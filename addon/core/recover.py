@@ -17,6 +17,7 @@ from .lit_diffuse.accumulate import LitDiffuse, accumulate
 from .material import METAL, SPECULAR, ObjectMaterial
 from .memory import peak_memory
 from .progress import Progress
+from .report import make_report
 from .settings import Settings
 from .shading.albedo import Albedo, fill, quotient
 from .shading.environment import Environment, EnvironmentAccumulator
@@ -46,6 +47,15 @@ class Recovery:
     progress : Progress
     unwrap : callable(Mesh, int) -> (t, 3, 2) float32
         Lays the mesh out in an atlas of so many texels; Blender's, in the extension.
+
+    Attributes
+    ----------
+    done : dict
+        Values of the stages so far.
+    log : dict
+        Time, memory and whether it was stored, of each.
+    bad_frames, blind_frames : list of str
+        Sentences on frames that turned out damaged; names of those without a valid pixel.
     """
 
     def __init__(
@@ -58,10 +68,10 @@ class Recovery:
     ):
         self.capture, self.store, self.settings, self.progress = capture, store, settings, progress
         self._unwrap = unwrap
-        self._done: dict[str, Any] = {}
-        self._log: dict[str, dict[str, Any]] = {}
-        self._bad_frames: list[str] = []
-        self._blind_frames: list[str] = []
+        self.done: dict[str, Any] = {}
+        self.log: dict[str, dict[str, Any]] = {}
+        self.bad_frames: list[str] = []
+        self.blind_frames: list[str] = []
 
     # Each stage's key: the stage before, and the settings that it heeds.
 
@@ -80,22 +90,22 @@ class Recovery:
         self, name: str, load: Callable[[dict, dict], Any], compute: Callable[[], tuple[Any, dict, dict]]
     ) -> Any:
         """The value of a stage: kept, stored, or computed now and stored."""
-        if name in self._done:
-            return self._done[name]
+        if name in self.done:
+            return self.done[name]
         started = time.monotonic()
         stored = self.store.load(name, self._keys[name])
         self.progress.stage(name)
         if stored is not None:
             meta = self.store.load_meta(name, self._keys[name]) or {}
             value = load(stored, meta)
-            self._log[name] = {"seconds": round(time.monotonic() - started, 2), "stored": True}
+            self.log[name] = {"seconds": round(time.monotonic() - started, 2), "stored": True}
         else:
             value, arrays, meta = compute()
             self.store.save(name, self._keys[name], arrays, meta)
-            self._log[name] = {"seconds": round(time.monotonic() - started, 2), "stored": False}
-        self._log[name]["peak_memory_bytes"] = peak_memory()
+            self.log[name] = {"seconds": round(time.monotonic() - started, 2), "stored": False}
+        self.log[name]["peak_memory_bytes"] = peak_memory()
         self.progress.done(stored=stored is not None)
-        self._done[name] = value
+        self.done[name] = value
         return value
 
     def surface(self) -> Surface:
@@ -126,13 +136,13 @@ class Recovery:
         try:
             pixels = read_pixels(frame)
             if not pixels.valid.any():
-                self._blind_frames.append(frame.name)
+                self.blind_frames.append(frame.name)
             return pixels
         except BadInputError as error:
-            self._bad_frames.append(f"{error} It was left out.")
-            if len(self._bad_frames) > MAX_BAD_SHARE * len(self.capture.frames):
+            self.bad_frames.append(f"{error} It was left out.")
+            if len(self.bad_frames) > MAX_BAD_SHARE * len(self.capture.frames):
                 raise BadInputError(
-                    f"{len(self._bad_frames)} of {len(self.capture.frames)} frames can't be read; the first: {error}"
+                    f"{len(self.bad_frames)} of {len(self.capture.frames)} frames can't be read; the first: {error}"
                 ) from error
             shape = (frame.camera.height, frame.camera.width)
             return Pixels(np.zeros((*shape, 3), np.float32), np.zeros(shape, bool), np.zeros(shape, bool))
@@ -162,11 +172,11 @@ class Recovery:
                 )
             value = (lit, sky.result(), kept.result())
             arrays = {f"{i}.{f.name}": getattr(v, f.name) for i, v in enumerate(value) for f in dataclasses.fields(v)}
-            return value, arrays, {"bad_frames": self._bad_frames, "blind_frames": self._blind_frames}
+            return value, arrays, {"bad_frames": self.bad_frames, "blind_frames": self.blind_frames}
 
         def load(arrays, meta):
-            self._bad_frames = list(meta.get("bad_frames", ()))
-            self._blind_frames = list(meta.get("blind_frames", ()))
+            self.bad_frames = list(meta.get("bad_frames", ()))
+            self.blind_frames = list(meta.get("blind_frames", ()))
             kinds = (LitDiffuse, Environment, Samples)
             return tuple(
                 kind(**{f.name: arrays[f"{i}.{f.name}"] for f in dataclasses.fields(kind)})
@@ -316,66 +326,4 @@ class Recovery:
 
     def report(self) -> dict[str, Any]:
         """What report.json holds so far: stages, settings, figures and warnings."""
-        result: dict[str, Any] = {
-            "capture": self.capture.root.name,
-            "settings": dataclasses.asdict(self.settings),
-            "stages": self._log,
-            "warnings": list(self.capture.warnings) + self._bad_frames,
-        }
-        figures: dict[str, Any] = {"frames": len(self.capture.frames), "triangles": len(self.capture.mesh.triangles)}
-        if "surface" in self._done:
-            surface = self.surface()
-            figures |= {"atlas_size": surface.atlas.size, "elements": len(surface.atlas)}
-            figures["texel_metres"] = surface.texel_size
-        if "lit_diffuse" in self._done:
-            self._report_lit(figures, result["warnings"])
-        if "shading" in self._done:
-            self._report_shading(figures, result["warnings"])
-        if "specular" in self._done:
-            models = [m.model for m in self.materials()]
-            figures["models"] = {model: models.count(model) for model in sorted(set(models))}
-        result["figures"] = figures
-        return result
-
-    def _report_lit(self, figures: dict[str, Any], warnings: list[str]) -> None:
-        lit, atlas = self.lit_diffuse(), self.surface().atlas
-        if self._blind_frames:
-            count, first = len(self._blind_frames), self._blind_frames[0]
-            warnings.append(f"{count} frames have no valid pixel (the first: {first}); all are NaN, inf or masked.")
-        if not lit.radiance[lit.seen].any():
-            warnings.append("Every frame is black; nothing can be said of any albedo.")
-        area = atlas.area.sum()
-        figures["unseen_share"] = float(atlas.area[~lit.seen].sum() / area)
-        figures["observations_median"] = float(np.median(lit.count[lit.seen]))
-        seen = np.bincount(atlas.object_id, lit.seen, int(atlas.object_id.max()) + 1)
-        unseen = [i for i in self.capture.instances if i.object_id >= len(seen) or seen[i.object_id] == 0]
-        if unseen:
-            names = ", ".join(f"{i.class_name} ({i.object_id})" for i in unseen[:5])
-            more = f" and {len(unseen) - 5} more" if len(unseen) > 5 else ""
-            warnings.append(f"No frame sees {names}{more}; their materials are taken from their class or the room.")
-        if not self.environment().seen:
-            figures["outside"] = "no frame sees past the mesh"
-
-    def _report_shading(self, figures: dict[str, Any], warnings: list[str]) -> None:
-        shading, lit = self.shading(), self.lit_diffuse()
-        escaped = float(shading.escaped[lit.seen].mean())
-        figures |= {
-            "escaped_share": escaped,
-            "albedo_above_one_share": shading.albedo.above_one,
-            "shading_points": shading.points,
-            "lamps": [lamp.object_id for lamp in shading.lamps],
-            "mirrors": [mirror.object_id for mirror in shading.mirrors],
-        }
-        warnings += [f"Lamp {lamp.object_id}: {lamp.note}" for lamp in shading.lamps if lamp.note]
-        warnings += shading.notes
-        if shading.albedo.above_one > 0.05:
-            warnings.append(
-                f"{shading.albedo.above_one:.0%} of the seen surface would need an albedo above 1: light is missing "
-                "(an unseen lamp, a clipped one, or a hole that was no window)."
-            )
-        if escaped > 0.02 and not self.environment().seen:
-            warnings.append(
-                f"{escaped:.0%} of the rays leave the mesh, but no frame sees what lies there; it was taken as dark."
-            )
-
-
+        return make_report(self)

@@ -1,0 +1,80 @@
+"""What report.json holds: how the run went, what it found, and what to be wary of, one sentence each."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .recover import Recovery
+
+
+def make_report(run: Recovery) -> dict[str, Any]:
+    """Stages, settings, figures and warnings of what has been computed so far."""
+    result: dict[str, Any] = {
+        "capture": run.capture.root.name,
+        "settings": dataclasses.asdict(run.settings),
+        "stages": run.log,
+        "warnings": list(run.capture.warnings) + run.bad_frames,
+    }
+    figures: dict[str, Any] = {"frames": len(run.capture.frames), "triangles": len(run.capture.mesh.triangles)}
+    if "surface" in run.done:
+        surface = run.surface()
+        figures |= {"atlas_size": surface.atlas.size, "elements": len(surface.atlas)}
+        figures["texel_metres"] = surface.texel_size
+    if "lit_diffuse" in run.done:
+        _report_lit(run, figures, result["warnings"])
+    if "shading" in run.done:
+        _report_shading(run, figures, result["warnings"])
+    if "specular" in run.done:
+        models = [m.model for m in run.materials()]
+        figures["models"] = {model: models.count(model) for model in sorted(set(models))}
+    result["figures"] = figures
+    return result
+
+
+def _report_lit(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:
+    lit, atlas = run.lit_diffuse(), run.surface().atlas
+    if run.blind_frames:
+        count, first = len(run.blind_frames), run.blind_frames[0]
+        warnings.append(f"{count} frames have no valid pixel (the first: {first}); all are NaN, inf or masked.")
+    if not lit.radiance[lit.seen].any():
+        warnings.append("Every frame is black; nothing can be said of any albedo.")
+    area = atlas.area.sum()
+    figures["unseen_share"] = float(atlas.area[~lit.seen].sum() / area)
+    figures["observations_median"] = float(np.median(lit.count[lit.seen]))
+    seen = np.bincount(atlas.object_id, lit.seen, int(atlas.object_id.max()) + 1)
+    unseen = [i for i in run.capture.instances if i.object_id >= len(seen) or seen[i.object_id] == 0]
+    if unseen:
+        names = ", ".join(f"{i.class_name} ({i.object_id})" for i in unseen[:5])
+        more = f" and {len(unseen) - 5} more" if len(unseen) > 5 else ""
+        warnings.append(f"No frame sees {names}{more}; their materials are taken from their class or the room.")
+    if not run.environment().seen:
+        figures["outside"] = "no frame sees past the mesh"
+
+
+def _report_shading(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:
+    shading, lit = run.shading(), run.lit_diffuse()
+    escaped = float(shading.escaped[lit.seen].mean())
+    figures |= {
+        "escaped_share": escaped,
+        "albedo_above_one_share": shading.albedo.above_one,
+        "shading_points": shading.points,
+        "lamps": [lamp.object_id for lamp in shading.lamps],
+        "mirrors": [mirror.object_id for mirror in shading.mirrors],
+    }
+    warnings += [f"Lamp {lamp.object_id}: {lamp.note}" for lamp in shading.lamps if lamp.note]
+    warnings += shading.notes
+    if shading.albedo.above_one > 0.05:
+        warnings.append(
+            f"{shading.albedo.above_one:.0%} of the seen surface would need an albedo above 1: light is missing "
+            "(an unseen lamp, a clipped one, or a hole that was no window)."
+        )
+    if escaped > 0.02 and not run.environment().seen:
+        warnings.append(
+            f"{escaped:.0%} of the rays leave the mesh, but no frame sees what lies there; it was taken as dark."
+        )
+
+
