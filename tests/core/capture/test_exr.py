@@ -175,8 +175,10 @@ for path in sys.argv[1:]:
         read_exr(path)
     except BadInputError as error:
         assert path in str(error) and str(error).endswith(".") and "\\n" not in str(error), str(error)
-    assert time.monotonic() - started < 2, path
-assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < 400_000, "too much memory"
+    assert time.monotonic() - started < 10, path  # hangs, not slowness
+# Not ru_maxrss: that outlives exec, so that it would count the test runner's own memory.
+status = dict(line.split(":", 1) for line in open("/proc/self/status"))
+assert int(status["VmHWM"].split()[0]) < 400_000, "too much memory"
 print("all", len(sys.argv) - 1)
 """
 
