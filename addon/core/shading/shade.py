@@ -145,7 +145,7 @@ def irradiance(
     return total, escaped, points, contrast * share
 
 
-def fill_unseen(atlas: Atlas, radiance: np.ndarray, seen: np.ndarray) -> np.ndarray:
+def fill_unseen(radiance: np.ndarray, seen: np.ndarray) -> np.ndarray:
     """L_d with the unseen elements dark, as (n, 3) float32 without NaN."""
     return np.where(seen[:, None], radiance, np.float32(0)).astype(np.float32)
 
@@ -190,7 +190,7 @@ def shade(
     how = {"sampler": sampler, "threads": threads, "seed": seed}
 
     # 1. All light. What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
-    field = LightField(mesh, atlas, scene, fill_unseen(atlas, lit_diffuse.radiance, seen), environment)
+    field = LightField(mesh, atlas, scene, fill_unseen(lit_diffuse.radiance, seen), environment)
     good = seen & (((lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= ENOUGH)) | (lit_diffuse.tier == SATURATED))
     unseen = [object_id for object_id, share in seen_share.items() if share == 0]
     light = find_light(field, normals, good if good.any() else seen, unseen, instances, seed)
