@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import importlib
 import json
 import os
 import sys
@@ -110,6 +111,20 @@ def make_parser() -> argparse.ArgumentParser:
     demo.add_argument("--size", choices=DEMO_SIZES, default="small", help="number and size of frames (default small)")
     add_settings(demo)
     add_common(demo, demo_command)
+
+    benchmark = commands.add_parser(
+        "benchmark", help="measure every stage's error and cost against the paper's", epilog=EXIT_CODES,
+        description="Run each stage over its alternatives, the paper's setting among them, and write a table (CSV and "
+                    "Markdown) and a plot for each. Errors are the same from run to run; seconds are the machine's.")
+    benchmark.add_argument("stages", metavar="STAGE", nargs="*",
+                           help="medians, accumulation, shading, specular or pipeline (default all)")
+    benchmark.add_argument("--capture", metavar="DIR", type=Path, help="also measure on this capture")
+    benchmark.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder to write, made if missing")
+    benchmark.add_argument("--large", action="store_true", help="the real size; takes much longer")
+    benchmark.add_argument("--seed", type=int, metavar="INT", default=0,
+                           help="of every pseudo-random choice (default 0)")
+    benchmark.add_argument("--threads", type=int, metavar="INT", default=0, help="0 takes all cores (default 0)")
+    add_common(benchmark, benchmark_command)
     return parser
 
 
@@ -180,6 +195,32 @@ def demo_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     return EXIT_OK
 
 
+def benchmark_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+    """`benchmark [STAGE ...] --out DIR`."""
+    if arguments.seed < 0 or arguments.threads < 0:
+        raise BadInputError("Options --seed and --threads take whole numbers of at least 0.")
+    with needed_packages():
+        from .benchmark.run import NO_PLOTS, Options, check_stages, plots_are_possible, run_benchmark
+        from .core.progress import Progress
+
+        stages = check_stages(arguments.stages)
+        with console_run(arguments, stream) as console:
+            progress = Progress(weights=dict.fromkeys(stages, 1.0), **console)
+            options = Options(arguments.capture, arguments.large, arguments.seed, arguments.threads, arguments.out,
+                              progress)
+            results = run_benchmark(stages, options)
+    if not arguments.quiet:
+        for stage, tables in results.items():
+            if isinstance(tables, str):
+                print(f"Skipped {stage}: {tables}", file=stream)
+            else:
+                print(*(table.markdown() for table in tables), sep="\n", file=stream)
+        if not plots_are_possible():
+            print(NO_PLOTS, file=stream)
+        print(f"Tables and plots: {arguments.out / 'index.md'}", file=stream)
+    return EXIT_OK
+
+
 def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`info CAPTURE`."""
     from .core.capture.read import describe, read_capture
@@ -204,10 +245,15 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
 
 def need(module: str):
     """A module of the bridge; where there is no Blender, say so in one sentence."""
-    import importlib
-
-    try:
+    with needed_packages():
         return importlib.import_module(f".bridge.{module}", __package__)
+
+
+@contextlib.contextmanager
+def needed_packages():
+    """Turn the absence of a package that the method needs into one sentence."""
+    try:
+        yield
     except ModuleNotFoundError as error:
         if error.name and error.name.split(".")[0] in ("bpy", "numpy", "scipy", "embreex", "OpenEXR"):
             raise BadInputError(f"The Python package '{error.name}' is missing; install Scan Relight with "

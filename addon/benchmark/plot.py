@@ -1,0 +1,67 @@
+"""A table's curves as a picture. The only module that imports matplotlib, which is there for development only."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from ..core.atomic import replacing
+from .table import BASELINE, Table
+
+PANEL = 4.2
+"""Edge of a panel in inches."""
+ACROSS = 3
+"""Panels side by side."""
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f", "#8c564b", "#b2a000", "#17202a")
+"""Okabe and Ito's, which colour-blind readers can tell apart, and a few more."""
+
+
+def write_plot(table: Table, path: Path | str) -> None:
+    """Error over cost, both logarithmic: a panel for each case, a line for each alternative, the paper's dashed.
+
+    An error of zero has no place on a logarithmic axis: it stands at the bottom of its panel with a hollow mark.
+    """
+    curves, records = table.curves, table.records()
+    cases = list(dict.fromkeys(record[curves.case] for record in records))
+    names = list(dict.fromkeys(record[curves.alternative] for record in records))
+    across = min(ACROSS, max(len(cases), 1))
+    down = -(-len(cases) // across)
+    figure = Figure(figsize=(PANEL * across, PANEL * down + 0.3 * len(names) ** 0.5 + 0.6), layout="constrained")
+    panels = figure.subplots(max(down, 1), across, squeeze=False).ravel()
+    handles = {}
+    for panel, case in zip(panels, cases):
+        here = [record for record in records if record[curves.case] == case and _is_drawn(record, curves)]
+        errors = [record[curves.error] for record in here if record[curves.error] > 0]
+        bottom = min(errors, default=1.0) / 4
+        panel.set(xscale="log", yscale="log", title=str(case), xlabel=curves.cost, ylabel=curves.error)
+        panel.grid(alpha=0.3)
+        for name in names:
+            rows = [record for record in here if record[curves.alternative] == name]
+            if not rows:
+                continue
+            paper = any(record.get(BASELINE) for record in rows)
+            x = [record[curves.cost] for record in rows]
+            y = [record[curves.error] or bottom for record in rows]
+            colour = COLOURS[names.index(name) % len(COLOURS)]
+            (line,) = panel.plot(
+                x, y, "--" if paper else "-", color=colour, label=f"{name} (paper)" if paper else str(name)
+            )
+            exact = [record[curves.error] == 0 for record in rows]
+            for a, b, hollow in zip(x, y, exact):
+                panel.plot(a, b, "s" if paper else "o", color=colour, markerfacecolor="none" if hollow else colour)
+            handles.setdefault(name, line)
+    for panel in panels[len(cases) :]:
+        panel.remove()
+    figure.suptitle(table.title)
+    figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=min(3, max(len(handles), 1)))
+    with replacing(path) as temporary:
+        # No date or version in the file: the same figures give the same bytes.
+        figure.savefig(temporary, format="png", dpi=110, metadata={"Software": None})
+
+
+def _is_drawn(record: dict, curves) -> bool:
+    """Whether a row has a place in the plot: a positive cost, and an error that was measured."""
+    cost, error = record[curves.cost], record[curves.error]
+    return cost is not None and error is not None and cost > 0 and math.isfinite(cost) and math.isfinite(error)

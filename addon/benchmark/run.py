@@ -1,0 +1,157 @@
+"""The benchmark's stages, what they are told, and the files they leave."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..core.atomic import write_bytes
+from ..core.errors import BadInputError
+from ..core.progress import Progress
+from .machine import describe_machine
+from .table import Table
+
+STAGES = ("medians", "accumulation", "shading", "specular", "pipeline")
+"""Each is the module of that name beside this one, with a function `run(options) -> iterable of Table`."""
+NO_PLOTS = "Plots need matplotlib, which is not installed here; the tables are complete without it."
+
+
+class SkippedStage(Exception):
+    """A stage can't run under the options given; its text is one sentence that says why."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a stage is told.
+
+    Attributes
+    ----------
+    capture : Path or None
+        A capture to measure on besides what the stage makes itself.
+    large : bool
+        The real size, which may take hours; else what finishes in minutes.
+    seed : int
+        Of every pseudo-random choice: errors are the same from run to run.
+    threads : int
+        0 takes all cores.
+    out : Path
+        Where the files go. A stage may keep scratch files there, and takes them away again.
+    progress : Progress
+        To be told the share of the stage that is done; raises `InterruptedRun` when the user wants to stop.
+    """
+
+    capture: Path | None = None
+    large: bool = False
+    seed: int = 0
+    threads: int = 0
+    out: Path = Path()
+    progress: Progress = field(default_factory=Progress)
+
+    def part(self, start: float, end: float, weights: dict[str, float] | None = None) -> Progress:
+        """A `Progress` for code with stages of its own, which advances this stage from share `start` to `end`."""
+        return Progress(lambda event: self.progress.update(start + (end - start) * event.overall), weights=weights)
+
+
+def check_stages(stages: Sequence[str]) -> tuple[str, ...]:
+    """The stages asked for in their order, all where none is named; raises `BadInputError` for an unknown one."""
+    for name in stages:
+        if name not in STAGES:
+            raise BadInputError(f"There is no benchmark '{name}'; choose among {', '.join(STAGES)}.")
+    return tuple(name for name in STAGES if name in stages or not stages)
+
+
+def load(stage: str) -> Callable[[Options], Iterable[Table]]:
+    """The function of a stage; imported when it is wanted, so that one stage does not need what another imports."""
+    return importlib.import_module(f".{stage}", __package__).run
+
+
+def run_benchmark(stages: Sequence[str], options: Options) -> dict[str, list[Table] | str]:
+    """Run stages and write their tables, plots and `index.md` into `options.out`.
+
+    What is finished is written at once: an interrupted run keeps it.
+
+    Parameters
+    ----------
+    stages : sequence of str
+        Names out of `STAGES`; empty for all.
+
+    Returns
+    -------
+    dict of str to (list of Table or str)
+        For each stage its tables, or the sentence why it was skipped.
+
+    Raises
+    ------
+    BadInputError
+        Unknown stage, no such capture, or a folder that can't be made.
+    InterruptedRun
+        From the progress.
+    """
+    stages = check_stages(stages)
+    if options.capture is not None and not options.capture.is_dir():
+        raise BadInputError(f"There is no capture folder '{options.capture}'; give one that holds transforms.json.")
+    try:
+        options.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or error
+        raise BadInputError(f"Folder '{options.out}' can't be made ({reason}); choose another.") from error
+    plots = plots_are_possible()
+    results: dict[str, list[Table] | str] = {}
+    seconds: dict[str, float] = {}
+    for stage in stages:
+        started = time.monotonic()
+        options.progress.stage(stage)
+        try:
+            results[stage] = []
+            for table in load(stage)(options):
+                results[stage].append(table)
+                _write(table, options.out, plots)
+        except SkippedStage as reason:
+            results[stage] = str(reason)
+        options.progress.done()
+        seconds[stage] = time.monotonic() - started
+        write_bytes(options.out / "index.md", _index(results, seconds, options, plots).encode())
+    return results
+
+
+def plots_are_possible() -> bool:
+    """Whether matplotlib is there."""
+    return importlib.util.find_spec("matplotlib") is not None
+
+
+def _write(table: Table, folder: Path, plots: bool) -> None:
+    """A table's files."""
+    table.write_csv(folder / f"{table.stage}.csv")
+    table.write_markdown(folder / f"{table.stage}.md")
+    if plots and table.curves is not None:
+        from .plot import write_plot
+
+        write_plot(table, folder / f"{table.stage}.png")
+
+
+def _index(results: dict[str, list[Table] | str], seconds: dict[str, float], options: Options, plots: bool) -> str:
+    """index.md: the machine, the settings, all tables."""
+    lines = ["# Benchmark", "", *(f"- {name}: {text}" for name, text in describe_machine().items()), ""]
+    lines += [
+        f"- capture: {options.capture.resolve().name if options.capture else 'none given'}",
+        f"- size: {'large' if options.large else 'default'}",
+        f"- seed: {options.seed}",
+        f"- threads: {options.threads or 'all cores'}",
+        "",
+    ]
+    if not plots:
+        lines += [NO_PLOTS, ""]
+    for stage, tables in results.items():
+        lines += [f"# {stage.capitalize()}", "", f"{seconds[stage]:.0f} s", ""]
+        if isinstance(tables, str):
+            lines += [f"Skipped: {tables}", ""]
+            continue
+        for table in tables:
+            lines += [table.markdown()]
+            if plots and table.curves is not None:
+                lines += [f"![{table.title}]({table.stage}.png)", ""]
+    return "\n".join(lines).rstrip() + "\n"
