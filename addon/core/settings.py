@@ -18,7 +18,8 @@ class Settings:
     atlas_size : int
         Upper bound on the atlas's edge in pixels.
     median : str
-        'exact' (batched, bounded buffer), 'p2' (the paper's P-square) or 'mean'.
+        'batched' (exact for a spot's first 20 observations, close beyond, in fixed memory), 'exact' (all observations
+        go to disk), 'p2' (the paper's P-square) or 'mean'.
     frame_order : str
         'shuffled' (fixed pseudo-random order) or 'capture' (video order, the paper's).
     shading : str
@@ -45,7 +46,7 @@ class Settings:
 
     texel_size: float = 0.0
     atlas_size: int = 4096
-    median: str = "exact"
+    median: str = "batched"
     frame_order: str = "shuffled"
     shading: str = "aimed"
     shading_rays: int = 192
@@ -59,7 +60,7 @@ class Settings:
     seed: int = 0
 
     CHOICES = {
-        "median": ("exact", "p2", "mean"),
+        "median": ("batched", "exact", "p2", "mean"),
         "frame_order": ("shuffled", "capture"),
         "shading": ("aimed", "uniform"),
         "specular": ("frames", "target"),

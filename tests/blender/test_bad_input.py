@@ -337,7 +337,7 @@ def test_a_disk_that_is_full_of_observations(recover, tmp_path, monkeypatch):
 
     monkeypatch.setattr(Exact, "HELD", 100)
     monkeypatch.setattr(Exact, "_flush", full)
-    code, err = recover()
+    code, err = recover("--median", "exact")
     assert code == 1 and "free some space" in err
     assert files(tmp_path / "out") == {"stages/surface.npz"}
     assert not list((tmp_path / "out").glob("tmp-*"))
