@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from . import instances, nerfstudio
-from .exr import read_exr, read_header
+from .exr import HALF_MAX, read_exr, read_header
 from .mesh_repair import repair
 from .model import Capture, Frame, Mesh, Pixels
 from .ply import read_ply
@@ -136,8 +136,9 @@ def read_pixels(frame: Frame) -> Pixels:
     rgb, alpha = read_exr(frame.path)
     if rgb.shape[:2] != shape:
         raise BadInputError(f"Frame '{frame.name}': '{frame.path}' changed its size during the run; start again.")
-    # A half float overflows to inf: the pixel was bright, but it gives no value at all, not even a bound.
-    saturated = (rgb >= frame.saturation).any(-1) | np.isposinf(rgb).any(-1)
+    # A half float overflows to inf: the pixel was bright, but it gives no value at all, not even a bound. Writers that
+    # hold what is brighter at a half's end give a bound.
+    saturated = ((rgb >= frame.saturation) | (rgb == HALF_MAX) | np.isposinf(rgb)).any(-1)
     seen = np.ones(shape, bool)
     if alpha is not None and (alpha > 0).any():  # some writers leave all of alpha at 0 and mean nothing by it
         seen &= alpha >= OPAQUE

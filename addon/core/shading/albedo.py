@@ -74,8 +74,11 @@ def fill(
     Parameters
     ----------
     error : (n,) float32, optional
-        Relative standard error of each quotient (`neighbourhood.doubt`); without it all count as equally good.
+        Relative standard error of each quotient (`neighbourhood.doubt`); without it all count as equally good. Where
+        it is inf, the quotient counts as not measured.
     """
+    if error is not None:
+        valid = valid & np.isfinite(error)
     result = np.clip(np.nan_to_num(rho), 0, MAX_ALBEDO)
     origin = np.where(valid, MEASURED, FILLED).astype(np.int8)
     reflecting = valid & ~np.isin(atlas.object_id, list(emitters))

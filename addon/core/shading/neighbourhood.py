@@ -34,14 +34,17 @@ DARK = 1e-3
 
 
 def doubt(lit: LitDiffuse) -> np.ndarray:
-    """Relative standard error of each element's L_d, from its observations: (n,) float32; inf where there are none."""
+    """Relative standard error of each element's L_d, from its observations: (n,) float32.
+
+    inf where there are none, or none but clipped ones: a lower bound may be off by any factor.
+    """
     middle = np.maximum(np.nan_to_num(lit.radiance).mean(1), 1e-12)
     spread = (np.nan_to_num(lit.upper) - np.nan_to_num(lit.lower)).mean(1) / 1.35 / middle
     n = np.maximum(lit.count, 1)
     # The median of n values of standard deviation s has the error 1.25 s / sqrt(n); few values hide their spread.
     error = np.hypot(1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, FEW)) / np.sqrt(n), LEAST_DOUBT)
-    error = np.where(lit.tier == CLEAN, error, error + EDGE_DOUBT * (1 + (lit.tier == SATURATED)))
-    return np.where(lit.seen, error, np.inf).astype(np.float32)
+    error = np.where(lit.tier == CLEAN, error, error + EDGE_DOUBT)
+    return np.where(lit.seen & (lit.tier != SATURATED), error, np.inf).astype(np.float32)
 
 
 def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
