@@ -20,6 +20,7 @@ from .progress import Progress
 from .report import make_report
 from .settings import Settings
 from .shading.albedo import Albedo, fill, quotient
+from .shading.clipped import shade_clipped
 from .shading.environment import Environment, EnvironmentAccumulator
 from .shading.field import LightField
 from .shading.lamps import Lamp
@@ -32,7 +33,7 @@ from .specular.samples import SampleCollector, Samples
 from .store import Store, key
 from .surface.build import Surface, build_surface, from_uv, turned
 
-CODE = 2
+CODE = 3
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -203,12 +204,15 @@ class Recovery:
         s = self.settings
 
         def compute():
-            found = shade(
-                surface.mesh, self.capture.instances, surface.atlas, surface.scene, lit, sky,
-                sampler=s.shading, rays=s.shading_rays, emitter_rays=s.emitter_rays, interpolate=s.interpolate,
-                threads=s.threads, seed=s.seed, progress=self.progress,
-                find_mirrors=self._find_mirrors if s.mirrors else None,
-            )  # fmt: skip
+            def shaded(known: LitDiffuse) -> Shading:
+                return shade(
+                    surface.mesh, self.capture.instances, surface.atlas, surface.scene, known, sky,
+                    sampler=s.shading, rays=s.shading_rays, emitter_rays=s.emitter_rays, interpolate=s.interpolate,
+                    threads=s.threads, seed=s.seed, progress=self.progress,
+                    find_mirrors=self._find_mirrors if s.mirrors else None,
+                )  # fmt: skip
+
+            found = shade_clipped(shaded, lit, surface.atlas)
             arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "doubt", "radiance")}
             arrays |= {"rho": found.albedo.rho, "origin": found.albedo.origin}
             arrays |= {"sky": found.environment.radiance, "sky_seen": found.environment.observations}
@@ -298,7 +302,8 @@ class Recovery:
             if m.model == METAL:
                 color[own] = m.f0
             elif m.model == SPECULAR:
-                color[own] = base_color(color[own], m.psi, m.phi)
+                # Above 1 the object would reflect more than all light, and a room of it would never grow dark.
+                color[own] = np.minimum(base_color(color[own], m.psi, m.phi), 1)
         return color
 
     def median_radiance(self) -> float:

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .lit_diffuse.visibility import SATURATED
+from .shading.albedo import MEASURED
+
 if TYPE_CHECKING:
     from .recover import Recovery
 
@@ -51,6 +54,10 @@ def _report_lit(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> 
         names = ", ".join(f"{i.class_name} ({i.object_id})" for i in unseen[:5])
         more = f" and {len(unseen) - 5} more" if len(unseen) > 5 else ""
         warnings.append(f"No frame sees {names}{more}; their materials are taken from their class or the room.")
+    clipped = float(atlas.area[lit.tier == SATURATED].sum() / area)
+    if clipped > 0:
+        figures["clipped_share"] = clipped
+        warnings.append(f"{clipped:.1%} of the surface is clipped in every frame that sees it; no albedo is had of it.")
     if not run.environment().seen:
         figures["outside"] = "no frame sees past the mesh"
 
@@ -72,7 +79,14 @@ def _report_shading(run: Recovery, figures: dict[str, Any], warnings: list[str])
             f"{shading.albedo.above_one:.0%} of the seen surface would need an albedo above 1: light is missing "
             "(an unseen lamp, a clipped one, or a hole that was no window)."
         )
-    if escaped > 0.02 and not run.environment().seen:
+    unlit = lit.seen & (shading.albedo.origin != MEASURED) & (lit.tier != SATURATED)
+    unlit &= ~np.isin(run.surface().atlas.object_id, [lamp.object_id for lamp in shading.lamps])
+    figures["unlit_share"] = float(unlit.sum() / max(lit.seen.sum(), 1))
+    if figures["unlit_share"] > 0.001:
+        warnings.append(
+            f"{figures['unlit_share']:.1%} of the seen surface gets too little light for an albedo; it was filled in."
+        )
+    if escaped > 0.02 and not run.environment().seen and not shading.environment.radiance.any():
         warnings.append(
             f"{escaped:.0%} of the rays leave the mesh, but no frame sees what lies there; it was taken as dark."
         )

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ..capture.model import Instance
-from .emitters import LUMINANCE, bright_triangles
+from .emitters import BRIGHT, LUMINANCE, bright_triangles
 from .environment import Environment
 from .field import LightField
 from .irradiance import direct, gather
@@ -25,6 +25,10 @@ MIN_GAIN = 0.03
 """A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share."""
 CLASS_AGREES = 0.25
 """If the solved luminance lies this near (relative) to a seen lamp of the same class, that lamp's radiance is taken."""
+MIN_SKY_GAIN = 0.1
+"""The same for a sky of which no frame saw anything: all albedos hang on it."""
+MIN_OPEN = 0.02
+"""Share of the received directions that must lead outside for such a sky to be looked for."""
 MIN_SKY = 0.01
 """Part of the received light below which a part of the sky can't be solved for; its neighbours' radiance stays."""
 SWEEPS = 2
@@ -102,6 +106,54 @@ def _pick(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:
     return np.sort(np.concatenate(chosen)) if chosen else np.zeros(0, np.int64)
 
 
+def _barely_seen(field: LightField, good: np.ndarray) -> np.ndarray:
+    """Elements of bright objects that have no good one, (n,) bool: a lamp may be smaller than a pixel.
+
+    What nobody saw is dark in `field`, so it is not among them.
+    """
+    luminance, atlas = field.radiance @ LUMINANCE, field.atlas
+    seen = (luminance > 0) & ~np.isin(atlas.object_id, atlas.object_id[good])
+    level = BRIGHT * float((luminance * atlas.area).sum() / max(atlas.area.sum(), 1e-30))
+    objects = np.unique(atlas.object_id[seen])
+    bright = [i for i in objects if np.median(luminance[seen & (atlas.object_id == i)]) > level]
+    return seen & np.isin(atlas.object_id, bright)
+
+
+def _with_whole_sky(field: LightField, normals, element: np.ndarray, seed: int) -> tuple[LightField, tuple[str, ...]]:
+    """Solve for one radiance of all the sky where rays leave the mesh but no frame looked there; says so in a note."""
+    if field.environment.seen:
+        return field, ()
+    everywhere = Environment.only(np.ones((1, 2), np.float32))
+    thrown = _irradiance(field.with_light(np.zeros_like(field.radiance), everywhere), normals, element, seed)[:, 0]
+    if thrown.mean() < MIN_OPEN * np.pi:
+        return field, ()
+    received = _irradiance(field, normals, element, seed)
+    object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
+    left = np.ones(len(element), bool)
+    for _ in range(SWEEPS):
+        sample = _Sample(element[left], object_id[left], sent[left], received[left])
+        found = sample.best(sent[left] @ LUMINANCE, received[left] @ LUMINANCE, thrown[left])
+        if found is None or found[2] > (1 - MIN_SKY_GAIN) * found[1]:
+            return field, ()
+        # Lamps show themselves once the rest is lit; their albedo says nothing of the sky.
+        lamps = find_seen(object_id, sent, received + found[0] * thrown[:, None])
+        left = ~np.isin(object_id, [lamp.object_id for lamp in lamps])
+        if left.sum() < 30:
+            return field, ()
+    radiance = np.full(3, found[0])
+    at = np.searchsorted(element, sample.element)
+    by_channel = [sample.best(sample.radiance[:, c], sample.received[:, c], thrown[at]) for c in range(3)]
+    if all(one is not None for one in by_channel):
+        radiance = np.array([one[0] for one in by_channel])
+    note = (
+        "Part of the light comes from a sky that no frame sees; it was solved from what it throws, as one radiance "
+        f"from all sides: {', '.join(f'{x:.3g}' for x in radiance)} "
+        f"(spread of log albedo {found[1]:.3f} to {found[2]:.3f})."
+    )
+    sky = Environment(np.broadcast_to(np.float32(radiance), (1, 2, 3)).copy(), np.zeros((1, 2), np.int32))
+    return field.with_light(field.radiance, sky), (note,)
+
+
 def _irradiance(field: LightField, normals: np.ndarray, element: np.ndarray, seed: int) -> np.ndarray:
     """E of a few elements by both estimators, (m, 3) float64."""
     bright = bright_triangles(field)
@@ -143,11 +195,11 @@ def find_light(
     unseen_objects : list of int
         Objects of which no frame saw anything.
     """
-    environment = field.environment
-    element = _pick(field, good, seed)
+    element = _pick(field, good | _barely_seen(field, good), seed)
     if not len(element):
-        return Light((), environment, ())
-    atlas = field.atlas
+        return Light((), field.environment, ())
+    field, found = _with_whole_sky(field, normals, element, seed)
+    environment, atlas = field.environment, field.atlas
     zones = environment.unseen_zones() if environment.seen else []
     known = environment
     for zone in zones:
@@ -162,7 +214,7 @@ def find_light(
     seen = find_seen(atlas.object_id[element], field.radiance[element], filled)
     lit = ~np.isin(atlas.object_id[element], [lamp.object_id for lamp in seen])
     if lit.sum() < 30:
-        return Light(tuple(seen), environment, ())
+        return Light(tuple(seen), environment, found)
     sent = field.radiance[element[lit]].astype(np.float64)
     sample = _Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit])
     thrown_sky = [G[lit] for G in thrown_sky]
@@ -187,7 +239,7 @@ def find_light(
         field.with_light(_lit_by(field, lamps), environment, [lamp.object_id for lamp in lamps]), normals, element, seed
     )
     sure = find_seen(atlas.object_id[element], field.radiance[element], everything)
-    return Light(tuple(sure) + tuple(lamps), environment, tuple(notes))
+    return Light(tuple(sure) + tuple(lamps), environment, found + tuple(notes))
 
 
 def _lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
@@ -222,21 +274,34 @@ def _solve_lamps(sample: _Sample, thrown, least, instances, seen, radiances, thr
         if not found:
             break
         object_id = min(found, key=lambda i: found[i][2])
-        lamps.append(_coloured(object_id, *found[object_id], class_of, seen, sample.received))
+        by_channel = [
+            sample.best(
+                sample.radiance[:, c], _all_light(base, lamps, thrown, radiances, thrown_sky)[:, c], left[object_id]
+            ) for c in range(3)
+        ]  # fmt: skip
+        lamps.append(_coloured(object_id, *found[object_id], class_of, seen, sample.received, by_channel))
         del left[object_id]
     return lamps
 
 
-def _coloured(object_id, s, before, after, class_of, seen, received) -> Lamp:
-    """Give a solved luminance its colour: a seen lamp's of the same class if they agree, else that of the light."""
+def _coloured(object_id, s, before, after, class_of, seen, received, by_channel) -> Lamp:
+    """Give a solved luminance its colour.
+
+    A seen lamp's of the same class if they agree; else what each channel says by itself, if together they make that
+    luminance; else that of the lamps, or of the light.
+    """
     how = f"No frame sees it; solved from the light it throws (spread of log albedo {before:.3f} to {after:.3f})"
     alike = [lamp for lamp in seen if class_of.get(lamp.object_id) == class_of.get(object_id)]
     for lamp in alike:
         if abs(s / float(lamp.radiance @ LUMINANCE) - 1) < CLASS_AGREES:
             note = f"{how}: {s:.3g}, near the seen lamp {lamp.object_id} of its class, whose radiance it takes."
-            return Lamp(object_id, lamp.radiance, False, note)
+            return Lamp(int(object_id), lamp.radiance, False, note)
+    if not alike and all(found is not None for found in by_channel):
+        colour = np.float32([found[0] for found in by_channel])
+        if abs(float(colour @ LUMINANCE) / s - 1) < CLASS_AGREES:
+            return Lamp(int(object_id), colour, False, how + ".")
     white = np.mean([lamp.radiance for lamp in alike or seen], 0) if seen else received.mean(0)
-    return Lamp(object_id, (s * white / max(float(white @ LUMINANCE), 1e-12)).astype(np.float32), False, how + ".")
+    return Lamp(int(object_id), (s * white / max(float(white @ LUMINANCE), 1e-12)).astype(np.float32), False, how + ".")
 
 
 def _solve_sky(sample: _Sample, lamps, thrown, radiances, guess, thrown_sky, base) -> list[str]:
