@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +22,8 @@ CLEAN, EDGE, SATURATED = 0, 1, 2
 """Tiers of an observation. CLEAN: the pixel and its eight neighbours show one surface. EDGE: the pixel's centre shows
 the element's object, but a neighbour shows something else, which a filter or a slightly wrong pose mixes in.
 SATURATED: the sensor clipped; a lower bound."""
+NOTHING = -2
+"""No object's id, and not that of a ray that escapes."""
 
 
 @dataclass(frozen=True)
@@ -68,14 +72,29 @@ class Observations:
     direction: np.ndarray
 
 
-def _neighbours(image: np.ndarray):
-    """The image's eight one-pixel shifts, borders repeated, with their offset (dy, dx)."""
-    padded = np.pad(image, ((1, 1), (1, 1)) + ((0, 0),) * (image.ndim - 2), mode="edge")
-    height, width = image.shape[:2]
+def _shifts(height: int, width: int) -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
+    """For each of the eight neighbours, the pixels that have one there, and where it lies."""
     for dy in (-1, 0, 1):
         for dx in (-1, 0, 1):
             if dy or dx:
-                yield padded[1 + dy : 1 + dy + height, 1 + dx : 1 + dx + width]
+                own, other = zip(*((slice(max(-d, 0), n - max(d, 0)), slice(max(d, 0), n - max(-d, 0)))
+                                   for d, n in ((dy, height), (dx, width))))  # fmt: skip
+                yield own, other
+
+
+def _dot(planes: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Sum over the first axis of `planes` ((3, ...)) times `vector` ((3,) numbers, or planes)."""
+    # Planes one by one: NumPy's sums over an axis of three take five to ten times as long.
+    return planes[0] * vector[0] + planes[1] * vector[1] + planes[2] * vector[2]
+
+
+@functools.lru_cache(maxsize=8)
+def _local_directions(width: int, height: int, fx: float, fy: float, cx: float, cy: float) -> np.ndarray:
+    """Unit directions through all pixels' centres in the camera's axes, (3, height * width) float64."""
+    x = np.broadcast_to((np.arange(width) + 0.5 - cx) / fx, (height, width))
+    y = np.broadcast_to(((cy - np.arange(height) - 0.5) / fy)[:, None], (height, width))
+    local = np.stack([x, y, np.full((height, width), -1.0)]).reshape(3, -1)
+    return local / np.sqrt(_dot(local, local))
 
 
 def view_frame(camera: Camera, mesh: Mesh, scene: RayScene, triangle_normal: np.ndarray) -> FrameView:
@@ -86,41 +105,60 @@ def view_frame(camera: Camera, mesh: Mesh, scene: RayScene, triangle_normal: np.
     triangle_normal : (t, 3) float32
     """
     height, width = camera.height, camera.width
-    directions = camera.directions(camera.pixel_centres())
-    origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
-    hits = scene.intersect(origins, directions)
+    local = _local_directions(width, height, camera.fx, camera.fy, camera.cx, camera.cy)
+    rays = np.stack([_dot(local, row) for row in camera.camera_to_world[:3, :3].tolist()]).astype(np.float32)
+    directions = np.ascontiguousarray(rays.T)
+    hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
     hit = hits.triangle >= 0
     object_id = np.where(hit, mesh.object_id[hits.triangle], -1).reshape(height, width).astype(np.int32)
     # The plane through the hit, seen from the centre: distance along d is offset / (n.d).
-    normal = np.where(hit[:, None], triangle_normal[hits.triangle], -directions)
+    normal = np.where(hit, triangle_normal.take(hits.triangle, 0).T, -rays)
     distance = np.where(hit, hits.distance, np.float32(0))
-    offset = (distance * (normal * directions).sum(1)).reshape(height, width)
-    distance, normal = distance.reshape(height, width), normal.reshape(height, width, 3)
+    offset = (distance * _dot(normal, rays)).reshape(height, width)
+    tolerance = (DEPTH_TOLERANCE * np.maximum(distance, 1e-6)).reshape(height, width)
+    distance = distance.reshape(height, width)
+    normal, rays = normal.reshape(3, height, width), rays.reshape(3, height, width)
     clean = np.ones((height, width), bool)
-    rays = directions.reshape(height, width, 3)
-    for other_id, other_distance, other_ray in zip(
-        _neighbours(object_id), _neighbours(distance), _neighbours(rays), strict=True
-    ):
-        along = (normal * other_ray).sum(-1)
+    for own, other in _shifts(height, width):
+        along = _dot(normal[:, own[0], own[1]], rays[:, other[0], other[1]])
         # cross-multiplied, so that grazing planes divide by nothing
-        off_plane = np.abs(other_distance * along - offset)
-        clean &= (other_id == object_id) & (off_plane <= DEPTH_TOLERANCE * np.maximum(distance, 1e-6))
+        along *= distance[other]
+        along -= offset[own]
+        clean[own] &= (np.abs(along, out=along) <= tolerance[own]) & (object_id[other] == object_id[own])
     return FrameView(camera, hits.triangle.reshape(height, width), distance, object_id, clean)
 
 
-def _bilinear(image: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """Sample (h, w, 3) at (m, 2) pixel positions whose four neighbours all lie inside."""
-    x, y = pixels[:, 0] - 0.5, pixels[:, 1] - 0.5
+def _bilinear(image: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Sample (h, w, 3) at m pixel positions, (m,) each; at a pixel's centre that is the pixel alone: (m, 3) float32."""
     height, width = image.shape[:2]
-    x0 = np.clip(np.floor(x).astype(np.int32), 0, width - 2)
-    y0 = np.clip(np.floor(y).astype(np.int32), 0, height - 2)
-    a = np.clip(x - x0, 0, 1)[:, None].astype(np.float32)
-    b = np.clip(y - y0, 0, 1)[:, None].astype(np.float32)
-    flat = image.reshape(-1, image.shape[2])
+    x, y = x - np.float32(0.5), y - np.float32(0.5)
+    x0 = np.clip(x.astype(np.int32), 0, width - 2)  # towards zero: what lies outside is clipped all the same
+    y0 = np.clip(y.astype(np.int32), 0, height - 2)
+    a, b = np.clip(x - x0, 0, 1).astype(np.float32), np.clip(y - y0, 0, 1).astype(np.float32)
     at = y0 * width + x0
-    top = flat.take(at, 0) * (1 - a) + flat.take(at + 1, 0) * a
-    bottom = flat.take(at + width, 0) * (1 - a) + flat.take(at + width + 1, 0) * a
-    return top * (1 - b) + bottom * b
+    beside, below, across = at + 1, at + width, at + (width + 1)
+    not_a, not_b = 1 - a, 1 - b
+    result = np.empty((len(x), 3), np.float32)
+    for channel, plane in enumerate(np.ascontiguousarray(image.reshape(-1, 3).T)):
+        top = plane.take(at) * not_a
+        top += plane.take(beside) * a
+        bottom = plane.take(below) * not_a
+        bottom += plane.take(across) * a
+        top *= not_b
+        bottom *= b
+        np.add(top, bottom, out=result[:, channel])
+    return result
+
+
+def _tiers(view: FrameView, pixels: Pixels) -> np.ndarray:
+    """The tier of what each pixel shows, (height * width,) int8."""
+    # A bilinear sample needs four good pixels, which only a clean neighbourhood grants; else the one pixel counts.
+    usable = pixels.valid & ~pixels.saturated
+    around = usable.copy()
+    for own, other in _shifts(*usable.shape):
+        around[own] &= usable[other]
+    tier = np.where(view.clean & around, CLEAN, np.where(pixels.saturated, SATURATED, EDGE))
+    return tier.astype(np.int8).ravel()
 
 
 def observe(
@@ -138,43 +176,43 @@ def observe(
     """
     camera = view.camera
     centre = camera.centre.astype(np.float32)
-    index = np.arange(len(atlas), dtype=np.int32) if elements is None else elements.astype(np.int32)
-    position = atlas.position if elements is None else atlas.position.take(index, 0)
-    normal = atlas.normal if elements is None else atlas.normal.take(index, 0)
+    index = np.arange(len(atlas), dtype=np.int32) if elements is None else elements.astype(np.int32, copy=False)
 
-    # Cheapest tests first: the side that faces the camera, then the frustum, then what the pixel shows.
-    at = np.flatnonzero(np.einsum("ij,ij->i", centre - position, normal) > 0)
-    xy, depth = camera.project(position.take(at, 0))
+    # Cheapest tests first: the frustum, then what the pixel shows, then the angle; rays last.
+    away = np.empty((3, len(index)), np.float32)
+    np.subtract(atlas.position.take(index, 0).T, centre[:, None], out=away)
+    right, up, back = camera.camera_to_world[:3, :3].T.tolist()
+    depth = -_dot(away, back)
+    inverse = 1 / np.maximum(depth, np.float32(1e-12))
+    x = float(camera.fx) * (_dot(away, right) * inverse) + float(camera.cx)
+    y = float(camera.cy) - float(camera.fy) * (_dot(away, up) * inverse)
     margin = 0.5
-    inside = np.flatnonzero(
-        (depth > 0)
-        & (xy[:, 0] >= margin) & (xy[:, 0] < camera.width - margin)
-        & (xy[:, 1] >= margin) & (xy[:, 1] < camera.height - margin)
-    )  # fmt: skip
-    at, xy = at[inside], xy.take(inside, 0)
-    pixel = xy[:, 1].astype(np.int32) * camera.width + xy[:, 0].astype(np.int32)
-    shows = (view.object_id.ravel()[pixel] == atlas.object_id[index[at]]) & pixels.valid.ravel()[pixel]
-    keep = np.flatnonzero(shows)
-    at, xy, pixel = at[keep], xy.take(keep, 0), pixel[keep]
-    position, normal = position.take(at, 0), normal.take(at, 0)
-    to_camera = centre - position
-    distance = np.linalg.norm(to_camera, axis=1)
-    direction = to_camera / np.maximum(distance, 1e-12)[:, None]
-    keep = np.flatnonzero(np.einsum("ij,ij->i", direction, normal) >= MIN_COSINE)
-    origins = scene.off_surface(position.take(keep, 0), normal.take(keep, 0))
-    direction = direction.take(keep, 0)
-    free = np.flatnonzero(~scene.occluded(origins, direction, distance[keep] - 2 * scene.offset))
-    keep, direction = keep[free], direction.take(free, 0)
-    index, xy, pixel = index[at[keep]], xy.take(keep, 0), pixel[keep]
+    inside = depth > 0
+    for position, extent in ((x, camera.width), (y, camera.height)):
+        inside &= (position >= margin) & (position < extent - margin)
+    at = np.flatnonzero(inside)
+    x, y = x.take(at), y.take(at)
+    pixel = y.astype(np.int32) * camera.width + x.astype(np.int32)
+    shown = np.where(pixels.valid, view.object_id, NOTHING).ravel()
+    keep = np.flatnonzero(shown.take(pixel) == atlas.object_id.take(index.take(at)))
+    at = at.take(keep)
+    away = np.stack([plane.take(at) for plane in away])
+    distance = np.sqrt(_dot(away, away))
+    direction = away / -np.maximum(distance, np.float32(1e-12))
+    normal = atlas.normal.take(index.take(at), 0)
+    angle = np.flatnonzero(_dot(direction, normal.T) >= MIN_COSINE)
+    at, keep, normal = at.take(angle), keep.take(angle), normal.take(angle, 0)
+    index = index.take(at)
+    to_camera = np.empty((len(at), 3), np.float32)
+    for i in range(3):
+        to_camera[:, i] = direction[i].take(angle)
+    origins = scene.off_surface(atlas.position.take(index, 0), normal)
+    reach = distance.take(angle) - np.float32(2 * scene.offset)
+    free = np.flatnonzero(~scene.occluded(origins, to_camera, reach))
+    index, to_camera, keep = index.take(free), to_camera.take(free, 0), keep.take(free)
 
-    # A bilinear sample needs four good pixels, which only a clean neighbourhood grants; else the one pixel counts.
-    usable = pixels.valid & ~pixels.saturated
-    around = usable.copy()
-    for other in _neighbours(usable):
-        around &= other
-    clean = (view.clean & around).ravel()[pixel]
-    radiance = pixels.radiance.reshape(-1, 3).take(pixel, 0)
-    smooth = np.flatnonzero(clean)
-    radiance[smooth] = _bilinear(pixels.radiance, xy.take(smooth, 0))
-    tier = np.where(clean, CLEAN, np.where(pixels.saturated.ravel()[pixel], SATURATED, EDGE)).astype(np.int8)
-    return Observations(index, radiance, tier, direction)
+    x, y, pixel = x.take(keep), y.take(keep), pixel.take(keep)
+    tier = _tiers(view, pixels).take(pixel)
+    mixed = np.flatnonzero(tier != CLEAN)
+    x[mixed], y[mixed] = np.floor(x[mixed]) + np.float32(0.5), np.floor(y[mixed]) + np.float32(0.5)
+    return Observations(index, _bilinear(pixels.radiance, x, y), tier, to_camera)
