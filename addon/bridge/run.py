@@ -92,7 +92,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
             progress.update(0.5)
             surface, materials = recovery.surface(), recovery.materials()
             # The file gets the mesh whose normals face the frames: its lamps shine on that side.
-            facing = replace(capture, mesh=surface.mesh)
+            facing = replace(capture, mesh=replace(surface.mesh, vertices=capture.mesh.vertices))
             warnings = write_scene(store.path("scene.blend"), facing, surface.atlas.uv, materials, store.folder,
                                    recovery.median_radiance(), fresh=scene is None, facing=True)
             if scene is not None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from .capture.model import Capture, Frame, Mesh, Pixels
 from .capture.read import MAX_BAD_SHARE, fingerprint, read_pixels
+from .capture.recentre import near_origin
 from .errors import BadInputError
 from .lit_diffuse.accumulate import LitDiffuse, accumulate
 from .material import METAL, SPECULAR, ObjectMaterial
@@ -33,7 +34,7 @@ from .specular.samples import SampleCollector, Samples
 from .store import Store, key
 from .surface.build import Surface, build_surface, from_uv, turned
 
-CODE = 3
+CODE = 4
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -68,6 +69,7 @@ class Recovery:
         unwrap: Callable[[Mesh, int], np.ndarray],
     ):
         self.capture, self.store, self.settings, self.progress = capture, store, settings, progress
+        self._near = near_origin(capture)
         self._unwrap = unwrap
         self.done: dict[str, Any] = {}
         self.log: dict[str, dict[str, Any]] = {}
@@ -110,8 +112,8 @@ class Recovery:
         return value
 
     def surface(self) -> Surface:
-        """Surface elements over the room."""
-        capture = self.capture
+        """Surface elements over the room; around the origin where the room lies far from it."""
+        capture = self._near
 
         def compute():
             found = build_surface(
@@ -122,13 +124,13 @@ class Recovery:
                 self.settings.atlas_size,
             )
             sign = np.where((found.mesh.triangles == capture.mesh.triangles).all(1), 1, -1).astype(np.int8)
-            return found, {"uv": found.uv, "sign": sign}, {"size": found.atlas.size}
+            return found, {"uv": found.uv, "sign": sign, "both": found.both_sides}, {"size": found.atlas.size}
 
         def load(arrays, meta):
             mesh, sign = capture.mesh, arrays["sign"]
             uv = None if mesh.uv is None else turned(mesh.uv, sign)
             facing = dataclasses.replace(mesh, triangles=turned(mesh.triangles, sign), uv=uv)
-            return from_uv(mesh, facing, sign, arrays["uv"], int(meta["size"]))
+            return from_uv(mesh, facing, sign, arrays["uv"], int(meta["size"]), arrays["both"])
 
         return self._stage("surface", load, compute)
 
@@ -151,7 +153,7 @@ class Recovery:
     def _accumulated(self) -> tuple[LitDiffuse, Environment, Samples]:
         """What the one pass over all frames gives."""
         surface = self.surface()
-        frames = self.capture.frames
+        frames = self._near.frames
 
         def compute():
             sky = EnvironmentAccumulator(float(np.median([1 / f.camera.fx for f in frames])))

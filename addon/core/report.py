@@ -9,6 +9,7 @@ import numpy as np
 
 from .lit_diffuse.visibility import SATURATED
 from .shading.albedo import MEASURED
+from .surface.elements import triangle_geometry
 
 if TYPE_CHECKING:
     from .recover import Recovery
@@ -27,6 +28,7 @@ def make_report(run: Recovery) -> dict[str, Any]:
         surface = run.surface()
         figures |= {"atlas_size": surface.atlas.size, "elements": len(surface.atlas)}
         figures["texel_metres"] = surface.texel_size
+        _report_surface(run, figures, result["warnings"])
     if "lit_diffuse" in run.done:
         _report_lit(run, figures, result["warnings"])
     if "shading" in run.done:
@@ -36,6 +38,21 @@ def make_report(run: Recovery) -> dict[str, Any]:
         figures["models"] = {model: models.count(model) for model in sorted(set(models))}
     result["figures"] = figures
     return result
+
+
+def _report_surface(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:
+    surface = run.surface()
+    _, area = triangle_geometry(surface.mesh)
+    share = float(area[surface.both_sides].sum() / area.sum())
+    figures["both_sides_share"] = share
+    if share > 0.01:
+        objects, count = np.unique(surface.mesh.object_id[surface.both_sides], return_counts=True)
+        class_of = {i.object_id: i.class_name for i in run.capture.instances}
+        names = ", ".join(f"{class_of[i]} ({i})" for i in objects[np.argsort(-count, kind="stable")][:5].tolist())
+        warnings.append(
+            f"{share:.1%} of the surface is a sheet that frames see from both sides ({names}): it has the light of one "
+            "side, and throws that to both; give it two faces, a little apart."
+        )
 
 
 def _report_lit(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:

@@ -11,7 +11,7 @@ from ..capture.model import Camera, Mesh
 from ..errors import BadInputError
 from .atlas import Atlas
 from .elements import make_atlas, triangle_geometry, uv_scale
-from .orientation import seen_sides
+from .orientation import Sides, seen_sides
 from .rays import RayScene
 
 TEXELS_A_PIXEL = 1.0
@@ -35,6 +35,8 @@ class Surface:
         The atlas coordinates in the corner order of the capture's own mesh.
     texel_size : float
         Edge of a surface element in metres.
+    both_sides : (t,) bool
+        Triangles that frames see from either side, of which the elements stand for one.
     """
 
     mesh: Mesh
@@ -42,6 +44,7 @@ class Surface:
     scene: RayScene
     uv: np.ndarray
     texel_size: float
+    both_sides: np.ndarray
 
 
 def turned(corners: np.ndarray, sign: np.ndarray) -> np.ndarray:
@@ -51,12 +54,12 @@ def turned(corners: np.ndarray, sign: np.ndarray) -> np.ndarray:
     return result
 
 
-def oriented(mesh: Mesh, cameras: Sequence[Camera]) -> tuple[Mesh, np.ndarray, float]:
-    """The mesh with normals towards the cameras, the sign of each triangle, and the frames' footprint in metres."""
+def oriented(mesh: Mesh, cameras: Sequence[Camera]) -> tuple[Mesh, Sides]:
+    """The mesh with normals towards the cameras, and what these see of each triangle."""
     normal, _ = triangle_geometry(mesh)
-    sign, footprint = seen_sides(mesh, normal, RayScene(mesh.vertices, mesh.triangles), cameras)
-    uv = None if mesh.uv is None else turned(mesh.uv, sign)
-    return replace(mesh, triangles=turned(mesh.triangles, sign), uv=uv), sign, footprint
+    sides = seen_sides(mesh, normal, RayScene(mesh.vertices, mesh.triangles), cameras)
+    uv = None if mesh.uv is None else turned(mesh.uv, sides.sign)
+    return replace(mesh, triangles=turned(mesh.triangles, sides.sign), uv=uv), sides
 
 
 def atlas_size(area: float, texel: float, largest: int) -> int:
@@ -88,23 +91,26 @@ def build_surface(
     BadInputError
         No camera looks at the mesh.
     """
-    facing, sign, footprint = oriented(mesh, cameras)
-    if footprint <= 0:
+    facing, sides = oriented(mesh, cameras)
+    if sides.footprint <= 0:
         raise BadInputError(
             "No camera of the capture looks at the mesh; check that transforms.json and mesh.ply share one frame."
         )
     _, area = triangle_geometry(mesh)
-    texel = texel_size or footprint / TEXELS_A_PIXEL
+    texel = texel_size or sides.footprint / TEXELS_A_PIXEL
     size = atlas_size(float(area.sum()), texel, largest)
     uv = unwrap(mesh, size)
     # The islands' true scale sets the size that makes a texel as large as wished.
     scale = uv_scale(mesh, uv)
     size = int(np.clip(np.ceil(1 / max(texel * scale, 1e-12) / STEP) * STEP, SMALLEST, largest // STEP * STEP))
-    return from_uv(mesh, facing, sign, uv, size)
+    return from_uv(mesh, facing, sides.sign, uv, size, sides.both)
 
 
-def from_uv(mesh: Mesh, facing: Mesh, sign: np.ndarray, uv: np.ndarray, size: int) -> Surface:
+def from_uv(
+    mesh: Mesh, facing: Mesh, sign: np.ndarray, uv: np.ndarray, size: int, both_sides: np.ndarray
+) -> Surface:
     """The surface for a known layout."""
     atlas = make_atlas(facing, turned(uv, sign), size)
     scale = uv_scale(mesh, uv)
-    return Surface(facing, atlas, RayScene(facing.vertices, facing.triangles), uv, 1 / max(scale * size, 1e-12))
+    scene = RayScene(facing.vertices, facing.triangles)
+    return Surface(facing, atlas, scene, uv, 1 / max(scale * size, 1e-12), both_sides)

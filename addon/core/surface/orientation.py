@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,9 +12,29 @@ from .rays import RayScene
 
 PIXEL_STEP = 4
 """Every fourth pixel in x and y votes."""
+LEAST_SHARE, LEAST_VOTES = 0.1, 4
+"""A triangle is seen from both sides if this share of its votes, and so many, are for the other one."""
 
 
-def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequence[Camera]) -> tuple[np.ndarray, float]:
+class Sides(NamedTuple):
+    """Which sides of the t triangles the frames see.
+
+    Attributes
+    ----------
+    sign : (t,) float32
+        +1 keep the winding, -1 turn it.
+    footprint : float
+        Edge in metres of the surface that a pixel covers: the lower quartile over all rays that hit.
+    both : (t,) bool
+        Triangles that are seen from either side: they can carry one side's light only.
+    """
+
+    sign: np.ndarray
+    footprint: float
+    both: np.ndarray
+
+
+def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequence[Camera]) -> Sides:
     """Turn normals towards the cameras that see them.
 
     Triangles that no ray meets follow the majority of their object.
@@ -22,15 +43,9 @@ def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequenc
     ----------
     normal : (t, 3) float32
         By the winding.
-
-    Returns
-    -------
-    (t,) float32
-        +1 keep, -1 turn.
-    footprint : float
-        Edge in metres of the surface that a pixel covers: the lower quartile over all rays that hit.
     """
     votes = np.zeros(len(mesh.triangles))
+    sides = np.zeros((2, len(votes)), np.int64)  # rays that met the front, and the back
     footprints = []
     for camera in cameras:
         y, x = np.mgrid[PIXEL_STEP // 2 : camera.height : PIXEL_STEP, PIXEL_STEP // 2 : camera.width : PIXEL_STEP]
@@ -40,9 +55,12 @@ def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequenc
         triangle = hits.triangle[hit]
         cosine = -np.einsum("ij,ij->i", directions[hit], normal[triangle])
         votes += np.bincount(triangle, weights=cosine, minlength=len(votes))
+        for side, met in zip(sides, (cosine > 0, cosine < 0), strict=True):
+            side += np.bincount(triangle[met], minlength=len(votes))
         footprints.append(hits.distance[hit] / np.float32(np.sqrt(camera.fx * camera.fy)))
     by_object = np.bincount(mesh.object_id, weights=np.sign(votes), minlength=int(mesh.object_id.max()) + 1)
     sign = np.where(votes != 0, np.sign(votes), np.where(by_object[mesh.object_id] < 0, -1.0, 1.0))
     together = np.concatenate(footprints) if footprints else np.zeros(0, np.float32)
     footprint = float(np.percentile(together, 25)) if len(together) else 0.0
-    return sign.astype(np.float32), footprint
+    both = sides.min(0) >= np.maximum(LEAST_SHARE * sides.sum(0), LEAST_VOTES)
+    return Sides(sign.astype(np.float32), footprint, both)
