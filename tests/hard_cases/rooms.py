@@ -59,6 +59,11 @@ def lamp_light(room: Room, albedo=GREY, lamp=(10, 9, 8)) -> np.ndarray:
     return radiosity(room, albedo, {6: lamp})
 
 
+def lit_by(room, quads, albedo, emission) -> np.ndarray:
+    """Radiance of a room's elements where `quads` are all that gives and reflects light; nonsense on others."""
+    return radiosity(replace(room, quads=tuple(quads)), albedo, emission)
+
+
 class Captured:
     """A capture folder with the pictures of a room.
 

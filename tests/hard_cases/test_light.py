@@ -9,7 +9,7 @@ import pytest
 
 from addon.core.material import EMITTER
 from addon.core.shading.albedo import MEASURED
-from tests.core.rooms import all_round, box_sides, lit_box, look_at, make_room, polygon_irradiance, quad, radiosity
+from tests.core.rooms import all_round, box_sides, lit_box, look_at, make_room, polygon_irradiance, quad
 from tests.hard_cases.rooms import (
     DEFAULT,
     GREY,
@@ -22,14 +22,10 @@ from tests.hard_cases.rooms import (
     closed_room,
     lamp_light,
     lamp_room,
+    lit_by,
 )
 
 WAYS = pytest.mark.parametrize("settings", [QUICK, PAPERS], ids=["default", "paper"])
-
-
-def lit_by(room, quads, albedo, emission) -> np.ndarray:
-    """Radiance of a room's elements where `quads` are all that gives and reflects light; nonsense on others."""
-    return radiosity(replace(room, quads=tuple(quads)), albedo, emission)
 
 
 def block(low, high, object_id: int) -> list:
