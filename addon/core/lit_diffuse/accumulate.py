@@ -127,8 +127,8 @@ def accumulate(
             stack.callback(estimator.close)
         for done, (index, view, pixels, seen) in enumerate(ordered_map(look, wanted, threads)):
             for tier, estimator in estimators.items():
-                chosen = seen.tier == tier
-                estimator.add(seen.element[chosen], seen.radiance[chosen])
+                chosen = np.flatnonzero(seen.tier == tier)
+                estimator.add(seen.element.take(chosen), seen.radiance.take(chosen, 0))
             if also is not None:
                 also(index, view, pixels, seen)
             if progress is not None:

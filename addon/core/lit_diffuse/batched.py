@@ -13,6 +13,7 @@ is lost then the benchmark `medians` shows.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 
 import numpy as np
 
@@ -24,7 +25,8 @@ SLOTS, KNOTS = 20, 12
 BATCH = SLOTS - KNOTS
 SLOT_BITS = 5
 AT_ONCE = 1 << 14
-"""Elements summarised at once: their places fit the processor's cache."""
+RENEWED_AT_ONCE = 1 << 11
+"""Elements summarised, and such whose knots are taken, at once: their places fit the processor's cache."""
 
 
 @functools.cache
@@ -42,14 +44,28 @@ def knot_ranks(count: int) -> np.ndarray:
 
 
 @functools.cache
-def _shares(count: int, batch: int) -> tuple[np.ndarray, np.ndarray]:
-    """Ranks that each place covers in all, and those below its value: knots of `count`, and `batch` more observations.
+def _shares(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Ranks that each place covers in all, and those below its value, with `count` observations: (SLOTS,) each.
 
     A knot covers half of the gap on either side, an observation covers one rank.
     """
-    half = np.concatenate([[0.5], np.diff(knot_ranks(count)) / 2, [0.5]])
-    ones = np.ones(batch)
-    return np.concatenate([half[:-1] + half[1:], ones]), np.concatenate([half[:-1], ones / 2])
+    cover, below = np.ones(SLOTS), np.full(SLOTS, 0.5)
+    if count > SLOTS:
+        half = np.concatenate([[0.5], np.diff(knot_ranks(count - _fresh(count))) / 2, [0.5]])
+        cover[:KNOTS], below[:KNOTS] = half[:-1] + half[1:], half[:-1]
+    return cover, below
+
+
+def _fresh(count):
+    """Observations beside the knots once there are `count` > SLOTS of them: 1 to BATCH."""
+    return (count - SLOTS - 1) % BATCH + 1
+
+
+@functools.cache
+def _places(most: int) -> np.ndarray:
+    """The place that the next observation takes, for each count up to `most`: (most + 1,) int64."""
+    count = np.arange(most + 1)
+    return np.where(count < SLOTS, count, KNOTS + (count - SLOTS) % BATCH)
 
 
 class Batched:
@@ -65,44 +81,54 @@ class Batched:
 
     def add(self, element: np.ndarray, values: np.ndarray) -> None:
         n = self._n.take(element)
-        slot = n
-        if n.max(initial=0) >= SLOTS:
-            beyond = (n - SLOTS) % BATCH
-            due = (n >= SLOTS) & (beyond == 0)
-            self._renew(element[due], n[due])
-            slot = np.where(n < SLOTS, n, KNOTS + beyond)
-        at = slot * np.int64(len(self._n))
+        most = int(n.max(initial=0))
+        at = _places(most).take(n)
+        if most >= SLOTS:
+            due = np.flatnonzero((at == KNOTS) & (n >= SLOTS))
+            self._renew(element.take(due), n.take(due))
+        at *= len(self._n)
         at += element
         # Three floats as one item: a third of the time of three columns.
         self._held.reshape(-1).view("V12")[at] = np.ascontiguousarray(values, np.float32).reshape(-1).view("V12")
-        self._n[element] = n + 1
+        n += 1
+        self._n[element] = n
 
     def _renew(self, element: np.ndarray, n: np.ndarray) -> None:
         """Take the knots of elements whose places are full; n: (m,) their counts."""
-        for count in np.unique(n):
-            alike = element[n == count]
-            keys, ranks = self._sorted(alike, int(count), SLOTS)
-            knots = np.rint(_at_ranks(ranks, keys, knot_ranks(int(count)))).astype(np.int32).view(np.float32)
-            self._held[:KNOTS, alike] = knots.reshape(len(alike), 3, KNOTS).transpose(2, 0, 1)
+        for block in blocks(len(element), RENEWED_AT_ONCE):
+            some, counts = element[block], n[block]
+            keys, ranks = self._sorted(some, counts)
+            knots = np.rint(_at_ranks(ranks, keys, _by_count(knot_ranks, counts))).astype(np.int32)
+            knots = np.ascontiguousarray(knots.reshape(len(some), 3, KNOTS).transpose(2, 0, 1)).view("V12")[..., 0]
+            self._held.view("V12")[:KNOTS, some, 0] = knots
 
-    def _sorted(self, element: np.ndarray, count: int, used: int) -> tuple[np.ndarray, np.ndarray]:
-        """Sorted keys and their ranks, (3 m, used) float64 each, of elements with `count` observations.
+    def _sorted(self, element: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Sorted keys and their ranks, (3 m, SLOTS) float64 each, of m elements with `n` >= SLOTS observations.
 
         A key is a float's bits: for numbers from 0 on they have the numbers' order, and a straight line between two
-        of them is nearly a straight line between the logarithms, which six decades ask for.
+        of them is nearly a straight line between the logarithms, which six decades ask for. Free places come last.
         """
-        held = self._held[:used, element].transpose(1, 2, 0).reshape(-1, used)
-        keys = np.maximum(np.ascontiguousarray(held).view(np.int32), 0).astype(np.int64)  # -0.0 becomes 0.0
+        held = self._held.view("V12")[..., 0].take(element, 1).view(np.float32).reshape(SLOTS, len(element), 3)
+        keys = held.view(np.int32).transpose(1, 2, 0).astype(np.int64)
+        np.maximum(keys, 0, out=keys)  # -0.0 becomes 0.0
+        free = np.arange(SLOTS) >= np.where(n > SLOTS, KNOTS + _fresh(n), SLOTS)[:, None]
+        if free.any():
+            np.copyto(keys, np.iinfo(np.int32).max, where=free[:, None])
         # The place rides along in the low bits: one sort instead of an argsort and two gathers.
-        keys = np.sort(keys << SLOT_BITS | np.arange(used), axis=1)
+        keys <<= SLOT_BITS
+        keys |= np.arange(SLOTS)
+        keys = keys.reshape(-1, SLOTS)
+        keys.sort(axis=1)
         place = keys & ((1 << SLOT_BITS) - 1)
-        if count > SLOTS:
-            cover, below = _shares(count - (used - KNOTS), used - KNOTS)
-            ranks = np.cumsum(cover[place], axis=1)
-            ranks += (below - cover)[place] - 0.5
-        else:  # all are observations still
-            ranks = np.broadcast_to(np.arange(used, dtype=np.float64), keys.shape)
-        return (keys >> SLOT_BITS).astype(np.float64), ranks
+        place += (np.repeat(np.arange(len(n)), 3) * SLOTS)[:, None]
+        cover = _by_count(lambda count: _shares(count)[0], n).take(place)
+        below = _by_count(lambda count: _shares(count)[1], n).take(place)
+        ranks = np.cumsum(cover, axis=1)
+        ranks -= cover
+        ranks += below
+        ranks -= 0.5
+        keys >>= SLOT_BITS
+        return keys.astype(np.float64), ranks
 
     def _summarise(self, block: slice) -> np.ndarray:
         """Quartiles of a block of elements, (quartile, k, 3) float32."""
@@ -110,26 +136,28 @@ class Batched:
         result = np.full((len(QUARTILES), len(n), 3), np.nan, np.float32)
         if not n.any():
             return result
-        most = min(int(n.max()), SLOTS)
         few = np.flatnonzero((n > 0) & (n <= SLOTS))
-        planes = np.where(np.arange(most)[:, None, None] < n[:, None], self._held[:most, block], np.float32(np.inf))
-        sort_planes(planes.reshape(most, -1))
+        most = int(n.take(few).max(initial=0))
+        planes = self._held[:most, block].copy()
+        for place, plane in enumerate(planes.view("V12")[..., 0]):
+            plane[n <= place] = np.full(3, np.inf, np.float32).view("V12")[0]
+        sort_planes(planes.reshape(most, 3 * len(n)))
         rows = planes.reshape(-1, 3)
         for quartile, share in zip(result, QUARTILES):
             rank = share * (n[few] - 1)
             low = rank.astype(np.int64)
-            part = (rank - low).astype(np.float32)[:, None]
+            rest = (rank - low).astype(np.float32)[:, None]
             lower = rows.take(low * len(n) + few, 0)
             upper = rows.take(np.minimum(low + 1, n[few] - 1) * len(n) + few, 0)
-            quartile[few] = lower + part * (upper - lower)
-        for count in np.unique(n[n > SLOTS]):
-            alike = np.flatnonzero(n == count)
-            used = KNOTS + (int(count) - SLOTS - 1) % BATCH + 1
-            keys, ranks = self._sorted(alike + block.start, int(count), used)
+            quartile[few] = lower + rest * (upper - lower)
+        beyond = np.flatnonzero(n > SLOTS)
+        for part in blocks(len(beyond), RENEWED_AT_ONCE):
+            many = beyond[part]
+            keys, ranks = self._sorted(many + block.start, n[many])
             # Between two observations the median is their mean, not that of their logarithms.
             values = keys.astype(np.int32).view(np.float32)
-            wanted = np.array(QUARTILES) * (int(count) - 1)
-            result[:, alike] = _at_ranks(ranks, values, wanted).reshape(len(alike), 3, -1).transpose(2, 0, 1)
+            found = _at_ranks(ranks, values, (n[many, None] - 1) * np.array(QUARTILES))
+            result[:, many] = found.reshape(len(many), 3, -1).transpose(2, 0, 1)
         return result
 
     def result(self) -> Summary:
@@ -141,8 +169,25 @@ class Batched:
         pass
 
 
+def _by_count(table: Callable[[int], np.ndarray], n: np.ndarray) -> np.ndarray:
+    """`table(count)` for each of the counts `n` ((m,)): (m, k)."""
+    counts, which = np.unique(n, return_inverse=True)
+    return np.stack([table(int(count)) for count in counts])[which]
+
+
 def _at_ranks(ranks: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Each row's value at ranks `wanted` ((w,)), linear in between: (m, w) float64; ranks and values: (m, k)."""
+    """Values at ranks `wanted`, linear in between, for each element's three channels.
+
+    Parameters
+    ----------
+    ranks, values : (3 m, k)
+    wanted : (m, w)
+
+    Returns
+    -------
+    (3 m, w) float64
+    """
     # All rows on one axis, one after the other: one call for all.
-    row = np.arange(len(ranks), dtype=np.float64)[:, None] * (ranks.max(initial=0) + wanted.max(initial=0) + 2)
-    return np.interp((row + wanted).ravel(), (row + ranks).ravel(), values.ravel()).reshape(len(ranks), len(wanted))
+    row = np.arange(len(ranks), dtype=np.float64)[:, None] * (ranks.max() + 2)
+    wanted = np.repeat(wanted, 3, axis=0)
+    return np.interp((row + wanted).ravel(), (row + ranks).ravel(), values.ravel()).reshape(wanted.shape)
