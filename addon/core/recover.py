@@ -84,7 +84,8 @@ class Recovery:
         surface = key("surface", CODE, fingerprint(self.capture), s.texel_size, s.atlas_size)
         lit = key("lit_diffuse", surface, s.median, s.frame_order, s.seed)
         shading = key(
-            "shading", lit, s.shading, s.shading_rays, s.emitter_rays, s.interpolate, s.mirrors, s.seed
+            "shading", lit, s.shading, s.shading_rays, s.emitter_rays, s.portal_rays, s.interpolate,
+            s.mirrors, s.seed,
         )
         specular = key("specular", shading, s.specular, s.specular_rays, s.refine)
         return {"surface": surface, "lit_diffuse": lit, "shading": shading, "specular": specular}
@@ -209,8 +210,8 @@ class Recovery:
             def shaded(known: LitDiffuse) -> Shading:
                 return shade(
                     surface.mesh, self.capture.instances, surface.atlas, surface.scene, known, sky,
-                    sampler=s.shading, rays=s.shading_rays, emitter_rays=s.emitter_rays, interpolate=s.interpolate,
-                    threads=s.threads, seed=s.seed, progress=self.progress,
+                    sampler=s.shading, rays=s.shading_rays, emitter_rays=s.emitter_rays, portal_rays=s.portal_rays,
+                    interpolate=s.interpolate, threads=s.threads, seed=s.seed, progress=self.progress,
                     find_mirrors=self._find_mirrors if s.mirrors else None,
                 )  # fmt: skip
 

@@ -27,7 +27,9 @@ class Settings:
     shading_rays : int
         Gather rays for each shading point.
     emitter_rays : int
-        Rays aimed at bright triangles for each surface element ('aimed' only).
+        Rays aimed at bright triangles for each surface element that is not interpolated ('aimed' only).
+    portal_rays : int
+        Rays aimed at the openings to the outside for each shading point ('aimed' only).
     interpolate : bool
         Gather where the indirect light changes and interpolate between; False gathers at each element.
     mirrors : bool
@@ -49,8 +51,9 @@ class Settings:
     median: str = "batched"
     frame_order: str = "shuffled"
     shading: str = "aimed"
-    shading_rays: int = 192
-    emitter_rays: int = 16
+    shading_rays: int = 128
+    emitter_rays: int = 32
+    portal_rays: int = 32
     interpolate: bool = True
     mirrors: bool = True
     specular: str = "frames"
@@ -79,5 +82,5 @@ class Settings:
 
 
 PAPER = Settings(median="p2", frame_order="capture", shading="uniform", shading_rays=10000, emitter_rays=0,
-                 interpolate=False, mirrors=False, specular="target", refine=0)
+                 portal_rays=0, interpolate=False, mirrors=False, specular="target", refine=0)
 """Haefner et al. 2021: P-square in video order, uniform rays, one target frame."""

@@ -75,29 +75,36 @@ def bright_triangles(field: LightField) -> BrightTriangles:
     )
 
 
-def aimed_density(
+def aimed_at(
     bright: BrightTriangles, hits: Hits, directions: np.ndarray, triangle_normal: np.ndarray
-) -> np.ndarray:
-    """Solid-angle density with which rays aimed at the bright triangles take given directions.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which rays met a bright triangle, and the solid-angle density with which aimed rays take their directions.
 
     Parameters
     ----------
     hits : Hits
-        What the directions met first.
+        What the n directions met first.
     directions : (n, 3) float32
     triangle_normal : (t, 3) float32
 
     Returns
     -------
-    (n,) float32
-        0 where no bright triangle was met.
+    (m,) int, (m,) float32
     """
-    if not len(bright):
-        return np.zeros(len(directions), np.float32)
-    density = np.where(hits.triangle >= 0, bright.density[hits.triangle], np.float32(0))
-    on = np.flatnonzero(density > 0)
+    density = bright.density[hits.triangle]  # of an escaped ray that of the last triangle; taken out below
+    on = np.flatnonzero((density > 0) & (hits.triangle >= 0))
     cosine = np.abs(np.einsum("ij,ij->i", directions[on], triangle_normal[hits.triangle[on]]))
-    density[on] *= hits.distance[on] ** 2 / np.maximum(cosine, 1e-6)
+    return on, density[on] * hits.distance[on] ** 2 / np.maximum(cosine, 1e-6)
+
+
+def aimed_density(
+    bright: BrightTriangles, hits: Hits, directions: np.ndarray, triangle_normal: np.ndarray
+) -> np.ndarray:
+    """The density of `aimed_at` for every ray, (n,) float32; 0 where no bright triangle was met."""
+    density = np.zeros(len(directions), np.float32)
+    if len(bright):
+        on, aimed = aimed_at(bright, hits, directions, triangle_normal)
+        density[on] = aimed
     return density
 
 
@@ -126,21 +133,20 @@ class BrightPoints:
     density: np.ndarray
 
 
-def sample_bright(bright: BrightTriangles, square: np.ndarray, rng: np.random.Generator) -> BrightPoints:
+def sample_bright(bright: BrightTriangles, cube: np.ndarray, rng=None) -> BrightPoints:
     """Draw k points for each of n receivers.
 
     Parameters
     ----------
-    square : (n, k, 2) float32
-        Where on its triangle each point lies; the triangles are stratified over the k.
+    cube : (n, k, 3) float32
+        In [0, 1): which triangle, and where on it. Well spread in all three together, they spread over each lamp too.
     """
-    n, k, _ = square.shape
-    strata = (np.arange(k, dtype=np.float32) + 0.5) / k
-    which = (strata + rng.random((n, 1), np.float32)) % 1
-    index = np.minimum(np.searchsorted(np.cumsum(bright.chance), which.ravel()), len(bright) - 1)
-    flat = square.reshape(-1, 2)
-    root = np.sqrt(flat[:, 0])
-    u, v = root * (1 - flat[:, 1]), root * flat[:, 1]  # uniform over the triangle
+    if rng is not None:  # TODO until lobes.py draws three axes itself
+        cube = np.concatenate([rng.random((*cube.shape[:2], 1), np.float32), cube], -1)
+    flat = cube.reshape(-1, 3)
+    index = np.minimum(np.searchsorted(np.cumsum(bright.chance), flat[:, 0]), len(bright) - 1)
+    root = np.sqrt(flat[:, 1])
+    u, v = root * (1 - flat[:, 2]), root * flat[:, 2]  # uniform over the triangle
     point = bright.corner[index] + u[:, None] * bright.edge_u[index] + v[:, None] * bright.edge_v[index]
     triangle = np.flatnonzero(bright.density > 0).astype(np.int32)[index]
     return BrightPoints(index, triangle, u, v, point, bright.density[triangle])

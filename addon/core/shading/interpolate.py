@@ -19,7 +19,7 @@ ALLOWED = 0.2
 """Error bound (Ward's epsilon) under which an element is interpolated."""
 REACH = 2 * ALLOWED
 """Error bound at which a point's weight has fallen to 0."""
-CONTRAST = 0.1
+CONTRAST = 0.15
 """Mean relative deviation between an element's neighbours up to which it is interpolated."""
 NEIGHBOURS = 8
 TURN = 1.5

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .directions import cosine_hemisphere, shifted, sobol, to_world, uniform_hemisphere
-from .emitters import BrightTriangles, aimed_density, sample_bright
+from .directions import PATTERNS, cosine_patterns, shifted, sobol, to_world, turned, uniform_hemisphere
+from .emitters import BrightTriangles, aimed_at, sample_bright
 from .field import LightField
 from .over_mirrors import direct_over_mirrors
+from .portals import Portals
 
 RAYS_AT_ONCE = 1 << 18
 
@@ -21,23 +22,27 @@ RAYS_AT_ONCE = 1 << 18
 def gather(
     field: LightField,
     bright: BrightTriangles,
-    triangle_normal: np.ndarray,
     position: np.ndarray,
     normal: np.ndarray,
     rays: int,
     emitter_rays: int,
     seed: int,
+    portals: Portals | None = None,
+    portal_rays: int = 0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The hemisphere's part of E by cosine-distributed rays.
+    """The hemisphere's part of E by cosine-distributed rays, and rays aimed at the portals.
 
     Parameters
     ----------
-    triangle_normal : (t, 3) float32
     position, normal : (n, 3) float32
     rays : int
-        For each point, drawn from one scrambled Sobol pattern, shifted for each point.
+        For each point: one of a few scrambled Sobol patterns, turned by an angle of its own.
     emitter_rays : int
         How many rays `direct` spends: what the balance heuristic needs to know. 0: everything is gathered here.
+    portals : Portals, optional
+        Where light comes in from outside.
+    portal_rays : int
+        For each point, aimed at the portals.
 
     Returns
     -------
@@ -49,31 +54,75 @@ def gather(
         Share of the rays that left the mesh.
     """
     rng = np.random.default_rng(seed)
-    pattern = sobol(rays, seed)
+    patterns = cosine_patterns(rays, seed)
+    portal_rays = portal_rays if portals is not None else 0
     total = np.zeros((len(position), 3), np.float32)
     radius, escaped = np.zeros(len(position), np.float32), np.zeros(len(position), np.float32)
     step = max(RAYS_AT_ONCE // rays, 1)
     for start in range(0, len(position), step):
         part = slice(start, start + step)
         p, n = position[part], normal[part]
-        local = cosine_hemisphere(shifted(pattern, len(p), rng))
-        directions = to_world(local, n).reshape(-1, 3)
+        directions, cosine = turned(patterns, n, rng)
+        directions, cosine = directions.reshape(-1, 3), cosine.ravel()
         origins = np.repeat(field.scene.off_surface(p, n), rays, 0)
         hits = field.scene.intersect(origins, directions)
-        element = field.elements(hits)
         # What a mirror shows of the bright triangles is aimed at below; here it would come as fireflies.
-        radiance = field.arriving(hits, element, directions, bright.density if emitter_rays else None)
-        out = element < 0
+        radiance = field.arriving(hits, field.elements(hits), directions, bright.density if emitter_rays else None)
+        out = hits.triangle < 0
         if emitter_rays and len(bright):
-            aimed = aimed_density(bright, hits, directions, triangle_normal)
-            own = rays * local[..., 2].reshape(-1) / np.float32(np.pi)
-            radiance *= (own / np.maximum(own + emitter_rays * aimed, 1e-20))[:, None]
-        total[part] = np.float32(np.pi / rays) * radiance.reshape(len(p), rays, 3).sum(1)
-        radius[part] = rays / np.maximum((1 / np.maximum(hits.distance, 1e-9)).reshape(len(p), rays).sum(1), 1e-20)
+            on, aimed = aimed_at(bright, hits, directions, field.normal)
+            radiance[on] *= _share(rays * cosine[on], emitter_rays * aimed)
+        if portal_rays:
+            on = np.flatnonzero(out)
+            radiance[on] *= _share(rays * cosine[on], portal_rays * portals.aimed_density(origins[on], directions[on]))
+        total[part] = np.float32(np.pi / rays) * np.einsum("nkc->nc", radiance.reshape(len(p), rays, 3))
+        near = np.einsum("nk->n", 1 / np.maximum(hits.distance, 1e-9).reshape(len(p), rays))
+        radius[part] = rays / np.maximum(near, 1e-20)
         escaped[part] = out.reshape(len(p), rays).mean(1)
+    if portal_rays:
+        total += from_outside(field, portals, position, normal, rays, portal_rays, seed)
     if emitter_rays and field.mirrors:
         total += direct_over_mirrors(field, bright, position, normal, emitter_rays, seed)
     return total, radius, escaped
+
+
+def _share(cosine_rays: np.ndarray, aimed: np.ndarray) -> np.ndarray:
+    """The balance heuristic's weight of cosine-distributed rays, (n, 1); `aimed` is rays times density."""
+    own = cosine_rays / np.float32(np.pi)
+    return (own / np.maximum(own + aimed, 1e-20))[:, None]
+
+
+def from_outside(
+    field: LightField,
+    portals: Portals,
+    position: np.ndarray,
+    normal: np.ndarray,
+    rays: int,
+    portal_rays: int,
+    seed: int,
+) -> np.ndarray:
+    """The outside's part of E by rays aimed at the portals, (n, 3) float32; `rays` as for `direct`."""
+    total = np.zeros((len(position), 3), np.float32)
+    rng = np.random.default_rng([seed, 1])
+    patterns = shifted(sobol(portal_rays, seed), PATTERNS, rng)
+    step = max(RAYS_AT_ONCE // portal_rays, 1)
+    for start in range(0, len(position), step):
+        part = slice(start, start + step)
+        p, n = position[part], normal[part]
+        origins = field.scene.off_surface(p, n)
+        square = patterns[rng.integers(0, PATTERNS, len(p))]
+        directions, density = portals.sample(origins, square, rng)
+        cosine = np.einsum("nkj,nj->nk", directions.reshape(len(p), portal_rays, 3), n).ravel()
+        useful = np.flatnonzero(cosine > 0)
+        hidden = field.scene.occluded(
+            np.repeat(origins, portal_rays, 0)[useful], directions[useful], np.full(len(useful), np.inf, np.float32)
+        )
+        useful = useful[~hidden]
+        weight = cosine[useful] / (portal_rays * density[useful] + rays * cosine[useful] / np.float32(np.pi))
+        light = np.zeros((len(directions), 3), np.float32)
+        light[useful] = field.environment(directions[useful]) * weight[:, None]
+        total[part] = light.reshape(len(p), portal_rays, 3).sum(1)
+    return total
 
 
 def direct(
@@ -103,31 +152,38 @@ def direct(
     if not len(bright) or not emitter_rays:
         return total
     rng = np.random.default_rng(seed)
-    pattern = sobol(emitter_rays, seed)
+    # The receivers share a few patterns of points: all that depends on the point alone is looked up once.
+    pick = sample_bright(bright, shifted(sobol(emitter_rays, seed, 3), PATTERNS, rng))
+    light = field.radiance[field.lookup(pick.triangle, pick.u, pick.v)].reshape(PATTERNS, emitter_rays, 3)
+    point = pick.point.reshape(PATTERNS, emitter_rays, 3)
+    outward = bright.normal[pick.index].reshape(PATTERNS, emitter_rays, 3)
+    density = pick.density.reshape(PATTERNS, emitter_rays)
+    one_sided = field.one_sided[pick.triangle].reshape(PATTERNS, emitter_rays)
     step = max(RAYS_AT_ONCE // emitter_rays, 1)
     for start in range(0, len(position), step):
         part = slice(start, start + step)
-        p, n = position[part], normal[part]
-        pick = sample_bright(bright, shifted(pattern, len(p), rng), rng)
-        origin = np.repeat(field.scene.off_surface(p, n), emitter_rays, 0)
-        way = pick.point - origin
-        distance = np.sqrt(np.einsum("ij,ij->i", way, way))
-        direction = way / np.maximum(distance, 1e-12)[:, None]
-        cosine = np.einsum("ijk,ik->ij", direction.reshape(len(p), emitter_rays, 3), n).ravel()
-        facing = -np.einsum("ij,ij->i", direction, bright.normal[pick.index])
-        behind = field.one_sided[pick.triangle] & (facing < 0)
+        n = normal[part]
+        pattern = rng.integers(0, PATTERNS, len(n))
+        origin = field.scene.off_surface(position[part], n)
+        direction = point[pattern] - origin[:, None]
+        distance = np.sqrt(np.einsum("ijk,ijk->ij", direction, direction))
+        direction /= np.maximum(distance, 1e-12)[..., None]
+        cosine = np.matmul(direction, n[:, :, None])[..., 0]
+        facing = -np.einsum("ijk,ijk->ij", direction, outward[pattern])
+        behind = one_sided[pattern] & (facing < 0)
         facing = np.abs(facing)
-        useful = np.flatnonzero((cosine > 0) & (facing > 1e-6) & (distance > 10 * field.scene.offset) & ~behind)
+        seen = (cosine > 0) & (facing > 1e-6) & (distance > 10 * field.scene.offset) & ~behind
+        row, ray = np.nonzero(seen)
         hidden = field.scene.occluded(
-            origin[useful], direction[useful], distance[useful] * np.float32(1 - 1e-4) - field.scene.offset
+            origin[row], direction[row, ray], distance[row, ray] * np.float32(1 - 1e-4) - field.scene.offset
         )
-        useful = useful[~hidden]
-        aimed = pick.density[useful] * distance[useful] ** 2 / facing[useful]
-        element = field.lookup(pick.triangle[useful], pick.u[useful], pick.v[useful])
-        share = emitter_rays * aimed + rays * cosine[useful] / np.float32(np.pi)
-        value = np.zeros((len(way), 3), np.float32)
-        value[useful] = field.radiance[element] * (cosine[useful] / np.maximum(share, 1e-20))[:, None]
-        total[part] = value.reshape(len(p), emitter_rays, 3).sum(1)
+        row, ray = row[~hidden], ray[~hidden]
+        cosine, facing = cosine[row, ray], facing[row, ray]
+        aimed = density[pattern[row], ray] * distance[row, ray] ** 2 / facing
+        share = emitter_rays * aimed + rays * cosine / np.float32(np.pi)
+        weight = np.zeros(distance.shape, np.float32)
+        weight[row, ray] = cosine / np.maximum(share, 1e-20)
+        total[part] = np.matmul(weight[:, None], light[pattern])[:, 0]
     return total
 
 

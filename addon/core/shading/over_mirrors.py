@@ -10,6 +10,8 @@ from .field import LightField
 from .mirrors import reflect
 
 RAYS_AT_ONCE = 1 << 18
+FEWER = 4
+"""What comes by a mirror is little of the light: so many times fewer rays are aimed at it."""
 
 
 def direct_over_mirrors(
@@ -30,15 +32,16 @@ def direct_over_mirrors(
     total = np.zeros((len(position), 3), np.float32)
     if not len(bright) or not emitter_rays:
         return total
+    emitter_rays = max(emitter_rays // FEWER, 1)
     step = max(RAYS_AT_ONCE // emitter_rays, 1)
-    pattern = sobol(emitter_rays, seed)
+    pattern = sobol(emitter_rays, seed, 3)
     for mirror in field.mirrors:
         rng = np.random.default_rng([seed, mirror.object_id])
         front = np.flatnonzero((position - mirror.point) @ mirror.normal > field.scene.offset)
         for start in range(0, len(front), step):
             at = front[start : start + step]
             p, n = position[at], normal[at]
-            pick = sample_bright(bright, shifted(pattern, len(at), rng), rng)
+            pick = sample_bright(bright, shifted(pattern, len(at), rng))
             image = pick.point - 2 * ((pick.point - mirror.point) @ mirror.normal)[:, None] * mirror.normal
             origin = np.repeat(field.scene.off_surface(p, n), emitter_rays, 0)
             way = image - origin

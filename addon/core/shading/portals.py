@@ -1,0 +1,140 @@
+"""Portals: the openings that light from outside comes in by, as cells on the room's bounding box to aim rays at.
+
+A window fills a small part of the hemisphere; cosine-distributed rays find it by chance. Where rays that left the mesh
+crossed the bounding box tells where the openings are, without any knowledge of what a window is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .directions import cosine_hemisphere, shifted, sobol, to_world
+from .emitters import LUMINANCE
+from .field import LightField
+
+CELLS = 24
+"""Cells along either axis of each of the box's six sides."""
+PILOT_POINTS, PILOT_RAYS = 4096, 64
+LEAST_ESCAPED = 16
+"""Of the pilot's rays; fewer lit ones are no opening worth aiming at."""
+
+
+@dataclass(frozen=True)
+class Portals:
+    """Cells of the box's sides, with the chance of being aimed at.
+
+    Attributes
+    ----------
+    low, size : (3,) float32
+        The box, metres.
+    cell : (k,) int
+        Flat indices of the cells with a chance above 0: side (2 * axis, + 1 for the high one), row, column.
+    chance : (k,) float64
+        Sums to 1; in proportion to the light that came in by the cell to the room's surface.
+    density : (6 * CELLS * CELLS,) float32
+        Chance over area of every cell: points per square metre.
+    """
+
+    low: np.ndarray
+    size: np.ndarray
+    cell: np.ndarray
+    chance: np.ndarray
+    density: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.cell)
+
+    def aimed_density(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """Solid-angle density with which aimed rays take directions that leave the room, (n,) float32."""
+        cell, distance, cosine = _exits(self.low, self.size, origins, directions)
+        return self.density[cell] * distance**2 / np.maximum(cosine, 1e-6)
+
+    def sample(self, origins: np.ndarray, square: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+        """Aim at the cells from n points, k rays each.
+
+        Parameters
+        ----------
+        origins : (n, 3) float32
+            Inside the box.
+        square : (n, k, 2) float32
+            Where in its cell each ray goes; the cells are stratified over the k.
+
+        Returns
+        -------
+        directions : (n * k, 3) float32
+            Unit.
+        density : (n * k,) float32
+            By solid angle.
+        """
+        n, k, _ = square.shape
+        strata = (np.arange(k, dtype=np.float32) + rng.random((n, k), np.float32)) / np.float32(k)
+        pick = self.cell[np.minimum(np.searchsorted(np.cumsum(self.chance), strata.ravel()), len(self) - 1)]
+        side, row, column = pick // CELLS**2, pick // CELLS % CELLS, pick % CELLS
+        flat = square.reshape(-1, 2)
+        axis = side // 2
+        first, second = (axis + 1) % 3, (axis + 2) % 3
+        at = np.arange(len(pick))
+        point = np.empty((len(pick), 3), np.float32)
+        point[at, axis] = side % 2
+        point[at, first] = (row + flat[:, 0]) / CELLS
+        point[at, second] = (column + flat[:, 1]) / CELLS
+        way = self.low + point * self.size - np.repeat(origins, k, 0)
+        distance = np.sqrt(np.einsum("ij,ij->i", way, way))
+        directions = way / np.maximum(distance, 1e-12)[:, None]
+        cosine = np.abs(directions[at, axis])
+        return directions, self.density[pick] * distance**2 / np.maximum(cosine, 1e-6)
+
+
+def _exits(
+    low: np.ndarray, size: np.ndarray, origins: np.ndarray, directions: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where rays from inside the box leave it: flat cell, distance and |cosine| to the side's normal."""
+    far = low + np.where(directions > 0, size, np.float32(0))
+    along = np.abs(directions)
+    way = np.where(along > 1e-9, np.abs(far - origins) / np.maximum(along, 1e-9), np.float32(np.inf))
+    axis = way.argmin(1)
+    at = np.arange(len(axis))
+    distance = way[at, axis]
+    point = (origins + distance[:, None] * directions - low) / size
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    row = np.clip((point[at, first] * CELLS).astype(np.int64), 0, CELLS - 1)
+    column = np.clip((point[at, second] * CELLS).astype(np.int64), 0, CELLS - 1)
+    side = 2 * axis + (directions[at, axis] > 0)
+    return (side * CELLS + row) * CELLS + column, distance, along[at, axis]
+
+
+def find_portals(field: LightField, seed: int = 0) -> Portals | None:
+    """The openings that matter, from a few rays of points spread over the surface; None where there are none.
+
+    Which cells are found changes the noise of what is computed with them, not its expectation: light through a cell
+    that was missed is still gathered.
+    """
+    if not field.environment.radiance.any():
+        return None
+    atlas = field.atlas
+    rng = np.random.default_rng(seed)
+    weight = np.cumsum(atlas.area.astype(np.float64))
+    start = np.searchsorted(weight, (np.arange(PILOT_POINTS) + rng.random(PILOT_POINTS)) / PILOT_POINTS * weight[-1])
+    start = np.minimum(start, len(atlas) - 1)
+    normal = atlas.normal[start]
+    local = cosine_hemisphere(shifted(sobol(PILOT_RAYS, seed), PILOT_POINTS, rng))
+    directions = to_world(local, normal).reshape(-1, 3)
+    origins = np.repeat(field.scene.off_surface(atlas.position[start], normal), PILOT_RAYS, 0)
+    out = np.flatnonzero(field.scene.intersect(origins, directions).triangle < 0)
+    light = field.environment(directions[out]) @ LUMINANCE
+    out, light = out[light > 0], light[light > 0]
+    if len(out) < LEAST_ESCAPED:
+        return None
+    margin = np.float32(2 * field.scene.offset)
+    corners = field.mesh.vertices
+    low = corners.min(0).astype(np.float32) - margin
+    size = corners.max(0).astype(np.float32) + margin - low
+    cell, _, _ = _exits(low, size, origins[out], directions[out])
+    chance = np.bincount(cell, light.astype(np.float64), 6 * CELLS**2)
+    side = np.repeat(np.arange(3), 2 * CELLS**2)
+    area = (size[(side + 1) % 3] * size[(side + 2) % 3] / CELLS**2).astype(np.float32)
+    found = np.flatnonzero(chance > 0)
+    chance /= chance.sum()
+    return Portals(low, size, found, chance[found], (chance / area).astype(np.float32))
