@@ -51,7 +51,9 @@ class Portals:
         cell, distance, cosine = _exits(self.low, self.size, origins, directions)
         return self.density[cell] * distance**2 / np.maximum(cosine, 1e-6)
 
-    def sample(self, origins: np.ndarray, square: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    def sample(
+        self, origins: np.ndarray, square: np.ndarray, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Aim at the cells from n points, k rays each.
 
         Parameters

@@ -38,7 +38,7 @@ def lamp():
 
 
 def both(field, bright, normals, position, normal, rays, emitter_rays, seed=0):
-    around, _, _ = gather(field, bright, normals, position, normal, rays, emitter_rays, seed)
+    around, _, _ = gather(field, bright, position, normal, rays, emitter_rays, seed)
     return around + direct(field, bright, position, normal, rays, emitter_rays, seed + 1)
 
 
@@ -52,7 +52,7 @@ def test_a_furnace_gives_pi_l(furnace):
     room, field = furnace
     bright = bright_triangles(field)
     assert len(bright) == 0  # nothing stands out
-    E, radius, escaped = gather(field, bright, room.normals, room.atlas.position, room.atlas.normal, 16, 0, 0)
+    E, radius, escaped = gather(field, bright, room.atlas.position, room.atlas.normal, 16, 0, 0)
     assert np.allclose(E, np.pi * np.float32([1, 2, 3]), rtol=1e-4)  # each cosine ray brings the same
     assert not escaped.any() and (radius > 0).all() and (radius < 5.6).all()
 
@@ -95,7 +95,7 @@ def test_rays_that_are_not_aimed_find_the_same_in_the_mean(lamp):
     position, up = np.repeat(np.float32([[0.3, 0, 0]]), 64, 0), np.repeat(np.float32([[0, 0, 1]]), 64, 0)
     wanted = 10 * polygon_irradiance(position[:1].astype(float), up[:1].astype(float), [shade])[0, 0]
     none = bright_triangles(room.field(room.by_object({})))
-    around, _, escaped = gather(field, none, room.normals, position, up, 4096, 0, 0)
+    around, _, escaped = gather(field, none, position, up, 4096, 0, 0)
     even, _ = uniform(field, position, up, 4096, 1)
     assert around[:, 0].mean() == pytest.approx(wanted, rel=0.03)
     assert even[:, 0].mean() == pytest.approx(wanted, rel=0.06)
@@ -149,7 +149,7 @@ def test_the_sky_through_an_open_roof():
     sky[8:] = 2
     field = room.field(room.by_object({}), Environment(sky, np.ones((16, 32), np.int32)))
     at, up = np.zeros((1, 3), np.float32), np.float32([[0, 0, 1]])
-    E, _, escaped = gather(field, bright_triangles(field), room.normals, at, up, 64, 0, 0)
+    E, _, escaped = gather(field, bright_triangles(field), at, up, 64, 0, 0)
     assert np.allclose(E, 2 * np.pi, rtol=1e-5) and escaped[0] == 1
 
 
@@ -158,5 +158,5 @@ def test_radius_is_the_harmonic_mean_distance():
     room = make_room([quad((-50, -50, 2), (0, 100, 0), (100, 0, 0), 0)], 2)
     field = room.field(room.by_object({}))
     at, up = np.zeros((1, 3), np.float32), np.float32([[0, 0, 1]])
-    _, radius, _ = gather(field, bright_triangles(field), room.normals, at, up, 1024, 0, 0)
+    _, radius, _ = gather(field, bright_triangles(field), at, up, 1024, 0, 0)
     assert radius[0] == pytest.approx(3.0, rel=0.01)

@@ -79,8 +79,8 @@ def test_gather_counts_light_over_a_mirror_once(corner):
     position, normal = places(12)
     field = field.with_mirrors((GLASS,))
     bright = bright_triangles(field)
-    aimed, _, _ = gather(field, bright, room.normals, position, normal, 256, 256, 0)
-    by_chance, _, _ = gather(field, bright, room.normals, position, normal, 1 << 16, 0, 0)
+    aimed, _, _ = gather(field, bright, position, normal, 256, 256, 0)
+    by_chance, _, _ = gather(field, bright, position, normal, 1 << 16, 0, 0)
     assert aimed.mean() == pytest.approx(by_chance.mean(), rel=0.03)
 
 
@@ -102,7 +102,7 @@ def test_a_perfect_mirror_in_a_furnace_changes_nothing():
     glass = Mirror(wall, room.atlas.position[own][0], room.atlas.normal[own][0], np.ones(3, np.float32))
     position, normal = room.atlas.position[~own][::7], room.atlas.normal[~own][::7]
     E, _, _ = gather(
-        field.with_mirrors((glass,)), bright_triangles(field), room.normals, position, normal, 64, 0, 0
+        field.with_mirrors((glass,)), bright_triangles(field), position, normal, 64, 0, 0
     )
     assert np.allclose(E, np.pi, rtol=1e-4)
 
