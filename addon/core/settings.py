@@ -18,8 +18,8 @@ class Settings:
     atlas_size : int
         Upper bound on the atlas's edge in pixels.
     median : str
-        'batched' (exact for a spot's first 20 observations, close beyond, in fixed memory), 'exact' (all observations
-        go to disk), 'p2' (the paper's P-square) or 'mean'.
+        'adaptive' (exact for short videos, batched beyond), 'batched' (exact for a spot's first 20 observations, close
+        beyond, in fixed memory), 'exact' (all observations go to disk), 'p2' (the paper's P-square) or 'mean'.
     frame_order : str
         'shuffled' (fixed pseudo-random order) or 'capture' (video order, the paper's).
     shading : str
@@ -48,7 +48,7 @@ class Settings:
 
     texel_size: float = 0.0
     atlas_size: int = 4096
-    median: str = "batched"
+    median: str = "adaptive"
     frame_order: str = "shuffled"
     shading: str = "aimed"
     shading_rays: int = 128
@@ -63,7 +63,7 @@ class Settings:
     seed: int = 0
 
     CHOICES = {
-        "median": ("batched", "exact", "p2", "mean"),
+        "median": ("adaptive", "batched", "exact", "p2", "mean"),
         "frame_order": ("shuffled", "capture"),
         "shading": ("aimed", "uniform"),
         "specular": ("frames", "target"),

@@ -79,7 +79,7 @@ def accumulate(
     frames: Sequence[Frame],
     read: Callable[[Frame], Pixels],
     *,
-    median: str = "batched",
+    median: str = "adaptive",
     order: str = "shuffled",
     seed: int = 0,
     threads: int = 0,
@@ -96,7 +96,7 @@ def accumulate(
     read : callable
         Gives a frame's pixels.
     median : str
-        'batched', 'exact', 'p2' or 'mean'; see `medians`.
+        'adaptive', 'batched', 'exact', 'p2' or 'mean'; see `medians`.
     order : str
         'shuffled' or 'capture'.
     folder : Path, optional

@@ -1,4 +1,4 @@
-"""The default median: exact for an element's first observations, a fixed number of knots beyond. Constant memory.
+"""The median in constant memory: exact for an element's first observations, a fixed number of knots beyond.
 
 Each element has `SLOTS` places a channel. While its observations fit, they are simply kept. From then on `KNOTS`
 places hold knots of its quantile function, and the other `BATCH` take new observations; whenever those are full, all

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -55,14 +56,28 @@ class Exact:
         return [record[start[bucket] : start[bucket + 1]] for record, start in self._held]
 
     def _records(self, bucket: int) -> np.ndarray:
-        """All observations of one bucket."""
-        parts = self._held_of(bucket)
+        """All observations of one bucket, in the order in which they came."""
+        parts = []
         if self._flushed:
             with open(self._path, "rb") as file:
                 for start in self._flushed:
                     file.seek(int(start[bucket]) * self.RECORD.itemsize)
                     parts.append(np.fromfile(file, self.RECORD, int(start[bucket + 1] - start[bucket])))
+        parts += self._held_of(bucket)
         return np.concatenate(parts) if parts else np.zeros(0, self.RECORD)
+
+    def replay(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """All observations anew, in portions as `add` takes them: each element at most once, in the order it had."""
+        for bucket in range(self._buckets):
+            record = self._records(bucket)
+            record = record[np.argsort(record["element"], kind="stable")]
+            element = record["element"]
+            first = np.flatnonzero(np.diff(element, prepend=np.uint32(0xFFFFFFFF)))
+            turn = np.arange(len(element)) - np.repeat(first, np.diff(first, append=len(element)))
+            # Sorted by turn, then element: each turn is one portion.
+            order = np.argsort(turn, kind="stable")
+            for portion in np.split(order, np.cumsum(np.bincount(turn))[:-1]):
+                yield element[portion].astype(np.int32), record["value"][portion]
 
     def _summarise(self, bucket: int) -> tuple[np.ndarray, np.ndarray]:
         """Quartiles ((k, 3, 3) float32: element, channel, quartile) and counts of one bucket."""

@@ -8,19 +8,23 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from .adaptive import Adaptive
 from .batched import Batched
 from .estimator import Estimator, Summary
 from .exact import Exact
 from .mean import Mean
 from .p_square import PSquare
 
-__all__ = ["Batched", "Estimator", "Exact", "Mean", "PSquare", "Summary", "make_estimator"]
+__all__ = ["Adaptive", "Batched", "Estimator", "Exact", "Mean", "PSquare", "Summary", "make_estimator"]
 
 
 def make_estimator(name: str, count: int, folder: Path | str | None = None, threads: int = 0) -> Estimator:
-    """'batched', 'exact', 'p2' (the paper's) or 'mean' for `count` elements; `folder` takes what 'exact' spills."""
+    """'adaptive', 'batched', 'exact', 'p2' (the paper's) or 'mean' for `count` elements.
+
+    `folder` takes what 'exact', and 'adaptive' at first, write to disk.
+    """
+    if name in ("adaptive", "exact"):
+        return {"adaptive": Adaptive, "exact": Exact}[name](count, folder, threads)
     if name == "batched":
         return Batched(count, threads)
-    if name == "exact":
-        return Exact(count, folder, threads)
     return {"p2": PSquare, "mean": Mean}[name](count)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from addon.core.lit_diffuse.batched import KNOTS, SLOTS, knot_ranks
-from addon.core.lit_diffuse.medians import Batched, Exact, Mean, PSquare, make_estimator
+from addon.core.lit_diffuse.medians import Adaptive, Batched, Exact, Mean, PSquare, make_estimator
 from addon.core.lit_diffuse.sorting import comparators, sort_planes
 
 ARTICLE = [0.02, 0.15, 0.74, 3.39, 0.83, 22.37, 10.15, 15.43, 38.62, 15.92,
@@ -85,7 +85,7 @@ def test_exact_takes_zeros_of_either_sign():
     assert one_by_one(Exact(1), [-0.0, -0.0, 1.0]).median[0, 0] == 0
 
 
-@pytest.mark.parametrize("name", ["batched", "exact", "p2", "mean"])
+@pytest.mark.parametrize("name", ["adaptive", "batched", "exact", "p2", "mean"])
 def test_nothing_added_gives_nothing(name):
     result = make_estimator(name, 3).result()
     assert result.count.tolist() == [0, 0, 0] and np.isnan(result.median).all()
@@ -285,6 +285,24 @@ def test_batched_takes_ties_zeros_and_six_decades():
         assert np.array_equal(batched(x).median, np.median(x, 0))
     wide = (10 ** rng.uniform(-4, 2, (1000, 50, 3))).astype(np.float32)
     assert log_error(batched(wide).median, np.median(wide, 0)) < 0.1  # 13.8 from end to end
+
+
+@pytest.mark.parametrize("bucket", [1 << 16, 7])
+def test_adaptive_is_exact_at_first_and_batched_from_then_on(bucket, tmp_path, monkeypatch):
+    """In the end it is as if all observations had gone to the summary from the start, in their order."""
+    monkeypatch.setattr(Exact, "BUCKET", bucket)
+    monkeypatch.setattr(Exact, "HELD", 100)
+    rng = np.random.default_rng(1)
+    for counts, twin in ((rng.integers(0, 20, 40), Exact), (rng.integers(0, 150, 40), Batched)):
+        adaptive, other = Adaptive(40, tmp_path), twin(40)
+        for element, x in ragged(rng, counts)[0]:
+            adaptive.add(element, x)
+            other.add(element, x)
+        found, wanted = adaptive.result(), other.result()
+        adaptive.close()
+        for name in ("lower", "median", "upper", "count"):
+            assert np.array_equal(getattr(found, name), getattr(wanted, name), equal_nan=True), name
+        assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("order", ["ascending", "descending"])
