@@ -317,7 +317,8 @@ class Recovery:
     def write_images(self) -> None:
         """The result folder's images and materials.json."""
         atlas, lit, shading = self.surface().atlas, self.lit_diffuse(), self.shading()
-        spread = (lit.upper - lit.lower).mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), 1e-6)
+        dark = max(1e-6 * self.median_radiance(), 1e-30)
+        spread = (lit.upper - lit.lower).mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
         coverage = np.stack([lit.count, np.nan_to_num(spread), self.albedo.origin], -1).astype(np.float32)
         images = {
             "albedo": self.albedo.rho,

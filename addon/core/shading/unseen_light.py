@@ -123,6 +123,17 @@ def _barely_seen(field: LightField, good: np.ndarray) -> np.ndarray:
     return seen & np.isin(atlas.object_id, bright)
 
 
+def _evened(field: LightField) -> np.ndarray:
+    """L_d with the median of its object where nobody saw an element ((n, 3) float32): it is dark there in `field`."""
+    radiance, atlas = field.radiance.copy(), field.atlas
+    seen = radiance.any(1)
+    for object_id in np.unique(atlas.object_id[~seen]):
+        own = atlas.object_id == object_id
+        if (own & seen).any():
+            radiance[own & ~seen] = np.median(radiance[own & seen], 0)
+    return radiance
+
+
 def _with_whole_sky(field: LightField, normals, element: np.ndarray, seed: int) -> tuple[LightField, tuple[str, ...]]:
     """Solve for one radiance of all the sky where rays leave the mesh but no frame looked there; says so in a note."""
     if field.environment.seen:
@@ -131,7 +142,7 @@ def _with_whole_sky(field: LightField, normals, element: np.ndarray, seed: int) 
     thrown = _irradiance(field.with_light(np.zeros_like(field.radiance), everywhere), normals, element, seed)[:, 0]
     if thrown.mean() < MIN_OPEN * np.pi:
         return field, ()
-    received = _irradiance(field, normals, element, seed)
+    received = _irradiance(field.with_light(_evened(field)), normals, element, seed)
     object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
     left = np.ones(len(element), bool)
     for _ in range(SWEEPS):
@@ -149,6 +160,10 @@ def _with_whole_sky(field: LightField, normals, element: np.ndarray, seed: int) 
     by_channel = [sample.best(sample.radiance[:, c], sample.received[:, c], thrown[at]) for c in range(3)]
     if all(one is not None for one in by_channel):
         radiance = np.array([one[0] for one in by_channel])
+    # No object reflects more than it gets.
+    least = (np.pi * sample.radiance - sample.received) / np.maximum(thrown[at], 1e-3 * thrown.mean())[:, None]
+    for one in np.unique(sample.object_id):
+        radiance = np.maximum(radiance, np.median(least[object_id[left] == one], 0))
     note = (
         "Part of the light comes from a sky that no frame sees; it was solved from what it throws, as one radiance "
         f"from all sides: {', '.join(f'{x:.3g}' for x in radiance)} "
@@ -215,7 +230,7 @@ def find_light(
     known = environment
     for zone in zones:
         known = known.with_zone(zone, np.zeros(3, np.float32))
-    received = _irradiance(field.with_light(field.radiance, known), normals, element, seed)
+    received = _irradiance(field.with_light(_evened(field), known), normals, element, seed)
     dark = np.zeros_like(field.radiance)
     thrown_sky = [
         _irradiance(field.with_light(dark, Environment.only(zone)), normals, element, seed)[:, 0] for zone in zones
