@@ -25,7 +25,7 @@ from addon.core.store import Store
 from tests.core.rooms import Room, all_round, box_sides, lit_box, make_room, picture, radiosity
 
 SIZE = (2.0, 2.0, 2.0)
-TEXEL = 0.1
+TEXEL = 0.2
 EYES = (0.8, 0.9, 0.7), (1.3, 1.1, 1.2), (0.7, 1.3, 1.4), (1.4, 0.6, 0.9)
 DEFAULT = Settings(texel_size=TEXEL, shading_rays=96, emitter_rays=16, specular_rays=16, threads=2)
 """Everything as by default, but for the number of rays."""
@@ -35,6 +35,10 @@ PAPERS = replace(PAPER, texel_size=TEXEL, shading_rays=512, specular_rays=16, th
 """The paper's way with few rays: 512 uniform ones give 10 % noise in a small lamp's light, less in a median."""
 GREY = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}
 """Albedo of an ordinary box by object; 6 is the lamp."""
+CLOSE = 0.05
+"""What an albedo may be off by, relative: the 16 texels to a wall of these rooms can't follow light into corners."""
+NOISY = 0.1
+"""The same where a small lamp is met by chance: the paper's uniform rays, a lamp too dim to be aimed at."""
 LAMP = ((0.3, 0.7), (0.3, 0.7))
 """Where in the ceiling the lamp lies."""
 

@@ -11,9 +11,11 @@ from addon.core.material import EMITTER
 from addon.core.shading.albedo import MEASURED
 from tests.core.rooms import all_round, box_sides, lit_box, look_at, make_room, polygon_irradiance, quad
 from tests.hard_cases.rooms import (
+    CLOSE,
     DEFAULT,
     GREY,
     LAMP,
+    NOISY,
     PAPERS,
     QUICK,
     SIZE,
@@ -83,8 +85,8 @@ def test_black_object_under_bright_light(capture, expect, settings):
     room = lamp_room()
     albedo = GREY | {0: 0.01}
     run = capture(room, lamp_light(room, albedo, (1e4, 9e3, 8e3))).recover(settings)
-    expect("albedo 0.01 of the floor", run.off(0, 0.01), 0.02 if settings is QUICK else 0.05)
-    expect("the other walls", run.worst({i: GREY[i] for i in range(1, 6)}), 0.02 if settings is QUICK else 0.05)
+    expect("albedo 0.01 of the floor", run.off(0, 0.01), CLOSE if settings is QUICK else NOISY)
+    expect("the other walls", run.worst({i: GREY[i] for i in range(1, 6)}), CLOSE if settings is QUICK else NOISY)
 
 
 def test_lamp_1e5_brighter_than_the_darkest_wall(capture, expect):
@@ -97,8 +99,8 @@ def test_lamp_1e5_brighter_than_the_darkest_wall(capture, expect):
     light = lamp_light(room, albedo, (1, 1, 1))
     assert light[room.atlas.object_id == 2].min() < 1e-5
     run = capture(room, light).recover()
-    expect("albedo 0.01 of the darkest wall", run.off(2, 0.01), 0.02)
-    expect("the other walls", run.worst({i: albedo[i] for i in (0, 1, 3, 4, 5)}), 0.02)
+    expect("albedo 0.01 of the darkest wall", run.off(2, 0.01), CLOSE)
+    expect("the other walls", run.worst({i: albedo[i] for i in (0, 1, 3, 4, 5)}), CLOSE)
     expect("the lamp is found", abs(len(run.figures["lamps"]) - 1), 0)
     expect("its radiance", float(np.abs(np.array(run.materials[6].emission) - 1).max()), 1e-3)
 
@@ -111,7 +113,7 @@ def test_radiance_from_1e_minus_6_to_65504(capture, expect, brightest):
     results = [capture(room, light * level).recover() for level in (1, brightest / light.max())]
     away = np.abs(results[1].albedo.rho - results[0].albedo.rho).max()
     expect("the albedo of the same room at radiance 10", float(away), 1e-3)
-    expect("its walls", results[1].worst(GREY), 0.02)
+    expect("its walls", results[1].worst(GREY), CLOSE)
     expect("the lamp is found", abs(len(results[1].figures["lamps"]) - 1), 0)
 
 
@@ -127,9 +129,9 @@ def test_two_rooms_radiance_1e10_apart(capture, expect):
     )  # fmt: skip
     views = cameras() + cameras([(x + 3, y, z) for x, y, z in ((0.8, 0.9, 0.7), (1.3, 1.1, 1.2), (0.7, 1.3, 1.4))])
     run = capture(room, light, views=views).recover()
-    expect("the bright room", run.worst(GREY), 0.02)
+    expect("the bright room", run.worst(GREY), CLOSE)
     wrong = [run.off(i, rho) for i, rho in shifted.items() if run.measured(i).any()]
-    expect("the dark room where it counts as measured", max(wrong, default=0.0), 0.03)
+    expect("the dark room where it counts as measured", max(wrong, default=0.0), NOISY)
 
 
 @pytest.mark.parametrize("settings", [QUICK, PAPERS], ids=["default", "paper"])
@@ -137,7 +139,7 @@ def test_white_box(capture, expect, settings):
     """Albedo 0.98 all around: light is reflected about forty times, and little of what is seen is the lamp's own."""
     room = lamp_room()
     run = capture(room, lamp_light(room, dict.fromkeys(range(6), 0.98), (10, 10, 10))).recover(settings)
-    expect("albedo 0.98", run.worst(dict.fromkeys(range(6), 0.98)), 0.02 if settings is QUICK else 0.02)
+    expect("albedo 0.98", run.worst(dict.fromkeys(range(6), 0.98)), CLOSE if settings is QUICK else NOISY)
     expect("nothing above 1 after clamping", max(float(run.albedo.rho.max()) - 1, 0), 0)
     above = run.figures["albedo_above_one_share"]
     assert above < 0.05 or "albedo above 1" in run.text, "many quotients above 1, and no word of it"
@@ -151,7 +153,7 @@ def test_cavity_without_light(capture, expect):
     room = make_room([*here, *cupboard], TEXEL)
     light = lit_by(room, here, GREY, {6: (10, 9, 8)}) * (room.atlas.object_id[:, None] < 10)
     run = capture(room, light, views=cameras() + all_round((3.25, 0.25, 0.25), 24)).recover(DEFAULT)
-    expect("the room beside it", run.worst(GREY), 0.02)
+    expect("the room beside it", run.worst(GREY), CLOSE)
     inside = run.atlas.object_id >= 10
     assert run.lit.seen[inside].any()
     expect("elements of it that count as measured", int((run.albedo.origin[inside] == MEASURED).sum()), 0)
@@ -166,7 +168,8 @@ def test_all_frames_black(capture, expect):
     assert "Every frame is black" in run.text
 
 
-COURT = (2.0, 2.0, 0.8)
+COURT = (2.0, 2.0, 0.5)
+COURT_EYES = (0.8, 0.9, 0.25), (1.3, 1.1, 0.3), (0.7, 1.3, 0.38)
 COURT_ALBEDO = {i: GREY[i] for i in (0, 2, 3, 4, 5)}
 
 
@@ -174,7 +177,7 @@ def court():
     """A box without its ceiling under a sky of radiance 2: the room, its light, and the share of rays that escape."""
     quads = [q for q in box_sides(COURT) if q.object_id != 1]
     sky = quad((0, 0, COURT[2]), (0, 2, 0), (2, 0, 0), 9)
-    room = make_room(quads, TEXEL)
+    room = make_room(quads, TEXEL / 2)
     light = lit_by(room, [*quads, sky], COURT_ALBEDO, {9: (2, 2, 2)})
     position, normal = room.atlas.position.astype(float), room.atlas.normal.astype(float)
     return room, light, float(polygon_irradiance(position, normal, [sky]).mean() / np.pi)
@@ -182,18 +185,15 @@ def court():
 
 def court_views(ways, fov: float) -> list:
     """Views from three places in the court."""
-    eyes = (0.8, 0.9, 0.4), (1.3, 1.1, 0.5), (0.7, 1.3, 0.6)
-    return [look_at(eye, np.array(eye) + way, 28, 28, fov) for eye in eyes for way in ways]
+    return [look_at(eye, np.array(eye) + way, 28, 28, fov) for eye in COURT_EYES for way in ways]
 
 
 @WAYS
 def test_hole_that_half_the_rays_leave_by(capture, expect, settings):
-    """A low-walled court under a sky that the frames see in full."""
+    """A court with low walls under a sky that the frames see in full."""
     room, light, share = court()
-    run = capture(room, light, views=cameras(((0.8, 0.9, 0.4), (1.3, 1.1, 0.5), (0.7, 1.3, 0.6))), outside=2.0).recover(
-        settings
-    )
-    expect("albedo of floor and walls", run.worst(COURT_ALBEDO), 0.02 if settings is QUICK else 0.03)
+    run = capture(room, light, views=cameras(COURT_EYES), outside=2.0).recover(replace(settings, texel_size=TEXEL / 2))
+    expect("albedo of floor and walls", run.worst(COURT_ALBEDO), CLOSE if settings is QUICK else NOISY)
     if settings is QUICK:  # the paper's rays are not cosine-distributed, so theirs is another share
         expect(f"{share:.0%} of the rays escape", abs(run.figures["escaped_share"] - share), 0.01)
 
@@ -202,8 +202,8 @@ def test_hole_of_which_half_is_seen(capture, expect):
     """The frames see the sky to one side only; the rest is solved for or filled in, and the report says so."""
     room, light, _ = court()
     ways = (1, 0, 0.5), (1, 0.5, -0.6), (-1, 0, -0.9), (0, 1, -0.9), (0, -1, -0.9), (0.1, 0, -1)
-    run = capture(room, light, views=court_views(ways, 80), outside=2.0).recover()
-    expect("albedo of floor and walls", run.worst(COURT_ALBEDO), 0.08)
+    run = capture(room, light, views=court_views(ways, 80), outside=2.0).recover(replace(QUICK, texel_size=TEXEL / 2))
+    expect("albedo of floor and walls", run.worst(COURT_ALBEDO), 0.1)
     assert "sky that no frame sees" in run.text
 
 
@@ -211,7 +211,7 @@ def test_hole_that_no_frame_looks_at(capture, expect):
     """All light comes from a sky that nobody saw: it is solved for, and the report says so."""
     room, light, _ = court()
     ways = (1, 0, -0.8), (-1, 0, -0.8), (0, 1, -0.8), (0, -1, -0.8), (0.1, 0, -1)
-    run = capture(room, light, views=court_views(ways, 60), outside=2.0).recover()
+    run = capture(room, light, views=court_views(ways, 60), outside=2.0).recover(replace(QUICK, texel_size=TEXEL / 2))
     assert not run.shading.environment.seen
     assert "no frame sees" in run.text
     expect("albedo of floor and walls", run.worst(COURT_ALBEDO), 0.3)
@@ -227,3 +227,15 @@ def test_lamp_clipped_in_every_frame(capture, expect, end):
     assert lamp.model == EMITTER and lamp.note, lamp
     expect("the lamp's radiance, solved for", float(np.abs(np.array(lamp.emission) / 2e5 - 1).max()), 0.1)
     expect("the walls", run.worst(GREY), 0.1)
+
+
+@pytest.mark.parametrize("level", [1.0, 1e-7], ids=["as bright as any", "1e-7 of that"])
+def test_lamp_that_no_frame_sees(capture, expect, level):
+    """The lamp's pixels are masked in every frame: it is solved for, at any exposure."""
+    room = lamp_room()
+    light = lamp_light(room, lamp=(10, 10, 10)) * level
+    run = capture(room, light, edit=lambda image, i: np.where(image > 5 * level, np.nan, image)).recover()
+    lamp = run.materials[6]
+    assert lamp.model == EMITTER and "solved" in lamp.note
+    expect("its radiance", float(np.abs(np.array(lamp.emission) / (10 * level) - 1).max()), 0.1)
+    expect("the walls", run.worst(GREY), NOISY)
