@@ -43,7 +43,7 @@ NOTES = (
     "'least' is reading every frame, and one occlusion ray for each pair of element and frame that are asked for, with "
     "nothing else: EmbreeScene.run on the same rays on all cores.",
     "'against the least' is in seconds of processor time, which other programs disturb less.",
-    "Errors are those of L_d against the exact median, over elements with more than two observations.",
+    "Errors are those of L_d against the exact median, over all elements that are seen.",
 )
 
 
@@ -146,8 +146,8 @@ def _rows(scene: Scene, options: Options) -> list[tuple]:
 
 
 def _error(lit: LitDiffuse, exact: LitDiffuse) -> float:
-    """RMS log error of L_d where the exact one rests on more than two observations."""
-    both = (exact.count > 2)[:, None] & (exact.radiance > 0) & (lit.radiance > 0)
+    """RMS log error of L_d over the elements that are seen."""
+    both = exact.seen[:, None] & (exact.radiance > 0) & (lit.radiance > 0)
     return float(np.sqrt(np.mean(np.log(lit.radiance[both] / exact.radiance[both]) ** 2)))
 
 

@@ -19,29 +19,34 @@ class Adaptive:
 
     Sorting once at the end costs less than renewing knots again and again, and has no error; but its disk grows with
     the video. Short videos, and kinds of observations that are rare, never need more.
+
+    Attributes
+    ----------
+    now : Exact or Batched
+        What takes the observations at present.
     """
 
     def __init__(self, count: int, folder: Path | str | None = None, threads: int = 0):
         self._count, self._threads = count, threads
-        self._now: Exact | Batched = Exact(count, folder, threads)
+        self.now: Exact | Batched = Exact(count, folder, threads)
         self._left = EXACT_BYTES // Exact.RECORD.itemsize * count
 
     def add(self, element: np.ndarray, values: np.ndarray) -> None:
-        if isinstance(self._now, Exact):
+        if isinstance(self.now, Exact):
             self._left -= len(element)
             if self._left < 0:
                 self._settle()
-        self._now.add(element, values)
+        self.now.add(element, values)
 
     def _settle(self) -> None:
         """Hand the observations over to a summary."""
-        exact, self._now = self._now, Batched(self._count, self._threads)
+        exact, self.now = self.now, Batched(self._count, self._threads)
         for element, values in exact.replay():
-            self._now.add(element, values)
+            self.now.add(element, values)
         exact.close()
 
     def result(self) -> Summary:
-        return self._now.result()
+        return self.now.result()
 
     def close(self) -> None:
-        self._now.close()
+        self.now.close()

@@ -41,6 +41,11 @@ class Exact:
         if sum(len(held) for held, _ in self._held) >= self.HELD:
             self._flush()
 
+    @property
+    def observations(self) -> int:
+        """How many there are so far."""
+        return sum(len(record) for record, _ in self._held) + int(self._flushed[-1][-1] if self._flushed else 0)
+
     def _flush(self) -> None:
         starts = [self._flushed[-1][-1] if self._flushed else 0]
         with open(self._path, "ab") as file:
