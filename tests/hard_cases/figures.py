@@ -31,12 +31,20 @@ FIGURES: list[Figure] = []
 
 
 def table() -> str:
-    """All figures of this process as Markdown, in the order in which the tests ran."""
-    lines = ["| case | known answer | tolerance | measured error |", "|---|---|---|---|"]
+    """All figures of this process as Markdown, in the order in which the tests ran.
+
+    Variants of one case that share the answer and the tolerance make one row, with the worst of their errors.
+    """
+    alike: dict[tuple, list[Figure]] = {}
     for f in FIGURES:
-        lines.append(f"| {f.case} | {f.known} | {_short(f.within)} | {_short(f.error)} |")
+        alike.setdefault((f.case.split(" (")[0], f.known, f.within), []).append(f)
+    lines = ["| case | known answer | tolerance | measured error |", "|---|---|---|---|"]
+    for (case, known, within), figures in alike.items():
+        variants = ", ".join(f.case.removeprefix(case).strip(" ()") for f in figures)
+        label = f"{case} ({variants})" if variants else case
+        lines.append(f"| {label} | {known} | {_short(within)} | {_short(max(f.error for f in figures))} |")
     return "\n".join(lines) + "\n"
 
 
 def _short(value: float) -> str:
-    return "exact" if value == 0 else f"{value:.2g}"
+    return "0" if value == 0 else f"{value:.2g}"
