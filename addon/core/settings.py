@@ -57,7 +57,7 @@ class Settings:
     interpolate: bool = True
     mirrors: bool = True
     specular: str = "frames"
-    specular_rays: int = 384
+    specular_rays: int = 256
     refine: int = 1
     threads: int = 0
     seed: int = 0

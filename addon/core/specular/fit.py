@@ -5,52 +5,38 @@ change from view to view, the diffuse part, is taken out of each element by leas
 median that still holds a broad lobe does not bias the fit. A diffuse part under a glossy coat darkens towards grazing
 views, where the coat reflects more; 'frames' lets it: D t(n.wo), t = 1 - kappa (1 - n.wo)^2. Without it a floor's
 highlights were half hidden by that darkening (living room: cost 0.90 of the Lambertian's without kappa, 0.78 with).
+
+The regressor A is noisy, as it comes of few rays. Least squares would take that noise for signal: it draws psi to 0,
+and makes whatever phi has the noisier A look worse. A and B come from two independent halves of the rays, so that the
+noise's part of every product is known (`LobeLight.A_noise`), and is taken out of <A, A>, <A, B> and the cost.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .lobes import GRID, LobeLight
+from .layout import Layout, Problem
+from .lobes import GRID
 
 HUBER = 2.0
 """Residuals beyond this many (robust) standard deviations weigh less: misregistration, edges, texture."""
 ROUNDS = 3
 KAPPAS = (0.0, 0.15, 0.3, 0.45, 0.6)
+LEAST_SIGNAL = 0.1
+"""Share of <A, A> that must be left once the noise's is taken out; where less is, psi rests on nothing, and is only
+prevented from growing without bound."""
 
 
 @dataclass(frozen=True)
-class Problem:
-    """The observations of one object, ready to be fitted.
+class Prior:
+    """What is known before any frame: mean and standard deviation of psi and of kappa."""
 
-    Attributes
-    ----------
-    element : (m,) int
-        Group of each observation: those of one surface element.
-    radiance : (m, 3) float64
-        I.
-    lit_diffuse : (m, 3) float64
-        L_d of the element; what 'target' takes as I_d.
-    light : LobeLight
-        A and B of each observation.
-    cosine : (m,) float32
-        n.wo.
-    """
-
-    element: np.ndarray
-    radiance: np.ndarray
-    lit_diffuse: np.ndarray
-    light: LobeLight
-    cosine: np.ndarray
-
-    def part(self, chosen: np.ndarray) -> Problem:
-        """The observations `chosen` ((m,) bool)."""
-        light = LobeLight(self.light.A[chosen], self.light.B[chosen], self.light.mirror[chosen])
-        return Problem(
-            self.element[chosen], self.radiance[chosen], self.lit_diffuse[chosen], light, self.cosine[chosen]
-        )
+    psi: float
+    psi_sigma: float
+    kappa: float
+    kappa_sigma: float
 
 
 @dataclass(frozen=True)
@@ -67,15 +53,9 @@ class LobeFit:
     kappa_lambertian : float
         The same with no lobe.
     cost : float
-        Mean robust cost of the residual, relative to the object's radiance.
-    cost_by_phi : (p,) float64
-        The same for each phi of the grid.
+        Mean robust cost of the residual, relative to the object's radiance; the part of the rays' noise taken out.
     cost_lambertian : float
         With no lobe at all.
-    diffuse_share : float
-        Mean of the diffuse part over mean radiance.
-    signal : float
-        How much psi's lobe moves the radiance, relative to it.
     residual, residual_lambertian : float
         Median size of the relative residual, with the lobe and without any.
     """
@@ -85,79 +65,110 @@ class LobeFit:
     kappa: float
     kappa_lambertian: float
     cost: float
-    cost_by_phi: np.ndarray
     cost_lambertian: float
-    diffuse_share: float
-    signal: float
     residual: float
     residual_lambertian: float
 
+    @property
+    def index(self) -> int:
+        """The grid's phi next to this one."""
+        return int(np.argmin(np.abs(np.sqrt(GRID) - np.sqrt(self.phi))))
 
-class _Solver:
-    """Nested least squares in psi for given phi and kappa."""
 
-    def __init__(self, problem: Problem, free_diffuse: bool, coloured: bool, least_psi: float = 0.0):
-        self.free, self.coloured, self.least_psi = free_diffuse, coloured, least_psi
-        self.problem = problem
-        _, self.group = np.unique(problem.element, return_inverse=True)
-        self.groups = int(self.group.max()) + 1
-        self.I = problem.radiance.astype(np.float64)
-        self.Ld = problem.lit_diffuse.astype(np.float64)
-        self.count = np.bincount(self.group, minlength=self.groups)
-        # Noise and misregistration grow with radiance: residuals count relative to the element's own level, with a
-        # floor at a tenth of the object's.
-        level = np.bincount(self.group, self.I.mean(1), self.groups) / self.count
-        self.level = np.maximum(level, 0.1 * np.median(level) + 1e-12)[self.group]
-        # a mean over n views takes part of the residual with it
-        self.inflate = np.sqrt(self.count / np.maximum(self.count - 1, 1))[self.group, None] if free_diffuse else 1.0
-        self.t = np.ones(len(self.I))
+@dataclass(frozen=True)
+class Solution:
+    """Several hypotheses (h of them) solved side by side.
 
-    def darken(self, kappa: float) -> None:
-        """Set how the diffuse part depends on the view."""
-        self.t = 1 - kappa * (1 - self.problem.cosine.astype(np.float64)) ** 2
+    Attributes
+    ----------
+    psi : (3, h) float32
+    size : (h, views, elements) float32
+        Size of the relative residual.
+    cost : (h, elements) float64
+        Robust cost of each element's observations, summed, in units of scale^2; the rays' noise taken out.
+    total : (h,) float64
+        Sum of the costs, and what the prior says.
+    """
 
-    def diffuse(self, values: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """What each element's own diffuse part takes of `values` ((m, 3)): D t with D by least squares."""
-        wt = weight * self.t
-        below = np.maximum(np.bincount(self.group, wt * self.t, self.groups), 1e-30)
-        D = np.stack([np.bincount(self.group, wt * values[:, c], self.groups) / below for c in range(3)], -1)
-        return D[self.group] * self.t[:, None]
+    psi: np.ndarray
+    size: np.ndarray
+    cost: np.ndarray
+    total: np.ndarray
 
-    def residual(self, A: np.ndarray, B: np.ndarray, psi: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """Size of the relative residual (m,) for given psi."""
-        rest = self.I - psi * A - B
-        rest = (rest - (self.diffuse(rest, weight) if self.free else self.Ld)) * self.inflate
-        return np.sqrt(np.einsum("mc,mc->m", rest, rest) / 3) / self.level
 
-    def psi(self, A: np.ndarray, B: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """clip(<A, r - B> / <A, A>, 0, 1), (3,)."""
-        r = self.I - B
-        a, r = (A - self.diffuse(A, weight), r - self.diffuse(r, weight)) if self.free else (A, r - self.Ld)
-        w = weight / self.level**2
-        up, down = np.einsum("m,mc,mc->c", w, a, r), np.einsum("m,mc,mc->c", w, a, a)
-        if not self.coloured:
-            up, down = np.full(3, up.sum()), np.full(3, down.sum())
-        return np.clip(up / np.maximum(down, 1e-30), self.least_psi, 1)
+def solve(
+    layout: Layout,
+    phi: slice | None,
+    kappa: float | tuple[float, ...],
+    scale: float,
+    *,
+    psi: np.ndarray | None = None,
+    coloured: bool = False,
+    least_psi: float = 0.0,
+    prior: Prior | None = None,
+    rounds: int = ROUNDS,
+) -> Solution:
+    """psi, robust cost and residuals for some phi, or one phi and several kappa: iteratively reweighted least squares.
 
-    def lobe(self, index: int) -> tuple[np.ndarray, np.ndarray]:
-        """A and B, (m, 3) float64, at one phi of the grid."""
-        return self.problem.light.A[:, index].astype(np.float64), self.problem.light.B[:, index].astype(np.float64)
-
-    def solve(self, index: int, kappa: float, scale: float) -> tuple[float, np.ndarray, np.ndarray]:
-        """Robust cost, psi and weights for one phi and kappa, by iteratively reweighted least squares."""
-        self.darken(kappa)
-        A, B = self.lobe(index)
-        weight = np.ones(len(A))
-        for _ in range(ROUNDS):
-            psi = self.psi(A, B, weight)
-            size = self.residual(A, B, psi, weight)
-            weight = np.minimum(1, HUBER * scale / np.maximum(size, 1e-12))
-        return float(huber(size, scale).mean()), psi, weight
-
-    def no_lobe(self, kappa: float) -> np.ndarray:
-        """Size of the relative residual (m,) of a Lambertian object."""
-        self.darken(kappa)
-        return self.residual(np.zeros_like(self.I), np.zeros_like(self.I), np.zeros(3), np.ones(len(self.I)))
+    Parameters
+    ----------
+    phi : slice or None
+        Of the grid; None for no lobe at all.
+    kappa : float or tuple of float
+    psi : (3,) float, optional
+        Given: nothing is solved for but the diffuse part.
+    """
+    t = layout.darkening(kappa)
+    if phi is None:
+        lobe, R = None, layout.I
+    else:
+        lobe = layout.lobe(phi)
+        R = layout.I - lobe.B
+    shape = np.broadcast_shapes(t.shape, R.shape[1:])
+    R = np.broadcast_to(R, (3, *shape))
+    weight = np.broadcast_to(layout.there, shape)
+    fixed = None if psi is None else np.asarray(psi, np.float32)[:, None] * np.ones((1, shape[0]), np.float32)
+    for _ in range(1 if lobe is None or fixed is not None else rounds):
+        wt = weight * t
+        below = np.maximum((wt * t).sum(1), np.float32(1e-20))
+        left = weight * (1 - wt * t / below[:, None])  # of independent noise, once the diffuse part has had its share
+        SR = np.einsum("hvg,chvg->chg", wt, R)
+        if lobe is None:
+            values, rest = np.zeros((3, shape[0]), np.float32), R - (SR / below)[:, :, None] * t
+        else:
+            A = np.broadcast_to(lobe.A, R.shape)
+            SA = np.einsum("hvg,chvg->chg", wt, A)
+            values = fixed
+            if fixed is None:
+                wA = weight * A
+                up = np.einsum("chvg,chvg->ch", wA, R) - np.einsum("chg,chg->ch", SA / below, SR)
+                down = np.einsum("chvg,chvg->ch", wA, A) - np.einsum("chg,chg->ch", SA / below, SA)
+                up += np.einsum("hvg,chvg->ch", left, np.broadcast_to(lobe.AB, R.shape))
+                clean = down - np.einsum("hvg,chvg->ch", left, np.broadcast_to(lobe.AA, R.shape))
+                if not coloured:
+                    up, down, clean = (np.broadcast_to(x.sum(0), x.shape) for x in (up, down, clean))
+                if prior is not None:
+                    # errors of one element's channels and views go together: they count once
+                    sure = 3 * layout.views * (scale / prior.psi_sigma) ** 2
+                    up, down, clean = up + sure * prior.psi, down + sure, clean + sure
+                values = np.clip(up / np.maximum(np.maximum(clean, LEAST_SIGNAL * down), 1e-30), least_psi, 1)
+            each = values[:, :, None, None]
+            rest = R - each * A
+            rest -= ((SR - values[..., None] * SA) / below)[:, :, None] * t
+        size = np.sqrt(np.einsum("chvg,chvg->hvg", rest, rest) / 3) * layout.inflate
+        weight = layout.there * np.minimum(1, HUBER * scale / np.maximum(size, 1e-12))
+    cost = huber(size, scale)
+    if lobe is not None:
+        noise = (each * (each * lobe.AA + 2 * lobe.AB) + lobe.BB).sum(0)
+        cost -= weight * left / np.maximum(layout.there, 1e-20) * noise * (layout.inflate / scale) ** 2 / 6
+    cost *= layout.there
+    by_element = cost.sum(1, dtype=np.float64)
+    total = by_element.sum(1)
+    if prior is not None:
+        off = ((values[0] - prior.psi) / prior.psi_sigma) ** 2
+        off = off + ((np.atleast_1d(kappa) - prior.kappa) / prior.kappa_sigma) ** 2
+        total += layout.views * off / 2
+    return Solution(values, size, by_element, total)
 
 
 def huber(size: np.ndarray, scale: float) -> np.ndarray:
@@ -172,12 +183,14 @@ def robust_scale(size: np.ndarray) -> float:
 
 
 def fit_lobe(
-    problem: Problem, way: str = "frames", coloured: bool = False, least_psi: float = 0.0, grid: np.ndarray = GRID
+    problem: Problem | Layout, way: str = "frames", coloured: bool = False, least_psi: float = 0.0,
+    prior: Prior | None = None,
 ) -> LobeFit:
-    """Best phi of the grid, with its psi.
+    """Best phi, with its psi.
 
     Parameters
     ----------
+    problem : Problem, or its Layout where several fits are made
     way : str
         'frames' or 'target'.
     coloured : bool
@@ -185,49 +198,86 @@ def fit_lobe(
     least_psi : float
         Lower bound of psi.
     """
-    solver = _Solver(problem, way == "frames", coloured, least_psi)
-    kappas = KAPPAS if solver.free else (0.0,)
-    flat = [solver.no_lobe(kappa) for kappa in kappas]
-    scale = robust_scale(flat[0])
-    kappa, costs = kappas[len(kappas) // 2], np.full(len(grid), np.inf)
+    layout = problem if isinstance(problem, Layout) else Layout(problem, way == "frames")
+    how = {"coloured": coloured, "least_psi": least_psi, "prior": prior}
+    kappas = KAPPAS if layout.free else (0.0,)
+    flat = solve(layout, None, kappas, 1.0).size
+    scale = robust_scale(layout.seen(flat[0]))
+    kappa = kappas[len(kappas) // 2]
     # phi at a middling kappa, kappa at that phi, phi again; and the scale from the fit, or every outlier of the poor
     # start would count as noise.
-    for _ in range(2 if solver.free else 1):
-        costs = np.array([solver.solve(i, kappa, scale)[0] for i in range(len(grid))])
+    for _ in range(2 if layout.free else 1):
+        costs = solve(layout, slice(None), kappa, scale, **how).total
         best = int(np.argmin(costs))
-        kappa = min(kappas, key=lambda k: solver.solve(best, k, scale)[0])
-        _, psi, weight = solver.solve(best, kappa, scale)
-        A, B = solver.lobe(best)
-        scale = robust_scale(solver.residual(A, B, psi, weight))
-    cost, psi, weight = solver.solve(best, kappa, scale)
-    lobe = psi * A + B
-    mean = max(float(problem.radiance.mean()), 1e-12)
-    moved = lobe - solver.diffuse(lobe, weight) if solver.free else lobe
-    size = solver.residual(A, B, psi, weight)
-    flat_costs = [float(huber(f, scale).mean()) for f in flat]
-    flattest = int(np.argmin(flat_costs))
+        by_kappa = solve(layout, slice(best, best + 1), kappas, scale, **how)
+        at = int(np.argmin(by_kappa.total))
+        kappa = kappas[at]
+        scale = robust_scale(layout.seen(by_kappa.size[at]))
+    near = slice(max(best - 1, 0), best + 2)
+    found = solve(layout, near, kappa, scale, **how)
+    costs = found.total
+    middle = best - near.start
+    root, psi = between(np.sqrt(GRID[near]), costs, found.psi, middle)
+    flat_costs = huber(flat, scale) * layout.there
+    flattest = int(np.argmin(flat_costs.sum((1, 2))))
+    unit = scale**2 / layout.count
     return LobeFit(
-        phi=float(grid[best]),
+        phi=float(min(max(root**2, GRID[0]), GRID[-1])),
         psi=psi,
         kappa=kappa,
         kappa_lambertian=kappas[flattest],
-        cost=cost * scale**2,
-        cost_by_phi=costs * scale**2,
-        cost_lambertian=flat_costs[flattest] * scale**2,
-        diffuse_share=float(np.clip((problem.radiance - lobe).mean() / mean, 0, 1)),
-        signal=float(np.sqrt((moved**2).mean()) / mean),
-        residual=float(np.median(size)),
-        residual_lambertian=float(np.median(flat[flattest])),
+        cost=float(found.cost[middle].sum()) * unit,
+        cost_lambertian=float(flat_costs[flattest].sum(dtype=np.float64)) * unit,
+        residual=float(np.median(layout.seen(found.size[middle]))),
+        residual_lambertian=float(np.median(layout.seen(flat[flattest]))),
     )
 
 
-def element_costs(problem: Problem, fit: LobeFit, lobe: bool, scale: float, grid: np.ndarray = GRID) -> np.ndarray:
-    """Robust cost of each element's observations under a fit made elsewhere, with its lobe or without: (groups,)."""
-    solver = _Solver(problem, True, True)
-    if lobe:
-        solver.darken(fit.kappa)
-        A, B = solver.lobe(int(np.argmin(np.abs(grid - fit.phi))))
-        size = solver.residual(A, B, fit.psi, np.ones(len(A)))
-    else:
-        size = solver.no_lobe(fit.kappa_lambertian)
-    return np.bincount(solver.group, huber(size, scale), solver.groups)
+def between(x: np.ndarray, cost: np.ndarray, psi: np.ndarray, middle: int) -> tuple[float, np.ndarray]:
+    """Where the parabola through three costs is least, and psi there.
+
+    Parameters
+    ----------
+    x : (2 or 3,) float
+        sqrt(phi), close to evenly spaced in the grid.
+    cost : like x
+        Least at `middle`.
+    psi : (3, 2 or 3) float
+
+    Returns
+    -------
+    x : float
+        No further off than half way to the next.
+    psi : (3,) float64
+        Interpolated.
+    """
+    x, psi = x.astype(np.float64), psi.astype(np.float64)
+    if len(x) < 3 or middle != 1:
+        return float(x[middle]), psi[:, middle]
+    left, right = (cost[0] - cost[1]) / (x[0] - x[1]), (cost[2] - cost[1]) / (x[2] - x[1])
+    curve = (right - left) / (x[2] - x[0])
+    if curve <= 0:
+        return float(x[1]), psi[:, 1]
+    slope = (right * (x[1] - x[0]) + left * (x[2] - x[1])) / (x[2] - x[0])
+    at = float(np.clip(x[1] - slope / (2 * curve), (x[0] + x[1]) / 2, (x[1] + x[2]) / 2))
+    return at, np.array([np.interp(at, x, channel) for channel in psi])
+
+
+def held_out_costs(
+    layout: Layout, fit: LobeFit, train: np.ndarray, scale: float, **how
+) -> tuple[np.ndarray, np.ndarray]:
+    """Costs of the elements that `train` ((g,) bool) leaves, with and without a lobe whose psi the others gave.
+
+    phi and kappa are those of the fit over all: two numbers of hundreds of elements, whose optimism is far below
+    what a lobe must gain. `how` is that of `solve`.
+    """
+    at = slice(fit.index, fit.index + 1)
+    psi = solve(layout.part(train), at, fit.kappa, scale, **how).psi[:, 0]
+    return element_costs(layout.part(~train), replace(fit, psi=psi), scale)
+
+
+def element_costs(layout: Layout, fit: LobeFit, scale: float) -> tuple[np.ndarray, np.ndarray]:
+    """Robust cost of each element's observations under a fit made elsewhere, with its lobe and without: (g,) each."""
+    at = slice(fit.index, fit.index + 1)
+    lobe = solve(layout, at, fit.kappa, scale, psi=fit.psi).cost[0]
+    return lobe, solve(layout, None, fit.kappa_lambertian, scale).cost[0]

@@ -10,7 +10,6 @@ from ..material import METAL
 from ..shading.field import FLAT, LightField
 from ..shading.lamps import Lamp
 from ..shading.mirrors import Mirror
-from .lobes import GRID
 from .models import choose_model, metal_f0
 from .problems import Problems
 from .samples import Samples
@@ -66,6 +65,6 @@ def find_mirrors(
         problem = maker.problem(index, RAYS)
         choice = choose_model(problem)
         if choice.model == METAL and choice.fit.phi <= MIRROR_PHI:
-            f0 = metal_f0(problem, int(np.argmin(np.abs(GRID - choice.fit.phi))))
+            f0 = metal_f0(problem, choice.fit.index)
             mirrors.append(Mirror(instance.object_id, *plane, f0.astype(np.float32)))
     return tuple(mirrors)

@@ -7,10 +7,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..material import LAMBERTIAN, METAL, SPECULAR
-from .fit import LobeFit, Problem, element_costs, fit_lobe
+from .fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs
+from .layout import Layout, Problem
 
 LEAST_PSI = 0.02
 """No solid dielectric reflects less at normal incidence (n = 1.33); a smaller fitted psi is no lobe at all."""
+DIELECTRIC = Prior(psi=0.04, psi_sigma=0.01, kappa=0.3, kappa_sigma=0.15)
+"""Plastics, lacquers, glass and woods have n = 1.4 to 1.6: F0 = 0.03 to 0.05, and what leaves their diffuse part
+through the surface, 1 - F(n.wo), is close to 1 - 0.3 (1 - n.wo)^2. A broad lobe leaves both open (darkening towards
+grazing views, or a lobe broader and stronger than it is), and then this decides; where the frames tell, they outweigh
+it."""
 METAL_PSI = 0.12
 """No common dielectric reflects more (n = 2.06); what does is a metal or a mirror."""
 METAL_PHI = 0.5
@@ -48,38 +54,51 @@ class Choice:
     note: str = ""
 
 
-def gain_of(fit: LobeFit, held: Problem) -> tuple[float, float]:
-    """Share of the cost that a fit's lobe takes off elements it has not seen, and that in standard errors."""
-    scale = max(1.4826 * fit.residual, 1e-4)
-    with_lobe, without = element_costs(held, fit, True, scale), element_costs(held, fit, False, scale)
+def _gain(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
+    """Share of the elements' costs that the lobe takes off, and that in standard errors."""
     saved = without - with_lobe
     error = saved.std() / np.sqrt(len(saved))
     return float(saved.sum() / max(without.sum(), 1e-30)), float(saved.mean() / max(error, 1e-30))
 
 
-def _held_out(problem: Problem, coloured: bool) -> tuple[float, float]:
-    """`gain_of` by two-fold cross-validation over the elements."""
-    elements, group = np.unique(problem.element, return_inverse=True)
-    odd = (np.random.default_rng(0).permutation(len(elements)) % 2).astype(bool)[group]
-    found = [
-        gain_of(fit_lobe(problem.part(train), "frames", coloured, LEAST_PSI), problem.part(~train))
-        for train in (odd, ~odd)
-    ]
-    gain, sigmas = np.mean(found, 0)
-    return float(gain), float(sigmas * np.sqrt(2))
+def gain_of(fit: LobeFit, held: Problem) -> tuple[float, float]:
+    """Share of the cost that a fit's lobe takes off elements it has not seen, and that in standard errors."""
+    return _gain(*element_costs(Layout(held), fit, max(1.4826 * fit.residual, 1e-4)))
+
+
+def _sets_apart(own: LobeFit, other: LobeFit, problem: Problem) -> bool:
+    """Whether an object's own lobe explains its frames better than another does, beyond doubt."""
+    layout, scale = Layout(problem), max(1.4826 * own.residual, 1e-4)
+    (with_own, _), (with_other, _) = (element_costs(layout, fit, scale) for fit in (own, other))
+    gain, sigmas = _gain(with_own, with_other)
+    return gain > MIN_GAIN and sigmas > MIN_SIGMAS
 
 
 def choose_model(problem: Problem) -> Choice:
     """The simplest model that the observations support, by two-fold cross-validation over the elements."""
     if len(np.unique(problem.element)) < MIN_ELEMENTS:
         return Choice(LAMBERTIAN, None, note="Too few observations to look for a highlight.")
-    metal = fit_lobe(problem, "frames", True)
+    layout = Layout(problem)
+    odd = (np.random.default_rng(0).permutation(layout.there.shape[1]) % 2).astype(bool)
+
+    def held_out(fit: LobeFit, how: dict) -> tuple[np.ndarray, np.ndarray]:
+        """Costs of the elements with the lobe that the others gave, and without one."""
+        found = [held_out_costs(layout, fit, train, scale, **how) for train in (odd, ~odd)]
+        with_lobe, without = (np.concatenate(costs) for costs in zip(*found, strict=True))
+        return with_lobe, without
+
+    how = {"least_psi": LEAST_PSI, "prior": DIELECTRIC}
+    fit = fit_lobe(layout, **how)
+    scale = max(1.4826 * fit.residual, 1e-4)
+    with_lobe, without = held_out(fit, how)
+    metal = fit_lobe(layout, coloured=True)
     if float(metal.psi.mean()) > METAL_PSI and metal.phi <= METAL_PHI:
-        gain, sigmas = _held_out(problem, True)
-        if gain > MIN_GAIN and sigmas > MIN_SIGMAS:
+        with_metal, bare = held_out(metal, {"coloured": True})
+        (gain, sigmas), (more, surely) = _gain(with_metal, bare), _gain(with_metal, with_lobe)
+        # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
+        if min(gain, more) > MIN_GAIN and min(sigmas, surely) > MIN_SIGMAS:
             return Choice(METAL, metal, gain, sigmas)
-    fit = fit_lobe(problem, "frames", False, LEAST_PSI)
-    gain, sigmas = _held_out(problem, False)
+    gain, sigmas = _gain(with_lobe, without)
     if gain > MIN_GAIN and sigmas > MIN_SIGMAS and fit.psi[0] <= METAL_PSI and fit.phi <= DIELECTRIC_PHI:
         return Choice(SPECULAR, fit, gain, sigmas)
     return Choice(LAMBERTIAN, fit, gain, sigmas, "Roughness and specular are not identifiable from these frames.")
@@ -88,31 +107,54 @@ def choose_model(problem: Problem) -> Choice:
 def adopt_from_class(
     choices: dict[int, Choice], problems: dict[int, Problem], class_of: dict[int, str]
 ) -> dict[int, Choice]:
-    """Let objects whose own frames decide nothing take over what others of their class were found to be.
+    """One lobe for each class of objects, unless an object's own frames speak against it.
 
-    The class's lobe is the one of the member with the strongest evidence. It is refused where it raises the object's
-    own cost by more than `EXCLUDED`: then the object is not like its class.
+    The class's model is that of the member with the strongest evidence, its lobe the median over the members of that
+    model, weighted by evidence. Members keep their own lobe where their frames set it apart from that. Objects
+    whose own frames decide nothing take over the class's, but not where it raises their cost by more than `EXCLUDED`.
     """
     result = dict(choices)
-    best: dict[str, int] = {}
-    for object_id, choice in choices.items():
-        name = class_of[object_id]
-        if choice.model != LAMBERTIAN and (name not in best or choice.sigmas > choices[best[name]].sigmas):
-            best[name] = object_id
-    for object_id, choice in choices.items():
-        source = best.get(class_of[object_id])
-        if choice.model != LAMBERTIAN or source is None:
+    for name in set(class_of[object_id] for object_id in choices):
+        members = {i: choice for i, choice in choices.items() if class_of[i] == name}
+        found = {i: choice for i, choice in members.items() if choice.model != LAMBERTIAN}
+        if not found:
             continue
-        model = choices[source]
-        if object_id in problems and len(np.unique(problems[object_id].element)) >= MIN_ELEMENTS:
-            own = model.fit if choice.fit is None else replace(model.fit, kappa_lambertian=choice.fit.kappa_lambertian)
-            own = replace(own, residual=choice.fit.residual if choice.fit else own.residual)
-            gain, _ = gain_of(own, problems[object_id])
-            if gain < -EXCLUDED:
-                continue
-        note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
-        result[object_id] = replace(model, gain=0.0, sigmas=0.0, note=note)
+        source = max(found, key=lambda i: found[i].sigmas)
+        model = _pooled([c for c in found.values() if c.model == found[source].model], found[source])
+        for i, choice in members.items():
+            if choice.model == LAMBERTIAN and not _refused(model.fit, choice.fit, problems.get(i)):
+                note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
+                result[i] = replace(model, gain=0.0, sigmas=0.0, note=note)
+            elif choice.model == model.model and len(found) > 1 and i in problems:
+                shared = replace(choice.fit, phi=model.fit.phi)
+                if model.model == SPECULAR:
+                    shared = replace(shared, psi=model.fit.psi)
+                if not _sets_apart(choice.fit, shared, problems[i]):
+                    result[i] = replace(choice, fit=shared)
     return result
+
+
+def _pooled(found: list[Choice], best: Choice) -> Choice:
+    """`best` with the median phi and psi of several choices, weighted by their evidence."""
+    weight = np.square([choice.sigmas for choice in found])
+    phi = _weighted_median(np.array([choice.fit.phi for choice in found]), weight)
+    psi = [_weighted_median(values, weight) for values in np.array([choice.fit.psi for choice in found]).T]
+    return replace(best, fit=replace(best.fit, phi=phi, psi=np.array(psi)))
+
+
+def _weighted_median(values: np.ndarray, weight: np.ndarray) -> float:
+    """The first value, in rising order, that at least half of the weight does not exceed."""
+    order = np.argsort(values)
+    return float(values[order][np.searchsorted(np.cumsum(weight[order]), weight.sum() / 2)])
+
+
+def _refused(lobe: LobeFit, own: LobeFit | None, problem: Problem | None) -> bool:
+    """Whether an object's own frames speak against its class's lobe."""
+    if problem is None or len(np.unique(problem.element)) < MIN_ELEMENTS:
+        return False
+    if own is not None:
+        lobe = replace(lobe, kappa_lambertian=own.kappa_lambertian, residual=own.residual)
+    return gain_of(lobe, problem)[0] < -EXCLUDED
 
 
 def metal_f0(problem: Problem, phi_index: int) -> np.ndarray:

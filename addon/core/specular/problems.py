@@ -7,9 +7,8 @@ import numpy as np
 from ..lit_diffuse.accumulate import LitDiffuse
 from ..shading.emitters import bright_triangles
 from ..shading.field import LightField
-from ..surface.elements import triangle_geometry
-from .fit import Problem
-from .lobes import GRID, LobeLight, reflected_light
+from .layout import Problem
+from .lobes import LobeLight, reflected_light
 from .samples import Samples
 
 LEAST_VIEWS = 4
@@ -57,7 +56,6 @@ class Problems:
         self._field, self._lit, self._samples = field, lit_diffuse, samples
         self._threads, self._seed = threads, seed
         self._bright = bright_triangles(field)
-        self._normals, _ = triangle_geometry(field.mesh)
         # A clipped pixel is no value; what is left is sorted by object, so that each object's lies together.
         usable = np.flatnonzero(~samples.saturated)
         owner = field.atlas.object_id[samples.element[usable]]
@@ -69,11 +67,12 @@ class Problems:
         first, last = np.searchsorted(self._owner, [object_id, object_id + 1])
         return pick(self._samples, self._usable[first:last], elements, views, least, self._seed + seed)
 
-    def light(self, index: np.ndarray, rays: int, grid: np.ndarray = GRID) -> LobeLight:
-        """A and B of observations."""
+    def light(self, index: np.ndarray, rays: int, phi: float | None = None) -> LobeLight:
+        """A and B of observations: for the whole grid, or for the one width `phi` with rays of that width."""
+        known = {} if phi is None else {"grid": np.float32([phi]), "proposals": (phi,)}
         return reflected_light(
-            self._field, self._bright, self._normals, self._samples.element[index], self._samples.direction[index],
-            rays=rays, grid=grid, threads=self._threads, seed=self._seed,
+            self._field, self._bright, self._samples.element[index], self._samples.direction[index],
+            rays=rays, threads=self._threads, seed=self._seed, **known,
         )  # fmt: skip
 
     def problem(self, index: np.ndarray, rays: int) -> Problem:

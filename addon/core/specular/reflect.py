@@ -9,11 +9,12 @@ import numpy as np
 from ..capture.model import Instance
 from ..lit_diffuse.accumulate import LitDiffuse
 from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, ObjectMaterial
+from ..parallel import ordered_map
 from ..progress import Progress
 from ..shading.field import LightField
 from ..shading.lamps import Lamp
-from .fit import Problem, fit_lobe
-from .lobes import GRID
+from .fit import fit_lobe
+from .layout import Problem
 from .models import Choice, adopt_from_class, choose_model, metal_f0
 from .problems import Problems
 from .samples import Samples
@@ -24,16 +25,15 @@ FIT_ELEMENTS = 350
 FIT_VIEWS = 12
 """Elements of an object that the fit looks at, and views of each."""
 SCREEN_ELEMENTS = 200
-SCREEN_RAYS = 8
-"""The first look is at fewer elements and with so many times fewer rays: it finds metals and drops what a lobe makes
-much worse. For the rest the rays count: their noise in A acts like an error in the regressor and draws psi to 0. On the
-living room's floor (F0 0.04) 64 rays an observation give psi 0.014, 512 give 0.034."""
+SCREEN_RAYS = 4
+"""The first look is at fewer elements and with so many times fewer rays; it finds metals and drops what a lobe
+makes much worse."""
 HOPELESS = 1.15
 """A lobe that raises the cost by this factor in the first look needs no second."""
 SEPARATE_ELEMENTS = 2500
 SEPARATE_VIEWS = 9
-SEPARATE_RAYS = 4
-"""Taking the lobe out of a median averages over views; so many times fewer rays do."""
+SEPARATE_RAYS = 8
+"""Taking the lobe out of a median averages over views, and its width is known; so many times fewer rays do."""
 TARGET_PHI = 7
 """Index into the grid of the middle width with which highlights are foreseen (A1)."""
 
@@ -63,7 +63,7 @@ def fit_specular(
     frame_names: list[str],
     *,
     way: str = "frames",
-    rays: int = 384,
+    rays: int = 256,
     refine: int = 1,
     threads: int = 0,
     seed: int = 0,
@@ -84,26 +84,20 @@ def fit_specular(
         From `progress`.
     """
     glowing = {lamp.object_id: lamp for lamp in lamps}
-    maker = Problems(field, lit_diffuse, samples, threads, seed)
+    # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
+    maker = Problems(field, lit_diffuse, samples, threads=1, seed=seed)
+    wanted = [i.object_id for i in instances if i.object_id not in glowing]
+
+    def look(object_id: int) -> tuple[Choice, Problem | None, int]:
+        return _look(maker, object_id, samples, len(frame_names), way, rays)
+
     problems, choices, targets = {}, {}, {}
-    for done, i in enumerate(instances):
-        if i.object_id in glowing:
-            continue
-        choices[i.object_id] = Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight.")
-        index = maker.pick(i.object_id, SCREEN_ELEMENTS, FIT_VIEWS)
-        if len(index):
-            problem = maker.problem(index, max(rays // SCREEN_RAYS, 16))
-            scores = score_frames(
-                samples.frame[index], problem.light.A[:, TARGET_PHI], problem.lit_diffuse, len(frame_names)
-            )
-            targets[i.object_id] = target_frame(scores)
-            if way == "frames":
-                choice, problem = _by_frames(maker, i.object_id, problem, rays)
-            else:
-                choice, problem = _by_target(maker, i.object_id, samples.frame, targets[i.object_id], rays)
-            choices[i.object_id], problems[i.object_id] = choice, problem
+    for object_id, found in zip(wanted, ordered_map(look, wanted, threads), strict=True):
+        choices[object_id], problem, targets[object_id] = found
+        if problem is not None:
+            problems[object_id] = problem
         if progress is not None:
-            progress.update(0.8 * (done + 1) / len(instances))
+            progress.update(0.8 * len(choices) / len(wanted))
     if way == "frames":
         choices = adopt_from_class(choices, problems, {i.object_id: i.class_name for i in instances})
 
@@ -123,11 +117,31 @@ def fit_specular(
 
     specular = np.zeros((len(field.atlas), 3), np.float32)
     glossy = [m for m in materials if m.model == SPECULAR] if refine else []
-    for done, material in enumerate(glossy):
-        _separate(material, field, maker, samples, max(rays // SEPARATE_RAYS, 16), specular)
+
+    def separate(material: ObjectMaterial) -> tuple[np.ndarray, np.ndarray]:
+        return _separate(material, field, maker, samples, max(rays // SEPARATE_RAYS, 16))
+
+    for done, (own, part) in enumerate(ordered_map(separate, glossy, threads)):
+        specular[own] = part
         if progress is not None:
             progress.update(0.8 + 0.2 * (done + 1) / len(glossy))
     return Specular(tuple(materials), specular)
+
+
+def _look(
+    maker: Problems, object_id: int, samples: Samples, frames: int, way: str, rays: int
+) -> tuple[Choice, Problem | None, int]:
+    """Model, observations and target frame (-1: none) of one object."""
+    index = maker.pick(object_id, SCREEN_ELEMENTS, FIT_VIEWS)
+    if not len(index):
+        return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, -1
+    problem = maker.problem(index, max(rays // SCREEN_RAYS, 16))
+    target = target_frame(
+        score_frames(samples.frame[index], problem.light.A[:, TARGET_PHI], problem.lit_diffuse, frames)
+    )
+    if way == "frames":
+        return (*_by_frames(maker, object_id, problem, rays), target)
+    return (*_by_target(maker, object_id, samples.frame, target, rays), target)
 
 
 def _by_frames(maker: Problems, object_id: int, screen: Problem, rays: int) -> tuple[Choice, Problem]:
@@ -165,18 +179,19 @@ def _material(instance: Instance, choice: Choice, problem: Problem | None, targe
     if choice.model == LAMBERTIAN:
         return ObjectMaterial(**(common | {"residual": common["residual_lambertian"]}))
     if choice.model == METAL:
-        at = int(np.argmin(np.abs(GRID - fit.phi)))
-        f0 = fit.psi if problem is None else metal_f0(problem, at)
+        f0 = fit.psi if problem is None else metal_f0(problem, fit.index)
         return ObjectMaterial(**common, phi=fit.phi, f0=tuple(float(x) for x in f0))
     return ObjectMaterial(**common, phi=fit.phi, psi=float(fit.psi.mean()))
 
 
-def _separate(material: ObjectMaterial, field, maker: Problems, samples: Samples, rays: int, specular) -> None:
-    """Write the specular part of a glossy object's L_d into `specular`."""
+def _separate(
+    material: ObjectMaterial, field: LightField, maker: Problems, samples: Samples, rays: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """A glossy object's elements (n,), and the specular part of their L_d, (n, 3)."""
+    own = np.flatnonzero(field.atlas.object_id == material.object_id)
     index = maker.pick(material.object_id, SEPARATE_ELEMENTS, SEPARATE_VIEWS, least=1, seed=2)
     if not len(index):
-        return
-    light = maker.light(index, rays, np.float32([material.phi]))
+        return own, np.zeros((len(own), 3), np.float32)
+    light = maker.light(index, rays, material.phi)
     element, part = specular_in_median(samples, index, material.psi * light.A[:, 0] + light.B[:, 0])
-    own = np.flatnonzero(field.atlas.object_id == material.object_id)
-    specular[own] = spread_over_object(field.atlas, own, element, part)
+    return own, spread_over_object(field.atlas, own, element, part)

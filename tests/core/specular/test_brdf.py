@@ -85,9 +85,7 @@ def test_sampled_normals_follow_the_density(phi, degrees):
     """Share of the samples below each of a few tilts and on either side, against the density's integral."""
     wo = tilted(degrees)
     rng, n = np.random.default_rng(0), 40000
-    drawn = brdf.sample_visible_normal(
-        np.tile(wo, (n, 1)).astype(np.float32), rng.random((n, 2), np.float32), phi
-    )
+    drawn = brdf.sample_visible_normal(wo.astype(np.float32)[:, None], rng.random((2, 1, n), np.float32), phi)[:, 0].T
     assert np.allclose(np.linalg.norm(drawn, axis=1), 1, atol=1e-5) and (drawn[:, 2] > 0).all()
     assert (drawn @ wo > -1e-4).all()
     h, step = sphere(800, 200)
@@ -107,3 +105,13 @@ def test_f_nd_is_the_product_and_is_reciprocal():
     other = brdf.f_nd(wo[2], w[2], h[2], wo @ h, 0.3, 0.05)
     assert one == pytest.approx(other)
     assert one == pytest.approx(brdf.G1(w[2], 0.3) * brdf.G1(wo[2], 0.3) * brdf.D(h[2], 0.3) * brdf.F(w @ h, 0.05))
+
+
+@pytest.mark.parametrize("phi", [0.01, 0.1, 0.5, 1.0])
+def test_all_phi_at_once(phi):
+    """`lobes` is G times D."""
+    rng = np.random.default_rng(1)
+    n_w, n_wo, n_h = (rng.uniform(0.05, 1, shape).astype(np.float32) for shape in ((7, 20), (7, 1), (7, 20)))
+    found = brdf.lobes(n_w, n_wo, 1 - n_h * n_h, np.float32([phi, 0.3]))
+    assert found.shape == (7, 2, 20) and found.dtype == np.float32
+    assert np.allclose(found[:, 0], brdf.G(n_w, n_wo, phi) * brdf.D(n_h, phi), rtol=2e-4)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from addon.core.specular.fit import fit_lobe, huber, robust_scale
+from addon.core.specular.fit import between, fit_lobe, huber, robust_scale, solve
+from addon.core.specular.layout import Layout
 from addon.core.specular.lobes import GRID
+from addon.core.specular.models import DIELECTRIC
 from tests.core.glossy_box import Box
 
 
@@ -34,8 +38,7 @@ def test_several_frames(box, phi, psi):
     # A broad lobe differs little from view to view: its psi rests on less.
     assert fit.psi[0] == pytest.approx(psi, rel=0.15 if phi < 0.3 else 0.25)
     assert np.ptp(fit.psi) == 0 and fit.cost < fit.cost_lambertian
-    assert fit.cost_by_phi.argmin() == np.argmin(np.abs(GRID - fit.phi)) and fit.cost_by_phi.shape == GRID.shape
-    assert fit.residual < fit.residual_lambertian and fit.signal > 0.005
+    assert fit.residual < fit.residual_lambertian
 
 
 @pytest.mark.parametrize(("phi", "psi"), [(0.06, 0.1), (0.11, 0.04), (0.2, 0.2), (0.4, 0.2)])
@@ -52,7 +55,6 @@ def test_a_metal_has_colour(box):
     f0 = np.array([0.9, 0.6, 0.3])
     fit = fit_lobe(box.problem(element, direction, 0.11, f0, np.zeros((len(element), 3))), coloured=True)
     assert steps(fit.phi, 0.11) <= 1 and np.allclose(fit.psi, f0, rtol=0.15)
-    assert fit.diffuse_share < 0.1
 
 
 def test_the_median_may_hold_some_of_the_lobe(box):
@@ -90,10 +92,10 @@ def test_a_coat_darkens_its_diffuse_part(box):
 def test_exposure_does_not_matter(box):
     element, direction, _ = box.views(30, 6)
     p = box.problem(element, direction, 0.11, 0.1, paint(element))
-    light = type(p.light)(p.light.A * 1000, p.light.B * 1000, p.light.mirror * 1000)
+    light = type(p.light)(*(1000 * getattr(p.light, name) for name in ("A", "B", "A_noise", "B_noise")))
     one = fit_lobe(p)
     other = fit_lobe(type(p)(p.element, p.radiance * 1000, p.lit_diffuse * 1000, light, p.cosine))
-    assert one.phi == other.phi and np.allclose(one.psi, other.psi, rtol=1e-4)
+    assert one.phi == pytest.approx(other.phi, rel=1e-4) and np.allclose(one.psi, other.psi, rtol=1e-4)
     assert one.cost == pytest.approx(other.cost, rel=1e-3)
 
 
@@ -101,7 +103,7 @@ def test_psi_is_bounded(box):
     element, direction, _ = box.views(30, 6)
     flat = box.problem(element, direction, None, 0, paint(element))
     assert fit_lobe(flat, least_psi=0.02).psi[0] >= 0.02
-    assert 0 <= fit_lobe(flat).psi[0] < 0.02
+    assert 0 <= fit_lobe(flat, prior=DIELECTRIC).psi[0] < 0.06  # what the frames leave open
     bright = box.problem(element, direction, 0.11, 3.0, paint(element))
     assert fit_lobe(bright).psi[0] == 1
 
@@ -112,3 +114,49 @@ def test_huber_and_scale():
     size = np.abs(np.random.default_rng(0).normal(0, 0.3, 20000))
     assert robust_scale(size) == pytest.approx(0.3, rel=0.03)
     assert robust_scale(np.zeros(5)) > 0
+
+
+@pytest.mark.parametrize("rays", [20, 40, 160])
+@pytest.mark.parametrize(("phi", "psi"), [(0.15, 0.04), (0.26, 0.1)])
+def test_few_rays_do_not_draw_psi_to_0(box, rays, phi, psi):
+    """The noise of A is taken out of <A, A>; without that 20 rays lose a good part of psi."""
+    element, direction, _ = box.views(150, 10)
+    problem = box.problem(element, direction, phi, psi, paint(element), rays=rays)
+    light = problem.light
+    deaf = replace(problem, light=replace(light, A_noise=0 * light.A, B_noise=0 * light.B))
+    at = slice(int(np.argmin(np.abs(GRID - phi))), int(np.argmin(np.abs(GRID - phi))) + 1)
+    found, naive, clear = (
+        float(solve(Layout(p), at, 0.0, 0.03).psi[0, 0])
+        for p in (problem, deaf, box.problem(element, direction, phi, psi, paint(element), rays=2000))
+    )
+    assert found == pytest.approx(clear, rel=0.12)
+    assert naive < found and (rays > 20 or naive < 0.9 * clear)
+
+
+@pytest.mark.parametrize("f0", [0.02, 0.2, 0.9])
+@pytest.mark.parametrize("phi", [0.02, 0.15, 0.5, 0.9])
+def test_the_whole_range(box, phi, f0):
+    """Narrow and broad, weak and strong. A broad and weak lobe hardly changes with the view: psi is loose there."""
+    element, direction, _ = box.views(120, 12)
+    fit = fit_lobe(box.problem(element, direction, phi, f0, paint(element), rays=128, noise=0.01))
+    loose = phi > 0.3
+    assert abs(np.sqrt(fit.phi) - np.sqrt(phi)) < (0.13 if loose else 0.05)
+    assert fit.psi[0] == pytest.approx(f0, rel=0.5 if loose else 0.2, abs=0.015 if loose else 0.005)
+
+
+def test_what_is_known_of_psi_fills_in(box):
+    """A prior decides where the frames don't, and gives way where they do."""
+    element, direction, _ = box.views(60, 10)
+    blurred = box.problem(element, direction, 0.6, 0.04, paint(element), noise=0.05)
+    assert abs(fit_lobe(blurred, prior=DIELECTRIC).psi[0] - 0.04) < 0.015
+    clear = box.problem(element, direction, 0.11, 0.08, paint(element))
+    assert fit_lobe(clear, prior=DIELECTRIC).psi[0] == pytest.approx(0.08, rel=0.15)
+
+
+def test_between_grid_points():
+    x = np.array([0.4, 0.5, 0.62])
+    psi = np.tile([0.1, 0.2, 0.3], (3, 1))
+    at, value = between(x, (x - 0.53) ** 2 * 7 + 1, psi, 1)
+    assert at == pytest.approx(0.53) and value == pytest.approx(0.225)
+    assert between(x[:2], np.array([1.0, 2.0]), psi[:, :2], 0)[0] == 0.4  # the grid's end
+    assert between(x, np.array([1.0, 1.0, 1.0]), psi, 1)[0] == 0.5
