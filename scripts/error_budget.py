@@ -26,7 +26,7 @@ from addon.core.recover import Recovery
 from addon.core.settings import Settings
 from addon.core.shading.albedo import MEASURED, quotient
 from addon.core.store import Store
-from addon.core.surface.elements import element_of_triangle, lookup
+from addon.core.surface.elements import ElementLookup
 
 SHIFTS = ((-0.25, -0.25), (0.25, 0.25), (-0.25, 0.25), (0.25, -0.25))
 
@@ -34,7 +34,7 @@ SHIFTS = ((-0.25, -0.25), (0.25, 0.25), (-0.25, 0.25), (0.25, -0.25))
 def views(capture: Path, recovery: Recovery) -> list[dict]:
     """For each held-out view: the element under each of four points a pixel, truth, and the pixels that count."""
     surface = recovery.surface()
-    fallback = element_of_triangle(surface.mesh, surface.atlas)
+    lookup = ElementLookup(surface.mesh, surface.atlas)
     spec = json.loads((capture / "truth" / "transforms.json").read_text())
     objects = {o["id"]: o for o in json.loads((capture / "truth" / "materials.json").read_text())}
     plain = {i for i, o in objects.items() if not (o["emission"] or o["metallic"] or o["masked"])}
@@ -51,9 +51,7 @@ def views(capture: Path, recovery: Recovery) -> list[dict]:
             hits = surface.scene.intersect(origins, directions)
             element = np.full(len(directions), -1)
             hit = hits.triangle >= 0
-            element[hit] = lookup(
-                surface.atlas, fallback, surface.mesh.object_id, hits.triangle[hit], hits.u[hit], hits.v[hit]
-            )
+            element[hit] = lookup(hits.triangle[hit], hits.u[hit], hits.v[hit])
             elements.append(element)
         ids = np.rint(read_exr(capture / "truth" / "object_id" / name).rgb[..., 0]).astype(int)
         counts = np.isin(ids, list(plain))

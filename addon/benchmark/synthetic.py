@@ -72,12 +72,12 @@ def synthetic_capture(
         Write the frames there, half floats as cameras' tools do: reading them then costs what reading costs.
     """
     rng = np.random.default_rng(seed)
-    quads, ids = [_box(np.zeros(3), np.array(ROOM), inward=True)], [np.arange(6)]
-    for box in range(BOXES):
+    quads, ids = [box(np.zeros(3), np.array(ROOM), inward=True)], [np.arange(6)]
+    for number in range(BOXES):
         low = np.append(rng.uniform(0.05, 0.85, 2) * ROOM[:2], 0.0)
-        quads.append(_box(low, low + rng.uniform(0.2, 0.9, 3), inward=False))
-        ids.append(np.full(6, 6 + box))
-    mesh, atlas = _tiled(np.concatenate(quads), np.concatenate(ids), elements)
+        quads.append(box(low, low + rng.uniform(0.2, 0.9, 3), inward=False))
+        ids.append(np.full(6, 6 + number))
+    mesh, atlas = tiled(np.concatenate(quads), np.concatenate(ids), elements)
     frames = tuple(Frame(str(i), (folder or Path()) / f"{i}.exr", _camera(i / count, size)) for i in range(count))
     capture = SyntheticCapture(mesh, atlas, RayScene(mesh.vertices, mesh.triangles), frames, seed)
     if folder is not None:
@@ -86,7 +86,7 @@ def synthetic_capture(
     return capture
 
 
-def _box(low: np.ndarray, high: np.ndarray, inward: bool) -> np.ndarray:
+def box(low: np.ndarray, high: np.ndarray, inward: bool) -> np.ndarray:
     """A box's six sides: a corner and two edges, whose cross product is the normal; (6, 3, 3)."""
     result = []
     for axis in range(3):
@@ -100,7 +100,7 @@ def _box(low: np.ndarray, high: np.ndarray, inward: bool) -> np.ndarray:
     return np.array(result)
 
 
-def _tiled(quads: np.ndarray, ids: np.ndarray, elements: int) -> tuple[Mesh, Atlas]:
+def tiled(quads: np.ndarray, ids: np.ndarray, elements: int) -> tuple[Mesh, Atlas]:
     """Quads ((q, 3, 3): corner and edges) as TILES * TILES squares each, laid out row upon row in an atlas."""
     length = np.linalg.norm(quads[:, 1:], axis=2)
     texel = np.sqrt(length.prod(1).sum() / elements)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..capture.model import Mesh
 from ..surface.atlas import Atlas
-from ..surface.elements import element_of_triangle, lookup, triangle_geometry
+from ..surface.elements import ElementLookup, triangle_geometry
 from ..surface.rays import Hits, RayScene
 from .environment import Environment
 from .mirrors import Mirror
@@ -42,9 +42,10 @@ class LightField:
         self.radiance = np.ascontiguousarray(radiance, np.float32)
         self.normal, _ = triangle_geometry(mesh)
         self.one_sided = np.isin(mesh.object_id, list(lamps))
+        self._lamps = bool(self.one_sided.any())
         self.mirrors: tuple[Mirror, ...] = ()
         self.mirror_of = np.full(len(mesh.triangles), -1, np.int8)
-        self._fallback = element_of_triangle(mesh, atlas)
+        self.lookup = ElementLookup(mesh, atlas)
 
     def with_light(
         self, radiance: np.ndarray, environment: Environment | None = None, lamps: Iterable[int] | None = None
@@ -56,6 +57,7 @@ class LightField:
         other.environment = environment or self.environment
         if lamps is not None:
             other.one_sided = np.isin(self.mesh.object_id, list(lamps))
+            other._lamps = bool(other.one_sided.any())
         return other
 
     def with_mirrors(self, mirrors: tuple[Mirror, ...]) -> LightField:
@@ -70,14 +72,17 @@ class LightField:
 
     def elements(self, hits: Hits) -> np.ndarray:
         """The element at each hit, (n,) int32; -1 where the ray escaped."""
-        element = np.full(len(hits.triangle), -1, np.int32)
-        hit = hits.triangle >= 0
-        element[hit] = self.lookup(hits.triangle[hit], hits.u[hit], hits.v[hit])
+        missed = np.flatnonzero(hits.triangle < 0)
+        if len(missed) == len(hits.triangle):
+            return np.full(len(missed), -1, np.int32)
+        # u and v of a miss may be anything.
+        u, v = hits.u, hits.v
+        if len(missed):
+            u, v = u.copy(), v.copy()
+            u[missed] = v[missed] = 0
+        element = self.lookup(hits.triangle, u, v)
+        element[missed] = -1
         return element
-
-    def lookup(self, triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """The element at points given by triangle (all >= 0) and barycentric coordinates, (n,) int32."""
-        return lookup(self.atlas, self._fallback, self.mesh.object_id, triangle, u, v)
 
     def along(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Follow rays.
@@ -122,7 +127,7 @@ class LightField:
         escaped = np.flatnonzero(element < 0)
         if len(escaped):
             radiance[escaped] = self.environment(directions[escaped])
-        lamp = np.flatnonzero(self.one_sided[hits.triangle] & (element >= 0))
+        lamp = np.flatnonzero(self.one_sided[hits.triangle] & (element >= 0)) if self._lamps else ()
         if len(lamp):
             behind = np.einsum("ij,ij->i", directions[lamp], self.normal[hits.triangle[lamp]]) > 0
             radiance[lamp[behind]] = 0

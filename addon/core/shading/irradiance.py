@@ -16,7 +16,7 @@ from .field import LightField
 from .over_mirrors import direct_over_mirrors
 from .portals import Portals
 
-RAYS_AT_ONCE = 1 << 18
+RAYS_AT_ONCE = 1 << 16
 
 
 def gather(

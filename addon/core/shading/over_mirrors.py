@@ -9,7 +9,7 @@ from .emitters import BrightTriangles, sample_bright
 from .field import LightField
 from .mirrors import reflect
 
-RAYS_AT_ONCE = 1 << 18
+RAYS_AT_ONCE = 1 << 16
 FEWER = 4
 """What comes by a mirror is little of the light: so many times fewer rays are aimed at it."""
 

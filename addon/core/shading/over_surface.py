@@ -15,17 +15,27 @@ from .portals import find_portals
 from .texel_blocks import TexelBlocks
 
 ELEMENTS_AT_ONCE = 1 << 13
-BLOCK_EDGE = 0.004
-"""Edge of the texel blocks that light is interpolated in, as a share of the elements' extent (or 2 texels)."""
+FINEST_TEXELS = 2.0
+FINEST_SHARE = 0.004
+"""Least distance of two gathering points, and edge of the texel blocks: the larger of so many texels and so large a
+share of the room. From that share on, finer texels cost look-ups, and rays only where the lamps' light changes."""
 SMOOTH = 0.05
 """Relative deviation of the lamps' light between a block's corners up to which it is interpolated."""
 
 
-def block_step(atlas: Atlas, finest: float) -> int:
-    """Edge in texels of the blocks that light is interpolated in: a power of two, at least 2 texels."""
+def finest_spacing(atlas: Atlas) -> float:
+    """Least distance of two gathering points, metres."""
     extent = np.sort(np.ptp(atlas.position, axis=0))
-    largest = max(BLOCK_EDGE * float(np.sqrt(extent[1] * extent[2])), finest)
-    return 1 << int(np.log2(largest / float(np.sqrt(np.median(atlas.area))) + 1e-6))
+    return max(FINEST_TEXELS * _texel_edge(atlas), FINEST_SHARE * float(np.sqrt(extent[1] * extent[2])))
+
+
+def _texel_edge(atlas: Atlas) -> float:
+    return float(np.sqrt(np.median(atlas.area)))
+
+
+def block_step(atlas: Atlas) -> int:
+    """Edge in texels of the blocks that light is interpolated in: a power of two."""
+    return 1 << max(int(np.log2(finest_spacing(atlas) / _texel_edge(atlas) + 1e-6)), 0)
 
 
 def irradiance(
@@ -91,7 +101,7 @@ def irradiance(
 
     cached = interpolate and aimed
     blocks = TexelBlocks(atlas, element, threads)
-    step = block_step(atlas, finest) if cached else 1
+    step = block_step(atlas) if cached else 1
     points = 0
 
     def around(index: np.ndarray) -> np.ndarray:

@@ -20,11 +20,8 @@ from .field import LightField
 from .lamps import Lamp
 from .mirrors import Mirror
 from .neighbourhood import doubt
-from .over_surface import irradiance
+from .over_surface import finest_spacing, irradiance
 from .unseen_light import find_light
-
-FINEST_TEXELS = 2.0
-"""Least distance of two shading points, in texels."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +104,7 @@ def shade(
     surface = np.bincount(atlas.object_id, atlas.area, objects)
     seen_surface = np.bincount(atlas.object_id, atlas.area * seen, objects)
     seen_share = {i: float(seen_surface[i] / surface[i]) for i in np.unique(atlas.object_id) if surface[i] > 0}
-    finest = FINEST_TEXELS * float(np.sqrt(np.median(atlas.area)))
+    finest = finest_spacing(atlas)
     how = {"sampler": sampler, "threads": threads, "seed": seed}
 
     # 1. All light. What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.

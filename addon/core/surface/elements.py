@@ -131,35 +131,49 @@ def element_of_triangle(mesh: Mesh, atlas: Atlas) -> np.ndarray:
     return first
 
 
-def lookup(
-    atlas: Atlas, fallback: np.ndarray, object_id: np.ndarray, triangle: np.ndarray, u: np.ndarray, v: np.ndarray
-) -> np.ndarray:
-    """The element at points on the surface.
+class ElementLookup:
+    """The element at points on the surface, made ready for many millions of them.
 
     Parameters
     ----------
+    mesh : Mesh
     atlas : Atlas
-    fallback : (t,) int32
-        `element_of_triangle`.
-    object_id : (t,) int32
-        Of the mesh.
-    triangle : (n,) int32
-        All >= 0.
-    u, v : (n,) float32
-        Barycentric coordinates of the second and third corner.
-
-    Returns
-    -------
-    (n,) int32
     """
-    corners = atlas.uv[triangle]
-    w = 1 - u - v
-    x = w * corners[:, 0, 0] + u * corners[:, 1, 0] + v * corners[:, 2, 0]
-    y = w * corners[:, 0, 1] + u * corners[:, 1, 1] + v * corners[:, 2, 1]
-    size = atlas.size
-    column = np.minimum((x * size).astype(np.int32), size - 1)
-    row = np.minimum((y * size).astype(np.int32), size - 1)
-    element = atlas.padding[row * size + column]
-    # A triangle too small for a texel of its own shows its neighbour's: right if of the same object.
-    other = atlas.object_id[element] != object_id[triangle]
-    return np.where(other, fallback[triangle], element)
+
+    def __init__(self, mesh: Mesh, atlas: Atlas):
+        self._atlas, self._object_id = atlas, mesh.object_id
+        self._of_triangle = element_of_triangle(mesh, atlas)
+        # Atlas coordinates in texels are linear in the barycentric ones: x + u dx_u + v dx_v, and y alike.
+        at = atlas.uv.astype(np.float64) * atlas.size
+        edges = at[:, 1:] - at[:, :1]
+        self._map = np.concatenate([at[:, 0], edges.transpose(0, 2, 1).reshape(-1, 4)], 1).astype(np.float32)
+        # A triangle too small for a texel of its own may show another object's: those alone are looked at closely.
+        self._close = np.bincount(atlas.triangle, minlength=len(mesh.triangles)) == 0
+        every = np.arange(len(mesh.triangles))
+        for u, v in ((0.01, 0.01), (0.98, 0.01), (0.01, 0.98), (1 / 3, 1 / 3)):
+            point = np.full((2, len(every)), ((u,), (v,)), np.float32)
+            self._close |= atlas.object_id[self._texel(every, *point)] != mesh.object_id
+
+    def _texel(self, triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """The element whose texel the points fall in."""
+        size = self._atlas.size
+        m = self._map[triangle]
+        column = (m[:, 0] + u * m[:, 2] + v * m[:, 3]).astype(np.int32)
+        row = (m[:, 1] + u * m[:, 4] + v * m[:, 5]).astype(np.int32)
+        return self._atlas.padding[np.minimum(row, size - 1) * size + np.minimum(column, size - 1)]
+
+    def __call__(self, triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """The element at each point, (n,) int32.
+
+        Parameters
+        ----------
+        triangle : (n,) int32
+            All >= 0.
+        u, v : (n,) float32
+            Barycentric coordinates of the second and third corner.
+        """
+        element = self._texel(triangle, u, v)
+        close = np.flatnonzero(self._close[triangle])
+        other = close[self._atlas.object_id[element[close]] != self._object_id[triangle[close]]]
+        element[other] = self._of_triangle[triangle[other]]
+        return element

@@ -9,7 +9,7 @@ import pytest
 
 from addon.core.capture.model import Frame
 from addon.core.lit_diffuse.accumulate import accumulate
-from addon.core.shading import shade as module
+from addon.core.shading import over_surface
 from addon.core.shading.albedo import MEASURED, NONE
 from addon.core.shading.shade import shade
 from tests.core.rooms import DARK, all_round, lit_box, make_room, picture, radiosity
@@ -90,7 +90,7 @@ def test_what_was_not_seen_is_filled_in(lit, monkeypatch):
     The guess is gathered 8 times as coarsely as the rest: 16 of this room's texels would be 1.6 m, not the 16 cm of a
     scan with texels of 1 cm.
     """
-    monkeypatch.setattr(module, "FINEST_TEXELS", 0.5)
+    monkeypatch.setattr(over_surface, "FINEST_TEXELS", 0.5)
     room, truth, found = lit
     gone = (room.atlas.object_id == 0) & (room.atlas.position[:, 0] > 2)
     radiance = np.where(gone[:, None], np.float32(np.nan), found.radiance)

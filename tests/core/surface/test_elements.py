@@ -7,7 +7,7 @@ import pytest
 
 from addon.core.capture.model import Mesh
 from addon.core.surface.atlas import Atlas
-from addon.core.surface.elements import element_of_triangle, lookup, make_atlas, triangle_geometry, uv_scale
+from addon.core.surface.elements import ElementLookup, make_atlas, triangle_geometry, uv_scale
 from tests.core.rooms import box_sides, make_room, quad
 
 
@@ -106,7 +106,7 @@ def points_on(mesh: Mesh, count: int):
 
 def test_lookup_finds_the_element_at_the_place(room):
     triangle, u, v = points_on(room.mesh, 500)
-    element = lookup(room.atlas, element_of_triangle(room.mesh, room.atlas), room.mesh.object_id, triangle, u, v)
+    element = ElementLookup(room.mesh, room.atlas)(triangle, u, v)
     a, b, c = (room.mesh.vertices[room.mesh.triangles[triangle, i]] for i in range(3))
     where = a + u[:, None] * (b - a) + v[:, None] * (c - a)
     away = np.abs(room.atlas.position[element] - where).max(1)
@@ -137,10 +137,9 @@ def crumbs():
 
 def test_surface_without_a_texel_shows_its_own_object(crumbs):
     mesh, atlas = crumbs
-    fallback = element_of_triangle(mesh, atlas)
     assert not np.isin([5, 6], atlas.triangle).any()  # or the test tests nothing
     triangle, u, v = points_on(mesh, 50)
-    element = lookup(atlas, fallback, mesh.object_id, triangle, u, v)
+    element = ElementLookup(mesh, atlas)(triangle, u, v)
     has_own = triangle < 6
     assert np.array_equal(atlas.object_id[element[has_own]], mesh.object_id[triangle[has_own]])
     away = np.linalg.norm(atlas.position[element[triangle == 5]] - [5.5, 0.5, 0], axis=1)

@@ -1,0 +1,177 @@
+"""Shading: the error of E for its rays and its time, in rooms lit in four ways."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from ..core.parallel import for_blocks
+from ..core.shading.directions import cosine_hemisphere, shifted, sobol, to_world, uniform_hemisphere
+from ..core.shading.emitters import bright_triangles
+from ..core.shading.field import LightField
+from ..core.shading.irradiance import direct, gather, uniform
+from ..core.shading.portals import find_portals
+from .lit_rooms import ROOMS, LitRoom, make_room
+from .run import Options
+from .shading_surface import surface_tables
+from .table import BASELINE, Curves, Table
+from .timing import once
+
+ELEMENTS = 40_000
+POINTS = 400
+REFERENCE = (1 << 13, 1 << 11, 1 << 12)
+"""Gather, lamp and portal rays of the reference."""
+PAPER = (100, 10_000)
+HIDDEN = 0.02
+"""Elements darker than this share of the median are not looked at."""
+ASKED = 10_000
+"""Rays of the paper's finer setting, whose error the others are to reach."""
+
+
+def looked_at(room: LitRoom, count: int, options: Options) -> tuple[np.ndarray, np.ndarray]:
+    """Elements spread over the surface ((m,) int), and their converged E ((m, 3) float32).
+
+    Lamps are left out, and what lies under or inside the furniture: no frame would see it.
+    """
+    plain = np.flatnonzero(~np.isin(room.atlas.object_id, room.lamps))
+    element = np.sort(np.random.default_rng(options.seed).choice(plain, min(count, len(plain)), replace=False))
+    true = reference(room, element, options)
+    level = true.mean(1)
+    seen = level > HIDDEN * np.median(level)
+    if room.exact is not None:
+        seen = _enclosed(room, element, options.seed) < 0.9
+    return element[seen], true[seen]
+
+
+def _enclosed(room: LitRoom, element: np.ndarray, seed: int) -> np.ndarray:
+    """Share of the hemisphere's rays that meet the back of a triangle, as from inside a box."""
+    position, normal = room.atlas.position[element], room.atlas.normal[element]
+    local = cosine_hemisphere(shifted(sobol(64, seed), len(element), np.random.default_rng(seed)))
+    directions = to_world(local, normal).reshape(-1, 3)
+    scene = room.field.scene
+    hits = scene.intersect(np.repeat(scene.off_surface(position, normal), 64, 0), directions)
+    back = np.einsum("ij,ij->i", directions, room.field.normal[hits.triangle]) > 0
+    return (back & (hits.triangle >= 0)).reshape(len(element), 64).mean(1)
+
+
+def reference(room: LitRoom, element: np.ndarray, options: Options) -> np.ndarray:
+    """Converged E at elements, (m, 3) float32; checked against more rays in tests."""
+    if room.exact is not None:
+        return np.full((len(element), 3), room.exact, np.float32)
+    field, E = room.field, np.empty((len(element), 3), np.float32)
+    bright, portals = bright_triangles(field), find_portals(field, options.seed)
+    position, normal = room.atlas.position[element], room.atlas.normal[element]
+    rays, lamp_rays, portal_rays = REFERENCE
+    lamp_rays = lamp_rays if len(bright) else 0
+
+    def run(part: slice) -> None:
+        p, n, own = position[part], normal[part], options.seed + 31 + part.start
+        around, _, _ = gather(field, bright, p, n, rays, lamp_rays, own, portals, portal_rays)
+        E[part] = around + direct(field, bright, p, n, rays, lamp_rays, own + 1)
+
+    for_blocks(run, len(element), 16, options.threads)
+    return E
+
+
+def relative_error(E: np.ndarray, true: np.ndarray) -> float:
+    """Root mean square of the relative error of mean E."""
+    return float(np.sqrt(np.mean((E.mean(1) / true.mean(1) - 1) ** 2)))
+
+
+def _by_pattern(field: LightField, position, normal, rays: int, seed: int, kind: str) -> np.ndarray:
+    """E by `rays` directions: 'uniform' or 'cosine', 'random' or 'Sobol' as in "cosine, Sobol"."""
+    rng = np.random.default_rng(seed)
+    E = np.zeros((len(position), 3), np.float32)
+    pattern = sobol(rays, seed)
+    step = max((1 << 18) // rays, 1)
+    for start in range(0, len(position), step):
+        part = slice(start, start + step)
+        count = len(position[part])
+        square = shifted(pattern, count, rng) if "Sobol" in kind else rng.random((count, rays, 2), np.float32)
+        local = (cosine_hemisphere if "cosine" in kind else uniform_hemisphere)(square)
+        directions = to_world(local, normal[part]).reshape(-1, 3)
+        origins = np.repeat(field.scene.off_surface(position[part], normal[part]), rays, 0)
+        radiance = field.along(origins, directions)[0].reshape(count, rays, 3)
+        weight = np.float32(np.pi) if "cosine" in kind else np.float32(2 * np.pi) * local[..., 2:3]
+        E[part] = (radiance * weight).mean(1)
+    return E
+
+
+def _aimed(field: LightField, bright, portals, position, normal, rays: int, seed: int) -> np.ndarray:
+    """E by `rays` in all: half of them by cosine, the rest aimed at lamps and portals."""
+    targets = bool(len(bright)) + (portals is not None)
+    aimed = rays // 2 // targets if targets else 0
+    lamp_rays, portal_rays = aimed if len(bright) else 0, aimed if portals else 0
+    around = rays - lamp_rays - portal_rays
+    E, _, _ = gather(field, bright, position, normal, around, lamp_rays, seed, portals, portal_rays)
+    return E + direct(field, bright, position, normal, around, lamp_rays, seed + 1)
+
+
+def _alternatives(room: LitRoom, seed: int) -> dict[str, tuple[tuple[int, ...], Callable]]:
+    """Name -> how many rays are tried, and the estimator: (field, position, normal, rays, seed) -> E."""
+
+    targets = bright_triangles(room.field), find_portals(room.field, seed)  # found once for a whole surface
+
+    def pattern(kind):
+        return lambda field, p, n, rays, seed: _by_pattern(field, p, n, rays, seed, kind)
+
+    return {
+        "uniform": ((*PAPER[:1], 1000, *PAPER[1:]), lambda f, p, n, rays, seed: uniform(f, p, n, rays, seed)[0]),
+        "uniform, Sobol": ((128, 1024, 8192), pattern("uniform, Sobol")),
+        "cosine": ((64, 512, 4096), pattern("cosine, random")),
+        "cosine, Sobol": ((16, 64, 256, 1024, 4096), pattern("cosine, Sobol")),
+        "cosine and aimed": ((8, 16, 32, 64, 128, 256, 512),
+                             lambda f, p, n, rays, seed: _aimed(f, *targets, p, n, rays, seed)),
+    }
+
+
+def _rays_for(rays: list[int], errors: list[float], wanted: float) -> float | None:
+    """Rays at which an alternative's error falls to `wanted`, between its measured points; None if it does not."""
+    for i, error in enumerate(errors):
+        if error <= wanted:
+            if i == 0:
+                return float(rays[0])
+            a, b = np.log([errors[i - 1], max(error, 1e-12)])
+            share = (a - np.log(wanted)) / max(a - b, 1e-12)
+            return float(np.exp(np.log(rays[i - 1]) + share * np.log(rays[i] / rays[i - 1])))
+    return None
+
+
+def run(options: Options) -> Iterator[Table]:
+    """Tables of single points, of what reaches the paper's error, and of the whole surface."""
+    points = POINTS * (4 if options.large else 1)
+    rows, needed = [], []
+    rooms = {}
+    for done, name in enumerate(ROOMS):
+        room = rooms[name] = make_room(name, ELEMENTS, options.seed, options.threads)
+        element, true = looked_at(room, points, options)
+        position, normal = room.atlas.position[element], room.atlas.normal[element]
+        found: dict[str, tuple[list[int], list[float]]] = {}
+        for alternative, (counts, estimate) in _alternatives(room, options.seed).items():
+            for rays in counts:
+                timing = once(lambda: estimate(room.field, position, normal, rays, options.seed))  # noqa: B023
+                error = relative_error(timing.value, true)
+                rows.append((name, alternative, alternative == "uniform" and rays in PAPER, rays, error,
+                             1e6 * timing.cpu_seconds / len(element)))
+                found.setdefault(alternative, ([], []))
+                found[alternative][0].append(rays)
+                found[alternative][1].append(error)
+        wanted = found["uniform"][1][found["uniform"][0].index(ASKED)]
+        for alternative, (counts, errors) in found.items():
+            rays = ASKED if alternative == "uniform" else _rays_for(counts, errors, wanted)
+            needed.append((name, alternative, alternative == "uniform", wanted, rays, ASKED / rays if rays else None))
+        options.progress.update(0.4 * (done + 1) / len(ROOMS))
+    yield Table(
+        "shading", "Shading: error of E at single points",
+        ("room", "estimator", BASELINE, "rays", "relative RMSE", "microseconds a point"), rows,
+        ("Error against a converged reference (furnace: against the exact value) at "
+         f"{points} points; processor time.",),
+        Curves("room", "estimator", "rays", "relative RMSE"),
+    )  # fmt: skip
+    yield Table(
+        "shading-rays", f"Shading: rays a point for the error of {ASKED} uniform rays",
+        ("room", "estimator", BASELINE, "error", "rays", "times fewer"), needed,
+        ("No figure: not reached with the most rays tried.",),
+    )  # fmt: skip
+    yield from surface_tables(rooms, options)
