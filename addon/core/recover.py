@@ -34,7 +34,7 @@ from .specular.samples import SampleCollector, Samples
 from .store import Store, key
 from .surface.build import Surface, build_surface, from_uv, turned
 
-CODE = 5
+CODE = 6
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -217,7 +217,7 @@ class Recovery:
 
             found = shade_clipped(shaded, lit, surface.atlas)
             arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "doubt", "radiance")}
-            arrays |= {"rho": found.albedo.rho, "origin": found.albedo.origin}
+            arrays |= {"rho": found.albedo.rho, "origin": found.albedo.origin, "error": found.albedo.error}
             arrays |= {"sky": found.environment.radiance, "sky_seen": found.environment.observations}
             meta = {
                 "above_one": found.albedo.above_one,
@@ -239,7 +239,7 @@ class Recovery:
             )
             return Shading(
                 a["irradiance"], a["escaped"], a["doubt"], a["radiance"],
-                Albedo(a["rho"], a["origin"], meta["above_one"]),
+                Albedo(a["rho"], a["origin"], meta["above_one"], a["error"]),
                 lamps, Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
             )  # fmt: skip
 

@@ -37,6 +37,8 @@ class LitDiffuse:
         Observations that `radiance` rests on.
     tier : (n,) int8
         CLEAN, EDGE or SATURATED: the kind of observations it rests on; -1 where there is none.
+    clipped : (n,) float32
+        Share of all observations, those that `radiance` does not rest on included, that the sensor clipped.
     """
 
     radiance: np.ndarray
@@ -44,6 +46,7 @@ class LitDiffuse:
     upper: np.ndarray
     count: np.ndarray
     tier: np.ndarray
+    clipped: np.ndarray
 
     @property
     def seen(self) -> np.ndarray:
@@ -69,7 +72,8 @@ def _choose(tiers: dict[int, Summary]) -> LitDiffuse:
         chosen = tier == other
         for name, values in parts.items():
             values[chosen] = getattr(tiers[other], name)[chosen]
-    return LitDiffuse(parts["median"], parts["lower"], parts["upper"], parts["count"], tier)
+    clipped = saturated.count / np.maximum(clean.count + edge.count + saturated.count, 1)
+    return LitDiffuse(*parts.values(), tier, clipped.astype(np.float32))
 
 
 def accumulate(

@@ -12,6 +12,8 @@ from .neighbourhood import steadied
 FLOOR = 1e-3
 """Below this share of the room's median irradiance a quotient says nothing."""
 MAX_ALBEDO = 1.0
+UNKNOWN, LEAST_SPREAD = 0.7, 0.3
+"""Relative error of an albedo that was taken from other objects: where there are too few to tell, and at least."""
 
 MEASURED, FILLED, NONE = 2, 1, 0
 """How an element's albedo came about: measured; filled in from its object; no reflectance (an emitter, or an object
@@ -30,11 +32,15 @@ class Albedo:
         MEASURED, FILLED or NONE.
     above_one : float
         Share of the measured elements, lamps left out, whose quotient was above 1: an alarm that light is missing.
+    error : (n,) float32
+        Relative standard error of `rho`, as far as it came of each element's own measurement and of its neighbourhood;
+        what all of an object has in common, such as missing light, is added in `evidence.texel`. 0 on lamps.
     """
 
     rho: np.ndarray
     origin: np.ndarray
     above_one: float
+    error: np.ndarray
 
 
 def quotient(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -85,21 +91,32 @@ def fill(
     above = float((rho[reflecting].max(1) > MAX_ALBEDO).mean()) if reflecting.any() else 0.0
     everywhere = np.median(result[reflecting], 0) if reflecting.any() else np.full(3, 0.5, np.float32)
     error = np.where(valid, 0.0 if error is None else error, np.inf).astype(np.float32)
+    left = error.copy()
     by_class: dict[str, list[np.ndarray]] = {}
     bare = []
     order = np.argsort(atlas.object_id, kind="stable")
     for own in np.split(order, np.flatnonzero(np.diff(atlas.object_id[order])) + 1):
         object_id = int(atlas.object_id[own[0]])
         if object_id in emitters:
-            result[own], origin[own] = 0, NONE
+            result[own], origin[own], left[own] = 0, NONE, 0
             continue
         if not valid[own].any():
             bare.append((object_id, own))
             continue
-        result[own] = steadied(atlas, own, result[own], error[own])
+        result[own], left[own] = steadied(atlas, own, result[own], error[own])
         by_class.setdefault(class_of.get(object_id, ""), []).append(np.median(result[own][valid[own]], 0))
+    known = [middle for alike in by_class.values() for middle in alike]
     for object_id, own in bare:
         alike = by_class.get(class_of.get(object_id, ""))
         result[own] = np.median(alike, 0) if alike else everywhere
         origin[own] = NONE
-    return Albedo(np.clip(result, 0, MAX_ALBEDO).astype(np.float32), origin, above)
+        left[own] = _spread(alike if alike and len(alike) > 2 else known)
+    return Albedo(np.clip(result, 0, MAX_ALBEDO).astype(np.float32), origin, above, left)
+
+
+def _spread(albedos: list[np.ndarray]) -> float:
+    """Relative standard deviation of some objects' albedo, (3,) each; that of any two things where there are few."""
+    if len(albedos) < 3:
+        return UNKNOWN
+    level = np.log(np.maximum(np.array(albedos).mean(1), FLOOR))
+    return max(1.4826 * float(np.median(np.abs(level - np.median(level)))), LEAST_SPREAD)

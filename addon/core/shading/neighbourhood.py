@@ -61,7 +61,9 @@ def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) ->
     return middle, np.maximum(width, np.float32(0.02))
 
 
-def steadied(atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, seed: int = 0) -> np.ndarray:
+def steadied(
+    atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, seed: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
     """Albedo of one object's elements, each drawn towards its neighbourhood as far as it is in doubt.
 
     Parameters
@@ -75,7 +77,9 @@ def steadied(atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, 
 
     Returns
     -------
-    (m, 3) float32
+    rho : (m, 3) float32
+    error : (m,) float32
+        Its relative standard error: the posterior's; the prior's width where nothing was measured.
     """
     position = atlas.position[own]
     measured = np.isfinite(error)
@@ -106,4 +110,5 @@ def steadied(atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, 
     wide = np.maximum(width**2, surprise)
     trust = (wide / (wide + error**2)).astype(np.float32)
     trust[~measured] = 0
-    return np.exp(trust * log_rho + (1 - trust) * middle).astype(np.float32)
+    left = np.where(measured, np.sqrt(trust[:, 0]) * error[:, 0], width[:, 0])
+    return np.exp(trust * log_rho + (1 - trust) * middle).astype(np.float32), left.astype(np.float32)

@@ -24,7 +24,8 @@ def measured(room, radiance, hidden=(), noise=0.03, texture=0.0, seed=0) -> LitD
     L = (radiance * np.exp(rng.normal(0, noise, (n, 3)) + patch)).astype(np.float32)
     seen = ~np.isin(room.atlas.object_id, list(hidden))
     L[~seen] = np.nan
-    return LitDiffuse(L, L, L, np.where(seen, 9, 0).astype(np.int32), np.where(seen, 0, -1).astype(np.int8))
+    count, tier = np.where(seen, 9, 0).astype(np.int32), np.where(seen, 0, -1).astype(np.int8)
+    return LitDiffuse(L, L, L, count, tier, np.zeros(len(L), np.float32))
 
 
 def run(room, lit, **options):

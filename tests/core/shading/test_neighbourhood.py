@@ -21,7 +21,7 @@ def atlas():
 
 
 def run(atlas, rho, error):
-    return steadied(atlas, np.arange(len(atlas)), rho.astype(np.float32), error.astype(np.float32))
+    return steadied(atlas, np.arange(len(atlas)), rho.astype(np.float32), error.astype(np.float32))[0]
 
 
 def grey(values):
@@ -139,7 +139,8 @@ def observed(median, spread, count, tier) -> LitDiffuse:
     median, spread, count, tier = np.broadcast_arrays(median, spread, count, tier)
     half = 0.675 * median * spread
     L, low, high = (grey(np.atleast_1d(x)) for x in (median, median - half, median + half))
-    return LitDiffuse(L, low, high, np.atleast_1d(count).astype(np.int32), np.atleast_1d(tier).astype(np.int8))
+    count, tier = np.atleast_1d(count).astype(np.int32), np.atleast_1d(tier).astype(np.int8)
+    return LitDiffuse(L, low, high, count, tier, np.zeros(len(count), np.float32))
 
 
 def test_doubt_falls_with_observations_and_rises_with_spread():
