@@ -28,7 +28,9 @@ def find(root: Path) -> Path | None:
     return next((root / name for name in FILES if (root / name).is_file()), None)
 
 
-def read_frames(root: Path, picture_size: Callable[[Path], tuple[int, int]]) -> tuple[list[Frame], list[str]]:
+def read_frames(
+    root: Path, picture_size: Callable[[Path], tuple[int, int]]
+) -> tuple[list[Frame], list[str], list[str]]:
     """Read all frames that the capture `root` lists.
 
     Parameters
@@ -42,6 +44,8 @@ def read_frames(root: Path, picture_size: Callable[[Path], tuple[int, int]]) -> 
         In the order of the file.
     problems : list of str
         One sentence for each frame that can't be used.
+    notes : list of str
+        Sentences on frames that are used, but may mean something else.
 
     Raises
     ------
@@ -77,7 +81,17 @@ def read_frames(root: Path, picture_size: Callable[[Path], tuple[int, int]]) -> 
             continue
         seen.add(frame.path)
         frames.append(frame)
-    return frames, problems
+    return frames, problems, _unexposed(top, names, entries)
+
+
+def _unexposed(top: dict[str, Any], names: list[str], entries: list[Any]) -> list[str]:
+    """A sentence where some frames state an exposure and others don't."""
+    stated = [isinstance(entry, dict) and entry.get("exposure") is not None for entry in entries]
+    if not any(stated) or all(stated) or top.get("exposure") is not None:
+        return []
+    first = names[stated.index(False)]
+    return [f"{stated.count(False)} of {len(stated)} frames state no exposure (the first: '{first}'); it was taken as "
+            "1; give each frame its own."]
 
 
 class _Escapes(BadInputError):

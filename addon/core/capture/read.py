@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from . import instances, nerfstudio
+from .clipping import find_clipping
 from .exr import HALF_MAX, read_exr, read_header
 from .mesh_repair import repair
 from .model import Capture, Frame, Mesh, Pixels
@@ -41,13 +42,13 @@ class Reader(NamedTuple):
         The file by which a user knows the format.
     find : callable(root) -> Path or None
         The file of poses where the folder has this format.
-    read_frames : callable(root, picture_size) -> (frames, problems)
+    read_frames : callable(root, picture_size) -> (frames, problems, notes)
     """
 
     name: str
     wants: str
     find: Callable[[Path], Path | None]
-    read_frames: Callable[[Path, Callable[[Path], tuple[int, int]]], tuple[list[Frame], list[str]]]
+    read_frames: Callable[[Path, Callable[[Path], tuple[int, int]]], tuple[list[Frame], list[str], list[str]]]
 
 
 READERS = (Reader("nerfstudio", nerfstudio.FILES[0], nerfstudio.find, nerfstudio.read_frames),)
@@ -69,7 +70,8 @@ def read_capture(folder: Path | str) -> Capture:
         raise BadInputError(f"Capture '{root}' {what}; give the folder that holds {MESH} and the poses.")
     reader = _reader(root)
     mesh, objects, warnings = _read_mesh(root)
-    frames, problems = reader.read_frames(root, read_header)
+    frames, problems, notes = reader.read_frames(root, read_header)
+    warnings += notes
     total = len(frames) + len(problems)
     good = []
     for frame in frames:
@@ -88,7 +90,8 @@ def read_capture(folder: Path | str) -> Capture:
     if len(good) == 1:
         warnings.append("The capture has a single frame; highlights can't be told from colour, and what it does not "
                         "see stays unknown.")
-    return Capture(root, mesh, objects, tuple(good), tuple(warnings))
+    clipped, notes = find_clipping(good, lambda path: read_exr(path).rgb)
+    return Capture(root, mesh, objects, clipped, tuple(warnings + notes))
 
 
 def _reader(root: Path) -> Reader:

@@ -1,0 +1,166 @@
+#!/usr/bin/env python3
+"""A capture as a real scanner would have made it: poses, mesh, noise, exposure and clipping off by known amounts.
+
+    python scripts/perturb_capture.py CAPTURE OUT [--seed N] [--poses 5 0.2] [--mesh 5] [--noise 0.02]
+                                                  [--exposure 2] [--clip 4] [--clip-at sensor] [--tell]
+
+Without any of the five switches all are on, as the line above has them; with some, only those. CAPTURE is in
+nerfstudio's layout. Its truth/ and its objects are copied as they are: the held-out views score what comes out.
+
+poses      each frame on its own: so many millimetres and degrees, root mean square
+mesh       millimetres along the normal, root mean square: half the variance a smooth field (waves of 0.25 to 2 m),
+           half independent from vertex to vertex; vertices in one place (seams) move together
+noise      each channel of each pixel by itself, relative
+exposure   stops in all: pixel = radiance * exposure, exposure even in its logarithm, written into transforms.json
+clip       pixels above are held there; after the exposure ('sensor'), or before it ('radiance': what an HDR video
+           merged from exposures of its own shows, clipped and then scaled)
+tell       write the key `saturation`; without it, the reader has to find the clipping itself
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from addon.core.capture.exr import read_exr, write_exr
+from addon.core.capture.ply import read_ply
+from addon.core.capture.ply_header import parse_header
+
+WAVES = 200
+SHORTEST, LONGEST = 0.25, 2.0
+"""Metres; a fused scan's error is smooth over about that, from drift and from the sensor's own depth error."""
+SEAM = 1e-5
+"""Vertices nearer than this, in metres, are one."""
+DEFAULTS = {"poses": (5.0, 0.2), "mesh": 5.0, "noise": 0.02, "exposure": 2.0, "clip": 4.0}
+
+
+def rotation(vector: np.ndarray) -> np.ndarray:
+    """The (3, 3) rotation about `vector` ((3,)) by its length in radians (Rodrigues)."""
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector / max(angle, 1e-12)
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+
+
+def perturbed_pose(matrix: list, metres: float, radians: float, rng: np.random.Generator) -> list:
+    """A camera-to-world matrix moved and turned by amounts whose root mean squares are `metres` and `radians`."""
+    pose = np.array(matrix, np.float64)
+    pose[:3, 3] += rng.normal(0, metres / np.sqrt(3), 3)
+    pose[:3, :3] = pose[:3, :3] @ rotation(rng.normal(0, radians / np.sqrt(3), 3))
+    return pose.tolist()
+
+
+def vertex_normals(vertices: np.ndarray, triangles: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Normals by place ((p, 3)): the mean over all triangles that meet there, by area; 0 where they cancel out."""
+    corners = vertices[triangles]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = np.zeros((place.max() + 1, 3))
+    for k in range(3):
+        for axis in range(3):
+            normal[:, axis] += np.bincount(place[triangles[:, k]], area[:, axis], len(normal))
+    return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+
+
+def offsets(points: np.ndarray, metres: float, rng: np.random.Generator) -> np.ndarray:
+    """How far each of the points ((p, 3)) moves along its normal, (p,): half smooth, half on its own."""
+    way = rng.normal(size=(WAVES, 3))
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    way *= 2 * np.pi / np.exp(rng.uniform(np.log(SHORTEST), np.log(LONGEST), (WAVES, 1)))
+    phase = rng.uniform(0, 2 * np.pi, WAVES)
+    smooth = sum(np.cos(points @ k + p) for k, p in zip(way, phase)) * np.sqrt(2 / WAVES)
+    return metres * np.sqrt(0.5) * (smooth + rng.normal(size=len(points)))
+
+
+def perturb_mesh(source: Path, target: Path, metres: float, rng: np.random.Generator) -> None:
+    """Copy a binary PLY whose first element is the vertices, and move those."""
+    content = bytearray(source.read_bytes())
+    order, elements, start = parse_header(bytes(content[: 1 << 20]))
+    head = elements[0]
+    if not order or head.name != "vertex" or any(p.count_kind for p in head.properties):
+        raise SystemExit(f"'{source}' is no binary PLY that begins with its vertices.")
+    kind = np.dtype([(p.name, order + p.kind) for p in head.properties])
+    records = np.frombuffer(content, kind, head.count, start)  # a view: what is written goes into `content`
+    ply = read_ply(source)
+    vertices, triangles = np.asarray(ply.vertices, np.float64), np.asarray(ply.triangles)
+    _, first, place = np.unique(np.round(vertices / SEAM).astype(np.int64), axis=0, return_index=True,
+                                return_inverse=True)
+    place = place.ravel()
+    normal = vertex_normals(vertices, triangles, place)
+    moved = vertices + (normal * offsets(vertices[first], metres, rng)[:, None])[place]
+    for axis, name in enumerate("xyz"):
+        records[name] = moved[:, axis]
+    target.write_bytes(content)
+
+
+def perturb_picture(source: Path, target: Path, noise: float, exposure: float, clip: float, sensor: bool,
+                    rng: np.random.Generator) -> None:
+    """Copy a picture with noise, exposed and clipped."""
+    rgb = read_exr(source).rgb
+    rgb = rgb * (1 + noise * rng.normal(size=rgb.shape))
+    rgb = np.minimum(rgb * exposure, clip) if sensor else np.minimum(rgb, clip) * exposure
+    target.parent.mkdir(parents=True, exist_ok=True)
+    write_exr(target, rgb.astype(np.float32), half=True)
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("capture", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--poses", type=float, nargs=2, metavar=("MM", "DEGREES"))
+    parser.add_argument("--mesh", type=float, metavar="MM")
+    parser.add_argument("--noise", type=float, metavar="SHARE")
+    parser.add_argument("--exposure", type=float, metavar="STOPS")
+    parser.add_argument("--clip", type=float, metavar="VALUE")
+    parser.add_argument("--clip-at", choices=("sensor", "radiance"), default="sensor")
+    parser.add_argument("--tell", action="store_true")
+    given = parser.parse_args()
+    if all(getattr(given, name) is None for name in DEFAULTS):
+        for name, value in DEFAULTS.items():
+            setattr(given, name, value)
+    return given
+
+
+def main() -> int:
+    given = arguments()
+    source, out = given.capture, given.out
+    # A generator for each: one perturbation alone is the same as among all.
+    poses, mesh, exposures, pictures = (np.random.default_rng([given.seed, k]) for k in range(4))
+    top = json.loads((source / "transforms.json").read_text())
+    out.mkdir(parents=True)
+    for name in ("info_semantic.json", "README.md"):
+        if (source / name).exists():
+            shutil.copyfile(source / name, out / name)
+    if (source / "truth").is_dir():
+        shutil.copytree(source / "truth", out / "truth", copy_function=shutil.copyfile)
+    if given.mesh:
+        perturb_mesh(source / "mesh.ply", out / "mesh.ply", given.mesh / 1000, mesh)
+    else:
+        shutil.copyfile(source / "mesh.ply", out / "mesh.ply")
+    clip = np.inf if given.clip is None else given.clip
+    for frame in top["frames"]:
+        if given.poses:
+            millimetres, degrees = given.poses
+            frame["transform_matrix"] = perturbed_pose(
+                frame["transform_matrix"], millimetres / 1000, np.radians(degrees), poses)
+        exposure = 1.0
+        if given.exposure:
+            exposure = float(2 ** exposures.uniform(-given.exposure / 2, given.exposure / 2))
+            frame["exposure"] = exposure
+        if given.tell and given.clip:
+            frame["saturation"] = clip if given.clip_at == "sensor" else clip * exposure
+        perturb_picture(source / frame["file_path"], out / frame["file_path"], given.noise or 0.0, exposure, clip,
+                        given.clip_at == "sensor", pictures)
+    (out / "transforms.json").write_text(json.dumps(top, indent=1))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
