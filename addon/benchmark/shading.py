@@ -99,10 +99,9 @@ def _by_pattern(field: LightField, position, normal, rays: int, seed: int, kind:
 
 
 def _aimed(field: LightField, bright, portals, position, normal, rays: int, seed: int) -> np.ndarray:
-    """E by `rays` in all: half of them by cosine, the rest aimed at lamps and portals."""
-    targets = bool(len(bright)) + (portals is not None)
-    aimed = rays // 2 // targets if targets else 0
-    lamp_rays, portal_rays = aimed if len(bright) else 0, aimed if portals else 0
+    """E by `rays` in all: a quarter of them aimed at lamps, half at portals, the rest by cosine."""
+    lamp_rays = rays // 4 if len(bright) else 0
+    portal_rays = rays // 2 if portals else 0
     around = rays - lamp_rays - portal_rays
     E, _, _ = gather(field, bright, position, normal, around, lamp_rays, seed, portals, portal_rays)
     return E + direct(field, bright, position, normal, around, lamp_rays, seed + 1)

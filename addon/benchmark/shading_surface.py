@@ -18,7 +18,7 @@ from .table import BASELINE, Curves, Table
 from .timing import Timing, alternately, once
 
 PAPER_RAYS = 100
-TEXELS = (40_000, 160_000, 640_000)
+TEXELS = (80_000, 320_000, 1_280_000)
 """Surface elements: x1, x4, x16."""
 LARGE = 4
 BAKE_SAMPLES = (4, 16)

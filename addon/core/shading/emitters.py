@@ -14,7 +14,8 @@ LUMINANCE = np.float32([0.2126, 0.7152, 0.0722])
 BRIGHT = 8.0
 """A triangle is bright from this multiple of the surface's mean radiance on. Only the noise depends on it, not the
 expectation: what is not aimed at is still gathered."""
-MAX_TRIANGLES = 4096
+MAX_TRIANGLES = 1 << 16
+"""Finely meshed lamps have many: 24 of 512 triangles each, cut off at 4096, had an error of 0.74 instead of 0.06."""
 
 
 @dataclass(frozen=True)
