@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .layout import Layout, Problem
-from .lobes import GRID
 
 HUBER = 2.0
 """Residuals beyond this many (robust) standard deviations weigh less: misregistration, edges, texture."""
@@ -68,11 +67,6 @@ class LobeFit:
     cost_lambertian: float
     residual: float
     residual_lambertian: float
-
-    @property
-    def index(self) -> int:
-        """The grid's phi next to this one."""
-        return int(np.argmin(np.abs(np.sqrt(GRID) - np.sqrt(self.phi))))
 
 
 @dataclass(frozen=True)
@@ -217,12 +211,12 @@ def fit_lobe(
     found = solve(layout, near, kappa, scale, **how)
     costs = found.total
     middle = best - near.start
-    root, psi = between(np.sqrt(GRID[near]), costs, found.psi, middle)
+    root, psi = between(np.sqrt(layout.grid[near]), costs, found.psi, middle)
     flat_costs = huber(flat, scale) * layout.there
     flattest = int(np.argmin(flat_costs.sum((1, 2))))
     unit = scale**2 / layout.count
     return LobeFit(
-        phi=float(min(max(root**2, GRID[0]), GRID[-1])),
+        phi=float(min(max(root**2, layout.grid[0]), layout.grid[-1])),
         psi=psi,
         kappa=kappa,
         kappa_lambertian=kappas[flattest],
@@ -271,13 +265,13 @@ def held_out_costs(
     phi and kappa are those of the fit over all: two numbers of hundreds of elements, whose optimism is far below
     what a lobe must gain. `how` is that of `solve`.
     """
-    at = slice(fit.index, fit.index + 1)
+    at = layout.at(fit.phi)
     psi = solve(layout.part(train), at, fit.kappa, scale, **how).psi[:, 0]
     return element_costs(layout.part(~train), replace(fit, psi=psi), scale)
 
 
 def element_costs(layout: Layout, fit: LobeFit, scale: float) -> tuple[np.ndarray, np.ndarray]:
     """Robust cost of each element's observations under a fit made elsewhere, with its lobe and without: (g,) each."""
-    at = slice(fit.index, fit.index + 1)
+    at = layout.at(fit.phi)
     lobe = solve(layout, at, fit.kappa, scale, psi=fit.psi).cost[0]
     return lobe, solve(layout, None, fit.kappa_lambertian, scale).cost[0]

@@ -65,6 +65,6 @@ def find_mirrors(
         problem = maker.problem(index, RAYS)
         choice = choose_model(problem)
         if choice.model == METAL and choice.fit.phi <= MIRROR_PHI:
-            f0 = metal_f0(problem, choice.fit.index)
+            f0 = metal_f0(problem, choice.fit.phi)
             mirrors.append(Mirror(instance.object_id, *plane, f0.astype(np.float32)))
     return tuple(mirrors)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .lobes import LobeLight
+from .lobes import LobeLight, nearest
 
 
 @dataclass(frozen=True)
@@ -75,10 +75,12 @@ class Layout:
         A mean over n views takes part of the residual with it; this makes up for it.
     count : int
         Observations.
+    grid : (p,) float32
+        phi of the lobes.
     """
 
     def __init__(self, problem: Problem, free: bool = True):
-        self.free, self.count = free, len(problem.element)
+        self.free, self.count, self.grid = free, len(problem.element), problem.light.grid
         order = np.argsort(problem.element, kind="stable")
         _, start, views = np.unique(problem.element[order], return_index=True, return_counts=True)
         group = np.repeat(np.arange(len(start)), views)
@@ -116,6 +118,11 @@ class Layout:
         kappa = np.atleast_1d(np.float32(kappa))[:, None, None]
         return (1 - kappa * self._grazing) * np.float32(self.free)
 
+    def at(self, phi: float) -> slice:
+        """The phi of the grid next to this one."""
+        index = nearest(self.grid, phi)
+        return slice(index, index + 1)
+
     def lobe(self, phi: slice) -> Lobe:
         """A, B and their noise for some phi of the grid."""
         one = self._lobe
@@ -128,7 +135,7 @@ class Layout:
     def part(self, chosen: np.ndarray) -> Layout:
         """The same for some elements, (g,) bool."""
         part = object.__new__(Layout)
-        part.free = self.free
+        part.free, part.grid = self.free, self.grid
         part.there, part.inflate, part.I = self.there[:, chosen], self.inflate[chosen], self.I[..., chosen]
         part._grazing = self._grazing[:, chosen]
         part.count = int(part.there.sum())

@@ -9,6 +9,7 @@ import numpy as np
 from ..material import LAMBERTIAN, METAL, SPECULAR
 from .fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs
 from .layout import Layout, Problem
+from .lobes import nearest
 
 LEAST_PSI = 0.02
 """No solid dielectric reflects less at normal incidence (n = 1.33); a smaller fitted psi is no lobe at all."""
@@ -19,8 +20,7 @@ grazing views, or a lobe broader and stronger than it is), and then this decides
 it."""
 METAL_PSI = 0.12
 """No common dielectric reflects more (n = 2.06); what does is a metal or a mirror."""
-METAL_PHI = 0.5
-DIELECTRIC_PHI = 0.7
+BROADEST_PHI = 0.5
 """A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface."""
 MIN_GAIN = 0.02
 MIN_SIGMAS = 3.0
@@ -92,14 +92,14 @@ def choose_model(problem: Problem) -> Choice:
     scale = max(1.4826 * fit.residual, 1e-4)
     with_lobe, without = held_out(fit, how)
     metal = fit_lobe(layout, coloured=True)
-    if float(metal.psi.mean()) > METAL_PSI and metal.phi <= METAL_PHI:
+    if float(metal.psi.mean()) > METAL_PSI and metal.phi <= BROADEST_PHI:
         with_metal, bare = held_out(metal, {"coloured": True})
         (gain, sigmas), (more, surely) = _gain(with_metal, bare), _gain(with_metal, with_lobe)
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
         if min(gain, more) > MIN_GAIN and min(sigmas, surely) > MIN_SIGMAS:
             return Choice(METAL, metal, gain, sigmas)
     gain, sigmas = _gain(with_lobe, without)
-    if gain > MIN_GAIN and sigmas > MIN_SIGMAS and fit.psi[0] <= METAL_PSI and fit.phi <= DIELECTRIC_PHI:
+    if gain > MIN_GAIN and sigmas > MIN_SIGMAS and fit.psi[0] <= METAL_PSI and fit.phi <= BROADEST_PHI:
         return Choice(SPECULAR, fit, gain, sigmas)
     return Choice(LAMBERTIAN, fit, gain, sigmas, "Roughness and specular are not identifiable from these frames.")
 
@@ -157,10 +157,10 @@ def _refused(lobe: LobeFit, own: LobeFit | None, problem: Problem | None) -> boo
     return gain_of(lobe, problem)[0] < -EXCLUDED
 
 
-def metal_f0(problem: Problem, phi_index: int) -> np.ndarray:
+def metal_f0(problem: Problem, phi: float) -> np.ndarray:
     """F0 of a metal, (3,): all its light is the lobe's, so I = F0 A + B; the median ratio over the observations."""
-    A = problem.light.A[:, phi_index].astype(np.float64)
-    B = problem.light.B[:, phi_index].astype(np.float64)
+    at = nearest(problem.light.grid, phi)
+    A, B = problem.light.A[:, at].astype(np.float64), problem.light.B[:, at].astype(np.float64)
     strong = A.mean(1) >= np.median(A.mean(1)) * 0.5
     ratio = (problem.radiance[strong] - B[strong]) / np.maximum(A[strong], 1e-9)
     return np.clip(np.median(ratio, 0), 0.02, 1.0)

@@ -179,7 +179,7 @@ def _material(instance: Instance, choice: Choice, problem: Problem | None, targe
     if choice.model == LAMBERTIAN:
         return ObjectMaterial(**(common | {"residual": common["residual_lambertian"]}))
     if choice.model == METAL:
-        f0 = fit.psi if problem is None else metal_f0(problem, fit.index)
+        f0 = fit.psi if problem is None else metal_f0(problem, fit.phi)
         return ObjectMaterial(**common, phi=fit.phi, f0=tuple(float(x) for x in f0))
     return ObjectMaterial(**common, phi=fit.phi, psi=float(fit.psi.mean()))
 
