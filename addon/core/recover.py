@@ -14,6 +14,7 @@ from .capture.model import Capture, Frame, Mesh, Pixels
 from .capture.read import MAX_BAD_SHARE, fingerprint, read_pixels
 from .capture.recentre import near_origin
 from .errors import BadInputError
+from .evidence.collect import Evidence, collect
 from .lit_diffuse.accumulate import LitDiffuse, accumulate
 from .material import METAL, SPECULAR, ObjectMaterial
 from .memory import peak_memory
@@ -251,18 +252,21 @@ class Recovery:
             field, lamps, self.lit_diffuse(), self.samples(), self.capture.instances, s.threads, s.seed
         )
 
+    def field(self) -> LightField:
+        """The room as a light source, with all that was found of its light."""
+        surface, shading = self.surface(), self.shading()
+        lamps = [lamp.object_id for lamp in shading.lamps]
+        room = LightField(surface.mesh, surface.atlas, surface.scene, shading.radiance, shading.environment, lamps)
+        return room.with_mirrors(shading.mirrors)
+
     def specular(self) -> Specular:
         """phi, psi and the model of every object."""
-        surface, lit, shading = self.surface(), self.lit_diffuse(), self.shading()
+        lit, shading = self.lit_diffuse(), self.shading()
         s = self.settings
 
         def compute():
-            field = LightField(
-                surface.mesh, surface.atlas, surface.scene, shading.radiance, shading.environment,
-                [lamp.object_id for lamp in shading.lamps],
-            ).with_mirrors(shading.mirrors)  # fmt: skip
             found = fit_specular(
-                self.capture.instances, field, lit, shading.lamps, self.samples(),
+                self.capture.instances, self.field(), lit, shading.lamps, self.samples(),
                 [frame.name for frame in self.capture.frames],
                 way=s.specular, rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
                 progress=self.progress,
@@ -309,6 +313,11 @@ class Recovery:
                 color[own] = np.minimum(base_color(color[own], m.psi, m.phi), 1)
         return color
 
+    @cached_property
+    def evidence(self) -> Evidence:
+        """How sure all of it is."""
+        return collect(self)
+
     def median_radiance(self) -> float:
         """Median of L_d over all that was seen: what a picture's exposure is set by."""
         lit = self.lit_diffuse()
@@ -326,6 +335,7 @@ class Recovery:
             "shading": shading.irradiance,
             "lit_diffuse": np.where(lit.seen[:, None], lit.radiance, 0).astype(np.float32),
             "coverage": coverage,
+            **self.evidence.images(),
         }
         for done, (name, values) in enumerate(images.items()):
             self.store.write_exr(f"{name}.exr", atlas.image(values)[::-1])

@@ -1,0 +1,1 @@
+"""How sure the results are: standard errors per texel, intervals per object, and the page that shows them."""

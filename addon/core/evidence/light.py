@@ -1,0 +1,169 @@
+"""How sure the irradiance E is: gathered anew at a few thousand spots, and how much of it no frame looked at.
+
+The same light is gathered twice with other rays, E_a and E_b. How far they differ from each other is their own noise;
+how much further they differ from E is the error of E, be it its rays' or its interpolation's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..lit_diffuse.accumulate import LitDiffuse
+from ..lit_diffuse.visibility import SATURATED
+from ..shading.emitters import LUMINANCE
+from ..shading.environment import Environment
+from ..shading.field import LightField
+from ..shading.over_surface import irradiance
+from ..shading.shade import Shading
+from ..surface.atlas import Atlas
+from .calibration import CLIPPED_UNSURE, LAMP_UNSURE, SKY_UNSURE, SURFACE_UNSURE
+
+SPOTS = 6000
+RAYS = {"rays": 128, "emitter_rays": 32, "portal_rays": 32}
+"""Of one check. 2 x 4000 spots cost 1 s of CPU in the living room; an object's error is then known to 10 - 20 %."""
+SHARE_RAYS = {"rays": 64, "emitter_rays": 16, "portal_rays": 16}
+ONE_SIGMA = 0.683
+WORST = 1.0
+"""Where next to no light comes, the logarithm may be off by anything."""
+PRIOR_SPOTS = 10
+"""An object's own error counts as much as the room's from so many spots on."""
+
+
+@dataclass(frozen=True)
+class LightEvidence:
+    """Errors of E at n elements.
+
+    Attributes
+    ----------
+    noise : (n,) float32
+        Relative standard error of E by rays and interpolation.
+    unseen : (n,) float32
+        Share of E that comes from what no frame saw: surfaces whose light was estimated, lamps and sky solved for.
+    unsure : (n,) float32
+        Relative error of E that follows from that.
+    bias : dict of int to float
+        By object_id: median of log(E checked / E) over its seen spots.
+    spots : int
+        Places at which E was checked.
+    """
+
+    noise: np.ndarray
+    unseen: np.ndarray
+    unsure: np.ndarray
+    bias: dict[int, float]
+    spots: int
+
+
+def spots(atlas: Atlas, seen: np.ndarray, count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """About `count` elements, evenly over the surface, one of each object at least.
+
+    Parameters
+    ----------
+    seen : (n,) bool
+        What was seen stands for what was seen, the rest for the rest.
+
+    Returns
+    -------
+    chosen : (k,) int
+    nearest : (n,) int
+        For each element, the index into `chosen` of the one that stands for it: of its object, in its cell, and on the
+        same side of it.
+    """
+    edge = float(np.sqrt(atlas.area.sum(dtype=np.float64) / count))
+    # Small things and edges occupy more cells than their area says.
+    cell = np.floor(atlas.position / (1.3 * max(edge, 1e-9))).astype(np.int64)
+    cell -= cell.min(0)
+    extent = cell.max(0) + 1
+    main = np.abs(atlas.normal).argmax(1)
+    side = 2 * main + (np.take_along_axis(atlas.normal, main[:, None], 1)[:, 0] > 0)
+    key = (12 * atlas.object_id.astype(np.int64) + 6 * seen + side)
+    for axis in range(3):
+        key = key * extent[axis] + cell[:, axis]
+    names, nearest = np.unique(key, return_inverse=True)
+    chosen = np.empty(len(names), np.int64)
+    order = np.random.default_rng(seed).permutation(len(key))
+    chosen[nearest[order]] = order
+    return chosen, nearest.ravel()
+
+
+def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse) -> tuple[LightField, np.ndarray]:
+    """The room with nothing but the light that no frame looked at, a kind in each channel, and how unsure each is.
+
+    Channel 0: surfaces and the lower bounds of clipped ones; 1: lamps that were solved for; 2: sky.
+    """
+    luminance = field.radiance @ LUMINANCE
+    solved = np.isin(field.atlas.object_id, [lamp.object_id for lamp in shading.lamps if not lamp.seen])
+    surface = (~lit.seen | (lit.tier == SATURATED)) & ~solved
+    kinds = np.stack([luminance * surface, luminance * solved, np.zeros_like(luminance)], 1)
+    sky = (shading.environment.radiance @ LUMINANCE) * (shading.environment.observations == 0)
+    sky = np.stack([np.zeros_like(sky), np.zeros_like(sky), sky], -1).astype(np.float32)
+    clipped = CLIPPED_UNSURE if (lit.tier[surface & lit.seen] == SATURATED).any() else SURFACE_UNSURE
+    unsure = np.array([max(SURFACE_UNSURE, clipped), LAMP_UNSURE, SKY_UNSURE])
+    return field.with_light(kinds, Environment(sky, shading.environment.observations)), unsure
+
+
+def light_evidence(
+    field: LightField, shading: Shading, lit: LitDiffuse, *, threads: int = 0, seed: int = 0
+) -> LightEvidence:
+    """Check E at some spots and carry what was found over to all elements.
+
+    Parameters
+    ----------
+    field : LightField
+        The room as E was gathered in it.
+    """
+    atlas = field.atlas
+    chosen, nearest = spots(atlas, lit.seen, SPOTS, seed)
+    how = {"sampler": "aimed", "interpolate": False, "finest": 1.0, "threads": threads}
+    kept = np.log(np.maximum(shading.irradiance[chosen].mean(1), 1e-20))
+    again = [irradiance(field, chosen, **RAYS, **how, seed=seed + 100_003 * (k + 1))[0].mean(1) for k in range(2)]
+    a, b = (np.clip(np.log(np.maximum(E, 1e-20)) - kept, -WORST, WORST) for E in again)
+    noise, bias = _by_group(2 * atlas.object_id[chosen] + lit.seen[chosen], a, b)
+
+    hidden, unsure = unsure_light(field, shading, lit)
+    shares = np.zeros((len(chosen), 3), np.float32)
+    if hidden.radiance.any() or hidden.environment.radiance.any():
+        part = irradiance(hidden, chosen, **SHARE_RAYS, **how, seed=seed + 7)[0]
+        shares = np.clip(part / np.maximum(shading.irradiance[chosen] @ LUMINANCE, 1e-20)[:, None], 0, 1)
+    return LightEvidence(
+        noise=noise[nearest].astype(np.float32),
+        unseen=np.minimum(shares.sum(1), 1)[nearest].astype(np.float32),
+        unsure=np.sqrt(np.square(shares * unsure).sum(1))[nearest].astype(np.float32),
+        bias=bias,
+        spots=len(chosen),
+    )
+
+
+def _by_group(group: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, dict[int, float]]:
+    """Standard error of log E at each spot, (k,), the same all over a group, and each seen object's offset.
+
+    Robust, as a contact shadow that fell between the shading points must not speak for a whole wall: from the share
+    of 68 % that lies within one standard deviation, for the checks' deviations and for the checks' own noise.
+
+    Parameters
+    ----------
+    group : (k,) int
+        Twice the object_id, and one more where the spot was seen: E of the unseen is a rough guess.
+    a, b : (k,) float
+        log(E checked / E) of both checks.
+    """
+    result, offset = np.empty(len(group)), {}
+    of_kind = {kind: _variance(a[group % 2 == kind], b[group % 2 == kind]) for kind in (0, 1)}
+    for one in np.unique(group):
+        own = group == one
+        count = int(own.sum())
+        whole = of_kind[one % 2]
+        result[own] = np.sqrt((count * _variance(a[own], b[own]) + PRIOR_SPOTS * whole) / (count + PRIOR_SPOTS))
+        if one % 2:
+            offset[int(one) // 2] = float(np.median((a[own] + b[own]) / 2))
+    return result, offset
+
+
+def _variance(a: np.ndarray, b: np.ndarray) -> float:
+    """What a and b have in common, less their own noise; at least 0."""
+    if not len(a):
+        return 0.0
+    together = np.quantile(np.abs(np.concatenate([a, b])), ONE_SIGMA) ** 2
+    return max(float(together - np.quantile(np.abs(a - b), ONE_SIGMA) ** 2 / 2), 0.0)

@@ -1,0 +1,84 @@
+"""What is known of each object as a whole: how much of it was seen, and its mean albedo with an interval."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..lit_diffuse.accumulate import LitDiffuse
+from ..shading.albedo import MEASURED, Albedo
+from ..surface.atlas import Atlas
+from .calibration import OF_OBJECT, Z90
+from .texel import TexelEvidence
+
+
+@dataclass(frozen=True)
+class ObjectEvidence:
+    """One object.
+
+    Attributes
+    ----------
+    object_id : int
+    area : float
+        Square metres.
+    seen_share, measured_share : float
+        Shares of its area that any frame saw, and whose albedo was measured.
+    clipped_share : float
+        Of its observations, those that the sensor clipped.
+    observations : float
+        Behind a spot's L_d, in the median over what was seen; 0 if nothing was.
+    albedo, albedo_low, albedo_high : (3,) tuple of float
+        Mean over what was measured (else over all of it), and its 90 % interval.
+    shading_error : float
+        Relative standard error of E, in the median over what was seen, else over all.
+    unseen_light : float
+        Share of E that comes from what no frame saw, in the mean over the same.
+    """
+
+    object_id: int
+    area: float
+    seen_share: float
+    measured_share: float
+    clipped_share: float
+    observations: float
+    albedo: tuple[float, float, float]
+    albedo_low: tuple[float, float, float]
+    albedo_high: tuple[float, float, float]
+    shading_error: float
+    unseen_light: float
+
+
+def object_evidence(atlas: Atlas, lit: LitDiffuse, albedo: Albedo, texels: TexelEvidence) -> list[ObjectEvidence]:
+    """One for each object that has elements, by object_id."""
+    order = np.argsort(atlas.object_id, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(atlas.object_id[order])) + 1)
+    return [_one(own, atlas, lit, albedo, texels) for own in groups]
+
+
+def _one(own: np.ndarray, atlas: Atlas, lit: LitDiffuse, albedo: Albedo, texels: TexelEvidence) -> ObjectEvidence:
+    area = atlas.area[own].astype(np.float64)
+    seen, measured = lit.seen[own], albedo.origin[own] == MEASURED
+    whole = max(float(area.sum()), 1e-30)
+    told = own[measured] if measured.any() else own
+    weight = atlas.area[told] / max(float(atlas.area[told].sum()), 1e-30)
+    mean = weight @ albedo.rho[told]
+    error = OF_OBJECT * np.sqrt(weight @ np.square(texels.albedo[told]))
+    shown = own[seen] if seen.any() else own
+    return ObjectEvidence(
+        object_id=int(atlas.object_id[own[0]]),
+        area=whole,
+        seen_share=float((area * seen).sum() / whole),
+        measured_share=float((area * measured).sum() / whole),
+        clipped_share=float(texels.clipped[shown].mean()),
+        observations=float(np.median(lit.count[shown])),
+        albedo=_three(mean),
+        albedo_low=_three(np.maximum(mean - Z90 * error, 0)),
+        albedo_high=_three(np.minimum(mean + Z90 * error, 1)),
+        shading_error=float(np.median(texels.shading[shown])),
+        unseen_light=float(texels.unseen[shown].mean()),
+    )
+
+
+def _three(values: np.ndarray) -> tuple[float, float, float]:
+    return tuple(round(float(x), 5) for x in values)

@@ -1,0 +1,119 @@
+"""Standard errors of every texel's shading and albedo."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from ..lit_diffuse.accumulate import LitDiffuse
+from ..lit_diffuse.visibility import EDGE
+from ..material import EMITTER, SPECULAR, ObjectMaterial
+from ..shading.albedo import MEASURED, Albedo
+from ..surface.atlas import Atlas
+from . import calibration as c
+from .light import LightEvidence
+
+AROUND = 5
+"""Edge in texels of the window over which texture is judged."""
+
+
+@dataclass(frozen=True)
+class TexelEvidence:
+    """Errors of n elements.
+
+    Attributes
+    ----------
+    shading : (n,) float32
+        Relative standard error of E.
+    albedo : (n, 3) float32
+        Standard error of the albedo; 90 % of the truth lies within 1.645 of it.
+    unseen : (n,) float32
+        Share of E that comes from what no frame saw.
+    clipped : (n,) float32
+        Share of the observations that the sensor clipped.
+    """
+
+    shading: np.ndarray
+    albedo: np.ndarray
+    unseen: np.ndarray
+    clipped: np.ndarray
+
+
+def contrast(atlas: Atlas, values: np.ndarray) -> np.ndarray:
+    """Standard deviation of log values ((n,), positive) over the texels around each element, (n,) float32."""
+    level = np.log(np.maximum(values, 1e-3)).astype(np.float32)
+    level -= level.mean()
+    sums = []
+    for one in (np.ones_like(level), level, level * level):
+        image = np.zeros(atlas.size * atlas.size, np.float32)
+        image[atlas.texel] = one
+        image = ndimage.uniform_filter(image.reshape(atlas.size, -1), AROUND, mode="constant")
+        sums.append(image.ravel()[atlas.texel])
+    count, total, squares = sums
+    return np.sqrt(np.maximum(squares / count - np.square(total / count), 0))
+
+
+def texel_evidence(
+    atlas: Atlas,
+    lit: LitDiffuse,
+    albedo: Albedo,
+    light: LightEvidence,
+    materials: list[ObjectMaterial],
+    specular: np.ndarray,
+    irradiance: np.ndarray,
+) -> TexelEvidence:
+    """All errors of a texel put together.
+
+    Parameters
+    ----------
+    specular : (n, 3) float32
+        Part of each element's L_d that was taken out as specular.
+    """
+    shading = np.sqrt(np.square(light.noise) + np.square(light.unsure) + c.LIGHT_FLOOR**2)
+    measured = albedo.origin == MEASURED
+    spread, common = by_object(atlas, albedo, shading)
+    texture = c.TEXTURE * contrast(atlas, albedo.rho.mean(1))
+    relative = np.square(c.OWN * albedo.error) + np.square(texture)
+    relative += np.where(lit.tier == EDGE, np.float32(c.AT_EDGES**2), 0)
+    # What was filled in shares the error of the light on those that it was filled in from.
+    relative += np.square(np.where(measured, shading, common))
+    relative += np.where(measured, 0, np.square(c.FILLED * spread) + c.FILLED_FLOOR**2)
+    gloss = gloss_error(atlas, albedo, materials, specular, irradiance)
+    error = np.sqrt(relative[:, None] * np.square(albedo.rho) + np.square(gloss)[:, None])
+    # Of an albedo between 0 and 1 nothing worse can be said than that nothing is known.
+    error = np.minimum(error, c.NOTHING_KNOWN)
+    error[np.isin(atlas.object_id, [m.object_id for m in materials if m.model == EMITTER])] = 0
+    return TexelEvidence(shading.astype(np.float32), error.astype(np.float32), light.unseen, lit.clipped)
+
+
+def by_object(atlas: Atlas, albedo: Albedo, shading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of what was measured of each element's object: spread of log albedo, and median error of E, (n,) float32 each."""
+    spread, common = np.zeros(len(atlas), np.float32), np.zeros(len(atlas), np.float32)
+    level = np.log(np.maximum(albedo.rho.mean(1), 1e-3))
+    order = np.argsort(atlas.object_id, kind="stable")
+    for own in np.split(order, np.flatnonzero(np.diff(atlas.object_id[order])) + 1):
+        known = own[albedo.origin[own] == MEASURED]
+        if len(known):
+            low, high = np.quantile(level[known], (0.16, 0.84))
+            spread[own], common[own] = (high - low) / 2, np.median(shading[known])
+    return spread, common
+
+
+def gloss_error(
+    atlas: Atlas, albedo: Albedo, materials: list[ObjectMaterial], specular: np.ndarray, irradiance: np.ndarray
+) -> np.ndarray:
+    """Error of albedo by what a highlight left in the median, or by taking too much out, (n,) float32, absolute."""
+    result = np.full(len(atlas), c.LEFT, np.float32)
+    for m in materials:
+        if m.model == SPECULAR:
+            own = np.flatnonzero(atlas.object_id == m.object_id)
+            taken = np.pi * specular[own].mean(1) / np.maximum(irradiance[own].mean(1), 1e-20)
+            known = albedo.origin[own] == MEASURED
+            if known.any():
+                # Where hardly any light comes the ratio is wild; what was filled in came from what was measured.
+                middle = np.median(taken[known])
+                taken = np.where(known, np.minimum(taken, 3 * middle), middle)
+                result[own] = c.TAKEN * taken + c.TAKEN_FLOOR
+    return result
