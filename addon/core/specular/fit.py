@@ -30,12 +30,10 @@ prevented from growing without bound."""
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known before any frame: mean and standard deviation of psi and of kappa."""
+    """What is known of psi before any frame: its mean and standard deviation."""
 
     psi: float
-    psi_sigma: float
-    kappa: float
-    kappa_sigma: float
+    sigma: float
 
 
 @dataclass(frozen=True)
@@ -143,7 +141,7 @@ def solve(
                     up, down, clean = (np.broadcast_to(x.sum(0), x.shape) for x in (up, down, clean))
                 if prior is not None:
                     # errors of one element's channels and views go together: they count once
-                    sure = 3 * layout.views * (scale / prior.psi_sigma) ** 2
+                    sure = 3 * layout.views * (scale / prior.sigma) ** 2
                     up, down, clean = up + sure * prior.psi, down + sure, clean + sure
                 values = np.clip(up / np.maximum(np.maximum(clean, LEAST_SIGNAL * down), 1e-30), least_psi, 1)
             each = values[:, :, None, None]
@@ -159,9 +157,7 @@ def solve(
     by_element = cost.sum(1, dtype=np.float64)
     total = by_element.sum(1)
     if prior is not None:
-        off = ((values[0] - prior.psi) / prior.psi_sigma) ** 2
-        off = off + ((np.atleast_1d(kappa) - prior.kappa) / prior.kappa_sigma) ** 2
-        total += layout.views * off / 2
+        total += layout.views * ((values[0] - prior.psi) / prior.sigma) ** 2 / 2
     return Solution(values, size, by_element, total)
 
 

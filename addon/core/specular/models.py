@@ -13,11 +13,10 @@ from .lobes import nearest
 
 LEAST_PSI = 0.02
 """No solid dielectric reflects less at normal incidence (n = 1.33); a smaller fitted psi is no lobe at all."""
-DIELECTRIC = Prior(psi=0.04, psi_sigma=0.01, kappa=0.3, kappa_sigma=0.15)
-"""Plastics, lacquers, glass and woods have n = 1.4 to 1.6: F0 = 0.03 to 0.05, and what leaves their diffuse part
-through the surface, 1 - F(n.wo), is close to 1 - 0.3 (1 - n.wo)^2. A broad lobe leaves both open (darkening towards
-grazing views, or a lobe broader and stronger than it is), and then this decides; where the frames tell, they outweigh
-it."""
+DIELECTRIC = Prior(0.04, 0.01)
+"""Plastics, lacquers, glass and woods have n = 1.4 to 1.6, F0 = 0.03 to 0.05. A broad lobe can be a little broader and
+much stronger for nearly the same frames (living room's panels: phi 0.39 with psi 0.05 or 0.45 with 0.1): there this
+decides; where the frames tell, they outweigh it."""
 METAL_PSI = 0.12
 """No common dielectric reflects more (n = 2.06); what does is a metal or a mirror."""
 BROADEST_PHI = 0.5
