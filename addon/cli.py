@@ -20,12 +20,11 @@ from typing import TextIO
 
 from .console import ConsoleProgress, StopWish, duration, own_console, unexpected
 from .core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_OK, BadInputError, ScanRelightError
-from .core.settings import PAPER, Settings
+from .core.settings import PRESETS, Settings
 from .settings_info import setting_infos
 from .version import VERSION
 
 COMMAND = "scan_relight"
-PRESETS = {"default": Settings(), "paper": PAPER}
 DEMO_SIZES = ("tiny", "small", "large")
 EXIT_CODES = """\
 exit codes: 0 done, 1 failure, 2 bad input, 130 interrupted (what is finished is kept; the same command goes on from
@@ -131,8 +130,8 @@ def make_parser() -> argparse.ArgumentParser:
 def add_settings(parser: argparse.ArgumentParser) -> None:
     """One option for each field of `Settings`."""
     group = parser.add_argument_group("settings")
-    group.add_argument("--preset", choices=tuple(PRESETS), default="default",
-                       help="what the settings below start from; 'paper' is the published method (default default)")
+    group.add_argument("--preset", choices=tuple(PRESETS), default="normal",
+                       help="what the settings below start from; 'paper' is the published method (default normal)")
     for info in setting_infos():
         text = f"{info.help} (default {info.default})".replace("%", "%%")
         option = f"--{info.name.replace('_', '-')}"

@@ -35,7 +35,7 @@ from .specular.samples import SampleCollector, Samples
 from .store import Store, key
 from .surface.build import Surface, build_surface, from_uv, turned
 
-CODE = 6
+CODE = 7
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -82,7 +82,7 @@ class Recovery:
     @cached_property
     def _keys(self) -> dict[str, str]:
         s = self.settings
-        surface = key("surface", CODE, fingerprint(self.capture), s.texel_size, s.atlas_size)
+        surface = key("surface", CODE, fingerprint(self.capture), s.texel_size, s.detail, s.atlas_size)
         lit = key("lit_diffuse", surface, s.median, s.frame_order, s.seed)
         shading = key(
             "shading", lit, s.shading, s.shading_rays, s.emitter_rays, s.portal_rays, s.interpolate,
@@ -123,6 +123,7 @@ class Recovery:
                 [frame.camera for frame in capture.frames],
                 self._unwrap,
                 self.settings.texel_size,
+                self.settings.detail,
                 self.settings.atlas_size,
             )
             sign = np.where((found.mesh.triangles == capture.mesh.triangles).all(1), 1, -1).astype(np.int8)

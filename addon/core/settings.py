@@ -9,12 +9,14 @@ from .errors import BadInputError
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of `recover`. The paper's way is `PAPER`.
+    """Settings of `recover`; `PRESETS` holds the ones that have names.
 
     Attributes
     ----------
     texel_size : float
         Edge of a surface element in metres; 0 chooses it from the frames' footprint.
+    detail : float
+        Texels along one pixel of the frames' footprint, where texel_size is 0.
     atlas_size : int
         Upper bound on the atlas's edge in pixels.
     median : str
@@ -47,6 +49,7 @@ class Settings:
     """
 
     texel_size: float = 0.0
+    detail: float = 1.0
     atlas_size: int = 4096
     median: str = "adaptive"
     frame_order: str = "shuffled"
@@ -77,6 +80,8 @@ class Settings:
             value = getattr(self, f.name)
             if isinstance(value, (int, float)) and not isinstance(value, bool) and not 0 <= value < float("inf"):
                 raise BadInputError(f"Setting '{f.name}' is {value}; give a finite number of at least 0.")
+        if not self.detail > 0:
+            raise BadInputError(f"Setting 'detail' is {self.detail}; give more than 0.")
         if self.shading_rays < 1 or self.specular_rays < 1 or self.atlas_size < 64:
             raise BadInputError("Settings shading_rays and specular_rays must be at least 1, atlas_size at least 64.")
 
@@ -84,3 +89,9 @@ class Settings:
 PAPER = Settings(median="p2", frame_order="capture", shading="uniform", shading_rays=10000, emitter_rays=0,
                  portal_rays=0, interpolate=False, mirrors=False, specular="target", refine=0)
 """Haefner et al. 2021: P-square in video order, uniform rays, one target frame."""
+DRAFT = Settings(detail=0.5, shading_rays=48, emitter_rays=16, portal_rays=16, specular_rays=96)
+"""A first look: texels of two pixels' edge, few rays."""
+FINE = Settings(detail=1.5, shading_rays=384, emitter_rays=64, portal_rays=96, specular_rays=512)
+"""What more time buys."""
+PRESETS = {"draft": DRAFT, "normal": Settings(), "fine": FINE, "paper": PAPER}
+"""By the names that the interfaces show."""

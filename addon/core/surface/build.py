@@ -14,7 +14,6 @@ from .elements import make_atlas, triangle_geometry, uv_scale
 from .orientation import Sides, seen_sides
 from .rays import RayScene
 
-TEXELS_A_PIXEL = 1.0
 """Texels along the edge of what a pixel covers."""
 EXPECTED_FILL = 0.55
 """Share of the atlas that islands usually cover; only the unwrapping's margin depends on it."""
@@ -73,6 +72,7 @@ def build_surface(
     cameras: Sequence[Camera],
     unwrap: Callable[[Mesh, int], np.ndarray],
     texel_size: float = 0.0,
+    detail: float = 1.0,
     largest: int = 4096,
 ) -> Surface:
     """Lay out the surface elements.
@@ -83,6 +83,8 @@ def build_surface(
         Gives atlas coordinates ((t, 3, 2) float32 in [0, 1], no overlap) for a mesh and an atlas size in texels.
     texel_size : float
         Edge of an element in metres; 0 takes it from the frames' footprint.
+    detail : float
+        Texels along one pixel of that footprint.
     largest : int
         Upper bound of the atlas's edge.
 
@@ -97,7 +99,7 @@ def build_surface(
             "No camera of the capture looks at the mesh; check that transforms.json and mesh.ply share one frame."
         )
     _, area = triangle_geometry(mesh)
-    texel = texel_size or sides.footprint / TEXELS_A_PIXEL
+    texel = texel_size or sides.footprint / detail
     size = atlas_size(float(area.sum()), texel, largest)
     uv = unwrap(mesh, size)
     # The islands' true scale sets the size that makes a texel as large as wished.

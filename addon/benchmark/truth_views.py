@@ -1,0 +1,83 @@
+"""Truth seen through a capture's held-out cameras, against what surface elements hold. Never read by the pipeline."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from ..core.capture.exr import read_exr
+from ..core.capture.model import Camera
+from ..core.capture.read import read_capture
+from ..core.progress import Progress
+from ..core.recover import Recovery
+from ..core.settings import Settings
+from ..core.store import Store
+from ..core.surface.elements import ElementLookup
+
+SHIFTS = ((-0.25, -0.25), (0.25, 0.25), (-0.25, 0.25), (0.25, -0.25))
+
+
+def views(capture: Path, recovery: Recovery) -> list[dict]:
+    """For each held-out view: the element under each of four points a pixel, truth, and the pixels that count."""
+    surface = recovery.surface()
+    lookup = ElementLookup(surface.mesh, surface.atlas)
+    spec = json.loads((capture / "truth" / "transforms.json").read_text())
+    objects = {o["id"]: o for o in json.loads((capture / "truth" / "materials.json").read_text())}
+    plain = {i for i, o in objects.items() if not (o["emission"] or o["metallic"] or o["masked"])}
+    found = []
+    for frame in spec["frames"]:
+        name = Path(frame["file_path"]).name
+        camera = Camera(
+            *(spec[k] for k in ("w", "h", "fl_x", "fl_y", "cx", "cy")), np.array(frame["transform_matrix"])
+        )
+        elements = []
+        for shift in SHIFTS:
+            directions = camera.directions(camera.pixel_centres() + shift)
+            origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
+            hits = surface.scene.intersect(origins, directions)
+            element = np.full(len(directions), -1)
+            hit = hits.triangle >= 0
+            element[hit] = lookup(hits.triangle[hit], hits.u[hit], hits.v[hit])
+            elements.append(element)
+        ids = np.rint(read_exr(capture / "truth" / "object_id" / name).rgb[..., 0]).astype(int)
+        counts = np.isin(ids, list(plain))
+        counts[1:] &= ids[1:] == ids[:-1]
+        counts[:, 1:] &= ids[:, 1:] == ids[:, :-1]
+        truth = read_exr(capture / "truth" / "albedo" / name).rgb.reshape(-1, 3)
+        element = np.stack(elements)
+        found.append({"element": element, "truth": truth, "counts": counts.ravel() & (element >= 0).all(0)})
+    return found
+
+
+def psnr(seen: list[dict], value: np.ndarray, only: np.ndarray | None = None) -> float:
+    """Mean PSNR over the views of elements' values ((n, 3)); `only` ((n,) bool) restricts it to some elements."""
+    result = []
+    for view in seen:
+        counts = view["counts"] if only is None else view["counts"] & only[view["element"]].all(0)
+        shown = value[view["element"]].mean(0)
+        error = np.clip(shown[counts], 0, 1) - np.clip(view["truth"][counts], 0, 1)
+        if counts.sum() > 100:
+            result.append(-10 * np.log10(np.mean(error**2)))
+    return float(np.mean(result))
+
+
+def projected_truth(seen: list[dict], count: int, fallback: np.ndarray) -> np.ndarray:
+    """The truth as elements could hold it at best: the mean of what the held-out views themselves show of each."""
+    total, hits = np.zeros((count, 3)), np.zeros(count)
+    for view in seen:
+        for element in view["element"]:
+            ok = view["counts"]
+            for c in range(3):
+                total[:, c] += np.bincount(element[ok], view["truth"][ok, c], count)
+            hits += np.bincount(element[ok], minlength=count)
+    return np.where(hits[:, None] > 0, total / np.maximum(hits, 1)[:, None], fallback)
+
+
+def albedo_psnr(capture: Path, result: Path) -> float:
+    """PSNR (dB) of a result's Base Color over the capture's held-out views; finished stages are taken from it."""
+    settings = Settings(**json.loads((result / "report.json").read_text())["settings"])
+    with Store(result) as store:
+        recovery = Recovery(read_capture(capture), store, settings, Progress(), None)
+        return psnr(views(capture, recovery), recovery.base_color())
