@@ -25,10 +25,17 @@ class Environment:
         Equirectangular, row 0 at the bottom; u = 0.5 - atan2(y, x) / (2 pi), v = 0.5 + asin(z) / pi. Linear Rec.709.
     observations : (h, 2h) int32
         Pixels behind each direction; 0 where `radiance` was filled in from neighbours.
+    clipped : (h, 2h) bool
+        Every one of those was clipped: `radiance` is a lower bound. None: nothing is.
     """
 
     radiance: np.ndarray
     observations: np.ndarray
+    clipped: np.ndarray | None = None
+
+    def __post_init__(self):
+        if self.clipped is None:
+            object.__setattr__(self, "clipped", np.zeros(self.observations.shape, bool))
 
     @property
     def seen(self) -> bool:
@@ -60,6 +67,10 @@ class Environment:
         zones = [np.where(side, weight, np.float32(0)) for side in (above, ~above)]
         return [zone for zone in zones if zone.any()]
 
+    def clipped_zone(self) -> np.ndarray:
+        """Weights ((h, 2h) float32) of the directions of which only a lower bound is known."""
+        return self.clipped.astype(np.float32)
+
     def zone_mean(self, zone: np.ndarray) -> np.ndarray:
         """Mean radiance over a zone, weighted by solid angle: (3,) float32."""
         height = len(zone)
@@ -69,7 +80,7 @@ class Environment:
     def with_zone(self, zone: np.ndarray, radiance: np.ndarray) -> Environment:
         """The same map with `radiance` ((3,)) mixed in by the weights of a zone."""
         mixed = self.radiance * (1 - zone[..., None]) + zone[..., None] * radiance
-        return Environment(mixed.astype(np.float32), self.observations)
+        return Environment(mixed.astype(np.float32), self.observations, self.clipped)
 
     def __call__(self, directions: np.ndarray) -> np.ndarray:
         """Radiance from unit `directions` ((n, 3) float32, away from the room): (n, 3) float32."""
@@ -115,6 +126,8 @@ class EnvironmentAccumulator:
         cells = 2 * self._height**2
         self._sum = np.zeros((cells, 3))
         self._count = np.zeros(cells, np.int64)
+        self._bound = np.zeros((cells, 3), np.float32)
+        self._bounds = np.zeros(cells, np.int64)
 
     def add(self, view: FrameView, pixels: Pixels) -> None:
         """Take the pixels whose whole neighbourhood escapes (an edge mixes in the window frame)."""
@@ -123,14 +136,19 @@ class EnvironmentAccumulator:
             return
         directions = view.camera.directions(view.camera.pixel_centres()[outside.ravel()])
         cells = _bin(directions, self._height)
-        radiance = pixels.radiance[outside]
+        radiance, clipped = pixels.radiance[outside], pixels.saturated[outside]
+        np.maximum.at(self._bound, cells[clipped], radiance[clipped])
+        self._bounds += np.bincount(cells[clipped], minlength=len(self._count))
+        cells, radiance = cells[~clipped], radiance[~clipped]
         for channel in range(3):
             self._sum[:, channel] += np.bincount(cells, radiance[:, channel], len(self._count))
         self._count += np.bincount(cells, minlength=len(self._count))
 
     def result(self) -> Environment:
-        """The map, unseen directions filled in from their neighbours."""
+        """The map, unseen directions filled in from their neighbours; of clipped ones the greatest lower bound."""
         shape = (self._height, 2 * self._height)
-        mean = (self._sum / np.maximum(self._count, 1)[:, None]).astype(np.float32).reshape(*shape, 3)
-        count = self._count.reshape(shape).astype(np.int32)
-        return Environment(_fill(mean, count), count)
+        clipped = (self._count == 0) & (self._bounds > 0)
+        mean = self._sum / np.maximum(self._count, 1)[:, None]
+        mean = np.where(clipped[:, None], self._bound, mean).astype(np.float32).reshape(*shape, 3)
+        count = np.where(clipped, self._bounds, self._count).reshape(shape).astype(np.int32)
+        return Environment(_fill(mean, count), count, clipped.reshape(shape))

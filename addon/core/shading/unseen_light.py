@@ -1,8 +1,8 @@
 """Light that no frame looked at, solved for from what it throws onto the surfaces that the frames do see.
 
-A lamp behind the camera, or the sky above what the windows showed, still lights the room. For a trial radiance s the
-albedos would be pi L_d / (E + s G), G being the irradiance thrown at radiance 1. Albedo varies little within an object,
-light a lot: the s under which log albedo varies least within the objects is the one taken.
+A lamp behind the camera, or the sky above what the windows showed, still lights the room. Albedo varies little within
+an object, light a lot: the radiance under which albedo varies least is the one taken (`light_fit`). Lamps are found one
+by one, then all that was solved is refined together.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from ..capture.model import Instance
 from ..parallel import for_blocks
@@ -19,15 +18,15 @@ from .environment import Environment
 from .field import LightField
 from .irradiance import direct, gather
 from .lamps import EMITTER_ALBEDO, Lamp, find_seen
+from .light_fit import Sample, on_flat
 from .portals import find_portals
+from .refine_light import CLASS_AGREES, Sky, all_light, refined
 
 SAMPLES = 4000
 """Elements that the test looks at, spread evenly over the objects. Noise in E or G draws the solved radiance to 0: few
 elements with many rays each find more of it than many with few (a sky of 1.7: 16,000 with 64 rays give 1.4)."""
 MIN_GAIN = 0.03
 """A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share."""
-CLASS_AGREES = 0.25
-"""If the solved luminance lies this near (relative) to a seen lamp of the same class, that lamp's radiance is taken."""
 MIN_SKY_GAIN = 0.1
 """The same for a sky of which no frame saw anything: all albedos hang on it."""
 MIN_OPEN = 0.02
@@ -35,6 +34,8 @@ MIN_OPEN = 0.02
 MIN_SKY = 0.01
 """Part of the received light below which a part of the sky can't be solved for; its neighbours' radiance stays."""
 SWEEPS = 2
+LEAST, ENOUGH = 30, 200
+"""Elements with which a solution can be tried; those on flat spots from which on the others are left out."""
 RAYS, EMITTER_RAYS, PORTAL_RAYS = 256, 64, 64
 ELEMENTS_AT_ONCE = 1 << 10
 
@@ -57,46 +58,6 @@ class Light:
     notes: tuple[str, ...]
 
 
-@dataclass
-class _Sample:
-    """m elements with a good L_d; `received` is E from all light known so far and grows as light is found."""
-
-    element: np.ndarray
-    object_id: np.ndarray
-    radiance: np.ndarray
-    received: np.ndarray
-
-    def __post_init__(self):
-        ids, self.group = np.unique(self.object_id, return_inverse=True)
-        count = np.bincount(self.group, minlength=len(ids))
-        start = np.concatenate([[0], np.cumsum(count)[:-1]])
-        self._middle = start + count // 2
-
-    def spread(self, log_albedo: np.ndarray) -> float:
-        """Mean absolute deviation of log albedo ((m,)) from its object's median; outliers count at most 1."""
-        order = np.lexsort((log_albedo, self.group))
-        median = log_albedo[order[self._middle]]
-        return float(np.minimum(np.abs(log_albedo - median[self.group]), 1).mean())
-
-    def best(self, sent: np.ndarray, received: np.ndarray, thrown: np.ndarray) -> tuple[float, float, float] | None:
-        """The radiance s that explains best what is `sent`, with the spread before and after; None if unbounded."""
-        if not (thrown > 0).any():
-            return None
-        sent = np.log(np.maximum(sent, 1e-9))
-
-        def cost(log_s: float) -> float:
-            return self.spread(sent - np.log(received + np.exp(log_s) * thrown + 1e-12))
-
-        # The scale to search around: where the trial light gives as much as all known light together.
-        grid = np.log(max(received.mean(), 1e-9) / thrown.mean()) + np.linspace(-5, 4, 37)
-        costs = [cost(x) for x in grid]
-        at = int(np.argmin(costs))
-        if at == len(grid) - 1:
-            return None  # more is always better: this says nothing about the light
-        found = minimize_scalar(cost, bounds=(grid[max(at - 1, 0)], grid[at + 1]), method="bounded")
-        return float(np.exp(found.x)), self.spread(sent - np.log(received + 1e-12)), float(found.fun)
-
-
 def _pick(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:
     """At most `SAMPLES` good elements, evenly over the objects that have them."""
     rng = np.random.default_rng(seed)
@@ -108,6 +69,13 @@ def _pick(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:
         own = element[objects == object_id]
         chosen.append(own if len(own) <= each else rng.choice(own, each, replace=False))
     return np.sort(np.concatenate(chosen)) if chosen else np.zeros(0, np.int64)
+
+
+def _steady(field: LightField, good: np.ndarray, flat: np.ndarray) -> np.ndarray:
+    """The good elements, (n,) bool: of an object with enough on flat spots, those."""
+    object_id = field.atlas.object_id
+    count = np.bincount(object_id, good & flat)
+    return good & (flat | (count < LEAST)[object_id])
 
 
 def _barely_seen(field: LightField, good: np.ndarray) -> np.ndarray:
@@ -146,7 +114,7 @@ def _with_whole_sky(field: LightField, normals, element: np.ndarray, seed: int) 
     object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
     left = np.ones(len(element), bool)
     for _ in range(SWEEPS):
-        sample = _Sample(element[left], object_id[left], sent[left], received[left])
+        sample = Sample(element[left], object_id[left], sent[left], received[left])
         found = sample.best(sent[left] @ LUMINANCE, received[left] @ LUMINANCE, thrown[left])
         if found is None or found[2] > (1 - MIN_SKY_GAIN) * found[1]:
             return field, ()
@@ -221,12 +189,15 @@ def find_light(
     unseen_objects : list of int
         Objects of which no frame saw anything.
     """
-    element = _pick(field, good | _barely_seen(field, good), seed)
+    flat = on_flat(field.atlas)
+    element = _pick(field, _steady(field, good, flat) | _barely_seen(field, good), seed)
     if not len(element):
         return Light((), field.environment, ())
     field, found = _with_whole_sky(field, normals, element, seed)
     environment, atlas = field.environment, field.atlas
     zones = environment.unseen_zones() if environment.seen else []
+    if environment.clipped.any():
+        zones.append(environment.clipped_zone())
     known = environment
     for zone in zones:
         known = known.with_zone(zone, np.zeros(3, np.float32))
@@ -239,33 +210,34 @@ def find_light(
     filled = received + sum(G[:, None] * s for G, s in zip(thrown_sky, guess, strict=True))
     seen = find_seen(atlas.object_id[element], field.radiance[element], filled)
     lit = ~np.isin(atlas.object_id[element], [lamp.object_id for lamp in seen])
-    if lit.sum() < 30:
+    if (lit & flat[element]).sum() >= ENOUGH:
+        lit &= flat[element]
+    if lit.sum() < LEAST:
         return Light(tuple(seen), environment, found)
     sent = field.radiance[element[lit]].astype(np.float64)
-    sample = _Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit])
-    thrown_sky = [G[lit] for G in thrown_sky]
+    sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit])
     thrown = {i: _thrown_by_object(field, normals, sample.element, i, seed) for i in unseen_objects}
 
     # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
     lit_room = field.with_light(field.radiance, environment)
     least = {i: _most_reflected(lit_room, normals, i, seed) for i in unseen_objects}
 
-    notes: list[str] = []
-    radiances = [g.copy() for g in guess]
+    sky = Sky([G[lit] for G in thrown_sky], guess, bool(environment.clipped.any()))
     lamps: list[Lamp] = []
     for sweep in range(SWEEPS):
-        lamps = _solve_lamps(sample, thrown, least, instances, seen, radiances, thrown_sky, received[lit])
-        notes = _solve_sky(sample, lamps, thrown, radiances, guess, thrown_sky, received[lit])
+        lamps = _solve_lamps(sample, thrown, least, instances, seen, sky, received[lit])
+        _solve_sky(sample, lamps, thrown, sky, received[lit])
         if not zones or sweep == SWEEPS - 1:
             break
-    for zone, radiance in zip(zones, radiances, strict=True):
+    lamps = refined(sample, lamps, thrown, least, instances, seen, sky, received[lit])
+    for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))
     # With all light known, what looked like a lamp for want of it does so no more.
     everything = _irradiance(
         field.with_light(_lit_by(field, lamps), environment, [lamp.object_id for lamp in lamps]), normals, element, seed
     )
     sure = find_seen(atlas.object_id[element], field.radiance[element], everything)
-    return Light(tuple(sure) + tuple(lamps), environment, found + tuple(notes))
+    return Light(tuple(sure) + tuple(lamps), environment, found + tuple(sky.notes()))
 
 
 def _lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
@@ -276,35 +248,23 @@ def _lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
     return radiance
 
 
-def _all_light(base, lamps, thrown, radiances, thrown_sky, without: int = -1) -> np.ndarray:
-    """E from everything, (m, 3), but for one zone of the sky."""
-    total = base.copy()
-    for lamp in lamps:
-        total += thrown[lamp.object_id][:, None] * lamp.radiance
-    for i, (G, s) in enumerate(zip(thrown_sky, radiances, strict=True)):
-        if i != without:
-            total += G[:, None] * s
-    return total
-
-
-def _solve_lamps(sample: _Sample, thrown, least, instances, seen, radiances, thrown_sky, base) -> list[Lamp]:
+def _solve_lamps(sample: Sample, thrown, least, instances, seen, sky: Sky, base) -> list[Lamp]:
     """Unseen lamps, the one that explains most first; none once the gain falls below `MIN_GAIN`."""
     class_of = {i.object_id: i.class_name for i in instances}
     sent = sample.radiance @ LUMINANCE
     lamps: list[Lamp] = []
     left = dict(thrown)
     while left:
-        received = _all_light(base, lamps, thrown, radiances, thrown_sky) @ LUMINANCE
+        received = all_light(base, lamps, thrown, sky) @ LUMINANCE
         found = {i: sample.best(sent, received, G) for i, G in left.items()}
         found = {i: f for i, f in found.items() if f is not None and f[2] < (1 - MIN_GAIN) * f[1] and f[0] > least[i]}
         if not found:
             break
         object_id = min(found, key=lambda i: found[i][2])
         by_channel = [
-            sample.best(
-                sample.radiance[:, c], _all_light(base, lamps, thrown, radiances, thrown_sky)[:, c], left[object_id]
-            ) for c in range(3)
-        ]  # fmt: skip
+            sample.best(sample.radiance[:, c], all_light(base, lamps, thrown, sky)[:, c], left[object_id])
+            for c in range(3)
+        ]
         lamps.append(_coloured(object_id, *found[object_id], class_of, seen, sample.received, by_channel))
         del left[object_id]
     return lamps
@@ -330,23 +290,14 @@ def _coloured(object_id, s, before, after, class_of, seen, received, by_channel)
     return Lamp(int(object_id), (s * white / max(float(white @ LUMINANCE), 1e-12)).astype(np.float32), False, how + ".")
 
 
-def _solve_sky(sample: _Sample, lamps, thrown, radiances, guess, thrown_sky, base) -> list[str]:
-    """Radiance of the sky's unseen zones, channel by channel, in place; one sentence for each solved zone."""
-    notes = []
-    for i, G in enumerate(thrown_sky):
-        others = _all_light(base, lamps, thrown, radiances, thrown_sky, without=i)
-        if (G[:, None] * guess[i]).mean() < MIN_SKY * others.mean():
+def _solve_sky(sample: Sample, lamps, thrown, sky: Sky, base) -> None:
+    """Radiance of the sky's unknown parts, channel by channel, one after another."""
+    for i, G in enumerate(sky.thrown):
+        others = all_light(base, lamps, thrown, sky, without=i)
+        if (G[:, None] * sky.guess[i]).mean() < MIN_SKY * others.mean():
             continue
         solved = [sample.best(sample.radiance[:, c], others[:, c], G) for c in range(3)]
         if any(found is None for found in solved):
             continue
-        # Far from all that was seen of the sky the solution is not believed: it may stand for something else.
-        top = 3 * guess[i].max()
-        radiances[i] = np.minimum([found[0] for found in solved], top)
-        notes.append(
-            f"Part {i + 1} of the sky that no frame sees was solved from the light it throws: radiance "
-            f"{', '.join(f'{x:.3g}' for x in radiances[i])} "
-            f"(its seen neighbours: {', '.join(f'{x:.3g}' for x in guess[i])})."
-        )
-    return notes
-
+        sky.solved.add(i)
+        sky.radiance[i] = np.clip([found[0] for found in solved], *sky.bounds(i))

@@ -1,0 +1,149 @@
+"""All unknown light together: what was found one by one is refined under a tighter cap (`light_fit`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..capture.model import Instance
+from .emitters import LUMINANCE
+from .lamps import Lamp
+from .light_fit import Sample
+
+CLASS_AGREES = 0.25
+"""If the solved luminance lies this near (relative) to a seen lamp of the same class, that lamp's radiance is taken."""
+BELIEVED = 3.0
+"""Further than this factor from all that was seen of the sky a solution is not believed: it may stand for something
+else."""
+BRIGHTEST = 30.0
+"""The same for a part of the sky that is clipped."""
+
+
+@dataclass
+class Sky:
+    """Parts of the sky whose radiance is not known, and what is known of it so far.
+
+    Attributes
+    ----------
+    thrown : list of (m,) float64
+        E from each part at radiance 1.
+    guess : list of (3,) float64
+        Radiance of the seen neighbours; of a clipped part the lower bound.
+    clipped : bool
+        The last part is what was seen, but clipped.
+    radiance : list of (3,) float64
+    solved : set of int
+        Parts of which the radiance was solved for.
+    """
+
+    thrown: list[np.ndarray]
+    guess: list[np.ndarray]
+    clipped: bool
+    radiance: list[np.ndarray] = field(default_factory=list)
+    solved: set[int] = field(default_factory=set)
+
+    def __post_init__(self):
+        self.radiance = [g.copy() for g in self.guess]
+
+    def _is_clipped(self, i: int) -> bool:
+        return self.clipped and i == len(self.thrown) - 1
+
+    def bounds(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest radiance that is believed, (3,) each."""
+        guess = np.maximum(self.guess[i], 1e-12)
+        if self._is_clipped(i):
+            return guess, BRIGHTEST * guess
+        return guess / BELIEVED, np.full(3, BELIEVED * guess.max())
+
+    def notes(self) -> list[str]:
+        """One sentence for each part that was solved."""
+        said = []
+        for i in sorted(self.solved):
+            values, guess = (", ".join(f"{x:.3g}" for x in one[i]) for one in (self.radiance, self.guess))
+            if self._is_clipped(i):
+                said.append("Part of the sky is clipped in every frame that sees it; it was solved from the light it "
+                            f"throws: radiance {values} (at least {guess}).")
+            else:
+                said.append(f"Part {i + 1} of the sky that no frame sees was solved from the light it throws: radiance "
+                            f"{values} (its seen neighbours: {guess}).")
+        return said
+
+
+def all_light(base: np.ndarray, lamps: list[Lamp], thrown: dict[int, np.ndarray], sky: Sky,
+              without: int = -1) -> np.ndarray:
+    """E from everything, (m, 3): `base`, the lamps, and the sky but for one part."""
+    total = base.copy()
+    for lamp in lamps:
+        total += thrown[lamp.object_id][:, None] * lamp.radiance
+    for i, (G, s) in enumerate(zip(sky.thrown, sky.radiance, strict=True)):
+        if i != without:
+            total += G[:, None] * s
+    return total
+
+
+def _alike(lamp: Lamp, luminance: float, instances: tuple[Instance, ...], seen: list[Lamp]) -> Lamp | None:
+    """A seen lamp of the same class whose luminance is about this one."""
+    class_of = {i.object_id: i.class_name for i in instances}
+    for other in seen:
+        if class_of.get(other.object_id) == class_of.get(lamp.object_id):
+            if abs(luminance / float(other.radiance @ LUMINANCE) - 1) < CLASS_AGREES:
+                return other
+    return None
+
+
+def refined(sample: Sample, lamps: list[Lamp], thrown: dict[int, np.ndarray], least: dict[int, float],
+            instances: tuple[Instance, ...], seen: list[Lamp], sky: Sky, base: np.ndarray) -> list[Lamp]:
+    """The lamps with refined radiances; those of the sky are refined in place.
+
+    Parameters
+    ----------
+    lamps : list of Lamp
+        Unseen ones, as found one by one. One that took a seen lamp's radiance keeps it.
+    least : dict of float
+        Luminance below which each would be no lamp.
+    base : (m, 3) float64
+        E from all light that the frames show.
+    """
+    fixed = [lamp for lamp in lamps if any(np.array_equal(lamp.radiance, other.radiance) for other in seen)]
+    free = [lamp for lamp in lamps if not any(lamp is other for other in fixed)]
+    parts = sorted(sky.solved)
+    if not free and not parts:
+        return lamps
+    others = Sky([G for i, G in enumerate(sky.thrown) if i not in parts],
+                 [r for i, r in enumerate(sky.radiance) if i not in parts], False)
+
+    def solve(weights: np.ndarray, start: np.ndarray) -> np.ndarray:
+        """Radiances of `free` and `parts` in the channel that `weights` ((3,)) makes."""
+        low, high = np.zeros(len(start)), np.full(len(start), np.inf)
+        for k, lamp in enumerate(free):
+            low[k] = least[lamp.object_id] * float(start[k] / max(float(lamp.radiance @ LUMINANCE), 1e-12))
+        for k, i in enumerate(parts, len(free)):
+            low[k], high[k] = (bound @ weights for bound in sky.bounds(i))
+        return sample.refine(
+            sample.radiance @ weights, all_light(base, fixed, thrown, others) @ weights,
+            [thrown[lamp.object_id] for lamp in free] + [sky.thrown[i] for i in parts], start, low, high,
+        )  # fmt: skip
+
+    def now() -> np.ndarray:
+        return np.maximum([*(lamp.radiance for lamp in free), *(sky.radiance[i] for i in parts)], 1e-9)
+
+    luminance = solve(LUMINANCE, now() @ LUMINANCE)
+    twins = {lamp.object_id: _alike(lamp, s, instances, seen) for lamp, s in zip(free, luminance)}
+    if any(twins.values()):
+        for lamp in [lamp for lamp in free if twins[lamp.object_id]]:
+            twin = twins[lamp.object_id]
+            whose = f", near the seen lamp {twin.object_id} of its class, whose radiance it takes."
+            fixed.append(replace(lamp, radiance=twin.radiance, note=lamp.note.rstrip(".") + whose))
+        free = [lamp for lamp in free if not twins[lamp.object_id]]
+        luminance = solve(LUMINANCE, now() @ LUMINANCE) if free or parts else luminance[:0]
+    colour = now() * (luminance / (now() @ LUMINANCE))[:, None]
+    if len(colour):
+        by_channel = np.stack([solve(np.eye(3)[c], colour[:, c]) for c in range(3)], 1)
+        agrees = np.abs(by_channel @ LUMINANCE / luminance - 1) < CLASS_AGREES
+        colour = np.where(agrees[:, None], by_channel, colour)
+    for k, i in enumerate(parts, len(free)):
+        sky.radiance[i] = np.clip(colour[k], *sky.bounds(i))
+    done = {lamp.object_id: lamp for lamp in fixed}
+    done |= {lamp.object_id: replace(lamp, radiance=np.float32(colour[k])) for k, lamp in enumerate(free)}
+    return [done[lamp.object_id] for lamp in lamps]
