@@ -155,3 +155,15 @@ def test_the_papers_single_frame_gives_numbers(capture, expect, phi):
     assert floor.model == SPECULAR and floor.target_frame
     expect("psi in 0...1", float(max(-floor.psi, floor.psi - 1, 0)), 0)
     expect("phi in 0...1", float(max(-floor.phi, floor.phi - 1, 0)), 0)
+
+
+def test_black_glossy_plastic(capture, expect):
+    """Albedo 0.02 under a highlight that most frames see some of: the plain median takes it for albedo."""
+    black = np.full(3, 0.02)
+    run = GlossyFloor(0.09, 0.04, rho=black).recover(capture)
+    floor = run.materials[0]
+    expect("a lobe is found", float(floor.model != SPECULAR), 0)
+    expect("albedo 0.02, absolute", float(np.abs(floor_albedo(run) - black).max()), 0.01)
+    plain = GlossyFloor(0.09, 0.04, rho=black).recover(capture, replace(SETTINGS, refine=0))
+    left = float(np.abs(floor_albedo(plain) - black).max())
+    assert left > 0.01, "the median alone does as well: this case tests nothing"
