@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from .atomic import write_bytes
 from .capture.model import Capture, Frame, Mesh, Pixels
 from .capture.read import MAX_BAD_SHARE, fingerprint, read_pixels
 from .capture.recentre import near_origin
 from .errors import BadInputError
 from .evidence.collect import Evidence, collect
+from .evidence.page import make_page
 from .lit_diffuse.accumulate import LitDiffuse, accumulate
 from .material import METAL, SPECULAR, ObjectMaterial
 from .memory import peak_memory
@@ -76,6 +78,11 @@ class Recovery:
         self.log: dict[str, dict[str, Any]] = {}
         self.bad_frames: list[str] = []
         self.blind_frames: list[str] = []
+
+    @property
+    def frames(self) -> tuple[Frame, ...]:
+        """The capture's, in the coordinates that the stages work in."""
+        return self._near.frames
 
     # Each stage's key: the stage before, and the settings that it heeds.
 
@@ -253,6 +260,7 @@ class Recovery:
             field, lamps, self.lit_diffuse(), self.samples(), self.capture.instances, s.threads, s.seed
         )
 
+    @cached_property
     def field(self) -> LightField:
         """The room as a light source, with all that was found of its light."""
         surface, shading = self.surface(), self.shading()
@@ -267,7 +275,7 @@ class Recovery:
 
         def compute():
             found = fit_specular(
-                self.capture.instances, self.field(), lit, shading.lamps, self.samples(),
+                self.capture.instances, self.field, lit, shading.lamps, self.samples(),
                 [frame.name for frame in self.capture.frames],
                 way=s.specular, rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
                 progress=self.progress,
@@ -342,7 +350,11 @@ class Recovery:
             self.store.write_exr(f"{name}.exr", atlas.image(values)[::-1])
             self.progress.update(0.5 * done / len(images))
         self.store.write_exr("environment.exr", shading.environment.radiance[::-1])
-        self.store.write_json("materials.json", {"objects": [dataclasses.asdict(m) for m in self.materials()]})
+        known = {one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects}
+        objects = [dataclasses.asdict(m) | known.get(m.object_id, {}) for m in self.materials()]
+        self.store.write_json("materials.json", {"objects": objects})
+        self.progress.update(0.6)
+        write_bytes(self.store.path("report.html"), make_page(self, self.report()).encode())
 
     def report(self) -> dict[str, Any]:
         """What report.json holds so far: stages, settings, figures and warnings."""

@@ -36,8 +36,23 @@ def make_report(run: Recovery) -> dict[str, Any]:
     if "specular" in run.done:
         models = [m.model for m in run.materials()]
         figures["models"] = {model: models.count(model) for model in sorted(set(models))}
+        figures["evidence"] = _evidence_figures(run)
     result["figures"] = figures
     return result
+
+
+def _evidence_figures(run: Recovery) -> dict[str, float]:
+    """How sure the room is as a whole; medians and means over the elements, lamps left out."""
+    evidence, albedo = run.evidence, run.albedo
+    relative = evidence.texels.albedo.mean(1) / np.maximum(albedo.rho.mean(1), 1e-3)
+    reflecting = ~np.isin(run.surface().atlas.object_id, [lamp.object_id for lamp in run.shading().lamps])
+    measured, filled = reflecting & (albedo.origin == MEASURED), reflecting & (albedo.origin != MEASURED)
+    kinds = {"": measured, "filled_": filled}
+    figures = {f"albedo_error_{name}median": float(np.median(relative[k])) for name, k in kinds.items() if k.any()}
+    if measured.any():
+        figures["shading_error_median"] = float(np.median(evidence.texels.shading[measured]))
+        figures["unseen_light_mean"] = float(evidence.texels.unseen[measured].mean())
+    return figures | {"spots_checked": evidence.light.spots}
 
 
 def _report_surface(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:

@@ -27,8 +27,8 @@ from addon.core.capture.ply import read_ply
 QUICK = ("--shading-rays", "8", "--specular-rays", "2", "--emitter-rays", "2", "--refine", "0", "--texel-size", "0.2",
          "--atlas-size", "256")
 FRAMES = 10
-RESULTS = {"albedo.exr", "base_color.exr", "coverage.exr", "environment.exr", "lit_diffuse.exr", "materials.json",
-           "report.json", "scene.blend", "shading.exr"}
+RESULTS = {"albedo.exr", "albedo_error.exr", "base_color.exr", "coverage.exr", "environment.exr", "evidence.exr",
+           "lit_diffuse.exr", "materials.json", "report.html", "report.json", "scene.blend", "shading.exr"}
 STAGES = ("surface", "lit_diffuse", "shading", "specular")
 
 
@@ -242,7 +242,8 @@ def test_pixels_that_say_nothing_do_no_harm(name, capture, recover, tmp_path):
     UNTOLD[name](capture)
     assert recover() == (0, "")
     assert whole(tmp_path / "out")
-    for image in ("albedo", "base_color", "shading", "lit_diffuse", "coverage", "environment"):
+    for image in ("albedo", "base_color", "shading", "lit_diffuse", "coverage", "environment", "evidence",
+                  "albedo_error"):
         assert np.isfinite(read_exr(tmp_path / "out" / f"{image}.exr").rgb).all(), image
     albedo = read_exr(tmp_path / "out" / "albedo.exr").rgb
     assert 0 <= albedo.min() and albedo.max() <= 1

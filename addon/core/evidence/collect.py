@@ -39,7 +39,7 @@ class Evidence:
 def collect(run: Recovery) -> Evidence:
     """The evidence of a run whose stages are done; a few thousand spots are gathered at again."""
     atlas, lit, shading, specular = run.surface().atlas, run.lit_diffuse(), run.shading(), run.specular()
-    light = light_evidence(run.field(), shading, lit, threads=run.settings.threads, seed=run.settings.seed)
+    light = light_evidence(run.field, shading, lit, threads=run.settings.threads, seed=run.settings.seed)
     texels = texel_evidence(
         atlas, lit, run.albedo, light, list(specular.materials), specular.specular, shading.irradiance
     )

@@ -20,7 +20,7 @@ from ..shading.shade import Shading
 from ..surface.atlas import Atlas
 from .calibration import CLIPPED_UNSURE, LAMP_UNSURE, SKY_UNSURE, SURFACE_UNSURE
 
-SPOTS = 6000
+SPOTS = 4000
 RAYS = {"rays": 128, "emitter_rays": 32, "portal_rays": 32}
 """Of one check. 2 x 4000 spots cost 1 s of CPU in the living room; an object's error is then known to 10 - 20 %."""
 SHARE_RAYS = {"rays": 64, "emitter_rays": 16, "portal_rays": 16}

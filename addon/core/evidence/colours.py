@@ -1,0 +1,45 @@
+"""Values as colours: radiance, albedo, and quantities as heat."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR
+
+HEAT = np.array([(12, 8, 38), (75, 12, 107), (145, 38, 103), (207, 68, 70), (246, 125, 21), (251, 200, 60),
+                 (252, 255, 200)], np.float32)
+"""Dark to light, also in grey (anchors of the inferno map of matplotlib, CC0, rounded)."""
+MODEL = {LAMBERTIAN: (150, 150, 150), SPECULAR: (60, 130, 220), METAL: (225, 150, 40), EMITTER: (255, 240, 150)}
+NOTHING = (40, 40, 46)
+
+
+def encoded(linear: np.ndarray) -> np.ndarray:
+    """Linear Rec.709 in 0...1 as sRGB bytes."""
+    x = np.clip(np.nan_to_num(linear), 0, 1)
+    curve = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(np.maximum(x, 1e-9), 1 / 2.4) - 0.055)
+    return (255 * curve + 0.5).astype(np.uint8)
+
+
+def photo(radiance: np.ndarray, middle: float) -> np.ndarray:
+    """Radiance as a photo whose grey lies at `middle`; bright light levels off instead of being cut."""
+    return encoded(1 - np.exp(-0.2 / max(middle, 1e-30) * np.maximum(np.nan_to_num(radiance), 0)))
+
+
+def heat(values: np.ndarray, top: float) -> np.ndarray:
+    """(...) values from 0 to `top` as (..., 3) uint8."""
+    at = np.clip(np.nan_to_num(values, nan=0.0, posinf=top) / top, 0, 1) * (len(HEAT) - 1)
+    low = np.minimum(at.astype(np.int32), len(HEAT) - 2)
+    share = (at - low)[..., None]
+    return ((1 - share) * HEAT[low] + share * HEAT[low + 1] + 0.5).astype(np.uint8)
+
+
+def heat_css() -> str:
+    """The same as a CSS gradient, for the legend."""
+    stops = ", ".join("rgb({:.0f} {:.0f} {:.0f})".format(*colour) for colour in HEAT)
+    return f"linear-gradient(to right, {stops})"
+
+
+def gloss(model: str, phi: float | None) -> tuple[int, int, int]:
+    """A model's colour, lighter the glossier."""
+    polish = 0.0 if phi is None else 1 - float(np.sqrt(phi))
+    return tuple(int(c + (255 - c) * 0.7 * polish) for c in MODEL[model])

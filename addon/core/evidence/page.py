@@ -1,0 +1,161 @@
+"""The page that tells a person in a minute what was recovered and how far to trust it: one HTML file, no script."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..material import EMITTER, METAL, SPECULAR, ObjectMaterial
+from .calibration import Z90
+from .colours import MODEL, encoded, heat_css
+from .objects import ObjectEvidence
+from .pictures import Picture, pictures_of
+from .png import data_address
+from .style import STYLE
+from .views import choose_frames, view
+
+if TYPE_CHECKING:
+    from ..recover import Recovery
+
+FRAMES = 3
+ROWS = 80
+"""Objects in the table; materials.json lists them all."""
+
+
+def make_page(run: Recovery, report: dict[str, Any]) -> str:
+    """The page of a run whose stages are done.
+
+    Parameters
+    ----------
+    report : dict
+        What report.json will hold.
+    """
+    name = escape(run.capture.root.name)
+    parts = [
+        f"<h1>{name} <small>recovered by Scan Relight</small></h1>",
+        _facts(run, report),
+        _warnings(report["warnings"]),
+        _pictures(run),
+        _objects(run),
+        _lamps(run),
+        "<footer>Intervals are meant to hold the truth nine times out of ten; docs/evidence.md says how that was "
+        "measured. The numbers behind this page: report.json, materials.json, coverage.exr, albedo_error.exr, "
+        "evidence.exr.</footer>",
+    ]
+    head = (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">'
+        f"<title>{name}: recovered</title><style>{STYLE.replace('HEAT', heat_css())}</style></head><body>"
+    )
+    return head + "\n".join(parts) + "</body></html>\n"
+
+
+def _facts(run: Recovery, report: dict[str, Any]) -> str:
+    figures, sure = report["figures"], report["figures"]["evidence"]
+    lamps = run.shading().lamps
+    hidden = sum(not lamp.seen for lamp in lamps)
+    glossy = sum(m.model in (SPECULAR, METAL) for m in run.materials())
+    tiles = [
+        (f"{1 - figures['unseen_share']:.0%}", "of the surface seen by a frame; the rest is filled in"),
+        (f"&plusmn;{Z90 * sure.get('albedo_error_median', 1):.0%}", "of an albedo that was measured, in the median"),
+        (f"{sure.get('unseen_light_mean', 0):.0%}", "of the light comes from what no frame saw"),
+        (f"{glossy} of {len(run.materials())}", "objects with a highlight"),
+        (f"{len(lamps)}", "lamps" + (f", {hidden} of them solved for" if hidden else "")),
+        (f"{figures['frames']}", f"frames, {figures['observations_median']:.0f} views of a spot in the median"),
+    ]
+    return '<div class="tiles">' + "".join(f"<div><b>{value}</b>{text}</div>" for value, text in tiles) + "</div>"
+
+
+def _warnings(warnings: list[str]) -> str:
+    if not warnings:
+        return "<p>No warnings.</p>"
+    return '<ul class="warnings">' + "".join(f"<li>{escape(one)}</li>" for one in warnings) + "</ul>"
+
+
+def _pictures(run: Recovery) -> str:
+    names = {i.object_id: i.class_name for i in run.capture.instances}
+    result = ["<h2>Frames</h2>"]
+    for index in choose_frames(run, FRAMES):
+        try:
+            seen = view(run, index)
+        except BadInputError:  # it was readable before; the page is not what to stop for
+            continue
+        pictures, worst = pictures_of(run, seen)
+        told = ", ".join(f"{escape(names.get(i, 'outside'))} ({i}) {size:.0%}" for i, size in worst)
+        result.append(f"<h3>{escape(run.frames[index].name)} <small>worst residuals: {told or 'none'}</small></h3>")
+        result.append('<div class="frames">' + "".join(map(_figure, pictures)) + "</div>")
+    chips = "".join(f'<span><i style="background:rgb{colour}"></i>{model}</span>' for model, colour in MODEL.items())
+    return "\n".join(result) + f'<p class="chips">{chips}<span>lighter: glossier</span></p>'
+
+
+def _figure(picture: Picture) -> str:
+    legend = f'<span class="heat"></span> {picture.legend}' if picture.legend else ""
+    return (
+        f'<figure><img alt="{escape(picture.title)}" src="{data_address(picture.image)}">'
+        f"<figcaption>{escape(picture.title)} {legend}</figcaption></figure>"
+    )
+
+
+def _objects(run: Recovery) -> str:
+    """A table of the objects, the least certain first."""
+    evidence = {one.object_id: one for one in run.evidence.objects}
+    known = [(m, evidence[m.object_id]) for m in run.materials() if m.object_id in evidence and m.model != EMITTER]
+    known.sort(key=lambda pair: -_doubt(pair[1]))
+    rows = "".join(_row(m, e) for m, e in known[:ROWS])
+    more = f"<p>{len(known) - ROWS} more are in materials.json.</p>" if len(known) > ROWS else ""
+    return (
+        "<h2>Objects, the least certain first</h2><table><tr><th></th><th>object</th><th>model</th>"
+        "<th>albedo</th><th>roughness</th><th>specular F0</th><th>seen</th><th>remarks</th></tr>"
+        f"{rows}</table>{more}"
+    )
+
+
+def _doubt(one: ObjectEvidence) -> float:
+    """Half an albedo's interval relative to the albedo."""
+    width = np.mean(one.albedo_high) - np.mean(one.albedo_low)
+    return float(width / 2 / max(np.mean(one.albedo), 0.02))
+
+
+def _row(m: ObjectMaterial, e: ObjectEvidence) -> str:
+    colour = m.f0 if m.model == METAL and m.f0 else e.albedo
+    albedo = "" if m.model == METAL else f"{np.mean(e.albedo):.2f} &plusmn; {_doubt(e):.0%}"
+    specular = "coloured" if m.model == METAL else _interval(m.psi, *_range(m, "specular"))
+    roughness = None if m.phi is None else float(np.sqrt(m.phi))
+    return (
+        f"<tr><td>{_swatch(colour)}</td><td>{escape(m.class_name)} <small>{m.object_id}</small></td>"
+        f"<td>{m.model}</td><td>{albedo}</td><td>{_interval(roughness, *_range(m, 'roughness'))}</td>"
+        f"<td>{specular}</td><td>{e.seen_share:.0%}</td><td>{escape(m.note)}</td></tr>"
+    )
+
+
+def _swatch(linear) -> str:
+    return '<i style="background:rgb({} {} {})"></i>'.format(*encoded(np.asarray(linear)))
+
+
+def _range(m: ObjectMaterial, name: str) -> tuple[float | None, float | None]:
+    return getattr(m, f"{name}_low", None), getattr(m, f"{name}_high", None)
+
+
+def _interval(value: float | None, low: float | None, high: float | None) -> str:
+    between = "" if low is None or high is None else f" <small>{low:.2f}&ndash;{high:.2f}</small>"
+    return ("unknown" if between else "") + between if value is None else f"{value:.2f}{between}"
+
+
+def _lamps(run: Recovery) -> str:
+    names = {i.object_id: i.class_name for i in run.capture.instances}
+    lamps = run.shading().lamps
+    if not lamps:
+        return "<h2>Lamps</h2><p>None; all light comes from outside.</p>"
+    rows = "".join(
+        f"<tr><td>{_swatch(lamp.radiance / max(lamp.radiance.max(), 1e-9))}</td>"
+        f"<td>{escape(names.get(lamp.object_id, ''))} <small>{lamp.object_id}</small></td>"
+        f"<td>{', '.join(f'{x:.3g}' for x in lamp.radiance)}</td><td>{'seen' if lamp.seen else 'solved for'}</td>"
+        f"<td>{escape(lamp.note)}</td></tr>"
+        for lamp in lamps
+    )
+    return (
+        "<h2>Lamps</h2><table><tr><th></th><th>lamp</th><th>radiance (R, G, B)</th><th>how</th><th>remarks</th></tr>"
+        f"{rows}</table>"
+    )

@@ -1,0 +1,116 @@
+"""The page's pictures of one frame: seen, predicted, recovered, and how sure it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import ndimage
+
+from ..material import METAL
+from .colours import NOTHING, encoded, gloss, heat, photo
+from .views import View
+
+if TYPE_CHECKING:
+    from ..recover import Recovery
+
+ERROR_TOP, RESIDUAL_TOP, VIEWS_TOP = 0.5, 0.5, 20
+"""What lies at the bright end of the heat maps: relative errors, and the number of views."""
+WORST = 3
+BLOCK = 12
+"""Edge in pixels of the squares among which the worst residuals are sought."""
+MARK = (0, 255, 200)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One picture of the page.
+
+    Attributes
+    ----------
+    title : str
+    image : (h, w, 3) uint8
+    legend : str
+        Of heat maps: from what to what; '' for others.
+    """
+
+    title: str
+    image: np.ndarray
+    legend: str = ""
+
+
+def pictures_of(run: Recovery, view: View) -> tuple[list[Picture], list[tuple[int, float]]]:
+    """Pictures of a frame, and its worst residuals: (object_id, mean relative residual) from the worst on."""
+    element, nothing = view.element, view.element < 0
+    shown = np.maximum(element, 0)
+    albedo, errors, shading = run.albedo.rho, run.evidence.texels, run.shading().irradiance
+    middle = float(np.median(view.radiance[view.valid])) if view.valid.any() else 1.0
+    emitters = np.isin(view.object_id, [lamp.object_id for lamp in run.shading().lamps])
+
+    relative = errors.albedo[shown].mean(-1) / np.maximum(albedo[shown].mean(-1), 0.02)
+    residual = view.residual
+    worst = worst_blocks(residual, view.object_id)
+    light = shading[shown]
+    grey = float(np.median(light[~nothing].mean(-1))) if not nothing.all() else 1.0
+    metals = {m.object_id: m.f0 for m in run.materials() if m.model == METAL}
+    bare = nothing | emitters | np.isin(view.object_id, list(metals))
+    colour = _where(nothing | emitters, encoded(albedo[shown]))
+    for object_id, f0 in metals.items():
+        colour[view.object_id == object_id] = encoded(np.array(f0))
+    views = _where(nothing, heat(run.lit_diffuse().count[shown], VIEWS_TOP))
+    residual = _boxed(heat(residual, RESIDUAL_TOP), worst)
+    unsure = _where(bare, heat(relative, ERROR_TOP))
+    pictures = [
+        Picture("Frame", photo(view.radiance, middle)),
+        Picture("Predicted from what was recovered", photo(view.predicted, middle)),
+        Picture("Residual; boxes: the worst", residual, _up_to(f"{RESIDUAL_TOP:.0%}")),
+        Picture("Albedo; of metals F0", colour),
+        Picture("Albedo's standard error, relative", unsure, _up_to(f"{ERROR_TOP:.0%}")),
+        Picture("Light that arrives (shading)", _where(nothing, photo(light, grey))),
+        Picture("Views of each spot", views, _up_to(VIEWS_TOP)),
+        Picture("Model, lighter the glossier", _models(run, view)),
+    ]
+    told = [(int(view.object_id[y + BLOCK // 2, x + BLOCK // 2]), size) for y, x, size in worst]
+    return pictures, told
+
+
+def _up_to(top) -> str:
+    return f"0 to {top} and more"
+
+
+def worst_blocks(residual: np.ndarray, object_id: np.ndarray) -> list[tuple[int, int, float]]:
+    """Corner (y, x) and mean of the squares with the largest residual, no two of one object."""
+    if min(residual.shape) <= BLOCK:
+        return []
+    mean = ndimage.uniform_filter(residual.astype(np.float32), BLOCK, mode="constant")
+    half = BLOCK // 2
+    mean[:half], mean[-half:], mean[:, :half], mean[:, -half:] = 0, 0, 0, 0
+    found = []
+    while len(found) < WORST and mean.max() > 0:
+        y, x = np.unravel_index(np.argmax(mean), mean.shape)
+        found.append((int(y) - half, int(x) - half, float(mean[y, x])))
+        mean[object_id == object_id[y, x]] = 0
+        mean[max(y - BLOCK, 0) : y + BLOCK, max(x - BLOCK, 0) : x + BLOCK] = 0
+    return found
+
+
+def _boxed(image: np.ndarray, corners: list[tuple[int, int, float]]) -> np.ndarray:
+    for y, x, _ in corners:
+        for edge in (image[y, x : x + BLOCK], image[y + BLOCK - 1, x : x + BLOCK], image[y : y + BLOCK, x],
+                     image[y : y + BLOCK, x + BLOCK - 1]):
+            edge[:] = MARK
+    return image
+
+
+def _where(nothing: np.ndarray, image: np.ndarray) -> np.ndarray:
+    image[nothing] = NOTHING
+    return image
+
+
+def _models(run: Recovery, view: View) -> np.ndarray:
+    image = np.empty((*view.object_id.shape, 3), np.uint8)
+    image[:] = NOTHING
+    for m in run.materials():
+        image[view.object_id == m.object_id] = gloss(m.model, m.phi)
+    return image

@@ -1,0 +1,143 @@
+"""Frames worth looking at, and what the recovery predicts for them, pixel by pixel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..capture.model import Camera, Pixels
+from ..capture.read import read_pixels
+from ..material import METAL, SPECULAR
+from ..shading.emitters import bright_triangles
+from ..specular.lobes import GRID, reflected_light
+
+if TYPE_CHECKING:
+    from ..recover import Recovery
+
+WIDTH = 240
+"""Pictures are this wide at most."""
+LOBE_RAYS = 24
+"""For each pixel of a glossy object."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A frame, made small, and what lies behind its pixels.
+
+    Attributes
+    ----------
+    index : int
+        Of the frame.
+    radiance : (h, w, 3) float32
+        Seen.
+    valid : (h, w) bool
+        Not masked, not clipped.
+    element : (h, w) int32
+        Behind each pixel's centre; -1 where it sees past the mesh.
+    object_id : (h, w) int32
+    predicted : (h, w, 3) float32
+        Diffuse light and highlight, as recovered.
+    """
+
+    index: int
+    radiance: np.ndarray
+    valid: np.ndarray
+    element: np.ndarray
+    object_id: np.ndarray
+    predicted: np.ndarray
+
+    @property
+    def residual(self) -> np.ndarray:
+        """|predicted - seen| over their mean, (h, w) float32, 0...2.
+
+        0 where nothing can be said: past the mesh, masked, clipped, and at the objects' edges, where pixels mix.
+        """
+        inner = self.valid & (self.element >= 0)
+        for axis in (0, 1):
+            same = np.diff(self.object_id, axis=axis) == 0
+            ahead, behind = [(0, 0), (0, 0)], [(0, 0), (0, 0)]
+            ahead[axis], behind[axis] = (1, 0), (0, 1)
+            inner = inner & np.pad(same, ahead, constant_values=True) & np.pad(same, behind, constant_values=True)
+        seen, told = self.radiance.mean(2), self.predicted.mean(2)
+        level = (seen + told) / 2 + 0.02 * float(np.median(seen))
+        return np.where(inner, np.abs(told - seen) / np.maximum(level, 1e-30), 0)
+
+
+def choose_frames(run: Recovery, count: int) -> list[int]:
+    """Frames that together show the most surface, the one that shows most first."""
+    samples, atlas = run.samples(), run.surface().atlas
+    area, chosen = atlas.area[samples.element].astype(np.float64), []
+    left = np.ones(len(atlas), bool)
+    while len(chosen) < min(count, len(run.capture.frames)):
+        gain = np.bincount(samples.frame, area * left[samples.element], len(run.capture.frames))
+        gain[chosen] = -1
+        best = int(np.argmax(gain))
+        if gain[best] <= 0:
+            break
+        chosen.append(best)
+        left[samples.element[samples.frame == best]] = False
+    return chosen
+
+
+def view(run: Recovery, index: int) -> View:
+    """Frame `index` made small, and predicted."""
+    frame = run.frames[index]
+    step = -(-frame.camera.width // WIDTH)
+    pixels, camera = _smaller(read_pixels(frame), step), _coarser(frame.camera, step)
+    directions = camera.directions(camera.pixel_centres())
+    origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
+    room, surface = run.field, run.surface()
+    hits = surface.scene.intersect(np.ascontiguousarray(origins), directions)
+    element = room.elements(hits)
+    predicted = room.arriving(hits, element, directions)
+    hit = np.flatnonzero(element >= 0)
+    predicted[hit] -= run.specular().specular[element[hit]]
+    _add_lobes(run, predicted, element, directions)
+    shape = (camera.height, camera.width)
+    ids = np.where(element >= 0, surface.atlas.object_id[element], -1)
+    return View(
+        index, pixels.radiance, pixels.valid & ~pixels.saturated, element.reshape(shape), ids.reshape(shape),
+        predicted.reshape(*shape, 3),
+    )  # fmt: skip
+
+
+def _add_lobes(run: Recovery, predicted: np.ndarray, element: np.ndarray, directions: np.ndarray) -> None:
+    """Highlights of what has one; a metal has nothing else, and a flat mirror was followed already."""
+    room = run.field
+    bright = bright_triangles(room)
+    mirrors = {mirror.object_id for mirror in room.mirrors}
+    owner = np.where(element >= 0, room.atlas.object_id[element], -1)
+    for m in run.materials():
+        at = np.flatnonzero(owner == m.object_id)
+        if m.model not in (SPECULAR, METAL) or m.object_id in mirrors or not len(at):
+            continue
+        phi = max(float(m.phi), float(GRID[0]))
+        light = reflected_light(
+            room, bright, element[at], -directions[at], rays=LOBE_RAYS, grid=np.float32([phi]), proposals=(phi,),
+            threads=run.settings.threads, seed=run.settings.seed,
+        )  # fmt: skip
+        f0 = np.float32(m.f0 if m.model == METAL else m.psi)
+        if m.model == METAL:
+            predicted[at] = 0
+        predicted[at] += f0 * light.A[:, 0] + light.B[:, 0]
+
+
+def _coarser(camera: Camera, step: int) -> Camera:
+    return replace(
+        camera, width=camera.width // step, height=camera.height // step,
+        fx=camera.fx / step, fy=camera.fy / step, cx=camera.cx / step, cy=camera.cy / step,
+    )  # fmt: skip
+
+
+def _smaller(pixels: Pixels, step: int) -> Pixels:
+    """Means over `step` * `step` pixels; good where all of them are."""
+    height, width = (n // step * step for n in pixels.valid.shape)
+
+    def blocks(values):
+        return values[:height, :width].reshape(height // step, step, width // step, step, *values.shape[2:])
+
+    return Pixels(
+        blocks(pixels.radiance).mean((1, 3)), blocks(pixels.valid).all((1, 3)), blocks(pixels.saturated).any((1, 3))
+    )
