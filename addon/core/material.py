@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 LAMBERTIAN = "lambertian"
 SPECULAR = "specular"
@@ -38,6 +38,13 @@ class ObjectMaterial:
         The same with no lobe at all; what the lobe had to beat.
     observations : int
         Pixels that the fit used.
+    roughness_low, roughness_high : float or None
+        90 % interval of Blender's roughness, sqrt(phi); 0 and 1 where it is not identifiable. None for emitters.
+    specular_low, specular_high : float or None
+        The same of psi, or of a metal's mean F0; all that a dielectric can have where it is not identifiable.
+    scores : dict of str to float
+        Cost on observations that the fit has not seen, relative to the Lambertian's, of each model that was tried:
+        below 1 is better.
     note : str
         Why a richer model was not taken, or what is doubtful; '' if nothing is.
     """
@@ -53,4 +60,9 @@ class ObjectMaterial:
     residual: float | None = None
     residual_lambertian: float | None = None
     observations: int = 0
+    roughness_low: float | None = None
+    roughness_high: float | None = None
+    specular_low: float | None = None
+    specular_high: float | None = None
+    scores: dict[str, float] = field(default_factory=dict)
     note: str = ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -44,6 +44,8 @@ class Choice:
     sigmas : float
         The same in standard errors.
     note : str
+    scores : dict of str to float
+        Cost on held-out elements relative to the Lambertian's, of each model that was tried.
     """
 
     model: str
@@ -51,6 +53,7 @@ class Choice:
     gain: float = 0.0
     sigmas: float = 0.0
     note: str = ""
+    scores: dict[str, float] = field(default_factory=dict)
 
 
 def _gain(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
@@ -90,17 +93,20 @@ def choose_model(problem: Problem) -> Choice:
     fit = fit_lobe(layout, **how)
     scale = max(1.4826 * fit.residual, 1e-4)
     with_lobe, without = held_out(fit, how)
+    scores = {LAMBERTIAN: 1.0, SPECULAR: float(with_lobe.sum() / max(without.sum(), 1e-30))}
     metal = fit_lobe(layout, coloured=True)
     if float(metal.psi.mean()) > METAL_PSI and metal.phi <= BROADEST_PHI:
         with_metal, bare = held_out(metal, {"coloured": True})
+        scores[METAL] = float(with_metal.sum() / max(bare.sum(), 1e-30))
         (gain, sigmas), (more, surely) = _gain(with_metal, bare), _gain(with_metal, with_lobe)
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
         if min(gain, more) > MIN_GAIN and min(sigmas, surely) > MIN_SIGMAS:
-            return Choice(METAL, metal, gain, sigmas)
+            return Choice(METAL, metal, gain, sigmas, scores=scores)
     gain, sigmas = _gain(with_lobe, without)
     if gain > MIN_GAIN and sigmas > MIN_SIGMAS and fit.psi[0] <= METAL_PSI and fit.phi <= BROADEST_PHI:
-        return Choice(SPECULAR, fit, gain, sigmas)
-    return Choice(LAMBERTIAN, fit, gain, sigmas, "Roughness and specular are not identifiable from these frames.")
+        return Choice(SPECULAR, fit, gain, sigmas, scores=scores)
+    note = "Roughness and specular are not identifiable from these frames."
+    return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores)
 
 
 def adopt_from_class(
@@ -123,7 +129,7 @@ def adopt_from_class(
         for i, choice in members.items():
             if choice.model == LAMBERTIAN and not _refused(model.fit, choice.fit, problems.get(i)):
                 note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
-                result[i] = replace(model, gain=0.0, sigmas=0.0, note=note)
+                result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
             elif choice.model == model.model and len(found) > 1 and i in problems:
                 shared = replace(choice.fit, phi=model.fit.phi)
                 if model.model == SPECULAR:

@@ -14,6 +14,7 @@ from ..progress import Progress
 from ..shading.field import LightField
 from ..shading.lamps import Lamp
 from .fit import fit_lobe
+from .intervals import GlossInterval, gloss_interval
 from .layout import Problem
 from .models import Choice, adopt_from_class, choose_model, metal_f0
 from .problems import Problems
@@ -101,6 +102,11 @@ def fit_specular(
     if way == "frames":
         choices = adopt_from_class(choices, problems, {i.object_id: i.class_name for i in instances})
 
+    # Where the target frame alone was fitted, elements have one view: the jackknife has nothing to work on.
+    told = problems if way == "frames" else {}
+    intervals = ordered_map(lambda i: gloss_interval(choices[i], told.get(i)), wanted, threads)
+    sure = dict(zip(wanted, intervals, strict=True))
+
     materials = []
     for i in instances:
         if i.object_id in glowing:
@@ -110,9 +116,9 @@ def fit_specular(
             continue
         target = targets.get(i.object_id, -1)
         name = frame_names[target] if target >= 0 else None
-        material = _material(i, choices[i.object_id], problems.get(i.object_id), name)
+        material = _material(i, choices[i.object_id], problems.get(i.object_id), name, sure[i.object_id])
         if material.model == METAL and i.object_id in {mirror.object_id for mirror in field.mirrors}:
-            material = replace(material, phi=0.0, note="A flat mirror; its lobe is narrower than the frames resolve.")
+            material = replace(material, phi=0.0, roughness_low=0.0, note="A flat mirror; its lobe is narrower than the frames resolve.")
         materials.append(material)
 
     specular = np.zeros((len(field.atlas), 3), np.float32)
@@ -163,7 +169,9 @@ def _by_target(maker: Problems, object_id: int, frame: np.ndarray, target: int, 
     return Choice(SPECULAR, fit_lobe(problem, "target")), problem
 
 
-def _material(instance: Instance, choice: Choice, problem: Problem | None, target: str | None) -> ObjectMaterial:
+def _material(
+    instance: Instance, choice: Choice, problem: Problem | None, target: str | None, sure: GlossInterval
+) -> ObjectMaterial:
     """The description of what was chosen."""
     fit = choice.fit
     common = {
@@ -174,6 +182,11 @@ def _material(instance: Instance, choice: Choice, problem: Problem | None, targe
         "observations": 0 if problem is None else len(problem.element),
         "residual": None if fit is None else fit.residual,
         "residual_lambertian": None if fit is None else fit.residual_lambertian,
+        "roughness_low": sure.roughness[0],
+        "roughness_high": sure.roughness[1],
+        "specular_low": sure.specular[0],
+        "specular_high": sure.specular[1],
+        "scores": choice.scores,
         "note": choice.note,
     }
     if choice.model == LAMBERTIAN:
