@@ -26,7 +26,7 @@ from .unwrap import unwrap
 
 STAGES = ("surface", "lit_diffuse", "shading", "specular")
 WRITE = "write"
-WEIGHTS = {"read": 1, "surface": 5, "lit_diffuse": 8, "shading": 30, "specular": 40, WRITE: 4}
+WEIGHTS = {"read": 1, "surface": 5, "lit_diffuse": 8, "shading": 17, "specular": 16, WRITE: 5}
 """Rough cost of the stages, for the estimate of the time left."""
 
 

@@ -134,7 +134,7 @@ class BrightPoints:
     density: np.ndarray
 
 
-def sample_bright(bright: BrightTriangles, cube: np.ndarray, rng=None) -> BrightPoints:
+def sample_bright(bright: BrightTriangles, cube: np.ndarray) -> BrightPoints:
     """Draw k points for each of n receivers.
 
     Parameters
@@ -142,8 +142,6 @@ def sample_bright(bright: BrightTriangles, cube: np.ndarray, rng=None) -> Bright
     cube : (n, k, 3) float32
         In [0, 1): which triangle, and where on it. Well spread in all three together, they spread over each lamp too.
     """
-    if rng is not None:  # TODO until lobes.py draws three axes itself
-        cube = np.concatenate([rng.random((*cube.shape[:2], 1), np.float32), cube], -1)
     flat = cube.reshape(-1, 3)
     index = np.minimum(np.searchsorted(np.cumsum(bright.chance), flat[:, 0]), len(bright) - 1)
     root = np.sqrt(flat[:, 1])
