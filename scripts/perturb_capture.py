@@ -23,6 +23,7 @@ import argparse
 import json
 import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -79,14 +80,12 @@ def offsets(points: np.ndarray, metres: float, rng: np.random.Generator) -> np.n
 
 
 def perturb_mesh(source: Path, target: Path, metres: float, rng: np.random.Generator) -> None:
-    """Copy a binary PLY whose first element is the vertices, and move those."""
+    """Copy a PLY whose first element is the vertices, and move those."""
     content = bytearray(source.read_bytes())
     order, elements, start = parse_header(bytes(content[: 1 << 20]))
     head = elements[0]
-    if not order or head.name != "vertex" or any(p.count_kind for p in head.properties):
-        raise SystemExit(f"'{source}' is no binary PLY that begins with its vertices.")
-    kind = np.dtype([(p.name, order + p.kind) for p in head.properties])
-    records = np.frombuffer(content, kind, head.count, start)  # a view: what is written goes into `content`
+    if head.name != "vertex" or any(p.count_kind for p in head.properties):
+        raise SystemExit(f"'{source}' does not begin with its vertices.")
     ply = read_ply(source)
     vertices, triangles = np.asarray(ply.vertices, np.float64), np.asarray(ply.triangles)
     _, first, place = np.unique(np.round(vertices / SEAM).astype(np.int64), axis=0, return_index=True,
@@ -94,8 +93,20 @@ def perturb_mesh(source: Path, target: Path, metres: float, rng: np.random.Gener
     place = place.ravel()
     normal = vertex_normals(vertices, triangles, place)
     moved = vertices + (normal * offsets(vertices[first], metres, rng)[:, None])[place]
-    for axis, name in enumerate("xyz"):
-        records[name] = moved[:, axis]
+    at = [next(i for i, p in enumerate(head.properties) if p.name == name) for name in "xyz"]
+    if order:
+        kind = np.dtype([(p.name, order + p.kind) for p in head.properties])
+        records = np.frombuffer(content, kind, head.count, start)  # a view: what is written goes into `content`
+        for axis, name in enumerate("xyz"):
+            records[name] = moved[:, axis]
+    else:
+        lines = content[start:].decode("latin-1").splitlines()
+        for i, point in enumerate(moved.tolist()):
+            words = lines[i].split()
+            for k, value in zip(at, point):
+                words[k] = repr(value)
+            lines[i] = " ".join(words)
+        content[start:] = ("\n".join(lines) + "\n").encode("latin-1")
     target.write_bytes(content)
 
 
@@ -109,7 +120,7 @@ def perturb_picture(source: Path, target: Path, noise: float, exposure: float, c
     write_exr(target, rgb.astype(np.float32), half=True)
 
 
-def arguments() -> argparse.Namespace:
+def arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("capture", type=Path)
     parser.add_argument("out", type=Path)
@@ -121,15 +132,15 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--clip", type=float, metavar="VALUE")
     parser.add_argument("--clip-at", choices=("sensor", "radiance"), default="sensor")
     parser.add_argument("--tell", action="store_true")
-    given = parser.parse_args()
+    given = parser.parse_args(argv)
     if all(getattr(given, name) is None for name in DEFAULTS):
         for name, value in DEFAULTS.items():
             setattr(given, name, value)
     return given
 
 
-def main() -> int:
-    given = arguments()
+def main(argv: Sequence[str] | None = None) -> int:
+    given = arguments(argv)
     source, out = given.capture, given.out
     # A generator for each: one perturbation alone is the same as among all.
     poses, mesh, exposures, pictures = (np.random.default_rng([given.seed, k]) for k in range(4))

@@ -13,6 +13,7 @@ from ..lit_diffuse.visibility import CLEAN, SATURATED
 from ..progress import Progress
 from ..surface.atlas import Atlas
 from ..surface.elements import triangle_geometry
+from ..surface.mesh_noise import tilt
 from ..surface.rays import RayScene
 from .albedo import Albedo, fill, quotient
 from .environment import Environment
@@ -35,7 +36,7 @@ class Shading:
     escaped : (n,) float32
         Share of the hemisphere's rays that left the mesh.
     doubt : (n,) float32
-        Relative error of `irradiance` by interpolation.
+        Relative error of `irradiance` by interpolation and by the mesh's noise.
     radiance : (n, 3) float32
         L_d with everything filled in: what the light field shows at each element. Lamps have their own radiance.
     albedo : Albedo
@@ -149,6 +150,8 @@ def shade(
         field, lit, rays=rays, emitter_rays=emitter_rays, portal_rays=portal_rays,
         interpolate=interpolate, finest=finest, progress=progress, **how,
     )  # fmt: skip
+    # A noisy mesh faces elsewhere than the surface did.
+    unsure = np.hypot(unsure, tilt(mesh)[atlas.triangle])
     rho, valid = quotient(lit_diffuse.radiance, E)
     albedo = fill(atlas, rho, valid & seen, class_of, emitters, np.hypot(doubt(lit_diffuse), unsure))
     return Shading(E, escaped, unsure, field.radiance, albedo, lamps, light.environment, light.notes, mirrors, points)

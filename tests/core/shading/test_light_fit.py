@@ -1,0 +1,79 @@
+"""Radiances of several lights from the albedo's spread, and which elements can tell."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon.core.shading.environment import EnvironmentAccumulator
+from addon.core.shading.lamps import Lamp
+from addon.core.shading.light_fit import Sample, on_flat
+from addon.core.shading.refine_light import Sky, refined
+from tests.core.rooms import look_at, make_room, quad
+from tests.core.shading.test_environment import FAR_BELOW, add
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+TRUE = np.array([[20.0, 18.0, 15.0], [1.0, 1.2, 1.5]])
+
+
+def sample(noise: float = 0.1, seed: int = 0):
+    """Three objects under known light, a lamp and a part of the sky; a tenth of the elements are something else."""
+    rng = np.random.default_rng(seed)
+    m = 1500
+    object_id = rng.integers(0, 3, m)
+    base = rng.uniform(0.2, 1, (m, 1)) * np.array([1, 0.9, 0.8])
+    thrown = rng.exponential(0.05, m), rng.exponential(0.5, m)
+    E = base + thrown[0][:, None] * TRUE[0] + thrown[1][:, None] * TRUE[1]
+    albedo = np.array([0.2, 0.5, 0.8])[object_id] * np.exp(rng.normal(0, noise, m))
+    albedo[rng.random(m) < 0.1] *= 3
+    return Sample(np.arange(m), object_id, albedo[:, None] * E / np.pi, base), base, thrown
+
+
+@pytest.mark.parametrize("bound", [False, True])
+def test_a_lamp_and_the_sky_are_refined_together(bound):
+    found, base, (lamp_light, sky_light) = sample()
+    sky = Sky([sky_light], [TRUE[1] * (0.8 if bound else 2)], bound)
+    sky.solved.add(0)
+    start = Lamp(7, np.float32([12, 12, 12]), False, "How.")
+    lamps = refined(found, [start], {7: lamp_light}, {7: 0.1}, (), [], sky, base)
+    assert np.allclose(lamps[0].radiance, TRUE[0], rtol=0.08) and lamps[0].note == "How."
+    assert np.allclose(sky.radiance[0], TRUE[1], rtol=0.1)
+    assert ("clipped" in sky.notes()[0]) == bound
+
+
+def test_a_lower_bound_holds():
+    found, base, (lamp_light, sky_light) = sample()
+    sky = Sky([sky_light], [2 * TRUE[1]], True)
+    sky.solved.add(0)
+    refined(found, [Lamp(7, np.float32(TRUE[0]), False)], {7: lamp_light}, {7: 0.1}, (), [], sky, base)
+    assert (sky.radiance[0] >= 2 * TRUE[1] - 1e-6).all()
+
+
+def test_nothing_to_refine():
+    found, base, _ = sample()
+    assert refined(found, [], {}, {}, (), [], Sky([], [], False), base) == []
+
+
+def test_flat_spots():
+    room = make_room([quad((0, 0, 0), (1, 0, 0), (0, 1, 0), 0), quad((0, 0, 0), (1, 0, 0), (0, 0, 1), 0)], 0.02)
+    flat, edge = on_flat(room.atlas), room.atlas.position[:, 1:].max(1)
+    assert flat[edge > 0.1].all() and not flat[edge < 0.05].any()
+
+
+def test_a_clipped_sky_is_a_bound_and_gives_way_to_what_is_not():
+    room = make_room([FAR_BELOW], 0.5)
+    accumulator = EnvironmentAccumulator(0.1)
+    camera = look_at((0, 0, 0), (0, 5, 1), 20, 20)
+    full, none = np.ones((20, 20), bool), np.zeros((20, 20), bool)
+    half = full.copy()
+    half[:, 10:] = False
+    for value, saturated in ((4, full), (6, full), (9, half), (5, none & half)):
+        image = np.full((20, 20, 3), value, np.float32)
+        add(accumulator, room, camera, image, saturated=saturated, valid=full if value != 5 else ~half)
+    environment = accumulator.result()
+    clipped = environment.clipped
+    assert clipped.any() and np.allclose(environment.radiance[clipped], 9)
+    other = (environment.observations > 0) & ~clipped
+    assert other.any() and np.allclose(environment.radiance[other].mean(), 7, atol=0.6)
+    assert (environment.clipped_zone() > 0).sum() == clipped.sum()
+    assert environment.with_zone(environment.clipped_zone(), np.float32([20] * 3)).clipped is clipped

@@ -1,0 +1,102 @@
+"""Scans that are off: a room whose truth is known, perturbed by the script, loses little."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from addon.core.capture.exr import read_exr
+from addon.core.capture.read import read_capture
+from addon.core.shading import unseen_light
+from addon.core.surface.mesh_noise import noise_of, tilt
+from tests.core.rooms import make_room, quad, split
+from tests.core.test_recover import ALBEDO, LAMP, OnDisk
+
+SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "perturb_capture.py"
+spec = importlib.util.spec_from_file_location("perturb_capture", SCRIPT)
+perturb = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(perturb)
+
+
+@pytest.fixture(autouse=True)
+def few_samples(monkeypatch):
+    monkeypatch.setattr(unseen_light, "SAMPLES", 1500)
+
+
+@pytest.fixture(scope="module")
+def disk(tmp_path_factory) -> OnDisk:
+    return OnDisk(tmp_path_factory.mktemp("room") / "capture")
+
+
+def perturbed(disk: OnDisk, out: Path, *switches: str) -> Path:
+    assert perturb.main([str(disk.root), str(out), *switches]) == 0
+    return out
+
+
+def turned(a: np.ndarray, b: np.ndarray) -> float:
+    """Degrees between two poses."""
+    return float(np.degrees(np.arccos(np.clip((np.trace(a[:3, :3].T @ b[:3, :3]) - 1) / 2, -1, 1))))
+
+
+def test_the_script_perturbs_by_what_it_says(disk, tmp_path):
+    true, off = read_capture(disk.root), read_capture(perturbed(disk, tmp_path / "all"))
+    poses = [(a.camera.camera_to_world, b.camera.camera_to_world) for a, b in zip(true.frames, off.frames)]
+    assert np.sqrt(np.mean([turned(a, b) ** 2 for a, b in poses])) == pytest.approx(0.2, rel=0.3)
+    moved = [np.sum((a[:3, 3] - b[:3, 3]) ** 2) for a, b in poses]
+    assert np.sqrt(np.mean(moved)) == pytest.approx(0.005, rel=0.3)
+    assert (off.mesh.object_id == true.mesh.object_id).all()
+    way = np.linalg.norm(off.mesh.vertices - true.mesh.vertices, axis=1)
+    assert 0.002 < np.sqrt(np.mean(way**2)) < 0.01
+    exposure = np.array([frame.exposure for frame in off.frames])
+    assert 0.5 <= exposure.min() < 0.65 and 1.5 < exposure.max() <= 2
+    assert all(frame.saturation == pytest.approx(4, rel=2e-3) for frame in off.frames)
+    for a, b in zip(true.frames, off.frames):
+        before, after = read_exr(a.path).rgb, read_exr(b.path).rgb
+        assert after.max() <= 4
+        below = (after < 3.9) & (before > 0)
+        assert np.std(after[below] / b.exposure / before[below] - 1) == pytest.approx(0.02, rel=0.15)
+
+
+def test_one_perturbation_alone(disk, tmp_path):
+    """Each is the same alone as among all; what is not asked for stays."""
+    everything, alone = perturbed(disk, tmp_path / "all"), perturbed(disk, tmp_path / "mesh", "--mesh", "5")
+    assert (everything / "mesh.ply").read_bytes() == (alone / "mesh.ply").read_bytes()
+    assert json.loads((alone / "transforms.json").read_text()) == json.loads(
+        (disk.root / "transforms.json").read_text())
+    assert np.allclose(read_exr(alone / "images/000.exr").rgb, read_exr(disk.path(0)).rgb, rtol=1e-3)
+    told = read_capture(perturbed(disk, tmp_path / "told", "--clip", "4", "--tell"))
+    assert [frame.saturation for frame in told.frames] == [4.0] * disk.count and not told.warnings
+
+
+def test_a_perturbed_room_is_recovered(disk, tmp_path):
+    """The lamp is burnt out in every frame; nothing but its light tells how bright it is."""
+    capture = read_capture(perturbed(disk, tmp_path / "capture"))
+    found = disk.run(tmp_path / "result", capture=capture)
+    for object_id, rho in ALBEDO.items():
+        assert np.abs(np.median(found.off(object_id, rho), 0)).max() < 0.15, object_id
+        off = found.off(object_id, rho)
+        assert np.sqrt(np.mean(off**2)) < 0.2, object_id
+    lamp = next(one for one in found.shading.lamps if one.object_id == 6)
+    assert np.allclose(lamp.radiance, LAMP, rtol=0.2) and lamp.note.startswith("Clipped in every frame")
+    assert any("clip at 4" in warning for warning in found.report["warnings"])
+
+
+def test_noise_of_a_mesh_is_measured_and_curvature_is_none():
+    rng = np.random.default_rng(0)
+    room = make_room(split(quad((0, 0, 0), (2, 0, 0), (0, 2, 0), 0), 40), 0.05)
+    mesh = room.mesh
+    _, place = np.unique(np.round(mesh.vertices, 6), axis=0, return_inverse=True)
+    bent = mesh.vertices + 0.2 * np.sin(mesh.vertices[:, :1]) * np.array([0, 0, 1.0])
+    height = rng.normal(size=place.max() + 1)[place.ravel()][:, None] * np.array([0, 0, 1.0])
+
+    def with_vertices(vertices):
+        return type(mesh)(vertices, mesh.triangles, mesh.object_id)
+
+    assert noise_of(with_vertices(bent)) < 1e-4 and not tilt(with_vertices(bent)).any()
+    noisy = with_vertices(bent + 0.004 * height)
+    assert noise_of(noisy) == pytest.approx(0.004, rel=0.25)
+    assert np.median(tilt(noisy)) == pytest.approx(1.2 * 0.004 / (0.05 / np.sqrt(2)), rel=0.3)
