@@ -113,17 +113,23 @@ def refined(sample: Sample, lamps: list[Lamp], thrown: dict[int, np.ndarray], le
     others = Sky([G for i, G in enumerate(sky.thrown) if i not in parts],
                  [r for i, r in enumerate(sky.radiance) if i not in parts], False)
 
-    def solve(weights: np.ndarray, start: np.ndarray) -> np.ndarray:
-        """Radiances of `free` and `parts` in the channel that `weights` ((3,)) makes."""
+    def solve(weights: np.ndarray, start: np.ndarray, known: np.ndarray | None = None) -> np.ndarray:
+        """Radiances of `free` and `parts` in the channel that `weights` ((3,)) makes.
+
+        With `known` luminances, under which the albedo's colour varies least: the texture and the errors of E that all
+        channels share are gone then.
+        """
         low, high = np.zeros(len(start)), np.full(len(start), np.inf)
         for k, lamp in enumerate(free):
             low[k] = least[lamp.object_id] * float(start[k] / max(float(lamp.radiance @ LUMINANCE), 1e-12))
         for k, i in enumerate(parts, len(free)):
             low[k], high[k] = (bound @ weights for bound in sky.bounds(i))
-        return sample.refine(
-            sample.radiance @ weights, all_light(base, fixed, thrown, others) @ weights,
-            [thrown[lamp.object_id] for lamp in free] + [sky.thrown[i] for i in parts], start, low, high,
-        )  # fmt: skip
+        sent, others_light = sample.radiance @ weights, all_light(base, fixed, thrown, others)
+        own = [thrown[lamp.object_id] for lamp in free] + [sky.thrown[i] for i in parts]
+        if known is not None:
+            bright = others_light @ LUMINANCE + np.stack(own, 1) @ known
+            sent = sent * bright / np.maximum(sample.radiance @ LUMINANCE, 1e-12)
+        return sample.refine(sent, others_light @ weights, own, start, low, high)
 
     def now() -> np.ndarray:
         return np.maximum([*(lamp.radiance for lamp in free), *(sky.radiance[i] for i in parts)], 1e-9)
@@ -139,9 +145,9 @@ def refined(sample: Sample, lamps: list[Lamp], thrown: dict[int, np.ndarray], le
         luminance = solve(LUMINANCE, now() @ LUMINANCE) if free or parts else luminance[:0]
     colour = now() * (luminance / (now() @ LUMINANCE))[:, None]
     if len(colour):
-        by_channel = np.stack([solve(np.eye(3)[c], colour[:, c]) for c in range(3)], 1)
-        agrees = np.abs(by_channel @ LUMINANCE / luminance - 1) < CLASS_AGREES
-        colour = np.where(agrees[:, None], by_channel, colour)
+        by_channel = np.stack([solve(np.eye(3)[c], colour[:, c], luminance) for c in range(3)], 1)
+        share = by_channel @ LUMINANCE / luminance
+        colour = np.where(np.abs(share - 1)[:, None] < CLASS_AGREES, by_channel / share[:, None], colour)
     for k, i in enumerate(parts, len(free)):
         sky.radiance[i] = np.clip(colour[k], *sky.bounds(i))
     done = {lamp.object_id: lamp for lamp in fixed}
