@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -76,7 +77,8 @@ def test_irradiance_agrees_with_radiosity(lit):
 def test_exposure_does_not_matter(lit):
     """Pictures a thousand times as bright: the same albedo."""
     room, _, found = lit
-    bright = type(found)(found.radiance * 1000, found.lower * 1000, found.upper * 1000, found.count, found.tier)
+    brighter = {name: getattr(found, name) * 1000 for name in ("radiance", "lower", "upper")}
+    bright = replace(found, **brighter)
     one, other = (
         shade(room.mesh, room.instances, room.atlas, room.scene, ld, DARK, rays=32, threads=2) for ld in (found, bright)
     )
@@ -94,7 +96,8 @@ def test_what_was_not_seen_is_filled_in(lit, monkeypatch):
     room, truth, found = lit
     gone = (room.atlas.object_id == 0) & (room.atlas.position[:, 0] > 2)
     radiance = np.where(gone[:, None], np.float32(np.nan), found.radiance)
-    part = type(found)(radiance, radiance, radiance, np.where(gone, 0, found.count).astype(np.int32), found.tier)
+    count = np.where(gone, 0, found.count).astype(np.int32)
+    part = replace(found, radiance=radiance, lower=radiance, upper=radiance, count=count)
     result = shade(room.mesh, room.instances, room.atlas, room.scene, part, DARK, rays=128, threads=2)
     off = result.radiance[gone] / truth[gone] - 1  # guessed without the light that it sends itself: too dark
     assert np.median(np.abs(off)) < 0.12
