@@ -9,7 +9,7 @@ import numpy as np
 
 from .light import LightEvidence, light_evidence
 from .objects import ObjectEvidence, object_evidence
-from .texel import TexelEvidence, texel_evidence
+from .texel import TexelEvidence, texel_evidence, without_light
 
 if TYPE_CHECKING:
     from ..recover import Recovery
@@ -39,8 +39,9 @@ class Evidence:
 def collect(run: Recovery) -> Evidence:
     """The evidence of a run whose stages are done; a few thousand spots are gathered at again."""
     atlas, lit, shading, specular = run.surface().atlas, run.lit_diffuse(), run.shading(), run.specular()
-    light = light_evidence(run.field, shading, lit, threads=run.settings.threads, seed=run.settings.seed)
+    own = without_light(atlas, lit, run.albedo)
+    light = light_evidence(run.field, shading, lit, own, threads=run.settings.threads, seed=run.settings.seed)
     texels = texel_evidence(
-        atlas, lit, run.albedo, light, list(specular.materials), specular.specular, shading.irradiance
+        atlas, lit, run.albedo, own, light, list(specular.materials), specular.specular, shading.irradiance
     )
     return Evidence(light, texels, object_evidence(atlas, lit, run.albedo, texels))

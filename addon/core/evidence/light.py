@@ -18,7 +18,7 @@ from ..shading.field import LightField
 from ..shading.over_surface import irradiance
 from ..shading.shade import Shading
 from ..surface.atlas import Atlas
-from .calibration import CLIPPED_UNSURE, LAMP_UNSURE, SKY_UNSURE, SURFACE_UNSURE
+from .calibration import CLIPPED_UNSURE, LAMP_UNSURE, ROUGH_LIGHT, SKY_UNSURE
 
 SPOTS = 4000
 RAYS = {"rays": 128, "emitter_rays": 32, "portal_rays": 32}
@@ -88,24 +88,24 @@ def spots(atlas: Atlas, seen: np.ndarray, count: int, seed: int = 0) -> tuple[np
     return chosen, nearest.ravel()
 
 
-def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse) -> tuple[LightField, np.ndarray]:
-    """The room with nothing but the light that no frame looked at, a kind in each channel, and how unsure each is.
+def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, doubt: np.ndarray) -> LightField:
+    """The room with nothing but the light that no frame looked at.
 
-    Channel 0: surfaces and the lower bounds of clipped ones; 1: lamps that were solved for; 2: sky.
+    Channel 0: all of it; 1: that of surfaces, times its relative error; 2: the same of lamps and sky.
     """
     luminance = field.radiance @ LUMINANCE
     solved = np.isin(field.atlas.object_id, [lamp.object_id for lamp in shading.lamps if not lamp.seen])
-    surface = (~lit.seen | (lit.tier == SATURATED)) & ~solved
-    kinds = np.stack([luminance * surface, luminance * solved, np.zeros_like(luminance)], 1)
+    clipped = lit.tier == SATURATED
+    surface = (~lit.seen | clipped) & ~solved
+    off = np.where(clipped, CLIPPED_UNSURE, np.minimum(np.hypot(doubt, ROUGH_LIGHT), 1))
+    kinds = [luminance * (surface | solved), luminance * surface * off, luminance * solved * LAMP_UNSURE]
     sky = (shading.environment.radiance @ LUMINANCE) * (shading.environment.observations == 0)
-    sky = np.stack([np.zeros_like(sky), np.zeros_like(sky), sky], -1).astype(np.float32)
-    clipped = CLIPPED_UNSURE if (lit.tier[surface & lit.seen] == SATURATED).any() else SURFACE_UNSURE
-    unsure = np.array([max(SURFACE_UNSURE, clipped), LAMP_UNSURE, SKY_UNSURE])
-    return field.with_light(kinds, Environment(sky, shading.environment.observations)), unsure
+    sky = np.stack([sky, np.zeros_like(sky), SKY_UNSURE * sky], -1).astype(np.float32)
+    return field.with_light(np.stack(kinds, 1), Environment(sky, shading.environment.observations))
 
 
 def light_evidence(
-    field: LightField, shading: Shading, lit: LitDiffuse, *, threads: int = 0, seed: int = 0
+    field: LightField, shading: Shading, lit: LitDiffuse, doubt: np.ndarray, *, threads: int = 0, seed: int = 0
 ) -> LightEvidence:
     """Check E at some spots and carry what was found over to all elements.
 
@@ -113,6 +113,8 @@ def light_evidence(
     ----------
     field : LightField
         The room as E was gathered in it.
+    doubt : (n,) float32
+        Relative error of each element's albedo, the light aside.
     """
     atlas = field.atlas
     chosen, nearest = spots(atlas, lit.seen, SPOTS, seed)
@@ -122,15 +124,15 @@ def light_evidence(
     a, b = (np.clip(np.log(np.maximum(E, 1e-20)) - kept, -WORST, WORST) for E in again)
     noise, bias = _by_group(2 * atlas.object_id[chosen] + lit.seen[chosen], a, b)
 
-    hidden, unsure = unsure_light(field, shading, lit)
+    hidden = unsure_light(field, shading, lit, doubt)
     shares = np.zeros((len(chosen), 3), np.float32)
     if hidden.radiance.any() or hidden.environment.radiance.any():
         part = irradiance(hidden, chosen, **SHARE_RAYS, **how, seed=seed + 7)[0]
         shares = np.clip(part / np.maximum(shading.irradiance[chosen] @ LUMINANCE, 1e-20)[:, None], 0, 1)
     return LightEvidence(
         noise=noise[nearest].astype(np.float32),
-        unseen=np.minimum(shares.sum(1), 1)[nearest].astype(np.float32),
-        unsure=np.sqrt(np.square(shares * unsure).sum(1))[nearest].astype(np.float32),
+        unseen=shares[nearest, 0].astype(np.float32),
+        unsure=np.hypot(shares[:, 1], shares[:, 2])[nearest].astype(np.float32),
         bias=bias,
         spots=len(chosen),
     )

@@ -55,10 +55,27 @@ def contrast(atlas: Atlas, values: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(squares / count - np.square(total / count), 0))
 
 
+def without_light(atlas: Atlas, lit: LitDiffuse, albedo: Albedo) -> np.ndarray:
+    """Relative error of albedo as far as it has nothing to do with light or gloss, (n,) float32.
+
+    What no frame saw has the error of what it was filled in from, the spread of its object, and the more, the less of
+    the object was measured.
+    """
+    measured = albedo.origin == MEASURED
+    texture = c.TEXTURE * contrast(atlas, albedo.rho.mean(1))
+    error = np.square(c.OWN * albedo.error) + np.square(texture)
+    error += np.where(lit.tier == EDGE, np.float32(c.AT_EDGES**2), 0)
+    spread, common, share = by_object(atlas, albedo, error)
+    error += np.where(measured, 0, np.square(c.FILLED * spread) + c.FILLED_FLOOR**2 + common)
+    error += np.where(measured, 0, np.square(c.BARELY_SEEN * (1 - share) ** 2))
+    return np.sqrt(error).astype(np.float32)
+
+
 def texel_evidence(
     atlas: Atlas,
     lit: LitDiffuse,
     albedo: Albedo,
+    own: np.ndarray,
     light: LightEvidence,
     materials: list[ObjectMaterial],
     specular: np.ndarray,
@@ -68,18 +85,15 @@ def texel_evidence(
 
     Parameters
     ----------
+    own : (n,) float32
+        `without_light`.
     specular : (n, 3) float32
         Part of each element's L_d that was taken out as specular.
     """
     shading = np.sqrt(np.square(light.noise) + np.square(light.unsure) + c.LIGHT_FLOOR**2)
-    measured = albedo.origin == MEASURED
-    spread, common = by_object(atlas, albedo, shading)
-    texture = c.TEXTURE * contrast(atlas, albedo.rho.mean(1))
-    relative = np.square(c.OWN * albedo.error) + np.square(texture)
-    relative += np.where(lit.tier == EDGE, np.float32(c.AT_EDGES**2), 0)
-    # What was filled in shares the error of the light on those that it was filled in from.
-    relative += np.square(np.where(measured, shading, common))
-    relative += np.where(measured, 0, np.square(c.FILLED * spread) + c.FILLED_FLOOR**2)
+    # What was filled in shares the error of the light on what it was filled in from.
+    _, common, _ = by_object(atlas, albedo, shading)
+    relative = np.square(own) + np.square(np.where(albedo.origin == MEASURED, shading, common))
     gloss = gloss_error(atlas, albedo, materials, specular, irradiance)
     error = np.sqrt(relative[:, None] * np.square(albedo.rho) + np.square(gloss)[:, None])
     # Of an albedo between 0 and 1 nothing worse can be said than that nothing is known.
@@ -88,17 +102,24 @@ def texel_evidence(
     return TexelEvidence(shading.astype(np.float32), error.astype(np.float32), light.unseen, lit.clipped)
 
 
-def by_object(atlas: Atlas, albedo: Albedo, shading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of what was measured of each element's object: spread of log albedo, and median error of E, (n,) float32 each."""
-    spread, common = np.zeros(len(atlas), np.float32), np.zeros(len(atlas), np.float32)
+def by_object(atlas: Atlas, albedo: Albedo, value: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of what was measured of each element's object: spread of log albedo, median of a value, share of the area.
+
+    Returns
+    -------
+    (n,) float32 each
+        0 for objects of which nothing was measured.
+    """
+    spread, middle, share = np.zeros((3, len(atlas)), np.float32)
     level = np.log(np.maximum(albedo.rho.mean(1), 1e-3))
     order = np.argsort(atlas.object_id, kind="stable")
     for own in np.split(order, np.flatnonzero(np.diff(atlas.object_id[order])) + 1):
         known = own[albedo.origin[own] == MEASURED]
         if len(known):
             low, high = np.quantile(level[known], (0.16, 0.84))
-            spread[own], common[own] = (high - low) / 2, np.median(shading[known])
-    return spread, common
+            spread[own], middle[own] = (high - low) / 2, np.median(value[known])
+            share[own] = atlas.area[known].sum() / max(atlas.area[own].sum(), 1e-30)
+    return spread, middle, share
 
 
 def gloss_error(

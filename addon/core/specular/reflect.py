@@ -118,7 +118,8 @@ def fit_specular(
         name = frame_names[target] if target >= 0 else None
         material = _material(i, choices[i.object_id], problems.get(i.object_id), name, sure[i.object_id])
         if material.model == METAL and i.object_id in {mirror.object_id for mirror in field.mirrors}:
-            material = replace(material, phi=0.0, roughness_low=0.0, note="A flat mirror; its lobe is narrower than the frames resolve.")
+            material = replace(material, phi=0.0, roughness_low=0.0,
+                               note="A flat mirror; its lobe is narrower than the frames resolve.")
         materials.append(material)
 
     specular = np.zeros((len(field.atlas), 3), np.float32)
