@@ -45,9 +45,8 @@ def write_plot(table: Table, path: Path | str) -> None:
             x = [record[curves.cost] for record in rows]
             y = [record[curves.error] or bottom for record in rows]
             colour = COLOURS[names.index(name) % len(COLOURS)]
-            (line,) = panel.plot(
-                x, y, "--" if paper else "-", color=colour, label=f"{name} (paper)" if paper else str(name)
-            )
+            label = f"{name} (paper)" if paper and "paper" not in str(name) else str(name)
+            (line,) = panel.plot(x, y, "--" if paper else "-", color=colour, label=label)
             exact = [record[curves.error] == 0 for record in rows]
             for a, b, hollow in zip(x, y, exact):
                 panel.plot(a, b, "s" if paper else "o", color=colour, markerfacecolor="none" if hollow else colour)
