@@ -91,7 +91,7 @@ def test_lobe_in_a_furnace(expect, cosine):
     element = np.flatnonzero(room.atlas.object_id == 0)[:40]
     way = np.float32([np.sqrt(1 - cosine**2), 0, cosine])
     light = reflected_light(
-        field, bright_triangles(field), room.normals, element, np.broadcast_to(way, (len(element), 3)),
+        field, bright_triangles(field), element, np.broadcast_to(way, (len(element), 3)),
         rays=512, grid=np.float32([0.01, 0.3, 1.0]), threads=2,
     )  # fmt: skip
     assert np.isfinite(light.A).all() and np.isfinite(light.B).all() and min(light.A.min(), light.B.min()) >= 0

@@ -15,10 +15,10 @@ from .portals import find_portals
 from .texel_blocks import TexelBlocks
 
 ELEMENTS_AT_ONCE = 1 << 13
-FINEST_TEXELS = 2.0
-FINEST_SHARE = 0.004
-"""Least distance of two gathering points, and edge of the texel blocks: the larger of so many texels and so large a
-share of the room. From that share on, finer texels cost look-ups, and rays only where the lamps' light changes."""
+FINEST_SHARE = 0.005
+"""Least distance of two gathering points, and edge of the texel blocks, as a share of the room; a texel where that is
+larger. Finer texels then cost look-ups, and rays only where the lamps' light changes; coarse ones are not interpolated
+over (texels of 4 cm in 2 by 2 blocks: relative RMSE 0.15 instead of 0.05)."""
 SMOOTH = 0.05
 """Relative deviation of the lamps' light between a block's corners up to which it is interpolated."""
 
@@ -26,7 +26,7 @@ SMOOTH = 0.05
 def finest_spacing(atlas: Atlas) -> float:
     """Least distance of two gathering points, metres."""
     extent = np.sort(np.ptp(atlas.position, axis=0))
-    return max(FINEST_TEXELS * _texel_edge(atlas), FINEST_SHARE * float(np.sqrt(extent[1] * extent[2])))
+    return max(_texel_edge(atlas), FINEST_SHARE * float(np.sqrt(extent[1] * extent[2])))
 
 
 def _texel_edge(atlas: Atlas) -> float:
