@@ -18,9 +18,9 @@ COARSE = 1.0
 """The cap under which a light is looked for: far from the solution, everything deviates."""
 CAP = 0.5
 """The cap under which all is refined. Texture, highlights and shadows of small things deviate by more than light does
-and draw a solution down under the coarse cap (two clipped lamps of 26.2 in the living room: 19 and 22 under 1). Of 0.07,
-0.12, 0.25 and 0.5, tried on that room with both lamps scaled in steps of 15 %, 0.5 alone had its least at the truth with
-and without a perturbed mesh; the smaller ones lay above it."""
+and draw a solution down under the coarse cap (two clipped lamps of 26.2 in the living room: 19 and 22 under 1). Of
+0.07, 0.12, 0.25 and 0.5, tried on that room alone with both lamps scaled in steps of 15 %, only 0.5 had its least at
+the truth both with and without a perturbed mesh; with it, the smaller ones had theirs above."""
 FLAT_CELL = 0.08
 """Edge in metres of the cells in which normals must agree."""
 FLAT = 0.99
