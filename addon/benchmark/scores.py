@@ -10,10 +10,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..bridge.demo import LIGHTS, VIEW, switch_off_the_lamps
+from ..bridge.demo import VIEW, new_lights, switch_off_the_lamps
 from ..bridge.demo_compare import describe, seen_albedo
 from ..bridge.demo_render import build, set_up_cycles
-from ..bridge.demo_room import look_at, room
+from ..bridge.demo_room import room
 from ..bridge.mesh_objects import OBJECT_ID
 from ..core.capture.exr import read_exr
 from ..core.capture.read import read_capture
@@ -110,12 +110,7 @@ def _relit(blend: Path | None, path: Path) -> np.ndarray:
     camera.matrix_world = Matrix(VIEW.tolist())
     scene.collection.objects.link(camera)
     scene.camera = camera
-    for place, target, tint, power in LIGHTS:
-        light = bpy.data.lights.new("score", "AREA")
-        light.color, light.energy, light.size = tint, power, 0.5
-        thing = bpy.data.objects.new("score", light)
-        thing.matrix_world = Matrix(look_at(place, target).tolist())
-        scene.collection.objects.link(thing)
+    new_lights(scene)
     scene.render.filepath = str(path.absolute())
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(str(path.absolute()))

@@ -90,12 +90,7 @@ def pictures(out: Path, size: str, progress: Progress) -> None:
     shoot(scene, out / "before.png")
     progress.update(0.5)
     switch_off_the_lamps(scene)
-    for place, target, tint, power in LIGHTS:
-        light = bpy.data.lights.new("Demo light", "AREA")
-        light.color, light.energy, light.size = tint, power, 0.5
-        thing = bpy.data.objects.new("Demo light", light)
-        thing.matrix_world = Matrix(look_at(place, target).tolist())
-        scene.collection.objects.link(thing)
+    new_lights(scene)
     shoot(scene, out / "relit.png")
     beside(out / "before.png", out / "relit.png", out / "before_after.png")
 
@@ -108,6 +103,16 @@ def switch_off_the_lamps(scene) -> None:
                 if node.type == "BSDF_PRINCIPLED":
                     node.inputs[EMISSION_STRENGTH].default_value = 0.0
     scene.world = None
+
+
+def new_lights(scene) -> None:
+    """The two lights of the relit picture."""
+    for place, target, tint, power in LIGHTS:
+        light = bpy.data.lights.new("Demo light", "AREA")
+        light.color, light.energy, light.size = tint, power, 0.5
+        thing = bpy.data.objects.new("Demo light", light)
+        thing.matrix_world = Matrix(look_at(place, target).tolist())
+        scene.collection.objects.link(thing)
 
 
 def shoot(scene, path: Path) -> None:
