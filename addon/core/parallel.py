@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 
-from .progress import Progress
+from .progress import Progress, Rounds
 
 
 def thread_count(threads: int) -> int:
@@ -42,7 +42,7 @@ def ordered_map(function: Callable, items: Iterable, threads: int, ahead: int = 
 
 
 def for_blocks(
-    function: Callable[[slice], None], count: int, size: int, threads: int, progress: Progress | None = None
+    function: Callable[[slice], None], count: int, size: int, threads: int, progress: Progress | Rounds | None = None
 ) -> None:
     """Run function(block) for every block of range(count); raises what a block raised, or `InterruptedRun`."""
     todo = blocks(count, size)

@@ -83,3 +83,26 @@ class Progress:
         spent = time.monotonic() - self._started
         left = spent * (1.0 - overall) / worked if worked > 0.02 else None
         self._listener(ProgressEvent(self._stage, float(share), float(overall), left))
+
+
+class Rounds:
+    """Part of a stage that is done in rounds, nobody knows how many: each takes half of what is left.
+
+    Parameters
+    ----------
+    progress : Progress or None
+    start, end : float
+        Shares of the stage.
+    """
+
+    def __init__(self, progress: Progress | None, start: float, end: float):
+        self._progress, self._start, self._end = progress, start, end
+
+    def update(self, share: float) -> None:
+        """Say that `share` (0...1) of the present round is done."""
+        if self._progress is not None:
+            self._progress.update(self._start + 0.5 * share * (self._end - self._start))
+
+    def next(self) -> None:
+        """Begin the next round."""
+        self._start += 0.5 * (self._end - self._start)

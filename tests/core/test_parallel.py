@@ -9,7 +9,7 @@ import pytest
 
 from addon.core.errors import InterruptedRun
 from addon.core.parallel import blocks, for_blocks, ordered_map, thread_count
-from addon.core.progress import Progress
+from addon.core.progress import Progress, Rounds
 
 
 def test_blocks_cover_the_range():
@@ -81,3 +81,14 @@ def test_for_blocks_stops_on_request():
     with pytest.raises(InterruptedRun):
         for_blocks(lambda part: ran.append(time.sleep(0.01)), 1000, 1, 2, Progress(should_stop=lambda: True))
     assert len(ran) < 900
+
+
+def test_rounds_of_unknown_number_never_go_back():
+    shares = []
+    rounds = Rounds(Progress(lambda event: shares.append(event.share)), 0.25, 1.0)
+    for _ in range(5):
+        for share in (0.0, 0.5, 1.0):
+            rounds.update(share)
+        rounds.next()
+    assert shares == sorted(shares) and shares[0] == 0.25 and 0.97 < shares[-1] < 1
+    Rounds(None, 0, 1).update(0.5)  # nobody listens

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..parallel import for_blocks
-from ..progress import Progress
+from ..progress import Progress, Rounds
 from ..surface.atlas import Atlas
 from .emitters import bright_triangles
 from .field import LightField
@@ -79,6 +79,7 @@ def irradiance(
     lamp_rays = emitter_rays if aimed and len(bright) else 0
     portals = find_portals(field, seed) if aimed and portal_rays else None
     steps = {"count": 0}
+    gathering, aiming = Rounds(progress, 0.0, 0.75), Rounds(progress, 0.75, 1.0)
 
     def gathered(index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """E and the escaped share in four channels, and the radius R, at some of the elements."""
@@ -96,7 +97,8 @@ def irradiance(
             else:
                 value[part, :3], value[part, 3] = uniform(field, position[at], normal[at], rays, here)
 
-        for_blocks(run, len(index), max(ELEMENTS_AT_ONCE * 64 // rays, 64), threads, progress)
+        for_blocks(run, len(index), max(ELEMENTS_AT_ONCE * 64 // rays, 64), threads, gathering)
+        gathering.next()
         return value, radius
 
     cached = interpolate and aimed
@@ -123,7 +125,8 @@ def irradiance(
             at = index[part]
             found[part] = direct(field, bright, position[at], normal[at], rays, lamp_rays, seed + 1 + part.start)
 
-        for_blocks(run, len(index), ELEMENTS_AT_ONCE, threads, progress)
+        for_blocks(run, len(index), ELEMENTS_AT_ONCE, threads, aiming)
+        aiming.next()
         return found
 
     value = blocks.evaluate(around, step, np.inf)
