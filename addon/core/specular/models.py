@@ -119,8 +119,11 @@ def adopt_from_class(
     whose own frames decide nothing take over the class's, but not where it raises their cost by more than `EXCLUDED`.
     """
     result = dict(choices)
-    for name in set(class_of[object_id] for object_id in choices):
+    for name in sorted(set(class_of[object_id] for object_id in choices)):
         members = {i: choice for i, choice in choices.items() if class_of[i] == name}
+        if all(choice.model == LAMBERTIAN for choice in members.values()):
+            together = _together(members)
+            members, result = members | together, result | together
         found = {i: choice for i, choice in members.items() if choice.model != LAMBERTIAN}
         if not found:
             continue
@@ -137,6 +140,22 @@ def adopt_from_class(
                 if not _sets_apart(choice.fit, shared, problems[i]):
                     result[i] = replace(choice, fit=shared)
     return result
+
+
+def _together(members: dict[int, Choice]) -> dict[int, Choice]:
+    """The members of a class that each gain by a lobe, as specular, if they are sure enough of it together.
+
+    None of them is by itself; all that have any evidence count, also those that speak against a lobe.
+    """
+    judged = {i: choice for i, choice in members.items() if choice.fit is not None}
+    summed = sum(choice.sigmas for choice in judged.values()) / max(np.sqrt(len(judged)), 1)
+    if len(judged) < 2 or summed <= MIN_SIGMAS:
+        return {}
+    return {
+        i: replace(choice, model=SPECULAR, note="Sure of its lobe together with others of its class.")
+        for i, choice in judged.items()
+        if choice.gain > MIN_GAIN and choice.fit.psi[0] <= METAL_PSI and choice.fit.phi <= BROADEST_PHI
+    }
 
 
 def _pooled(found: list[Choice], best: Choice) -> Choice:

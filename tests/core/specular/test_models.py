@@ -69,3 +69,16 @@ def test_nobody_to_take_over_from(seen):
     choices = {0: Choice(LAMBERTIAN, None), 1: Choice(LAMBERTIAN, None)}
     assert adopt_from_class(choices, {}, {0: "a", 1: "a"}) == choices
     assert adopt_from_class({}, {}, {}) == {}
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "model"), [((2.8, 2.6), SPECULAR), ((2.8, 0.5), LAMBERTIAN), ((2.9, 2.9, -4), LAMBERTIAN)],
+    ids=["both nearly sure", "one nearly sure", "a third speaks against it"],
+)  # fmt: skip
+def test_a_class_may_be_sure_together(seen, sigmas, model):
+    fit = choose_model(seen["glossy"]).fit
+    choices = {i: Choice(LAMBERTIAN, fit, 0.03 if s > 1 else -0.01, s, "Not sure.") for i, s in enumerate(sigmas)}
+    result = adopt_from_class(choices, {}, {i: "pot" for i in choices})
+    assert {choice.model for choice in result.values()} == {model}
+    if model == SPECULAR:
+        assert "together" in result[0].note
