@@ -1,32 +1,57 @@
-"""The operators `bpy.ops.scan_relight.*`, one thin file each."""
+"""The operators `bpy.ops.scan_relight.*`, the sidebar's panels, the preferences: one thin file each."""
 
 from __future__ import annotations
 
 
 def classes() -> tuple[type, ...]:
-    """Every operator, in the order of the method."""
+    """Everything that Blender has to know: property groups, preferences, operators, panels. Each part adds its own."""
     from .accumulate import SCAN_RELIGHT_OT_accumulate
     from .fit import SCAN_RELIGHT_OT_fit
     from .import_capture import SCAN_RELIGHT_OT_import_capture
+    from .panel_capture import SCAN_RELIGHT_PT_capture
+    from .panel_recover import SCAN_RELIGHT_PT_recover
+    from .preferences import ScanRelightPreferences
     from .recover import SCAN_RELIGHT_OT_recover
+    from .scene_props import ScanRelightScene, ScanRelightSettings
     from .shade import SCAN_RELIGHT_OT_shade
     from .write import SCAN_RELIGHT_OT_write
 
-    return (SCAN_RELIGHT_OT_import_capture, SCAN_RELIGHT_OT_accumulate, SCAN_RELIGHT_OT_shade, SCAN_RELIGHT_OT_fit,
-            SCAN_RELIGHT_OT_write, SCAN_RELIGHT_OT_recover)
+    return (
+        # Property groups: those that others point to come first.
+        ScanRelightSettings, ScanRelightScene, ScanRelightPreferences,
+        # Operators, in the order of the method.
+        SCAN_RELIGHT_OT_import_capture, SCAN_RELIGHT_OT_accumulate, SCAN_RELIGHT_OT_shade, SCAN_RELIGHT_OT_fit,
+        SCAN_RELIGHT_OT_write, SCAN_RELIGHT_OT_recover,
+        # Panels, in the order of the work.
+        SCAN_RELIGHT_PT_capture,
+        SCAN_RELIGHT_PT_recover,
+    )  # fmt: skip
+
+
+def pointers() -> tuple[tuple[type, str, type], ...]:
+    """Blender type, name and property group of everything that hangs on Blender's own data."""
+    import bpy
+
+    from .scene_props import ScanRelightScene
+
+    return ((bpy.types.Scene, "scan_relight", ScanRelightScene),)
 
 
 def register():
-    """Register every operator."""
+    """Register every class and hang the property groups up."""
     import bpy
 
-    for operator in classes():
-        bpy.utils.register_class(operator)
+    for cls in classes():
+        bpy.utils.register_class(cls)
+    for owner, name, group in pointers():
+        setattr(owner, name, bpy.props.PointerProperty(type=group))
 
 
 def unregister():
     """Take back what `register` did."""
     import bpy
 
-    for operator in reversed(classes()):
-        bpy.utils.unregister_class(operator)
+    for owner, name, _ in pointers():
+        delattr(owner, name)
+    for cls in reversed(classes()):
+        bpy.utils.unregister_class(cls)

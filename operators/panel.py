@@ -1,0 +1,29 @@
+"""What all panels of the sidebar's tab "Scan Relight" share."""
+
+from __future__ import annotations
+
+from ..addon.bridge import job
+from . import text
+
+
+class SidebarPanel:
+    """A part of the tab. `bl_order`: Capture 0, Recover 1, Results 2, Look 3, Relight 4, Export 5."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Scan Relight"
+
+    @classmethod
+    def poll(cls, context):
+        """Only where there is a scene to work in."""
+        return context.scene is not None
+
+    @staticmethod
+    def say(layout, context, sentence: str, icon: str = "NONE") -> None:
+        """Write `sentence` over as many lines as the panel's width asks for."""
+        text.say(layout, context, sentence, icon)
+
+    @staticmethod
+    def job():
+        """The run that is going on, or None."""
+        return job.current()
