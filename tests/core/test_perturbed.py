@@ -11,25 +11,15 @@ import pytest
 
 from addon.core.capture.exr import read_exr
 from addon.core.capture.read import read_capture
-from addon.core.shading import unseen_light
 from addon.core.surface.mesh_noise import noise_of, tilt
+from tests.core.on_disk import ALBEDO, LAMP, OnDisk
 from tests.core.rooms import make_room, quad, split
-from tests.core.test_recover import ALBEDO, LAMP, OnDisk
 
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "perturb_capture.py"
+pytestmark = pytest.mark.usefixtures("few_samples")
 spec = importlib.util.spec_from_file_location("perturb_capture", SCRIPT)
 perturb = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(perturb)
-
-
-@pytest.fixture(autouse=True)
-def few_samples(monkeypatch):
-    monkeypatch.setattr(unseen_light, "SAMPLES", 1500)
-
-
-@pytest.fixture(scope="module")
-def disk(tmp_path_factory) -> OnDisk:
-    return OnDisk(tmp_path_factory.mktemp("room") / "capture")
 
 
 def perturbed(disk: OnDisk, out: Path, *switches: str) -> Path:

@@ -107,7 +107,7 @@ def test_the_page_of_a_run(tmp_path):
     from addon.core.progress import Progress
     from addon.core.recover import Recovery
     from addon.core.store import Store
-    from tests.core.test_recover import CHEAP, OnDisk
+    from tests.core.on_disk import CHEAP, OnDisk
 
     disk = OnDisk(tmp_path / "<cap & ture>")
     with Store(tmp_path / "result") as store:

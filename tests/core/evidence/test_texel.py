@@ -13,7 +13,7 @@ from addon.core.evidence.objects import object_evidence
 from addon.core.evidence.texel import contrast, texel_evidence, without_light
 from addon.core.lit_diffuse.accumulate import LitDiffuse
 from addon.core.lit_diffuse.visibility import CLEAN, EDGE
-from addon.core.material import EMITTER, LAMBERTIAN, ObjectMaterial
+from addon.core.material import EMITTER, LAMBERTIAN, Z90, ObjectMaterial
 from addon.core.shading.albedo import FILLED, MEASURED, Albedo
 from addon.core.shading.lamps import Lamp
 from tests.core.rooms import DARK, box_sides, lit_box, make_room, radiosity
@@ -96,7 +96,7 @@ def test_an_object_is_surer_than_its_texels_and_says_what_was_seen(box):
     floor, ceiling = object_evidence(box.atlas, lit, albedo, texels)[:2]
     assert floor.seen_share == pytest.approx(0.25, abs=0.01) and ceiling.seen_share == 1
     assert ceiling.albedo == pytest.approx((0.5, 0.5, 0.5))
-    half = c.Z90 * c.OF_OBJECT * float(texels.albedo[box.atlas.object_id == 1].mean())
+    half = Z90 * c.OF_OBJECT * float(texels.albedo[box.atlas.object_id == 1].mean())
     assert ceiling.albedo_high[0] - 0.5 == pytest.approx(half, rel=0.05)
     assert ceiling.albedo_low[0] == pytest.approx(1 - ceiling.albedo_high[0], abs=1e-4)
 

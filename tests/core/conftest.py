@@ -1,0 +1,19 @@
+"""What several tests of whole runs share."""
+
+from __future__ import annotations
+
+import pytest
+
+from addon.core.shading import unseen_light
+from tests.core.on_disk import OnDisk
+
+
+@pytest.fixture
+def few_samples(monkeypatch):
+    """The search for lamps looks at fewer elements than it would in a real room."""
+    monkeypatch.setattr(unseen_light, "SAMPLES", 1500)
+
+
+@pytest.fixture(scope="module")
+def disk(tmp_path_factory) -> OnDisk:
+    return OnDisk(tmp_path_factory.mktemp("room") / "capture")
