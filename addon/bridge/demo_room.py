@@ -79,17 +79,22 @@ class Thing:
         a, b = (((np.arange(count) + 0.5) * step % 1)[None, :, None] for step in (0.7548776662, 0.5698402910))
         weights = (1 - a) * (1 - b), a * (1 - b), a * b, (1 - a) * b
         points, uv = (sum(w * corners[:, None, k] for k, w in enumerate(weights)) for corners in (self.quads, self.uv))
-        colours = np.empty(points.shape)
+        colours = self.colours(self.slot, uv)
+        area = np.linalg.norm(self.normals(), axis=1)
+        return points, colours, np.repeat((area / area.sum())[:, None] / count, count, 1)
+
+    def colours(self, slot: np.ndarray, uv: np.ndarray) -> np.ndarray:
+        """Base colours where paint `slot` ((m,) int) has the coordinates `uv` ((m, ..., 2)), (m, ..., 3) float64."""
+        result = np.empty((*uv.shape[:-1], 3))
         for k, paint in enumerate(self.paints):
-            mine = self.slot == k
+            mine = slot == k
             if paint.albedo.ndim == 1:
-                colours[mine] = paint.albedo
+                result[mine] = paint.albedo
             else:
                 size = np.array(paint.albedo.shape[1::-1])
                 x, y = np.moveaxis(np.clip((uv[mine] * size).astype(int), 0, size - 1), -1, 0)
-                colours[mine] = paint.albedo[y, x]
-        area = np.linalg.norm(self.normals(), axis=1)
-        return points, colours, np.repeat((area / area.sum())[:, None] / count, count, 1)
+                result[mine] = paint.albedo[y, x]
+        return result
 
     def normals(self) -> np.ndarray:
         """Normals of the quads as long as their area, (q, 3) float64."""

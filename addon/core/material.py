@@ -9,6 +9,8 @@ SPECULAR = "specular"
 METAL = "metal"
 EMITTER = "emitter"
 MODELS = (LAMBERTIAN, SPECULAR, METAL, EMITTER)
+Z90 = 1.645
+"""A 90 % interval is the value -+ this many standard errors."""
 
 
 @dataclass(frozen=True)

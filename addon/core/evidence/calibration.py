@@ -8,9 +8,6 @@ room's figures were seen, not aimed at. What came out, and what that is worth: d
 
 from __future__ import annotations
 
-Z90 = 1.645
-"""A 90 % interval is the value -+ this many standard errors."""
-
 LAMP_UNSURE, SKY_UNSURE, CLIPPED_UNSURE, ROUGH_LIGHT = 0.1, 0.3, 0.4, 0.25
 """Relative error of light that no frame looked at: lamps and sky that were solved for; clipped surfaces, known as a
 lower bound; and, besides the error of their albedo, surfaces: the light on them is gathered roughly. (An unseen ceiling

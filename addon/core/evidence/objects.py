@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..lit_diffuse.accumulate import LitDiffuse
+from ..material import Z90
 from ..shading.albedo import MEASURED, Albedo
 from ..surface.atlas import Atlas
-from .calibration import OF_OBJECT, Z90
+from .calibration import OF_OBJECT
 from .texel import TexelEvidence
 
 

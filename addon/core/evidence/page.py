@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import BadInputError
-from ..material import EMITTER, METAL, SPECULAR, ObjectMaterial
-from .calibration import Z90
+from ..material import EMITTER, METAL, SPECULAR, Z90, ObjectMaterial
 from .colours import MODEL, encoded, heat_css
 from .objects import ObjectEvidence
 from .pictures import Picture, pictures_of

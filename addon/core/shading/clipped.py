@@ -64,6 +64,8 @@ def shade_clipped(shade: Callable[[LitDiffuse], object], lit: LitDiffuse, atlas:
         if lamp.object_id in bounds and float(lamp.radiance @ LUMINANCE) >= bounds[lamp.object_id]
     }  # fmt: skip
     if len(solved) < len(bounds):
+        # Once more, as the first run had nothing where those that were not solved for are: their bound lights the
+        # others, and has to be there when these are solved for. Where all were solved, the first run stands.
         found = shade(unseen(lit, atlas, list(solved)) if solved else lit)
 
     def told(lamp: Lamp) -> Lamp:

@@ -11,6 +11,8 @@ from .emitters import LUMINANCE
 EMITTER_ALBEDO = 2.0
 """An object whose median albedo would have to be above this gives light of its own. 1 is the physical bound; the rest
 is room for missing light and for noise."""
+AGREES = 0.25
+"""Luminances that lie this near each other (relative) count as the same."""
 
 
 @dataclass(frozen=True)
@@ -51,3 +53,12 @@ def find_seen(object_id: np.ndarray, radiance: np.ndarray, irradiance: np.ndarra
         if np.median(np.pi * luminance[own] / np.maximum(received[own], 1e-12)) > EMITTER_ALBEDO:
             lamps.append(Lamp(int(one), np.median(radiance[own], 0), True))
     return lamps
+
+
+def twin(object_id: int, luminance: float, class_of: dict[int, str], seen: list[Lamp]) -> Lamp | None:
+    """A seen lamp of the object's class with about the luminance that was solved for the object."""
+    for other in seen:
+        if class_of.get(other.object_id) == class_of.get(object_id):
+            if abs(luminance / float(other.radiance @ LUMINANCE) - 1) < AGREES:
+                return other
+    return None

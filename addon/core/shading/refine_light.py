@@ -8,11 +8,9 @@ import numpy as np
 
 from ..capture.model import Instance
 from .emitters import LUMINANCE
-from .lamps import Lamp
+from .lamps import AGREES, Lamp, twin
 from .light_fit import Sample
 
-CLASS_AGREES = 0.25
-"""If the solved luminance lies this near (relative) to a seen lamp of the same class, that lamp's radiance is taken."""
 BELIEVED = 3.0
 """Further than this factor from all that was seen of the sky a solution is not believed: it may stand for something
 else."""
@@ -82,16 +80,6 @@ def all_light(base: np.ndarray, lamps: list[Lamp], thrown: dict[int, np.ndarray]
     return total
 
 
-def _alike(lamp: Lamp, luminance: float, instances: tuple[Instance, ...], seen: list[Lamp]) -> Lamp | None:
-    """A seen lamp of the same class whose luminance is about this one."""
-    class_of = {i.object_id: i.class_name for i in instances}
-    for other in seen:
-        if class_of.get(other.object_id) == class_of.get(lamp.object_id):
-            if abs(luminance / float(other.radiance @ LUMINANCE) - 1) < CLASS_AGREES:
-                return other
-    return None
-
-
 def refined(sample: Sample, lamps: list[Lamp], thrown: dict[int, np.ndarray], least: dict[int, float],
             instances: tuple[Instance, ...], seen: list[Lamp], sky: Sky, base: np.ndarray) -> list[Lamp]:
     """The lamps with refined radiances; those of the sky are refined in place.
@@ -135,19 +123,20 @@ def refined(sample: Sample, lamps: list[Lamp], thrown: dict[int, np.ndarray], le
         return np.maximum([*(lamp.radiance for lamp in free), *(sky.radiance[i] for i in parts)], 1e-9)
 
     luminance = solve(LUMINANCE, now() @ LUMINANCE)
-    twins = {lamp.object_id: _alike(lamp, s, instances, seen) for lamp, s in zip(free, luminance)}
+    class_of = {i.object_id: i.class_name for i in instances}
+    twins = {lamp.object_id: twin(lamp.object_id, s, class_of, seen) for lamp, s in zip(free, luminance)}
     if any(twins.values()):
         for lamp in [lamp for lamp in free if twins[lamp.object_id]]:
-            twin = twins[lamp.object_id]
-            whose = f", near the seen lamp {twin.object_id} of its class, whose radiance it takes."
-            fixed.append(replace(lamp, radiance=twin.radiance, note=lamp.note.rstrip(".") + whose))
+            same = twins[lamp.object_id]
+            whose = f", near the seen lamp {same.object_id} of its class, whose radiance it takes."
+            fixed.append(replace(lamp, radiance=same.radiance, note=lamp.note.rstrip(".") + whose))
         free = [lamp for lamp in free if not twins[lamp.object_id]]
         luminance = solve(LUMINANCE, now() @ LUMINANCE) if free or parts else luminance[:0]
     colour = now() * (luminance / (now() @ LUMINANCE))[:, None]
     if len(colour):
         by_channel = np.stack([solve(np.eye(3)[c], colour[:, c], luminance) for c in range(3)], 1)
         share = by_channel @ LUMINANCE / luminance
-        colour = np.where(np.abs(share - 1)[:, None] < CLASS_AGREES, by_channel / share[:, None], colour)
+        colour = np.where(np.abs(share - 1)[:, None] < AGREES, by_channel / share[:, None], colour)
     for k, i in enumerate(parts, len(free)):
         sky.radiance[i] = np.clip(colour[k], *sky.bounds(i))
     done = {lamp.object_id: lamp for lamp in fixed}

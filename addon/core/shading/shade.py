@@ -12,7 +12,6 @@ from ..lit_diffuse.accumulate import ENOUGH, LitDiffuse
 from ..lit_diffuse.visibility import CLEAN, SATURATED
 from ..progress import Progress
 from ..surface.atlas import Atlas
-from ..surface.elements import triangle_geometry
 from ..surface.mesh_noise import tilt
 from ..surface.rays import RayScene
 from .albedo import Albedo, fill, quotient
@@ -77,8 +76,8 @@ def shade(
     environment: Environment,
     *,
     sampler: str = "aimed",
-    rays: int = 256,
-    emitter_rays: int = 16,
+    rays: int = 128,
+    emitter_rays: int = 32,
     portal_rays: int = 32,
     interpolate: bool = True,
     threads: int = 0,
@@ -98,7 +97,6 @@ def shade(
     InterruptedRun
         From `progress`.
     """
-    normals, _ = triangle_geometry(mesh)
     class_of = {i.object_id: i.class_name for i in instances}
     seen = lit_diffuse.seen
     objects = int(atlas.object_id.max()) + 1
@@ -112,7 +110,7 @@ def shade(
     field = LightField(mesh, atlas, scene, fill_unseen(lit_diffuse.radiance, seen), environment)
     good = seen & (((lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= ENOUGH)) | (lit_diffuse.tier == SATURATED))
     unseen = [object_id for object_id, share in seen_share.items() if share == 0]
-    light = find_light(field, normals, good if good.any() else seen, unseen, instances, seed)
+    light = find_light(field, good if good.any() else seen, unseen, instances, seed)
     lamps = light.lamps
     radiance = field.radiance.copy()
     for lamp in lamps:

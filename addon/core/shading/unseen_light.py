@@ -17,10 +17,10 @@ from .emitters import BRIGHT, LUMINANCE, bright_triangles
 from .environment import Environment
 from .field import LightField
 from .irradiance import direct, gather
-from .lamps import EMITTER_ALBEDO, Lamp, find_seen
+from .lamps import AGREES, EMITTER_ALBEDO, Lamp, find_seen, twin
 from .light_fit import Sample, on_flat
 from .portals import find_portals
-from .refine_light import CLASS_AGREES, Sky, all_light, refined
+from .refine_light import Sky, all_light, refined
 
 SAMPLES = 4000
 """Elements that the test looks at, spread evenly over the objects. Noise in E or G draws the solved radiance to 0: few
@@ -102,15 +102,15 @@ def _evened(field: LightField) -> np.ndarray:
     return radiance
 
 
-def _with_whole_sky(field: LightField, normals, element: np.ndarray, seed: int) -> tuple[LightField, tuple[str, ...]]:
+def _with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[LightField, tuple[str, ...]]:
     """Solve for one radiance of all the sky where rays leave the mesh but no frame looked there; says so in a note."""
     if field.environment.seen:
         return field, ()
     everywhere = Environment.only(np.ones((1, 2), np.float32))
-    thrown = _irradiance(field.with_light(np.zeros_like(field.radiance), everywhere), normals, element, seed)[:, 0]
+    thrown = _irradiance(field.with_light(np.zeros_like(field.radiance), everywhere), element, seed)[:, 0]
     if thrown.mean() < MIN_OPEN * np.pi:
         return field, ()
-    received = _irradiance(field.with_light(_evened(field)), normals, element, seed)
+    received = _irradiance(field.with_light(_evened(field)), element, seed)
     object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
     left = np.ones(len(element), bool)
     for _ in range(SWEEPS):
@@ -141,7 +141,7 @@ def _with_whole_sky(field: LightField, normals, element: np.ndarray, seed: int) 
     return field.with_light(field.radiance, sky), (note,)
 
 
-def _irradiance(field: LightField, normals: np.ndarray, element: np.ndarray, seed: int) -> np.ndarray:
+def _irradiance(field: LightField, element: np.ndarray, seed: int) -> np.ndarray:
     """E of a few elements by both estimators, (m, 3) float64."""
     bright, portals = bright_triangles(field), find_portals(field, seed)
     position, normal = field.atlas.position[element], field.atlas.normal[element]
@@ -156,22 +156,21 @@ def _irradiance(field: LightField, normals: np.ndarray, element: np.ndarray, see
     return E
 
 
-def _thrown_by_object(field: LightField, normals, element, object_id: int, seed: int) -> np.ndarray:
+def _thrown_by_object(field: LightField, element: np.ndarray, object_id: int, seed: int) -> np.ndarray:
     """E from one object at radiance 1 and nothing else, (m,) float64."""
     alone = np.repeat((field.atlas.object_id == object_id)[:, None], 3, 1).astype(np.float32)
     lit = field.with_light(alone, Environment.dark(), [object_id])
-    return _irradiance(lit, normals, element, seed)[:, 0]
+    return _irradiance(lit, element, seed)[:, 0]
 
 
-def _most_reflected(field: LightField, normals, object_id: int, seed: int) -> float:
+def _most_reflected(field: LightField, object_id: int, seed: int) -> float:
     """Luminance that an object would send out at an albedo of `EMITTER_ALBEDO`, in the median over its elements."""
     own = _pick(field, field.atlas.object_id == object_id, seed)[:500]
-    return EMITTER_ALBEDO / np.pi * float(np.median(_irradiance(field, normals, own, seed) @ LUMINANCE))
+    return EMITTER_ALBEDO / np.pi * float(np.median(_irradiance(field, own, seed) @ LUMINANCE))
 
 
 def find_light(
     field: LightField,
-    normals: np.ndarray,
     good: np.ndarray,
     unseen_objects: list[int],
     instances: tuple[Instance, ...],
@@ -183,7 +182,6 @@ def find_light(
     ----------
     field : LightField
         With L_d filled in; what nobody saw must be dark in it, or it would hide the light looked for.
-    normals : (t, 3) float32
     good : (n,) bool
         Elements whose L_d rests on enough clean observations, saturated ones included.
     unseen_objects : list of int
@@ -193,7 +191,7 @@ def find_light(
     element = _pick(field, _steady(field, good, flat) | _barely_seen(field, good), seed)
     if not len(element):
         return Light((), field.environment, ())
-    field, found = _with_whole_sky(field, normals, element, seed)
+    field, found = _with_whole_sky(field, element, seed)
     environment, atlas = field.environment, field.atlas
     zones = environment.unseen_zones() if environment.seen else []
     if environment.clipped.any():
@@ -201,10 +199,10 @@ def find_light(
     known = environment
     for zone in zones:
         known = known.with_zone(zone, np.zeros(3, np.float32))
-    received = _irradiance(field.with_light(_evened(field), known), normals, element, seed)
+    received = _irradiance(field.with_light(_evened(field), known), element, seed)
     dark = np.zeros_like(field.radiance)
     thrown_sky = [
-        _irradiance(field.with_light(dark, Environment.only(zone)), normals, element, seed)[:, 0] for zone in zones
+        _irradiance(field.with_light(dark, Environment.only(zone)), element, seed)[:, 0] for zone in zones
     ]
     guess = [environment.zone_mean(zone).astype(np.float64) for zone in zones]
     filled = received + sum(G[:, None] * s for G, s in zip(thrown_sky, guess, strict=True))
@@ -216,11 +214,11 @@ def find_light(
         return Light(tuple(seen), environment, found)
     sent = field.radiance[element[lit]].astype(np.float64)
     sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit])
-    thrown = {i: _thrown_by_object(field, normals, sample.element, i, seed) for i in unseen_objects}
+    thrown = {i: _thrown_by_object(field, sample.element, i, seed) for i in unseen_objects}
 
     # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
     lit_room = field.with_light(field.radiance, environment)
-    least = {i: _most_reflected(lit_room, normals, i, seed) for i in unseen_objects}
+    least = {i: _most_reflected(lit_room, i, seed) for i in unseen_objects}
 
     sky = Sky([G[lit] for G in thrown_sky], guess, bool(environment.clipped.any()))
     lamps: list[Lamp] = []
@@ -234,7 +232,7 @@ def find_light(
         environment = environment.with_zone(zone, radiance.astype(np.float32))
     # With all light known, what looked like a lamp for want of it does so no more.
     everything = _irradiance(
-        field.with_light(_lit_by(field, lamps), environment, [lamp.object_id for lamp in lamps]), normals, element, seed
+        field.with_light(_lit_by(field, lamps), environment, [lamp.object_id for lamp in lamps]), element, seed
     )
     sure = find_seen(atlas.object_id[element], field.radiance[element], everything)
     return Light(tuple(sure) + tuple(lamps), environment, found + tuple(sky.notes()))
@@ -277,14 +275,14 @@ def _coloured(object_id, s, before, after, class_of, seen, received, by_channel)
     luminance; else that of the lamps, or of the light.
     """
     how = f"No frame sees it; solved from the light it throws (spread of log albedo {before:.3f} to {after:.3f})"
+    same = twin(object_id, s, class_of, seen)
+    if same is not None:
+        note = f"{how}: {s:.3g}, near the seen lamp {same.object_id} of its class, whose radiance it takes."
+        return Lamp(int(object_id), same.radiance, False, note)
     alike = [lamp for lamp in seen if class_of.get(lamp.object_id) == class_of.get(object_id)]
-    for lamp in alike:
-        if abs(s / float(lamp.radiance @ LUMINANCE) - 1) < CLASS_AGREES:
-            note = f"{how}: {s:.3g}, near the seen lamp {lamp.object_id} of its class, whose radiance it takes."
-            return Lamp(int(object_id), lamp.radiance, False, note)
     if not alike and all(found is not None for found in by_channel):
         colour = np.float32([found[0] for found in by_channel])
-        if abs(float(colour @ LUMINANCE) / s - 1) < CLASS_AGREES:
+        if abs(float(colour @ LUMINANCE) / s - 1) < AGREES:
             return Lamp(int(object_id), colour, False, how + ".")
     white = np.mean([lamp.radiance for lamp in alike or seen], 0) if seen else received.mean(0)
     return Lamp(int(object_id), (s * white / max(float(white @ LUMINANCE), 1e-12)).astype(np.float32), False, how + ".")

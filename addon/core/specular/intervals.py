@@ -11,13 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..material import LAMBERTIAN, METAL, SPECULAR
+from ..material import LAMBERTIAN, METAL, Z90
 from .fit import fit_lobe
 from .layout import Layout, Problem
-from .models import DIELECTRIC, LEAST_PSI, METAL_PSI, Choice
+from .models import HOW, METAL_PSI, Choice
 
 GROUPS = 6
-Z90 = 1.645
 ROUGHNESS_SYSTEMATIC = 0.07
 """Standard error of Blender's roughness that all elements share; the grid of phi alone has steps of 0.06. Of 24 glossy
 objects in eight rendered rooms (`tests/blender/evidence`) the 90 % intervals then hold 22, in the living room 23 of
@@ -63,15 +62,13 @@ def gloss_interval(choice: Choice, problem: Problem | None) -> GlossInterval:
 
 def jackknife(problem: Problem, model: str) -> tuple[float, float]:
     """Standard errors of roughness and psi of a model's fit, as far as elements differ."""
-    how = {"coloured": True} if model == METAL else {"least_psi": LEAST_PSI, "prior": DIELECTRIC}
-    assert model in (METAL, SPECULAR)
     layout = Layout(problem)
     count = layout.there.shape[1]
     groups = min(GROUPS, count // 3)
     if groups < 3:
         return 0.3, 0.3
     group = np.arange(count) * groups // count
-    fits = [fit_lobe(layout.part(group != left_out), **how) for left_out in range(groups)]
+    fits = [fit_lobe(layout.part(group != left_out), **HOW[model]) for left_out in range(groups)]
     found = np.array([(np.sqrt(fit.phi), fit.psi.mean()) for fit in fits])
     error = np.sqrt((groups - 1) / groups * np.square(found - found.mean(0)).sum(0))
     return float(error[0]), float(error[1])

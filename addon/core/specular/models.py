@@ -21,6 +21,8 @@ METAL_PSI = 0.12
 """No common dielectric reflects more (n = 2.06); what does is a metal or a mirror."""
 BROADEST_PHI = 0.5
 """A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface."""
+HOW = {SPECULAR: {"least_psi": LEAST_PSI, "prior": DIELECTRIC}, METAL: {"coloured": True}}
+"""What `fit_lobe` is told of each model."""
 MIN_GAIN = 0.02
 MIN_SIGMAS = 3.0
 """A lobe must lower the cost on elements that its fit has not seen by this share, and by this many standard errors."""
@@ -68,6 +70,11 @@ def gain_of(fit: LobeFit, held: Problem) -> tuple[float, float]:
     return _gain(*element_costs(Layout(held), fit, max(1.4826 * fit.residual, 1e-4)))
 
 
+def _dielectric(fit: LobeFit) -> bool:
+    """Whether a dielectric can have this lobe, and frames can tell it from a diffuse part."""
+    return fit.psi[0] <= METAL_PSI and fit.phi <= BROADEST_PHI
+
+
 def _sets_apart(own: LobeFit, other: LobeFit, problem: Problem) -> bool:
     """Whether an object's own lobe explains its frames better than another does, beyond doubt."""
     layout, scale = Layout(problem), max(1.4826 * own.residual, 1e-4)
@@ -83,27 +90,26 @@ def choose_model(problem: Problem) -> Choice:
     layout = Layout(problem)
     odd = (np.random.default_rng(0).permutation(layout.there.shape[1]) % 2).astype(bool)
 
-    def held_out(fit: LobeFit, how: dict) -> tuple[np.ndarray, np.ndarray]:
+    def held_out(fit: LobeFit, model: str) -> tuple[np.ndarray, np.ndarray]:
         """Costs of the elements with the lobe that the others gave, and without one."""
-        found = [held_out_costs(layout, fit, train, scale, **how) for train in (odd, ~odd)]
+        found = [held_out_costs(layout, fit, train, scale, **HOW[model]) for train in (odd, ~odd)]
         with_lobe, without = (np.concatenate(costs) for costs in zip(*found, strict=True))
         return with_lobe, without
 
-    how = {"least_psi": LEAST_PSI, "prior": DIELECTRIC}
-    fit = fit_lobe(layout, **how)
+    fit = fit_lobe(layout, **HOW[SPECULAR])
     scale = max(1.4826 * fit.residual, 1e-4)
-    with_lobe, without = held_out(fit, how)
+    with_lobe, without = held_out(fit, SPECULAR)
     scores = {LAMBERTIAN: 1.0, SPECULAR: float(with_lobe.sum() / max(without.sum(), 1e-30))}
-    metal = fit_lobe(layout, coloured=True)
+    metal = fit_lobe(layout, **HOW[METAL])
     if float(metal.psi.mean()) > METAL_PSI and metal.phi <= BROADEST_PHI:
-        with_metal, bare = held_out(metal, {"coloured": True})
+        with_metal, bare = held_out(metal, METAL)
         scores[METAL] = float(with_metal.sum() / max(bare.sum(), 1e-30))
         (gain, sigmas), (more, surely) = _gain(with_metal, bare), _gain(with_metal, with_lobe)
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
         if min(gain, more) > MIN_GAIN and min(sigmas, surely) > MIN_SIGMAS:
             return Choice(METAL, metal, gain, sigmas, scores=scores)
     gain, sigmas = _gain(with_lobe, without)
-    if gain > MIN_GAIN and sigmas > MIN_SIGMAS and fit.psi[0] <= METAL_PSI and fit.phi <= BROADEST_PHI:
+    if gain > MIN_GAIN and sigmas > MIN_SIGMAS and _dielectric(fit):
         return Choice(SPECULAR, fit, gain, sigmas, scores=scores)
     note = "Roughness and specular are not identifiable from these frames."
     return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores)
@@ -154,7 +160,7 @@ def _together(members: dict[int, Choice]) -> dict[int, Choice]:
     return {
         i: replace(choice, model=SPECULAR, note="Sure of its lobe together with others of its class.")
         for i, choice in judged.items()
-        if choice.gain > MIN_GAIN and choice.fit.psi[0] <= METAL_PSI and choice.fit.phi <= BROADEST_PHI
+        if choice.gain > MIN_GAIN and _dielectric(choice.fit)
     }
 
 

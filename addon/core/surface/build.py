@@ -14,7 +14,6 @@ from .elements import make_atlas, triangle_geometry, uv_scale
 from .orientation import Sides, seen_sides
 from .rays import RayScene
 
-"""Texels along the edge of what a pixel covers."""
 EXPECTED_FILL = 0.55
 """Share of the atlas that islands usually cover; only the unwrapping's margin depends on it."""
 SMALLEST, STEP = 64, 64

@@ -70,16 +70,7 @@ def _colour_at(thing: Thing, points: np.ndarray) -> np.ndarray:
     corner = thing.uv[quad]
     weights = (1 - a) * (1 - b), a * (1 - b), a * b, (1 - a) * b
     uv = sum(weight * corner[:, k] for k, weight in enumerate(weights))
-    colour = np.empty((len(points), 3))
-    for slot, paint in enumerate(thing.paints):
-        mine = thing.slot[quad] == slot
-        if paint.albedo.ndim == 1:
-            colour[mine] = paint.albedo
-        else:
-            size = np.array(paint.albedo.shape[1::-1])
-            x, y = np.moveaxis(np.clip((uv[mine] * size).astype(int), 0, size - 1), -1, 0)
-            colour[mine] = paint.albedo[y, x]
-    return colour
+    return thing.colours(thing.slot[quad], uv)
 
 
 def _repainted(things: tuple[Thing, ...], seed: int, low: float, high: float, glossy: dict[str, tuple[float, float]]):

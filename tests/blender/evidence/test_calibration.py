@@ -9,7 +9,7 @@ bpy = pytest.importorskip("bpy")
 
 from addon.bridge.unwrap import unwrap  # noqa: E402
 from addon.core.capture.read import read_capture  # noqa: E402
-from addon.core.evidence.calibration import Z90  # noqa: E402
+from addon.core.material import Z90  # noqa: E402
 from addon.core.progress import Progress  # noqa: E402
 from addon.core.recover import Recovery  # noqa: E402
 from addon.core.settings import Settings  # noqa: E402
