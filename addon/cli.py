@@ -93,6 +93,7 @@ def make_parser() -> argparse.ArgumentParser:
     recover.add_argument("capture", metavar="CAPTURE", type=Path,
                          help="folder with transforms.json, mesh.ply, info_semantic.json and the frames")
     recover.add_argument("--out", metavar="RESULT", type=Path, required=True, help="folder to write, made if missing")
+    add_reading(recover)
     add_settings(recover)
     add_common(recover, recover_command)
 
@@ -100,6 +101,7 @@ def make_parser() -> argparse.ArgumentParser:
                                description="Read and check a capture without recovering anything.", epilog=EXIT_CODES)
     info.add_argument("capture", metavar="CAPTURE", type=Path, help="folder of the capture")
     info.add_argument("--json", action="store_true", help="machine-readable")
+    add_reading(info)
     add_common(info, info_command)
 
     demo = commands.add_parser(
@@ -125,6 +127,31 @@ def make_parser() -> argparse.ArgumentParser:
     benchmark.add_argument("--threads", type=int, metavar="INT", default=0, help="0 takes all cores (default 0)")
     add_common(benchmark, benchmark_command)
     return parser
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """How the capture is to be read, where its folder does not tell: one option for each field of `Reading`."""
+    group = parser.add_argument_group("the capture")
+    group.add_argument("--format", metavar="NAME", default="",
+                       help="its layout, such as nerfstudio (default: found from what the folder holds)")
+    group.add_argument("--mesh", metavar="FILE", type=Path, help="the mesh, where it is not the format's own")
+    group.add_argument("--outside", action="store_true", help="let its files name others outside of its folder")
+    group.add_argument("--transfer", metavar="CURVE", default="",
+                       help="curve of 8 and 16-bit pictures: srgb, linear, or a gamma such as 2.2")
+    group.add_argument("--exposures", metavar="CSV", type=Path, help="exposure of each frame: lines of name, exposure")
+    group.add_argument("--convention", metavar="NAME", default="",
+                       help="a correction of all poses, as `info` proposes it")
+
+
+def reading_from(arguments: argparse.Namespace):
+    """The `Reading` that was asked for."""
+    from .core.capture.layout import Reading
+
+    def import_mesh(path: Path):
+        return need("import_mesh").import_mesh(path)  # only now: most captures need no Blender to be read
+
+    return Reading(arguments.format, arguments.mesh, arguments.outside, arguments.transfer, arguments.exposures,
+                   arguments.convention, import_mesh)
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
@@ -173,7 +200,8 @@ def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     settings = settings_from(arguments)
     run = need("run")
     with console_run(arguments, stream) as console:
-        report = run.run(arguments.capture, arguments.out, settings, run.progress_for(settings, **console))
+        report = run.run(arguments.capture, arguments.out, settings, run.progress_for(settings, **console),
+                         reading=reading_from(arguments))
     if not arguments.quiet:
         for warning in report.get("warnings", ()):
             print(f"Warning: {warning}", file=stream)
@@ -224,7 +252,7 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`info CAPTURE`."""
     from .core.capture.read import describe, read_capture
 
-    facts = describe(read_capture(arguments.capture))
+    facts = describe(read_capture(arguments.capture, reading_from(arguments)))
     if arguments.json:
         print(json.dumps(facts, indent=1), file=stream)
         return EXIT_OK

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from ..core.capture.model import Frame, Mesh, Pixels
-from ..core.capture.read import read_capture, read_pixels
+from ..core.capture.pixels import read_pixels
+from ..core.capture.read import read_capture
 from ..core.lit_diffuse.accumulate import LitDiffuse, accumulate
 from ..core.memory import peak_memory
 from ..core.parallel import ordered_map

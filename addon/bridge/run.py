@@ -12,6 +12,7 @@ from pathlib import Path
 
 import bpy
 
+from ..core.capture.layout import AS_FOUND, Reading
 from ..core.capture.read import read_capture
 from ..core.errors import BadInputError, StorageError
 from ..core.memory import peak_memory
@@ -37,7 +38,8 @@ def progress_for(settings: Settings, listener: Callable[[ProgressEvent], None] |
 
 
 def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, progress: Progress,
-        until: str = WRITE, scene: bpy.types.Scene | None = None, import_first: bool = True) -> dict:
+        until: str = WRITE, scene: bpy.types.Scene | None = None, import_first: bool = True,
+        reading: Reading = AS_FOUND) -> dict:
     """Recover a capture up to a stage; stages that the result folder holds already are not done again.
 
     Parameters
@@ -54,6 +56,8 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         as it is. Without one, scene.blend is made from an empty file.
     import_first : bool
         Bring the capture into `scene` before; False takes the objects that are there.
+    reading : Reading
+        How the capture is to be read.
 
     Returns
     -------
@@ -72,7 +76,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         raise BadInputError(f"Result folder '{out_folder}' is the capture itself; choose another.")
     started = time.monotonic()
     progress.stage("read")
-    capture = read_capture(capture_folder)
+    capture = read_capture(capture_folder, reading)
     if scene is not None and not import_first:
         imported(scene, capture)  # its absence is told now, not after the work
     progress.done()

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 
 from .atomic import write_bytes
+from .capture.fingerprint import fingerprint
 from .capture.model import Capture, Frame, Mesh, Pixels
-from .capture.read import MAX_BAD_SHARE, fingerprint, read_pixels
+from .capture.pixels import read_pixels
+from .capture.read import MAX_BAD_SHARE
 from .capture.recentre import near_origin
 from .errors import BadInputError
 from .evidence.collect import Evidence, collect

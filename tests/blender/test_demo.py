@@ -12,7 +12,8 @@ bpy = pytest.importorskip("bpy")
 from addon.bridge.demo_render import SIZES, is_rendered, render_capture  # noqa: E402
 from addon.bridge.demo_room import room, tour  # noqa: E402
 from addon.core.capture.exr import read_exr  # noqa: E402
-from addon.core.capture.read import read_capture, read_pixels  # noqa: E402
+from addon.core.capture.pixels import read_pixels  # noqa: E402
+from addon.core.capture.read import read_capture  # noqa: E402
 from addon.core.errors import StorageError  # noqa: E402
 from addon.core.settings import Settings  # noqa: E402
 from addon.core.surface.rays import RayScene  # noqa: E402

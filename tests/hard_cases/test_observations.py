@@ -9,7 +9,7 @@ import pytest
 
 from addon.core.capture.exr import write_exr
 from addon.core.capture.model import Frame
-from addon.core.capture.read import read_pixels
+from addon.core.capture.pixels import read_pixels
 from addon.core.lit_diffuse.accumulate import accumulate, frame_order
 from addon.core.lit_diffuse.medians import make_estimator
 from tests.core.rooms import all_round, look_at, picture, pixels_of

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..errors import BadInputError
-from .ply import PlyMesh
+from .layout import RawMesh
 
 MAX_COORDINATE = 1e6
 """Metres; beyond, single precision (rays, atlas) can't hold a room."""
@@ -15,17 +17,12 @@ USUAL_EXTENT = (0.1, 1000.0)
 """Metres; a room outside of this was likely exported in another unit."""
 
 
-def repair(mesh: PlyMesh, name: str) -> tuple[PlyMesh, list[str]]:
+def repair(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
     """Remove the triangles of `mesh` that are degenerate or have vertices that are not finite.
-
-    Parameters
-    ----------
-    name : str
-        The file, for messages.
 
     Returns
     -------
-    mesh : PlyMesh
+    mesh : RawMesh
         Each triangle has an area; every vertex is finite.
     warnings : list of str
 
@@ -34,6 +31,7 @@ def repair(mesh: PlyMesh, name: str) -> tuple[PlyMesh, list[str]]:
     BadInputError
         No triangle is left.
     """
+    name = mesh.name
     if not len(mesh.triangles):
         raise BadInputError(f"Mesh '{name}' has no triangles; export the room's surface with its faces.")
     warnings = []
@@ -59,7 +57,7 @@ def repair(mesh: PlyMesh, name: str) -> tuple[PlyMesh, list[str]]:
     extent = float(np.ptp(vertices[triangles.ravel()], axis=0).max())
     if not USUAL_EXTENT[0] <= extent <= USUAL_EXTENT[1]:
         warnings.append(f"Mesh '{name}' is {extent:.3g} m across; captures are in metres.")
-    return PlyMesh(vertices, triangles, ids, uv), warnings
+    return replace(mesh, vertices=vertices, triangles=triangles, object_id=ids, uv=uv), warnings
 
 
 def _has_area(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -6,10 +6,12 @@ centre lies at (0.5, 0.5); x runs right, y runs down. Radiance is linear Rec.709
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
+from .lens import Lens
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,8 @@ class Camera:
         Focal lengths and principal point in pixels.
     camera_to_world : (4, 4) float64
         Rigid pose, OpenGL axes.
+    lens : Lens or None
+        How rays become image points before focal lengths and principal point; None: perspective without distortion.
     """
 
     width: int
@@ -33,6 +37,7 @@ class Camera:
     cx: float
     cy: float
     camera_to_world: np.ndarray
+    lens: Lens | None = None
 
     @property
     def centre(self) -> np.ndarray:
@@ -75,6 +80,15 @@ class Camera:
 
 
 @dataclass(frozen=True)
+class Shot:
+    """One of several exposures of a frame; `path`, `exposure` and `saturation` as in `Frame`."""
+
+    path: Path
+    exposure: float
+    saturation: float = float("inf")
+
+
+@dataclass(frozen=True)
 class Frame:
     """One posed HDR picture, still on disk.
 
@@ -91,6 +105,12 @@ class Frame:
         pixel = radiance * exposure.
     saturation : float
         Pixel value (before division by `exposure`) from which on the sensor clips; inf where unknown.
+    transfer : str
+        Curve of the stored numbers, as `pictures.read_picture` takes it; '' for linear floats.
+    brackets : tuple of Shot
+        Further exposures of the same pose, to be merged with the first.
+    id_path : Path or None
+        Picture that holds each pixel's object.
     """
 
     name: str
@@ -99,6 +119,9 @@ class Frame:
     mask_path: Path | None = None
     exposure: float = 1.0
     saturation: float = float("inf")
+    transfer: str = ""
+    brackets: tuple[Shot, ...] = ()
+    id_path: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -163,10 +186,13 @@ class Capture:
         In capture (video) order.
     warnings : tuple of str
         One sentence each, for the report.
+    format : str
+        What it was read as.
     """
 
     root: Path
     mesh: Mesh
     instances: tuple[Instance, ...]
     frames: tuple[Frame, ...]
-    warnings: tuple[str, ...] = field(default=())
+    warnings: tuple[str, ...] = ()
+    format: str = ""

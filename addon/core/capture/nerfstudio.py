@@ -7,13 +7,16 @@ the whole file is raised.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 from ..errors import BadInputError
+from . import instances
 from .jsonfile import is_number, read_json
+from .layout import Layout, Reader, Reading
+from .meshes import find_mesh, read_mesh
 from .model import Camera, Frame
+from .pictures import picture_size
 from .pose import check_pose
 
 FILES = ("transforms.json", "transforms_train.json")
@@ -28,30 +31,24 @@ def find(root: Path) -> Path | None:
     return next((root / name for name in FILES if (root / name).is_file()), None)
 
 
-def read_frames(
-    root: Path, picture_size: Callable[[Path], tuple[int, int]]
-) -> tuple[list[Frame], list[str], list[str]]:
-    """Read all frames that the capture `root` lists.
-
-    Parameters
-    ----------
-    picture_size : callable
-        Gives a picture's width and height; asked only where the file leaves them out.
-
-    Returns
-    -------
-    frames : list of Frame
-        In the order of the file.
-    problems : list of str
-        One sentence for each frame that can't be used.
-    notes : list of str
-        Sentences on frames that are used, but may mean something else.
+def read(root: Path, reading: Reading) -> Layout:
+    """Read the poses, the mesh and the objects' names.
 
     Raises
     ------
     BadInputError
-        The file is not JSON, lists no frames, has distorted frames, or leads out of the capture's folder.
+        The file is not JSON, lists no frames, has distorted frames, or leads out of the capture's folder; the mesh or
+        the list of objects can't be read.
     """
+    mesh = read_mesh(find_mesh(root, reading), reading)
+    semantic = root / instances.FILE
+    names = instances.read_instances(semantic) if semantic.exists() else None
+    frames, problems, notes = read_frames(root)
+    return Layout(frames, mesh, names, instances.FILE, problems, notes)
+
+
+def read_frames(root: Path) -> tuple[list[Frame], list[str], list[str]]:
+    """All frames that the capture `root` lists, sentences on those that can't be used, and on what may mean else."""
     path = find(root) or root / FILES[0]
     top = read_json(path)
     entries = top.get("frames")
@@ -71,7 +68,7 @@ def read_frames(
             continue
         _check_lens(top, entry, path)
         try:
-            frame = _frame(root, top, entry, name, picture_size)
+            frame = _frame(root, top, entry, name)
             if frame.path in seen:
                 raise BadInputError(f"Frame '{name}' is listed twice; keep the entry with the right pose.")
         except BadInputError as error:
@@ -117,8 +114,7 @@ def _check_lens(top: dict[str, Any], entry: dict[str, Any], path: Path) -> None:
                             "undistort them and set k1 to k6, p1 and p2 to 0.")
 
 
-def _frame(root: Path, top: dict[str, Any], entry: dict[str, Any], name: str,
-           picture_size: Callable[[Path], tuple[int, int]]) -> Frame:
+def _frame(root: Path, top: dict[str, Any], entry: dict[str, Any], name: str) -> Frame:
     """One frame; raises `BadInputError` where it can't be used."""
     path = _inside(root, entry.get("file_path"), name)
     ended = path.with_name(path.name + ENDING)
@@ -184,3 +180,6 @@ def _inside(root: Path, value: Any, name: str) -> Path:
             raise _Escapes(f"Frame '{name}' has the path '{value}', which leads out of the capture '{root}'; "
                            "give paths within it.")
     return root / PurePosixPath(value.replace("\\", "/"))
+
+
+READER = Reader("nerfstudio", FILES[0], lambda root: find(root) is not None, read)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..capture.model import Camera, Pixels
-from ..capture.read import read_pixels
+from ..capture.pixels import read_pixels
 from ..material import METAL, SPECULAR
 from ..shading.emitters import bright_triangles
 from ..specular.lobes import GRID, reflected_light

@@ -8,7 +8,8 @@ import pytest
 from addon.core.capture.clipping import find_clipping
 from addon.core.capture.exr import HALF_MAX
 from addon.core.capture.model import Camera, Frame
-from addon.core.capture.read import describe, read_capture, read_pixels
+from addon.core.capture.pixels import read_pixels
+from addon.core.capture.read import describe, read_capture
 from addon.core.errors import BadInputError
 from tests.core.capture.conftest import HEIGHT, WIDTH
 

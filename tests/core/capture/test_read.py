@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from addon.core.capture.exr import write_exr
+from addon.core.capture.fingerprint import fingerprint
+from addon.core.capture.pixels import read_pixels
 from addon.core.capture.png import write_png
-from addon.core.capture.read import describe, fingerprint, read_capture, read_pixels
+from addon.core.capture.read import describe, read_capture
 from addon.core.errors import BadInputError
+from tests.core.capture.conftest import CORNERS, SIDES, ply_text
 
 HEIGHT, WIDTH = 6, 8
 
@@ -417,6 +420,9 @@ def test_the_fingerprint_follows_what_matters(capture):
     seen.append(now())
     with open(capture.root / "mesh.ply", "a") as file:
         file.write("\n")
+    assert now() == seen[-1]
+    corners = [CORNERS[0], (5.5, 0, 0), *CORNERS[2:]]
+    capture.mesh(ply_text(corners, SIDES, range(6)))
     seen.append(now())
     assert len(set(seen)) == len(seen)
 

@@ -1,0 +1,49 @@
+"""What a lens does between a ray and the image plane: the interface of all camera models."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+
+class Lens(Protocol):
+    """A camera model without its focal lengths and principal point.
+
+    Axes are COLMAP's and OpenCV's: x right, y down, z forward. Image points (u, v) are such that
+    pixel = (fx u + cx, fy v + cy). Instances are frozen and hashable.
+    """
+
+    name: str
+
+    def project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Image points of rays.
+
+        Parameters
+        ----------
+        rays : (n, 3) float
+            Any length but 0.
+
+        Returns
+        -------
+        points : (n, 2) float64
+            Nonsense where not `seen`.
+        seen : (n,) bool
+            False: outside of what the model can map one to one (behind the camera, beyond the fold).
+        """
+        ...
+
+    def unproject(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Unit rays through image points: the inverse of `project`.
+
+        Parameters
+        ----------
+        points : (n, 2) float
+
+        Returns
+        -------
+        rays : (n, 3) float64
+        seen : (n,) bool
+            False: no ray leads there.
+        """
+        ...

@@ -1,0 +1,55 @@
+"""A mesh from a file of any kind: PLY here, others through whatever the caller brings (Blender's importers)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..errors import BadInputError
+from .layout import RawMesh, Reading
+from .ply import read_ply
+
+IMPORTED = (".obj", ".gltf", ".glb")
+"""Endings that `Reading.import_mesh` is asked for."""
+MESH = "mesh.ply"
+
+
+def read_mesh(path: Path, reading: Reading) -> RawMesh:
+    """Read the mesh `path`.
+
+    Raises
+    ------
+    BadInputError
+        It is absent, damaged, or of a kind that can't be read.
+    """
+    ending = path.suffix.lower()
+    if ending in IMPORTED:
+        if reading.import_mesh is None:
+            raise BadInputError(f"Mesh '{path}' needs Blender to be read; run the command where bpy is installed, or "
+                                "convert it to PLY.")
+        return reading.import_mesh(path)
+    if ending != ".ply":
+        raise BadInputError(f"Mesh '{path}' is of no kind that is known; give a PLY, OBJ, glTF or GLB file.")
+    ply = read_ply(path)
+    return RawMesh(ply.vertices, ply.triangles, ply.object_id, ply.uv, name=path.name)
+
+
+def find_mesh(root: Path, reading: Reading) -> Path:
+    """The mesh that the user named, else `mesh.ply`, else the only mesh file of the folder.
+
+    Raises
+    ------
+    BadInputError
+        There is none, or several.
+    """
+    if reading.mesh is not None:
+        return reading.mesh
+    usual = root / MESH
+    if usual.exists():
+        return usual
+    found = sorted(p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED) and p.is_file())
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise BadInputError(f"Capture '{root}' has several meshes ({', '.join(p.name for p in found[:3])}, ...); name "
+                            "one with --mesh.")
+    raise BadInputError(f"Mesh '{usual}' does not exist; a capture needs its mesh there, or named with --mesh.")

@@ -1,0 +1,46 @@
+"""What a frame measured: its picture read, exposure divided out, pixels that say nothing marked."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import BadInputError
+from .exr import HALF_MAX
+from .model import Frame, Pixels
+from .pictures import read_mask, read_picture
+
+NOISE = 1e-4
+"""Negative values down to this come from filtering and count as 0."""
+OPAQUE = 0.99
+"""A pixel of less alpha is a mixture of what was seen and nothing."""
+
+
+def read_pixels(frame: Frame) -> Pixels:
+    """Read what `frame` measured: exposure divided out, masked and impossible pixels marked.
+
+    Raises
+    ------
+    BadInputError
+        A picture is damaged, or of another size than the camera.
+    """
+    shape = frame.camera.height, frame.camera.width
+    rgb, alpha = read_picture(frame.path)
+    if rgb.shape[:2] != shape:
+        raise BadInputError(f"Frame '{frame.name}': '{frame.path}' changed its size during the run; start again.")
+    # A half float overflows to inf: the pixel was bright, but it gives no value at all, not even a bound. Writers that
+    # hold what is brighter at a half's end give a bound.
+    saturated = ((rgb >= frame.saturation) | (rgb == HALF_MAX) | np.isposinf(rgb)).any(-1)
+    seen = np.ones(shape, bool)
+    if alpha is not None and (alpha > 0).any():  # some writers leave all of alpha at 0 and mean nothing by it
+        seen &= alpha >= OPAQUE
+    if frame.mask_path is not None:
+        mask = read_mask(frame.mask_path)
+        if mask.shape != shape:
+            raise BadInputError(f"Frame '{frame.name}': mask '{frame.mask_path}' differs in size; make it the frame's.")
+        seen &= mask
+    valid = seen & (np.isfinite(rgb) & (rgb >= -NOISE)).all(-1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        radiance = np.maximum(rgb, 0) / np.float32(frame.exposure)
+        valid &= np.isfinite(radiance).all(-1)
+    radiance[~valid] = 0
+    return Pixels(radiance.astype(np.float32, copy=False), valid, saturated & seen)
