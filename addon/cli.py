@@ -21,10 +21,12 @@ from typing import TextIO
 from .console import ConsoleProgress, StopWish, duration, own_console, unexpected
 from .core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_OK, BadInputError, ScanRelightError
 from .core.settings import PRESETS, Settings
+from .leash import JsonProgress, Leash, MemoryGuard
 from .settings_info import setting_infos
 from .version import VERSION
 
 COMMAND = "scan_relight"
+RUN_STAGES = ("surface", "lit_diffuse", "shading", "specular", "write")
 DEMO_SIZES = ("tiny", "small", "large")
 EXIT_CODES = """\
 exit codes: 0 done, 1 failure, 2 bad input, 130 interrupted (what is finished is kept; the same command goes on from
@@ -94,7 +96,12 @@ def make_parser() -> argparse.ArgumentParser:
                          help="folder with transforms.json, mesh.ply, info_semantic.json and the frames")
     recover.add_argument("--out", metavar="RESULT", type=Path, required=True, help="folder to write, made if missing")
     add_reading(recover)
+    recover.add_argument("--until", metavar="STAGE", choices=RUN_STAGES, default="write",
+                         help=f"last stage to do: {', '.join(RUN_STAGES)} (default write, which is all)")
+    recover.add_argument("--from-stage", metavar="STAGE", choices=RUN_STAGES,
+                         help="do this stage and all later ones anew, though they are stored")
     add_settings(recover)
+    add_leash(recover)
     add_common(recover, recover_command)
 
     info = commands.add_parser("info", help="say what a capture holds, and what is wrong with it",
@@ -170,6 +177,17 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
             group.add_argument(option, type=info.kind, metavar=info.kind.__name__.upper(), help=text)
 
 
+def add_leash(parser: argparse.ArgumentParser) -> None:
+    """Options for programs that start a run and follow it."""
+    group = parser.add_argument_group("for programs that start a run")
+    group.add_argument("--progress", choices=("text", "json"), default="text",
+                       help="json: one line of JSON for each event instead of text (default text)")
+    group.add_argument("--stop-with-stdin", action="store_true",
+                       help="stop when standard input says 'stop' or ends, so that the run never outlives its starter")
+    group.add_argument("--memory-limit", type=float, metavar="GB", default=0.0,
+                       help="stop when the run takes more gigabytes (default 0, no limit)")
+
+
 def add_common(parser: argparse.ArgumentParser, function) -> None:
     """Options of every command, and what runs it."""
     if function is not info_command:
@@ -187,11 +205,15 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
 @contextlib.contextmanager
 def console_run(arguments: argparse.Namespace, stream: TextIO):
     """The listener and the wish to stop of a long command, as keywords of `run.progress_for`."""
-    listener = ConsoleProgress(stream, quiet=arguments.quiet)
+    machine = getattr(arguments, "progress", "text") == "json"
+    listener = JsonProgress(stream) if machine else ConsoleProgress(stream, quiet=arguments.quiet)
+    guard = MemoryGuard(getattr(arguments, "memory_limit", 0.0), lambda text: os._exit(complain(text, EXIT_FAILURE)))
+    leash = Leash() if getattr(arguments, "stop_with_stdin", False) else None
     with StopWish() as wish:
         try:
-            yield {"listener": listener, "should_stop": wish}
+            yield {"listener": listener, "should_stop": lambda: guard() or wish() or (leash is not None and leash())}
         finally:
+            guard.close()
             listener.close()
 
 
@@ -201,11 +223,17 @@ def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     run = need("run")
     with console_run(arguments, stream) as console:
         report = run.run(arguments.capture, arguments.out, settings, run.progress_for(settings, **console),
-                         reading=reading_from(arguments))
-    if not arguments.quiet:
+                         until=arguments.until, reading=reading_from(arguments), from_stage=arguments.from_stage)
+    if isinstance(console["listener"], JsonProgress):
+        for warning in report.get("warnings", ()):
+            console["listener"].tell("warning", text=warning)
+        console["listener"].tell("done", seconds=report["seconds"], result=str(arguments.out.absolute()),
+                                 until=arguments.until)
+    elif not arguments.quiet:
         for warning in report.get("warnings", ()):
             print(f"Warning: {warning}", file=stream)
-        print(f"Done in {duration(report['seconds'])}: {arguments.out / 'scene.blend'}", file=stream)
+        made = arguments.out / ("scene.blend" if arguments.until == RUN_STAGES[-1] else "stages")
+        print(f"Done in {duration(report['seconds'])}: {made}", file=stream)
     return EXIT_OK
 
 

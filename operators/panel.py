@@ -26,4 +26,4 @@ class SidebarPanel:
     @staticmethod
     def job():
         """The run that is going on, or None."""
-        return job.current()
+        return job.running()

@@ -39,7 +39,7 @@ def progress_for(settings: Settings, listener: Callable[[ProgressEvent], None] |
 
 def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, progress: Progress,
         until: str = WRITE, scene: bpy.types.Scene | None = None, import_first: bool = True,
-        reading: Reading = AS_FOUND) -> dict:
+        reading: Reading = AS_FOUND, from_stage: str | None = None) -> dict:
     """Recover a capture up to a stage; stages that the result folder holds already are not done again.
 
     Parameters
@@ -58,6 +58,8 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         Bring the capture into `scene` before; False takes the objects that are there.
     reading : Reading
         How the capture is to be read.
+    from_stage : str, optional
+        Do this stage and all later ones anew, though the result folder holds them.
 
     Returns
     -------
@@ -71,6 +73,8 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     """
     if until not in (*STAGES, WRITE):
         raise BadInputError(f"There is no stage '{until}'; choose one of {', '.join((*STAGES, WRITE))}.")
+    if from_stage is not None and from_stage not in (*STAGES, WRITE):
+        raise BadInputError(f"There is no stage '{from_stage}'; choose one of {', '.join((*STAGES, WRITE))}.")
     capture_folder, out_folder = Path(capture_folder), Path(out_folder)
     if out_folder.resolve() == capture_folder.resolve():
         raise BadInputError(f"Result folder '{out_folder}' is the capture itself; choose another.")
@@ -81,6 +85,8 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         imported(scene, capture)  # its absence is told now, not after the work
     progress.done()
     with Store(out_folder) as store, _told(out_folder):
+        if from_stage in STAGES:
+            store.drop(STAGES[STAGES.index(from_stage):])
         recovery = Recovery(capture, store, settings, progress, unwrap)
         for stage in STAGES:
             getattr(recovery, stage)()

@@ -30,6 +30,10 @@ class StorageError(ScanRelightError):
     """The result folder can't be written any more (disk full, folder taken away)."""
 
 
+class MemoryLimitError(ScanRelightError):
+    """The run needs more memory than it may take."""
+
+
 class InterruptedRun(ScanRelightError):
     """The user asked to stop; every finished stage is kept."""
 

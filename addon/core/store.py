@@ -17,6 +17,7 @@ import re
 import shutil
 import zipfile
 import zlib
+from collections.abc import Iterable
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -145,6 +146,11 @@ class Store:
                         np.lib.format.write_array(entry, np.asarray(array), allow_pickle=False)
             file.flush()
             os.fsync(file.fileno())
+
+    def drop(self, names: Iterable[str]) -> None:
+        """Forget the stages `names`, so that they are done again; one that is not stored is no error."""
+        for name in names:
+            self._stage(name).unlink(missing_ok=True)
 
     def write_json(self, name: str, value: Any) -> Path:
         """Write the result `name`; NaN and inf, which JSON lacks, become null. Raises `StorageError`."""

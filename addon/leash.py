@@ -1,0 +1,137 @@
+"""What ties a run to whoever started it: events as lines of JSON, the wish to stop, and a limit on memory."""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+import time
+from collections.abc import Callable
+from typing import TextIO
+
+from .core.errors import EXIT_INTERRUPTED, MemoryLimitError
+from .core.memory import peak_memory
+from .core.progress import ProgressEvent
+
+EVENT_SECONDS = 0.1
+"""Progress is told at most this often, and at each stage's start and end."""
+STOP = b"stop"
+GRACE = 5.0
+"""Seconds after which a run that was let go ends at once instead of at its next safe point."""
+GIGABYTE = 1e9
+
+
+class JsonProgress:
+    """A listener for `Progress` that writes each event as one line of JSON.
+
+    Parameters
+    ----------
+    stream : text file
+    """
+
+    def __init__(self, stream: TextIO):
+        self._stream = stream
+        self._stage, self._share, self._said = None, 0.0, 0.0
+
+    def __call__(self, event: ProgressEvent) -> None:
+        """Take in one event of the run."""
+        now = time.monotonic()
+        new = event.stage != self._stage
+        ended = event.share >= 1.0 > self._share
+        if not event.stage or not (new or ended or now - self._said >= EVENT_SECONDS):
+            return
+        self._stage, self._share, self._said = event.stage, event.share, now
+        self.tell("progress", stage=event.stage, share=event.share, overall=event.overall,
+                  seconds_left=event.seconds_left)
+
+    def tell(self, kind: str, **values: object) -> None:
+        """Write one line: `{"event": kind, ...}`."""
+        self._stream.write(json.dumps({"event": kind, **values}) + "\n")
+        self._stream.flush()
+
+    def close(self) -> None:
+        """Nothing is left open."""
+
+
+class Leash:
+    """The wish to stop of a run whose standard input is held by another program.
+
+    The run stops where the line "stop" arrives or the input ends: so it never outlives a program that crashed.
+    Where no safe point comes within `GRACE` seconds the process ends there; files are written whole or not at all.
+
+    Parameters
+    ----------
+    descriptor : int
+        Of the input; tests give another one.
+    end : callable(int)
+        Ends the process.
+    """
+
+    def __init__(self, descriptor: int = 0, end: Callable[[int], None] = os._exit):
+        self.wished = False
+        self._descriptor, self._end = descriptor, end
+        threading.Thread(target=self._watch, name="leash", daemon=True).start()
+
+    def __call__(self) -> bool:
+        """Whether a stop was asked for."""
+        return self.wished
+
+    def _watch(self) -> None:
+        heard = b""
+        while STOP not in heard:
+            try:
+                some = os.read(self._descriptor, 64)
+            except OSError:
+                some = b""
+            if not some:
+                break
+            heard = heard[-len(STOP):] + some
+        self.wished = True
+        time.sleep(GRACE)
+        self._end(EXIT_INTERRUPTED)
+
+
+class MemoryGuard:
+    """Stops a run that takes more memory than it may.
+
+    Parameters
+    ----------
+    limit : float
+        Gigabytes; 0 sets no limit.
+    end : callable(str), optional
+        Ends the process with the sentence where no safe point comes within `GRACE` seconds; left out, the run is only
+        stopped at its safe points.
+    """
+
+    PERIOD = 0.2
+
+    def __init__(self, limit: float, end: Callable[[str], None] | None = None):
+        self.limit, self.exceeded = limit, False
+        self._end = end
+        self._done = threading.Event()
+        if limit > 0 and peak_memory() is not None:
+            threading.Thread(target=self._watch, name="memory guard", daemon=True).start()
+
+    @property
+    def sentence(self) -> str:
+        """What the user is told."""
+        return (f"The run needs more than the memory limit of {self.limit:g} GB and was stopped; the finished stages "
+                "are kept. Raise the limit, or take a greater texel size, a smaller atlas size or fewer threads.")
+
+    def __call__(self) -> bool:
+        """Asked where a run may be stopped; raises `MemoryLimitError` once the limit is passed."""
+        if self.exceeded:
+            raise MemoryLimitError(self.sentence)
+        return False
+
+    def close(self) -> None:
+        """Watch no longer."""
+        self._done.set()
+
+    def _watch(self) -> None:
+        while not self._done.wait(self.PERIOD):
+            if peak_memory() > self.limit * GIGABYTE:
+                self.exceeded = True
+                if self._end is not None and not self._done.wait(GRACE):
+                    self._end(self.sentence)
+                return
