@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 from contextlib import suppress
 from pathlib import Path
 
@@ -15,11 +15,20 @@ from ..core.material import EMITTER, LAMBERTIAN, ObjectMaterial
 from .cameras import make_cameras
 from .images import load_image
 from .materials import make_material
-from .mesh_objects import ATLAS_UV, OBJECT_ID, make_objects
+from .mesh_objects import ATLAS_UV, OBJECT_ID, each_object
 from .scene import ALBEDO, BASE_COLOR, SHADING
 
 CAPTURE = "scan_relight_capture"
 """Custom property of the collection: the folder of the capture that it came from."""
+
+
+def whole(slices: Generator):
+    """Do all slices of a piece of work at once; what it returns."""
+    while True:
+        try:
+            next(slices)
+        except StopIteration as end:
+            return end.value
 
 
 def import_capture(scene: bpy.types.Scene, capture: Capture) -> bpy.types.Collection:
@@ -30,15 +39,25 @@ def import_capture(scene: bpy.types.Scene, capture: Capture) -> bpy.types.Collec
     bpy.types.Collection
         "Scan Relight" with "Room", "Lamps" and "Cameras" within, linked to the scene.
     """
+    return whole(importing(scene, capture))
+
+
+def importing(scene: bpy.types.Scene, capture: Capture) -> Generator[float, None, bpy.types.Collection]:
+    """`import_capture` in slices of an object or camera each; yields the share done, so that a window can be drawn."""
     top = bpy.data.collections.new("Scan Relight")
     top[CAPTURE] = str(capture.root.absolute())
     room, lamps, eyes = (bpy.data.collections.new(name) for name in ("Room", "Lamps", "Cameras"))
     for part in (room, lamps, eyes):
         top.children.link(part)
-    scene.collection.children.link(top)
-    make_objects(capture.mesh, capture.instances, np.zeros((len(capture.mesh.triangles), 3, 2), np.float32), room)
-    for thing, frame in zip(make_cameras(capture.frames, eyes), capture.frames):
+    total = len(capture.instances) + len(capture.frames)
+    blank = np.zeros((len(capture.mesh.triangles), 3, 2), np.float32)
+    for done, _ in enumerate(each_object(capture.mesh, capture.instances, blank, room), 1):
+        yield done / total
+    for done, frame in enumerate(capture.frames, len(capture.instances) + 1):
+        [thing] = make_cameras([frame], eyes)
         show_frame(thing.data, frame.path)
+        yield done / total
+    scene.collection.children.link(top)  # not before: a window that is drawn in between would draw each half
     return top
 
 
@@ -86,6 +105,12 @@ def apply_recovery(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarra
     BadInputError
         An image can't be read.
     """
+    return whole(applying(scene, capture, atlas_uv, materials, result_folder))
+
+
+def applying(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
+             result_folder: Path | str) -> Generator[float, None, tuple[str, ...]]:
+    """`apply_recovery` in slices of an object each; yields the share done, so that a window can be drawn."""
     top = imported(scene, capture)
     folder = Path(result_folder).absolute()
     images = {name: load_image(folder / name) for name in (BASE_COLOR, ALBEDO, SHADING) if (folder / name).exists()}
@@ -93,9 +118,13 @@ def apply_recovery(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarra
     parts = {part.name.split(".")[0]: part for part in top.children}
     descriptions = {one.object_id: one for one in materials}
     warnings = []
-    for instance in capture.instances:
+    order = np.argsort(capture.mesh.object_id, kind="stable")
+    sorted_id = capture.mesh.object_id[order]
+    for done, instance in enumerate(capture.instances):
+        yield done / len(capture.instances)
         thing = things.get(instance.object_id)
-        own = np.flatnonzero(capture.mesh.object_id == instance.object_id)
+        first, last = np.searchsorted(sorted_id, [instance.object_id, instance.object_id + 1])
+        own = order[first:last]
         if thing is None or len(thing.data.polygons) != len(own):
             what = "was deleted" if thing is None else "was edited"
             warnings.append(f"Object {instance.object_id} ({instance.class_name}) {what} and is left as it is.")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import bpy
 import numpy as np
@@ -37,9 +37,14 @@ def make_objects(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray
         By `object_id`. The origin lies in the middle of the object's box; shading is flat, because the scan's
         geometric normals are what the light was divided by.
     """
+    return dict(each_object(mesh, instances, atlas_uv, collection))
+
+
+def each_object(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray,
+                collection: bpy.types.Collection) -> Iterator[tuple[int, bpy.types.Object]]:
+    """`make_objects` one by one, so that a window can be drawn in between."""
     order = np.argsort(mesh.object_id, kind="stable")
     sorted_id = mesh.object_id[order]
-    objects = {}
     for instance in instances:
         first, last = np.searchsorted(sorted_id, [instance.object_id, instance.object_id + 1])
         if first == last:
@@ -58,8 +63,7 @@ def make_objects(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray
         thing.location = middle
         thing[OBJECT_ID] = int(instance.object_id)
         collection.objects.link(thing)
-        objects[instance.object_id] = thing
-    return objects
+        yield instance.object_id, thing
 
 
 def is_open(data: bpy.types.Mesh) -> bool:

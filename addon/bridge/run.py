@@ -18,6 +18,7 @@ from ..core.errors import BadInputError, StorageError
 from ..core.memory import peak_memory
 from ..core.progress import Progress, ProgressEvent
 from ..core.recover import Recovery
+from ..core.room_file import ROOM, write_room
 from ..core.settings import Settings
 from ..core.store import Store
 from ..version import VERSION
@@ -96,13 +97,15 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         if until == WRITE:
             progress.stage(WRITE)
             writing = time.monotonic()
-            for name in ("report.json", "scene.blend"):  # a stopped run must not leave the last one's among new images
+            # A stopped run must not leave the last one's among new images.
+            for name in ("report.json", "scene.blend", ROOM):
                 store.path(name).unlink(missing_ok=True)
             recovery.write_images()
             progress.update(0.5)
             surface, materials = recovery.surface(), recovery.materials()
             # The file gets the mesh whose normals face the frames: its lamps shine on that side.
             facing = replace(capture, mesh=replace(surface.mesh, vertices=capture.mesh.vertices))
+            write_room(store.folder, capture, surface.uv)
             warnings = write_scene(store.path("scene.blend"), facing, surface.atlas.uv, materials, store.folder,
                                    recovery.median_radiance(), fresh=scene is None, facing=True)
             if scene is not None:

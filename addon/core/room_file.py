@@ -1,0 +1,107 @@
+"""The room as a finished run knew it, in one file of the result folder: what an interface needs to show it again.
+
+Reading it asks for neither the capture's pictures nor the stages, and takes a blink.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .atomic import replacing
+from .capture.model import Camera, Capture, Frame, Instance, Mesh
+from .errors import BadInputError, MissingStageError
+from .material import ObjectMaterial
+
+ROOM = "room.npz"
+MATERIALS = "materials.json"
+CAMERA = ("width", "height", "fx", "fy", "cx", "cy")
+DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, NotImplementedError)
+
+
+@dataclass(frozen=True)
+class Room:
+    """A finished run.
+
+    Attributes
+    ----------
+    capture : Capture
+        Its frames know the cameras' pinhole part alone; their pictures may be gone.
+    atlas_uv : (t, 3, 2) float32
+        Atlas coordinates of each triangle's corners.
+    materials : tuple of ObjectMaterial
+    folder : Path
+        The result folder.
+    """
+
+    capture: Capture
+    atlas_uv: np.ndarray
+    materials: tuple[ObjectMaterial, ...]
+    folder: Path
+
+
+def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray) -> None:
+    """Write `ROOM` into a result folder; `atlas_uv` as in `Room`. Raises `StorageError`."""
+    mesh = capture.mesh
+    told = {
+        "root": str(capture.root.absolute()),
+        "format": capture.format,
+        "instances": [[one.object_id, one.class_name] for one in capture.instances],
+        "frames": [[frame.name, str(frame.path.absolute()), [getattr(frame.camera, name) for name in CAMERA]]
+                   for frame in capture.frames],
+    }
+    arrays = {
+        "told": np.frombuffer(json.dumps(told).encode(), np.uint8),
+        "vertices": mesh.vertices,
+        "triangles": mesh.triangles,
+        "object_id": mesh.object_id,
+        "atlas_uv": np.asarray(atlas_uv, np.float32),
+        "poses": np.stack([frame.camera.camera_to_world for frame in capture.frames]),
+    }
+    if mesh.uv is not None:
+        arrays["uv"] = mesh.uv
+    with replacing(folder / ROOM) as temporary, open(temporary, "wb") as file:
+        np.savez(file, **arrays)
+
+
+def read_room(folder: Path | str) -> Room:
+    """The finished run in a result folder.
+
+    Raises
+    ------
+    MissingStageError
+        No run was finished there.
+    BadInputError
+        A file is damaged.
+    """
+    folder = Path(folder).absolute()
+    for name in (ROOM, MATERIALS):
+        if not (folder / name).is_file():
+            raise MissingStageError(f"Folder '{folder}' holds no finished result ('{name}' is missing); "
+                                    "run the recovery to its end first.")
+    try:
+        with open(folder / ROOM, "rb") as file, np.load(file, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        told = json.loads(arrays["told"].tobytes())
+        frames = tuple(Frame(name, Path(path), Camera(*camera, pose))
+                       for (name, path, camera), pose in zip(told["frames"], arrays["poses"], strict=True))
+        mesh = Mesh(*(arrays[name] for name in ("vertices", "triangles", "object_id")), arrays.get("uv"))
+        instances = tuple(Instance(int(number), name) for number, name in told["instances"])
+        capture = Capture(Path(told["root"]), mesh, instances, frames, format=told["format"])
+        described = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))["objects"]
+        materials = tuple(material(one) for one in described)
+    except DAMAGE as error:
+        raise BadInputError(f"The result in '{folder}' is damaged ({type(error).__name__}: {error}); "
+                            "run the recovery again.") from error
+    return Room(capture, arrays["atlas_uv"], materials, folder)
+
+
+def material(told: dict) -> ObjectMaterial:
+    """One object of materials.json as its description; further keys are left out."""
+    known = {name: tuple(value) if isinstance(value, list) else value for name, value in told.items()
+             if name in ObjectMaterial.__dataclass_fields__}
+    return ObjectMaterial(**known)
