@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
+from .cli_relight import add_relight, relight_command
 from .console import ConsoleProgress, StopWish, duration, own_console, unexpected
 from .core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_OK, BadInputError, ScanRelightError
 from .core.settings import PRESETS, Settings
@@ -110,6 +111,8 @@ def make_parser() -> argparse.ArgumentParser:
     info.add_argument("--json", action="store_true", help="machine-readable")
     add_reading(info)
     add_common(info, info_command)
+
+    add_common(add_relight(commands, EXIT_CODES), relight_command)
 
     demo = commands.add_parser(
         "demo", help="render a small room, recover it, compare, relight", epilog=EXIT_CODES,

@@ -41,6 +41,11 @@ def use_camera(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
     scene.camera = thing
 
 
+def frame_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The cameras of a scene that `make_cameras` made, in the capture's order."""
+    return [thing for thing in scene.objects if thing.type == "CAMERA" and "pixel_aspect" in thing]
+
+
 def differing(frames: Iterable[Frame]) -> str:
     """One sentence if the frames don't all share one size and pixel shape ('' if they do).
 

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-import errno
-import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..core.atomic import replacing, write_bytes
-from ..core.errors import StorageError
-from ..core.material import EMITTER
+from ..core.atomic import write_bytes
 from ..core.progress import Progress, ProgressEvent
 from ..core.settings import Settings
 from ..core.store import Store
+from . import relight_outside
 from .demo_compare import comparison
-from .demo_render import can_denoise, is_rendered, render_capture
+from .demo_render import is_rendered, render_capture
 from .demo_room import look_at
-from .images import image_array
-from .materials import EMISSION_STRENGTH
+from .pictures import beside, can_denoise, shoot
+from .relight_lamps import find_lamps, set_on
 from .run import WEIGHTS, run
 
 PICTURES = {"tiny": (96, 72, 16), "small": (480, 360, 32), "large": (960, 720, 128)}
@@ -80,8 +76,6 @@ def pictures(out: Path, size: str, progress: Progress) -> None:
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = width, height, 100
     scene.render.pixel_aspect_x = scene.render.pixel_aspect_y = 1
     scene.view_settings.view_transform = "Standard"
-    image = scene.render.image_settings
-    image.file_format, image.color_mode, image.color_depth = "PNG", "RGB", "8"
     camera = bpy.data.objects.new("Demo view", bpy.data.cameras.new("Demo view"))
     camera.data.angle, camera.data.clip_start = np.radians(80), 0.01
     camera.matrix_world = Matrix(VIEW.tolist())
@@ -97,12 +91,10 @@ def pictures(out: Path, size: str, progress: Progress) -> None:
 
 def switch_off_the_lamps(scene) -> None:
     """Every recovered lamp and the light from outside."""
-    for material in bpy.data.materials:
-        if material.get("scan_relight_model") == EMITTER:
-            for node in material.node_tree.nodes:
-                if node.type == "BSDF_PRINCIPLED":
-                    node.inputs[EMISSION_STRENGTH].default_value = 0.0
-    scene.world = None
+    for lamp in find_lamps(scene):
+        set_on(lamp, False)
+    if scene.world:
+        relight_outside.set_on(scene.world, False)
 
 
 def new_lights(scene) -> None:
@@ -113,37 +105,3 @@ def new_lights(scene) -> None:
         thing = bpy.data.objects.new("Demo light", light)
         thing.matrix_world = Matrix(look_at(place, target).tolist())
         scene.collection.objects.link(thing)
-
-
-def shoot(scene, path: Path) -> None:
-    """Render to the file `path`, in whole or not at all."""
-    with _saving(path) as temporary:
-        scene.render.filepath = str(temporary.absolute())
-        bpy.ops.render.render(write_still=True, scene=scene.name)
-
-
-@contextmanager
-def _saving(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path` that Blender saves a PNG to, moved over it; one sentence where that fails."""
-    try:
-        with replacing(path) as temporary:
-            yield temporary
-            if temporary.read_bytes()[-8:-4] != b"IEND":  # Blender does not always notice a full disk
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    except RuntimeError as error:
-        reason = " ".join(str(error).split()).removeprefix("Error: ").rstrip(".")
-        raise StorageError(f"'{path}' can't be written ({reason}); free some space or choose another result folder."
-                           ) from error
-
-
-def beside(left: Path, right: Path, out: Path) -> None:
-    """Put two pictures of one size beside each other."""
-    images = [bpy.data.images.load(str(path.absolute())) for path in (left, right)]
-    pixels = [image_array(image) for image in images]
-    gap = np.ones((pixels[0].shape[0], max(pixels[0].shape[1] // 80, 1), 4), np.float32)
-    joined = np.concatenate([pixels[0], gap, pixels[1]], 1)
-    made = bpy.data.images.new("before_after", joined.shape[1], joined.shape[0])
-    made.pixels.foreach_set(joined.astype(np.float32).ravel())
-    with _saving(out) as temporary:
-        made.filepath_raw, made.file_format = str(temporary.absolute()), "PNG"
-        made.save()

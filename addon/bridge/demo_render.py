@@ -18,6 +18,7 @@ from .demo_capture import FIELD_OF_VIEW, frame_path, write_all_but_frames
 from .demo_room import Paint, Thing, room, tour
 from .images import array_image
 from .materials import BASE_COLOR, IOR, ROUGHNESS, SPECULAR_LEVEL, ior_of
+from .pictures import can_denoise
 
 SIZES = {
     "tiny": (10, 64, 48, 24),
@@ -128,13 +129,6 @@ def set_up_cycles(scene, size: tuple[int, int], samples: int) -> None:
     cycles.caustics_reflective, cycles.blur_glossy = True, 0
     cycles.use_light_tree = False  # two lamps: it would cost 40 % of the time for nothing
     cycles.use_denoising = can_denoise()
-
-
-def can_denoise() -> bool:
-    """Whether this Blender was built with OpenImageDenoise; some distributions' are not."""
-    import _cycles
-
-    return bool(getattr(_cycles, "with_openimagedenoise", False))
 
 
 def build(thing: Thing):

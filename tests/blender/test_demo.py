@@ -97,13 +97,13 @@ def test_a_full_disk_leaves_no_capture(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("content", [b"", b"\x89PNG half of it"])
 def test_half_a_picture_is_never_taken_for_a_whole_one(content, tmp_path):
-    from addon.bridge.demo import _saving
+    from addon.bridge.pictures import saving
 
     with pytest.raises(StorageError, match="relit.png' can't be written .No space left"), \
-            _saving(tmp_path / "relit.png") as temporary:
+            saving(tmp_path / "relit.png") as temporary:
         temporary.write_bytes(content)
     with pytest.raises(StorageError, match="relit.png' can't be written .it fell over"), \
-            _saving(tmp_path / "relit.png") as temporary:
+            saving(tmp_path / "relit.png") as temporary:
         raise RuntimeError("Error: it fell over.\n")
     assert not list(tmp_path.iterdir())
 

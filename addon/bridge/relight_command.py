@@ -1,0 +1,186 @@
+"""The command `relight`: a result's scene rendered under another light; the file itself is not changed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+
+from ..core.errors import BadInputError
+from . import relight_lamps, relight_outside
+from .before_after import render_pair
+from .cameras import frame_cameras, use_camera
+from .pictures import CYCLES, check_format, prepare, settings_kept, shoot
+from .relight_lights import SOFTBOX, SPOT, SUN, WINDOW, add_light
+from .relight_room import room_light
+
+SCENE = "scene.blend"
+OUTSIDE_SHARE = 4.0
+"""Mean radiance of a picture put around the room, relative to that of the room's median surface: it is the outdoors,
+which shows through openings that cover a small part of what any spot of the room sees."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """What is to be changed about the light.
+
+    Attributes
+    ----------
+    lamps : str
+        'on', 'off', or NAME=FACTOR and NAME=off, separated by commas; a name stands for one lamp or a class of them.
+    world : str
+        'on', 'off', or degrees by which the outside is turned, anticlockwise from above.
+    world_strength : float
+    hdri : Path or None
+        Picture to put around the room.
+    added : dict of str to float
+        Strength of each new light, by `relight_lights.PRESETS`.
+    """
+
+    lamps: str = "on"
+    world: str = "on"
+    world_strength: float = 1.0
+    hdri: Path | None = None
+    added: dict[str, float] = field(default_factory=dict)
+
+
+def relight(result: Path, light: Light, out: Path, camera: str | None = None, samples: int = 0,
+            engine: str = CYCLES, before_after: bool = False, percentage: int = 100) -> list[str]:
+    """Open a result's scene, change its light, render.
+
+    Parameters
+    ----------
+    result : Path
+        A result folder.
+    light : Light
+    out : Path
+        Ends in .png, .jpg or .exr.
+    camera : str, optional
+        Number of a frame in the capture's order, from 0, or its name; by default the scene's camera.
+    samples : int
+        0: as the scene says.
+    engine : str
+        `pictures.CYCLES` or `pictures.EEVEE`.
+    before_after : bool
+        Two pictures beside each other: the captured light, the new one.
+    percentage : int
+        Of the frame's size.
+
+    Returns
+    -------
+    list of str
+        Remarks, one sentence each.
+
+    Raises
+    ------
+    BadInputError, StorageError
+        One sentence for the user; nothing is rendered if anything that was given is wrong.
+    """
+    check_format(out)
+    path = Path(result) / SCENE
+    if not path.is_file():
+        raise BadInputError(f"Result folder '{result}' holds no {SCENE}; run 'recover CAPTURE --out {result}' first.")
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False)
+    except RuntimeError as error:
+        raise BadInputError(f"'{path}' can't be opened by Blender {bpy.app.version_string}; recover the capture "
+                            "again.") from error
+    scene = bpy.context.scene
+    if camera is not None:
+        use_camera(scene, camera_named(scene, camera))
+    if scene.camera is None:
+        raise BadInputError(f"'{path}' has no camera to render through.")
+    remarks = apply_light(scene, light)
+    with settings_kept(scene):
+        prepare(scene, engine, samples, percentage)
+        if before_after:
+            render_pair(scene, out)
+        else:
+            shoot(scene, out)
+    return remarks
+
+
+def apply_light(scene: bpy.types.Scene, light: Light) -> list[str]:
+    """Change a scene's light; returns remarks, raises `BadInputError` where something is unknown."""
+    remarks: list[str] = []
+    set_lamps(scene, light.lamps)
+    if light.hdri is not None:
+        relight_outside.use_hdri(scene, light.hdri, outside_radiance(scene))
+    if scene.world is not None:
+        turn = world_rotation(light.world)
+        relight_outside.set_on(scene.world, turn is not None)
+        relight_outside.set_rotation(scene.world, math.radians(turn or 0.0))
+        relight_outside.set_factor(scene.world, light.world_strength)
+    for preset, strength in light.added.items():
+        add_light(scene, preset, strength)
+    if light.hdri is not None and not relight_outside.is_open(scene):
+        remarks.append("The scanned room is closed, so the picture around it sends no light in.")
+    return remarks
+
+
+def set_lamps(scene: bpy.types.Scene, text: str) -> None:
+    """Obey the option ``--lamps``; every part of it is checked before anything changes."""
+    if text in ("on", "off"):
+        for lamp in relight_lamps.find_lamps(scene):
+            relight_lamps.set_on(lamp, text == "on")
+        return
+    wanted = []
+    for part in text.split(","):
+        name, sign, value = part.rpartition("=")
+        if not sign:
+            raise BadInputError(f"Option --lamps takes on, off or NAME=FACTOR, separated by commas, not '{part}'.")
+        lamps = relight_lamps.lamp_named(scene, name)
+        wanted.append((lamps, None if value == "off" else 1.0 if value == "on" else _factor(value, "--lamps")))
+    for lamps, value in wanted:
+        for lamp in lamps:
+            relight_lamps.set_on(lamp, value is not None)
+            if value is not None:
+                relight_lamps.set_factor(lamp, value)
+
+
+def world_rotation(text: str) -> float | None:
+    """Degrees that the option ``--world`` asks for; None: off."""
+    if text in ("on", "off"):
+        return 0.0 if text == "on" else None
+    try:
+        angle = float(text)
+    except ValueError:
+        angle = math.nan
+    if not math.isfinite(angle):
+        raise BadInputError(f"Option --world takes on, off or an angle in degrees, not '{text}'.")
+    return angle
+
+
+def outside_radiance(scene: bpy.types.Scene) -> float:
+    """Mean radiance that a picture around the room is scaled to."""
+    return OUTSIDE_SHARE * room_light(scene) / math.pi
+
+
+def camera_named(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
+    """The camera of a frame, by its number from 0 or its name; raises `BadInputError`."""
+    cameras = frame_cameras(scene)
+    found = next((c for c in cameras if c.name == name), None)
+    if found is None and name.lstrip("-").isdigit() and 0 <= int(name) < len(cameras):
+        found = cameras[int(name)]
+    if found is None:
+        some = ", ".join(f"'{c.name}'" for c in cameras[:3])
+        raise BadInputError(f"There is no camera '{name}'; take a number from 0 to {len(cameras) - 1} or a name such "
+                            f"as {some}." if cameras else f"There is no camera '{name}'; the scene has none at all.")
+    return found
+
+
+def _factor(text: str, option: str) -> float:
+    """A number of at least 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value >= 0):
+        raise BadInputError(f"Option {option} takes factors of at least 0, not '{text}'.")
+    return value
+
+
+OPTIONS = {"window": WINDOW, "softbox": SOFTBOX, "spot": SPOT, "sun": SUN}
+"""Options of the command line that add a light."""

@@ -1,0 +1,64 @@
+"""The command `relight` of the command line: its options, and from them to what the bridge does."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TextIO
+
+from .core.errors import EXIT_OK, BadInputError
+
+
+def add_relight(commands, epilog: str) -> argparse.ArgumentParser:
+    """Add the parser of `relight` to the program's `commands`."""
+    parser = commands.add_parser(
+        "relight", help="render a result's scene under another light", epilog=epilog,
+        description="Render RESULT/scene.blend with its lamps changed and new lights added. The scene is not changed. "
+                    "New lights take a strength, 1 if none is given, relative to the room's own light.")
+    parser.add_argument("result", metavar="RESULT", type=Path, help="folder that 'recover' wrote")
+    parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="picture to write: .png, .jpg or .exr")
+    light = parser.add_argument_group("light")
+    light.add_argument("--lamps", metavar="on|off|NAME=FACTOR,...", default="on",
+                       help="the lamps of the scan; a name means one lamp or all of its class (default on)")
+    light.add_argument("--world", metavar="on|off|DEGREES", default="on",
+                       help="the light from outside; an angle turns it, anticlockwise from above (default on)")
+    light.add_argument("--world-strength", metavar="FACTOR", type=positive, default=1.0,
+                       help="of the light from outside (default 1)")
+    light.add_argument("--hdri", metavar="FILE", type=Path, help="equirectangular picture to put around the room")
+    for name, text in (("window", "a window's soft light from the side"), ("softbox", "a studio light by the camera"),
+                       ("spot", "a spot from above"), ("sun", "a low, warm sun from the side")):
+        light.add_argument(f"--{name}", metavar="STRENGTH", type=positive, nargs="?", const=1.0, help=f"add {text}")
+    picture = parser.add_argument_group("picture")
+    picture.add_argument("--camera", metavar="NUMBER|NAME", help="frame to look through, from 0 (default the first)")
+    picture.add_argument("--before-after", action="store_true", help="the captured light beside the new one")
+    picture.add_argument("--samples", metavar="INT", type=int, default=0,
+                         help="for each pixel, 0 takes the scene's (default 0)")
+    picture.add_argument("--size", metavar="PERCENT", type=int, default=100, help="of the frame (default 100)")
+    picture.add_argument("--engine", choices=("cycles", "eevee"), default="cycles",
+                         help="eevee needs a graphics card (default cycles)")
+    return parser
+
+
+def positive(text: str) -> float:
+    """A number of at least 0 from the command line."""
+    value = float(text)
+    if not 0 <= value < float("inf"):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of at least 0")
+    return value
+
+
+def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+    """`relight RESULT --out FILE`."""
+    from .cli import need  # which imports this module
+
+    if arguments.samples < 0 or not 1 <= arguments.size <= 1000:
+        raise BadInputError("Option --samples takes a number of at least 0, and --size 1 to 1000 percent.")
+    command = need("relight_command")
+    added = {kind: getattr(arguments, name) for name, kind in command.OPTIONS.items()
+             if getattr(arguments, name) is not None}
+    light = command.Light(arguments.lamps, arguments.world, arguments.world_strength, arguments.hdri, added)
+    remarks = command.relight(arguments.result, light, arguments.out, arguments.camera, arguments.samples,
+                              arguments.engine.upper(), arguments.before_after, arguments.size)
+    if not arguments.quiet:
+        print(*(f"Note: {remark}" for remark in remarks), f"Done: {arguments.out}", sep="\n", file=stream)
+    return EXIT_OK
