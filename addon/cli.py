@@ -109,6 +109,8 @@ def make_parser() -> argparse.ArgumentParser:
                                description="Read and check a capture without recovering anything.", epilog=EXIT_CODES)
     info.add_argument("capture", metavar="CAPTURE", type=Path, help="folder of the capture")
     info.add_argument("--json", action="store_true", help="machine-readable")
+    info.add_argument("--room", metavar="FOLDER", type=Path, help=argparse.SUPPRESS)
+    info.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)
     add_reading(info)
     add_common(info, info_command)
 
@@ -283,7 +285,14 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`info CAPTURE`."""
     from .core.capture.read import describe, read_capture
 
-    facts = describe(read_capture(arguments.capture, reading_from(arguments)))
+    if arguments.stop_with_stdin:
+        Leash(grace=0.0)
+    capture = read_capture(arguments.capture, reading_from(arguments))
+    if arguments.room is not None:
+        from .core.room_file import write_room
+
+        write_room(arguments.room, capture)
+    facts = describe(capture)
     if arguments.json:
         print(json.dumps(facts, indent=1), file=stream)
         return EXIT_OK

@@ -57,7 +57,7 @@ class Leash:
     """The wish to stop of a run whose standard input is held by another program.
 
     The run stops where the line "stop" arrives or the input ends: so it never outlives a program that crashed.
-    Where no safe point comes within `GRACE` seconds the process ends there; files are written whole or not at all.
+    Where no safe point comes within `grace` seconds the process ends there; files are written whole or not at all.
 
     Parameters
     ----------
@@ -65,11 +65,13 @@ class Leash:
         Of the input; tests give another one.
     end : callable(int)
         Ends the process.
+    grace : float
+        Seconds; 0 where nothing is left to be finished.
     """
 
-    def __init__(self, descriptor: int = 0, end: Callable[[int], None] = os._exit):
+    def __init__(self, descriptor: int = 0, end: Callable[[int], None] = os._exit, grace: float = GRACE):
         self.wished = False
-        self._descriptor, self._end = descriptor, end
+        self._descriptor, self._end, self._grace = descriptor, end, grace
         threading.Thread(target=self._watch, name="leash", daemon=True).start()
 
     def __call__(self) -> bool:
@@ -87,7 +89,7 @@ class Leash:
                 break
             heard = heard[-len(STOP):] + some
         self.wished = True
-        time.sleep(GRACE)
+        time.sleep(self._grace)
         self._end(EXIT_INTERRUPTED)
 
 

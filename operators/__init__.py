@@ -6,22 +6,26 @@ from __future__ import annotations
 def classes() -> tuple[type, ...]:
     """Everything that Blender has to know: property groups, preferences, operators, panels. Each part adds its own."""
     from .accumulate import SCAN_RELIGHT_OT_accumulate
+    from .check_capture import SCAN_RELIGHT_OT_check_capture
     from .fit import SCAN_RELIGHT_OT_fit
     from .import_capture import SCAN_RELIGHT_OT_import_capture
+    from .job_operator import SCAN_RELIGHT_OT_stop
     from .panel_capture import SCAN_RELIGHT_PT_capture
     from .panel_recover import SCAN_RELIGHT_PT_recover
     from .preferences import ScanRelightPreferences
     from .recover import SCAN_RELIGHT_OT_recover
-    from .scene_props import ScanRelightScene, ScanRelightSettings
+    from .run import SCAN_RELIGHT_OT_run
+    from .scene_props import ScanRelightReading, ScanRelightScene, ScanRelightSettings
     from .shade import SCAN_RELIGHT_OT_shade
     from .write import SCAN_RELIGHT_OT_write
 
     return (
         # Property groups: those that others point to come first.
-        ScanRelightSettings, ScanRelightScene, ScanRelightPreferences,
+        ScanRelightSettings, ScanRelightReading, ScanRelightScene, ScanRelightPreferences,
         # Operators, in the order of the method.
-        SCAN_RELIGHT_OT_import_capture, SCAN_RELIGHT_OT_accumulate, SCAN_RELIGHT_OT_shade, SCAN_RELIGHT_OT_fit,
-        SCAN_RELIGHT_OT_write, SCAN_RELIGHT_OT_recover,
+        SCAN_RELIGHT_OT_check_capture, SCAN_RELIGHT_OT_import_capture,
+        SCAN_RELIGHT_OT_accumulate, SCAN_RELIGHT_OT_shade, SCAN_RELIGHT_OT_fit, SCAN_RELIGHT_OT_write,
+        SCAN_RELIGHT_OT_recover, SCAN_RELIGHT_OT_run, SCAN_RELIGHT_OT_stop,
         # Panels, in the order of the work.
         SCAN_RELIGHT_PT_capture,
         SCAN_RELIGHT_PT_recover,
@@ -41,16 +45,27 @@ def register():
     """Register every class and hang the property groups up."""
     import bpy
 
+    from .job_operator import forget_job
+
     for cls in classes():
         bpy.utils.register_class(cls)
     for owner, name, group in pointers():
         setattr(owner, name, bpy.props.PointerProperty(type=group))
+    bpy.app.handlers.load_pre.append(forget_job)
 
 
 def unregister():
     """Take back what `register` did."""
     import bpy
 
+    from ..addon.bridge import job
+    from . import findings
+    from .job_operator import forget_job
+
+    bpy.app.handlers.load_pre.remove(forget_job)
+    findings.forget()
+    job.forget()
+    job.end_all()
     for owner, name, _ in pointers():
         delattr(owner, name)
     for cls in reversed(classes()):

@@ -14,7 +14,9 @@ class SCAN_RELIGHT_OT_accumulate(StageOperator, bpy.types.Operator):
     bl_idname = "scan_relight.accumulate"
     bl_label = "Accumulate"
     bl_description = "Project the frames onto the surface and take each element's median"
+    bl_options = set()  # the scene stays as it is: no undo step
+    until = "lit_diffuse"
 
     def work(self, context):
         """Run the stages up to this one."""
-        return self.run(context, "lit_diffuse")
+        return self.run(context, self.until)

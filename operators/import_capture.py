@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
+import tempfile
+
 import bpy
 
+from . import reading_props
 from .settings_props import CaptureOperator
 
 
@@ -19,6 +23,33 @@ class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
         from ..addon.bridge.apply import import_capture
         from ..addon.core.capture.read import read_capture
 
-        capture = read_capture(self.folder("capture_folder"))
+        capture = read_capture(self.folder("capture_folder"), reading_props.reading(self))
         import_capture(context.scene, capture)
         return capture.warnings
+
+    def begin(self, context):
+        """Read it beside the window; large captures take a while."""
+        from ..addon.bridge.job_command import command
+
+        capture, scratch = self.folder("capture_folder"), tempfile.mkdtemp(prefix="scan-relight-")
+        words = ["info", capture, "--json", "--room", scratch, "--stop-with-stdin", *reading_props.options(self)]
+        return self.start(context, command(words), title=self.bl_label, capture_folder=capture, scratch=scratch)
+
+    def load(self, job):
+        """The capture as it was read."""
+        import json
+
+        from ..addon.core.room_file import read_capture_file
+
+        try:
+            job.warnings.extend(json.loads(job.text)["warnings"])
+            return read_capture_file(job.facts["scratch"])[0]
+        finally:
+            shutil.rmtree(job.facts["scratch"], ignore_errors=True)
+
+    def change(self, scene, loaded):
+        """Build the objects."""
+        from ..addon.bridge.apply import importing
+
+        yield from importing(scene, loaded)
+        return ()

@@ -2,9 +2,32 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
+from ..addon.bridge import job as jobs
+from ..addon.console import duration
+from ..addon.settings_info import setting_infos
+from . import preferences
+from .job_operator import active, bar
 from .panel import SidebarPanel
+
+GROUPS = (
+    ("Texture", ("texel_size", "detail", "atlas_size", "median", "frame_order")),
+    ("Light", ("shading", "shading_rays", "emitter_rays", "portal_rays", "interpolate", "mirrors")),
+    ("Highlights", ("specular", "specular_rays", "refine")),
+    ("Run", ("threads", "seed")),
+)
+OTHER = "More"
+
+
+def groups() -> list[tuple[str, list[str]]]:
+    """Every setting under its heading; one that has none comes last."""
+    names = [info.name for info in setting_infos()]
+    placed = {name for _, some in GROUPS for name in some}
+    found = [(heading, [name for name in some if name in names]) for heading, some in GROUPS]
+    return [*found, (OTHER, [name for name in names if name not in placed])]
 
 
 class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
@@ -16,7 +39,73 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context):
         """The choices and the run."""
-        layout, choices = self.layout, context.scene.scan_relight
+        job = active()
+        choices = self.layout.column()
+        choices.enabled = job is None
+        self.choices(choices, context)
+        if job is None:
+            self.start()
+            self.outcome(context)
+        else:
+            self.progress(job)
+
+    def choices(self, layout, context) -> None:
+        """Preset, folder, settings."""
+        choices = context.scene.scan_relight
         layout.use_property_split = True
+        layout.use_property_decorate = False
         layout.prop(choices, "preset")
+        changed = choices.settings.changed(choices.preset)
+        layout.prop(choices.settings, "detail")
+        layout.prop(choices.settings, "shading_rays", text="Rays")
         layout.prop(choices, "result_folder")
+        if not choices.result_folder and choices.capture_folder:
+            folder = preferences.result_folder("", choices.capture_folder)
+            self.say(layout, context, f"In the cache: {folder.name}", "FILE_CACHE")
+        header, body = layout.panel("scan_relight_settings", default_closed=True)
+        header.label(text="Settings" + (f" ({len(changed)} changed)" if changed else ""))
+        if body is not None:
+            for heading, names in groups():
+                if names:
+                    column = body.column(heading=heading)
+                    column.label(text=heading)
+                    for name in names:
+                        column.prop(choices.settings, name)
+
+    def start(self) -> None:
+        """The button."""
+        row = self.layout.row()
+        row.scale_y = 1.4
+        row.operator("scan_relight.run", text="Run", icon="PLAY").target = "recover"
+
+    def progress(self, job: jobs.Job) -> None:
+        """One bar, and Stop."""
+        factor, text = bar(job)
+        column = self.layout.column(align=True)
+        column.label(text=job.facts.get("title", ""))
+        column.progress(factor=factor, text=text)
+        column.operator("scan_relight.stop", icon="CANCEL")
+
+    def outcome(self, context) -> None:
+        """How the last run of this session ended."""
+        job = jobs.current()
+        if job is None or job.running:
+            return
+        layout = self.layout
+        failed = job.facts.get("failed") or (job.sentence if job.state != jobs.DONE else "")
+        if failed:
+            self.say(layout, context, failed, "INFO" if job.state == jobs.STOPPED else "CANCEL")
+        elif job.facts.get("unwanted"):
+            self.say(layout, context, jobs.STOPPED_TEXT, "INFO")
+        else:
+            self.say(layout, context, f"{job.facts.get('title', 'Run')}: done in {duration(job.seconds)}.", "CHECKMARK")
+        result = job.facts.get("result_folder")
+        report = Path(result) / "report.html" if result else None
+        if report is not None and job.state == jobs.DONE and job.facts.get("until") == "write":
+            layout.operator("wm.path_open", text="Open Report", icon="URL").filepath = str(report)
+        if job.warnings:
+            header, body = layout.panel("scan_relight_warnings", default_closed=False)
+            header.label(text=f"{len(job.warnings)} warning{'s' * (len(job.warnings) > 1)}")
+            if body is not None:
+                for sentence in job.warnings:
+                    self.say(body, context, sentence, "ERROR")

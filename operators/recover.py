@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import bpy
 
-from .settings_props import StageOperator, with_settings
+from .settings_props import SceneStageOperator, with_settings
 
 
 @with_settings
-class SCAN_RELIGHT_OT_recover(StageOperator, bpy.types.Operator):
+class SCAN_RELIGHT_OT_recover(SceneStageOperator, bpy.types.Operator):
     """Recover a capture from the first stage to the last."""
 
     bl_idname = "scan_relight.recover"
     bl_label = "Recover"
     bl_description = "Import the capture, run every stage and put the materials onto the objects"
-
-    def work(self, context):
-        """Run, then import and dress, so that a failed run leaves the scene alone."""
-        return self.run(context, "write", scene=context.scene)

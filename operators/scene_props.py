@@ -1,25 +1,16 @@
 """What the artist chose, kept in the scene: plain choices only. What a run does at the moment is nobody's to save."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+from contextlib import suppress
 from dataclasses import replace
 
 import bpy
 
 from ..addon.core.settings import PRESETS, Settings
 from ..addon.settings_info import setting_infos
-from .settings_props import with_settings
-
-PRESET_TEXTS = {
-    "draft": "A first look: coarse texels, few rays",
-    "normal": "Texels as fine as the frames, rays enough for most rooms",
-    "fine": "Finer texels and three times the rays; takes several times as long",
-    "paper": "The published method, for comparison; very slow",
-}
-
-
-def preset_items() -> list[tuple[str, str, str]]:
-    """Items of an enumeration of the presets."""
-    return [(name, name.capitalize(), PRESET_TEXTS.get(name, "")) for name in PRESETS]
+from . import findings
+from .reading_props import with_reading
+from .settings_props import preset_items, setting_value, with_settings
 
 
 def preset_chosen(choices, context) -> None:
@@ -28,13 +19,20 @@ def preset_chosen(choices, context) -> None:
                                   seed=choices.settings.seed))
 
 
+def capture_chosen(choices, context) -> None:
+    """Have a look at the folder at once, beside the window."""
+    if choices.capture_folder and not bpy.app.background:
+        with suppress(OSError):  # then the button says why
+            findings.begin(choices)
+
+
 @with_settings
 class ScanRelightSettings(bpy.types.PropertyGroup):
     """One property for each field of `Settings`."""
 
     def value(self) -> Settings:
         """The settings as chosen; raises `BadInputError` on one that can't be."""
-        return Settings(**{info.name: getattr(self, info.name) for info in setting_infos()})
+        return Settings(**{info.name: setting_value(self, info) for info in setting_infos()})
 
     def take(self, settings: Settings) -> None:
         """Show `settings`."""
@@ -50,11 +48,18 @@ class ScanRelightSettings(bpy.types.PropertyGroup):
                 and not same[info.kind](getattr(self, info.name), getattr(wanted, info.name))]
 
 
+@with_reading
+class ScanRelightReading(bpy.types.PropertyGroup):
+    """How the capture is to be read."""
+
+
 class ScanRelightScene(bpy.types.PropertyGroup):
     """`Scene.scan_relight`."""
 
     capture_folder: bpy.props.StringProperty(
-        name="Capture", description="Folder of the scan: its mesh, its frames and their cameras", subtype="DIR_PATH")
+        name="Capture", description="Folder of the scan: its mesh, its frames and their cameras", subtype="DIR_PATH",
+        update=capture_chosen)
+    reading: bpy.props.PointerProperty(type=ScanRelightReading)
     result_folder: bpy.props.StringProperty(
         name="Result", description="Folder for the recovered scene and the finished stages; empty takes one in the "
         "cache folder of the preferences", subtype="DIR_PATH")

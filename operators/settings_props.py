@@ -1,6 +1,7 @@
 """The settings as properties of an operator, made from the `Settings` dataclass; and what all operators share."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import contextlib
 import importlib.util
 from dataclasses import replace
 from functools import cache
@@ -9,9 +10,20 @@ import bpy
 
 from ..addon.console import unexpected
 from ..addon.core.errors import BadInputError, ScanRelightError
-from ..addon.core.settings import PAPER, Settings
+from ..addon.core.settings import PRESETS, Settings
+from ..addon.leash import MemoryGuard
 from ..addon.settings_info import SettingInfo, setting_infos
+from . import preferences, reading_props
+from .job_operator import JobOperator, active
+from .reading_props import with_reading
 
+RUN_STAGES = ("surface", "lit_diffuse", "shading", "specular", "write")
+PRESET_TEXTS = {
+    "draft": "A first look: coarse texels, few rays",
+    "normal": "Texels as fine as the frames, rays enough for most rooms",
+    "fine": "Finer texels and three times the rays; takes several times as long",
+    "paper": "The published method, for comparison; very slow",
+}
 PACKAGES = ("scipy", "embreex", "OpenEXR")
 
 
@@ -35,18 +47,34 @@ def with_settings(operator):
     return operator
 
 
+def setting_value(owner, info: SettingInfo):
+    """What `owner` has chosen. Blender keeps floats in single precision; six digits are what was typed."""
+    value = getattr(owner, info.name)
+    return float(f"{value:.6g}") if info.kind is float else value
+
+
 @cache
 def missing_packages() -> tuple[str, ...]:
     """The bundled packages that are not there."""
     return tuple(name for name in PACKAGES if importlib.util.find_spec(name) is None)
 
 
-class CaptureOperator:
-    """What every operator has: a capture folder, and errors that become one sentence."""
+def preset_items() -> list[tuple[str, str, str]]:
+    """Items of an enumeration of the presets."""
+    return [(name, name.capitalize(), PRESET_TEXTS.get(name, "")) for name in PRESETS]
 
-    bl_options = {"REGISTER", "UNDO"}
+
+@with_reading
+class CaptureOperator(JobOperator):
+    """What every operator has: a capture folder, and errors that become one sentence.
+
+    With a window the work is a job of its own that `modal` follows; in the background `execute` does it itself.
+    """
+
+    bl_options = {"UNDO"}
     capture_folder: bpy.props.StringProperty(
         name="Capture", description="Folder with transforms.json, mesh.ply and the frames", subtype="DIR_PATH")
+    ask: bpy.props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"}, description="Ask for the folders first")
 
     @classmethod
     def poll(cls, context):
@@ -60,15 +88,26 @@ class CaptureOperator:
         if context.mode != "OBJECT":
             cls.poll_message_set("Leave the editing mode for object mode first.")
             return False
+        if active() is not None:
+            cls.poll_message_set("A run is going on; stop it first or wait for its end.")
+            return False
         return True
 
     def invoke(self, context, event):
         """Ask for the folders and settings."""
+        if not self.ask:
+            return self.execute(context)
+        choices = context.scene.scan_relight
+        for name in ("capture_folder", "result_folder"):
+            if name in self.properties.bl_rna.properties and not getattr(self, name):
+                setattr(self, name, getattr(choices, name))
         return context.window_manager.invoke_props_dialog(self, width=420)
 
     def execute(self, context):
-        """Do the work; every error that is foreseen becomes one sentence."""
+        """Do the work, or start it; every error that is foreseen becomes one sentence."""
         try:
+            if not bpy.app.background:
+                return self.begin(context)
             for sentence in self.work(context):
                 self.report({"WARNING"}, sentence)
         except ScanRelightError as error:
@@ -95,22 +134,103 @@ class StageOperator(CaptureOperator):
 
     result_folder: bpy.props.StringProperty(
         name="Result", description="Folder for the recovered scene and the finished stages", subtype="DIR_PATH")
+    preset: bpy.props.EnumProperty(
+        name="Preset", description="What the settings that are not given start from", items=preset_items(),
+        default="normal")
+    from_stage: bpy.props.EnumProperty(
+        name="Again from", description="Do this stage and all later ones anew, though they are stored",
+        items=[("NONE", "Nothing", "Go on from what is stored"),
+               *((name, name.replace("_", " ").capitalize(), "") for name in RUN_STAGES)])
     paper: bpy.props.BoolProperty(
         name="As in the paper", description="The published method; the other settings are not looked at", default=False)
 
+    def draw(self, context):
+        """The dialog: what is to be decided; all else comes from the preset or from who calls."""
+        layout = self.layout
+        layout.use_property_split = True
+        for name in ("capture_folder", "result_folder", "preset", "from_stage"):
+            layout.prop(self, name)
+
     def settings(self) -> Settings:
-        """The settings as chosen."""
+        """The preset with every setting that was given; threads are the preferences' where they are not."""
+        given = {info.name: setting_value(self, info) for info in setting_infos()
+                 if self.properties.is_property_set(info.name)}
         if self.paper:
-            return replace(PAPER, threads=self.threads, seed=self.seed)
-        return Settings(**{info.name: getattr(self, info.name) for info in setting_infos()})
+            given = {name: given[name] for name in ("threads", "seed") if name in given}
+        ours = preferences.preferences()
+        if not given.get("threads") and ours is not None:
+            given["threads"] = ours.threads
+        return replace(PRESETS["paper" if self.paper else self.preset], **given)
 
     def run(self, context, until: str, **where) -> list[str]:
-        """Run the stages up to `until`; returns the report's warnings. `where` goes to `bridge.run.run`."""
+        """Run the stages up to `until` here; returns the report's warnings. `where` goes to `bridge.run.run`."""
         from ..addon.bridge.run import progress_for, run  # not earlier: Blender's start should not wait for it
 
         settings = self.settings()
-        manager = context.window_manager
-        shown = None if bpy.app.background else (lambda event: manager.progress_update(event.overall))
-        report = run(self.folder("capture_folder"), self.folder("result_folder"), settings,
-                     progress_for(settings, shown), until, **where)
+        guard = MemoryGuard(self.memory_limit())
+        with contextlib.closing(guard):
+            report = run(self.folder("capture_folder"), self.folder("result_folder"), settings,
+                         progress_for(settings, should_stop=guard), until, reading=reading_props.reading(self),
+                         from_stage=None if self.from_stage == "NONE" else self.from_stage, **where)
         return report["warnings"]
+
+    @staticmethod
+    def memory_limit() -> float:
+        """Gigabytes that a run may take; 0 for no limit."""
+        ours = preferences.preferences()
+        return ours.memory_limit if ours is not None else 0.0
+
+    def begin(self, context):
+        """Start the run as a job; the command line's own, so that its result is the same."""
+        from ..addon.bridge.job_command import command
+
+        capture, result, settings = self.folder("capture_folder"), self.folder("result_folder"), self.settings()
+        words = ["recover", capture, "--out", result, *reading_props.options(self), "--until", self.until,
+                 "--progress", "json", "--stop-with-stdin", "--memory-limit", str(self.memory_limit())]
+        if self.from_stage != "NONE":
+            words += ["--from-stage", self.from_stage]
+        for info in setting_infos():
+            value, option = getattr(settings, info.name), info.name.replace("_", "-")
+            words += [f"--{'' if value else 'no-'}{option}"] if info.kind is bool else [f"--{option}", str(value)]
+        return self.start(context, command(words), title=self.bl_label, capture_folder=capture, result_folder=result,
+                          until=self.until)
+
+
+class SceneStageOperator(StageOperator):
+    """A stage operator whose end also changes the scene, in one undo step."""
+
+    until = RUN_STAGES[-1]
+    import_first = True
+
+    def work(self, context):
+        """Run, then change the scene, so that a failed run leaves it alone."""
+        return self.run(context, self.until, scene=context.scene, import_first=self.import_first)
+
+    def begin(self, context):
+        """Start the run; where the capture should be in the scene, its absence is told now and not afterwards."""
+        from ..addon.bridge.apply import imported_from
+
+        if not self.import_first:
+            imported_from(context.scene, self.folder("capture_folder"))
+        return super().begin(context)
+
+    def load(self, job):
+        """The room that the run has left."""
+        from ..addon.core.room_file import read_room
+
+        return read_room(job.facts["result_folder"])
+
+    def change(self, scene, loaded):
+        """Import the capture, then put on what was recovered."""
+        from ..addon.bridge.apply import applying, importing
+
+        half = 0.5 if self.import_first else 0.0
+        if self.import_first:
+            for share in importing(scene, loaded.capture):
+                yield share * half
+        slices = applying(scene, loaded.capture, loaded.atlas_uv, loaded.materials, loaded.folder)
+        while True:
+            try:
+                yield half + (1 - half) * next(slices)
+            except StopIteration as end:
+                return end.value

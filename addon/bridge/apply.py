@@ -72,11 +72,16 @@ def show_frame(camera: bpy.types.Camera, path: Path) -> None:
 
 def imported(scene: bpy.types.Scene, capture: Capture) -> bpy.types.Collection:
     """The collection that `import_capture` made of `capture` in `scene`; raises `MissingStageError` without one."""
-    root = str(capture.root.absolute())
+    return imported_from(scene, capture.root)
+
+
+def imported_from(scene: bpy.types.Scene, folder: Path | str) -> bpy.types.Collection:
+    """`imported` by the capture's folder."""
+    root = str(Path(folder).absolute())
     for collection in reversed(scene.collection.children_recursive):
         if collection.get(CAPTURE) == root:
             return collection
-    raise MissingStageError(f"Capture '{capture.root}' is not in this scene; import it first.")
+    raise MissingStageError(f"Capture '{folder}' is not in this scene; import it first.")
 
 
 def apply_recovery(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray,

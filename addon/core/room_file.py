@@ -44,9 +44,11 @@ class Room:
     folder: Path
 
 
-def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray) -> None:
-    """Write `ROOM` into a result folder; `atlas_uv` as in `Room`. Raises `StorageError`."""
+def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = None) -> None:
+    """Write `ROOM` into a folder; `atlas_uv` as in `Room`, all 0 where there is no atlas. Raises `StorageError`."""
     mesh = capture.mesh
+    if atlas_uv is None:
+        atlas_uv = np.zeros((len(mesh.triangles), 3, 2), np.float32)
     told = {
         "root": str(capture.root.absolute()),
         "format": capture.format,
@@ -60,7 +62,7 @@ def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray) -> None:
         "triangles": mesh.triangles,
         "object_id": mesh.object_id,
         "atlas_uv": np.asarray(atlas_uv, np.float32),
-        "poses": np.stack([frame.camera.camera_to_world for frame in capture.frames]),
+        "poses": np.reshape([frame.camera.camera_to_world for frame in capture.frames], (-1, 4, 4)),
     }
     if mesh.uv is not None:
         arrays["uv"] = mesh.uv
@@ -83,6 +85,17 @@ def read_room(folder: Path | str) -> Room:
         if not (folder / name).is_file():
             raise MissingStageError(f"Folder '{folder}' holds no finished result ('{name}' is missing); "
                                     "run the recovery to its end first.")
+    capture, atlas_uv = read_capture_file(folder)
+    try:
+        described = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))["objects"]
+        return Room(capture, atlas_uv, tuple(material(one) for one in described), folder)
+    except DAMAGE as error:
+        raise _damaged(folder, error) from error
+
+
+def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
+    """The capture in `ROOM`, and its `atlas_uv`; raises `BadInputError` where the file is absent or damaged."""
+    folder = Path(folder)
     try:
         with open(folder / ROOM, "rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
@@ -91,13 +104,14 @@ def read_room(folder: Path | str) -> Room:
                        for (name, path, camera), pose in zip(told["frames"], arrays["poses"], strict=True))
         mesh = Mesh(*(arrays[name] for name in ("vertices", "triangles", "object_id")), arrays.get("uv"))
         instances = tuple(Instance(int(number), name) for number, name in told["instances"])
-        capture = Capture(Path(told["root"]), mesh, instances, frames, format=told["format"])
-        described = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))["objects"]
-        materials = tuple(material(one) for one in described)
+        return Capture(Path(told["root"]), mesh, instances, frames, format=told["format"]), arrays["atlas_uv"]
     except DAMAGE as error:
-        raise BadInputError(f"The result in '{folder}' is damaged ({type(error).__name__}: {error}); "
-                            "run the recovery again.") from error
-    return Room(capture, arrays["atlas_uv"], materials, folder)
+        raise _damaged(folder, error) from error
+
+
+def _damaged(folder: Path, error: Exception) -> BadInputError:
+    return BadInputError(f"The result in '{folder}' is damaged ({type(error).__name__}: {error}); "
+                         "run the recovery again.")
 
 
 def material(told: dict) -> ObjectMaterial:

@@ -189,8 +189,9 @@ def test_what_is_chosen_arrives(ops, name, until, paper, package, tmp_path, monk
     [(capture, result, chosen, stage, where)] = asked
     assert (capture, result, stage) == ("a", "b", until)
     assert chosen == (replace(settings.PAPER, seed=5) if paper else settings.Settings(seed=5, median="mean"))
+    assert where.pop("from_stage") is None and where.pop("reading").format == ""
     assert where == {"write": {"scene": bpy.context.scene, "import_first": False},
-                     "recover": {"scene": bpy.context.scene}}.get(name, {})
+                     "recover": {"scene": bpy.context.scene, "import_first": True}}.get(name, {})
 
 
 @pytest.mark.slow

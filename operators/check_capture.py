@@ -1,0 +1,47 @@
+"""`bpy.ops.scan_relight.check_capture`: read the scene's capture and say what it holds and what is wrong with it."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..addon.core.errors import ScanRelightError
+from . import findings, reading_props
+
+
+class SCAN_RELIGHT_OT_check_capture(bpy.types.Operator):
+    """Check the capture that is chosen in the panel."""
+
+    bl_idname = "scan_relight.check_capture"
+    bl_label = "Check"
+    bl_description = "Read the capture and show what it holds and what is wrong with it; nothing is changed"
+
+    @classmethod
+    def poll(cls, context):
+        """A folder is needed."""
+        if context.scene is None or not context.scene.scan_relight.capture_folder:
+            cls.poll_message_set("Choose the capture's folder first.")
+            return False
+        return True
+
+    def execute(self, context):
+        """With a window beside it; in the background at once."""
+        choices = context.scene.scan_relight
+        if not bpy.app.background:
+            try:
+                findings.begin(choices)
+            except OSError as error:
+                self.report({"ERROR"}, f"The check can't be started ({error.strerror or error}); start Blender anew.")
+                return {"CANCELLED"}
+            return {"FINISHED"}
+        from ..addon.core.capture.read import describe, read_capture
+
+        try:
+            facts = describe(read_capture(findings.key(choices)[0], reading_props.reading(choices.reading)))
+        except ScanRelightError as error:
+            findings.put(choices, str(error))
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        findings.put(choices, facts)
+        for sentence in facts["warnings"]:
+            self.report({"WARNING"}, sentence)
+        return {"FINISHED"}

@@ -1,0 +1,66 @@
+"""What was found in captures, by folder and way of reading. Kept while Blender runs, never in the file."""
+
+from __future__ import annotations
+
+import json
+
+import bpy
+
+from ..addon.bridge import job as jobs
+from . import reading_props
+
+_found: dict[tuple, jobs.Job | dict | str] = {}
+
+
+def key(choices) -> tuple:
+    """What a finding is found by: the capture's folder and how it is read."""
+    return bpy.path.abspath(choices.capture_folder), *reading_props.options(choices.reading)
+
+
+def look(choices) -> jobs.Job | dict | str | None:
+    """A job that still reads, the facts as `describe` gives them, a sentence on what is wrong, or None."""
+    found = _found.get(key(choices))
+    if isinstance(found, jobs.Job) and not found.running:
+        found = _found[key(choices)] = _result(found)
+    return found
+
+
+def put(choices, found: dict | str) -> None:
+    """Keep what was found."""
+    _found[key(choices)] = found
+
+
+def begin(choices) -> None:
+    """Read the capture beside the window; a panel shows what was found once it is there."""
+    from ..addon.bridge.job_command import command
+
+    for one in _found.values():
+        if isinstance(one, jobs.Job):
+            one.stop()  # the folder before: nobody waits for it any more
+    words = ["info", key(choices)[0], "--json", "--stop-with-stdin", *reading_props.options(choices.reading)]
+    found = _found[key(choices)] = jobs.Job(command(words))
+
+    def watch():
+        from .job_operator import redraw
+
+        redraw(bpy.context)
+        return 0.2 if found.running else None
+
+    bpy.app.timers.register(watch, first_interval=0.2)
+
+
+def _result(job: jobs.Job) -> dict | str:
+    if job.state == jobs.DONE:
+        try:
+            return json.loads(job.text[job.text.index("{"):])
+        except ValueError:
+            return "The capture was read, but what was found can't be understood; start Blender anew."
+    return job.sentence if job.state == jobs.FAILED else "The check was stopped; check again."
+
+
+def forget() -> None:
+    """Know nothing any more."""
+    for one in _found.values():
+        if isinstance(one, jobs.Job):
+            one.stop()
+    _found.clear()
