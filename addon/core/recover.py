@@ -39,7 +39,7 @@ from .specular.samples import SampleCollector, Samples
 from .store import Store, key
 from .surface.build import Surface, build_surface, from_uv, turned
 
-CODE = 10
+CODE = 11
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..material import LAMBERTIAN, METAL, SPECULAR
-from .fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs
+from .fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs, huber
 from .layout import Layout, Problem
 from .lobes import nearest
 
@@ -19,6 +19,10 @@ much stronger for nearly the same frames (living room's panels: phi 0.39 with ps
 decides; where the frames tell, they outweigh it."""
 METAL_PSI = 0.12
 """No common dielectric reflects more (n = 2.06); what does is a metal or a mirror."""
+BARE = 2.0
+"""A metal has no diffuse part. Its lobe alone, with nothing of each element's own, may cost up to so many times what
+each element's own mean does (errors of the light field and of the mesh): metals in the living room had 0.1 to 1.4,
+dielectrics and matt things whose lobe looked like a metal's 2.4 to 60, there and in four small rooms."""
 BROADEST_PHI = 0.5
 """A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface."""
 HOW = {SPECULAR: {"least_psi": LEAST_PSI, "prior": DIELECTRIC}, METAL: {"coloured": True}}
@@ -56,6 +60,8 @@ class Choice:
     sigmas: float = 0.0
     note: str = ""
     scores: dict[str, float] = field(default_factory=dict)
+    metal: LobeFit | None = None
+    """A metal's lobe that serves better than any other model, but not beyond doubt."""
 
 
 def _gain(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
@@ -73,6 +79,20 @@ def gain_of(fit: LobeFit, held: Problem) -> tuple[float, float]:
 def _dielectric(fit: LobeFit) -> bool:
     """Whether a dielectric can have this lobe, and frames can tell it from a diffuse part."""
     return fit.psi[0] <= METAL_PSI and fit.phi <= BROADEST_PHI
+
+
+def _metallic(fit: LobeFit) -> bool:
+    """Whether this lobe is too strong for a dielectric, and frames can tell it from a diffuse part."""
+    return float(fit.psi.mean()) > METAL_PSI and fit.phi <= BROADEST_PHI
+
+
+def _bare_metal(problem: Problem, layout: Layout, phi: float, fit: LobeFit, scale: float) -> tuple[LobeFit, np.ndarray]:
+    """A metal's lobe of width phi with no diffuse part at all: `fit` with its F0, and the elements' costs, (g,)."""
+    f0 = metal_f0(problem, phi)
+    lobe = layout.lobe(layout.at(phi))
+    rest = layout.I - f0.astype(np.float32)[:, None, None, None] * lobe.A - lobe.B
+    size = np.sqrt(np.square(rest[:, 0]).mean(0))
+    return replace(fit, phi=float(phi), psi=f0, kappa=0.0), (huber(size, scale) * layout.there).sum(0, dtype=np.float64)
 
 
 def _sets_apart(own: LobeFit, other: LobeFit, problem: Problem) -> bool:
@@ -100,19 +120,27 @@ def choose_model(problem: Problem) -> Choice:
     scale = max(1.4826 * fit.residual, 1e-4)
     with_lobe, without = held_out(fit, SPECULAR)
     scores = {LAMBERTIAN: 1.0, SPECULAR: float(with_lobe.sum() / max(without.sum(), 1e-30))}
-    metal = fit_lobe(layout, **HOW[METAL])
-    if float(metal.psi.mean()) > METAL_PSI and metal.phi <= BROADEST_PHI:
-        with_metal, bare = held_out(metal, METAL)
-        scores[METAL] = float(with_metal.sum() / max(bare.sum(), 1e-30))
-        (gain, sigmas), (more, surely) = _gain(with_metal, bare), _gain(with_metal, with_lobe)
+    metal, likely = fit_lobe(layout, **HOW[METAL]), None
+    found = [(metal, *held_out(metal, METAL))] if _metallic(metal) else []
+    # Errors of the light draw psi down where each element has a diffuse part of its own; without one they don't.
+    bare = min((_bare_metal(problem, layout, phi, metal, scale) for phi in layout.grid[layout.grid <= BROADEST_PHI]),
+               key=lambda one: one[1].sum())
+    found += [(*bare, without)] if _metallic(bare[0]) else []
+    for fit_of_metal, with_metal, matt in found:
+        scores[METAL] = min(float(with_metal.sum() / max(matt.sum(), 1e-30)), scores.get(METAL, np.inf))
+        if _bare_metal(problem, layout, fit_of_metal.phi, metal, scale)[1].sum() > BARE * matt.sum():
+            continue
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
+        (gain, sigmas), (more, surely) = _gain(with_metal, matt), _gain(with_metal, with_lobe)
         if min(gain, more) > MIN_GAIN and min(sigmas, surely) > MIN_SIGMAS:
-            return Choice(METAL, metal, gain, sigmas, scores=scores)
+            return Choice(METAL, fit_of_metal, gain, sigmas, scores=scores)
+        if min(gain, more) > MIN_GAIN and likely is None:
+            likely = fit_of_metal
     gain, sigmas = _gain(with_lobe, without)
     if gain > MIN_GAIN and sigmas > MIN_SIGMAS and _dielectric(fit):
-        return Choice(SPECULAR, fit, gain, sigmas, scores=scores)
+        return Choice(SPECULAR, fit, gain, sigmas, scores=scores, metal=likely)
     note = "Roughness and specular are not identifiable from these frames."
-    return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores)
+    return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores, likely)
 
 
 def adopt_from_class(
@@ -123,6 +151,7 @@ def adopt_from_class(
     The class's model is that of the member with the strongest evidence, its lobe the median over the members of that
     model, weighted by evidence. Members keep their own lobe where their frames set it apart from that. Objects
     whose own frames decide nothing take over the class's, but not where it raises their cost by more than `EXCLUDED`.
+    Among metals, one whose frames favour metal without being sure of it is one.
     """
     result = dict(choices)
     for name in sorted(set(class_of[object_id] for object_id in choices)):
@@ -136,7 +165,10 @@ def adopt_from_class(
         source = max(found, key=lambda i: found[i].sigmas)
         model = _pooled([c for c in found.values() if c.model == found[source].model], found[source])
         for i, choice in members.items():
-            if choice.model == LAMBERTIAN and not _refused(model.fit, choice.fit, problems.get(i)):
+            if model.model == METAL != choice.model and choice.metal is not None:
+                note = "Not beyond doubt by itself; others of its class are metal."
+                result[i] = replace(choice, model=METAL, fit=choice.metal, note=note)
+            elif choice.model == LAMBERTIAN and not _refused(model.fit, choice.fit, problems.get(i)):
                 note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
             elif choice.model == model.model and len(found) > 1 and i in problems:

@@ -27,8 +27,7 @@ FIT_VIEWS = 12
 """Elements of an object that the fit looks at, and views of each."""
 SCREEN_ELEMENTS = 200
 SCREEN_RAYS = 4
-"""The first look is at fewer elements and with so many times fewer rays; it finds metals and drops what a lobe
-makes much worse."""
+"""The first look is at fewer elements and with so many times fewer rays; it drops what a lobe makes much worse."""
 HOPELESS = 1.15
 """A lobe that raises the cost by this factor in the first look needs no second."""
 SEPARATE_ELEMENTS = 2500
@@ -84,13 +83,13 @@ def fit_specular(
     InterruptedRun
         From `progress`.
     """
-    glowing = {lamp.object_id: lamp for lamp in lamps}
+    glowing, mirrors = {lamp.object_id: lamp for lamp in lamps}, {mirror.object_id for mirror in field.mirrors}
     # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
     maker = Problems(field, lit_diffuse, samples, threads=1, seed=seed)
     wanted = [i.object_id for i in instances if i.object_id not in glowing]
 
     def look(object_id: int) -> tuple[Choice, Problem | None, int]:
-        return _look(maker, object_id, samples, len(frame_names), way, rays)
+        return _look(maker, object_id, samples, len(frame_names), way, rays, object_id in mirrors)
 
     problems, choices, targets = {}, {}, {}
     for object_id, found in zip(wanted, ordered_map(look, wanted, threads), strict=True):
@@ -117,7 +116,7 @@ def fit_specular(
         target = targets.get(i.object_id, -1)
         name = frame_names[target] if target >= 0 else None
         material = _material(i, choices[i.object_id], problems.get(i.object_id), name, sure[i.object_id])
-        if material.model == METAL and i.object_id in {mirror.object_id for mirror in field.mirrors}:
+        if material.model == METAL and i.object_id in mirrors:
             material = replace(material, phi=0.0, roughness_low=0.0,
                                note="A flat mirror; its lobe is narrower than the frames resolve.")
         materials.append(material)
@@ -136,7 +135,7 @@ def fit_specular(
 
 
 def _look(
-    maker: Problems, object_id: int, samples: Samples, frames: int, way: str, rays: int
+    maker: Problems, object_id: int, samples: Samples, frames: int, way: str, rays: int, mirror: bool
 ) -> tuple[Choice, Problem | None, int]:
     """Model, observations and target frame (-1: none) of one object."""
     index = maker.pick(object_id, SCREEN_ELEMENTS, FIT_VIEWS)
@@ -147,15 +146,16 @@ def _look(
         score_frames(samples.frame[index], problem.light.A[:, TARGET_PHI], problem.lit_diffuse, frames)
     )
     if way == "frames":
-        return (*_by_frames(maker, object_id, problem, rays), target)
+        return (*_by_frames(maker, object_id, problem, rays, mirror), target)
     return (*_by_target(maker, object_id, samples.frame, target, rays), target)
 
 
-def _by_frames(maker: Problems, object_id: int, screen: Problem, rays: int) -> tuple[Choice, Problem]:
-    """Choose a model; in two looks, as only some objects deserve the second."""
+def _by_frames(maker: Problems, object_id: int, screen: Problem, rays: int, mirror: bool) -> tuple[Choice, Problem]:
+    """Choose a model; in two looks, as only some objects deserve the second. A `mirror` was looked at before."""
     first = choose_model(screen)
     fit = first.fit
-    if first.model == METAL or fit is None or fit.cost > HOPELESS * fit.cost_lambertian:
+    hopeless = fit is None or fit.cost > HOPELESS * fit.cost_lambertian
+    if hopeless and first.model != METAL or mirror and first.model == METAL:
         return first, screen
     problem = maker.problem(maker.pick(object_id, FIT_ELEMENTS, FIT_VIEWS, seed=1), rays)
     return choose_model(problem), problem

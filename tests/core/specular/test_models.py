@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -44,6 +46,34 @@ def test_each_gets_the_simplest_model(seen):
 
 def test_a_metals_colour(seen):
     assert np.allclose(metal_f0(seen["metal"], 0.11), COPPER, rtol=0.05)
+
+
+def test_a_metal_has_no_diffuse_part(seen):
+    """The same coloured lobe over a strong diffuse part is no metal's, however well it fits."""
+    box = Box()
+    element, direction, _ = box.views(60, 10)
+    assert choose_model(box.problem(element, direction, 0.11, COPPER / 4, 3 * paint(element))).model != METAL
+
+
+def test_a_metal_under_light_that_is_off(seen):
+    """What each view is thought to show is off by a quarter; that draws psi down, and must not pass for a coat."""
+    problem = seen["metal"]
+    rng = np.random.default_rng(2)
+    off = np.exp(0.25 * rng.normal(size=(len(problem.element), 1, 1))).astype(np.float32)
+    wrong = replace(problem, light=replace(problem.light, A=problem.light.A * off, B=problem.light.B * off))
+    choice = choose_model(wrong)
+    assert choice.model == METAL and choice.fit.phi == pytest.approx(0.11, abs=0.05)
+    assert np.allclose(metal_f0(wrong, choice.fit.phi), COPPER, rtol=0.15)
+
+
+def test_the_others_of_its_class_are_metal(seen):
+    """One that is not sure of being metal by itself keeps its own lobe; one whose frames say otherwise stays."""
+    sure, matt = choose_model(seen["metal"]), choose_model(seen["matt"])
+    own = replace(sure.fit, phi=0.2)
+    likely = Choice(LAMBERTIAN, sure.fit, 0.1, 2.5, "Not sure.", metal=own)
+    result = adopt_from_class({0: sure, 1: likely, 2: matt}, {2: seen["matt"]}, dict.fromkeys(range(3), "steel"))
+    assert result[1].model == METAL and result[1].fit is own and "class" in result[1].note
+    assert result[2] is matt
 
 
 def test_the_class_helps_out(seen):
