@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable
-from contextlib import suppress
 from pathlib import Path
 
 import bpy
@@ -14,6 +13,7 @@ from ..core.errors import MissingStageError
 from ..core.material import EMITTER, LAMBERTIAN, ObjectMaterial
 from .cameras import make_cameras
 from .images import load_image
+from .match_frame import show_picture
 from .materials import make_material
 from .mesh_objects import ATLAS_UV, OBJECT_ID, each_object
 from .scene import ALBEDO, BASE_COLOR, SHADING
@@ -55,19 +55,11 @@ def importing(scene: bpy.types.Scene, capture: Capture) -> Generator[float, None
         yield done / total
     for done, frame in enumerate(capture.frames, len(capture.instances) + 1):
         [thing] = make_cameras([frame], eyes)
-        show_frame(thing.data, frame.path)
+        show_picture(thing)
+        thing.data.show_background_images = True
         yield done / total
     scene.collection.children.link(top)  # not before: a window that is drawn in between would draw each half
     return top
-
-
-def show_frame(camera: bpy.types.Camera, path: Path) -> None:
-    """Lay a frame's picture behind what its camera sees."""
-    with suppress(RuntimeError):  # a picture that Blender can't show is no reason to fail
-        background = camera.background_images.new()
-        background.image = bpy.data.images.load(str(Path(path).absolute()), check_existing=True)
-        background.alpha = 1.0
-        camera.show_background_images = True
 
 
 def imported(scene: bpy.types.Scene, capture: Capture) -> bpy.types.Collection:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -25,9 +26,15 @@ def make_cameras(frames: Iterable[Frame], collection: bpy.types.Collection) -> l
     -------
     list of bpy.types.Object
         Named after the frames. Custom properties ``width``, ``height`` (pixels) and ``pixel_aspect`` (fx / fy) tell
-        the render size each one is exact for; `use_camera` sets it.
+        the render size each one is exact for; `use_camera` sets it. ``frame_path`` and ``frame_exposure`` tell the
+        frame's picture and what its radiance was multiplied by.
     """
-    return [_camera_object(frame.name, frame.camera, collection) for frame in frames]
+    made = []
+    for frame in frames:
+        thing = _camera_object(frame.name, frame.camera, collection)
+        thing["frame_path"], thing["frame_exposure"] = str(Path(frame.path).absolute()), float(frame.exposure)
+        made.append(thing)
+    return made
 
 
 def use_camera(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:

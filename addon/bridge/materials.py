@@ -80,6 +80,28 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
     return material
 
 
+def plain_material(name: str, colour: tuple[float, float, float] = (0.5, 0.5, 0.5), roughness: float = 0.5,
+                   specular: float = 0.5, metallic: float = 0.0, ior: float = 1.5,
+                   emission: tuple[float, float, float] = (0.0, 0.0, 0.0),
+                   base_color: bpy.types.Image | None = None) -> bpy.types.Material:
+    """A Principled material of plain numbers and at most a picture over the atlas, such as any program understands.
+
+    `specular` is Specular IOR Level, 0.5 being what `ior` says; `colour` and `emission` are linear Rec.709.
+    """
+    material = bpy.data.materials.new(name)
+    nodes, links, principled = _fresh_tree(material)
+    value = principled.inputs
+    value[BASE_COLOR].default_value = (*colour, 1)
+    value[ROUGHNESS].default_value, value[METALLIC].default_value = roughness, metallic
+    value[SPECULAR_LEVEL].default_value, value[IOR].default_value = specular, ior
+    value[EMISSION_STRENGTH].default_value = 0.0
+    if any(emission):
+        _emit(nodes, links, value, emission, None)
+    if base_color is not None:
+        links.new(_texture(nodes, links, base_color, (-400, 200)), value[BASE_COLOR])
+    return material
+
+
 def _emit(nodes, links, value, radiance, image):
     """Emit exactly `radiance`, or the image's: strength is the largest component, so that colours stay within 1."""
     if image is not None:
