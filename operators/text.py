@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-MARGIN = 44
-"""Pixels at an interface scale of 1 that the panel's edges and paddings take."""
+MARGIN = 68
+"""Pixels at an interface scale of 1 that the tabs, the panel's edges and paddings take."""
 ICON = 20
 
 

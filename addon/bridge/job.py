@@ -65,7 +65,9 @@ class Job:
         self._wished: float | None = None
         self._errors: deque[str] = deque(maxlen=40)
         self._finished = threading.Event()
-        flags = {"creationflags": subprocess.CREATE_NO_WINDOW} if os.name == "nt" else {"start_new_session": True}
+        flags = {"start_new_session": True}
+        if os.name == "nt":
+            flags = {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS}
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **flags)
         _alive.add(self)
