@@ -43,8 +43,10 @@ def begin(choices) -> None:
     def watch():
         from .job_operator import redraw
 
+        if found.running:
+            return 0.2
         redraw(bpy.context)
-        return 0.2 if found.running else None
+        return None
 
     bpy.app.timers.register(watch, first_interval=0.2)
 

@@ -1,6 +1,7 @@
 """How a capture is to be read, as properties of operators and of the scene; one for each field of `Reading`."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import inspect
 from pathlib import Path
 
 import bpy
@@ -24,7 +25,7 @@ def format_items() -> list[tuple[str, str, str]]:
 
 def with_reading(cls):
     """Class decorator: give an operator or property group one property for each field of `Reading`."""
-    string, own = bpy.props.StringProperty, dict(cls.__dict__.get("__annotations__", {}))
+    string, own = bpy.props.StringProperty, inspect.get_annotations(cls)
     cls.__annotations__ = own | dict(zip(NAMES, (
         bpy.props.EnumProperty(name="Format", description="Layout of the capture's folder", items=format_items(),
                                default=FOUND),

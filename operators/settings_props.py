@@ -3,6 +3,7 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import contextlib
 import importlib.util
+import inspect
 from dataclasses import replace
 from functools import cache
 
@@ -42,7 +43,7 @@ def property_for(info: SettingInfo):
 
 def with_settings(operator):
     """Class decorator: give an operator one property for each field of `Settings`."""
-    own = dict(operator.__dict__.get("__annotations__", {}))
+    own = inspect.get_annotations(operator)
     operator.__annotations__ = own | {info.name: property_for(info) for info in setting_infos()}
     return operator
 
