@@ -31,8 +31,8 @@ def command(arguments: Sequence[str]) -> list[str]:
 
     In Blender it is Blender itself, without a window and with factory settings: so no preference, startup file or other
     add-on has a say in the result, and it does not matter how this one was installed or enabled. Packages are looked
-    for where this process finds them, in the same order. Where `bpy` is a Python module it is Python. It runs at a lower
-    priority, so that the window has the processor when it needs it.
+    for where this process finds them, in the same order. Where `bpy` is a Python module it is Python. It has a
+    lower priority, so that the window gets the processor when it needs it.
     """
     scripts = bpy.utils.system_resource("SCRIPTS")  # the child's Blender puts them in place itself
     path = [one for one in sys.path if isinstance(one, str) and not (scripts and one.startswith(scripts))]
