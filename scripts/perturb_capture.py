@@ -2,14 +2,16 @@
 """A capture as a real scanner would have made it: poses, mesh, noise, exposure and clipping off by known amounts.
 
     python scripts/perturb_capture.py CAPTURE OUT [--seed N] [--poses 5 0.2] [--mesh 5] [--noise 0.02]
-                                                  [--exposure 2] [--clip 4] [--clip-at sensor] [--tell]
+                                                  [--exposure 2] [--clip 4] [--mesh-smooth 0.5]
+                                                  [--clip-at sensor] [--tell]
 
 Without any of the five switches all are on, as the line above has them; with some, only those. CAPTURE is in
 nerfstudio's layout. Its truth/ and its objects are copied as they are: the held-out views score what comes out.
 
 poses      each frame on its own: so many millimetres and degrees, root mean square
-mesh       millimetres along the normal, root mean square: half the variance a smooth field (waves of 0.25 to 2 m),
-           half independent from vertex to vertex; vertices in one place (seams) move together
+mesh       millimetres along the normal, root mean square; vertices in one place (seams) move together
+mesh-smooth  the share of that variance which is a smooth field (waves of 0.25 to 2 m); the rest is independent from
+           vertex to vertex, with 0 all of it
 noise      each channel of each pixel by itself, relative
 exposure   stops in all: pixel = radiance * exposure, exposure even in its logarithm, written into transforms.json
 clip       pixels above are held there; after the exposure ('sensor'), or before it ('radiance': what an HDR video
@@ -69,17 +71,17 @@ def vertex_normals(vertices: np.ndarray, triangles: np.ndarray, place: np.ndarra
     return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
 
 
-def offsets(points: np.ndarray, metres: float, rng: np.random.Generator) -> np.ndarray:
-    """How far each of the points ((p, 3)) moves along its normal, (p,): half smooth, half on its own."""
+def offsets(points: np.ndarray, metres: float, share: float, rng: np.random.Generator) -> np.ndarray:
+    """How far each of the points ((p, 3)) moves along its normal, (p,): `share` of the variance is smooth."""
     way = rng.normal(size=(WAVES, 3))
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     way *= 2 * np.pi / np.exp(rng.uniform(np.log(SHORTEST), np.log(LONGEST), (WAVES, 1)))
     phase = rng.uniform(0, 2 * np.pi, WAVES)
     smooth = sum(np.cos(points @ k + p) for k, p in zip(way, phase)) * np.sqrt(2 / WAVES)
-    return metres * np.sqrt(0.5) * (smooth + rng.normal(size=len(points)))
+    return metres * (np.sqrt(share) * smooth + np.sqrt(1 - share) * rng.normal(size=len(points)))
 
 
-def perturb_mesh(source: Path, target: Path, metres: float, rng: np.random.Generator) -> None:
+def perturb_mesh(source: Path, target: Path, metres: float, share: float, rng: np.random.Generator) -> None:
     """Copy a PLY whose first element is the vertices, and move those."""
     content = bytearray(source.read_bytes())
     order, elements, start = parse_header(bytes(content[: 1 << 20]))
@@ -92,7 +94,7 @@ def perturb_mesh(source: Path, target: Path, metres: float, rng: np.random.Gener
                                 return_inverse=True)
     place = place.ravel()
     normal = vertex_normals(vertices, triangles, place)
-    moved = vertices + (normal * offsets(vertices[first], metres, rng)[:, None])[place]
+    moved = vertices + (normal * offsets(vertices[first], metres, share, rng)[:, None])[place]
     at = [next(i for i, p in enumerate(head.properties) if p.name == name) for name in "xyz"]
     if order:
         kind = np.dtype([(p.name, order + p.kind) for p in head.properties])
@@ -130,6 +132,7 @@ def arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--noise", type=float, metavar="SHARE")
     parser.add_argument("--exposure", type=float, metavar="STOPS")
     parser.add_argument("--clip", type=float, metavar="VALUE")
+    parser.add_argument("--mesh-smooth", type=float, default=0.5, metavar="SHARE")
     parser.add_argument("--clip-at", choices=("sensor", "radiance"), default="sensor")
     parser.add_argument("--tell", action="store_true")
     given = parser.parse_args(argv)
@@ -152,7 +155,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if (source / "truth").is_dir():
         shutil.copytree(source / "truth", out / "truth", copy_function=shutil.copyfile)
     if given.mesh:
-        perturb_mesh(source / "mesh.ply", out / "mesh.ply", given.mesh / 1000, mesh)
+        perturb_mesh(source / "mesh.ply", out / "mesh.ply", given.mesh / 1000, given.mesh_smooth, mesh)
     else:
         shutil.copyfile(source / "mesh.ply", out / "mesh.ply")
     clip = np.inf if given.clip is None else given.clip

@@ -103,8 +103,9 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
             recovery.write_images()
             progress.update(0.5)
             surface, materials = recovery.surface(), recovery.materials()
-            # The file gets the mesh whose normals face the frames: its lamps shine on that side.
-            facing = replace(capture, mesh=replace(surface.mesh, vertices=capture.mesh.vertices))
+            # The file gets the mesh whose normals face the frames: its lamps shine on that side. And the one that the
+            # materials were measured on: their colours fit its normals.
+            facing = replace(capture, mesh=recovery.room_mesh())
             write_room(store.folder, capture, surface.uv)
             warnings = write_scene(store.path("scene.blend"), facing, surface.atlas.uv, materials, store.folder,
                                    recovery.median_radiance(), fresh=scene is None, facing=True)

@@ -38,8 +38,9 @@ from .specular.reflect import Specular, fit_specular
 from .specular.samples import SampleCollector, Samples
 from .store import Store, key
 from .surface.build import Surface, build_surface, from_uv, turned
+from .surface.denoise import without_noise
 
-CODE = 11
+CODE = 12
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -91,7 +92,7 @@ class Recovery:
     @cached_property
     def _keys(self) -> dict[str, str]:
         s = self.settings
-        surface = key("surface", CODE, fingerprint(self.capture), s.texel_size, s.detail, s.atlas_size)
+        surface = key("surface", CODE, fingerprint(self.capture), s.texel_size, s.detail, s.atlas_size, s.denoise_mesh)
         lit = key("lit_diffuse", surface, s.median, s.frame_order, s.seed)
         shading = key(
             "shading", lit, s.shading, s.shading_rays, s.emitter_rays, s.portal_rays, s.interpolate,
@@ -127,8 +128,9 @@ class Recovery:
         capture = self._near
 
         def compute():
+            mesh, noise = without_noise(capture.mesh) if self.settings.denoise_mesh else (capture.mesh, 0.0)
             found = build_surface(
-                capture.mesh,
+                mesh,
                 [frame.camera for frame in capture.frames],
                 self._unwrap,
                 self.settings.texel_size,
@@ -136,15 +138,27 @@ class Recovery:
                 self.settings.atlas_size,
             )
             sign = np.where((found.mesh.triangles == capture.mesh.triangles).all(1), 1, -1).astype(np.int8)
-            return found, {"uv": found.uv, "sign": sign, "both": found.both_sides}, {"size": found.atlas.size}
+            arrays = {"uv": found.uv, "sign": sign, "both": found.both_sides}
+            if noise:
+                arrays["vertices"] = mesh.vertices
+            return dataclasses.replace(found, noise=noise), arrays, {"size": found.atlas.size, "noise": noise}
 
         def load(arrays, meta):
             mesh, sign = capture.mesh, arrays["sign"]
+            if "vertices" in arrays:
+                mesh = dataclasses.replace(mesh, vertices=arrays["vertices"])
             uv = None if mesh.uv is None else turned(mesh.uv, sign)
             facing = dataclasses.replace(mesh, triangles=turned(mesh.triangles, sign), uv=uv)
-            return from_uv(mesh, facing, sign, arrays["uv"], int(meta["size"]), arrays["both"])
+            found = from_uv(mesh, facing, sign, arrays["uv"], int(meta["size"]), arrays["both"])
+            return dataclasses.replace(found, noise=float(meta["noise"]))
 
         return self._stage("surface", load, compute)
+
+    def room_mesh(self) -> Mesh:
+        """The mesh that the stages worked on, where the capture has it: normals face the frames, noise is out of it."""
+        mesh = self.surface().mesh
+        moved = mesh.vertices - self._near.mesh.vertices
+        return dataclasses.replace(mesh, vertices=self.capture.mesh.vertices + moved)
 
     def _read(self, frame: Frame) -> Pixels:
         """A frame's pixels; one that turns out damaged counts as blind, unless too many are."""

@@ -19,6 +19,9 @@ class Settings:
         Texels along one pixel of the frames' footprint, where texel_size is 0.
     atlas_size : int
         Upper bound on the atlas's edge in pixels.
+    denoise_mesh : bool
+        Take a scanned mesh's noise out of it, edges kept, for all that is computed and for the scene that is written. A
+        mesh without noise, and objects in your own scene, stay as they are.
     median : str
         'adaptive' (exact for short videos, batched beyond), 'batched' (exact for a spot's first 20 observations, close
         beyond, in fixed memory), 'exact' (all observations go to disk), 'p2' (the paper's P-square) or 'mean'.
@@ -51,6 +54,7 @@ class Settings:
     texel_size: float = 0.0
     detail: float = 1.0
     atlas_size: int = 4096
+    denoise_mesh: bool = True
     median: str = "adaptive"
     frame_order: str = "shuffled"
     shading: str = "aimed"
@@ -86,8 +90,8 @@ class Settings:
             raise BadInputError("Settings shading_rays and specular_rays must be at least 1, atlas_size at least 64.")
 
 
-PAPER = Settings(median="p2", frame_order="capture", shading="uniform", shading_rays=10000, emitter_rays=0,
-                 portal_rays=0, interpolate=False, mirrors=False, specular="target", refine=0)
+PAPER = Settings(denoise_mesh=False, median="p2", frame_order="capture", shading="uniform", shading_rays=10000,
+                 emitter_rays=0, portal_rays=0, interpolate=False, mirrors=False, specular="target", refine=0)
 """Haefner et al. 2021: P-square in video order, uniform rays, one target frame."""
 DRAFT = Settings(detail=0.5, shading_rays=48, emitter_rays=16, portal_rays=16, specular_rays=96)
 """A first look: texels of two pixels' edge, few rays."""

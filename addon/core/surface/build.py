@@ -35,6 +35,8 @@ class Surface:
         Edge of a surface element in metres.
     both_sides : (t,) bool
         Triangles that frames see from either side, of which the elements stand for one.
+    noise : float
+        What was taken out of the capture's vertices: standard deviation along the normals, in metres.
     """
 
     mesh: Mesh
@@ -43,6 +45,7 @@ class Surface:
     uv: np.ndarray
     texel_size: float
     both_sides: np.ndarray
+    noise: float = 0.0
 
 
 def turned(corners: np.ndarray, sign: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from ..capture.model import Mesh
+from .weld import point_normals, ring_of, welded
 
 LEAST_NOISE = 0.001
 """Metres. Below, what is measured may be shape: a modelled living room has 0.13 mm."""
@@ -21,23 +22,14 @@ def noise_of(mesh: Mesh) -> float:
     From each vertex's height over its neighbours, less those neighbours' own: curvature, which neighbours share, is
     gone. The median over the vertices, so that creases don't count. (The living room with 3.5 mm: 3.8 mm.)
     """
-    # Vertices in one place are one: at seams they are listed twice.
-    _, first, place = np.unique(mesh.vertices, axis=0, return_index=True, return_inverse=True)
-    points, faces = mesh.vertices[first].astype(np.float64), place.ravel()[mesh.triangles]
-    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    pairs = np.concatenate([pairs, pairs[:, ::-1]])
-    ring = sparse.csr_matrix((np.ones(len(pairs)), pairs.T), (len(points), len(points)))
-    ring.data[:] = 1
+    points, faces, _ = welded(mesh)
+    ring = ring_of(faces, len(points))
     degree = np.asarray(ring.sum(1))[:, 0]
     inner = degree >= 4
     if inner.sum() < LEAST_VERTICES:
         return 0.0
     share = sparse.diags(1 / np.maximum(degree, 1)) @ ring
-    corners = points[faces]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal = np.stack([sum(np.bincount(faces[:, k], area[:, axis], len(points)) for k in range(3))
-                       for axis in range(3)], 1)  # fmt: skip
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    normal = point_normals(points, faces)
     height = ((points - share @ points) * normal).sum(1)
     second = height - share @ height
     # Of independent noise of 1: a vertex less the mean of d neighbours, twice.
