@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import importlib.util
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from addon.benchmark.pipeline import cut_in_four
 from addon.core.capture.exr import read_exr
 from addon.core.capture.read import read_capture
+from addon.core.progress import Progress
+from addon.core.recover import Recovery
+from addon.core.store import Store
 from addon.core.surface.mesh_noise import noise_of, tilt
-from tests.core.on_disk import ALBEDO, LAMP, OnDisk
+from addon.core.surface.weld import point_normals, welded
+from tests.core.on_disk import ALBEDO, CHEAP, LAMP, OnDisk
 from tests.core.rooms import make_room, quad, split
 
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "perturb_capture.py"
@@ -73,6 +79,44 @@ def test_a_perturbed_room_is_recovered(disk, tmp_path):
     lamp = next(one for one in found.shading.lamps if one.object_id == 6)
     assert np.allclose(lamp.radiance, LAMP, rtol=0.2) and lamp.note.startswith("Clipped in every frame")
     assert any("clip at 4" in warning for warning in found.report["warnings"])
+
+
+def apart(mesh, size: int) -> np.ndarray:
+    """An atlas with a cell for each triangle."""
+    side = int(np.ceil(np.sqrt(len(mesh.triangles))))
+    cell = np.stack(np.divmod(np.arange(len(mesh.triangles)), side), 1)[:, None]
+    return ((cell + np.array([[0.1, 0.1], [0.9, 0.1], [0.1, 0.9]])) / side).astype(np.float32)
+
+
+def test_noise_is_taken_out_of_the_mesh_and_stored(disk, tmp_path):
+    capture = read_capture(disk.root)
+    fine = cut_in_four(capture.mesh, 4)
+    points, faces, place = welded(fine)
+    offset = np.random.default_rng(1).normal(size=len(points))
+    moved = points + (0.005 * offset)[:, None] * point_normals(points, faces)
+    far = np.array([4e5, 5e6, 300.0])
+    noisy = replace(capture, mesh=replace(fine, vertices=moved[place]))
+
+    def surface(what, where, settings=CHEAP):
+        with Store(tmp_path / where) as store:
+            run = Recovery(what, store, settings, Progress(), apart)
+            return run.surface(), run.room_mesh(), run.report()
+
+    found, mesh, report = surface(noisy, "noisy")
+    assert found.noise == pytest.approx(0.005, rel=0.4) == report["figures"]["mesh_noise_metres"]
+    assert any("The mesh has noise of" in warning for warning in report["warnings"])
+    off = [np.sqrt(np.mean((v - fine.vertices) ** 2)) for v in (noisy.mesh.vertices, mesh.vertices)]
+    assert off[1] < 0.7 * off[0]
+    again, same, report = surface(noisy, "noisy")
+    assert report["stages"]["surface"]["stored"] and again.noise == found.noise
+    assert np.array_equal(same.vertices, mesh.vertices) and np.array_equal(again.atlas.normal, found.atlas.normal)
+    # Switched off, or with nothing to take out, every vertex is the capture's own, far from the origin, too.
+    assert np.array_equal(surface(noisy, "off", replace(CHEAP, denoise_mesh=False))[1].vertices, noisy.mesh.vertices)
+    frames = tuple(replace(f, camera=replace(f.camera, camera_to_world=f.camera.camera_to_world + np.pad(
+        far[:, None], ((0, 1), (3, 0))))) for f in capture.frames)
+    distant = replace(capture, mesh=replace(fine, vertices=fine.vertices + far), frames=frames)
+    _, mesh, report = surface(distant, "far")
+    assert np.array_equal(mesh.vertices, distant.mesh.vertices) and report["figures"]["mesh_noise_metres"] == 0
 
 
 def test_noise_of_a_mesh_is_measured_and_curvature_is_none():
