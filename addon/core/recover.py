@@ -182,7 +182,7 @@ class Recovery:
         frames = self._near.frames
 
         def compute():
-            sky = EnvironmentAccumulator(float(np.median([1 / f.camera.fx for f in frames])))
+            sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
             kept = SampleCollector(surface.atlas, len(frames), self.settings.seed)
 
             def also(index, view, pixels, seen):

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from .atomic import replacing
+from .capture.lenses_told import lens_of, told_lens
 from .capture.model import Camera, Capture, Frame, Instance, Mesh
 from .errors import BadInputError, MissingStageError
 from .material import ObjectMaterial
@@ -30,7 +31,7 @@ class Room:
     Attributes
     ----------
     capture : Capture
-        Its frames know the cameras' pinhole part alone; their pictures may be gone.
+        Its frames' pictures may be gone.
     atlas_uv : (t, 3, 2) float32
         Atlas coordinates of each triangle's corners.
     materials : tuple of ObjectMaterial
@@ -53,7 +54,8 @@ def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = Non
         "root": str(capture.root.absolute()),
         "format": capture.format,
         "instances": [[one.object_id, one.class_name] for one in capture.instances],
-        "frames": [[frame.name, str(frame.path.absolute()), [getattr(frame.camera, name) for name in CAMERA]]
+        "frames": [[frame.name, str(frame.path.absolute()), [getattr(frame.camera, name) for name in CAMERA],
+                    told_lens(frame.camera.lens)]
                    for frame in capture.frames],
     }
     arrays = {
@@ -100,8 +102,8 @@ def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
         with open(folder / ROOM, "rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         told = json.loads(arrays["told"].tobytes())
-        frames = tuple(Frame(name, Path(path), Camera(*camera, pose))
-                       for (name, path, camera), pose in zip(told["frames"], arrays["poses"], strict=True))
+        frames = tuple(Frame(name, Path(path), Camera(*camera, pose, lens_of(lens)))
+                       for (name, path, camera, lens), pose in zip(told["frames"], arrays["poses"], strict=True))
         mesh = Mesh(*(arrays[name] for name in ("vertices", "triangles", "object_id")), arrays.get("uv"))
         instances = tuple(Instance(int(number), name) for number, name in told["instances"])
         return Capture(Path(told["root"]), mesh, instances, frames, format=told["format"]), arrays["atlas_uv"]

@@ -11,10 +11,21 @@ class Lens(Protocol):
     """A camera model without its focal lengths and principal point.
 
     Axes are COLMAP's and OpenCV's: x right, y down, z forward. Image points (u, v) are such that
-    pixel = (fx u + cx, fy v + cy). Instances are frozen and hashable.
+    pixel = (fx u + cx, fy v + cy). Instances are frozen and hashable, and hold nothing but numbers, strings, tuples of
+    them and lenses.
+
+    Attributes
+    ----------
+    name : str
+        The model, as COLMAP or nerfstudio calls it.
+    widest : float
+        No ray further than this angle (radians) from z is seen.
     """
 
     name: str
+
+    @property
+    def widest(self) -> float: ...
 
     def project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Image points of rays.
@@ -27,7 +38,7 @@ class Lens(Protocol):
         Returns
         -------
         points : (n, 2) float64
-            Nonsense where not `seen`.
+            Finite; nonsense where not `seen`.
         seen : (n,) bool
             False: outside of what the model can map one to one (behind the camera, beyond the fold).
         """
@@ -43,7 +54,14 @@ class Lens(Protocol):
         Returns
         -------
         rays : (n, 3) float64
+            z where not `seen`.
         seen : (n,) bool
             False: no ray leads there.
         """
         ...
+
+
+def ahead(rays: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """The same rays, those not `seen` replaced by z: what is computed with them stays finite."""
+    rays[~seen] = 0, 0, 1
+    return rays

@@ -16,7 +16,7 @@ from .lens import Lens
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera.
+    """A camera: a pinhole, or one with a lens.
 
     Attributes
     ----------
@@ -56,8 +56,14 @@ class Camera:
         pixels : (n, 2) float
             x and y in pixels; nonsense where `depth` <= 0.
         depth : (n,) float
-            Distance along the optical axis in metres, negative behind the camera.
+            Distance along the optical axis in metres, negative behind the camera. With a lens: distance from the
+            centre, negative where no ray from the point reaches the image plane.
         """
+        if self.lens is not None:
+            local = (points - self.centre) @ self.camera_to_world[:3, :3]
+            image, seen = self.lens.project(local * (1, -1, -1))
+            distance = np.linalg.norm(local, axis=1)
+            return image * (self.fx, self.fy) + (self.cx, self.cy), np.where(seen, distance, -distance)
         rotation = self.camera_to_world[:3, :3]
         local = (points - self.centre.astype(points.dtype)) @ rotation.astype(points.dtype)
         depth = -local[:, 2]
@@ -66,12 +72,46 @@ class Camera:
         return pixels, depth
 
     def directions(self, pixels: np.ndarray) -> np.ndarray:
-        """World directions of unit length through `pixels` ((n, 2) float, x and y), as (n, 3) float32."""
+        """World directions of unit length through `pixels` ((n, 2) float, x and y), as (n, 3) float32.
+
+        Along the optical axis for pixels that no ray leads to; `rays` tells which those are.
+        """
+        if self.lens is not None:
+            return self.rays(pixels)[0]
         x = (pixels[:, 0] - self.cx) / self.fx
         y = (self.cy - pixels[:, 1]) / self.fy
         local = np.stack([x, y, -np.ones_like(x)], -1)
         world = local @ self.camera_to_world[:3, :3].T
         return (world / np.linalg.norm(world, axis=1, keepdims=True)).astype(np.float32)
+
+    def rays(self, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`directions` of `pixels` ((n, 2) float), and whether a ray leads there: (n, 3) float32, (n,) bool."""
+        if self.lens is None:
+            return self.directions(pixels), np.ones(len(pixels), bool)
+        local, seen = self.lens.unproject((pixels - (self.cx, self.cy)) / (self.fx, self.fy))
+        return ((local * (1, -1, -1)) @ self.camera_to_world[:3, :3].T).astype(np.float32), seen
+
+    def pixel_angles(self, pixels: np.ndarray) -> np.ndarray:
+        """Edge in radians of a square as large as what each of `pixels` ((n, 2) float) covers, (n,) float32.
+
+        As at the principal point for a pinhole; NaN where no ray leads to all of the pixel.
+        """
+        if self.lens is None:
+            return np.full(len(pixels), 1 / np.sqrt(self.fx * self.fy), np.float32)
+        ends, seen = zip(*(self.lens.unproject((pixels + shift - (self.cx, self.cy)) / (self.fx, self.fy))
+                           for shift in ((-0.5, 0), (0.5, 0), (0, -0.5), (0, 0.5))))  # fmt: skip
+        area = np.linalg.norm(np.cross(ends[1] - ends[0], ends[3] - ends[2]), axis=1)
+        return np.where(np.all(seen, 0), np.sqrt(area), np.nan).astype(np.float32)
+
+    @property
+    def pixel_angle(self) -> float:
+        """Radians that a pixel covers: at the principal point of a pinhole, else the median over the frame."""
+        if self.lens is None:
+            return 1 / self.fx
+        y, x = np.mgrid[0.5 : self.height : max(self.height / 16, 1), 0.5 : self.width : max(self.width / 16, 1)]
+        angles = self.pixel_angles(np.stack([x.ravel(), y.ravel()], -1))
+        known = angles[angles > 0]
+        return float(np.median(known)) if len(known) else 1 / self.fx
 
     def pixel_centres(self) -> np.ndarray:
         """Centres of all pixels row by row, (height * width, 2) float64."""
@@ -133,7 +173,7 @@ class Pixels:
     radiance : (height, width, 3) float32
         Linear Rec.709; 0 where not `valid`.
     valid : (height, width) bool
-        False: masked out, NaN, inf, negative. Such a pixel says nothing.
+        False: masked out, NaN, inf, negative, or no ray leads there. Such a pixel says nothing.
     saturated : (height, width) bool
         True: the sensor clipped; `radiance` is a lower bound.
     """

@@ -8,6 +8,7 @@ from ..errors import BadInputError
 from .exr import HALF_MAX
 from .model import Frame, Pixels
 from .pictures import read_mask, read_picture
+from .pixel_rays import pixel_rays
 
 NOISE = 1e-4
 """Negative values down to this come from filtering and count as 0."""
@@ -38,6 +39,9 @@ def read_pixels(frame: Frame) -> Pixels:
         if mask.shape != shape:
             raise BadInputError(f"Frame '{frame.name}': mask '{frame.mask_path}' differs in size; make it the frame's.")
         seen &= mask
+    led = pixel_rays(frame.camera)[1] if frame.camera.lens is not None else None
+    if led is not None:  # beyond the lens's image circle
+        seen &= led
     valid = seen & (np.isfinite(rgb) & (rgb >= -NOISE)).all(-1)
     with np.errstate(over="ignore", invalid="ignore"):
         radiance = np.maximum(rgb, 0) / np.float32(frame.exposure)

@@ -35,7 +35,7 @@ class View:
     valid : (h, w) bool
         Not masked, not clipped.
     element : (h, w) int32
-        Behind each pixel's centre; -1 where it sees past the mesh.
+        Behind each pixel's centre; -1 where it sees past the mesh, or no ray leads to it.
     object_id : (h, w) int32
     predicted : (h, w, 3) float32
         Diffuse light and highlight, as recovered.
@@ -86,12 +86,13 @@ def view(run: Recovery, index: int) -> View:
     frame = run.frames[index]
     step = -(-frame.camera.width // WIDTH)
     pixels, camera = _smaller(read_pixels(frame), step), _coarser(frame.camera, step)
-    directions = camera.directions(camera.pixel_centres())
+    directions, seen = camera.rays(camera.pixel_centres())
     origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
     room, surface = run.field, run.surface()
     hits = surface.scene.intersect(np.ascontiguousarray(origins), directions)
-    element = room.elements(hits)
+    element = np.where(seen, room.elements(hits), -1)
     predicted = room.arriving(hits, element, directions)
+    predicted[~seen] = 0
     hit = np.flatnonzero(element >= 0)
     predicted[hit] -= run.specular().specular[element[hit]]
     _add_lobes(run, predicted, element, directions)

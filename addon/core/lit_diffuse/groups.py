@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..capture.model import Camera
+from ..capture.pixel_rays import widest_angle
 from ..surface.atlas import Atlas
 from .visibility import MIN_COSINE, FrameView
 
@@ -53,16 +55,7 @@ class ElementGroups:
         shown = np.zeros(max(self._object_id.max(initial=0), view.object_id.max()) + 2, bool)
         shown[view.object_id.ravel()] = True  # -1 marks the last
         keep = shown[self._object_id]
-        local = (self._centre - camera.centre) @ camera.camera_to_world[:3, :3]
-        depth = -local[:, 2]
-        keep &= depth > -self._radius
-        for along, f, c, extent in (
-            (local[:, 0], camera.fx, camera.cx, camera.width),
-            (-local[:, 1], camera.fy, camera.cy, camera.height),
-        ):
-            # Signed distance to the frustum's two planes: f * along + c * depth is 0 at the frame's first column.
-            keep &= f * along + c * depth > -self._radius * np.hypot(f, c)
-            keep &= f * along + (c - extent) * depth < self._radius * np.hypot(f, c - extent)
+        keep &= self._in_frustum(camera) if camera.lens is None else self._in_cone(camera)
         to_camera = camera.centre - self._centre
         distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-12)
         cosine = np.einsum("ij,ij->i", to_camera, self._axis) / distance
@@ -70,3 +63,25 @@ class ElementGroups:
         least = np.arccos(np.clip(cosine, -1, 1)) - self._opening - np.arcsin(np.minimum(self._radius / distance, 1))
         keep &= (least < np.arccos(MIN_COSINE) + SLACK) | (distance <= self._radius)
         return np.flatnonzero(keep[self._group]).astype(np.int32)
+
+    def _in_frustum(self, camera: Camera) -> np.ndarray:
+        """Groups that a pinhole's frustum may reach."""
+        local = (self._centre - camera.centre) @ camera.camera_to_world[:3, :3]
+        depth = -local[:, 2]
+        keep = depth > -self._radius
+        for along, f, c, extent in (
+            (local[:, 0], camera.fx, camera.cx, camera.width),
+            (-local[:, 1], camera.fy, camera.cy, camera.height),
+        ):
+            # Signed distance to the frustum's two planes: f * along + c * depth is 0 at the frame's first column.
+            keep &= f * along + c * depth > -self._radius * np.hypot(f, c)
+            keep &= f * along + (c - extent) * depth < self._radius * np.hypot(f, c - extent)
+        return keep
+
+    def _in_cone(self, camera: Camera) -> np.ndarray:
+        """Groups that the cone around a lens's widest ray may reach."""
+        away = self._centre - camera.centre
+        distance = np.maximum(np.linalg.norm(away, axis=1), 1e-12)
+        angle = np.arccos(np.clip(-(away @ camera.camera_to_world[:3, 2]) / distance, -1, 1))
+        ball = np.arcsin(np.minimum(self._radius / distance, 1))
+        return (angle - ball < widest_angle(camera) + SLACK) | (distance <= self._radius)

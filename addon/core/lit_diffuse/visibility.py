@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..capture.model import Camera, Mesh, Pixels
+from ..capture.pixel_rays import pixel_rays
 from ..surface.atlas import Atlas
 from ..surface.rays import RayScene
 
@@ -24,6 +24,10 @@ the element's object, but a neighbour shows something else, which a filter or a 
 SATURATED: the sensor clipped; a lower bound."""
 NOTHING = -2
 """No object's id, and not that of a ray that escapes."""
+EDGE_MARGIN = 0.5
+"""Pixels around the frame's border that are not looked up: half of each lies beyond the outermost centres."""
+FAR = 1e9
+"""Pixels; what a lens throws further out than this overflows nothing."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +38,14 @@ class FrameView:
     ----------
     camera : Camera
     triangle : (height, width) int32
-        First triangle along the pixel's ray; -1 where the ray leaves the mesh.
+        First triangle along the pixel's ray; -1 where the ray leaves the mesh, or no ray leads to the pixel.
     distance : (height, width) float32
         Along the ray, metres.
     object_id : (height, width) int32
-        -1 where the ray leaves the mesh.
+        -1 where `triangle` is.
     clean : (height, width) bool
-        All nine pixels of the neighbourhood show one continuous surface (or all escape).
+        All nine pixels of the neighbourhood show one continuous surface (or all escape). No pixel is clean that has
+        none of a lens's rays, or such a neighbour.
     """
 
     camera: Camera
@@ -88,15 +93,6 @@ def _dot(planes: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return planes[0] * vector[0] + planes[1] * vector[1] + planes[2] * vector[2]
 
 
-@functools.lru_cache(maxsize=8)
-def _local_directions(width: int, height: int, fx: float, fy: float, cx: float, cy: float) -> np.ndarray:
-    """Unit directions through all pixels' centres in the camera's axes, (3, height * width) float64."""
-    x = np.broadcast_to((np.arange(width) + 0.5 - cx) / fx, (height, width))
-    y = np.broadcast_to(((cy - np.arange(height) - 0.5) / fy)[:, None], (height, width))
-    local = np.stack([x, y, np.full((height, width), -1.0)]).reshape(3, -1)
-    return local / np.sqrt(_dot(local, local))
-
-
 def view_frame(camera: Camera, mesh: Mesh, scene: RayScene, triangle_normal: np.ndarray) -> FrameView:
     """Trace the camera's pixels and find the depth edges.
 
@@ -105,14 +101,17 @@ def view_frame(camera: Camera, mesh: Mesh, scene: RayScene, triangle_normal: np.
     triangle_normal : (t, 3) float32
     """
     height, width = camera.height, camera.width
-    local = _local_directions(width, height, camera.fx, camera.fy, camera.cx, camera.cy)
+    local, seen = pixel_rays(camera)
     rays = np.stack([_dot(local, row) for row in camera.camera_to_world[:3, :3].tolist()]).astype(np.float32)
     directions = np.ascontiguousarray(rays.T)
     hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
-    hit = hits.triangle >= 0
-    object_id = np.where(hit, mesh.object_id[hits.triangle], -1).reshape(height, width).astype(np.int32)
+    triangle = hits.triangle if seen is None else np.where(seen.ravel(), hits.triangle, -1)
+    hit = triangle >= 0
+    object_id = np.where(hit, mesh.object_id[triangle], -1).reshape(height, width).astype(np.int32)
+    if seen is not None:
+        object_id[~seen] = NOTHING
     # The plane through the hit, seen from the centre: distance along d is offset / (n.d).
-    normal = np.where(hit, triangle_normal.take(hits.triangle, 0).T, -rays)
+    normal = np.where(hit, triangle_normal.take(triangle, 0).T, -rays)
     distance = np.where(hit, hits.distance, np.float32(0))
     offset = (distance * _dot(normal, rays)).reshape(height, width)
     tolerance = (DEPTH_TOLERANCE * np.maximum(distance, 1e-6)).reshape(height, width)
@@ -125,7 +124,25 @@ def view_frame(camera: Camera, mesh: Mesh, scene: RayScene, triangle_normal: np.
         along *= distance[other]
         along -= offset[own]
         clean[own] &= (np.abs(along, out=along) <= tolerance[own]) & (object_id[other] == object_id[own])
-    return FrameView(camera, hits.triangle.reshape(height, width), distance, object_id, clean)
+    if seen is not None:
+        clean &= seen
+        object_id[~seen] = -1
+    return FrameView(camera, triangle.reshape(height, width), distance, object_id, clean)
+
+
+def _projected(camera: Camera, away: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pixel positions x, y ((n,) float32) of points `away` ((3, n) float32) from the centre, and whether
+    they are seen."""
+    right, up, back = camera.camera_to_world[:3, :3].T.tolist()
+    if camera.lens is not None:
+        image, seen = camera.lens.project(np.stack([_dot(away, right), -_dot(away, up), -_dot(away, back)], -1))
+        pixels = np.clip(image * (camera.fx, camera.fy) + (camera.cx, camera.cy), -FAR, FAR).astype(np.float32)
+        return np.ascontiguousarray(pixels[:, 0]), np.ascontiguousarray(pixels[:, 1]), seen
+    depth = -_dot(away, back)
+    inverse = 1 / np.maximum(depth, np.float32(1e-12))
+    x = float(camera.fx) * (_dot(away, right) * inverse) + float(camera.cx)
+    y = float(camera.cy) - float(camera.fy) * (_dot(away, up) * inverse)
+    return x, y, depth > 0
 
 
 def _bilinear(image: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -166,8 +183,8 @@ def observe(
 ) -> Observations:
     """What a frame says of the surface elements.
 
-    Rejected: behind the camera, outside the frame, n.v < `MIN_COSINE`, occluded (embree), pixel of another object,
-    invalid pixels.
+    Rejected: out of the lens's reach, outside the frame, n.v < `MIN_COSINE`, occluded (embree), pixel of another
+    object, invalid pixels.
 
     Parameters
     ----------
@@ -181,15 +198,9 @@ def observe(
     # Cheapest tests first: the frustum, then what the pixel shows, then the angle; rays last.
     away = np.empty((3, len(index)), np.float32)
     np.subtract(atlas.position.take(index, 0).T, centre[:, None], out=away)
-    right, up, back = camera.camera_to_world[:3, :3].T.tolist()
-    depth = -_dot(away, back)
-    inverse = 1 / np.maximum(depth, np.float32(1e-12))
-    x = float(camera.fx) * (_dot(away, right) * inverse) + float(camera.cx)
-    y = float(camera.cy) - float(camera.fy) * (_dot(away, up) * inverse)
-    margin = 0.5
-    inside = depth > 0
+    x, y, inside = _projected(camera, away)
     for position, extent in ((x, camera.width), (y, camera.height)):
-        inside &= (position >= margin) & (position < extent - margin)
+        inside &= (position >= EDGE_MARGIN) & (position < extent - EDGE_MARGIN)
     at = np.flatnonzero(inside)
     x, y = x.take(at), y.take(at)
     pixel = y.astype(np.int32) * camera.width + x.astype(np.int32)

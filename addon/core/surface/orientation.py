@@ -49,7 +49,10 @@ def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequenc
     footprints = []
     for camera in cameras:
         y, x = np.mgrid[PIXEL_STEP // 2 : camera.height : PIXEL_STEP, PIXEL_STEP // 2 : camera.width : PIXEL_STEP]
-        directions = camera.directions(np.stack([x.ravel() + 0.5, y.ravel() + 0.5], -1))
+        pixels = np.stack([x.ravel() + 0.5, y.ravel() + 0.5], -1)
+        directions, seen = camera.rays(pixels)
+        if not seen.all():
+            pixels, directions = pixels[seen], directions[seen]
         hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
         hit = hits.triangle >= 0
         triangle = hits.triangle[hit]
@@ -57,7 +60,11 @@ def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequenc
         votes += np.bincount(triangle, weights=cosine, minlength=len(votes))
         for side, met in zip(sides, (cosine > 0, cosine < 0), strict=True):
             side += np.bincount(triangle[met], minlength=len(votes))
-        footprints.append(hits.distance[hit] / np.float32(np.sqrt(camera.fx * camera.fy)))
+        if camera.lens is None:
+            footprints.append(hits.distance[hit] / np.float32(np.sqrt(camera.fx * camera.fy)))
+        else:
+            edges = hits.distance[hit] * camera.pixel_angles(pixels[hit])
+            footprints.append(edges[edges > 0])
     by_object = np.bincount(mesh.object_id, weights=np.sign(votes), minlength=int(mesh.object_id.max()) + 1)
     sign = np.where(votes != 0, np.sign(votes), np.where(by_object[mesh.object_id] < 0, -1.0, 1.0))
     together = np.concatenate(footprints) if footprints else np.zeros(0, np.float32)

@@ -1,0 +1,288 @@
+"""Lenses that bend by polynomials: Brown-Conrady, OpenCV's rational one, Kannala-Brandt fisheyes, thin prisms.
+
+Their inverses are found by Newton's method, in the disc on which the model is one to one.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from .lens import ahead
+
+STEEPEST = math.tan(math.radians(89.99))
+"""Tangent of the widest angle that a perspective lens is followed to."""
+ENTRIES = 2049
+"""Of the table from which the search for a radius starts."""
+AZIMUTHS = 64
+RIM = 0.999
+"""Share of the radius that was found by samples in `AZIMUTHS` directions, for what lies between them."""
+STEPS, STEPS_2D = 60, 20
+CLOSE = 1e-13
+"""A search ends when it is this near its target, relative to 1 plus the radius."""
+BLOCK = 1 << 16
+"""Points at a time: their numbers stay in the processor's cache."""
+
+
+def _poly(coefficients: tuple[float, ...], s: np.ndarray) -> np.ndarray:
+    """1 + c0 s + c1 s^2 + ..."""
+    value = np.zeros_like(s)
+    for c in reversed(coefficients):
+        value = (value + c) * s
+    return value + 1
+
+
+def _slope(coefficients: tuple[float, ...], s: np.ndarray) -> np.ndarray:
+    """Derivative of `_poly` by s."""
+    value = np.zeros_like(s)
+    for power, c in reversed(list(enumerate(coefficients, 1))):
+        value = value * s + power * c
+    return value
+
+
+def _blocks(count: int) -> Iterator[slice]:
+    return (slice(start, start + BLOCK) for start in range(0, count, BLOCK))
+
+
+@dataclass(frozen=True)
+class Polynomial:
+    """x_d = x N(s) / D(s) + tangential + prism, s = x^2 + y^2; (x, y) is the ray's point before distortion.
+
+    Tangential and prism, of the point (a, b) with t = a^2 + b^2::
+
+        2 p1 a b + p2 (t + 2 a^2) + s0 t + s1 t^2
+        2 p2 a b + p1 (t + 2 b^2) + s2 t + s3 t^2
+
+    Brown, "Decentering distortion of lenses" (1966); OpenCV's calib3d; Kannala and Brandt, "A generic camera model"
+    (2006); Project Aria's Fisheye624. Names as COLMAP's src/colmap/sensor/models.h.
+
+    Attributes
+    ----------
+    name : str
+    fisheye : bool
+        (x, y) has the ray's angle from z as its length (up to pi); else it is (X, Y) / Z.
+    numerator, denominator : tuple of float
+        N = 1 + n0 s + n1 s^2 + ..., D likewise.
+    tangential : (p1, p2)
+    prism : (s0, s1, s2, s3)
+    chained : bool
+        (a, b) is the point after the radial part; else (x, y).
+    """
+
+    name: str
+    fisheye: bool
+    numerator: tuple[float, ...] = ()
+    denominator: tuple[float, ...] = ()
+    tangential: tuple[float, float] = (0.0, 0.0)
+    prism: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    chained: bool = False
+
+    @property
+    def radial(self) -> bool:
+        """Whether nothing but the radius changes."""
+        return not any(self.tangential) and not any(self.prism)
+
+    @property
+    def widest(self) -> float:
+        return self.limit if self.fisheye else math.atan(self.limit)
+
+    @functools.cached_property
+    def limit(self) -> float:
+        """Radius of the disc of points before distortion on which the model is one to one.
+
+        A map whose Jacobian's symmetric part is positive definite on a convex domain is one to one there. Without
+        tangential part and prism that is just where r_d grows with r.
+        """
+        end = math.pi if self.fisheye else STEEPEST
+        end = float(_first_fall(self._growing, self._spread(end), np.zeros(1))[0])
+        if self.radial:
+            return end * (1 - 1e-12)
+        phi = np.arange(AZIMUTHS) * (2 * np.pi / AZIMUTHS)
+        return RIM * float(_first_fall(self._definite, self._spread(end)[::4], phi).min())
+
+    def _spread(self, end: float) -> np.ndarray:
+        """`ENTRIES` radii from 0 to `end`, evenly by angle."""
+        share = np.linspace(0, 1, ENTRIES)
+        return share * end if self.fisheye else np.tan(share * math.atan(end))
+
+    def _growing(self, r: np.ndarray, phi: np.ndarray) -> np.ndarray:
+        """Whether r_d grows with r, before the denominator's first root."""
+        s = r * r
+        n, d = _poly(self.numerator, s), _poly(self.denominator, s)
+        return (d > 0) & ((n + 2 * s * _slope(self.numerator, s)) * d > 2 * s * n * _slope(self.denominator, s))
+
+    def _definite(self, r: np.ndarray, phi: np.ndarray) -> np.ndarray:
+        """Whether the Jacobian's symmetric part is positive definite."""
+        j = self._distort(r * np.cos(phi), r * np.sin(phi))[2]
+        return (j[0] + j[3]) / 2 > np.hypot((j[0] - j[3]) / 2, (j[1] + j[2]) / 2)
+
+    def _distort(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
+        """The distorted point, and the Jacobian's four entries row by row."""
+        s = x * x + y * y
+        n, d = _poly(self.numerator, s), _poly(self.denominator, s)
+        ratio = n / d
+        twice = 2 * (_slope(self.numerator, s) - ratio * _slope(self.denominator, s)) / d  # 2 d(ratio)/ds
+        j = ratio + twice * x * x, twice * x * y, twice * x * y, ratio + twice * y * y
+        u, v = x * ratio, y * ratio
+        if self.radial:
+            return u, v, j
+        (p1, p2), (s0, s1, s2, s3) = self.tangential, self.prism
+        a, b = (u, v) if self.chained else (x, y)
+        t = a * a + b * b
+        across, down = 2 * (s0 + 2 * s1 * t), 2 * (s2 + 2 * s3 * t)
+        e = (2 * p1 * b + 6 * p2 * a + across * a, 2 * p1 * a + 2 * p2 * b + across * b,
+             2 * p2 * b + 2 * p1 * a + down * a, 2 * p2 * a + 6 * p1 * b + down * b)  # fmt: skip
+        u = u + 2 * p1 * a * b + p2 * (t + 2 * a * a) + (s0 + s1 * t) * t
+        v = v + 2 * p2 * a * b + p1 * (t + 2 * b * b) + (s2 + s3 * t) * t
+        if not self.chained:
+            return u, v, tuple(i + k for i, k in zip(j, e))
+        e = 1 + e[0], e[1], e[2], 1 + e[3]
+        return u, v, (e[0] * j[0] + e[1] * j[2], e[0] * j[1] + e[1] * j[3],
+                      e[2] * j[0] + e[3] * j[2], e[2] * j[1] + e[3] * j[3])  # fmt: skip
+
+    def project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rays = np.asarray(rays, np.float64)
+        points, seen = np.empty((len(rays), 2)), np.empty(len(rays), bool)
+        for block in _blocks(len(rays)):
+            points[block], seen[block] = self._project(rays[block])
+        return points, seen
+
+    def _project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        x, y, z = rays.T
+        across = np.hypot(x, y)
+        if self.fisheye:
+            theta = np.arctan2(across, z)
+            axis = across <= 1e-12 * np.abs(z)
+            seen = (theta <= self.limit) & ~(axis & (z <= 0))  # straight behind lies a whole circle
+            scale = np.where(axis, 1, theta) / np.where(axis, np.where(z > 0, z, 1), np.maximum(across, 1e-300))
+        else:
+            seen = (z > 0) & (across <= self.limit * z)
+            scale = 1 / np.where(seen, z, 1)
+        scale = np.where(seen, scale, 0)
+        u, v, _ = self._distort(x * scale, y * scale)
+        return np.stack([u, v], -1), seen
+
+    def unproject(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        points = np.asarray(points, np.float64)
+        rays, seen = np.empty((len(points), 3)), np.empty(len(points), bool)
+        for block in _blocks(len(points)):
+            rays[block], seen[block] = self._unproject(points[block])
+        return rays, seen
+
+    def _unproject(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        u, v = points.T
+        radius = np.hypot(u, v)
+        if self.radial:
+            r, seen = self._radius(radius)
+        else:
+            r = np.interp(radius, *self._table[::-1])
+        scale = np.where(radius > 1e-12, r / np.maximum(radius, 1e-300), 1)
+        x, y = u * scale, v * scale
+        if not self.radial:
+            x, y, seen = self._refine(u, v, x, y)
+            r = np.hypot(x, y)
+        if self.fisheye:
+            rays = np.stack([x * np.sinc(r / np.pi), y * np.sinc(r / np.pi), np.cos(r)], -1)
+        else:
+            level = 1 / np.sqrt(1 + r * r)
+            rays = np.stack([x * level, y * level, level], -1)
+        return ahead(rays, seen), seen
+
+    @functools.cached_property
+    def _table(self) -> tuple[np.ndarray, np.ndarray]:
+        """Radii before and after the radial part, rising."""
+        before = self._spread(self.limit)
+        return before, np.maximum.accumulate(self._bent(before)[0])
+
+    def _bent(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The radius after the radial part, and its derivative."""
+        s = r * r
+        n, d = _poly(self.numerator, s), _poly(self.denominator, s)
+        ratio = n / d
+        slope = ratio + 2 * s * (_slope(self.numerator, s) - ratio * _slope(self.denominator, s)) / d
+        return r * ratio, slope
+
+    def _radius(self, target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The radius before the radial part: Newton's method between two entries of the table."""
+        before, after = self._table
+        seen = target <= after[-1]
+        target = np.where(seen, target, after[-1])
+        place = np.clip(np.searchsorted(after, target), 1, len(after) - 1)
+        low, high = before[place - 1], before[place]
+        span = after[place] - after[place - 1]
+        r = low + (high - low) * np.where(span > 0, (target - after[place - 1]) / np.where(span > 0, span, 1), 0)
+        return _bracketed(self._bent, target, r, low, high), seen
+
+    def _refine(self, u: np.ndarray, v: np.ndarray, x: np.ndarray, y: np.ndarray):
+        """Newton's method in two dimensions, from the radial part's inverse; steps are halved where they lead astray.
+
+        Returns x, y, and whether they were found within the disc.
+        """
+        x, y, found = x.copy(), y.copy(), np.zeros(len(x), bool)
+        at = np.arange(len(x))  # those still searched for
+        goal = CLOSE * (1 + np.hypot(u, v))
+        du, dv, j = self._off(u, v, x, y)
+        for _ in range(STEPS_2D):
+            size = np.hypot(du, dv)
+            done = size <= goal[at]
+            found[at[done]] = True
+            left = ~done
+            if not left.any():
+                break
+            at, du, dv, size, j = at[left], du[left], dv[left], size[left], tuple(i[left] for i in j)
+            safe = np.maximum(j[0] * j[3] - j[1] * j[2], 1e-12)
+            dx, dy = (j[3] * du - j[1] * dv) / safe, (j[0] * dv - j[2] * du) / safe
+            step = np.ones(len(at))
+            for _ in range(8):
+                nx, ny = x[at] - step * dx, y[at] - step * dy
+                inward = np.minimum(1, self.limit / np.maximum(np.hypot(nx, ny), 1e-300))
+                nx, ny = nx * inward, ny * inward
+                du, dv, j = self._off(u[at], v[at], nx, ny)
+                worse = np.hypot(du, dv) > np.maximum(size, goal[at])
+                if not worse.any():
+                    break
+                step[worse] /= 2
+            stuck = (nx == x[at]) & (ny == y[at])
+            x[at], y[at] = nx, ny
+            found[at[stuck & (np.hypot(du, dv) <= 1e3 * goal[at])]] = True  # as near as rounding lets it come
+            at, du, dv, j = at[~stuck], du[~stuck], dv[~stuck], tuple(i[~stuck] for i in j)
+        return x, y, found
+
+    def _off(self, u: np.ndarray, v: np.ndarray, x: np.ndarray, y: np.ndarray):
+        got_u, got_v, j = self._distort(x, y)
+        return got_u - u, got_v - v, j
+
+
+def _first_fall(good: Callable, radii: np.ndarray, phi: np.ndarray) -> np.ndarray:
+    """The radius up to which `good` holds in each direction `phi`: the first of `radii` where not, then by halves."""
+    holds = good(radii[:, None] + 0 * phi, phi)
+    first = np.where(holds.all(0), len(radii), holds.argmin(0))
+    low, high = radii[np.maximum(first - 1, 0)], radii[np.minimum(first, len(radii) - 1)]
+    for _ in range(50):
+        middle = (low + high) / 2
+        fine = good(middle, phi)
+        low, high = np.where(fine, middle, low), np.where(fine, high, middle)
+    return np.where(first == len(radii), radii[-1], low)
+
+
+def _bracketed(function: Callable, target: np.ndarray, r: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Where a rising function of the radius reaches `target`, known to be between `low` and `high`."""
+    result = r.copy()
+    at = np.arange(len(r))
+    goal = CLOSE * (1 + target)
+    for _ in range(STEPS):
+        value, slope = function(r)
+        off = value - target[at]
+        result[at] = r
+        left = np.abs(off) > goal[at]
+        if not left.any():
+            break
+        at, r, off, slope, low, high = at[left], r[left], off[left], slope[left], low[left], high[left]
+        low, high = np.where(off < 0, r, low), np.where(off > 0, r, high)
+        step = r - off / np.maximum(slope, 1e-300)
+        r = np.where((step > low) & (step < high), step, (low + high) / 2)
+    return result

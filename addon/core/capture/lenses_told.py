@@ -1,0 +1,30 @@
+"""Lenses as JSON holds them: the class's name and the values of its fields."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from .lens import Lens
+from .lenses import Cropped, Division, EnhancedUnified, Equirectangular, FieldOfView
+from .lenses_polynomial import Polynomial
+
+KINDS = {kind.__name__: kind for kind in (Cropped, Division, EnhancedUnified, Equirectangular, FieldOfView, Polynomial)}
+
+
+def told_lens(lens: Lens | None) -> list[Any] | None:
+    """A lens as lists, numbers and strings; None stays None."""
+    if lens is None:
+        return None
+    values = [getattr(lens, field.name) for field in dataclasses.fields(lens)]
+    return [type(lens).__name__, [told_lens(v) if dataclasses.is_dataclass(v) else v for v in values]]
+
+
+def lens_of(told: list[Any] | None) -> Lens | None:
+    """The lens that `told_lens` told. Raises KeyError, TypeError or ValueError for anything else."""
+    if told is None:
+        return None
+    kind, values = told
+    if kind == Cropped.__name__:
+        return Cropped(lens_of(values[0]), *values[1:])
+    return KINDS[kind](*(tuple(v) if isinstance(v, list) else v for v in values))

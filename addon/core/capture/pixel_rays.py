@@ -1,0 +1,50 @@
+"""The rays of all of a frame's pixels, kept for the frames that share a lens."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from .lens import Lens
+from .model import Camera
+
+
+def pixel_rays(camera: Camera) -> tuple[np.ndarray, np.ndarray | None]:
+    """Unit directions through all pixels' centres in the camera's axes (OpenGL).
+
+    Returns
+    -------
+    local : (3, height * width) float64
+    seen : (height, width) bool, or None
+        False: no ray leads to the pixel, and its direction means nothing. None: one leads to each.
+    """
+    return _pixel_rays(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.lens)
+
+
+@functools.lru_cache(maxsize=8)
+def _pixel_rays(width: int, height: int, fx: float, fy: float, cx: float, cy: float,
+                lens: Lens | None) -> tuple[np.ndarray, np.ndarray | None]:
+    x = np.broadcast_to((np.arange(width) + 0.5 - cx) / fx, (height, width))
+    y = np.broadcast_to(((cy - np.arange(height) - 0.5) / fy)[:, None], (height, width))
+    if lens is None:
+        local = np.stack([x, y, np.full((height, width), -1.0)]).reshape(3, -1)
+        return local / np.sqrt(local[0] * local[0] + local[1] * local[1] + local[2] * local[2]), None
+    rays, seen = lens.unproject(np.stack([x.ravel(), -y.ravel()], -1))
+    local = np.stack([rays[:, 0], -rays[:, 1], -rays[:, 2]])
+    return local, None if seen.all() else seen.reshape(height, width)
+
+
+@functools.lru_cache(maxsize=64)
+def _widest(width: int, height: int, fx: float, fy: float, cx: float, cy: float, lens: Lens) -> float:
+    local, seen = _pixel_rays(width, height, fx, fy, cx, cy, lens)
+    if seen is not None:  # the picture ends where the lens does
+        return lens.widest
+    rays = local.reshape(3, height, width)
+    step = max((float(np.sqrt((np.diff(rays, axis=axis) ** 2).sum(0)).max(initial=0)) for axis in (1, 2)), default=0)
+    return min(lens.widest, float(np.arccos(np.clip(-rays[2].max(), -1, 1))) + 2 * step)
+
+
+def widest_angle(camera: Camera) -> float:
+    """An angle from the optical axis (radians) beyond which a camera with a lens sees nothing."""
+    return _widest(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.lens)
