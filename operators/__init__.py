@@ -7,6 +7,7 @@ def classes() -> tuple[type, ...]:
     """Everything that Blender has to know: property groups, preferences, operators, panels. Each part adds its own."""
     from .accumulate import SCAN_RELIGHT_OT_accumulate
     from .check_capture import SCAN_RELIGHT_OT_check_capture
+    from .clear_cache import SCAN_RELIGHT_OT_clear_cache
     from .fit import SCAN_RELIGHT_OT_fit
     from .import_capture import SCAN_RELIGHT_OT_import_capture
     from .job_operator import SCAN_RELIGHT_OT_stop
@@ -25,7 +26,7 @@ def classes() -> tuple[type, ...]:
         # Operators, in the order of the method.
         SCAN_RELIGHT_OT_check_capture, SCAN_RELIGHT_OT_import_capture,
         SCAN_RELIGHT_OT_accumulate, SCAN_RELIGHT_OT_shade, SCAN_RELIGHT_OT_fit, SCAN_RELIGHT_OT_write,
-        SCAN_RELIGHT_OT_recover, SCAN_RELIGHT_OT_run, SCAN_RELIGHT_OT_stop,
+        SCAN_RELIGHT_OT_recover, SCAN_RELIGHT_OT_run, SCAN_RELIGHT_OT_stop, SCAN_RELIGHT_OT_clear_cache,
         # Panels, in the order of the work.
         SCAN_RELIGHT_PT_capture,
         SCAN_RELIGHT_PT_recover,

@@ -18,7 +18,9 @@ from ..addon.core.errors import ScanRelightError
 
 PERIOD = 0.1
 """Seconds between two looks at the job."""
-SLICE = 0.03
+REDRAW = 0.5
+"""Seconds between two pictures of the progress bar, unless the stage changes: drawing is the window's time."""
+SLICE = 0.06
 """Seconds that the scene is worked at before the window is drawn again."""
 STAGES = {"": "Starting", "read": "Reading the capture", "surface": "Surface", "lit_diffuse": "Frames to texture",
           "shading": "Light and albedo", "specular": "Highlights", "write": "Writing"}
@@ -70,7 +72,8 @@ class JobOperator:
         except OSError as error:
             self.report({"ERROR"}, f"The run can't be started ({error.strerror or error}); start Blender anew.")
             return {"CANCELLED"}
-        self._slices = self._loader = self._ready = self._said = None
+        self._slices = self._loader = self._ready = self._said = self._state = None
+        self._drawn = 0.0
         self._timer = context.window_manager.event_timer_add(PERIOD, window=context.window)
         context.window_manager.modal_handler_add(self)
         redraw(context)
@@ -193,10 +196,11 @@ class JobOperator:
     def _tell(self, context) -> None:
         """Draw what has changed."""
         job = self.job
-        text = bar(job)[1]
-        if text == self._said:
+        text, now = bar(job)[1], time.monotonic()
+        state = job.stage, job.state, job.stopping, job.facts["phase"]
+        if text == self._said or (state == self._state and now - self._drawn < REDRAW):
             return
-        self._said = text
+        self._said, self._state, self._drawn = text, state, now
         redraw(context)
         if context.workspace is not None:
             context.workspace.status_text_set(f"Scan Relight: {text}   (ESC over a 3D view stops)")

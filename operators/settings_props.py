@@ -37,7 +37,7 @@ def property_for(info: SettingInfo):
     make = {bool: bpy.props.BoolProperty, int: bpy.props.IntProperty, float: bpy.props.FloatProperty}[info.kind]
     extra = {} if info.kind is bool else {"min": 0}
     if info.kind is float:
-        extra["precision"] = 4
+        extra["precision"] = 3
     return make(name=name, description=info.help, default=info.default, **extra)
 
 
