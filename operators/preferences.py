@@ -23,9 +23,8 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
     threads: bpy.props.IntProperty(
         name="Threads", description="Processor threads that a run may take; 0 takes all", min=0, soft_max=64)
     memory_limit: bpy.props.FloatProperty(
-        name="Memory limit", description="Gigabytes that a run may take before it is stopped; 0 sets no limit. A run is a process of its "
-        "own: Blender's own memory does not count",
-        min=0.0, soft_max=256.0, precision=1)
+        name="Memory limit", description="Gigabytes that a run may take before it is stopped; 0 sets no limit. A run "
+        "is a process of its own: Blender's own memory does not count", min=0.0, soft_max=256.0, precision=1)
 
     def draw(self, context):
         """The choices."""

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 
 from ..core.errors import EXIT_INTERRUPTED, EXIT_OK
 
-GRACE = 0.7
+GRACE = 0.5
 """Seconds between the polite wish to stop and the end of the process: finished stages are whole files by then."""
 RUNNING, STOPPED, DONE, FAILED = "running", "stopped", "done", "failed"
 STOPPED_TEXT = "Stopped; the finished stages are kept and the next run goes on from them."
