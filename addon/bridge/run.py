@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -24,6 +25,7 @@ from ..core.store import Store
 from ..version import VERSION
 from .apply import apply_recovery, import_capture, imported
 from .scene import write_scene
+from .scene_capture import polygons_of
 from .unwrap import unwrap
 
 STAGES = ("surface", "lit_diffuse", "shading", "specular")
@@ -88,7 +90,8 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     with Store(out_folder) as store, _told(out_folder):
         if from_stage in STAGES:
             store.drop(STAGES[STAGES.index(from_stage):])
-        recovery = Recovery(capture, store, settings, progress, unwrap)
+        faces = polygons_of(capture.root, capture.mesh)
+        recovery = Recovery(capture, store, settings, progress, partial(unwrap, polygons=faces))
         for stage in STAGES:
             getattr(recovery, stage)()
             if stage == until:

@@ -7,6 +7,7 @@ other become islands of their own, and islands that waste the square are cut.
 from __future__ import annotations
 
 from contextlib import contextmanager
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -23,7 +24,30 @@ _LAYER = "ScanRelight"
 _EXPECTED_FILL = 0.6
 
 
-def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0) -> np.ndarray:
+class Polygons(NamedTuple):
+    """The faces that a mesh's triangles were cut from.
+
+    Attributes
+    ----------
+    start : (p + 1,) int
+        First corner of each face, and the end.
+    vertex : (c,) int
+        Vertex of the mesh at each corner.
+    corner : (t, 3) int
+        The corners of each triangle, all of one face.
+    """
+
+    start: np.ndarray
+    vertex: np.ndarray
+    corner: np.ndarray
+
+    @property
+    def face(self) -> np.ndarray:
+        """Face of each triangle, (t,) int64."""
+        return np.searchsorted(self.start, self.corner[:, 0], "right") - 1
+
+
+def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0, polygons: Polygons | None = None) -> np.ndarray:
     """Lay the room out flat without overlap, all surfaces at nearly one scale.
 
     Works on a temporary object in a temporary scene: the user's scene, selection and mode stay as they are.
@@ -35,6 +59,9 @@ def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0) -> np.ndarr
         Edge of the atlas in texels; margin and tolerance count in these.
     margin_texels : float
         Empty texels between two islands.
+    polygons : Polygons, optional
+        Keep the triangles of each face together, so that its corners have one coordinate each. A face that folds onto
+        itself is torn all the same.
 
     Returns
     -------
@@ -47,28 +74,50 @@ def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0) -> np.ndarr
     whole = _without_repeats(mesh.triangles)
     triangles, object_id = mesh.triangles[whole], mesh.object_id[whole]
     uv = np.zeros((len(mesh.triangles), 3, 2), np.float32)
+    if polygons is not None:
+        polygons = polygons._replace(corner=polygons.corner[whole])
     if len(triangles):
-        uv[whole] = _unwrapped(mesh.vertices, triangles, object_id, size, margin_texels)
+        uv[whole] = _unwrapped(mesh.vertices, triangles, object_id, size, margin_texels, polygons)
     return np.clip(np.nan_to_num(uv, nan=0.0, posinf=0.0, neginf=0.0), 0, 1)
 
 
-def _unwrapped(vertices, triangles, object_id, size, margin_texels):
+def _unwrapped(vertices, triangles, object_id, size, margin_texels, polygons):
     # Vertices are split between objects: an island then never spans two of them.
     points, corners = _split(vertices, triangles, object_id)
-    with _temporary(points, corners) as data:
-        _operate(data, bpy.ops.uv.smart_project, angle_limit=_PROJECTION_ANGLE, island_margin=0.0, area_weight=0.0,
-                 correct_aspect=False, scale_to_bounds=False)
-        uv = _layout(data)
-    uv = np.nan_to_num(uv, nan=0.0, posinf=0.0, neginf=0.0)
+    if polygons is None:
+        uv = _projected(points, corners.ravel(), 3 * np.arange(len(corners))).reshape(-1, 3, 2)
+    else:  # parts of the scene share no vertices
+        uv = _projected(vertices.astype(np.float32), polygons.vertex, polygons.start[:-1])[polygons.corner]
     ids = corner_ids(corners, uv)
     island = connected(ids)
     pairs = overlapping_pairs(uv, OVERLAP_TEXELS / size, island)
-    layer = layers(pairs, _height(vertices[triangles], island))
+    face, height = np.arange(len(uv)), _height(vertices[triangles], island)
+    if polygons is not None:
+        face = _faces(polygons.face, pairs)
+        height = (np.bincount(face, height) / np.bincount(face))
+        pairs = np.unique(np.sort(face[pairs], axis=1), axis=0)
+    layer = layers(pairs, height)[face]
     if layer.any():
         island = connected(ids, island * (layer.max() + 1) + layer)
-    island = cut_sparse(uv, ids, island, margin_texels / size)
+    island = cut_sparse(uv, ids, island, margin_texels / size, face)
     points, corners = _split(vertices, triangles, island)
     return _packed(points, corners, uv, size, margin_texels)
+
+
+def _projected(points, vertex, start):
+    """Coordinates of each corner, (c, 2) float32, by Blender's projection of each face along one of few directions."""
+    with _temporary(points, vertex, start) as data:
+        _operate(data, bpy.ops.uv.smart_project, angle_limit=_PROJECTION_ANGLE, island_margin=0.0, area_weight=0.0,
+                 correct_aspect=False, scale_to_bounds=False)
+        return np.nan_to_num(_layout(data), nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def _faces(face, pairs):
+    """Numbers of what stays together, (t,): the face of each triangle, or itself where its face folds onto itself."""
+    folded = np.unique(face[pairs[face[pairs[:, 0]] == face[pairs[:, 1]]]])
+    alone = np.isin(face, folded)
+    face = np.where(alone, face.max() + 1 + np.arange(len(face)), face)
+    return np.unique(face, return_inverse=True)[1].reshape(-1)
 
 
 def _packed(points, corners, uv, size, margin_texels):
@@ -82,11 +131,11 @@ def _packed(points, corners, uv, size, margin_texels):
         # Blender's margin is one before its own scaling: the scale is guessed, and mended once or twice.
         wanted = margin = margin_texels / 2 / size
         for _ in range(3):
-            with _temporary(points, corners) as data:
+            with _temporary(points, corners.ravel(), 3 * np.arange(len(corners))) as data:
                 data.uv_layers[0].data.foreach_set("uv", uv.ravel())
                 _operate(data, bpy.ops.uv.pack_islands, rotate=True, rotate_method=turn, scale=True, margin=margin,
                          margin_method="ADD", shape_method="AABB", udim_source="CLOSEST_UDIM")
-                packed = np.nan_to_num(_layout(data), nan=0.0, posinf=0.0, neginf=0.0)
+                packed = np.nan_to_num(_layout(data).reshape(-1, 3, 2), nan=0.0, posinf=0.0, neginf=0.0)
             border = packed.min()
             if border >= 0.97 * wanted or border <= 0:
                 break
@@ -117,18 +166,21 @@ def _height(corners, island):
 
 
 @contextmanager
-def _temporary(points, corners):
-    """A mesh of these triangles on an object of a scene of its own; all gone afterwards."""
+def _temporary(points, vertex, start):
+    """A mesh on an object of a scene of its own; all gone afterwards.
+
+    Its faces are given by the vertex of each corner and the first corner of each face.
+    """
     scene = bpy.data.scenes.new("Scan Relight unwrap")
     data = bpy.data.meshes.new("Scan Relight unwrap")
     thing = bpy.data.objects.new("Scan Relight unwrap", data)
     try:
         data.vertices.add(len(points))
         data.vertices.foreach_set("co", np.ascontiguousarray(points, np.float32).ravel())
-        data.loops.add(corners.size)
-        data.loops.foreach_set("vertex_index", corners.ravel())
-        data.polygons.add(len(corners))
-        data.polygons.foreach_set("loop_start", np.arange(0, corners.size, 3, dtype=np.int32))
+        data.loops.add(len(vertex))
+        data.loops.foreach_set("vertex_index", np.ascontiguousarray(vertex, np.int32))
+        data.polygons.add(len(start))
+        data.polygons.foreach_set("loop_start", np.ascontiguousarray(start, np.int32))
         data.update(calc_edges=True)
         data.uv_layers.new(name=_LAYER)
         scene.collection.objects.link(thing)
@@ -161,7 +213,7 @@ def _operate(data, operator, **settings):
 
 
 def _layout(data):
-    """The mesh's texture coordinates, (t, 3, 2) float32."""
+    """The mesh's texture coordinates, (c, 2) float32."""
     uv = np.empty(len(data.loops) * 2, np.float32)
     data.uv_layers[_LAYER].data.foreach_get("uv", uv)
-    return uv.reshape(-1, 3, 2)
+    return uv.reshape(-1, 2)

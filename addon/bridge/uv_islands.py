@@ -70,7 +70,8 @@ def boxes(uv: np.ndarray, island: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.minimum.reduceat(uv.min(1)[order], start), np.maximum.reduceat(uv.max(1)[order], start)
 
 
-def cut_sparse(uv: np.ndarray, corners: np.ndarray, island: np.ndarray, margin: float) -> np.ndarray:
+def cut_sparse(uv: np.ndarray, corners: np.ndarray, island: np.ndarray, margin: float,
+               face: np.ndarray | None = None) -> np.ndarray:
     """Cut islands that fill little of their box (window frames, skirting boards) until the boxes get no smaller.
 
     Parameters
@@ -80,6 +81,8 @@ def cut_sparse(uv: np.ndarray, corners: np.ndarray, island: np.ndarray, margin: 
     island : (t,) int64
     margin : float
         Width that each island needs around itself, in units of `uv`.
+    face : (t,) int64, optional
+        Triangles of one number stay together.
 
     Returns
     -------
@@ -87,6 +90,9 @@ def cut_sparse(uv: np.ndarray, corners: np.ndarray, island: np.ndarray, margin: 
     """
     area = areas(uv)
     centre = uv.mean(1, dtype=np.float64)
+    face = np.arange(len(uv)) if face is None else face
+    count = np.maximum(np.bincount(face), 1)
+    centre = np.stack([(np.bincount(face, centre[:, k]) / count)[face] for k in (0, 1)], -1)
     settled = np.zeros(len(uv), bool)
     for _ in range(_ROUNDS):
         low, high = boxes(uv, island)
@@ -107,7 +113,7 @@ def cut_sparse(uv: np.ndarray, corners: np.ndarray, island: np.ndarray, margin: 
         finer = island.copy()
         finer[chosen[accepted]] = island.max() + 1 + piece[accepted]
         single = chosen[apart[island[chosen]]]
-        finer[single] = finer.max() + 1 + np.arange(len(single))
+        finer[single] = finer.max() + 1 + face[single]
         island = np.unique(finer, return_inverse=True)[1].reshape(-1)
     return island
 
