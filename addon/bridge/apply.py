@@ -11,15 +11,16 @@ import numpy as np
 from ..core.capture.model import Capture
 from ..core.errors import MissingStageError
 from ..core.material import EMITTER, LAMBERTIAN, ObjectMaterial
+from . import result_images
 from .cameras import make_cameras
-from .images import load_image
 from .match_frame import show_picture
 from .materials import make_material
 from .mesh_objects import ATLAS_UV, OBJECT_ID, each_object
-from .scene import ALBEDO, BASE_COLOR, SHADING
 
 CAPTURE = "scan_relight_capture"
 """Custom property of the collection: the folder of the capture that it came from."""
+RESULT = "scan_relight_result"
+"""Custom property of an object: the result folder that its material came from."""
 
 
 def whole(slices: Generator):
@@ -77,7 +78,8 @@ def imported_from(scene: bpy.types.Scene, folder: Path | str) -> bpy.types.Colle
 
 
 def apply_recovery(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray,
-                   materials: Iterable[ObjectMaterial], result_folder: Path | str) -> tuple[str, ...]:
+                   materials: Iterable[ObjectMaterial], result_folder: Path | str,
+                   where: str = result_images.RESULT) -> tuple[str, ...]:
     """Put atlas coordinates, images and materials onto the imported objects; what they wore before is replaced.
 
     Parameters
@@ -89,6 +91,8 @@ def apply_recovery(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarra
     materials : iterable of ObjectMaterial
     result_folder : path
         Holds the images.
+    where : str
+        Where the images go: see `result_images`.
 
     Returns
     -------
@@ -102,15 +106,16 @@ def apply_recovery(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarra
     BadInputError
         An image can't be read.
     """
-    return whole(applying(scene, capture, atlas_uv, materials, result_folder))
+    return whole(applying(scene, capture, atlas_uv, materials, result_folder, where))
 
 
 def applying(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
-             result_folder: Path | str) -> Generator[float, None, tuple[str, ...]]:
+             result_folder: Path | str,
+             where: str = result_images.RESULT) -> Generator[float, None, tuple[str, ...]]:
     """`apply_recovery` in slices of an object each; yields the share done, so that a window can be drawn."""
     top = imported(scene, capture)
     folder = Path(result_folder).absolute()
-    images = {name: load_image(folder / name) for name in (BASE_COLOR, ALBEDO, SHADING) if (folder / name).exists()}
+    base_color = result_images.bring(folder, where)
     things = {thing[OBJECT_ID]: thing for thing in top.all_objects if OBJECT_ID in thing}
     parts = {part.name.split(".")[0]: part for part in top.children}
     descriptions = {one.object_id: one for one in materials}
@@ -133,7 +138,8 @@ def applying(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, mat
         description = descriptions.get(instance.object_id) or ObjectMaterial(
             instance.object_id, instance.class_name, LAMBERTIAN, note="no description")
         thing.data.materials.clear()
-        thing.data.materials.append(make_material(description, images.get(BASE_COLOR)))
+        thing.data.materials.append(make_material(description, base_color))
+        thing[RESULT] = str(folder)
         if description.model == EMITTER and "Lamps" in parts and thing.name not in parts["Lamps"].objects:
             for part in parts.values():
                 if thing.name in part.objects:

@@ -23,10 +23,12 @@ from ..core.room_file import ROOM, write_room
 from ..core.settings import Settings
 from ..core.store import Store
 from ..version import VERSION
-from .apply import apply_recovery, import_capture, imported
+from . import result_images
+from .apply import import_capture, imported, whole
 from .scene import write_scene
-from .scene_capture import polygons_of
+from .scene_capture import check_own, polygons_of
 from .unwrap import unwrap
+from .write_back import AUTO, is_own, putting_on
 
 STAGES = ("surface", "lit_diffuse", "shading", "specular")
 WRITE = "write"
@@ -42,7 +44,8 @@ def progress_for(settings: Settings, listener: Callable[[ProgressEvent], None] |
 
 def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, progress: Progress,
         until: str = WRITE, scene: bpy.types.Scene | None = None, import_first: bool = True,
-        reading: Reading = AS_FOUND, from_stage: str | None = None) -> dict:
+        reading: Reading = AS_FOUND, from_stage: str | None = None, target: str = AUTO,
+        images: str = result_images.RESULT, copies: bool = False) -> dict:
     """Recover a capture up to a stage; stages that the result folder holds already are not done again.
 
     Parameters
@@ -63,6 +66,9 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         How the capture is to be read.
     from_stage : str, optional
         Do this stage and all later ones anew, though the result folder holds them.
+    target, images, copies
+        With `scene`: what the materials go onto, and where their images go; see `write_back.putting_on`. Nothing is
+        imported where they go onto the artist's own objects.
 
     Returns
     -------
@@ -84,8 +90,11 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     started = time.monotonic()
     progress.stage("read")
     capture = read_capture(capture_folder, reading)
-    if scene is not None and not import_first:
-        imported(scene, capture)  # its absence is told now, not after the work
+    own = is_own(capture.root, target)
+    if scene is not None and own:
+        check_own(capture.root)  # what is absent is told now, not after the work
+    elif scene is not None and not import_first:
+        imported(scene, capture)
     progress.done()
     with Store(out_folder) as store, _told(out_folder):
         if from_stage in STAGES:
@@ -113,9 +122,10 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
             warnings = write_scene(store.path("scene.blend"), facing, surface.atlas.uv, materials, store.folder,
                                    recovery.median_radiance(), fresh=scene is None, facing=True)
             if scene is not None:
-                if import_first:
+                if import_first and not own:
                     import_capture(scene, capture)
-                warnings += apply_recovery(scene, capture, surface.uv, materials, store.folder)
+                warnings += whole(putting_on(bpy.context, capture, surface.uv, materials, store.folder, target, images,
+                                             copies))
             progress.done()
         report = recovery.report()
         if until == WRITE:

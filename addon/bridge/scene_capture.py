@@ -22,7 +22,7 @@ import numpy as np
 from ..core.capture.layout import RawMesh
 from ..core.capture.mesh_repair import repair
 from ..core.capture.model import Mesh
-from ..core.errors import BadInputError, StorageError
+from ..core.errors import BadInputError, MissingStageError, StorageError
 from . import scene_cameras
 from .scene_mesh import Part, SceneMesh, gather, joined
 from .unwrap import Polygons
@@ -228,6 +228,12 @@ def sources(folder: Path | str) -> tuple[Source, ...]:
         return tuple(Source(**one) for one in json.loads(path.read_text(encoding="utf-8"))["objects"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadInputError(f"'{path}' is damaged; capture the scene again.") from error
+
+
+def check_own(folder: Path | str) -> None:
+    """Raise `MissingStageError` unless a capture was made of a scene."""
+    if not sources(folder):
+        raise MissingStageError(f"Capture '{folder}' was not made of a scene; capture the selected objects first.")
 
 
 def polygons_of(folder: Path | str, mesh: Mesh) -> Polygons | None:

@@ -7,7 +7,7 @@ several objects share is copied for each, as each has a place of its own in the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 from pathlib import Path
 
 import bpy
@@ -18,9 +18,10 @@ from ..core.capture.model import Capture
 from ..core.errors import BadInputError, MissingStageError
 from ..core.material import LAMBERTIAN, ObjectMaterial
 from . import result_images
+from .apply import RESULT, applying, whole
 from .materials import make_material
 from .mesh_objects import ATLAS_UV, OBJECT_ID
-from .scene_capture import Source, few, polygons_of, sharing, sources
+from .scene_capture import Source, check_own, few, polygons_of, sharing, sources
 from .scene_mesh import Part, gather, same_topology, topology
 from .scene_mesh import topology_hash as hash_of
 
@@ -28,15 +29,15 @@ BEFORE = "scan_relight_before"
 """Custom property of an object: what it wore before."""
 COPY_OF = "scan_relight_copy_of"
 """Custom property of a copy: the object that it stands for."""
-RESULT = "scan_relight_result"
-"""Custom property of an object: the result folder that its material came from."""
 ASIDE = "ScanRelight before"
 """Name that texture coordinates get that already had ours."""
+AUTO, IMPORTED, SELECTED = "AUTO", "IMPORTED", "SELECTED"
+"""What materials go onto: what the capture came from; the capture's imported objects; the artist's own."""
 SUFFIX = " (Scan Relight)"
 
 
 def write_back(context: bpy.types.Context, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
-               result_folder: Path | str, images: str = result_images.RESULT, copies: bool = False) -> tuple[str, ...]:
+               result_folder: Path | str, where: str = result_images.RESULT, copies: bool = False) -> tuple[str, ...]:
     """Put the recovered materials onto the objects that a capture was made of.
 
     Parameters
@@ -47,7 +48,7 @@ def write_back(context: bpy.types.Context, capture: Capture, atlas_uv: np.ndarra
     atlas_uv : (t, 3, 2) float32
     materials : iterable of ObjectMaterial
     result_folder : path
-    images : str
+    where : str
         Where the images go: see `result_images`.
     copies : bool
         Make a copy, with its faces fixed, of each object whose faces come from modifiers or instances, and hide the
@@ -65,16 +66,38 @@ def write_back(context: bpy.types.Context, capture: Capture, atlas_uv: np.ndarra
     BadInputError
         An image can't be read, or the images' folder can't be told.
     """
+    return whole(writing_back(context, capture, atlas_uv, materials, result_folder, where, copies))
+
+
+def putting_on(context: bpy.types.Context, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
+               result_folder: Path | str, target: str = AUTO, where: str = result_images.RESULT,
+               copies: bool = False) -> Generator[float, None, tuple[str, ...]]:
+    """`writing_back` or `apply.applying`, as `target` says; `AUTO` takes what the capture came from."""
+    if is_own(capture.root, target):
+        return writing_back(context, capture, atlas_uv, materials, result_folder, where, copies)
+    return applying(context.scene, capture, atlas_uv, materials, result_folder, where)
+
+
+def is_own(capture_folder: Path | str, target: str = AUTO) -> bool:
+    """Whether a capture's materials belong onto the artist's own objects."""
+    return target == SELECTED or target == AUTO and bool(sources(capture_folder))
+
+
+def writing_back(context: bpy.types.Context, capture: Capture, atlas_uv: np.ndarray,
+                 materials: Iterable[ObjectMaterial], result_folder: Path | str, where: str = result_images.RESULT,
+                 copies: bool = False) -> Generator[float, None, tuple[str, ...]]:
+    """`write_back` in slices of an object each; yields the share done, so that a window can be drawn."""
     known, polygons = sources(capture.root), polygons_of(capture.root, capture.mesh)
-    if not known or polygons is None:
-        raise MissingStageError(f"Capture '{capture.root}' was not made of a scene; capture the selected objects "
-                                "first.")
-    base_color = result_images.bring(result_folder, images)
+    check_own(capture.root)
+    if polygons is None:
+        raise MissingStageError(f"Capture '{capture.root}' is damaged; capture the scene again.")
+    base_color = result_images.bring(result_folder, where)
     corner_uv, torn = corners_of(polygons, atlas_uv)
     descriptions = {one.object_id: one for one in materials}
     work = _Work(context, Path(result_folder).absolute(), base_color)
     gone, edited, made, locked, torn_names = [], [], [], [], []
-    for source in known:
+    for done, source in enumerate(known):
+        yield done / len(known)
         thing = context.scene.objects.get(source.thing)
         if thing is None:
             gone.append(source.name)
