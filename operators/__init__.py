@@ -6,17 +6,24 @@ from __future__ import annotations
 def classes() -> tuple[type, ...]:
     """Everything that Blender has to know: property groups, preferences, operators, panels. Each part adds its own."""
     from .accumulate import SCAN_RELIGHT_OT_accumulate
+    from .capture_from_scene import SCAN_RELIGHT_OT_capture_from_scene
     from .check_capture import SCAN_RELIGHT_OT_check_capture
     from .clear_cache import SCAN_RELIGHT_OT_clear_cache
     from .fit import SCAN_RELIGHT_OT_fit
     from .import_capture import SCAN_RELIGHT_OT_import_capture
     from .job_operator import SCAN_RELIGHT_OT_stop
+    from .look import SCAN_RELIGHT_OT_look
+    from .open_report import SCAN_RELIGHT_OT_open_report
     from .panel_capture import SCAN_RELIGHT_PT_capture
+    from .panel_look import SCAN_RELIGHT_PT_look, SCAN_RELIGHT_PT_own_scene
     from .panel_recover import SCAN_RELIGHT_PT_recover
+    from .panel_results import SCAN_RELIGHT_PT_results, SCAN_RELIGHT_PT_stages, SCAN_RELIGHT_UL_results
     from .preferences import ScanRelightPreferences
     from .recover import SCAN_RELIGHT_OT_recover
+    from .restore_materials import SCAN_RELIGHT_OT_restore_materials
     from .run import SCAN_RELIGHT_OT_run
     from .scene_props import ScanRelightReading, ScanRelightScene, ScanRelightSettings
+    from .select_result_object import SCAN_RELIGHT_OT_select_result_object
     from .shade import SCAN_RELIGHT_OT_shade
     from .write import SCAN_RELIGHT_OT_write
 
@@ -27,9 +34,14 @@ def classes() -> tuple[type, ...]:
         SCAN_RELIGHT_OT_check_capture, SCAN_RELIGHT_OT_import_capture,
         SCAN_RELIGHT_OT_accumulate, SCAN_RELIGHT_OT_shade, SCAN_RELIGHT_OT_fit, SCAN_RELIGHT_OT_write,
         SCAN_RELIGHT_OT_recover, SCAN_RELIGHT_OT_run, SCAN_RELIGHT_OT_stop, SCAN_RELIGHT_OT_clear_cache,
-        # Panels, in the order of the work.
-        SCAN_RELIGHT_PT_capture,
+        # The artist's side.
+        SCAN_RELIGHT_OT_capture_from_scene, SCAN_RELIGHT_OT_restore_materials, SCAN_RELIGHT_OT_select_result_object,
+        SCAN_RELIGHT_OT_look, SCAN_RELIGHT_OT_open_report,
+        # Panels, in the order of the work; a panel's parts come after it.
+        SCAN_RELIGHT_PT_capture, SCAN_RELIGHT_PT_own_scene,
         SCAN_RELIGHT_PT_recover,
+        SCAN_RELIGHT_UL_results, SCAN_RELIGHT_PT_results, SCAN_RELIGHT_PT_stages,
+        SCAN_RELIGHT_PT_look,
     )  # fmt: skip
 
 
@@ -47,11 +59,13 @@ def register():
     import bpy
 
     from .job_operator import forget_job
+    from .panel_results import active_row_property
 
     for cls in classes():
         bpy.utils.register_class(cls)
     for owner, name, group in pointers():
         setattr(owner, name, bpy.props.PointerProperty(type=group))
+    bpy.types.Scene.scan_relight_row = active_row_property()
     bpy.app.handlers.load_pre.append(forget_job)
 
 
@@ -60,11 +74,13 @@ def unregister():
     import bpy
 
     from ..addon.bridge import job
-    from . import findings
+    from . import findings, results
     from .job_operator import forget_job
 
     bpy.app.handlers.load_pre.remove(forget_job)
     findings.forget()
+    results.forget()
+    del bpy.types.Scene.scan_relight_row
     job.forget()
     job.end_all()
     for owner, name, _ in pointers():

@@ -64,6 +64,7 @@ class SCAN_RELIGHT_OT_run(bpy.types.Operator):
             return found
         found["result_folder"] = str(preferences.result_folder(choices.result_folder, choices.capture_folder))
         found |= {"preset": choices.preset, "from_stage": self.from_stage}
+        found |= {name: getattr(choices, name) for name in ("images", "copies")}
         wanted = {*choices.settings.changed(choices.preset), "threads", "seed"}
         return found | {info.name: setting_value(choices.settings, info) for info in setting_infos()
                         if info.name in wanted}

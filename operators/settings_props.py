@@ -25,6 +25,13 @@ PRESET_TEXTS = {
     "fine": "Finer texels and three times the rays; takes several times as long",
     "paper": "The published method, for comparison; very slow",
 }
+TARGETS = [("AUTO", "What was captured", "Imported objects of a scan; your own objects where they were captured"),
+           ("IMPORTED", "Imported objects", "The objects that Import Capture made"),
+           ("SELECTED", "Your own objects", "The objects that were selected when the scene was captured; what they "
+            "wear now is kept and can be restored")]
+IMAGES = [("RESULT", "In the result folder", "Refer to the images where they are"),
+          ("FOLDER", "Beside the file", "Copy the images into a folder beside the saved .blend"),
+          ("PACK", "Packed", "Keep the images within the .blend")]
 PACKAGES = ("scipy", "embreex", "OpenEXR")
 
 
@@ -202,17 +209,30 @@ class SceneStageOperator(StageOperator):
 
     until = RUN_STAGES[-1]
     import_first = True
+    target: bpy.props.EnumProperty(
+        name="Onto", description="Which objects the materials go onto", items=TARGETS)
+    images: bpy.props.EnumProperty(
+        name="Images", description="Where the recovered images are kept", items=IMAGES)
+    copies: bpy.props.BoolProperty(
+        name="Copies", description="Where modifiers or instances make an object's faces, put the material onto a copy "
+        "of it and hide the object; without this such objects are left as they are", default=False)
 
     def work(self, context):
         """Run, then change the scene, so that a failed run leaves it alone."""
-        return self.run(context, self.until, scene=context.scene, import_first=self.import_first)
+        return self.run(context, self.until, scene=context.scene, import_first=self.import_first, target=self.target,
+                        images=self.images, copies=self.copies)
 
     def begin(self, context):
         """Start the run; where the capture should be in the scene, its absence is told now and not afterwards."""
         from ..addon.bridge.apply import imported_from
+        from ..addon.bridge.scene_capture import check_own
+        from ..addon.bridge.write_back import is_own
 
-        if not self.import_first:
-            imported_from(context.scene, self.folder("capture_folder"))
+        capture = self.folder("capture_folder")
+        if is_own(capture, self.target):
+            check_own(capture)
+        elif not self.import_first:
+            imported_from(context.scene, capture)
         return super().begin(context)
 
     def load(self, job):
@@ -223,13 +243,15 @@ class SceneStageOperator(StageOperator):
 
     def change(self, scene, loaded):
         """Import the capture, then put on what was recovered."""
-        from ..addon.bridge.apply import applying, importing
+        from ..addon.bridge.apply import importing
+        from ..addon.bridge.write_back import is_own, putting_on
 
-        half = 0.5 if self.import_first else 0.0
-        if self.import_first:
+        half = 0.0 if is_own(loaded.capture.root, self.target) or not self.import_first else 0.5
+        if half:
             for share in importing(scene, loaded.capture):
                 yield share * half
-        slices = applying(scene, loaded.capture, loaded.atlas_uv, loaded.materials, loaded.folder)
+        slices = putting_on(scene, loaded.capture, loaded.atlas_uv, loaded.materials, loaded.folder, self.target,
+                            self.images, self.copies)
         while True:
             try:
                 yield half + (1 - half) * next(slices)

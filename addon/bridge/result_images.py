@@ -40,11 +40,19 @@ def bring(folder: Path | str, where: str = RESULT) -> bpy.types.Image | None:
     return found.get(BASE_COLOR)
 
 
-def image(folder: Path | str, name: str, where: str = RESULT, keep: bool = True) -> bpy.types.Image:
-    """One image of a result folder, with the colour space that its content asks for; raises as `bring`."""
+def image(folder: Path | str, name: str, where: str = RESULT, keep: bool = True,
+          share: bool = False) -> bpy.types.Image:
+    """One image of a result folder, with the colour space that its content asks for; raises as `bring`.
+
+    `keep` gives it a fake user; with `share` one that is there already is read again.
+    """
     source = Path(folder).absolute() / name
-    path = source if where != FOLDER else _beside(source)
     earlier = next((one for one in bpy.data.images if one.get(MARK) == str(source) and not one.library), None)
+    if share and earlier is not None:
+        if not earlier.packed_file:
+            earlier.reload()
+        return earlier
+    path = source if where != FOLDER else _beside(source)
     loaded = load_image(path, colour_space=COLOUR_SPACES[name], packed=where == PACK, keep=keep)
     loaded[MARK] = str(source)
     if earlier is not None:

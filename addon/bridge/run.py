@@ -124,7 +124,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
             if scene is not None:
                 if import_first and not own:
                     import_capture(scene, capture)
-                warnings += whole(putting_on(bpy.context, capture, surface.uv, materials, store.folder, target, images,
+                warnings += whole(putting_on(scene, capture, surface.uv, materials, store.folder, target, images,
                                              copies))
             progress.done()
         report = recovery.report()

@@ -21,6 +21,7 @@ from . import result_images
 from .apply import RESULT, applying, whole
 from .materials import make_material
 from .mesh_objects import ATLAS_UV, OBJECT_ID
+from .relight_room import depsgraph_of
 from .scene_capture import Source, check_own, few, polygons_of, sharing, sources
 from .scene_mesh import Part, gather, same_topology, topology
 from .scene_mesh import topology_hash as hash_of
@@ -36,13 +37,13 @@ AUTO, IMPORTED, SELECTED = "AUTO", "IMPORTED", "SELECTED"
 SUFFIX = " (Scan Relight)"
 
 
-def write_back(context: bpy.types.Context, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
+def write_back(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
                result_folder: Path | str, where: str = result_images.RESULT, copies: bool = False) -> tuple[str, ...]:
     """Put the recovered materials onto the objects that a capture was made of.
 
     Parameters
     ----------
-    context : bpy.types.Context
+    scene : bpy.types.Scene
     capture : Capture
         Made by `capture_scene`.
     atlas_uv : (t, 3, 2) float32
@@ -66,16 +67,16 @@ def write_back(context: bpy.types.Context, capture: Capture, atlas_uv: np.ndarra
     BadInputError
         An image can't be read, or the images' folder can't be told.
     """
-    return whole(writing_back(context, capture, atlas_uv, materials, result_folder, where, copies))
+    return whole(writing_back(scene, capture, atlas_uv, materials, result_folder, where, copies))
 
 
-def putting_on(context: bpy.types.Context, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
+def putting_on(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
                result_folder: Path | str, target: str = AUTO, where: str = result_images.RESULT,
                copies: bool = False) -> Generator[float, None, tuple[str, ...]]:
     """`writing_back` or `apply.applying`, as `target` says; `AUTO` takes what the capture came from."""
     if is_own(capture.root, target):
-        return writing_back(context, capture, atlas_uv, materials, result_folder, where, copies)
-    return applying(context.scene, capture, atlas_uv, materials, result_folder, where)
+        return writing_back(scene, capture, atlas_uv, materials, result_folder, where, copies)
+    return applying(scene, capture, atlas_uv, materials, result_folder, where)
 
 
 def is_own(capture_folder: Path | str, target: str = AUTO) -> bool:
@@ -83,7 +84,7 @@ def is_own(capture_folder: Path | str, target: str = AUTO) -> bool:
     return target == SELECTED or target == AUTO and bool(sources(capture_folder))
 
 
-def writing_back(context: bpy.types.Context, capture: Capture, atlas_uv: np.ndarray,
+def writing_back(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray,
                  materials: Iterable[ObjectMaterial], result_folder: Path | str, where: str = result_images.RESULT,
                  copies: bool = False) -> Generator[float, None, tuple[str, ...]]:
     """`write_back` in slices of an object each; yields the share done, so that a window can be drawn."""
@@ -94,11 +95,11 @@ def writing_back(context: bpy.types.Context, capture: Capture, atlas_uv: np.ndar
     base_color = result_images.bring(result_folder, where)
     corner_uv, torn = corners_of(polygons, atlas_uv)
     descriptions = {one.object_id: one for one in materials}
-    work = _Work(context, Path(result_folder).absolute(), base_color)
+    work = _Work(scene, Path(result_folder).absolute(), base_color)
     gone, edited, made, locked, torn_names = [], [], [], [], []
     for done, source in enumerate(known):
         yield done / len(known)
-        thing = context.scene.objects.get(source.thing)
+        thing = scene.objects.get(source.thing)
         if thing is None:
             gone.append(source.name)
             continue
@@ -142,8 +143,8 @@ def corners_of(polygons, atlas_uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 class _Work:
     """What dressing one object after the other needs to know."""
 
-    def __init__(self, context, folder: Path, base_color):
-        self.context, self.folder, self.base_color, self.shown = context, folder, base_color, sharing()
+    def __init__(self, scene, folder: Path, base_color):
+        self.scene, self.folder, self.base_color, self.shown = scene, folder, base_color, sharing()
 
     def dress(self, thing: bpy.types.Object, source: Source, description: ObjectMaterial, uv: np.ndarray) -> None:
         """Put atlas coordinates ((c, 2) float32) and the material onto an object, keeping what it wore."""
@@ -175,9 +176,8 @@ class _Work:
         owners = {thing for _, thing, _, _ in made}
         for thing in owners:  # earlier copies go; what is read is the object itself
             undo_copies(thing)
-        self.context.view_layer.update()
         ordered = sorted(owners, key=lambda thing: thing.name)
-        depsgraph = self.context.evaluated_depsgraph_get()
+        depsgraph = depsgraph_of(self.scene)
         parts = {(part.thing, part.name): part for part in gather(depsgraph, ordered)}
         changed, copies = [], {}
         for source, thing, description, uv in made:

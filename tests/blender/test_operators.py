@@ -190,8 +190,8 @@ def test_what_is_chosen_arrives(ops, name, until, paper, package, tmp_path, monk
     assert (capture, result, stage) == ("a", "b", until)
     assert chosen == (replace(settings.PAPER, seed=5) if paper else settings.Settings(seed=5, median="mean"))
     assert where.pop("from_stage") is None and where.pop("reading").format == ""
-    assert where == {"write": {"scene": bpy.context.scene, "import_first": False},
-                     "recover": {"scene": bpy.context.scene, "import_first": True}}.get(name, {})
+    onto = {"scene": bpy.context.scene, "target": "AUTO", "images": "RESULT", "copies": False}
+    assert where == {"write": onto | {"import_first": False}, "recover": onto | {"import_first": True}}.get(name, {})
 
 
 @pytest.mark.slow

@@ -1,0 +1,62 @@
+"""`bpy.ops.scan_relight.look`: what the viewport shows on the recovered objects."""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import bpy
+
+from ..addon.core.errors import ScanRelightError
+
+
+def look_items() -> list[tuple[str, str, str]]:
+    """Items of an enumeration of the looks."""
+    from ..addon.bridge.look import LOOKS
+
+    return [(name, one.label, one.text) for name, one in LOOKS.items()]
+
+
+class SCAN_RELIGHT_OT_look(bpy.types.Operator):
+    """Show another look of the recovered objects."""
+
+    bl_idname = "scan_relight.look"
+    bl_label = "Look"
+    bl_description = "What the viewport shows on the recovered objects; renders and materials stay as they are"
+    bl_options = {"REGISTER", "UNDO"}
+
+    look: bpy.props.EnumProperty(name="Look", description="What the viewport shows", items=look_items())
+    switch_view: bpy.props.BoolProperty(
+        name="Switch the view", description="Turn viewports that show no materials (Solid, Wireframe) to Material "
+        "Preview, where the look can be seen", default=True)
+
+    @classmethod
+    def description(cls, context, properties):
+        """The tooltip of the chosen look."""
+        from ..addon.bridge.look import LOOKS
+
+        return f"{LOOKS[properties.look].text}. Only the viewport changes, never a render"
+
+    @classmethod
+    def poll(cls, context):
+        """Whether anything recovered is there."""
+        from ..addon.bridge import look
+
+        if context.scene is None or not look.recovered(context.scene):
+            cls.poll_message_set("No object of this scene wears recovered materials; run the recovery first.")
+            return False
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Leave the editing mode for object mode first.")
+            return False
+        return True
+
+    def execute(self, context):
+        """Switch."""
+        from ..addon.bridge import look
+
+        try:
+            look.set_look(context.scene, self.look)
+        except ScanRelightError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if self.switch_view and context.screen is not None:
+            for area in context.screen.areas:
+                if area.type == "VIEW_3D" and area.spaces.active.shading.type in ("SOLID", "WIREFRAME"):
+                    area.spaces.active.shading.type = "MATERIAL"
+        return {"FINISHED"}

@@ -1,0 +1,32 @@
+"""`bpy.ops.scan_relight.open_report`: the result's page in the browser."""
+
+from __future__ import annotations
+
+import bpy
+
+from . import results
+
+
+class SCAN_RELIGHT_OT_open_report(bpy.types.Operator):
+    """Open the result's page."""
+
+    bl_idname = "scan_relight.open_report"
+    bl_label = "Open Report"
+    bl_description = "Open the page with figures, pictures and doubts of this result in the browser"
+
+    @classmethod
+    def poll(cls, context):
+        """Whether there is a page."""
+        folder = results.folder_of(context.scene) if context.scene else None
+        if folder is None or not (folder / results.PAGE).is_file():
+            cls.poll_message_set("There is no report yet; run the recovery to its end first.")
+            return False
+        return True
+
+    def execute(self, context):
+        """Open it; in the background only say where it lies."""
+        page = results.folder_of(context.scene) / results.PAGE
+        if bpy.app.background:
+            self.report({"INFO"}, str(page))
+            return {"FINISHED"}
+        return bpy.ops.wm.path_open(filepath=str(page))

@@ -1,0 +1,177 @@
+"""The tab's third part: what was found of each object, how sure it is, and the stages that led there."""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import bpy
+
+from ..addon.console import duration
+from . import results
+from .panel import SidebarPanel
+from .select_result_object import select
+
+ICONS = {"lambertian": "SHADING_SOLID", "specular": "SHADING_TEXTURE", "metal": "SHADING_RENDERED",
+         "emitter": "LIGHT_AREA"}
+SIGNS = {"sure": "CHECKMARK", "fair": "REMOVE", "unsure": "QUESTION", "unknown": "BLANK1"}
+MODELS = [("ALL", "All models", "Show every object"),
+          ("lambertian", "Lambertian", "Only objects without a highlight"),
+          ("specular", "Specular", "Only objects with a highlight over their colour"),
+          ("metal", "Metal", "Only metals"),
+          ("emitter", "Lamps", "Only objects that give light")]
+ORDERS = [("NAME", "Name", "By name"), ("MODEL", "Model", "By model, then by name"),
+          ("CERTAINTY", "Least sure first", "By how sure the material is, the least sure first")]
+
+
+class SCAN_RELIGHT_UL_results(bpy.types.UIList):
+    """The recovered objects; the rows are the scene's own objects, so nothing of this is saved."""
+
+    bl_idname = "SCAN_RELIGHT_UL_results"
+
+    model: bpy.props.EnumProperty(name="Model", description="Which objects are listed", items=MODELS)
+    order: bpy.props.EnumProperty(name="Order", description="How the list is sorted", items=ORDERS)
+
+    def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
+        """Name, roughness, specular, certainty."""
+        found = results.result_of(context.scene)
+        one = found.objects.get(item.get("object_id"), {}) if found else {}
+        split = layout.split(factor=0.52)
+        split.label(text=item.name, icon=ICONS.get(one.get("model"), "BLANK1"), translate=False)
+        row = split.row()
+        texts = columns(one)
+        row.label(text=texts[0])
+        row.label(text=texts[1])
+        row.label(text="", icon=SIGNS[results.certainty(one)])
+
+    def draw_filter(self, context, layout):
+        """Name, model, order."""
+        layout.prop(self, "filter_name", text="", icon="VIEWZOOM")
+        row = layout.row(align=True)
+        row.prop(self, "model", text="")
+        row.prop(self, "order", text="")
+
+    def filter_items(self, context, data, property):
+        """Only recovered objects that pass the filters, in the chosen order."""
+        things = getattr(data, property)
+        found = results.result_of(context.scene)
+        known = found.objects if found else {}
+        shown, keys = [], []
+        for thing in things:
+            one = known.get(thing.get("object_id")) if thing.type == "MESH" else None
+            passes = one is not None and self.model in ("ALL", one.get("model"))
+            passes = passes and self.filter_name.lower() in thing.name.lower()
+            shown.append(self.bitflag_filter_item if passes else 0)
+            keys.append(order_key(thing.name, one or {}, self.order))
+        ranked = sorted(range(len(keys)), key=keys.__getitem__)
+        places = [0] * len(ranked)
+        for place, number in enumerate(ranked):
+            places[number] = place
+        return shown, places
+
+
+def order_key(name: str, one: dict, order: str) -> tuple:
+    """What a row is sorted by."""
+    if order == "MODEL":
+        return one.get("model", ""), name.lower()
+    if order == "CERTAINTY":
+        value = results.doubt(one)
+        return -(value if value is not None else -1.0), name.lower()
+    return (name.lower(),)
+
+
+def columns(one: dict) -> tuple[str, str]:
+    """Roughness and specular F0 of a row; empty where it has no highlight."""
+    if one.get("phi") is None:
+        return "", ""
+    value = one.get("psi")
+    if value is None:
+        value = sum(one["f0"]) / 3 if one.get("f0") else None
+    return f"{max(one['phi'], 0) ** 0.5:.2f}", "" if value is None else f"{value:.2f}"
+
+
+def active_row(scene) -> int:
+    """The active object's row."""
+    thing = bpy.context.view_layer.objects.active if bpy.context.scene == scene else None
+    return scene.objects.find(thing.name) if thing is not None else -1
+
+
+def choose_row(scene, row: int) -> None:
+    """A click on a row selects its object."""
+    if 0 <= row < len(scene.objects) and bpy.context.scene == scene and bpy.context.mode == "OBJECT":
+        select(bpy.context, scene.objects[row])
+
+
+def active_row_property():
+    """`Scene.scan_relight_row`: follows the active object and is kept nowhere."""
+    return bpy.props.IntProperty(name="Object", description="Click to select the object in the scene", get=active_row,
+                                 set=choose_row, options={"SKIP_SAVE"})
+
+
+class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
+    """What was found."""
+
+    bl_idname = "SCAN_RELIGHT_PT_results"
+    bl_label = "Results"
+    bl_order = 2
+
+    def draw(self, context):
+        """The list, the chosen object, the page."""
+        layout, scene = self.layout, context.scene
+        found = results.result_of(scene)
+        if found is None or not found.objects:
+            self.say(layout, context, "No result yet: run the recovery to its end, or choose the folder of one that "
+                     "is finished.", "INFO")
+            return
+        if any(thing.get("object_id") in found.objects for thing in scene.objects if thing.type == "MESH"):
+            head = layout.split(factor=0.52)
+            head.label(text="Object")
+            row = head.row()
+            for text in ("Rough", "F0", ""):
+                row.label(text=text)
+            layout.template_list("SCAN_RELIGHT_UL_results", "", scene, "objects", scene, "scan_relight_row", rows=6)
+        else:
+            self.say(layout, context, f"{len(found.objects)} objects in '{found.folder.name}'; none of them is in "
+                     "this scene. Import the capture to see them.", "INFO")
+        thing = context.active_object
+        one = found.objects.get(thing.get("object_id")) if thing is not None and thing.type == "MESH" else None
+        if one is not None:
+            self.details(layout.box(), context, thing.name, one)
+        layout.operator("scan_relight.open_report", icon="URL")
+
+    def details(self, layout, context, name: str, one: dict) -> None:
+        """Everything of one object."""
+        column = layout.column(align=True)
+        column.label(text=name, icon=ICONS.get(one.get("model"), "BLANK1"), translate=False)
+        for label, text in results.facts(one):
+            split = column.split(factor=0.38)
+            split.label(text=label)
+            split.label(text=text)
+        if one.get("note"):
+            self.say(layout, context, f"{one['note'][0].upper()}{one['note'][1:]}.".replace("..", "."))
+
+
+class SCAN_RELIGHT_PT_stages(SidebarPanel, bpy.types.Panel):
+    """The stages of the run."""
+
+    bl_idname = "SCAN_RELIGHT_PT_stages"
+    bl_parent_id = "SCAN_RELIGHT_PT_results"
+    bl_label = "Stages"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        """Only where a run left word of its stages."""
+        found = results.result_of(context.scene) if context.scene else None
+        return found is not None and bool(found.stages)
+
+    def draw(self, context):
+        """Each stage with its time, and a button to do it and the later ones again."""
+        stages = results.result_of(context.scene).stages
+        self.say(self.layout, context, "Run again from a stage on; those before it are taken as they are stored.")
+        column = self.layout.column(align=True)
+        for name, label in results.STAGES:
+            told = stages.get(name)
+            row = column.row(align=True)
+            split = row.split(factor=0.62)
+            split.label(text=label)
+            seconds = (told or {}).get("seconds")
+            split.label(text="" if seconds is None else "stored" if told.get("stored") else duration(seconds))
+            again = row.operator("scan_relight.run", text="", icon="FILE_REFRESH")
+            again.target, again.from_stage = "recover", name
