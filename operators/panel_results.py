@@ -25,13 +25,13 @@ class SCAN_RELIGHT_UL_results(bpy.types.UIList):
 
     bl_idname = "SCAN_RELIGHT_UL_results"
 
+    known: dict = {}  # what the last `filter_items` found, as it comes before the rows
     model: bpy.props.EnumProperty(name="Model", description="Which objects are listed", items=MODELS)
     order: bpy.props.EnumProperty(name="Order", description="How the list is sorted", items=ORDERS)
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
         """Name, roughness, specular, certainty."""
-        found = results.result_of(context.scene)
-        one = found.objects.get(item.get("object_id"), {}) if found else {}
+        one = self.known.get(item.get("object_id"), {})
         split = layout.split(factor=0.52)
         split.label(text=item.name, icon=ICONS.get(one.get("model"), "BLANK1"), translate=False)
         row = split.row()
@@ -51,7 +51,7 @@ class SCAN_RELIGHT_UL_results(bpy.types.UIList):
         """Only recovered objects that pass the filters, in the chosen order."""
         things = getattr(data, property)
         found = results.result_of(context.scene)
-        known = found.objects if found else {}
+        known = type(self).known = found.objects if found else {}
         shown, keys = [], []
         for thing in things:
             one = known.get(thing.get("object_id")) if thing.type == "MESH" else None

@@ -1,4 +1,4 @@
-"""What a result folder says of its objects, for the panel: read when a file changed, kept in memory, never in the file."""
+"""What a result folder says of its objects, for the panel: read when a file changed, kept in memory, never saved."""
 
 from __future__ import annotations
 

@@ -306,7 +306,8 @@ def _without_slot(data: bpy.types.Mesh) -> None:
     number = np.empty(len(data.polygons), np.int32)
     data.polygons.foreach_get("material_index", number)
     data.materials.clear()
-    data.polygons.foreach_set("material_index", number)
+    if number.any():  # else an attribute would appear that was not there
+        data.polygons.foreach_set("material_index", number)
 
 
 def _without_ours(data: bpy.types.Mesh, aside: bool) -> None:
