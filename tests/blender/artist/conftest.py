@@ -16,7 +16,7 @@ def scene():
     return bpy.context.scene
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def package(root):
     """The checkout as the registered package `scan_relight`."""
     import importlib.util
