@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import BadInputError
-from . import nerfstudio
+from . import colmap, nerfstudio
 from .layout import Reader
 
-READERS: tuple[Reader, ...] = (nerfstudio.READER,)
+READERS: tuple[Reader, ...] = (nerfstudio.READER, colmap.READER)
 
 
 def reader_for(root: Path, name: str = "") -> Reader:
