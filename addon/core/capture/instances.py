@@ -46,18 +46,18 @@ def read_instances(path: Path | str) -> dict[int, str]:
     return names
 
 
-def assign(object_id: np.ndarray | None, count: int,
-           names: dict[int, str] | None) -> tuple[np.ndarray, tuple[Instance, ...], list[str]]:
+def assign(object_id: np.ndarray, names: dict[int, str] | None,
+           names_file: str = FILE) -> tuple[np.ndarray, tuple[Instance, ...], list[str]]:
     """Give every triangle an instance.
 
     Parameters
     ----------
-    object_id : (t,) int or None
-        As the mesh has it.
-    count : int
-        t.
+    object_id : (t,) int
+        As the mesh has it, or as it was found.
     names : dict of int to str, or None
         As `read_instances` gives it; None where the capture has none.
+    names_file : str
+        Where the names come from, for messages.
 
     Returns
     -------
@@ -67,20 +67,17 @@ def assign(object_id: np.ndarray | None, count: int,
         Sorted; each has a triangle.
     warnings : list of str
     """
-    if object_id is None:
-        return (np.zeros(count, np.int32), (Instance(0, "room"),),
-                ["The mesh has no object_id on its faces; the whole room is taken as one object."])
     warnings = []
     present = np.unique(object_id)
     if names is None:
-        warnings.append(f"The capture has no {FILE}; objects are named by their number.")
+        warnings.append(f"The capture has no {names_file}; objects are named by their number.")
         names = {int(i): f"object_{i}" for i in present if 0 <= i <= MAX_ID}
     known = np.isin(present, np.fromiter(names, np.int64, len(names)))
     kept = present[known]
     instances = [Instance(int(i), names[int(i)]) for i in kept]
     idle = sorted(set(names) - {int(i) for i in kept})
     if idle:
-        warnings.append(f"{len(idle)} of the objects in {FILE} have no triangles and are left out: "
+        warnings.append(f"{len(idle)} of the objects in {names_file} have no triangles and are left out: "
                         f"{_few([f'{i} ({names[i]})' for i in idle])}.")
     loose = ~np.isin(object_id, kept)
     result = object_id.copy()
@@ -90,8 +87,8 @@ def assign(object_id: np.ndarray | None, count: int,
             number = next(i for i in range(MAX_ID) if i not in names)
         result[loose] = number
         instances = sorted([*instances, Instance(number, "unlabelled")], key=lambda one: one.object_id)
-        warnings.append(f"{int(loose.sum())} of {count} triangles belong to no object; they become one of their own, "
-                        f"'unlabelled' (object_id {number}).")
+        warnings.append(f"{int(loose.sum())} of {len(object_id)} triangles belong to no object; they become one of "
+                        f"their own, 'unlabelled' (object_id {number}).")
     return result.astype(np.int32), tuple(instances), warnings
 
 

@@ -32,12 +32,18 @@ class PlyMesh(NamedTuple):
         In the order of the file's faces; each index is within the vertices.
     object_id : (t,) int64 or None
     uv : (t, 3, 2) float32 or None
+    face : (t,) int64
+        The file's face that each triangle is part of.
+    corner : (t, 3) int32
+        Which of that face's corners each of the triangle's is.
     """
 
     vertices: np.ndarray
     triangles: np.ndarray
     object_id: np.ndarray | None
     uv: np.ndarray | None
+    face: np.ndarray
+    corner: np.ndarray
 
 
 class _Body(NamedTuple):
@@ -106,21 +112,22 @@ def _parse(content: bytes) -> PlyMesh:
         raise _Damaged("has vertices without x, y and z")
     vertices = np.stack([values[axis] for axis in "xyz"], -1).astype(np.float64)
     if "face" not in found:
-        return PlyMesh(vertices, np.zeros((0, 3), np.int32), None, None)
+        return PlyMesh(vertices, np.zeros((0, 3), np.int32), None, None, np.zeros(0, np.int64),
+                       np.zeros((0, 3), np.int32))
 
     element, starts, lists = found["face"]
     name = next((n for n in INDEX_NAMES if n in lists), None)
     if name is None:
         raise _Damaged("has faces without vertex_indices")
     kinds = {p.name: p for p in element.properties}
-    triangles, source = _triangles(body, lists[name], kinds[name].count_kind, kinds[name].kind, vertices)
+    triangles, source, corner = _triangles(body, lists[name], kinds[name].count_kind, kinds[name].kind, vertices)
     ids = _scalars(body, element, starts, lists, "object_id")
     if ids is not None:
         whole = np.nan_to_num(ids, nan=-1.0, posinf=-1.0, neginf=-1.0) if ids.dtype.kind == "f" else ids
         ids = whole.astype(np.int64)[source]
     pair = next((pair for pair in UV_NAMES if all(values[n] is not None for n in pair)), None)
     uv = None if pair is None else np.stack([values[n] for n in pair], -1).astype(np.float32)[triangles]
-    return PlyMesh(vertices, triangles, ids, uv)
+    return PlyMesh(vertices, triangles, ids, uv, source, corner)
 
 
 def _numbers(text: bytes) -> np.ndarray:
@@ -245,28 +252,39 @@ def _scalars(body: _Body, element: Element, starts: np.ndarray, lists: dict[str,
 
 
 def _triangles(body: _Body, at: np.ndarray, count_kind: str, kind: str,
-               vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Split the polygons whose lists stand at `at`; gives (t, 3) int32 and the face that each came from, (t,)."""
+               vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Split the polygons whose lists stand at `at`.
+
+    Returns
+    -------
+    triangles : (t, 3) int32
+    face : (t,) int64
+        The polygon that each came from.
+    corner : (t, 3) int32
+        Which of its corners they are.
+    """
     counts = body.take(at, count_kind)[:, 0].astype(np.int64)
-    pieces, sources = [np.zeros((0, 3), np.int32)], [np.zeros(0, np.int64)]
-    for corners in np.unique(counts[counts >= 3]):
+    pieces, sources, places = [np.zeros((0, 3), np.int32)], [np.zeros(0, np.int64)], [np.zeros((0, 3), np.int32)]
+    for corners in np.unique(counts[counts >= 3]).tolist():
         faces = np.flatnonzero(counts == corners)
-        values = body.take(at[faces] + body.size(count_kind), kind, int(corners))
+        values = body.take(at[faces] + body.size(count_kind), kind, corners)
         bad = ~((values >= 0) & (values < len(vertices)) & (values == np.floor(values)))
         if bad.any():
             face, corner = np.argwhere(bad)[0]
             raise _Damaged(f"has a face ({faces[face]}) that points to vertex {values[face, corner]} "
                            f"of {len(vertices)}")
         polygon = values.astype(np.int32)
-        fan = np.stack([np.repeat(polygon[:, :1], corners - 2, 1), polygon[:, 1:-1], polygon[:, 2:]], -1)
+        later = np.arange(1, corners - 1)
+        fan = np.broadcast_to(np.stack([0 * later, later, later + 1], -1), (len(faces), corners - 2, 3))
         if corners == 4:
-            a, b, c, d = np.moveaxis(polygon, 1, 0)
-            other = np.stack([np.stack([a, b, d], -1), np.stack([b, c, d], -1)], 1)
+            a, b, c, d = (vertices[polygon[:, i]] for i in range(4))
             with np.errstate(invalid="ignore", over="ignore"):
-                shorter = ((vertices[b] - vertices[d]) ** 2).sum(1) < ((vertices[a] - vertices[c]) ** 2).sum(1)
-            fan = np.where(shorter[:, None, None], other, fan)
-        pieces.append(fan.reshape(-1, 3))
+                shorter = ((b - d) ** 2).sum(1) < ((a - c) ** 2).sum(1)
+            fan = np.where(shorter[:, None, None], [[0, 1, 3], [1, 2, 3]], fan)
+        fan = fan.reshape(len(faces), -1)
+        pieces.append(np.take_along_axis(polygon, fan, 1).reshape(-1, 3))
+        places.append(fan.reshape(-1, 3).astype(np.int32))
         sources.append(np.repeat(faces, corners - 2))
     source = np.concatenate(sources)
     order = np.argsort(source, kind="stable")
-    return np.concatenate(pieces)[order].astype(np.int32), source[order]
+    return np.concatenate(pieces)[order].astype(np.int32), source[order], np.concatenate(places)[order]

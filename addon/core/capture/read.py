@@ -10,11 +10,14 @@ import numpy as np
 from ..errors import BadInputError
 from . import instances
 from .clipping import find_clipping
+from .id_pictures import read_ids
 from .layout import AS_FOUND, Layout, Reading
 from .mesh_repair import repair
 from .model import Capture, Frame, Mesh
+from .parts import connected_parts
 from .pictures import mask_size, picture_size, read_picture
 from .readers import reader_for
+from .vote import vote
 
 MAX_BAD_SHARE = 0.2
 """More bad frames than this share, and the capture is taken as broken instead of the frames as bad."""
@@ -38,17 +41,31 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
         raise BadInputError(f"Capture '{root}' {what}; give the folder that holds the mesh and the poses.")
     reader = reader_for(root, reading.format)
     layout = reader.read(root, reading)
-    mesh, objects, warnings = _objects(layout)
     frames, more = _usable(root, layout)
+    mesh, objects, warnings = _objects(layout, frames)
     clipped, notes = find_clipping(frames, lambda path: read_picture(path).rgb)
     return Capture(root, mesh, objects, clipped, (*warnings, *more, *notes), reader.name)
 
 
-def _objects(layout: Layout) -> tuple[Mesh, tuple, list[str]]:
-    """The mesh repaired, with an instance for each of its triangles."""
+def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str]]:
+    """The mesh repaired, with an instance for each of its triangles.
+
+    What tells the objects: the mesh's faces, objects or groups; else pictures of ids; else which parts hang together.
+    """
     raw, warnings = repair(layout.mesh)
     names = layout.names if layout.names is not None else raw.names
-    ids, objects, more = instances.assign(raw.object_id, len(raw.triangles), names)
+    found = raw.object_id
+    if found is None and any(frame.id_path is not None for frame in frames):
+        found, notes = vote(raw.vertices, raw.triangles, frames, read_ids)
+        warnings += notes
+    elif found is None:
+        found = connected_parts(raw.vertices, raw.triangles)
+        count = int(found.max()) + 1
+        names = {i: f"part_{i}" for i in range(count)} if count > 1 else {0: "room"}
+        warnings.append(f"Nothing tells the mesh's objects; each of its {count} connected parts is taken as one." if
+                        count > 1 else "The mesh has no object_id on its faces and hangs together; the whole room is "
+                        "taken as one object.")
+    ids, objects, more = instances.assign(found, names, layout.names_file or instances.FILE)
     return Mesh(raw.vertices, raw.triangles, ids, raw.uv), objects, warnings + more
 
 

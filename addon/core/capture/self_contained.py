@@ -1,0 +1,184 @@
+"""A copy of a mesh file that names nothing outside of itself: what Blender's importers are given.
+
+Importers follow what a file names: material libraries, pictures, buffers, wherever they lie. Of a mesh only its surface
+is wanted, so the copy has no materials and pictures at all, and its buffers lie beside it.
+glTF: registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, sections 3.6 (buffers) and 4.4 (the binary container).
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import struct
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
+from urllib.parse import unquote
+
+from ..errors import BadInputError
+
+MAX_JSON = 1 << 28
+"""Bytes of glTF's JSON part that are read at most."""
+MAX_BARE = 1 << 24
+"""Elements that an accessor without a buffer may claim: they are zeros that the importer makes up."""
+DROPPED = ("materials", "textures", "images", "samplers", "animations", "skins", "cameras", "extensions")
+COMPRESSED = "KHR_draco_mesh_compression"
+OBJ_DROPPED = re.compile(rb"^\s*(mtllib|usemtl|usemap|maplib|call|csh)\b")
+BLOCK = 1 << 20
+
+
+def copy_obj(path: Path, folder: Path) -> tuple[Path, bool]:
+    """Copy the OBJ file `path` into `folder` without its materials.
+
+    Returns
+    -------
+    copy : Path
+    named : bool
+        Whether it has objects (`o`); else its groups (`g`) are what tells its parts.
+
+    Raises
+    ------
+    OSError
+        It can't be read, or the copy not written.
+    """
+    copy, named, inside = folder / "mesh.obj", False, False
+    with open(path, "rb") as source, open(copy, "wb") as target:
+        # Lines of bounded length: a file without line ends is no reason to hold all of it.
+        while line := source.readline(BLOCK):
+            dropped = inside or OBJ_DROPPED.match(line) is not None
+            inside = dropped and line.rstrip(b"\r\n").endswith(b"\\")
+            named |= line.startswith(b"o ")
+            if not dropped:
+                target.write(line)
+    return copy, named
+
+
+def copy_gltf(path: Path, folder: Path) -> Path:
+    """Copy the glTF or GLB file `path` into `folder`: geometry and nodes only, its buffers beside it.
+
+    Raises
+    ------
+    BadInputError
+        It is damaged, or names buffers outside of its folder.
+    OSError
+        It can't be read, or the copy not written.
+    """
+    top, binary = _read(path)
+    if not isinstance(top.get("asset"), dict) or not str(top["asset"].get("version", "")).startswith("2"):
+        raise BadInputError(f"Mesh '{path}' is no glTF 2.0; export it again.")
+    sizes = []
+    for i, buffer in enumerate(_list(top, "buffers", path)):
+        target = folder / f"buffer{i}.bin"
+        uri = buffer.get("uri")
+        if uri is None:
+            if i or binary is None:
+                raise BadInputError(f"Mesh '{path}' has a buffer ({i}) without content; export it again.")
+            _copy_part(path, target, *binary)
+        elif isinstance(uri, str) and uri.startswith("data:"):
+            _decode(path, uri, target)
+        else:
+            shutil.copyfile(_beside(path, uri), target)
+        buffer["uri"] = target.name
+        sizes.append(target.stat().st_size)
+        if not _count(buffer.get("byteLength")) <= sizes[-1]:
+            raise BadInputError(f"Mesh '{path}' has a buffer ({i}) that is cut off; copy or export it again.")
+    _check_sizes(top, sizes, path)
+    for name in DROPPED:
+        top.pop(name, None)
+    for mesh in _list(top, "meshes", path):
+        for primitive in _list(mesh, "primitives", path):
+            primitive.pop("material", None)
+            kept = primitive.get("extensions")
+            kept = {COMPRESSED: kept[COMPRESSED]} if isinstance(kept, dict) and COMPRESSED in kept else {}
+            primitive["extensions"] = kept
+    for node in _list(top, "nodes", path):
+        for name in ("skin", "camera", "extensions"):
+            node.pop(name, None)
+    for name in ("extensionsUsed", "extensionsRequired"):
+        top[name] = [one for one in top.get(name) or [] if one in (COMPRESSED, "KHR_mesh_quantization")]
+        if not top[name]:
+            del top[name]
+    copy = folder / "mesh.gltf"
+    copy.write_text(json.dumps(top))
+    return copy
+
+
+def _read(path: Path) -> tuple[dict[str, Any], tuple[int, int] | None]:
+    """The JSON part, and where the binary part begins and how long it is."""
+    with open(path, "rb") as file:
+        head = file.read(20)
+        binary = None
+        if head[:4] == b"glTF":
+            if len(head) < 20 or head[16:20] != b"JSON":
+                raise BadInputError(f"Mesh '{path}' is damaged or cut off; copy or export it again.")
+            length = struct.unpack("<I", head[12:16])[0]
+            text = file.read(min(length, MAX_JSON))
+            chunk = file.read(8)
+            if len(chunk) == 8 and chunk[4:] == b"BIN\0":
+                binary = 28 + length, struct.unpack("<I", chunk[:4])[0]
+        else:
+            text = head + file.read(MAX_JSON)
+    try:
+        top = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise BadInputError(f"Mesh '{path}' is no glTF, or damaged; copy or export it again.") from error
+    if not isinstance(top, dict):
+        raise BadInputError(f"Mesh '{path}' is no glTF; export it again.")
+    return top, binary
+
+
+def _list(value: dict[str, Any], name: str, path: Path) -> list[dict[str, Any]]:
+    """The list of objects `name`, empty where absent."""
+    found = value.get(name, [])
+    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+        raise BadInputError(f"Mesh '{path}' has '{name}' that are no list of objects; export it again.")
+    return found
+
+
+def _count(value: Any) -> float:
+    """A count or size as the file gives it; inf where it is none."""
+    return value if isinstance(value, int) and not isinstance(value, bool) and value >= 0 else float("inf")
+
+
+def _beside(path: Path, uri: Any) -> Path:
+    """The file that `uri` names, which has to lie in the folder of `path` or below."""
+    name = unquote(uri) if isinstance(uri, str) else ""
+    kinds = PurePosixPath(name), PureWindowsPath(name)
+    if not name or "\0" in name or "://" in name or any(
+            kind.is_absolute() or kind.drive or kind.root or ".." in kind.parts for kind in kinds):
+        raise BadInputError(f"Mesh '{path}' names the buffer {str(uri)[:80]!r}, which does not lie beside it; "
+                            "export it as one GLB file.")
+    found = path.parent / name
+    if not found.is_file():
+        raise BadInputError(f"Mesh '{path}' names the buffer '{found}', which is not there; copy it as well.")
+    return found
+
+
+def _copy_part(path: Path, target: Path, begin: int, length: int) -> None:
+    with open(path, "rb") as source, open(target, "wb") as file:
+        source.seek(begin)
+        while length > 0 and (block := source.read(min(length, BLOCK))):
+            file.write(block)
+            length -= len(block)
+
+
+def _decode(path: Path, uri: str, target: Path) -> None:
+    import base64
+    import binascii
+
+    try:
+        target.write_bytes(base64.b64decode(uri.partition(",")[2], validate=True))
+    except (binascii.Error, ValueError) as error:
+        raise BadInputError(f"Mesh '{path}' has a damaged buffer; export it again.") from error
+
+
+def _check_sizes(top: dict[str, Any], sizes: list[int], path: Path) -> None:
+    """Compare what views and accessors claim with what there is: importers take them at their word."""
+    for view in _list(top, "bufferViews", path):
+        buffer = view.get("buffer")
+        end = _count(view.get("byteOffset", 0)) + _count(view.get("byteLength"))
+        if _count(buffer) >= len(sizes) or end > sizes[buffer]:
+            raise BadInputError(f"Mesh '{path}' points beyond its buffers: it is damaged; export it again.")
+    for accessor in _list(top, "accessors", path):
+        if not _count(accessor.get("count")) <= (MAX_BARE if "bufferView" not in accessor else sum(sizes)):
+            raise BadInputError(f"Mesh '{path}' claims more values than it holds: it is damaged; export it again.")

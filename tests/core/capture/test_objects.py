@@ -1,0 +1,126 @@
+"""Where no face carries an object: pictures of ids, connected parts, one object."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from addon.core.capture.exr import write_exr
+from addon.core.capture.id_pictures import read_ids
+from addon.core.capture.model import Frame
+from addon.core.capture.parts import MOST, connected_parts
+from addon.core.capture.png import write_png
+from addon.core.capture.read import read_capture
+from addon.core.capture.vote import vote
+from addon.core.errors import BadInputError
+from addon.core.surface.rays import RayScene
+from tests.core.rooms import all_round, lit_box, make_room
+
+
+def boxes(*places, size=1.0):
+    """Cubes of 12 triangles each whose vertices are listed anew for every triangle, as an STL has them."""
+    corners = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float) * size
+    quads = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
+    faces = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
+    soup = np.concatenate([corners[faces].reshape(-1, 3) + place for place in places])
+    return soup, np.arange(len(soup)).reshape(-1, 3)
+
+
+def test_parts_are_welded_by_place():
+    vertices, triangles = boxes((0, 0, 0), (3, 0, 0), (0, 5, 0))
+    part = connected_parts(vertices, triangles).reshape(3, 12)
+    assert (part == part[:, :1]).all() and sorted(part[:, 0].tolist()) == [0, 1, 2]
+
+
+def test_the_greatest_part_comes_first_and_crumbs_join_the_nearest():
+    small, a = boxes((0, 0, 0))
+    large, b = boxes((3, 0, 0), size=4)
+    crumb, c = boxes((-0.1, 0, 0), size=0.01)
+    vertices = np.concatenate([small, large, crumb])
+    part = connected_parts(vertices, np.concatenate([a, b + len(small), c + len(small) + len(large)]))
+    assert part.tolist() == [1] * 12 + [0] * 12 + [1] * 12
+
+
+def test_the_number_of_parts_is_bounded():
+    part = connected_parts(*boxes(*((3.0 * i, 0, 0) for i in range(MOST + 9))))
+    assert np.unique(part).tolist() == list(range(MOST))
+
+
+def test_a_capture_of_loose_parts_gets_an_object_for_each(capture, text_of_ply):
+    vertices, triangles = boxes((0, 0, 0), (3, 0, 0))
+    capture.mesh(text_of_ply(vertices.tolist(), triangles.tolist()))
+    (capture.root / "info_semantic.json").unlink()
+    read = read_capture(capture.root)
+    assert [one.class_name for one in read.instances] == ["part_0", "part_1"]
+    assert any("2 connected parts" in warning for warning in read.warnings)
+
+
+@pytest.fixture(scope="module")
+def room():
+    return make_room(lit_box(lamps=(((0.3, 0.7), (0.3, 0.7)),)), 0.1)
+
+
+def seen_ids(room, camera):
+    """What a renderer would write: the object behind each pixel."""
+    directions = camera.directions(camera.pixel_centres())
+    origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
+    triangle = RayScene(room.mesh.vertices, room.mesh.triangles).intersect(origins, directions).triangle
+    return room.mesh.object_id[triangle].reshape(camera.height, camera.width).astype(np.int64)
+
+
+def frames_of(room, tmp_path, change=lambda ids: ids, ending="exr"):
+    frames = []
+    for i, camera in enumerate(all_round((1.7, 1.3, 1.1), 40)):
+        path = tmp_path / f"{i}.{ending}"
+        ids = change(seen_ids(room, camera))
+        if ending == "exr":
+            write_exr(path, np.repeat(ids[..., None], 3, -1).astype(np.float32))
+        else:
+            write_png(path, np.stack([ids % 256, ids // 256 % 256, ids // 65536], -1).astype(np.uint8))
+        frames.append(Frame(f"{i}", path, camera, id_path=path))
+    return frames
+
+
+@pytest.mark.parametrize("ending, shift", [("exr", 0), ("exr", 70_001), ("png", 0), ("png", 70_001)])
+def test_the_vote_finds_the_objects(room, tmp_path, ending, shift):
+    frames = frames_of(room, tmp_path, lambda ids: ids + shift, ending)
+    found, notes = vote(room.mesh.vertices, room.mesh.triangles, frames, read_ids)
+    assert (found == room.mesh.object_id + shift).mean() > 0.99
+    assert "voted" in notes[0]
+
+
+def test_the_vote_outlives_wrong_pixels_and_a_damaged_picture(room, tmp_path):
+    rng = np.random.default_rng(0)
+    frames = frames_of(room, tmp_path, lambda ids: np.where(rng.random(ids.shape) < 0.02, 99, ids))
+    (tmp_path / "cut.exr").write_bytes(b"v/1\x01")
+    frames.append(replace(frames[0], id_path=tmp_path / "cut.exr"))
+    found, notes = vote(room.mesh.vertices, room.mesh.triangles, frames, read_ids)
+    assert (found == room.mesh.object_id).mean() > 0.99
+    assert "1 pictures of ids can't be used" in notes[1]
+
+
+def test_what_no_pixel_sees_takes_its_neighbours_ids(room, tmp_path):
+    frames = frames_of(room, tmp_path)
+    hidden, extra = boxes((50, 50, 50))
+    vertices = np.concatenate([room.mesh.vertices, hidden])
+    triangles = np.concatenate([room.mesh.triangles, extra + len(room.mesh.vertices)])
+    found, _ = vote(vertices, triangles, frames[:1], read_ids)
+    assert set(found.tolist()) <= set(room.mesh.object_id.tolist())
+    assert len(set(found[-12:].tolist())) == 1
+
+
+def test_pictures_that_are_no_ids_are_told(room, tmp_path):
+    [frame, *_] = frames_of(room, tmp_path)
+    for values, told in ((0.5, "between whole numbers"), (np.nan, "not finite"), (3e7, "float can't hold")):
+        write_exr(frame.id_path, np.full((frame.camera.height, frame.camera.width, 3), values, np.float32))
+        with pytest.raises(BadInputError, match=told):
+            vote(room.mesh.vertices, room.mesh.triangles, [frame], read_ids)
+    write_exr(frame.id_path, np.zeros((3, 4, 3), np.float32))
+    with pytest.raises(BadInputError, match="4 x 3 pixels"):
+        vote(room.mesh.vertices, room.mesh.triangles, [frame], read_ids)
+    away = replace(frame, camera=replace(frame.camera, camera_to_world=np.eye(4) + 1e3 * np.eye(4, k=3)))
+    write_exr(frame.id_path, np.zeros((frame.camera.height, frame.camera.width, 3), np.float32))
+    with pytest.raises(BadInputError, match="shows any of the mesh"):
+        vote(room.mesh.vertices, room.mesh.triangles, [away], read_ids)

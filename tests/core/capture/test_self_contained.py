@@ -1,0 +1,73 @@
+"""Copies of mesh files name nothing else, and what a damaged or hostile one claims is found before it is used."""
+
+from __future__ import annotations
+
+import json
+import struct
+
+import pytest
+
+from addon.core.capture.self_contained import copy_gltf, copy_obj
+from addon.core.errors import BadInputError
+
+
+def gltf(**changes):
+    return {"asset": {"version": "2.0"}, "buffers": [{"uri": "mesh.bin", "byteLength": 12}],
+            "bufferViews": [{"buffer": 0, "byteLength": 12}], "accessors": [{"bufferView": 0, "count": 1}],
+            "images": [{"uri": "/etc/passwd"}], "materials": [{}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 0}]}], "nodes": [{"mesh": 0}],
+            **changes}  # fmt: skip
+
+
+def test_an_obj_loses_its_libraries(tmp_path):
+    (tmp_path / "a.obj").write_text("mtllib ../one.mtl \\\n ../two.mtl\no chair\nv 0 0 0\n  usemtl wood\ncall x.obj\n")
+    (tmp_path / "copy").mkdir()
+    copy, named = copy_obj(tmp_path / "a.obj", tmp_path / "copy")
+    assert named and copy.read_text() == "o chair\nv 0 0 0\n"
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_a_gltf_keeps_its_surface_only(tmp_path, binary):
+    top = gltf()
+    if binary:
+        del top["buffers"][0]["uri"]
+        text = json.dumps(top).encode()
+        (tmp_path / "a.gltf").write_bytes(b"glTF" + struct.pack("<III4s", 2, 0, len(text), b"JSON") + text
+                                          + struct.pack("<I4s", 12, b"BIN\0") + b"A" * 12)
+    else:
+        (tmp_path / "mesh.bin").write_bytes(b"A" * 12)
+        (tmp_path / "a.gltf").write_text(json.dumps(top))
+    (tmp_path / "copy").mkdir()
+    copy = json.loads(copy_gltf(tmp_path / "a.gltf", tmp_path / "copy").read_text())
+    assert "images" not in copy and "materials" not in copy and "material" not in copy["meshes"][0]["primitives"][0]
+    assert copy["buffers"][0]["uri"] == "buffer0.bin" and (tmp_path / "copy/buffer0.bin").read_bytes() == b"A" * 12
+
+
+@pytest.mark.parametrize("changes, told", [
+    ({"buffers": [{"uri": "../mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
+    ({"buffers": [{"uri": "%2e%2e/mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
+    ({"buffers": [{"uri": "C:\\mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
+    ({"buffers": [{"uri": "http://x/mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
+    ({"buffers": [{"uri": "no.bin", "byteLength": 12}]}, "is not there"),
+    ({"buffers": [{"uri": "data:;base64,%%%", "byteLength": 12}]}, "damaged buffer"),
+    ({"buffers": [{"byteLength": 12}]}, "without content"),
+    ({"buffers": [{"uri": "mesh.bin", "byteLength": 13}]}, "cut off"),
+    ({"buffers": 7}, "no list of objects"),
+    ({"bufferViews": [{"buffer": 0, "byteLength": 1 << 40}]}, "beyond its buffers"),
+    ({"bufferViews": [{"buffer": "0", "byteLength": 1}]}, "beyond its buffers"),
+    ({"accessors": [{"count": 1 << 40}]}, "more values than it holds"),
+    ({"asset": {"version": "1.0"}}, "no glTF 2.0"),
+])
+def test_what_is_wrong_with_a_gltf_is_one_sentence(tmp_path, changes, told):
+    (tmp_path / "mesh.bin").write_bytes(b"A" * 12)
+    (tmp_path / "a.gltf").write_text(json.dumps(gltf(**changes)))
+    (tmp_path / "copy").mkdir()
+    with pytest.raises(BadInputError, match=told):
+        copy_gltf(tmp_path / "a.gltf", tmp_path / "copy")
+
+
+@pytest.mark.parametrize("content", [b"", b"glTF", b"glTF" + bytes(30), b"[1]", b"{", b"[" * 100_000])
+def test_no_gltf_at_all(tmp_path, content):
+    (tmp_path / "a.glb").write_bytes(content)
+    with pytest.raises(BadInputError):
+        copy_gltf(tmp_path / "a.glb", tmp_path)
