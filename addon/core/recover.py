@@ -40,7 +40,7 @@ from .store import Store, key
 from .surface.build import Surface, build_surface, from_uv, turned
 from .surface.denoise import without_noise
 
-CODE = 12
+CODE = 13
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -237,7 +237,7 @@ class Recovery:
                     surface.mesh, self.capture.instances, surface.atlas, surface.scene, known, sky,
                     sampler=s.shading, rays=s.shading_rays, emitter_rays=s.emitter_rays, portal_rays=s.portal_rays,
                     interpolate=s.interpolate, threads=s.threads, seed=s.seed, progress=self.progress,
-                    find_mirrors=self._find_mirrors if s.mirrors else None,
+                    find_mirrors=self._find_mirrors if s.mirrors else None, noise=surface.noise,
                 )  # fmt: skip
 
             found = shade_clipped(shaded, lit, surface.atlas)

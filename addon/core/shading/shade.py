@@ -84,6 +84,7 @@ def shade(
     seed: int = 0,
     progress: Progress | None = None,
     find_mirrors: Callable[[LightField, tuple[Lamp, ...]], tuple[Mirror, ...]] | None = None,
+    noise: float = 0.0,
 ) -> Shading:
     """Lamps, irradiance and albedo (Haefner et al. 2021, sec. 3.2, with aimed rays and interpolation by default).
 
@@ -91,6 +92,8 @@ def shade(
     ----------
     find_mirrors : callable, optional
         Tells the flat mirrors once the lamps are known; light is then followed over them.
+    noise : float
+        Metres, what was taken out of the mesh's vertices.
 
     Raises
     ------
@@ -149,7 +152,7 @@ def shade(
         interpolate=interpolate, finest=finest, progress=progress, **how,
     )  # fmt: skip
     # A noisy mesh faces elsewhere than the surface did.
-    unsure = np.hypot(unsure, tilt(mesh)[atlas.triangle])
+    unsure = np.hypot(unsure, tilt(mesh, noise)[atlas.triangle])
     rho, valid = quotient(lit_diffuse.radiance, E)
     albedo = fill(atlas, rho, valid & seen, class_of, emitters, np.hypot(doubt(lit_diffuse), unsure))
     return Shading(E, escaped, unsure, field.radiance, albedo, lamps, light.environment, light.notes, mirrors, points)

@@ -136,6 +136,20 @@ def _solve(system: sparse.csr_matrix, right: np.ndarray, guess: np.ndarray | Non
     return cg(system, right, guess, rtol=TOLERANCE, maxiter=MOST_STEPS, M=scaled)[0]
 
 
+def _linear(
+    points: np.ndarray, normal: np.ndarray, hinges: Hinges, noise: float, scale: float
+) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix, sparse.csr_matrix]:
+    """Angles, their weights, their change by each point's way along its normal, and the normal equations' matrix."""
+    count = len(points)
+    theta, gradient = dihedral(points, hinges, FLOOR * noise)
+    weight = 1 / (scale**2 + theta**2)
+    ends = (hinges.a, hinges.b, hinges.c, hinges.d)
+    values = np.concatenate([(by * normal[at]).sum(1) for by, at in zip(gradient, ends)])
+    rows = np.tile(np.arange(len(theta)), 4)
+    change = sparse.csr_matrix((values, (rows, np.concatenate(ends))), (len(theta), count))
+    return theta, weight, change, (sparse.eye(count) / noise**2 + change.T @ sparse.diags(weight) @ change).tocsr()
+
+
 def _within(points: np.ndarray, measured: np.ndarray, farthest: float) -> np.ndarray:
     way = points - measured
     length = np.linalg.norm(way, axis=1, keepdims=True)
@@ -179,18 +193,12 @@ def denoised(mesh: Mesh, noise: float) -> np.ndarray:
     faces = faces[real]
     if not len(faces):
         return mesh.vertices
-    count, hinges = len(measured), hinges_of(faces)
-    rows = np.tile(np.arange(len(hinges.a)), 4)
-    columns = np.concatenate([hinges.a, hinges.b, hinges.c, hinges.d])
+    hinges = hinges_of(faces)
     points = _within(_unfolded(measured, faces, noise), measured, FARTHEST * noise)
     for scale in SCALES:
         normal = point_normals(points, faces)
-        theta, gradient = dihedral(points, hinges, FLOOR * noise)
-        weight = 1 / (scale**2 + theta**2)
-        by_point = [(by * normal[at]).sum(1) for by, at in zip(gradient, (hinges.a, hinges.b, hinges.c, hinges.d))]
-        change = sparse.csr_matrix((np.concatenate(by_point), (rows, columns)), (len(theta), count))
+        theta, weight, change, system = _linear(points, normal, hinges, noise, scale)
         gone = ((points - measured) * normal).sum(1)
-        system = (sparse.eye(count) / noise**2 + change.T @ sparse.diags(weight) @ change).tocsr()
         step = _solve(system, -gone / noise**2 - change.T @ (weight * theta))
         # The angles are linear over small steps only.
         points = points + np.clip(step, -noise, noise)[:, None] * normal

@@ -14,6 +14,9 @@ LEAST_VERTICES = 100
 TILT = 1.2
 """Radians by which a triangle of height 1 is tilted by vertices off by 1: each of three vertices adds its share."""
 MOST = 3.0
+LEFT = 0.5
+"""Share of a tilt that is left once the noise is taken out (`denoise`): in the living room 0.2 to 0.3 in the median,
+0.6 to 0.9 in the root mean square, as triangles lower than the noise stay wrong."""
 
 
 def noise_of(mesh: Mesh) -> float:
@@ -37,13 +40,14 @@ def noise_of(mesh: Mesh) -> float:
     return float(np.median(np.abs(second[inner])) / 0.6745 / np.sqrt((1 + 1 / d) ** 2 + 1 / d))
 
 
-def tilt(mesh: Mesh) -> np.ndarray:
+def tilt(mesh: Mesh, taken_out: float = 0.0) -> np.ndarray:
     """Standard deviation in radians by which noise tilts each triangle, (t,) float32; 0 for a mesh without noise.
 
+    `taken_out` is the noise in metres that the mesh had before it was denoised; 0: it was not.
     That is about the relative error of the irradiance there: of light from one side, E changes with the cosine.
     """
-    noise = noise_of(mesh)
-    if noise < LEAST_NOISE:
+    noise = LEFT * taken_out if taken_out else noise_of(mesh)
+    if not taken_out and noise < LEAST_NOISE:
         return np.zeros(len(mesh.triangles), np.float32)
     corners = mesh.vertices[mesh.triangles]
     longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
