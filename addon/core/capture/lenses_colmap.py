@@ -5,6 +5,7 @@ Source: COLMAP's doc/cameras.rst and src/colmap/sensor/models.h (4.x), which als
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -42,7 +43,13 @@ def polynomial(name: str, *, fisheye: bool = False, numerator: Sequence[float] =
     parts = [tuple(float(c) for c in part) for part in (numerator, denominator, tangential, prism)]
     if not fisheye and not any(any(part) for part in parts):
         return None
-    return Polynomial(name, fisheye, *parts, chained=chained)
+    return _shared(name, fisheye, *parts, chained)
+
+
+@functools.lru_cache(maxsize=1024)
+def _shared(*values) -> Polynomial:
+    """One lens for all frames of one camera: what it finds out of itself is found once."""
+    return Polynomial(*values)
 
 
 def _fov(p: Sequence[float]) -> Lens | None:

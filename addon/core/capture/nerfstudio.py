@@ -1,4 +1,4 @@
-"""Frames from a nerfstudio `transforms.json`.
+"""Captures in nerfstudio's layout: `transforms.json`, or the split files of the NeRF-synthetic scenes.
 
 A frame that can't be used becomes a problem in a list, so that one bad frame does not hide the next; what is wrong with
 the whole file is raised.
@@ -7,28 +7,42 @@ the whole file is raised.
 from __future__ import annotations
 
 import math
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
 from typing import Any
+
+import numpy as np
 
 from ..errors import BadInputError
 from . import instances
 from .jsonfile import is_number, read_json
-from .layout import Layout, Reader, Reading
-from .meshes import find_mesh, read_mesh
-from .model import Camera, Frame
-from .pictures import picture_size
+from .layout import Layout, RawMesh, Reader, Reading
+from .meshes import MESH, find_mesh, read_mesh
+from .model import Frame
+from .nerfstudio_camera import check_model, lens_notes, positive, read_camera
+from .paths import EscapesError, inside
 from .pose import check_pose
 
-FILES = ("transforms.json", "transforms_train.json")
-MODELS = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE")
-DISTORTION = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2")
+FILE = "transforms.json"
+SPLITS = ("transforms_train.json", "transforms_val.json")
+"""Read one after the other where `FILE` is absent; the test split is left alone."""
+TEST_SPLIT = "transforms_test.json"
 ENDING = ".exr"
 """Tried where `file_path` has none, as in the NeRF-synthetic scenes."""
+BEFORE = [[0.0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]]
+"""What nerfstudio did to COLMAP's world before it wrote down `applied_transform`."""
+ORIGINAL_MESH, STORED_MESH = "mesh-original", "mesh-stored"
+"""Values of `Reading.convention`: the mesh is in the world before `applied_transform`, or in the poses'."""
+MOST, FEW = 0.9, 0.1
+"""The mesh counts as one of the original world where, moved to the poses' world, its box holds more than `MOST` of the
+cameras, and else fewer than `FEW`."""
 
 
-def find(root: Path) -> Path | None:
-    """The file of poses in the capture `root`, or None."""
-    return next((root / name for name in FILES if (root / name).is_file()), None)
+def find(root: Path) -> list[Path]:
+    """The files of poses in the capture `root`."""
+    if (root / FILE).is_file():
+        return [root / FILE]
+    return [root / name for name in SPLITS if (root / name).is_file()]
 
 
 def read(root: Path, reading: Reading) -> Layout:
@@ -37,62 +51,96 @@ def read(root: Path, reading: Reading) -> Layout:
     Raises
     ------
     BadInputError
-        The file is not JSON, lists no frames, has distorted frames, or leads out of the capture's folder; the mesh or
-        the list of objects can't be read.
+        A file is not JSON, lists no frames, has an unknown lens, or leads out of the capture's folder; the mesh or the
+        list of objects can't be read.
     """
-    mesh = read_mesh(find_mesh(root, reading), reading)
+    paths = find(root) or [root / FILE]
+    top = read_json(paths[0])
+    mesh = read_mesh(_mesh_path(root, top, reading), reading)
     semantic = root / instances.FILE
     names = instances.read_instances(semantic) if semantic.exists() else None
-    frames, problems, notes = read_frames(root)
-    return Layout(frames, mesh, names, instances.FILE, problems, notes)
+    frames, problems, notes = read_frames(root, reading)
+    mesh, more = _in_frames_world(mesh, root, top, frames, reading)
+    return Layout(frames, mesh, names, instances.FILE, problems, notes + more)
 
 
-def read_frames(root: Path) -> tuple[list[Frame], list[str], list[str]]:
+def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], list[str]]:
     """All frames that the capture `root` lists, sentences on those that can't be used, and on what may mean else."""
-    path = find(root) or root / FILES[0]
-    top = read_json(path)
-    entries = top.get("frames")
-    if not isinstance(entries, list) or not entries:
-        raise BadInputError(f"'{path}' lists no frames; export the capture again.")
-    _check_lens(top, top, path)
-    names = [_name(entry, i) for i, entry in enumerate(entries)]
+    listed: list[tuple[dict[str, Any], Any, Path]] = []
+    notes: list[str] = []
+    for path in find(root) or [root / FILE]:
+        top = read_json(path)
+        entries = top.get("frames")
+        if not isinstance(entries, list) or not entries:
+            raise BadInputError(f"'{path}' lists no frames; export the capture again.")
+        entries, said = _without_test(top, entries)
+        listed += [(top, entry, path) for entry in entries]
+        notes += said + _unexposed(top, entries) + lens_notes(top, entries) + _orientation(top)
+    if (root / TEST_SPLIT).is_file() and not (root / FILE).is_file():
+        notes.append(f"The frames of '{TEST_SPLIT}' were left out; put those to be used into '{FILE}'.")
+    names = [_name(entry, i) for i, (_, entry, _) in enumerate(listed)]
     if len(set(names)) < len(names):  # left/0001 and right/0001: tell them apart by their folders
         names = [str(entry.get("file_path", i)) if isinstance(entry, dict) else str(i)
-                 for i, entry in enumerate(entries)]
+                 for i, (_, entry, _) in enumerate(listed)]
     frames: list[Frame] = []
     problems: list[str] = []
     seen: set[Path] = set()
-    for name, entry in zip(names, entries):
+    for name, (top, entry, path) in zip(names, listed):
         if not isinstance(entry, dict):
             problems.append(f"Frame '{name}' is no JSON object in '{path}'.")
             continue
-        _check_lens(top, entry, path)
+        model = check_model(top, entry, path)
         try:
-            frame = _frame(root, top, entry, name)
+            frame = _frame(root, top, entry, name, model, reading)
             if frame.path in seen:
                 raise BadInputError(f"Frame '{name}' is listed twice; keep the entry with the right pose.")
+        except EscapesError:
+            raise
         except BadInputError as error:
-            if isinstance(error, _Escapes):
-                raise
             problems.append(str(error))
             continue
         seen.add(frame.path)
         frames.append(frame)
-    return frames, problems, _unexposed(top, names, entries)
+    return frames, problems, list(dict.fromkeys(notes))
 
 
-def _unexposed(top: dict[str, Any], names: list[str], entries: list[Any]) -> list[str]:
+def _without_test(top: dict[str, Any], entries: list[Any]) -> tuple[list[Any], list[str]]:
+    """The entries without those that are for testing alone (`test_filenames`), and a sentence on them."""
+
+    def split(key: str) -> set[str]:
+        value = top.get(key)
+        return {_plain(v) for v in value if isinstance(v, str)} if isinstance(value, list) else set()
+
+    test = split("test_filenames") - split("train_filenames")
+    kept = [e for e in entries if not (isinstance(e, dict) and isinstance(e.get("file_path"), str)
+                                       and _plain(e["file_path"]) in test)]  # fmt: skip
+    if not kept or len(kept) == len(entries):
+        return entries, []
+    return kept, [f"{len(entries) - len(kept)} of {len(entries)} frames are listed in 'test_filenames' and were left "
+                  "out; take them out of that list to use them."]
+
+
+def _plain(path: str) -> str:
+    return PurePosixPath(path.replace("\\", "/")).as_posix()
+
+
+def _unexposed(top: dict[str, Any], entries: list[Any]) -> list[str]:
     """A sentence where some frames state an exposure and others don't."""
     stated = [isinstance(entry, dict) and entry.get("exposure") is not None for entry in entries]
     if not any(stated) or all(stated) or top.get("exposure") is not None:
         return []
-    first = names[stated.index(False)]
-    return [f"{stated.count(False)} of {len(stated)} frames state no exposure (the first: '{first}'); it was taken as "
-            "1; give each frame its own."]
+    index = stated.index(False)
+    return [f"{stated.count(False)} of {len(stated)} frames state no exposure (the first: "
+            f"'{_name(entries[index], index)}'); it was taken as 1; give each frame its own."]
 
 
-class _Escapes(BadInputError):
-    """A path leads out of the capture's folder: no slip of one frame, so it is told at once."""
+def _orientation(top: dict[str, Any]) -> list[str]:
+    """A sentence where nerfstudio itself would turn the world before it uses it."""
+    method = top.get("orientation_override")
+    if method in (None, "none"):
+        return []
+    return [f"The file asks nerfstudio to turn the world upright ('orientation_override' is '{method}'); the poses "
+            "were taken as stored, with +Z up."]
 
 
 def _name(entry: Any, index: int) -> str:
@@ -100,23 +148,9 @@ def _name(entry: Any, index: int) -> str:
     return (isinstance(path, str) and PurePosixPath(path.replace("\\", "/")).stem) or f"#{index}"
 
 
-def _check_lens(top: dict[str, Any], entry: dict[str, Any], path: Path) -> None:
-    """Raise `BadInputError` where the frames are not those of a pinhole camera."""
-    model = entry.get("camera_model", top.get("camera_model", MODELS[0]))
-    if model not in MODELS:
-        raise BadInputError(f"'{path}' has frames of camera model '{model}', which aren't supported yet; "
-                            "undistort them to a pinhole camera.")
-    values = [entry.get(name, 0) for name in DISTORTION]
-    listed = entry.get("distortion_params")
-    values += listed if isinstance(listed, list) else []
-    if any(value not in (0, None) for value in values):
-        raise BadInputError(f"'{path}' has distorted frames, which aren't supported yet; "
-                            "undistort them and set k1 to k6, p1 and p2 to 0.")
-
-
-def _frame(root: Path, top: dict[str, Any], entry: dict[str, Any], name: str) -> Frame:
+def _frame(root: Path, top: dict[str, Any], entry: dict[str, Any], name: str, model: str, reading: Reading) -> Frame:
     """One frame; raises `BadInputError` where it can't be used."""
-    path = _inside(root, entry.get("file_path"), name)
+    path = inside(root, entry.get("file_path"), name, reading.outside)
     ended = path.with_name(path.name + ENDING)
     try:
         if not path.is_file() and (not path.suffix or ended.is_file()):
@@ -125,61 +159,89 @@ def _frame(root: Path, top: dict[str, Any], entry: dict[str, Any], name: str) ->
         raise BadInputError(f"Frame '{name}' has a file_path that can't be a file; mend it.") from error
     mask = entry.get("mask_path")
     pose = check_pose(entry.get("transform_matrix"), name)
-    exposure = _positive(top, entry, "exposure", name, 1.0)
-    saturation = _positive(top, entry, "saturation", name, math.inf)
-    size = [_positive(top, entry, key, name, None) for key in ("w", "h")]
-    if None in size:
-        size = list(picture_size(path))
-    if any(value != int(value) for value in size):
-        raise BadInputError(f"Frame '{name}' has a size of {size[0]} x {size[1]}; give whole pixels as w and h.")
-    width, height = (int(value) for value in size)
-    fx, fy = _focal_lengths(top, entry, name, width, height)
-    centre = [entry.get(key, top.get(key, half)) for key, half in (("cx", width / 2), ("cy", height / 2))]
-    if not all(is_number(value) for value in centre):
-        raise BadInputError(f"Frame '{name}' has a principal point that is no number; mend its cx and cy.")
-    camera = Camera(width, height, fx, fy, float(centre[0]), float(centre[1]), pose)
-    mask_path = None if mask in (None, "") else _inside(root, mask, name)
+    exposure = positive(top, entry, "exposure", name, 1.0)
+    saturation = positive(top, entry, "saturation", name, math.inf)
+    camera = read_camera(top, entry, name, path, model, pose)
+    mask_path = None if mask in (None, "") else inside(root, mask, name, reading.outside)
     return Frame(name, path, camera, mask_path, exposure, saturation)
 
 
-def _focal_lengths(top: dict[str, Any], entry: dict[str, Any], name: str, width: int,
-                   height: int) -> tuple[float, float]:
-    fx = _positive(top, entry, "fl_x", name, None)
-    fy = _positive(top, entry, "fl_y", name, None)
-    for key, extent in (("camera_angle_x", width), ("camera_angle_y", height)):
-        angle = _positive(top, entry, key, name, None)
-        if angle is not None and not angle < math.pi:
-            raise BadInputError(f"Frame '{name}' has a {key} of {angle}; give radians below pi.")
-        if angle is not None and key == "camera_angle_x":
-            fx = fx or extent / 2 / math.tan(angle / 2)
-        elif angle is not None:
-            fy = fy or extent / 2 / math.tan(angle / 2)
-    if fx is None and fy is None:
-        raise BadInputError(f"Frame '{name}' has no focal length; give fl_x or camera_angle_x.")
-    return fx or fy, fy or fx
+# The mesh's world
 
 
-def _positive(top: dict[str, Any], entry: dict[str, Any], key: str, name: str, default: float | None) -> float | None:
-    """The number `key` of the frame, else of the file, else `default`; raises `BadInputError` unless above 0."""
-    value = entry.get(key, top.get(key))
-    if value is None or value == math.inf and default == math.inf:
-        return default
-    if not is_number(value) or not value > 0:
-        raise BadInputError(f"Frame '{name}' has {key} = {value!r}; give a number above 0.")
-    return float(value)
+def applied(root: Path, top: dict[str, Any]) -> np.ndarray | None:
+    """From the original world to that of the poses (`applied_transform`, `applied_scale`), (4, 4); None: the same.
+
+    Raises
+    ------
+    BadInputError
+        They are no matrix and no number.
+    """
+    matrix = top.get("applied_transform")
+    if matrix is None and (root / "colmap/sparse/0").is_dir():
+        matrix = BEFORE
+    scale = top.get("applied_scale", 1.0)
+    try:
+        result = np.eye(4)
+        if matrix is not None:
+            rows = np.array(matrix, np.float64)
+            if rows.shape not in ((3, 4), (4, 4)):
+                raise ValueError
+            result[:3] = rows[:3]
+        if not is_number(scale) or not scale > 0 or not np.isfinite(result).all():
+            raise ValueError
+    except (TypeError, ValueError):
+        raise BadInputError(f"'{FILE}' in '{root}' has an applied_transform that is no 3 x 4 matrix, or an "
+                            "applied_scale that is no number above 0; mend or remove them.") from None
+    result[:3] *= scale
+    return None if np.array_equal(result, np.eye(4)) else result
 
 
-def _inside(root: Path, value: Any, name: str) -> Path:
-    """`value` as a path within `root`."""
-    if not isinstance(value, str) or not value.strip() or "\0" in value:
-        raise BadInputError(f"Frame '{name}' names no picture; give its file_path.")
-    # Both ways of writing paths: a capture made on the other system must not lead out either.
-    for kind in (PurePosixPath, PureWindowsPath):
-        path = kind(value)
-        if path.is_absolute() or path.drive or path.root or ".." in path.parts:
-            raise _Escapes(f"Frame '{name}' has the path '{value}', which leads out of the capture '{root}'; "
-                           "give paths within it.")
-    return root / PurePosixPath(value.replace("\\", "/"))
+def _in_frames_world(mesh: RawMesh, root: Path, top: dict[str, Any], frames: list[Frame],
+                     reading: Reading) -> tuple[RawMesh, list[str]]:
+    """The mesh in the world of the poses, and a sentence where that is not plain.
+
+    nerfstudio writes its own point cloud in the poses' world, and so a mesh is expected there; one that was made by
+    COLMAP itself is not, and is moved as the file says where the cameras leave no doubt.
+    """
+    matrix = applied(root, top)
+    if matrix is None or not len(mesh.vertices):
+        return mesh, []
+    moved = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    original = reading.convention == ORIGINAL_MESH
+    because = "as asked"
+    if reading.convention not in (ORIGINAL_MESH, STORED_MESH) and frames:
+        there, here = (_within(vertices, frames) for vertices in (moved, mesh.vertices))
+        original = there > MOST and here < FEW
+        because = f"{there:.0%} of the cameras are then within its box, and {here:.0%} else"
+    if original:
+        return replace(mesh, vertices=moved), [
+            f"'{mesh.name}' was moved from the original world to the poses' by 'applied_transform': {because}."]
+    if top.get("applied_transform") is None and top.get("applied_scale") is None:
+        return mesh, []
+    return mesh, [f"The poses were moved by 'applied_transform' or 'applied_scale'; '{mesh.name}' was taken to have "
+                  "been moved with them."]
 
 
-READER = Reader("nerfstudio", FILES[0], lambda root: find(root) is not None, read)
+def _within(vertices: np.ndarray, frames: list[Frame]) -> float:
+    """Share of the cameras that are within the vertices' box."""
+    low, high = vertices.min(0), vertices.max(0)
+    centres = np.array([frame.camera.centre for frame in frames])
+    return float(((centres >= low) & (centres <= high)).all(1).mean())
+
+
+def _mesh_path(root: Path, top: dict[str, Any], reading: Reading) -> Path:
+    """As `find_mesh`; where it finds none, the file of `ply_file_path`."""
+    try:
+        path = find_mesh(root, reading)
+    except BadInputError:
+        named = top.get("ply_file_path")
+        if not isinstance(named, str):
+            raise
+        path = inside(root, named, MESH, reading.outside)
+        if not path.is_file():
+            raise
+    return path
+
+
+READER = Reader("nerfstudio", FILE, lambda root: bool(find(root)), read)
