@@ -41,11 +41,12 @@ class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
 
         from ..addon.core.room_file import read_capture_file
 
-        try:
-            job.warnings.extend(json.loads(job.text)["warnings"])
-            return read_capture_file(job.facts["scratch"])[0]
-        finally:
-            shutil.rmtree(job.facts["scratch"], ignore_errors=True)
+        job.warnings.extend(json.loads(job.text[job.text.index("{"):])["warnings"])
+        return read_capture_file(job.facts["scratch"])[0]
+
+    def tidy(self, job):
+        """What was read is not needed any more."""
+        shutil.rmtree(job.facts["scratch"], ignore_errors=True)
 
     def change(self, scene, loaded):
         """Build the objects."""

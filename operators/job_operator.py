@@ -112,9 +112,12 @@ class JobOperator:
 
     def cancel(self, context):
         """Blender ends the operator: it closes, or its window does."""
-        if self.job is not None:
-            self.job.stop()
+        self.job.stop()
+        self.job.facts["phase"] = "end"
         self._leave(context, set())
+
+    def tidy(self, job: jobs.Job) -> None:
+        """Put away what only this job needed; called at its end, whatever that is."""
 
     def _look(self, context):
         job = self.job
@@ -211,6 +214,7 @@ class JobOperator:
             self._timer = None
         for workspace in bpy.data.workspaces:
             workspace.status_text_set(None)
+        self.tidy(self.job)
         redraw(context)
         return verdict
 

@@ -6,7 +6,6 @@ import importlib
 import importlib.util
 import json
 import shutil
-import sys
 from dataclasses import replace
 
 import pytest
@@ -15,28 +14,6 @@ bpy = pytest.importorskip("bpy")
 
 NAMES = ("import_capture", "accumulate", "shade", "fit", "write", "recover")
 QUICK = {"shading_rays": 16, "specular_rays": 4, "emitter_rays": 2, "refine": 0, "texel_size": 0.12, "atlas_size": 512}
-
-
-@pytest.fixture(scope="module")
-def package(root):
-    """The checkout as the registered package `scan_relight`."""
-    spec = importlib.util.spec_from_file_location("scan_relight", root / "__init__.py",
-                                                  submodule_search_locations=[str(root)])
-    package = importlib.util.module_from_spec(spec)
-    sys.modules["scan_relight"] = package
-    spec.loader.exec_module(package)
-    package.register()
-    yield package
-    package.unregister()
-    for name in [name for name in sys.modules if name.split(".")[0] == "scan_relight"]:
-        del sys.modules[name]
-
-
-@pytest.fixture
-def ops(package):
-    """`bpy.ops.scan_relight` over an empty scene."""
-    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    return bpy.ops.scan_relight
 
 
 def one_sentence(told) -> bool:

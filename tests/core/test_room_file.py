@@ -1,0 +1,68 @@
+"""The room of a finished run: what is written is what is read."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from addon.core.capture.model import Camera, Capture, Frame, Instance, Mesh
+from addon.core.errors import BadInputError, MissingStageError
+from addon.core.material import METAL, ObjectMaterial
+from addon.core.room_file import read_capture_file, read_room, write_room
+
+
+def a_capture(uv=None):
+    pose = np.eye(4)
+    pose[:3, 3] = 1, 2, 3
+    mesh = Mesh(np.arange(12.0).reshape(4, 3), np.int32([[0, 1, 2], [1, 2, 3]]), np.int32([4, 7]), uv)
+    frames = tuple(Frame(f"frame {k}", Path(f"/capture/{k}.exr"), Camera(32, 24, 20.5, 21, 16, 12, pose))
+                   for k in range(3))
+    return Capture(Path("/capture"), mesh, (Instance(4, "sofa"), Instance(7, "")), frames, format="nerfstudio")
+
+
+@pytest.mark.parametrize("with_uv", [False, True])
+def test_there_and_back(tmp_path, with_uv):
+    capture = a_capture(np.random.default_rng(0).random((2, 3, 2), np.float32) if with_uv else None)
+    uv = np.random.default_rng(1).random((2, 3, 2), np.float32)
+    write_room(tmp_path, capture, uv)
+    back, back_uv = read_capture_file(tmp_path)
+    assert back.root == capture.root.absolute() and back.format == "nerfstudio" and back.instances == capture.instances
+    assert [(f.name, f.path) for f in back.frames] == [(f.name, f.path.absolute()) for f in capture.frames]
+    for one, other in zip(back.frames, capture.frames):
+        assert (one.camera.fx, one.camera.width) == (other.camera.fx, other.camera.width)
+        assert np.array_equal(one.camera.camera_to_world, other.camera.camera_to_world)
+    for name in ("vertices", "triangles", "object_id"):
+        assert np.array_equal(getattr(back.mesh, name), getattr(capture.mesh, name))
+        assert getattr(back.mesh, name).dtype == getattr(capture.mesh, name).dtype
+    assert np.array_equal(back_uv, uv) and (back.mesh.uv is None) == (capture.mesh.uv is None)
+
+
+def test_materials_come_from_their_file(tmp_path):
+    write_room(tmp_path, a_capture())
+    metal = ObjectMaterial(4, "sofa", METAL, phi=0.25, f0=(0.9, 0.8, 0.7), note="shiny")
+    told = json.loads(json.dumps(asdict(metal))) | {"evidence": {"area": 1.0}}
+    (tmp_path / "materials.json").write_text(json.dumps({"objects": [told]}))
+    room = read_room(tmp_path)
+    assert room.materials == (metal,) and room.folder == tmp_path and not room.atlas_uv.any()
+
+
+def test_an_unfinished_result_is_told(tmp_path):
+    with pytest.raises(MissingStageError, match="room.npz' is missing"):
+        read_room(tmp_path)
+    write_room(tmp_path, a_capture())
+    with pytest.raises(MissingStageError, match="materials.json' is missing"):
+        read_room(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["room.npz", "materials.json"])
+def test_damage_is_told(tmp_path, name):
+    write_room(tmp_path, a_capture())
+    (tmp_path / "materials.json").write_text('{"objects": []}')
+    content = (tmp_path / name).read_bytes()
+    (tmp_path / name).write_bytes(content[: len(content) // 2])
+    with pytest.raises(BadInputError, match="is damaged"):
+        read_room(tmp_path)
