@@ -114,7 +114,9 @@ def make_parser() -> argparse.ArgumentParser:
     add_reading(info)
     add_common(info, info_command)
 
-    add_common(add_relight(commands, EXIT_CODES), relight_command)
+    relight = add_relight(commands, EXIT_CODES)
+    add_leash(relight)
+    add_common(relight, relight_command)
 
     demo = commands.add_parser(
         "demo", help="render a small room, recover it, compare, relight", epilog=EXIT_CODES,

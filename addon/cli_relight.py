@@ -18,12 +18,12 @@ def add_relight(commands, epilog: str) -> argparse.ArgumentParser:
     parser.add_argument("result", metavar="RESULT", type=Path, help="folder that 'recover' wrote")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="picture to write: .png, .jpg or .exr")
     light = parser.add_argument_group("light")
-    light.add_argument("--lamps", metavar="on|off|NAME=FACTOR,...", default="on",
-                       help="the lamps of the scan; a name means one lamp or all of its class (default on)")
-    light.add_argument("--world", metavar="on|off|DEGREES", default="on",
-                       help="the light from outside; an angle turns it, anticlockwise from above (default on)")
-    light.add_argument("--world-strength", metavar="FACTOR", type=positive, default=1.0,
-                       help="of the light from outside (default 1)")
+    light.add_argument("--lamps", metavar="on|off|NAME=FACTOR,...", default=None,
+                       help="the lamps of the scan; a name means one lamp or all of its class (default as saved)")
+    light.add_argument("--world", metavar="on|off|DEGREES", default=None,
+                       help="the light from outside; an angle turns it, anticlockwise from above (default as saved)")
+    light.add_argument("--world-strength", metavar="FACTOR", type=positive,
+                       help="of the light from outside (default as saved)")
     light.add_argument("--hdri", metavar="FILE", type=Path, help="equirectangular picture to put around the room")
     for name, text in (("window", "a window's soft light from the side"), ("softbox", "a studio light by the camera"),
                        ("spot", "a spot from above"), ("sun", "a low, warm sun from the side")):
@@ -49,7 +49,9 @@ def positive(text: str) -> float:
 
 def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`relight RESULT --out FILE`."""
-    from .cli import need  # which imports this module
+    from .cli import console_run, need  # which imports this module
+    from .core.progress import Progress
+    from .leash import JsonProgress
 
     if arguments.samples < 0 or not 1 <= arguments.size <= 1000:
         raise BadInputError("Option --samples takes a number of at least 0, and --size 1 to 1000 percent.")
@@ -57,8 +59,15 @@ def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     added = {kind: getattr(arguments, name) for name, kind in command.OPTIONS.items()
              if getattr(arguments, name) is not None}
     light = command.Light(arguments.lamps, arguments.world, arguments.world_strength, arguments.hdri, added)
-    remarks = command.relight(arguments.result, light, arguments.out, arguments.camera, arguments.samples,
-                              arguments.engine.upper(), arguments.before_after, arguments.size)
-    if not arguments.quiet:
+    with console_run(arguments, stream) as console:
+        stages = ("before", "after") if arguments.before_after else ("after",)
+        progress = Progress(weights=dict.fromkeys(stages, 1.0), **console)
+        remarks = command.relight(arguments.result, light, arguments.out, arguments.camera, arguments.samples,
+                                  arguments.engine.upper(), arguments.before_after, arguments.size, progress)
+    if isinstance(console["listener"], JsonProgress):
+        for remark in remarks:
+            console["listener"].tell("warning", text=remark)
+        console["listener"].tell("done", picture=str(arguments.out.absolute()))
+    elif not arguments.quiet:
         print(*(f"Note: {remark}" for remark in remarks), f"Done: {arguments.out}", sep="\n", file=stream)
     return EXIT_OK

@@ -20,6 +20,7 @@ def classes() -> tuple[type, ...]:
     from .panel_results import SCAN_RELIGHT_PT_results, SCAN_RELIGHT_PT_stages, SCAN_RELIGHT_UL_results
     from .preferences import ScanRelightPreferences
     from .recover import SCAN_RELIGHT_OT_recover
+    from .relight_register import relight_groups, relight_operators, relight_panels
     from .restore_materials import SCAN_RELIGHT_OT_restore_materials
     from .run import SCAN_RELIGHT_OT_run
     from .scene_props import ScanRelightReading, ScanRelightScene, ScanRelightSettings
@@ -29,19 +30,20 @@ def classes() -> tuple[type, ...]:
 
     return (
         # Property groups: those that others point to come first.
-        ScanRelightSettings, ScanRelightReading, ScanRelightScene, ScanRelightPreferences,
+        ScanRelightSettings, ScanRelightReading, ScanRelightScene, ScanRelightPreferences, *relight_groups(),
         # Operators, in the order of the method.
         SCAN_RELIGHT_OT_check_capture, SCAN_RELIGHT_OT_import_capture,
         SCAN_RELIGHT_OT_accumulate, SCAN_RELIGHT_OT_shade, SCAN_RELIGHT_OT_fit, SCAN_RELIGHT_OT_write,
         SCAN_RELIGHT_OT_recover, SCAN_RELIGHT_OT_run, SCAN_RELIGHT_OT_stop, SCAN_RELIGHT_OT_clear_cache,
         # The artist's side.
         SCAN_RELIGHT_OT_capture_from_scene, SCAN_RELIGHT_OT_restore_materials, SCAN_RELIGHT_OT_select_result_object,
-        SCAN_RELIGHT_OT_look, SCAN_RELIGHT_OT_open_report,
+        SCAN_RELIGHT_OT_look, SCAN_RELIGHT_OT_open_report, *relight_operators(),
         # Panels, in the order of the work; a panel's parts come after it.
         SCAN_RELIGHT_PT_capture, SCAN_RELIGHT_PT_own_scene,
         SCAN_RELIGHT_PT_recover,
         SCAN_RELIGHT_UL_results, SCAN_RELIGHT_PT_results, SCAN_RELIGHT_PT_stages,
         SCAN_RELIGHT_PT_look,
+        *relight_panels(),
     )  # fmt: skip
 
 
@@ -49,9 +51,10 @@ def pointers() -> tuple[tuple[type, str, type], ...]:
     """Blender type, name and property group of everything that hangs on Blender's own data."""
     import bpy
 
+    from .relight_register import relight_pointers
     from .scene_props import ScanRelightScene
 
-    return ((bpy.types.Scene, "scan_relight", ScanRelightScene),)
+    return ((bpy.types.Scene, "scan_relight", ScanRelightScene), *relight_pointers())
 
 
 def register():

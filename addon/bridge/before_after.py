@@ -1,7 +1,7 @@
 """Before and after: one view under the captured and under the present light, side by side.
 
-In background mode the pictures are rendered here. In a window another Blender renders saved copies of the scene, so
-that the window never freezes, nothing of the open scene changes, and a stop is a matter of ending that process.
+In background mode the pictures are rendered here. Beside a window the command line renders a saved copy of the scene
+(`save_copy`), so that the window never freezes, nothing of the open scene changes, and a stop ends a process.
 """
 
 from __future__ import annotations
@@ -12,37 +12,79 @@ from pathlib import Path
 
 import bpy
 
-from ..core.errors import BadInputError
+from ..core.errors import BadInputError, StorageError
+from ..core.progress import Progress
 from .pictures import beside, check_format, shoot
 from .relight_state import captured_light
 
-NAME = "Before / After"
+NAME = "Before and After"
 """Name of the image in Blender."""
+COPY = "scene.blend"
+WEIGHTS = {"before": 1, "after": 1}
 
 
-def render_pair(scene: bpy.types.Scene, out: Path) -> None:
+def render_pair(scene: bpy.types.Scene, out: Path, progress: Progress | None = None) -> None:
     """Render both pictures, one after the other, and save them side by side; within `pictures.settings_kept`."""
     ending = check_format(out)
     if scene.camera is None:
         raise BadInputError("The scene has no camera to render through; choose a frame of the capture first.")
+    progress = progress or Progress()
     folder = Path(tempfile.mkdtemp(prefix="scan_relight_"))
     try:
         before, after = folder / f"before{ending}", folder / f"after{ending}"
+        # No finer than that: Blender's handler of render statistics waits for Python, which waits for the render.
+        progress.stage("before")
         with captured_light(scene):
             shoot(scene, before)
+        progress.done()
+        progress.stage("after")
         shoot(scene, after)
+        progress.done()
         beside(before, after, out)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def save_copy(folder: Path) -> None:
+    """Save what is open as a copy that the command `relight` can open; what is open stays as it is.
+
+    Raises
+    ------
+    StorageError
+        The copy can't be written.
+    """
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / COPY), copy=True, compress=False, relative_remap=True)
+    except RuntimeError as error:
+        reason = " ".join(str(error).split()).removeprefix("Error: ").rstrip(".")
+        raise StorageError(f"A copy of the scene can't be saved to '{folder}' ({reason}); free some space.") from error
 
 
 def show(path: Path) -> bpy.types.Image:
     """The finished picture as an image in Blender; an earlier one is replaced."""
     image = bpy.data.images.get(NAME)
     if image is None:
-        image = bpy.data.images.load(str(path))
+        image = bpy.data.images.load(str(path), check_existing=False)
         image.name = NAME
     else:
         image.filepath = str(path)
         image.reload()
     return image
+
+
+def show_in_window(image: bpy.types.Image) -> None:
+    """Show an image in an image editor; where none is open, in a window of its own."""
+    manager = bpy.context.window_manager
+    for window in manager.windows:
+        for area in window.screen.areas:
+            if area.type == "IMAGE_EDITOR":
+                area.spaces.active.image = image
+                return
+    known = {window.as_pointer() for window in manager.windows}
+    with bpy.context.temp_override(window=manager.windows[0]):
+        bpy.ops.wm.window_new()
+    for window in manager.windows:
+        if window.as_pointer() not in known:
+            area = window.screen.areas[0]
+            area.type = "IMAGE_EDITOR"
+            area.spaces.active.image = image

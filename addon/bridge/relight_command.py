@@ -9,45 +9,42 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import BadInputError
+from ..core.progress import Progress
 from . import relight_lamps, relight_outside
+from .before_after import COPY as SCENE
 from .before_after import render_pair
 from .cameras import frame_cameras, use_camera
 from .pictures import CYCLES, check_format, prepare, settings_kept, shoot
 from .relight_lights import SOFTBOX, SPOT, SUN, WINDOW, add_light
-from .relight_room import room_light
-
-SCENE = "scene.blend"
-OUTSIDE_SHARE = 4.0
-"""Mean radiance of a picture put around the room, relative to that of the room's median surface: it is the outdoors,
-which shows through openings that cover a small part of what any spot of the room sees."""
 
 
 @dataclass(frozen=True)
 class Light:
-    """What is to be changed about the light.
+    """What is to be changed about the light; None leaves it as the file has it.
 
     Attributes
     ----------
-    lamps : str
+    lamps : str or None
         'on', 'off', or NAME=FACTOR and NAME=off, separated by commas; a name stands for one lamp or a class of them.
-    world : str
+    world : str or None
         'on', 'off', or degrees by which the outside is turned, anticlockwise from above.
-    world_strength : float
+    world_strength : float or None
     hdri : Path or None
         Picture to put around the room.
     added : dict of str to float
         Strength of each new light, by `relight_lights.PRESETS`.
     """
 
-    lamps: str = "on"
-    world: str = "on"
-    world_strength: float = 1.0
+    lamps: str | None = None
+    world: str | None = None
+    world_strength: float | None = None
     hdri: Path | None = None
     added: dict[str, float] = field(default_factory=dict)
 
 
 def relight(result: Path, light: Light, out: Path, camera: str | None = None, samples: int = 0,
-            engine: str = CYCLES, before_after: bool = False, percentage: int = 100) -> list[str]:
+            engine: str = CYCLES, before_after: bool = False, percentage: int = 100,
+            progress: Progress | None = None) -> list[str]:
     """Open a result's scene, change its light, render.
 
     Parameters
@@ -67,6 +64,7 @@ def relight(result: Path, light: Light, out: Path, camera: str | None = None, sa
         Two pictures beside each other: the captured light, the new one.
     percentage : int
         Of the frame's size.
+    progress : Progress, optional
 
     Returns
     -------
@@ -78,6 +76,7 @@ def relight(result: Path, light: Light, out: Path, camera: str | None = None, sa
     BadInputError, StorageError
         One sentence for the user; nothing is rendered if anything that was given is wrong.
     """
+    progress = progress or Progress()
     check_format(out)
     path = Path(result) / SCENE
     if not path.is_file():
@@ -96,22 +95,27 @@ def relight(result: Path, light: Light, out: Path, camera: str | None = None, sa
     with settings_kept(scene):
         prepare(scene, engine, samples, percentage)
         if before_after:
-            render_pair(scene, out)
+            render_pair(scene, out, progress)
         else:
+            progress.stage("after")
             shoot(scene, out)
+            progress.done()
     return remarks
 
 
 def apply_light(scene: bpy.types.Scene, light: Light) -> list[str]:
     """Change a scene's light; returns remarks, raises `BadInputError` where something is unknown."""
     remarks: list[str] = []
-    set_lamps(scene, light.lamps)
+    if light.lamps is not None:
+        set_lamps(scene, light.lamps)
     if light.hdri is not None:
-        relight_outside.use_hdri(scene, light.hdri, outside_radiance(scene))
-    if scene.world is not None:
+        relight_outside.use_hdri(scene, light.hdri, relight_outside.usual_radiance(scene))
+    if scene.world is not None and light.world is not None:
         turn = world_rotation(light.world)
         relight_outside.set_on(scene.world, turn is not None)
-        relight_outside.set_rotation(scene.world, math.radians(turn or 0.0))
+        if light.world not in ("on", "off"):
+            relight_outside.set_rotation(scene.world, math.radians(turn))
+    if scene.world is not None and light.world_strength is not None:
         relight_outside.set_factor(scene.world, light.world_strength)
     for preset, strength in light.added.items():
         add_light(scene, preset, strength)
@@ -151,11 +155,6 @@ def world_rotation(text: str) -> float | None:
     if not math.isfinite(angle):
         raise BadInputError(f"Option --world takes on, off or an angle in degrees, not '{text}'.")
     return angle
-
-
-def outside_radiance(scene: bpy.types.Scene) -> float:
-    """Mean radiance that a picture around the room is scaled to."""
-    return OUTSIDE_SHARE * room_light(scene) / math.pi
 
 
 def camera_named(scene: bpy.types.Scene, name: str) -> bpy.types.Object:

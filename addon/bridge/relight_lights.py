@@ -28,7 +28,7 @@ PRESETS = (WINDOW, SOFTBOX, SPOT, SUN)
 TINTS = {WINDOW: (0.86, 0.93, 1.0), SOFTBOX: (1.0, 0.95, 0.88), SPOT: (1.0, 0.86, 0.68), SUN: (1.0, 0.62, 0.32)}
 """Linear Rec.709, largest component 1: overcast sky, studio lamp, halogen, low sun."""
 NAMES = {WINDOW: "Window light", SOFTBOX: "Softbox", SPOT: "Spot", SUN: "Evening sun"}
-_STRONGER = {WINDOW: 4.0, SOFTBOX: 2.0, SPOT: 4.0, SUN: 16.0}
+_STRONGER = {WINDOW: 4.0, SOFTBOX: 2.0, SPOT: 4.0, SUN: 24.0}
 """Irradiance on the target relative to the room's own. A light from one side has to make up for all that it leaves in
 the dark, and a small patch of sun is read as sun only where it is much brighter than its surroundings."""
 _PLACES = {WINDOW: window_place, SOFTBOX: softbox_place, SPOT: spot_place, SUN: sun_place}

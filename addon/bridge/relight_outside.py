@@ -14,7 +14,7 @@ from mathutils import Vector
 
 from ..core.errors import BadInputError
 from .images import RADIANCE, image_array
-from .relight_room import bounds, cast
+from .relight_room import bounds, cast, room_light
 
 RECOVERED = "scan_relight_recovered_world"
 """Custom property of the scene: its world before another picture took its place."""
@@ -23,6 +23,9 @@ HDRI = "scan_relight_hdri"
 _OFF, _FACTOR, _KEPT = "scan_relight_world_off", "scan_relight_world_factor", "scan_relight_recovered_strength"
 _TURN, _PLACE = "Scan Relight turn", "Scan Relight place"
 MAX_FACTOR = 1000.0
+_BRIGHTER = 4.0
+"""Mean radiance of a picture put around the room, relative to that of the room's median surface: it is the outdoors,
+which shows through openings that cover a small part of what any spot of the room sees."""
 
 
 def has_outside(scene: bpy.types.Scene) -> bool:
@@ -161,6 +164,11 @@ def is_changed(scene: bpy.types.Scene) -> bool:
     world = scene.world
     return scene.get(RECOVERED) is not None or world is not None and (
         not is_on(world) or factor(world) != 1 or rotation(world) != 0)
+
+
+def usual_radiance(scene: bpy.types.Scene) -> float:
+    """Mean radiance that a picture around this room is scaled to, in the frames' unit."""
+    return _BRIGHTER * room_light(scene) / math.pi
 
 
 def is_open(scene: bpy.types.Scene) -> bool:

@@ -1,0 +1,102 @@
+"""A recovered material in plain Principled terms: numbers, one 8-bit picture over the atlas, one colour of light."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..core.capture.png import write_png
+from . import relight_lamps
+from .images import image_array
+from .materials import (
+    BASE_COLOR,
+    EMISSION_COLOR,
+    EMISSION_STRENGTH,
+    IOR,
+    METALLIC,
+    ROUGHNESS,
+    SPECULAR_LEVEL,
+    ior_of,
+    plain_material,
+)
+
+
+def plain_copy(material: bpy.types.Material, textures: Path, pictures: dict, level: bool = True) -> bpy.types.Material:
+    """A material that exporters understand.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        What it shows is read off its Principled node; one without such a node becomes grey.
+    textures : Path
+        Folder for the 8-bit pictures.
+    pictures : dict
+        Those that were made already, by the image they show; filled here.
+    level : bool
+        The format holds Specular IOR Level; else F0, which that level scales, goes into the index of refraction.
+
+    Returns
+    -------
+    bpy.types.Material
+        Culled from behind where the original shines on one side only: glTF then has it single-sided.
+    """
+    shader = next((n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED"), None) \
+        if material.node_tree else None
+    if shader is None:
+        return plain_material(material.name)
+    value = shader.inputs
+    image = _image(value[BASE_COLOR])
+    ior, specular = value[IOR].default_value, value[SPECULAR_LEVEL].default_value
+    if not level:
+        ior, specular = ior_of(2 * specular * ((ior - 1) / (ior + 1)) ** 2), 0.5
+    made = plain_material(
+        material.name, tuple(value[BASE_COLOR].default_value[:3]), value[ROUGHNESS].default_value,
+        specular, value[METALLIC].default_value, ior, emission(material),
+        None if image is None else _picture(image, textures, pictures))
+    made.use_backface_culling = bool(value[EMISSION_COLOR].links) and relight_lamps.is_lamp(material)
+    return made
+
+
+def emission(material: bpy.types.Material) -> tuple[float, float, float]:
+    """Radiance that a material emits to its front, linear Rec.709; (0, 0, 0) for none."""
+    if relight_lamps.is_lamp(material):
+        return relight_lamps.radiance(material)
+    shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+    strength = shader.inputs[EMISSION_STRENGTH].default_value
+    return tuple(strength * c for c in shader.inputs[EMISSION_COLOR].default_value[:3])
+
+
+def _image(socket) -> bpy.types.Image | None:
+    """The image that a colour socket shows, through whatever nodes lie between (the first that is found)."""
+    waiting, seen = [socket], set()
+    while waiting:
+        for link in waiting.pop().links:
+            node = link.from_node
+            if node in seen:
+                continue
+            seen.add(node)
+            if node.type == "TEX_IMAGE":
+                return node.image
+            waiting.extend(node.inputs)
+    return None
+
+
+def _picture(image: bpy.types.Image, textures: Path, pictures: dict) -> bpy.types.Image:
+    """An image as PNG of 8 bits in sRGB, which glTF and USD's preview surface take."""
+    if image in pictures:
+        return pictures[image]
+    if not all(image.size):
+        return image
+    from .export import srgb
+
+    pixels = image_array(image)[::-1, :, :3]
+    if image.colorspace_settings.name != "sRGB" or image.is_float:
+        pixels = srgb(pixels)
+    path = textures / f"{bpy.path.clean_name(image.name.split('.')[0])}_{len(pictures)}.png"
+    write_png(path, np.ascontiguousarray((pixels * 255 + 0.5).astype(np.uint8)))
+    made = bpy.data.images.load(str(path))
+    made.colorspace_settings.name = "sRGB"
+    pictures[image] = made
+    return made

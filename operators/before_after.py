@@ -1,0 +1,101 @@
+"""`bpy.ops.scan_relight.before_after`: one view under captured and new light, side by side."""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+import bpy
+
+from ..addon.bridge import before_after, pictures
+from ..addon.core.errors import BadInputError
+from .job_operator import JobOperator, active
+from .relight_base import RelightOperator, default_folder
+from .relight_props import ENGINES
+
+FILE = "before_after.png"
+
+
+class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Operator):
+    """Render both pictures; beside a window in a process of its own."""
+
+    bl_idname = "scan_relight.before_after"
+    bl_label = "Before and After"
+    bl_description = "Render this view under the captured and the present light, side by side, into an image and a file"
+    bl_options = {"UNDO"}
+
+    filepath: bpy.props.StringProperty(
+        name="File", description="Picture to write; by default before_after.png in the result folder",
+        subtype="FILE_PATH", options={"SKIP_SAVE"})
+    engine: bpy.props.EnumProperty(name="Engine", description="Renders the two pictures", items=ENGINES)
+    samples: bpy.props.IntProperty(name="Samples", description="For each pixel; 0 takes the scene's", min=0, default=64)
+    percentage: bpy.props.IntProperty(
+        name="Size", description="Of the scene's render size", subtype="PERCENTAGE", min=1, max=1000, default=100)
+
+    @classmethod
+    def poll(cls, context):
+        """A camera is needed, and no other run."""
+        if not super().poll(context):
+            return False
+        if context.scene.camera is None:
+            cls.poll_message_set("The scene has no camera to render through; choose a frame first.")
+            return False
+        if active() is not None:
+            cls.poll_message_set("A run is going on; stop it first or wait for its end.")
+            return False
+        return True
+
+    def target(self, scene) -> Path:
+        """The file to write."""
+        if self.filepath:
+            return Path(bpy.path.abspath(self.filepath)).absolute()
+        folder = default_folder(scene)
+        if not folder:
+            raise BadInputError("Choose a result folder or save the file first, so that the picture has a place.")
+        return Path(folder) / FILE
+
+    def work(self, context):
+        """In the background: here and now."""
+        scene, out = context.scene, self.target(context.scene)
+        with pictures.settings_kept(scene):
+            pictures.prepare(scene, self.engine, self.samples, self.percentage)
+            before_after.render_pair(scene, out)
+        before_after.show(out)
+
+    def execute(self, context):
+        """Blocks in the background; else starts the job."""
+        if bpy.app.background:
+            return RelightOperator.execute(self, context)
+        from ..addon.bridge.job_command import command
+
+        try:
+            out = self.target(context.scene)
+            pictures.check_format(out)
+            self._folder = Path(tempfile.mkdtemp(prefix="scan_relight_"))
+            before_after.save_copy(self._folder)
+        except BadInputError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        words = ["relight", str(self._folder), "--out", str(self._folder / out.name), "--before-after",
+                 "--engine", self.engine.lower(), "--samples", str(self.samples), "--size", str(self.percentage),
+                 "--progress", "json", "--stop-with-stdin"]
+        return self.start(context, command(words), title="Before and After", out=str(out), result_folder="")
+
+    def load(self, job):
+        """Bring the picture to its place."""
+        out = Path(job.facts["out"])
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with pictures.saving(out) as temporary:
+            shutil.copyfile(self._folder / out.name, temporary)
+        return out
+
+    def change(self, scene, loaded):
+        """Show it."""
+        before_after.show_in_window(before_after.show(loaded))
+        yield 1.0
+        return ()
+
+    def _leave(self, context, verdict):
+        shutil.rmtree(getattr(self, "_folder", os.devnull), ignore_errors=True)
+        return super()._leave(context, verdict)

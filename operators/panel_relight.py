@@ -1,0 +1,213 @@
+"""The tab's part Relight: the lamps of the scan, the outside, new lights, the view, objects, before and after."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..addon.bridge import match_frame, relight_lamps, relight_lights, relight_outside
+from ..addon.bridge.cameras import frame_cameras
+from .panel import SidebarPanel
+from .relight import PRESETS
+from .relight_base import has_room
+
+ICONS = {"WINDOW": "LIGHT_AREA", "SOFTBOX": "MESH_PLANE", "SPOT": "LIGHT_SPOT", "SUN": "LIGHT_SUN"}
+
+
+class SCAN_RELIGHT_UL_lamps(bpy.types.UIList):
+    """The lamps of the scan."""
+
+    bl_idname = "SCAN_RELIGHT_UL_lamps"
+
+    def draw_item(self, context, layout, data, item, icon, active_data, active_property, index):
+        """Switch, name, colour, strength."""
+        lamp = item.scan_relight_lamp
+        row = layout.row(align=True)
+        row.prop(lamp, "on", text="", icon="OUTLINER_OB_LIGHT" if lamp.on else "LIGHT", emboss=False)
+        row.label(text=item.name)
+        value = row.row(align=True)
+        value.enabled = lamp.on
+        colour = value.row(align=True)
+        colour.scale_x = 0.4
+        colour.enabled = relight_lamps.colour(item) is not None
+        colour.prop(lamp, "colour", text="")
+        strength = value.row(align=True)
+        strength.scale_x = 0.7
+        strength.prop(lamp, "factor", text="")
+
+    def filter_items(self, context, data, name):
+        """Of all materials, this scene's lamps."""
+        lamps = {material.name for material in relight_lamps.find_lamps(context.scene)}
+        wanted = self.filter_name.casefold()
+        return [self.bitflag_filter_item if material.name in lamps and wanted in material.name.casefold() else 0
+                for material in getattr(data, name)], []
+
+
+class RelightPanel(SidebarPanel):
+    """A part that needs a scanned room."""
+
+    @classmethod
+    def poll(cls, context):
+        """With a room only."""
+        return super().poll(context) and has_room(context.scene)
+
+
+class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
+    """The lamps."""
+
+    bl_idname = "SCAN_RELIGHT_PT_relight"
+    bl_label = "Relight"
+    bl_order = 4
+
+    def draw(self, context):
+        """The lamps as a list, the chosen one's numbers, the way back."""
+        layout, scene = self.layout, context.scene
+        if not has_room(scene):
+            self.say(layout, context, "Recover a capture, or open a result's scene.blend, to light it anew.", "INFO")
+            return
+        studio, lamps = scene.scan_relight_studio, relight_lamps.find_lamps(scene)
+        if lamps:
+            layout.template_list("SCAN_RELIGHT_UL_lamps", "", bpy.data, "materials", studio, "lamp", rows=3)
+            row = layout.row(align=True)
+            row.operator("scan_relight.switch_lamps", text="All On", icon="OUTLINER_OB_LIGHT").on = True
+            row.operator("scan_relight.switch_lamps", text="All Off", icon="LIGHT").on = False
+            chosen = bpy.data.materials[studio.lamp] if studio.lamp < len(bpy.data.materials) else None
+            if chosen in lamps:
+                self.numbers(layout, context, chosen)
+        else:
+            self.say(layout, context, "The scan has no lamp.", "INFO")
+        layout.operator("scan_relight.restore_light", icon="LOOP_BACK")
+
+    def numbers(self, layout, context, lamp) -> None:
+        """What a lamp emits, now and as found."""
+        now, found = (" ".join(f"{c:.3g}" for c in values) for values in
+                      (relight_lamps.radiance(lamp), relight_lamps.recovered_radiance(lamp)))
+        self.say(layout, context, f"{lamp.name}: radiance {now} (R G B, in the frames' unit)")
+        if relight_lamps.is_changed(lamp):
+            row = layout.row()
+            self.say(row.column(), context, f"Found: {found}")
+            row.operator("scan_relight.restore_lamp", text="", icon="LOOP_BACK").name = lamp.name
+
+
+class SCAN_RELIGHT_PT_outside(RelightPanel, bpy.types.Panel):
+    """The world."""
+
+    bl_idname = "SCAN_RELIGHT_PT_outside"
+    bl_label = "Outside"
+    bl_parent_id = "SCAN_RELIGHT_PT_relight"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """On or off, strength, rotation, another picture."""
+        layout, world = self.layout, context.scene.world
+        layout.use_property_split, layout.use_property_decorate = True, False
+        if not relight_outside.has_outside(context.scene):
+            self.say(layout, context, "The scan saw no light from outside.", "INFO")
+        else:
+            outside = world.scan_relight_outside
+            layout.prop(outside, "on")
+            column = layout.column()
+            column.enabled = outside.on
+            column.prop(outside, "factor")
+            column.prop(outside, "rotation")
+        row = layout.row(align=True)
+        row.operator("scan_relight.use_hdri", text="HDR File", icon="FILE_IMAGE")
+        if relight_outside.studio_lights():
+            row.operator_menu_enum("scan_relight.use_studio_light", "picture", text="Blender's", icon="WORLD")
+
+
+class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):
+    """Presets."""
+
+    bl_idname = "SCAN_RELIGHT_PT_new_lights"
+    bl_label = "New Lights"
+    bl_parent_id = "SCAN_RELIGHT_PT_relight"
+
+    def draw(self, context):
+        """One button each."""
+        layout, studio = self.layout, context.scene.scan_relight_studio
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop(studio, "aim")
+        layout.prop(studio, "strength")
+        grid = layout.grid_flow(columns=2, even_columns=True, align=True)
+        for name, text, _ in PRESETS:
+            button = grid.operator("scan_relight.add_light", text=text, icon=ICONS[name])
+            button.preset, button.aim, button.strength = name, studio.aim, studio.strength
+        for light in relight_lights.added_lights(context.scene):
+            row = layout.row(align=True)
+            row.prop(light, "hide_render", text="", icon_only=True, emboss=False)
+            row.label(text=light.name)
+            colour = row.row(align=True)
+            colour.scale_x = 0.5
+            colour.prop(light.data, "color", text="")
+            row.prop(light.data, "energy", text="")
+        layout.operator("scan_relight.remove_lights", icon="TRASH")
+
+
+class SCAN_RELIGHT_PT_view(SidebarPanel, bpy.types.Panel):
+    """Frames."""
+
+    bl_idname = "SCAN_RELIGHT_PT_view"
+    bl_label = "Camera"
+    bl_parent_id = "SCAN_RELIGHT_PT_relight"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """A slider over the frames."""
+        layout, scene = self.layout, context.scene
+        cameras, studio = frame_cameras(scene), scene.scan_relight_studio
+        layout.use_property_split, layout.use_property_decorate = True, False
+        row = layout.row(align=True)
+        row.operator("scan_relight.match_frame", text="", icon="TRIA_LEFT").step = -1
+        row.prop(studio, "frame", text="")
+        row.operator("scan_relight.match_frame", text="", icon="TRIA_RIGHT").step = 1
+        if not cameras:
+            self.say(layout, context, "The scene has no camera of a capture.", "INFO")
+            return
+        index = match_frame.current(scene)
+        name = cameras[index].name if index >= 0 else "The camera is none of the capture's."
+        self.say(layout, context, f"{name} ({index + 1} of {len(cameras)})" if index >= 0 else name)
+        layout.prop(studio, "show_frame")
+        column = layout.column()
+        column.enabled = studio.show_frame
+        column.prop(studio, "frame_front")
+        column.prop(studio, "frame_alpha")
+
+
+class SCAN_RELIGHT_PT_virtual(RelightPanel, bpy.types.Panel):
+    """Things that were not scanned."""
+
+    bl_idname = "SCAN_RELIGHT_PT_virtual"
+    bl_label = "Objects"
+    bl_parent_id = "SCAN_RELIGHT_PT_relight"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        """A new one, or one's own."""
+        layout, studio = self.layout, context.scene.scan_relight_studio
+        layout.use_property_split, layout.use_property_decorate = True, False
+        for name in ("place", "shape", "look", "size"):
+            layout.prop(studio, name)
+        button = layout.operator("scan_relight.add_virtual", icon="ADD")
+        button.shape, button.look, button.size, button.place = studio.shape, studio.look, studio.size, studio.place
+        layout.label(text="The selected object")
+        row = layout.row(align=True)
+        row.operator("scan_relight.place_object", icon="TRIA_DOWN_BAR").place = studio.place
+        row.operator("scan_relight.pick_place", icon="EYEDROPPER")
+        layout.operator("scan_relight.virtual_look", icon="MATERIAL").look = studio.look
+
+
+class SCAN_RELIGHT_PT_before_after(RelightPanel, bpy.types.Panel):
+    """The preview."""
+
+    bl_idname = "SCAN_RELIGHT_PT_before_after"
+    bl_label = "Before and After"
+    bl_parent_id = "SCAN_RELIGHT_PT_relight"
+
+    def draw(self, context):
+        """How, and the button."""
+        layout, studio = self.layout, context.scene.scan_relight_studio
+        layout.use_property_split, layout.use_property_decorate = True, False
+        for name in ("engine", "samples", "percentage"):
+            layout.prop(studio, name)
+        button = layout.operator("scan_relight.before_after", text="Render Both", icon="RENDER_STILL")
+        button.engine, button.samples, button.percentage = studio.engine, studio.samples, studio.percentage

@@ -1,0 +1,182 @@
+"""`bpy.ops.scan_relight.*` for the light: switch and restore lamps, add lights, another picture around the room."""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+from pathlib import Path
+
+import bpy
+
+from ..addon.bridge import relight_lamps, relight_lights, relight_outside, relight_state
+from ..addon.core.errors import BadInputError
+from .relight_base import RelightOperator
+from .relight_props import AIMS
+
+PRESETS = (("WINDOW", "Window", "A window's soft, cool light from the side"),
+           ("SOFTBOX", "Softbox", "A studio light beside the camera"),
+           ("SPOT", "Spot", "A spot from above, a little on the camera's side"),
+           ("SUN", "Evening Sun", "A low, warm sun: through an opening of the scan, else as a window would let it in"))
+
+
+class SCAN_RELIGHT_OT_switch_lamps(RelightOperator, bpy.types.Operator):
+    """Switch every lamp of the scan."""
+
+    bl_idname = "scan_relight.switch_lamps"
+    bl_label = "Switch All Lamps"
+    bl_description = "Switch all lamps of the scan on or off; their strength and colour stay"
+
+    on: bpy.props.BoolProperty(name="On", description="On or off", default=False)
+
+    def work(self, context):
+        """All of them."""
+        for lamp in relight_lamps.find_lamps(context.scene):
+            relight_lamps.set_on(lamp, self.on)
+
+
+class SCAN_RELIGHT_OT_restore_lamp(RelightOperator, bpy.types.Operator):
+    """Make one lamp what the scan found."""
+
+    bl_idname = "scan_relight.restore_lamp"
+    bl_label = "Restore Lamp"
+    bl_description = "Make this lamp exactly what the scan found"
+
+    name: bpy.props.StringProperty(name="Lamp", description="Name of its material, or its class")
+
+    def work(self, context):
+        """By its name."""
+        for lamp in relight_lamps.lamp_named(context.scene, self.name):
+            relight_lamps.restore(lamp)
+
+
+class SCAN_RELIGHT_OT_restore_light(RelightOperator, bpy.types.Operator):
+    """Back to the captured light."""
+
+    bl_idname = "scan_relight.restore_light"
+    bl_label = "Restore Captured Light"
+    bl_description = "Make lamps and outside exactly what was recovered, and remove the lights that were added here"
+
+    @classmethod
+    def poll(cls, context):
+        """Only where anything differs."""
+        if not super().poll(context):
+            return False
+        if not relight_state.is_relit(context.scene):
+            cls.poll_message_set("The light is as it was captured.")
+            return False
+        return True
+
+    def work(self, context):
+        """All of it."""
+        relight_state.restore_captured(context.scene)
+
+
+class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
+    """Add a light inside the room."""
+
+    bl_idname = "scan_relight.add_light"
+    bl_label = "Add Light"
+
+    preset: bpy.props.EnumProperty(name="Light", description="What kind of light", items=PRESETS)
+    strength: bpy.props.FloatProperty(
+        name="Strength", description="1 keeps the scene's exposure readable", min=0.0, soft_max=4.0, default=1.0)
+    aim: bpy.props.EnumProperty(name="Aim At", description="What the light is aimed at", items=AIMS)
+
+    @classmethod
+    def description(cls, context, properties):
+        """The preset's own words."""
+        text = next(text for name, _, text in PRESETS if name == properties.preset)
+        return f"{text}; stands inside the room, as strong as the room's own light asks for"
+
+    def work(self, context):
+        """Add it and make it the active object."""
+        light = relight_lights.add_light(context.scene, self.preset, self.strength, self.aim, context.object)
+        for thing in context.selected_objects:
+            thing.select_set(False)
+        light.select_set(True)
+        context.view_layer.objects.active = light
+
+
+class SCAN_RELIGHT_OT_remove_lights(RelightOperator, bpy.types.Operator):
+    """Remove what was added."""
+
+    bl_idname = "scan_relight.remove_lights"
+    bl_label = "Remove New Lights"
+    bl_description = "Remove all lights that were added here"
+
+    @classmethod
+    def poll(cls, context):
+        """Only where there are any."""
+        if not super().poll(context):
+            return False
+        if not relight_lights.added_lights(context.scene):
+            cls.poll_message_set("No light was added here.")
+            return False
+        return True
+
+    def work(self, context):
+        """All of them."""
+        relight_lights.remove_lights(context.scene)
+
+
+class SCAN_RELIGHT_OT_use_hdri(RelightOperator, bpy.types.Operator):
+    """Put a picture around the room."""
+
+    bl_idname = "scan_relight.use_hdri"
+    bl_label = "Picture Around the Room"
+    bl_description = "Put an equirectangular HDR picture around the room; the recovered outside is kept"
+
+    filepath: bpy.props.StringProperty(
+        name="Picture", description="EXR or HDR file", subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: bpy.props.StringProperty(default="*.exr;*.hdr;*.png;*.jpg", options={"HIDDEN"})
+
+    def invoke(self, context, event):
+        """Choose the file."""
+        if self.filepath:
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def work(self, context):
+        """Scale it to a day outside such a room."""
+        if not self.filepath:
+            raise BadInputError("Choose the picture first.")
+        scene = context.scene
+        relight_outside.use_hdri(scene, bpy.path.abspath(self.filepath), relight_outside.usual_radiance(scene))
+        if not relight_outside.is_open(scene):
+            return ["The scanned room is closed, so the picture around it sends no light in."]
+        return []
+
+
+_items: list[tuple[str, str, str]] = []  # Blender keeps no reference to what a callback returns
+
+
+def _studio_items(operator, context):
+    _items[:] = [(str(path), path.stem.capitalize(), f"Blender's own picture '{path.stem}'")
+                 for path in relight_outside.studio_lights()]
+    return _items
+
+
+class SCAN_RELIGHT_OT_use_studio_light(RelightOperator, bpy.types.Operator):
+    """One of Blender's own pictures around the room."""
+
+    bl_idname = "scan_relight.use_studio_light"
+    bl_label = "Blender's Pictures"
+    bl_description = "Put one of the HDR pictures that come with Blender around the room"
+
+    picture: bpy.props.EnumProperty(name="Picture", description="Which one", items=_studio_items)
+
+    @classmethod
+    def poll(cls, context):
+        """Some builds have none."""
+        if not super().poll(context):
+            return False
+        if not relight_outside.studio_lights():
+            cls.poll_message_set("This Blender comes without its HDR pictures; choose a file instead.")
+            return False
+        return True
+
+    def work(self, context):
+        """As any other picture."""
+        scene = context.scene
+        relight_outside.use_hdri(scene, Path(self.picture), relight_outside.usual_radiance(scene))
+        if not relight_outside.is_open(scene):
+            return ["The scanned room is closed, so the picture around it sends no light in."]
+        return []

@@ -1,0 +1,105 @@
+"""What the panels Relight and Export show: lamps and outside as they are, and what was chosen for the next click.
+
+The properties of lamps and outside hold nothing: they read and write what the bridge keeps with material and world.
+"""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import bpy
+
+from ..addon.bridge import match_frame, relight_lamps, relight_outside
+from ..addon.bridge.cameras import frame_cameras
+
+AIMS = (("VIEW", "View", "What the middle of the camera's picture shows"),
+        ("CURSOR", "3D Cursor", "Where the 3D cursor is"),
+        ("OBJECT", "Object", "The active object"))
+PLACES = AIMS[:2]
+SHAPES = (("SPHERE", "Sphere", "A ball"), ("CUBE", "Cube", "A cube"), ("MONKEY", "Suzanne", "Blender's monkey"))
+LOOKS = (("MATTE", "Matte", "Grey, like chalk"), ("GLOSSY", "Glossy", "Red lacquer"),
+         ("MIRROR", "Mirror", "Polished metal, to see the room's light in"))
+ENGINES = (("CYCLES", "Cycles", "Path tracing: the room's own light bounces"),
+           ("EEVEE", "EEVEE", "Quick; indirect light and large lamps are only approximate"))
+
+
+def _lamp(group):
+    return group.id_data if relight_lamps.is_lamp(group.id_data) else None
+
+
+class ScanRelightLamp(bpy.types.PropertyGroup):
+    """`Material.scan_relight_lamp`."""
+
+    on: bpy.props.BoolProperty(
+        name="On", description="Whether this lamp shines",
+        get=lambda self: bool(_lamp(self)) and relight_lamps.is_on(self.id_data),
+        set=lambda self, value: _lamp(self) and relight_lamps.set_on(self.id_data, value))
+    factor: bpy.props.FloatProperty(
+        name="Strength", description="Times the radiance that the scan found; 1 is the lamp as captured",
+        min=0.0, max=relight_lamps.MAX_FACTOR, soft_max=4.0, step=5, precision=2,
+        get=lambda self: relight_lamps.factor(self.id_data),
+        set=lambda self, value: _lamp(self) and relight_lamps.set_factor(self.id_data, value))
+    colour: bpy.props.FloatVectorProperty(
+        name="Colour", description="Colour of its light", subtype="COLOR", size=3, min=0.0, max=1.0,
+        get=lambda self: (_lamp(self) and relight_lamps.colour(self.id_data)) or (1.0, 1.0, 1.0),
+        set=lambda self, value: _lamp(self) and relight_lamps.set_colour(self.id_data, value))
+
+
+class ScanRelightOutside(bpy.types.PropertyGroup):
+    """`World.scan_relight_outside`."""
+
+    on: bpy.props.BoolProperty(
+        name="Light from Outside", description="Whether light comes in from outside the scanned room",
+        get=lambda self: relight_outside.is_on(self.id_data),
+        set=lambda self, value: relight_outside.set_on(self.id_data, value))
+    factor: bpy.props.FloatProperty(
+        name="Strength", description="Times the light from outside that was recovered, or the picture's",
+        min=0.0, max=relight_outside.MAX_FACTOR, soft_max=4.0, step=5, precision=2,
+        get=lambda self: relight_outside.factor(self.id_data),
+        set=lambda self, value: relight_outside.set_factor(self.id_data, value))
+    rotation: bpy.props.FloatProperty(
+        name="Rotation", description="Turns the outside about the vertical, anticlockwise from above", subtype="ANGLE",
+        soft_min=-3.141593, soft_max=3.141593, step=100,
+        get=lambda self: relight_outside.rotation(self.id_data),
+        set=lambda self, value: relight_outside.set_rotation(self.id_data, value))
+
+
+def _set_frame(studio, index):
+    match_frame.match_frame(studio.id_data, index, studio.show_frame, studio.frame_alpha, studio.frame_front,
+                            bpy.path.abspath(studio.id_data.scan_relight.capture_folder))
+
+
+def _frame_changed(studio, context):
+    index = match_frame.current(studio.id_data)
+    if index >= 0:
+        _set_frame(studio, index)
+
+
+class ScanRelightStudio(bpy.types.PropertyGroup):
+    """`Scene.scan_relight_studio`."""
+
+    lamp: bpy.props.IntProperty(name="Lamp", description="The lamp that is shown in full", default=0)
+    frame: bpy.props.IntProperty(
+        name="Frame", description="Look through the camera of this frame of the capture: its lens, its size",
+        get=lambda self: max(match_frame.current(self.id_data), 0),
+        set=lambda self, value: _set_frame(self, min(max(value, 0), max(len(frame_cameras(self.id_data)) - 1, 0))))
+    show_frame: bpy.props.BoolProperty(
+        name="Show Its Picture", description="Lay the frame's picture behind the scene, under the scene's exposure",
+        default=True, update=_frame_changed)
+    frame_front: bpy.props.BoolProperty(
+        name="In Front", description="Lay the picture before the scene instead of behind", update=_frame_changed)
+    frame_alpha: bpy.props.FloatProperty(
+        name="Opacity", description="Of the frame's picture", min=0.0, max=1.0, default=1.0, subtype="FACTOR",
+        update=_frame_changed)
+    aim: bpy.props.EnumProperty(name="Aim At", description="What a new light is aimed at", items=AIMS)
+    strength: bpy.props.FloatProperty(
+        name="Strength", description="Of a new light; 1 keeps the scene's exposure readable", min=0.0, soft_max=4.0,
+        default=1.0, step=5, precision=2)
+    place: bpy.props.EnumProperty(name="Place", description="Where an object is set down", items=PLACES)
+    shape: bpy.props.EnumProperty(name="Shape", description="What is set into the room", items=SHAPES)
+    look: bpy.props.EnumProperty(name="Material", description="Of the new object", items=LOOKS, default="MIRROR")
+    size: bpy.props.FloatProperty(
+        name="Size", description="Its largest extent", subtype="DISTANCE", min=0.001, soft_max=2.0, default=0.3)
+    engine: bpy.props.EnumProperty(name="Engine", description="Renders the two pictures", items=ENGINES)
+    samples: bpy.props.IntProperty(
+        name="Samples", description="For each pixel; more is calmer and slower", min=1, soft_max=4096, default=64)
+    percentage: bpy.props.IntProperty(
+        name="Size", description="Of the scene's render size", subtype="PERCENTAGE", min=1, soft_max=100, max=1000,
+        default=100)

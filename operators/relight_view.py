@@ -1,0 +1,45 @@
+"""`bpy.ops.scan_relight.match_frame`: the scene's camera becomes a frame's, with its picture behind."""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import bpy
+
+from ..addon.bridge import match_frame
+from ..addon.bridge.cameras import frame_cameras
+from ..addon.core.errors import BadInputError
+from .relight_base import RelightOperator
+
+
+class SCAN_RELIGHT_OT_match_frame(RelightOperator, bpy.types.Operator):
+    """Look through a frame of the capture."""
+
+    bl_idname = "scan_relight.match_frame"
+    bl_label = "Match Frame"
+    bl_description = "Look and render through the camera of a frame: its lens, size and pixel shape"
+    needs_room = False
+
+    index: bpy.props.IntProperty(name="Frame", description="In the capture's order, from 0", min=0)
+    step: bpy.props.IntProperty(name="Step", description="So many frames on from the present one; 0 takes the frame")
+
+    @classmethod
+    def poll(cls, context):
+        """Only with cameras of a capture."""
+        if not super().poll(context):
+            return False
+        if not frame_cameras(context.scene):
+            cls.poll_message_set("The scene has no camera of a capture; import a capture first.")
+            return False
+        return True
+
+    def work(self, context):
+        """Set the camera; in a window, look through it."""
+        scene, studio = context.scene, context.scene.scan_relight_studio
+        count = len(frame_cameras(scene))
+        index = (match_frame.current(scene) + self.step) % count if self.step else self.index
+        if index >= count:
+            raise BadInputError(f"There is no frame {index}; the capture's last one is {count - 1}.")
+        told = match_frame.match_frame(scene, index, studio.show_frame, studio.frame_alpha, studio.frame_front,
+                                       bpy.path.abspath(scene.scan_relight.capture_folder))
+        space = context.space_data
+        if space is not None and space.type == "VIEW_3D" and space.region_3d is not None:
+            space.region_3d.view_perspective = "CAMERA"
+        return [told] if told else []

@@ -1,0 +1,185 @@
+"""Exports: what other programs read back is what the materials say; the scene has not changed."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from addon.bridge import export as exporting  # noqa: E402
+from addon.bridge import relight_lamps  # noqa: E402
+from addon.bridge.images import image_array, load_image  # noqa: E402
+from addon.bridge.materials import ior_of, make_material  # noqa: E402
+from addon.bridge.mesh_objects import ATLAS_UV, OBJECT_ID, mesh_data  # noqa: E402
+from addon.core.capture.exr import write_exr  # noqa: E402
+from addon.core.errors import BadInputError, StorageError  # noqa: E402
+from addon.core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR, ObjectMaterial  # noqa: E402
+
+COLOUR = (0.5, 0.1, 0.02)
+UV = np.float32([[0.1, 0.1], [0.9, 0.1], [0.9, 0.8]])
+KNOWN = (
+    ObjectMaterial(1, "wall", LAMBERTIAN),
+    ObjectMaterial(2, "table", SPECULAR, phi=0.09, psi=0.06),
+    ObjectMaterial(3, "tap", METAL, phi=0.04, f0=(0.9, 0.8, 0.5)),
+    ObjectMaterial(4, "lamp", EMITTER, emission=(6.0, 3.0, 1.5)),
+    ObjectMaterial(5, "sheet lamp", EMITTER, emission=(0.8, 0.4, 0.2)),
+)
+
+
+@pytest.fixture
+def things(scene, tmp_path):
+    """One triangle for each model, the atlas an EXR of one colour."""
+    write_exr(tmp_path / "base_color.exr", np.broadcast_to(np.float32(COLOUR), (8, 8, 3)))
+    image = load_image(tmp_path / "base_color.exr")
+    for known in KNOWN:
+        mesh = mesh_data(known.class_name, np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]]), np.array([[0, 1, 2]]))
+        mesh.uv_layers.new(name=ATLAS_UV).data.foreach_set("uv", UV.ravel())
+        mesh.materials.append(make_material(known, image, one_sided=known.object_id == 5))
+        thing = bpy.data.objects.new(known.class_name, mesh)
+        thing.location = known.object_id, 0, 0
+        thing[OBJECT_ID] = known.object_id
+        scene.collection.objects.link(thing)
+    bpy.context.view_layer.update()
+    return scene
+
+
+def everything():
+    """Names and numbers of all that the scene holds."""
+    kinds = ("objects", "meshes", "materials", "images", "collections", "scenes", "cameras", "lights")
+    return ({kind: sorted(x.name for x in getattr(bpy.data, kind)) for kind in kinds},
+            [(t.name, t.select_get(), t.hide_viewport, t.parent, [s.material.name + s.link for s in t.material_slots])
+             for t in bpy.context.scene.objects],
+            {(m.name, n.name, s.name): (len(s.links), list(s.default_value) if hasattr(s.default_value, "__len__")
+                                        else s.default_value)
+             for m in bpy.data.materials for n in m.node_tree.nodes for s in n.inputs if hasattr(s, "default_value")})
+
+
+def read_back(path):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    if path.suffix in (".glb", ".gltf"):
+        bpy.ops.import_scene.gltf(filepath=str(path))
+    else:
+        bpy.ops.wm.usd_import(filepath=str(path))
+    found = {}
+    for thing in bpy.context.scene.objects:
+        if thing.type == "MESH":
+            name = thing.name.split(".")[0].replace("_", " ")
+            shader = next(n for n in thing.material_slots[0].material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+            found[name] = thing, shader.inputs, thing.material_slots[0].material
+    return found
+
+
+def base_colour(socket):
+    if not socket.links:
+        return np.array(socket.default_value[:3])
+    node = socket.links[0].from_node
+    while node.type != "TEX_IMAGE":
+        node = next(s for s in node.inputs if s.links).links[0].from_node
+    value = image_array(node.image)[..., :3].mean((0, 1))
+    assert node.image.colorspace_settings.name == "sRGB"
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+
+
+def light(inputs):
+    return inputs["Emission Strength"].default_value * np.array(inputs["Emission Color"].default_value[:3])
+
+
+@pytest.mark.parametrize("ending", [".glb", ".gltf", ".usdc", ".usda"])
+def test_what_is_read_back_is_what_the_materials_say(things, tmp_path, ending):
+    before = everything()
+    exporting.export(things, tmp_path / "out" / f"room{ending}", lights=False)
+    assert everything() == before
+    found = read_back(tmp_path / "out" / f"room{ending}")
+    assert set(found) == {known.class_name for known in KNOWN}
+    usd = ending.startswith(".usd")
+    for name in ("wall", "table"):
+        thing, inputs, _ = found[name]
+        assert np.allclose(base_colour(inputs["Base Color"]), COLOUR, atol=0.004)
+        uv = np.array([item.vector[:] for item in thing.data.uv_layers.active.uv])
+        assert np.allclose(sorted(uv.tolist()), sorted(UV.tolist()), atol=1e-4)
+    table, wall, tap = (found[name][1] for name in ("table", "wall", "tap"))
+    assert table["Roughness"].default_value == pytest.approx(0.3, abs=1e-3)
+    assert table["IOR"].default_value == pytest.approx(ior_of(0.06), abs=1e-3)
+    f0 = ((wall["IOR"].default_value - 1) / (wall["IOR"].default_value + 1)) ** 2
+    assert 2 * wall["Specular IOR Level"].default_value * f0 == pytest.approx(0, abs=1e-6)
+    assert tap["Metallic"].default_value == 1 and tap["Roughness"].default_value == pytest.approx(0.2, abs=1e-3)
+    assert np.allclose(base_colour(tap["Base Color"]), (0.9, 0.8, 0.5), atol=1e-3)
+    for name, radiance in (("lamp", (6.0, 3.0, 1.5)), ("sheet lamp", (0.8, 0.4, 0.2))):
+        assert np.allclose(light(found[name][1]), radiance, rtol=1e-3)
+    assert light(wall).max() == 0
+    if not usd:
+        assert found["sheet lamp"][2].use_backface_culling and not found["lamp"][2].use_backface_culling
+    place = found["table"][0].matrix_world.translation
+    assert place.x == pytest.approx(2, abs=1e-5)
+
+
+def test_the_extensions_are_named_in_the_file(things, tmp_path):
+    exporting.export(things, tmp_path / "room.gltf")
+    file = json.loads((tmp_path / "room.gltf").read_text())
+    used = set(file["extensionsUsed"])
+    assert {"KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_specular"} <= used
+    assert all(image["mimeType"] == "image/png" for image in file["images"]) and len(file["images"]) == 1
+
+
+def test_lamps_go_as_they_shine_now(things, tmp_path):
+    relight_lamps.set_factor(relight_lamps.lamp_named(things, "lamp 4")[0], 0.5)
+    relight_lamps.set_on(relight_lamps.lamp_named(things, "sheet lamp")[0], False)
+    exporting.export(things, tmp_path / "room.glb")
+    found = read_back(tmp_path / "room.glb")
+    assert np.allclose(light(found["lamp"][1]), (3.0, 1.5, 0.75), rtol=1e-3)
+    assert light(found["sheet lamp"][1]).max() == 0
+
+
+def test_selected_only_and_lights_that_a_format_lacks(things, tmp_path):
+    things.objects["tap"].select_set(True)
+    data = bpy.data.lights.new("soft", "AREA")
+    things.collection.objects.link(bpy.data.objects.new("soft", data))
+    told = exporting.export(things, tmp_path / "tap.glb", exporting.SELECTED)
+    assert any("no area lights" in one for one in told)
+    assert set(read_back(tmp_path / "tap.glb")) == {"tap"}
+
+
+@pytest.mark.parametrize("name, says", [("room.obj", "ending in '.obj'"), ("room", "can't be written")])
+def test_an_unknown_format_is_told(things, tmp_path, name, says):
+    with pytest.raises(BadInputError, match=says):
+        exporting.export(things, tmp_path / name)
+
+
+def test_a_failure_leaves_the_scene_and_the_old_file(things, tmp_path, monkeypatch):
+    (tmp_path / "room.glb").write_bytes(b"old")
+    before = everything()
+
+    def fail(path, ending, collection):
+        raise RuntimeError("Error: it fell over.\n")
+
+    monkeypatch.setattr(exporting, "_write", fail)
+    with pytest.raises(StorageError, match="it fell over"):
+        exporting.export(things, tmp_path / "room.glb")
+    assert everything() == before and (tmp_path / "room.glb").read_bytes() == b"old"
+    assert [p.name for p in tmp_path.iterdir() if p.suffix != ".exr"] == ["room.glb"]
+
+
+def test_nothing_chosen_is_told(things, tmp_path):
+    with pytest.raises(BadInputError, match="nothing to export"):
+        exporting.export(things, tmp_path / "room.glb", exporting.SELECTED)
+
+
+def test_without_usd_it_is_told(monkeypatch):
+    class Options:
+        usd = False
+
+    class App:
+        build_options = Options
+
+    class Blender:
+        app = App
+        types = bpy.types
+
+    monkeypatch.setattr(exporting, "bpy", Blender)
+    assert "without USD" in exporting.can_export(".usdz") and not exporting.can_export(".glb")
+
+
+def test_the_transfer_curve():
+    assert exporting.srgb(np.array([0.0, 0.5, 1.0, 2.0, math.nan])) == pytest.approx([0, 0.735357, 1, 1, 0], abs=1e-5)
