@@ -51,6 +51,9 @@ def plain_copy(material: bpy.types.Material, textures: Path, pictures: dict, lev
     ior, specular = value[IOR].default_value, value[SPECULAR_LEVEL].default_value
     if not level:
         ior, specular = ior_of(2 * specular * ((ior - 1) / (ior + 1)) ** 2), 0.5
+    elif specular == 0.5:
+        # Blender's glTF exporter writes an index of refraction only beside a specular factor that is not 1.
+        specular = 0.49999
     made = plain_material(
         material.name, tuple(value[BASE_COLOR].default_value[:3]), value[ROUGHNESS].default_value,
         specular, value[METALLIC].default_value, ior, emission(material),

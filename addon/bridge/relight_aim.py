@@ -14,6 +14,10 @@ _CLEAR = 0.05
 """Metres that a light keeps off what is behind it."""
 
 
+_NEAR = 0.8
+"""Metres from its target from which on a light lights more than that."""
+
+
 class Placement(NamedTuple):
     """Where a light is, how it is turned, its size in metres, and whether it shines in through an opening."""
 
@@ -33,7 +37,7 @@ def softbox_place(scene: bpy.types.Scene, target: Vector, ignored: bpy.types.Obj
             distance = _free(scene, target, direction, 1.8)
             if best is None or distance > best[0] + 0.2:
                 best = distance, direction
-    distance, direction = best
+    distance, direction = _from_camera(scene, target, *best)
     edge = min(max(0.4 * distance, 0.15), 0.8)
     return Placement(target + direction * distance, _facing(-direction), edge, edge)
 
@@ -42,7 +46,8 @@ def spot_place(scene: bpy.types.Scene, target: Vector, ignored: bpy.types.Object
     """Under the ceiling, a little on the camera's side of the target."""
     up = max((_towards(-view_direction(scene), side, elevation) for side in (0, 35, -35) for elevation in (65, 80)),
              key=lambda direction: _free(scene, target, direction, 2.2))
-    return Placement(target + up * _free(scene, target, up, 2.2), _facing(-up), 0.08, 0.08)
+    distance, up = _from_camera(scene, target, _free(scene, target, up, 2.2), up)
+    return Placement(target + up * distance, _facing(-up), 0.08, 0.08)
 
 
 def window_place(scene: bpy.types.Scene, target: Vector, ignored: bpy.types.Object | None) -> Placement:
@@ -83,10 +88,23 @@ def sun_place(scene: bpy.types.Scene, target: Vector, ignored: bpy.types.Object 
                 return Placement(origin, _facing(-direction), 1.0, 1.2, outside=True)
     direction = max((_towards(-view_direction(scene), side, up) for side in beside[:6] for up in (16, 24)),
                     key=lambda d: _free(scene, above, d, 6.0))
-    distance = _free(scene, above, direction, 6.0)
+    distance, direction = _from_camera(scene, above, _free(scene, above, direction, 6.0), direction)
     width, height = min(0.9, 0.5 * distance), min(1.1, 0.6 * distance)
     origin = above + direction * distance
     return Placement(origin, _facing(target - origin), width, height)
+
+
+def _from_camera(scene, target: Vector, distance: float, direction: Vector) -> tuple[float, Vector]:
+    """Distance and direction of a light; from the camera, which sees the target, where all else is too close to it.
+
+    A light in a corner, a hand's breadth from its target, would leave the rest of the room black.
+    """
+    if distance >= _NEAR or scene.camera is None:
+        return distance, direction
+    way = scene.camera.matrix_world.translation - target
+    if way.length <= distance:
+        return distance, direction
+    return _free(scene, target, way.normalized(), way.length), way.normalized()
 
 
 def _before(scene, target: Vector) -> Vector:
