@@ -10,6 +10,8 @@ views are traced with embree and show the nearest surface element.
 
 from __future__ import annotations
 
+import copy
+import dataclasses
 import json
 import sys
 from pathlib import Path
@@ -27,6 +29,16 @@ from addon.core.shading.albedo import MEASURED, quotient
 from addon.core.store import Store
 
 
+def without_excess(recovery: Recovery) -> np.ndarray:
+    """The albedo had glossy things thrown what their medians say."""
+    other = copy.copy(recovery)
+    found = recovery.specular()
+    other.done = recovery.done | {"specular": dataclasses.replace(found, excess=np.zeros_like(found.excess))}
+    for name in ("irradiance", "albedo"):
+        other.__dict__.pop(name, None)
+    return other.albedo.rho
+
+
 def main() -> int:
     capture, result = Path(sys.argv[1]), Path(sys.argv[2])
     settings = Settings(**json.loads((result / "report.json").read_text())["settings"])
@@ -35,15 +47,18 @@ def main() -> int:
         lit, shading = recovery.lit_diffuse(), recovery.shading()
         seen = views(capture, recovery)
         base, albedo = recovery.base_color(), recovery.albedo
-        raw, _ = quotient(np.maximum(lit.radiance - recovery.specular().specular, 0), shading.irradiance)
+        specular = recovery.specular().specular
+        raw, _ = quotient(np.maximum(lit.radiance - specular, 0), recovery.irradiance)
+        medians = without_excess(recovery)
         measured = albedo.origin == MEASURED
         good = measured & (lit.tier == 0) & (lit.count >= 6)
         limit = projected_truth(seen, len(lit.count), albedo.rho)
         rows = (
             ("Base Color as written", psnr(seen, base)),
             ("without the compensation for Principled's layering", psnr(seen, albedo.rho)),
+            ("that, and glossy things lighting by their median", psnr(seen, medians)),
             ("... and the specular part left in the median", psnr(seen, shading.albedo.rho)),
-            ("... and neither filled in nor steadied: plain quotient, unseen black", psnr(seen, np.nan_to_num(raw))),
+            ("plain quotient: neither filled in nor steadied, unseen black", psnr(seen, np.nan_to_num(raw))),
             ("albedo on measured elements only", psnr(seen, albedo.rho, measured)),
             ("albedo on elements with six or more clean observations", psnr(seen, albedo.rho, good)),
             ("the truth itself through the texels (limit of the sampling)", psnr(seen, limit)),

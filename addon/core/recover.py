@@ -40,7 +40,7 @@ from .store import Store, key
 from .surface.build import Surface, build_surface, from_uv, turned
 from .surface.denoise import without_noise
 
-CODE = 13
+CODE = 14
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -291,18 +291,19 @@ class Recovery:
 
         def compute():
             found = fit_specular(
-                self.capture.instances, self.field, lit, shading.lamps, self.samples(),
+                self.capture.instances, self.field, lit, shading.irradiance, shading.lamps, self.samples(),
                 [frame.name for frame in self.capture.frames],
                 way=s.specular, rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
                 progress=self.progress,
             )  # fmt: skip
-            return found, {"specular": found.specular}, {"materials": [dataclasses.asdict(m) for m in found.materials]}
+            arrays = {"specular": found.specular, "excess": found.excess}
+            return found, arrays, {"materials": [dataclasses.asdict(m) for m in found.materials]}
 
         def load(arrays, meta):
             def one(d):
                 return ObjectMaterial(**{k: tuple(v) if isinstance(v, list) else v for k, v in d.items()})
 
-            return Specular(tuple(one(d) for d in meta["materials"]), arrays["specular"])
+            return Specular(tuple(one(d) for d in meta["materials"]), arrays["specular"], arrays["excess"])
 
         return self._stage("specular", load, compute)
 
@@ -311,13 +312,17 @@ class Recovery:
         return list(self.specular().materials)
 
     @cached_property
+    def irradiance(self) -> np.ndarray:
+        """The final E, (n, 3) float32."""
+        return self.shading().irradiance + self.specular().excess
+
+    @cached_property
     def albedo(self) -> Albedo:
-        """The final albedo: of L_d less its specular part."""
-        lit, shading = self.lit_diffuse(), self.shading()
-        specular = self.specular().specular
-        if not specular.any():
+        """The final albedo: of L_d less its specular part, under all that glossy things throw."""
+        lit, shading, found = self.lit_diffuse(), self.shading(), self.specular()
+        if not found.specular.any() and not found.excess.any():
             return shading.albedo
-        rho, valid = quotient(np.maximum(lit.radiance - specular, 0), shading.irradiance)
+        rho, valid = quotient(np.maximum(lit.radiance - found.specular, 0), self.irradiance)
         class_of = {i.object_id: i.class_name for i in self.capture.instances}
         emitters = {lamp.object_id for lamp in shading.lamps}
         error = np.hypot(doubt(lit), shading.doubt)
@@ -357,7 +362,7 @@ class Recovery:
         images = {
             "albedo": self.albedo.rho,
             "base_color": self.base_color(),
-            "shading": shading.irradiance,
+            "shading": self.irradiance,
             "lit_diffuse": np.where(lit.seen[:, None], lit.radiance, 0).astype(np.float32),
             "coverage": coverage,
             **self.evidence.images(),

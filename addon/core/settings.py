@@ -44,7 +44,8 @@ class Settings:
     specular_rays : int
         Rays for each observation in the specular fit.
     refine : int
-        1 takes the fitted specular out of the lit diffuse texture again; 0 leaves it (the paper).
+        Rounds after the fit: 1 takes the fitted specular out of the lit diffuse texture; 2 also lights the room with
+        what glossy things really reflect; 0 leaves both (the paper).
     threads : int
         0 takes all cores.
     seed : int
@@ -65,7 +66,7 @@ class Settings:
     mirrors: bool = True
     specular: str = "frames"
     specular_rays: int = 256
-    refine: int = 1
+    refine: int = 2
     threads: int = 0
     seed: int = 0
 

@@ -106,7 +106,7 @@ def test_results(store):
     path = store.write_json("report/run.json", {"psnr": np.float32(20), "bad": float("nan"), "ids": np.arange(2),
                                                 "settings": Settings()})
     told = json.loads(path.read_text())
-    assert (told["psnr"], told["bad"], told["ids"], told["settings"]["refine"]) == (20, None, [0, 1], 1)
+    assert (told["psnr"], told["bad"], told["ids"], told["settings"]["refine"]) == (20, None, [0, 1], 2)
     picture = store.write_exr("textures/albedo.exr", np.full((4, 5, 3), 0.25), half=True)
     assert (read_exr(picture).rgb == 0.25).all()
 

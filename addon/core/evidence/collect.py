@@ -42,6 +42,6 @@ def collect(run: Recovery) -> Evidence:
     own = without_light(atlas, lit, run.albedo)
     light = light_evidence(run.field, shading, lit, own, threads=run.settings.threads, seed=run.settings.seed)
     texels = texel_evidence(
-        atlas, lit, run.albedo, own, light, list(specular.materials), specular.specular, shading.irradiance
+        atlas, lit, run.albedo, own, light, list(specular.materials), specular.specular, run.irradiance
     )
     return Evidence(light, texels, object_evidence(atlas, lit, run.albedo, texels))

@@ -44,7 +44,7 @@ def pictures_of(run: Recovery, view: View) -> tuple[list[Picture], list[tuple[in
     """Pictures of a frame, and its worst residuals: (object_id, mean relative residual) from the worst on."""
     element, nothing = view.element, view.element < 0
     shown = np.maximum(element, 0)
-    albedo, errors, shading = run.albedo.rho, run.evidence.texels, run.shading().irradiance
+    albedo, errors, shading = run.albedo.rho, run.evidence.texels, run.irradiance
     middle = float(np.median(view.radiance[view.valid])) if view.valid.any() else 1.0
     emitters = np.isin(view.object_id, [lamp.object_id for lamp in run.shading().lamps])
 

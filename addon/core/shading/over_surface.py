@@ -23,10 +23,10 @@ SMOOTH = 0.05
 """Relative deviation of the lamps' light between a block's corners up to which it is interpolated."""
 
 
-def finest_spacing(atlas: Atlas) -> float:
+def finest_spacing(atlas: Atlas, share: float = FINEST_SHARE) -> float:
     """Least distance of two gathering points, metres."""
     extent = np.sort(np.ptp(atlas.position, axis=0))
-    return max(_texel_edge(atlas), FINEST_SHARE * float(np.sqrt(extent[1] * extent[2])))
+    return max(_texel_edge(atlas), share * float(np.sqrt(extent[1] * extent[2])))
 
 
 def _texel_edge(atlas: Atlas) -> float:

@@ -14,6 +14,7 @@ from ..progress import Progress
 from ..shading.field import LightField
 from ..shading.lamps import Lamp
 from .fit import fit_lobe
+from .glossy_light import Excess, glossy_light
 from .intervals import GlossInterval, gloss_interval
 from .layout import Problem
 from .models import Choice, adopt_from_class, choose_model, metal_f0
@@ -48,23 +49,27 @@ class Specular:
         One for each instance, by object_id.
     specular : (n, 3) float32
         Part of each element's L_d that is specular.
+    excess : (n, 3) float32
+        What is to be added to E, as glossy things throw more on each element than their L_d says.
     """
 
     materials: tuple[ObjectMaterial, ...]
     specular: np.ndarray
+    excess: np.ndarray
 
 
 def fit_specular(
     instances: tuple[Instance, ...],
     field: LightField,
     lit_diffuse: LitDiffuse,
+    irradiance: np.ndarray,
     lamps: tuple[Lamp, ...],
     samples: Samples,
     frame_names: list[str],
     *,
     way: str = "frames",
     rays: int = 256,
-    refine: int = 1,
+    refine: int = 2,
     threads: int = 0,
     seed: int = 0,
     progress: Progress | None = None,
@@ -75,8 +80,10 @@ def fit_specular(
     ----------
     way : str
         'target': the paper's single target frame and always a lobe. 'frames': many views and a choice of model.
+    irradiance : (n, 3) float32
+        E of each element, from L_d.
     refine : int
-        0 leaves L_d as the median gave it.
+        0 leaves L_d as the median gave it; 1 takes the lobes out of it; 2 also corrects E for what they really throw.
 
     Raises
     ------
@@ -97,7 +104,7 @@ def fit_specular(
         if problem is not None:
             problems[object_id] = problem
         if progress is not None:
-            progress.update(0.8 * len(choices) / len(wanted))
+            progress.update(0.7 * len(choices) / len(wanted))
     if way == "frames":
         choices = adopt_from_class(choices, problems, {i.object_id: i.class_name for i in instances})
 
@@ -130,8 +137,16 @@ def fit_specular(
     for done, (own, part) in enumerate(ordered_map(separate, glossy, threads)):
         specular[own] = part
         if progress is not None:
-            progress.update(0.8 + 0.2 * (done + 1) / len(glossy))
-    return Specular(tuple(materials), specular)
+            progress.update(0.7 + 0.15 * (done + 1) / len(glossy))
+
+    excess = np.zeros_like(specular)
+    if refine > 1:
+        seen = np.flatnonzero(lit_diffuse.seen)
+        sent = Excess(field, tuple(materials), specular, seed)
+        excess[seen] = glossy_light(
+            sent, seen, irradiance[seen], threads=threads, seed=seed, progress=progress, share=(0.85, 1.0)
+        )
+    return Specular(tuple(materials), specular, excess)
 
 
 def _look(
