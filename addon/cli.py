@@ -111,6 +111,9 @@ def make_parser() -> argparse.ArgumentParser:
     info.add_argument("--json", action="store_true", help="machine-readable")
     info.add_argument("--room", metavar="FOLDER", type=Path, help=argparse.SUPPRESS)
     info.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)
+    info.add_argument("--no-look", action="store_true", help="don't compare the frames with the mesh")
+    info.add_argument("--overlay", metavar="PNG", type=Path,
+                      help="write frames with the mesh's edges drawn over them")
     add_reading(info)
     add_common(info, info_command)
 
@@ -295,6 +298,8 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
 
         write_room(arguments.room, capture)
     facts = describe(capture)
+    if capture.frames and not arguments.no_look:
+        facts["agreement"] = compare(capture, arguments)
     if arguments.json:
         print(json.dumps(facts, indent=1), file=stream)
         return EXIT_OK
@@ -309,7 +314,33 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         print(f"    {one['object_id']:>5}  {one['class_name']:<24} {one['triangles']:>8} triangles", file=stream)
     for warning in facts["warnings"]:
         print(f"  warning    {warning}", file=stream)
+    for sentence in facts.get("agreement", {}).get("sentences", ()):
+        print(f"  poses      {sentence}", file=stream)
     return EXIT_OK
+
+
+def compare(capture, arguments: argparse.Namespace) -> dict:
+    """Whether frames and mesh fit, ready for JSON; writes the overlay where one is wanted."""
+    with needed_packages():
+        from .core.agreement.look import look
+        from .core.agreement.overlay import overlay
+        from .core.atomic import write_bytes
+        from .core.capture.conventions import Convention
+        from .core.capture.pixels import read_pixels
+        from .core.evidence.png import png
+
+        found = look(capture, read_pixels, search=not arguments.convention)
+        if arguments.overlay is not None:
+            columns = [Convention()] + ([found.best.convention] if found.best else [])
+            write_bytes(arguments.overlay, png(overlay(capture, read_pixels, columns)))
+    return {
+        "fits": found.fits,
+        "quality": found.as_read.quality,
+        "hit": found.as_read.hit,
+        "convention": str(found.best.convention) if found.best else None,
+        "misaligned_pixels": found.misaligned.round(3).tolist(),
+        "sentences": found.sentences(),
+    }
 
 
 def need(module: str):

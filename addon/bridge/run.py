@@ -13,7 +13,11 @@ from pathlib import Path
 
 import bpy
 
+from ..core.agreement.look import look
+from ..core.capture.conventions import AS_READ
 from ..core.capture.layout import AS_FOUND, Reading
+from ..core.capture.model import Capture
+from ..core.capture.pixels import read_pixels
 from ..core.capture.read import read_capture
 from ..core.errors import BadInputError, StorageError
 from ..core.memory import peak_memory
@@ -95,6 +99,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         check_own(capture.root)  # what is absent is told now, not after the work
     elif scene is not None and not import_first:
         imported(scene, capture)
+    told = _look(capture, reading)
     progress.done()
     with Store(out_folder) as store, _told(out_folder):
         if from_stage in STAGES:
@@ -131,12 +136,27 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         if until == WRITE:
             report["stages"][WRITE] = {"seconds": round(time.monotonic() - writing, 2), "stored": False,
                                        "peak_memory_bytes": peak_memory()}
-        report["warnings"] += warnings
+        report["warnings"] += (*told, *warnings)
         report["versions"] = versions()
         report["peak_memory_bytes"] = peak_memory()
         report["seconds"] = round(time.monotonic() - started, 2)
         store.write_json("report.json", report)
     return report
+
+
+def _look(capture: Capture, reading: Reading) -> list[str]:
+    """Sentences on what does not fit between frames and mesh; none where all does.
+
+    Raises
+    ------
+    BadInputError
+        The poses are surely read wrongly, and how they would be right is known.
+    """
+    found = look(capture, read_pixels, search=not reading.convention)
+    if found.best is not None:
+        raise BadInputError(f"Capture '{capture.root}': {found.sentence()} Give that, or --convention {AS_READ} to go "
+                            "on all the same.")
+    return found.sentences()[found.fits:]
 
 
 @contextmanager

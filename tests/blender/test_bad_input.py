@@ -28,7 +28,7 @@ QUICK = ("--shading-rays", "8", "--specular-rays", "2", "--emitter-rays", "2", "
          "--atlas-size", "256")
 FRAMES = 10
 RESULTS = {"albedo.exr", "albedo_error.exr", "base_color.exr", "coverage.exr", "environment.exr", "evidence.exr",
-           "lit_diffuse.exr", "materials.json", "report.html", "report.json", "scene.blend", "shading.exr"}
+           "lit_diffuse.exr", "materials.json", "report.html", "report.json", "room.npz", "scene.blend", "shading.exr"}
 STAGES = ("surface", "lit_diffuse", "shading", "specular")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from ..errors import BadInputError
 from . import instances
 from .clipping import find_clipping
+from .conventions import parse
 from .id_pictures import read_ids
 from .layout import AS_FOUND, Layout, Reading
 from .mesh_repair import repair
@@ -41,6 +43,8 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
         raise BadInputError(f"Capture '{root}' {what}; give the folder that holds the mesh and the poses.")
     reader = reader_for(root, reading.format)
     layout = reader.read(root, reading)
+    convention = parse(reading.convention)
+    layout = replace(layout, frames=convention.frames(layout.frames), mesh=convention.mesh(layout.mesh))
     frames, more = _usable(root, layout)
     mesh, objects, warnings = _objects(layout, frames)
     clipped, notes = find_clipping(frames, lambda path: read_picture(path).rgb)

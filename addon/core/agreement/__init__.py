@@ -1,0 +1,1 @@
+"""Whether the frames fit the mesh: convention of the poses, and small misalignment. See docs/captures.md."""

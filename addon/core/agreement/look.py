@@ -1,0 +1,206 @@
+"""Do the frames agree with the mesh as the poses are read, and if not, read how would they?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..capture.conventions import SCALES, Convention, alternatives
+from ..capture.model import Capture, Frame, Pixels
+from ..surface.elements import triangle_geometry
+from ..surface.rays import RayScene
+from .edges import Shown, edge_score, shown
+from .misalignment import misalignments
+from .photometric import consistency
+from .views import SmallView, small_views
+
+AGREE = 0.755
+"""Quality from which on the poses are taken as right. Over nine rooms: right 0.78 to 0.91, wrong up to 0.73."""
+BETTER = 0.08
+"""By how much another convention has to be better."""
+LEAST_HIT = 0.05
+"""Share of rays that meet the mesh, below which nothing can be said for a convention."""
+COARSE = 6
+"""Views that all candidates are tried on: pairs of views grow with the square of their number."""
+FINALISTS = 6
+"""Candidates of which all views and the edges are looked at."""
+PLAUSIBLE = 5.0
+"""A scale is tried if it spreads the cameras over a third of the mesh, within this factor."""
+TIE = 0.01
+UPRIGHT = 0.7
+"""Mean cosine from which on an axis is taken as the one that points up."""
+LEAST_VIEWS = 2
+
+
+@dataclass(frozen=True)
+class Fit:
+    """How well the frames fit the mesh under a convention.
+
+    Attributes
+    ----------
+    convention : Convention
+    colour : float
+        Probability that two views of one spot are more alike than of two spots (0.5 by chance); NaN unknown.
+    edge : float
+        Probability that pictures change more at the mesh's edges than elsewhere (0.5 by chance); NaN unknown.
+    hit : float
+        Share of rays through the frames' pixels that meet the mesh.
+    """
+
+    convention: Convention
+    colour: float
+    edge: float
+    hit: float
+
+    @property
+    def quality(self) -> float:
+        """Mean of what is known of `colour` and `edge`; 0 where nothing is."""
+        known = [value for value in (self.colour, self.edge) if np.isfinite(value)]
+        return float(np.mean(known)) if known and self.hit >= LEAST_HIT else 0.0
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """What looking at the capture told.
+
+    Attributes
+    ----------
+    as_read : Fit
+    best : Fit or None
+        A convention that fits clearly better, where one was looked for and found.
+    misaligned : (k,) float
+        Pixels by which frames lie beside what other frames show, where that can be measured.
+    searched : bool
+        Whether other conventions were tried.
+    up : str
+        The world's axis that is up in the frames; '' where it is none, or frames differ.
+    """
+
+    as_read: Fit
+    best: Fit | None
+    misaligned: np.ndarray
+    searched: bool
+    up: str = "+z"
+
+    @property
+    def fits(self) -> bool:
+        """Whether the poses, as read, fit the mesh."""
+        return self.best is None and self.as_read.quality >= AGREE
+
+    @property
+    def unknown(self) -> bool:
+        """Whether there was too little to look at: a single frame, no texture, no overlap."""
+        return self.best is None and not np.isfinite(self.as_read.colour)
+
+    def sentences(self) -> list[str]:
+        """What a user is told."""
+        told = [self.sentence()]
+        if self.up not in ("+z", ""):
+            convention = replace(self.best.convention if self.best else Convention(), up=self.up)
+            told.append(f"The capture lies on its side: {self.up} is up in its frames; --convention {convention} turns "
+                        "it upright.")
+        return told
+
+    def sentence(self) -> str:
+        """Whether the frames fit the mesh, in words."""
+        fit, best = self.as_read, self.best
+        if best is not None:
+            return (f"The frames don't fit the mesh as the poses are read (agreement {fit.quality:.2f} of 1, 0.5 is "
+                    f"chance), but do with --convention {best.convention} ({best.quality:.2f}).")
+        if self.fits:
+            return f"The frames fit the mesh (agreement {fit.quality:.2f} of 1, 0.5 is chance){self._shift()}."
+        if self.unknown:
+            return "Too few spots are seen by two frames to tell whether the poses fit the mesh."
+        tried = " and no usual convention fits better" if self.searched else ""
+        return (f"The frames fit the mesh badly (agreement {fit.quality:.2f} of 1, 0.5 is chance){tried}; check poses, "
+                "focal lengths and mesh against each other with an overlay picture (info --overlay).")
+
+    def _shift(self) -> str:
+        if not len(self.misaligned):
+            return ""
+        return (f", to {np.median(self.misaligned):.1f} pixels in the median and {self.misaligned.max():.1f} in the "
+                f"worst of {len(self.misaligned)} frames")
+
+
+@dataclass(frozen=True)
+class _Scene:
+    views: list[SmallView]
+    capture: Capture
+    rays: RayScene
+    normal: np.ndarray
+
+    def colour(self, convention: Convention, every: int = 1) -> Fit:
+        views = self.views[::every]
+        found = consistency(views, convention.cameras([view.camera for view in views]), self.rays)
+        return Fit(convention, found.score, float("nan"), found.hit)
+
+    def shown(self, convention: Convention) -> list[Shown]:
+        cameras = convention.cameras([view.camera for view in self.views])
+        return [shown(camera, self.capture.mesh, self.normal, self.rays) for camera in cameras]
+
+    def whole(self, fit: Fit) -> Fit:
+        return replace(fit, edge=edge_score(self.views, self.shown(fit.convention)))
+
+
+def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True) -> Agreement:
+    """Compare frames and mesh, and try other conventions where they don't agree.
+
+    Parameters
+    ----------
+    read : callable(Frame) -> Pixels
+        `capture.pixels.read_pixels`.
+    search : bool
+        Try other conventions where the poses as read don't fit.
+
+    Returns
+    -------
+    Agreement
+    """
+    normal, _ = triangle_geometry(capture.mesh)
+    scene = _Scene(small_views(capture.frames, read), capture, RayScene(capture.mesh.vertices, capture.mesh.triangles),
+                   normal)
+    plain = scene.whole(scene.colour(Convention()))
+    if plain.quality >= AGREE or not search or len(scene.views) < LEAST_VIEWS:
+        at = scene.shown(Convention())
+        moved = misalignments(scene.views, [v.camera for v in scene.views], at, scene.rays)
+        misaligned = moved if plain.quality >= AGREE else np.zeros(0)
+        return Agreement(plain, None, misaligned, False, _up(scene.views, Convention()))
+    best = _search(scene)
+    better = best is not None and best.quality >= max(AGREE, plain.quality + BETTER)
+    chosen = best.convention if better else Convention()
+    return Agreement(plain, best if better else None, np.zeros(0), True, _up(scene.views, chosen))
+
+
+def _up(views: Sequence[SmallView], convention: Convention) -> str:
+    """The signed axis along which most pictures are upright, or ''."""
+    if not views:
+        return "+z"
+    mean = np.mean([camera.camera_to_world[:3, 1] for camera in convention.cameras([v.camera for v in views])], 0)
+    axis = int(np.abs(mean).argmax())
+    return "" if abs(mean[axis]) < UPRIGHT else ("+" if mean[axis] > 0 else "-") + "xyz"[axis]
+
+
+def _search(scene: _Scene) -> Fit | None:
+    """The convention that fits best: colours first, edges for the best few, the simplest among equals."""
+    best: Fit | None = None
+    for scale in (1.0, *_likely(scene)):
+        every = max(1, len(scene.views) // COARSE)
+        found = [scene.colour(replace(one, scale=scale), every) for one in alternatives()]
+        found = sorted((fit for fit in found if fit.quality > 0), key=lambda fit: -fit.quality)[:FINALISTS]
+        for fit in (scene.whole(scene.colour(fit.convention)) for fit in found):
+            if best is None or fit.quality > best.quality + TIE * np.sign(fit.convention.parts - best.convention.parts):
+                best = fit
+        if best is not None and best.quality >= AGREE:
+            break
+    return best
+
+
+def _likely(scene: _Scene) -> list[float]:
+    """Those of `SCALES` that spread the cameras over about a third of the mesh, the likeliest first."""
+    centres = np.array([view.camera.centre for view in scene.views])
+    extent = float(np.ptp(scene.capture.mesh.vertices[scene.capture.mesh.triangles.ravel()], axis=0).max())
+    spread = max(float(np.ptp(centres, axis=0).max()), 1e-9)
+    off = {scale: abs(np.log(scale * spread / (extent / 3))) for scale in SCALES}
+    return sorted((scale for scale in SCALES if off[scale] < np.log(PLAUSIBLE)), key=off.__getitem__)

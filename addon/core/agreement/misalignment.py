@@ -1,0 +1,96 @@
+"""By how many pixels a frame lies beside what the other frames show of the same spots (Lucas and Kanade 1981)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..capture.model import Camera
+from ..surface.rays import RayScene
+from .edges import Shown
+from .views import SmallView
+
+OTHERS = 6
+"""Views whose median is taken as what a spot looks like."""
+LEAST_VIEWS = 2
+ROUNDS = 12
+LARGEST = 4.0
+"""Pixels of the small view; a shift beyond is not found by following gradients."""
+LEAST_SPOTS = 100
+LEAST_TEXTURE = 1e-3
+"""Mean square gradient below which a shift in that direction can't be seen."""
+TUNING, LEAST_RESIDUAL = 3.0, 0.02
+"""Residuals beyond so many times their median, or this if that is more, count as highlights or occlusion."""
+
+
+def predicted(index: int, views: Sequence[SmallView], cameras: Sequence[Camera], seen: Sequence[Shown],
+              scene: RayScene) -> np.ndarray:  # fmt: skip
+    """What the other views say that view `index` shows, (height, width) logarithm of grey; NaN where fewer than two."""
+    camera, own = cameras[index], seen[index]
+    directions = camera.directions(camera.pixel_centres())
+    at = np.flatnonzero((own.triangle >= 0).ravel())
+    points = camera.centre + own.distance.ravel()[at, None].astype(np.float64) * directions[at]
+    way = [np.linalg.norm(eye.centre - camera.centre) for eye in cameras]
+    nearest = [j for j in np.argsort(way, kind="stable") if j != index][:OTHERS]
+    said = np.full((len(nearest), len(at)), np.nan, np.float32)
+    for row, j in enumerate(nearest):
+        eye, view = cameras[j], views[j]
+        pixel, depth = eye.project(points)
+        inside = np.flatnonzero((depth > 0) & (pixel >= 1).all(1) & (pixel < (eye.width - 1, eye.height - 1)).all(1))
+        away = eye.centre - points[inside]
+        distance = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
+        origins = points[inside] + away / distance * (4 * scene.offset)
+        free = ~scene.occluded(np.float32(origins), np.float32(away / distance),
+                               np.float32(distance[:, 0] - 8 * scene.offset))  # fmt: skip
+        inside = inside[free]
+        said[row, inside] = bilinear(view.log.mean(-1), pixel[inside] - 0.5)
+    enough = np.isfinite(said).sum(0) >= LEAST_VIEWS
+    image = np.full(camera.height * camera.width, np.nan, np.float32)
+    image[at[enough]] = np.nanmedian(said[:, enough], 0)
+    return image.reshape(camera.height, camera.width)
+
+
+def bilinear(image: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """`image` ((h, w)) between its pixels, at (n, 2) x and y counted from the first pixel's centre; NaN outside."""
+    x0, y0 = np.floor(at).astype(int).T
+    good = (x0 >= 0) & (y0 >= 0) & (x0 < image.shape[1] - 1) & (y0 < image.shape[0] - 1)
+    x0, y0 = np.where(good, x0, 0), np.where(good, y0, 0)
+    a, b = at[:, 0] - x0, at[:, 1] - y0
+    value = ((1 - a) * (1 - b) * image[y0, x0] + a * (1 - b) * image[y0, x0 + 1]
+             + (1 - a) * b * image[y0 + 1, x0] + a * b * image[y0 + 1, x0 + 1])  # fmt: skip
+    return np.where(good, value, np.nan)
+
+
+def shift(image: np.ndarray, reference: np.ndarray) -> np.ndarray | None:
+    """By how many pixels (x, y) `image` lies beside `reference` ((h, w) each, NaN unknown); None where unknown."""
+    grid = np.stack(np.meshgrid(*(np.arange(n, dtype=float) for n in reference.shape[::-1])), -1).reshape(-1, 2)
+    dy, dx = np.gradient(reference)
+    slope = np.stack([dx.ravel(), dy.ravel()], 1)
+    moved = np.zeros(2)
+    for _ in range(ROUNDS):
+        off = bilinear(image, grid + moved) - reference.ravel()
+        good = np.isfinite(off) & np.isfinite(slope).all(1)
+        if good.sum() < LEAST_SPOTS:
+            return None
+        J, r = slope[good], off[good] - np.median(off[good])
+        scale = max(float(np.median(np.abs(r))), LEAST_RESIDUAL) * TUNING
+        weight = np.minimum(1, scale / np.maximum(np.abs(r), 1e-12))
+        A = J.T @ (weight[:, None] * J)
+        if np.linalg.eigvalsh(A)[0] < LEAST_TEXTURE * good.sum():
+            return None
+        moved -= np.linalg.solve(A, J.T @ (weight * r))
+        if np.abs(moved).max() > LARGEST:
+            return None
+    return moved
+
+
+def misalignments(views: Sequence[SmallView], cameras: Sequence[Camera], seen: Sequence[Shown],
+                  scene: RayScene) -> np.ndarray:  # fmt: skip
+    """Length of each view's shift in pixels of the full frame, (k,) for the views of which it can be told."""
+    lengths = []
+    for i, view in enumerate(views):
+        found = shift(view.log.mean(-1), predicted(i, views, cameras, seen, scene))
+        if found is not None:
+            lengths.append(float(np.linalg.norm(found)) * view.step)
+    return np.array(lengths)

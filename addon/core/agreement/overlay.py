@@ -1,0 +1,62 @@
+"""A picture of the mesh's edges drawn over frames: what a person checks poses with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..capture.conventions import Convention
+from ..capture.model import Capture, Frame, Pixels
+from ..evidence.colours import photo
+from ..surface.elements import triangle_geometry
+from ..surface.rays import RayScene
+from .edges import shown
+from .views import small_camera
+
+ROWS = 3
+WIDTH = 640
+"""About so many pixels across for each frame."""
+LINE = (255, 90, 0)
+GAP = 8
+
+
+def overlay(capture: Capture, read: Callable[[Frame], Pixels], conventions: Sequence[Convention]) -> np.ndarray:
+    """Some frames, one a row, with the mesh's edges as each of the conventions (one a column) places them.
+
+    Returns
+    -------
+    (height, width, 3) uint8
+    """
+    normal, _ = triangle_geometry(capture.mesh)
+    rays = RayScene(capture.mesh.vertices, capture.mesh.triangles)
+    chosen = np.unique(np.linspace(0, len(capture.frames) - 1, ROWS + 2).round().astype(int)[1:-1])
+    rows = []
+    for frame in (capture.frames[i] for i in chosen):
+        pixels = read(frame)
+        step = max(1, -(-frame.camera.width // WIDTH))
+        camera = small_camera(frame.camera, step)
+        radiance = pixels.radiance[: camera.height * step : step, : camera.width * step : step]
+        lit = radiance[radiance.sum(-1) > 0]
+        plain = photo(radiance, float(np.median(lit)) if len(lit) else 1.0)
+        images = []
+        for convention in conventions:
+            image = plain.copy()
+            image[shown(convention.cameras([camera])[0], capture.mesh, normal, rays).edge] = LINE
+            images.append(image)
+        rows.append(_beside(images, 1))
+    return _beside(rows, 0)
+
+
+def _beside(images: Sequence[np.ndarray], axis: int) -> np.ndarray:
+    """Images in a row (axis 1) or column (axis 0), on black where sizes differ."""
+    across = 1 - axis
+    extent = max(image.shape[across] for image in images)
+    padded = []
+    for image in images:
+        pad = [(0, 0), (0, 0), (0, 0)]
+        pad[across] = (0, extent - image.shape[across])
+        pad[axis] = (0, GAP)
+        padded.append(np.pad(image, pad))
+    whole = np.concatenate(padded, axis)
+    return whole[:-GAP] if axis == 0 else whole[:, :-GAP]

@@ -1,0 +1,81 @@
+"""Do views agree on the colour of the spots that they share? Only with the right poses do they."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..capture.model import Camera
+from ..surface.rays import RayScene
+from .views import SmallView
+
+GRID = 20
+"""Rays along an edge of each view."""
+LEAST_PAIRS = 200
+"""Fewer pairs of observations say nothing."""
+
+
+class Consistency(NamedTuple):
+    """How well views agree.
+
+    Attributes
+    ----------
+    score : float
+        Probability that two views of one spot differ by less than views of two spots: 0.5 by chance, 1 at best; NaN
+        where too few spots are shared.
+    hit : float
+        Share of the views' rays that meet the mesh.
+    pairs : int
+    """
+
+    score: float
+    hit: float
+    pairs: int
+
+
+def consistency(views: Sequence[SmallView], cameras: Sequence[Camera], scene: RayScene, seed: int = 0) -> Consistency:
+    """Compare views of the same spots.
+
+    Parameters
+    ----------
+    cameras : sequence of Camera
+        The views' cameras, in the pose to be tried.
+    """
+    rng = np.random.default_rng(seed)
+    near, far, hits, rays = [], [], 0, 0
+    for i, (view, camera) in enumerate(zip(views, cameras, strict=True)):
+        x, y = (np.unique(np.linspace(0, n - 1, GRID).round().astype(int)) for n in (camera.width, camera.height))
+        column, row = (a.ravel() for a in np.meshgrid(x, y))
+        directions = camera.directions(np.stack([column + 0.5, row + 0.5], -1))
+        found = scene.intersect(np.broadcast_to(np.float32(camera.centre), directions.shape), directions)
+        own = view.log[row, column]
+        rays += len(own)
+        hits += int((found.triangle >= 0).sum())
+        good = (found.triangle >= 0) & np.isfinite(own).all(1)
+        points = camera.centre + found.distance[good, None].astype(np.float64) * directions[good]
+        own = own[good]
+        for j, (other, eye) in enumerate(zip(views, cameras, strict=True)):
+            if j == i:
+                continue
+            pixel, depth = eye.project(points)
+            inside = np.flatnonzero((depth > 0) & (pixel >= 0).all(1) & (pixel < (eye.width, eye.height)).all(1))
+            away = eye.centre - points[inside]
+            distance = np.linalg.norm(away, axis=1)
+            origins = points[inside] + away * (scene.offset / np.maximum(distance, 1e-12))[:, None] * 4
+            free = ~scene.occluded(np.float32(origins), np.float32(away / np.maximum(distance, 1e-12)[:, None]),
+                                   np.float32(distance - 8 * scene.offset))
+            inside = inside[free]
+            column, row = pixel[inside].astype(int).T
+            theirs = other.log[row, column]
+            known = np.isfinite(theirs).all(1)
+            inside, theirs = inside[known], theirs[known]
+            if len(inside) > 1:
+                near.append(np.abs(own[inside] - theirs).mean(1))
+                far.append(np.abs(own[inside] - theirs[rng.permutation(len(inside))]).mean(1))
+    pairs = sum(map(len, near))
+    if pairs < LEAST_PAIRS:
+        return Consistency(float("nan"), hits / max(rays, 1), pairs)
+    a, b = np.concatenate(near), np.concatenate(far)
+    return Consistency(float((a < b).mean() + (a == b).mean() / 2), hits / max(rays, 1), pairs)

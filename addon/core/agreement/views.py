@@ -1,0 +1,72 @@
+"""A few frames at a small size, with what the mesh shows in each of their pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..capture.model import Camera, Frame, Pixels
+from ..errors import BadInputError
+
+COUNT = 16
+"""Frames that are looked at, spread evenly."""
+WIDTH = 160
+"""About so many pixels across are enough to tell a wrong convention, and cheap."""
+
+
+@dataclass(frozen=True)
+class SmallView:
+    """A frame at a small size.
+
+    Attributes
+    ----------
+    name : str
+    camera : Camera
+        Of the small picture.
+    log : (height, width, 3) float32
+        Natural logarithm of the radiance; NaN where the frame says nothing.
+    step : int
+        Pixels of the frame along an edge of one of these.
+    """
+
+    name: str
+    camera: Camera
+    log: np.ndarray
+    step: int
+
+
+def small_camera(camera: Camera, step: int) -> Camera:
+    """The camera of a picture whose pixels are `step` * `step` of the original's."""
+    return replace(camera, width=camera.width // step, height=camera.height // step, fx=camera.fx / step,
+                   fy=camera.fy / step, cx=camera.cx / step, cy=camera.cy / step)  # fmt: skip
+
+
+def small_views(frames: Sequence[Frame], read: Callable[[Frame], Pixels], count: int = COUNT) -> list[SmallView]:
+    """`count` of the frames, evenly spread; those that can't be read are left out."""
+    chosen = np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int)) if frames else ()
+    views = []
+    for frame in (frames[i] for i in chosen):
+        try:
+            pixels = read(frame)
+        except BadInputError:  # it will be told of where frames are read for good
+            continue
+        step = max(1, round(frame.camera.width / WIDTH))
+        camera = small_camera(frame.camera, step)
+        views.append(SmallView(frame.name, camera, _small(pixels, camera, step), step))
+    return views
+
+
+def _small(pixels: Pixels, camera: Camera, step: int) -> np.ndarray:
+    """Logarithm of the mean over blocks; a block with a pixel that says nothing is NaN."""
+    shape = camera.height, step, camera.width, step
+
+    def blocks(image: np.ndarray) -> np.ndarray:
+        return image[: camera.height * step, : camera.width * step].reshape(*shape, -1)
+
+    radiance = blocks(pixels.radiance).mean((1, 3), dtype=np.float64)
+    valid = blocks(pixels.valid).all((1, 3))[..., 0]
+    lit = radiance[valid]
+    floor = 1e-3 * float(np.median(lit)) if len(lit) else 1.0
+    return np.where(valid[..., None], np.log(np.maximum(radiance, max(floor, 1e-30))), np.nan).astype(np.float32)
