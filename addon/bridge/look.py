@@ -122,10 +122,12 @@ def set_look(scene: bpy.types.Scene, look: str, folder: Path | str | None = None
         raise BadInputError("No object of this scene wears recovered materials; run the recovery first.")
     if not (folder / LOOKS[look].file).is_file():
         raise BadInputError(f"'{folder / LOOKS[look].file}' is missing; run the recovery again to its end.")
-    material = _material(scene, look, folder)
-    clear(scene)
-    group = _group(material)
-    group[MARK] = look
+    try:
+        group = _group(_material(scene, look, folder), look)
+    except BadInputError:
+        _sweep()
+        raise
+    clear(scene, group)
     for thing in things:
         modifier = thing.modifiers.new(NAME, "NODES")
         modifier.node_group = group
@@ -133,23 +135,32 @@ def set_look(scene: bpy.types.Scene, look: str, folder: Path | str | None = None
     return len(things)
 
 
-def clear(scene: bpy.types.Scene) -> int:
-    """Let the viewport show the materials themselves; returns how many objects showed something else."""
+def clear(scene: bpy.types.Scene, but: bpy.types.NodeTree | None = None) -> int:
+    """Let the viewport show the materials themselves; returns how many objects showed something else.
+
+    The node group `but` is kept for what comes next.
+    """
     count = 0
     for thing in scene.objects:
         modifier = thing.modifiers.get(NAME)
         if modifier is not None and not thing.library:
             thing.modifiers.remove(modifier)
             count += 1
+    _sweep(but)
+    return count
+
+
+def _sweep(but: bpy.types.NodeTree | None = None) -> None:
+    """Remove what earlier looks left: groups, materials and images that nothing uses."""
     for group in [one for one in bpy.data.node_groups if MARK in one and not one.users and not one.library]:
-        bpy.data.node_groups.remove(group)
+        if group != but:
+            bpy.data.node_groups.remove(group)
     for material in [one for one in bpy.data.materials if MARK in one and not one.users and not one.library]:
-        images = [node.image for node in material.node_tree.nodes if node.type == "TEX_IMAGE"]
+        images = {node.image for node in material.node_tree.nodes if node.type == "TEX_IMAGE"}
         bpy.data.materials.remove(material)
         for picture in images:
             if picture is not None and not picture.users:
                 bpy.data.images.remove(picture)
-    return count
 
 
 def refresh(scene: bpy.types.Scene) -> None:
@@ -159,11 +170,13 @@ def refresh(scene: bpy.types.Scene) -> None:
         modifier = thing.modifiers.get(NAME)
         if modifier is not None and thing not in keep and not thing.library:
             thing.modifiers.remove(modifier)
+    _sweep()
 
 
-def _group(material: bpy.types.Material) -> bpy.types.NodeTree:
+def _group(material: bpy.types.Material, look: str) -> bpy.types.NodeTree:
     """Geometry nodes that set a material on all there is."""
     group = bpy.data.node_groups.new(NAME, "GeometryNodeTree")
+    group[MARK] = look
     for way in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
     start, put, end = (group.nodes.new(kind) for kind in ("NodeGroupInput", "GeometryNodeSetMaterial",

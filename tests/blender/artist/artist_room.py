@@ -120,3 +120,22 @@ def show(camera, path):
     back = camera.data.background_images.new()
     back.image = bpy.data.images.load(str(path))
     return back
+
+
+def node_trees():
+    """Nodes, values and links of every material, in plain values."""
+    found = {}
+    for material in bpy.data.materials:
+        tree = material.node_tree
+        nodes = {node.name: (node.bl_idname, tuple(node.location), getattr(getattr(node, "image", None), "name", ""),
+                             {socket.identifier: plain(socket) for socket in node.inputs}) for node in tree.nodes}
+        links = sorted((link.from_node.name, link.from_socket.identifier, link.to_node.name, link.to_socket.identifier)
+                       for link in tree.links)
+        found[material.name] = nodes, links
+    return found
+
+
+def plain(socket):
+    """A socket's value."""
+    value = getattr(socket, "default_value", None)
+    return tuple(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
