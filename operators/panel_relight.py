@@ -110,9 +110,9 @@ class SCAN_RELIGHT_PT_outside(RelightPanel, bpy.types.Panel):
             column.prop(outside, "factor")
             column.prop(outside, "rotation")
         row = layout.row(align=True)
-        row.operator("scan_relight.use_hdri", text="HDR File", icon="FILE_IMAGE")
+        row.operator("scan_relight.use_hdri", text="HDR File", icon="FILE_FOLDER")
         if relight_outside.studio_lights():
-            row.operator_menu_enum("scan_relight.use_studio_light", "picture", text="Blender's", icon="WORLD")
+            row.operator_menu_enum("scan_relight.use_studio_light", "picture", text="Built-in", icon="WORLD")
 
 
 class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):

@@ -21,7 +21,7 @@ CYCLES, EEVEE = "CYCLES", "EEVEE"
 _RENDER = ("engine", "filepath", "resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x",
            "pixel_aspect_y", "use_border", "use_file_extension", "use_compositing", "use_sequencer",
            "use_overwrite", "use_placeholder", "film_transparent")
-_IMAGE = ("file_format", "color_mode", "color_depth", "color_management")
+_IMAGE = ("media_type", "file_format", "color_mode", "color_depth", "color_management")
 _CYCLES = ("samples", "use_denoising", "use_adaptive_sampling", "device")
 _VIEW = ("view_transform", "look", "exposure", "gamma", "use_curve_mapping")
 

@@ -96,11 +96,11 @@ def target_of(scene: bpy.types.Scene, kind: str = VIEW, thing: bpy.types.Object 
     return (low + high) / 2
 
 
-def picture_ray(scene: bpy.types.Scene) -> tuple[Vector, Vector]:
-    """Origin and direction of the ray through the middle of the camera's picture."""
+def picture_ray(scene: bpy.types.Scene, x: float = 0.5, y: float = 0.5) -> tuple[Vector, Vector]:
+    """Origin and direction of the ray through a place in the camera's picture: x and y from its lower left, 0...1."""
     pose = scene.camera.matrix_world
-    frame = scene.camera.data.view_frame(scene=scene)
-    middle = sum(frame, Vector()) / 4
+    right_top, right_low, left_low, _ = scene.camera.data.view_frame(scene=scene)
+    middle = left_low + (right_low - left_low) * x + (right_top - right_low) * y
     if scene.camera.data.type == "ORTHO":
         return pose @ Vector((middle.x, middle.y, 0)), (pose.to_3x3() @ Vector((0, 0, -1))).normalized()
     return pose.translation.copy(), (pose.to_3x3() @ middle).normalized()

@@ -27,6 +27,8 @@ LOOKS = {
 }
 _UPRIGHT = 0.5
 """Least z of the normal of a surface that a thing can stand on."""
+_FLAT = 0.12
+"""Metres around a place over which it has to be level to be taken for a floor or a table."""
 _PROBES = 400
 
 
@@ -149,10 +151,11 @@ def place_in_view(scene: bpy.types.Scene, ignored: bpy.types.Object | None = Non
         low, high = bounds(scene)
         starts = [scene.cursor.location + Vector((0, 0, 0.05)), (low + high) / 2]
         if scene.camera:
+            seen = _flat_in_view(scene)
+            if seen:
+                return seen
             origin, direction = picture_ray(scene)
             hit = cast(scene, origin, direction)
-            if hit and hit.normal.z >= _UPRIGHT:
-                return hit
             if hit:
                 starts.insert(0, hit.place - direction * min(0.8, 0.4 * hit.distance))
         for start in starts:
@@ -164,6 +167,20 @@ def place_in_view(scene: bpy.types.Scene, ignored: bpy.types.Object | None = Non
         if ignored:
             ignored.hide_viewport = hidden
     raise BadInputError("There is no surface below the middle of the view; set the 3D cursor over a floor or a table.")
+
+
+def _flat_in_view(scene: bpy.types.Scene) -> Hit | None:
+    """The level, flat surface that the picture shows nearest to its middle: a floor or a table, no leaf of a plant."""
+    steps = [k / 24 - 0.5 for k in range(2, 23)]
+    for x, y in sorted(((x, y) for x in steps for y in steps), key=lambda at: at[0] ** 2 + at[1] ** 2):
+        hit = cast(scene, *picture_ray(scene, 0.5 + x, 0.5 + y))
+        if hit is None or hit.normal.z < 0.95:
+            continue
+        around = [cast(scene, hit.place + Vector((dx, dy, 0.05)), Vector((0, 0, -1)), 0.1)
+                  for dx, dy in ((_FLAT, 0), (-_FLAT, 0), (0, _FLAT), (0, -_FLAT))]
+        if all(one and abs(one.place.z - hit.place.z) < 0.02 for one in around):
+            return hit
+    return None
 
 
 def below_cursor(scene: bpy.types.Scene) -> Hit:
