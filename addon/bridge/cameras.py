@@ -1,4 +1,8 @@
-"""The capture's cameras in Blender, exact to a thousandth of a pixel."""
+"""The capture's cameras in Blender: pinholes exact to a thousandth of a pixel, lenses as near as Blender has them.
+
+Panoramas and fisheyes become panoramic cameras, which Cycles alone renders; lenses that distort a perspective have no
+counterpart, and become the perspective without distortion.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +13,16 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..core.capture.lenses import Equirectangular
 from ..core.capture.model import Camera, Frame
+from ..core.capture.pixel_rays import widest_angle
 
 _SENSOR = 36.0
+_WIDE = np.radians(80)
+"""A lens that sees further than this from its axis is no perspective."""
+_TOLD = 0.5
+"""Pixels off from which on a lens is told of."""
+_GRID = 33
 
 
 def make_cameras(frames: Iterable[Frame], collection: bpy.types.Collection) -> list[bpy.types.Object]:
@@ -65,6 +76,89 @@ def differing(frames: Iterable[Frame]) -> str:
             "camera: set the render size from the camera's custom properties before you render through another one.")
 
 
+def unlike(frames: Iterable[Frame]) -> str:
+    """One sentence if Blender has no camera like some of the frames' lenses ('' if it has): how far they are off."""
+    worst: dict[tuple, tuple[float, Camera]] = {}
+    for frame in frames:
+        camera = frame.camera
+        if camera.lens is not None:
+            key = (camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.lens)
+            if key not in worst:
+                worst[key] = off_by(camera), camera
+    far, camera = max(worst.values(), key=lambda pair: pair[0], default=(0.0, None))
+    if far < _TOLD:
+        return ""
+    return (f"Blender has no camera with a lens such as {camera.lens.name}: its cameras show what the frames show "
+            f"up to {far:.1f} pixels beside it, most of all in the corners; the recovery itself uses the exact lens.")
+
+
+def off_by(camera: Camera) -> float:
+    """Pixels by which the Blender camera's picture is off the camera's own, at most."""
+    y, x = (np.linspace(0, extent, _GRID) for extent in (camera.height, camera.width))
+    pixels = np.stack([i.ravel() for i in np.meshgrid(x, y)], -1)
+    points = (pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+    seen = camera.lens.unproject(points)[1]
+    points = points[seen]
+    if isinstance(camera.lens, Equirectangular):
+        return 0.0
+    if _is_wide(camera):
+        radius = np.hypot(points[:, 0], points[:, 1])
+        theta = sum(k * (camera.fx * _SENSOR / camera.width * radius) ** power
+                    for power, k in enumerate(_angles(camera), 1))  # fmt: skip
+        across = points / np.maximum(radius, 1e-12)[:, None] * np.sin(theta)[:, None]
+        rays = np.column_stack([across, np.cos(theta)])
+    else:
+        rays = np.column_stack([points, np.ones(len(points))])
+    shown, known = camera.lens.project(rays)
+    off = np.hypot(*((shown - points) * (camera.fx, camera.fy))[known].T)
+    return float(off.max(initial=0)) if known.any() else float("inf")
+
+
+def _is_wide(camera: Camera) -> bool:
+    return getattr(camera.lens, "fisheye", False) or getattr(getattr(camera.lens, "lens", None), "fisheye", False) \
+        or widest_angle(camera) > _WIDE
+
+
+def _angles(camera: Camera) -> np.ndarray:
+    """Coefficients of the ray's angle as a polynomial of the distance in millimetres from the principal point, (4,).
+
+    Cycles has no other fisheye with free coefficients; least squares in pixels over the frame, the mean of all
+    directions where a lens is not round.
+    """
+    corners = np.array([(x, y) for x in (0, camera.width) for y in (0, camera.height)], float)
+    reach = np.linalg.norm((corners - (camera.cx, camera.cy)) / (camera.fx, camera.fy), axis=1).max()
+    radius, phi = np.meshgrid(np.linspace(0, reach, 401)[1:], np.arange(16) * (np.pi / 8), indexing="ij")
+    points = np.stack([radius * np.cos(phi), radius * np.sin(phi)], -1).reshape(-1, 2)
+    rays, seen = camera.lens.unproject(points)
+    theta = np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2]).reshape(radius.shape)
+    good = seen.reshape(radius.shape).all(1)
+    radius, theta = radius[good, 0], theta[good].mean(1)
+    millimetres = camera.fx * _SENSOR / camera.width * radius
+    pixels = 1 / np.maximum(np.gradient(theta, radius), 1e-6)  # how much a wrong angle counts
+    powers = (millimetres / millimetres[-1])[:, None] ** np.arange(1, 5)
+    k = np.linalg.lstsq(powers * pixels[:, None], theta * pixels, rcond=None)[0]
+    return k / millimetres[-1] ** np.arange(1, 5)
+
+
+def _set_panorama(data: bpy.types.Camera, camera: Camera) -> None:
+    """Make `data` a whole or partial panorama, or a fisheye."""
+    data.type = "PANO"
+    if isinstance(camera.lens, Equirectangular):
+        data.panorama_type = "EQUIRECTANGULAR"
+        data.shift_x = data.shift_y = 0.0
+        data.longitude_min, data.longitude_max = (x / camera.fx for x in (-camera.cx, camera.width - camera.cx))
+        data.latitude_min, data.latitude_max = (y / camera.fy for y in (camera.cy - camera.height, camera.cy))
+        return
+    data.panorama_type = "FISHEYE_LENS_POLYNOMIAL"
+    data.fisheye_fov = 2 * min(widest_angle(camera), np.pi)
+    # Its sign is Cycles' own; shifts count in the picture's width and height here.
+    data.fisheye_polynomial_k0 = 0.0
+    for power, k in enumerate(_angles(camera), 1):
+        setattr(data, f"fisheye_polynomial_k{power}", -k)
+    data.shift_x = 0.5 - camera.cx / camera.width
+    data.shift_y = camera.cy / camera.height - 0.5
+
+
 def _camera_object(name: str, camera: Camera, collection) -> bpy.types.Object:
     data = bpy.data.cameras.new(name)
     data.sensor_fit = "HORIZONTAL"
@@ -74,6 +168,10 @@ def _camera_object(name: str, camera: Camera, collection) -> bpy.types.Object:
     # Shifts count in widths of the picture; a tall pixel counts by its true height.
     data.shift_x = 0.5 - camera.cx / camera.width
     data.shift_y = (camera.cy - camera.height / 2) * aspect / camera.width
+    if isinstance(camera.lens, Equirectangular):
+        aspect = 1.0  # its pixels may have any shape
+    if camera.lens is not None and _is_wide(camera):
+        _set_panorama(data, camera)
     data.clip_start, data.clip_end = 0.01, 1000.0
     data.display_size = 0.15
     thing = bpy.data.objects.new(name, data)

@@ -17,7 +17,7 @@ import numpy as np
 from ..core.capture.model import Capture
 from ..core.errors import StorageError
 from ..core.material import EMITTER, LAMBERTIAN, ObjectMaterial
-from .cameras import differing, make_cameras, use_camera
+from .cameras import differing, make_cameras, unlike, use_camera
 from .images import load_image, relative_to
 from .materials import make_material
 from .mesh_objects import is_open, make_objects
@@ -112,8 +112,8 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
         _prepare(scene, median_radiance)
         if cameras:
             use_camera(scene, cameras[0])
-    warning = differing(capture.frames)
-    return BuiltScene(top, objects, cameras, list(images.values()), (warning,) if warning else ())
+    warnings = tuple(filter(None, (differing(capture.frames), unlike(capture.frames))))
+    return BuiltScene(top, objects, cameras, list(images.values()), warnings)
 
 
 def write_scene(path: Path | str, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],

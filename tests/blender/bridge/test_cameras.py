@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from addon.core.capture.lenses import Cropped, EnhancedUnified, Equirectangular
+from addon.core.capture.lenses_colmap import polynomial
 from addon.core.capture.model import Camera, Frame
 
 bpy = pytest.importorskip("bpy")
@@ -10,7 +12,7 @@ bpy = pytest.importorskip("bpy")
 from bpy_extras.object_utils import world_to_camera_view  # noqa: E402
 from mathutils import Vector  # noqa: E402
 
-from addon.bridge.cameras import differing, make_cameras, use_camera  # noqa: E402
+from addon.bridge.cameras import differing, make_cameras, off_by, unlike, use_camera  # noqa: E402
 
 POSE = np.array([[0.36, 0.48, -0.8, 1.5], [-0.8, 0.6, 0.0, -0.7], [0.48, 0.64, 0.6, 2.0], [0, 0, 0, 1.0]])
 CAMERAS = {
@@ -67,3 +69,67 @@ def test_differing_sizes_are_told(tmp_path):
     frames = [Frame(n, tmp_path, c) for n, c in CAMERAS.items()]
     assert differing(frames[:2]) == ""
     assert "5 different" in differing(frames)
+
+
+LENSES = {
+    "panorama": (Equirectangular(), 160, 80),
+    "fisheye of 200 degrees": (polynomial("FISHEYE", fisheye=True), 96, 80),
+    "bent fisheye": (polynomial("OPENCV_FISHEYE", fisheye=True, numerator=(-0.02, 0.004, 0.0, 0.0)), 96, 80),
+    "cropped": (Cropped(polynomial("OPENCV_FISHEYE", fisheye=True, numerator=(0.03, 0.0, 0.0, 0.0)), 1.6, 1.6), 96, 80),
+    "unified": (EnhancedUnified(0.7, 1.0), 96, 80),
+}
+
+
+def through(name):
+    lens, width, height = LENSES[name]
+    if name == "panorama":
+        return Camera(width, height, width / 2 / np.pi, height / np.pi, width / 2, height / 2, POSE, lens)
+    return Camera(width, height, 30.0, 33.0, 44.7, 42.2, POSE, lens)
+
+
+@pytest.mark.parametrize("place", [(0.5, 0.35, -1.0), (-0.9, -0.4, -0.3), (0.2, -0.9, -0.6), (-0.7, 0.3, 0.05)])
+@pytest.mark.parametrize("name", LENSES)
+def test_cycles_renders_through_lenses(scene, shoot, tmp_path, name, place):
+    camera = through(name)
+    off = off_by(camera)
+    assert off < (0.1 if name != "unified" else 1.5)  # its angle is no polynomial
+    assert bool(unlike([Frame(name, tmp_path, camera)])) == (name == "unified")
+    point = POSE[:3, :3] @ np.multiply(place, 3) + POSE[:3, 3]
+    pixel, depth = camera.project(point[None])
+    if depth[0] < 0 or not ((pixel > 5) & (pixel < (camera.width - 5, camera.height - 5))).all():
+        pytest.skip("not in this picture")
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=0.12, location=point)
+    scene.render.film_transparent = True
+    use_camera(scene, make_cameras([Frame(name, tmp_path, camera)], scene.collection)[0])
+    alpha = shoot(camera.width, camera.height, 64)[..., 3].ravel()
+    alpha = alpha * camera.rays(camera.pixel_centres())[1]  # beyond the lens's circle Blender may show anything
+    assert alpha.sum() > 1
+    got = camera.pixel_centres().T @ alpha / alpha.sum()
+    np.testing.assert_allclose(got, pixel[0], atol=0.15 + off)
+
+
+def test_partial_panoramas(scene, shoot, tmp_path):
+    camera = Camera(160, 80, 60.0, 55.0, 70.0, 30.0, POSE, Equirectangular())
+    point = POSE[:3, :3] @ [1.5, 0.35, -1.0] + POSE[:3, 3]
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=0.06, location=point)
+    scene.render.film_transparent = True
+    use_camera(scene, make_cameras([Frame("part", tmp_path, camera)], scene.collection)[0])
+    alpha = shoot(camera.width, camera.height, 64)[..., 3].ravel()
+    got = camera.pixel_centres().T @ alpha / alpha.sum()
+    np.testing.assert_allclose(got, camera.project(point[None])[0][0], atol=0.15)
+
+
+def test_lenses_that_blender_lacks_are_told(scene, tmp_path):
+    lens = polynomial("SIMPLE_RADIAL", numerator=(-0.1,))
+    camera = Camera(640, 480, 500, 500, 320, 240, POSE, lens)
+    # In the corner r^2 = 0.64 and r = 0.8 before distortion as Blender shows it: 0.1 * 0.8^3 * 500.
+    assert off_by(camera) == pytest.approx(25.6, abs=0.01)
+    sentence = unlike([Frame("a", tmp_path, camera), Frame("b", tmp_path, CAMERAS["plain"])])
+    assert "SIMPLE_RADIAL" in sentence and "25.6 pixels" in sentence
+    thing = make_cameras([Frame("a", tmp_path, camera)], scene.collection)[0]
+    assert thing.data.type == "PERSP" and thing.data.lens == pytest.approx(500 * 36 / 640)
+    assert unlike([Frame("b", tmp_path, CAMERAS["plain"])]) == ""
+    prism = polynomial("THIN_PRISM_FISHEYE", fisheye=True, tangential=(0.01, 0.0))
+    bent = Camera(640, 480, 250, 250, 320, 240, POSE, prism)
+    assert 5 < off_by(bent) < 100 and "THIN_PRISM" in unlike([Frame("c", tmp_path, bent)])
+    assert make_cameras([Frame("c", tmp_path, bent)], scene.collection)[0].data.type == "PANO"
