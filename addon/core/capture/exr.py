@@ -4,32 +4,19 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import OpenEXR
 
 from ..atomic import write_bytes
 from ..errors import BadInputError, StorageError
-from .exr_header import MAX_RATIO, ExrHeader, parse_header, window_size
+from .exr_header import ExrHeader, parse_headers, window_size
+from .exr_layers import ExrLayer, choose_layer
+from .luma_chroma import to_rgb
+from .picture import Picture
+from .primaries import REC709, to_rec709
 
-REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-"""x and y of red, green, blue and white; what a file without chromaticities means."""
 HALF_MAX = 65504.0
-
-
-class Picture(NamedTuple):
-    """A picture, row 0 at the top.
-
-    Attributes
-    ----------
-    rgb : (h, w, 3) float32
-        Linear Rec.709; NaN where the display window is larger than the data.
-    alpha : (h, w) float32 or None
-    """
-
-    rgb: np.ndarray
-    alpha: np.ndarray | None
 
 
 def read_header(path: Path | str) -> tuple[int, int]:
@@ -40,13 +27,25 @@ def read_header(path: Path | str) -> tuple[int, int]:
     BadInputError
         As `read_exr`, but for damage within the compressed pixels.
     """
-    return _supported(Path(path)).size
+    return _supported(Path(path))[0].header.size
+
+
+def exr_note(path: Path | str) -> str:
+    """Which layer or view `read_exr` takes, as the end of a sentence; '' where the file has no other.
+
+    Raises
+    ------
+    BadInputError
+        As `read_header`.
+    """
+    return _supported(Path(path))[1]
 
 
 def read_exr(path: Path | str) -> Picture:
-    """Read the picture `path`: half, float or uint; RGB, RGBA or Y; scan lines or tiles.
+    """Read the picture `path`: half, float or uint; RGB, luminance and chroma, or Y; scan lines, tiles or parts.
 
-    The picture is the display window. A file with other primaries than Rec.709 is converted.
+    The picture is the display window, and the layer is `exr_layers.choose_layer`'s. A file with other primaries than
+    Rec.709 is converted. Of a mip-map or rip-map the largest level is read.
 
     Raises
     ------
@@ -54,25 +53,34 @@ def read_exr(path: Path | str) -> Picture:
         The file is absent, damaged, cut off, or of a kind that isn't supported.
     """
     path = Path(path)
-    header = _supported(path)
+    layer, _ = _supported(path)
+    header = layer.header
+    names = (*layer.colour, *([layer.alpha] if layer.alpha else []))
     try:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             if not file.parts:  # how the library tells of pixels that it failed to decode
                 raise ValueError("its pixels can't be decoded")
             # Copies: the arrays belong to the file, and it closes.
-            planes = {name: np.array(file.channels()[name].pixels, np.float32) for name in _wanted(header)}
+            channels = file.channels(layer.part)
+            planes = [np.array(channels[name].pixels, np.float32) for name in names]
     except MemoryError as error:
         raise BadInputError(f"Picture '{path}' does not fit in memory; scale it down.") from error
     except Exception as error:  # the library raises whatever comes; none of it means anything to a user
         reason = " ".join(str(error).split())[-120:]
         raise BadInputError(f"Picture '{path}' is damaged ({reason}); write or copy it again.") from error
     width, height = window_size(header.data_window)
-    if any(plane.shape != (height, width) for plane in planes.values()):
-        raise BadInputError(f"Picture '{path}' is damaged (its channels differ in size); write or copy it again.")
-    alpha = planes.pop("A", None)
-    rgb = np.stack(list(planes.values()) if len(planes) == 3 else [planes["Y"]] * 3, -1)
-    if header.chromaticities is not None and len(planes) == 3:
-        rgb = _to_rec709(rgb, header.chromaticities, path)
+    for name, plane in zip(names, planes):
+        x, y = header.channels[name]
+        if plane.shape != (-(-height // y), -(-width // x)):
+            raise BadInputError(f"Picture '{path}' is damaged (its channels differ in size); write or copy it again.")
+    alpha = planes.pop() if layer.alpha else None
+    chromaticities = header.chromaticities or REC709
+    if layer.has_chroma:
+        rgb = to_rgb(*planes, chromaticities)
+    else:
+        rgb = np.stack(planes if len(planes) == 3 else planes * 3, -1)
+    if len(planes) == 3:
+        rgb = to_rec709(rgb, chromaticities, path)
     if header.data_window != header.display_window:
         rgb = _place(rgb, header, np.nan)
         alpha = None if alpha is None else _place(alpha, header, 0.0)
@@ -115,29 +123,20 @@ def write_exr(path: Path | str, array: np.ndarray, half: bool = False) -> None:
     write_bytes(path, stream.getvalue())
 
 
-def _wanted(header: ExrHeader) -> list[str]:
-    """The channels that are read, colour first; empty where the file has no colour that is understood."""
-    names = header.channels
-    colour = ["R", "G", "B"] if {"R", "G", "B"} <= names.keys() else ["Y"] if "Y" in names else []
-    return colour + ["A"] if "A" in names and colour else colour
-
-
-def _supported(path: Path) -> ExrHeader:
-    """The header of `path`; raises `BadInputError` where `read_exr` has no meaning for it."""
-    header = parse_header(path)
-    wanted = _wanted(header)
-    names = ", ".join(sorted(header.channels)[:6])
-    if not wanted:
-        raise BadInputError(f"Picture '{path}' holds the channels {names}; write it with R, G and B.")
-    if {"RY", "BY"} & header.channels.keys() and "R" not in wanted:
-        raise BadInputError(f"Picture '{path}' holds luminance and chroma, which isn't supported; write it as RGB.")
-    if any(header.channels[name] != (1, 1) for name in wanted):
-        raise BadInputError(f"Picture '{path}' holds subsampled channels, which isn't supported; write it as RGB.")
+def _supported(path: Path) -> tuple[ExrLayer, str]:
+    """What to read of `path`, and `choose_layer`'s note; raises `BadInputError` where `read_exr` has no meaning."""
+    layer, note = choose_layer(parse_headers(path), path)
+    header = layer.header
+    x, y = header.data_window[:2]
+    for name in (*layer.colour, *([layer.alpha] if layer.alpha else [])):
+        halved = layer.has_chroma and name.upper().endswith(("RY", "BY"))
+        if header.channels[name] not in ([(1, 1), (2, 2)] if halved and x % 2 == y % 2 == 0 else [(1, 1)]):
+            raise BadInputError(f"Picture '{path}' holds subsampled channels, which isn't supported; write it as RGB.")
     (width, height), (data_width, data_height) = header.size, window_size(header.data_window)
     if width * height > max(1 << 24, 16 * data_width * data_height):
         raise BadInputError(f"Picture '{path}' has {data_width} x {data_height} pixels in a display window of "
                             f"{width} x {height}; crop its display window.")
-    return header
+    return layer, note
 
 
 def _place(plane: np.ndarray, header: ExrHeader, fill: float) -> np.ndarray:
@@ -151,27 +150,3 @@ def _place(plane: np.ndarray, header: ExrHeader, fill: float) -> np.ndarray:
     if x0 < x1 and y0 < y1:
         placed[y0:y1, x0:x1] = plane[y0 - y : y1 - y, x0 - x : x1 - x]
     return placed
-
-
-def _rgb_to_xyz(chromaticities: tuple[float, ...]) -> np.ndarray:
-    """(3, 3) matrix from RGB of these primaries to CIE XYZ with Y = 1 at white."""
-    x, y = np.array(chromaticities, float).reshape(4, 2).T
-    xyz = np.stack([x / y, np.ones(4), (1 - x - y) / y]) if np.all(y != 0) else None
-    if xyz is None:  # a primary on the line y = 0 (such as CIE X and Z themselves) has no luminance
-        xyz = np.stack([x, y, 1 - x - y])
-        xyz[:, 3] /= y[3]
-    return xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])
-
-
-def _to_rec709(rgb: np.ndarray, chromaticities: tuple[float, ...], path: Path) -> np.ndarray:
-    """Convert (h, w, 3) from the primaries `chromaticities`; white keeps its XYZ, as OpenEXR's own viewer has it."""
-    if np.allclose(chromaticities, REC709, atol=1e-3):
-        return rgb
-    try:
-        with np.errstate(all="raise"):
-            matrix = np.linalg.solve(_rgb_to_xyz(REC709), _rgb_to_xyz(chromaticities))
-    except (ArithmeticError, np.linalg.LinAlgError):
-        matrix = np.full((3, 3), np.nan)
-    if not np.all(np.abs(matrix) < MAX_RATIO):
-        raise BadInputError(f"Picture '{path}' names primaries that span no colours; write it in linear Rec.709.")
-    return rgb @ matrix.T.astype(np.float32)

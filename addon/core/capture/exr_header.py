@@ -12,26 +12,28 @@ import math
 import struct
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO, NamedTuple
 
 from ..errors import BadInputError
+from .picture import MAX_PIXELS
 
 MAGIC = b"\x76\x2f\x31\x01"
-MAX_PIXELS = 1 << 27
-"""Largest picture that is read at all: 134 million pixels."""
+MAX_PARTS = 1024
 MAX_RATIO = 5000
 """No compression of OpenEXR makes a picture smaller than this; more claims a size that the file can't hold."""
 FREE_BYTES = 1 << 26
 """Below this many bytes of pixels the ratio is not looked at."""
 HEADER_BYTES = (1 << 18, 1 << 24)
 """How much is read in search of the header's end, and how much where the first did not hold it."""
-LINES_PER_CHUNK = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256, 10: 256, 11: 32}
+LINES_PER_CHUNK = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256, 10: 256, 11: 32, 12: 256,
+                   13: 1}
 TILED, LONG_NAMES, DEEP, MULTIPART = 0x200, 0x400, 0x800, 0x1000
 PIXEL_BYTES = {0: 4, 1: 2, 2: 4}  # uint, half, float
 
 
 @dataclass(frozen=True)
 class ExrHeader:
-    """The part of a header that matters here.
+    """What matters here of the header of a part; most files have one.
 
     Attributes
     ----------
@@ -41,12 +43,21 @@ class ExrHeader:
         Both ends belong to the window.
     chromaticities : tuple of 8 float, or None
         x and y of red, green, blue and white.
+    name : str
+        Of the part; '' in a file of one.
+    view : str
+        Which eye's view the part is; '' where it does not say.
+    views : tuple of str
+        Views that lie side by side in the channels, the default first.
     """
 
     channels: dict[str, tuple[int, int]]
     data_window: tuple[int, int, int, int]
     display_window: tuple[int, int, int, int]
     chromaticities: tuple[float, ...] | None
+    name: str = ""
+    view: str = ""
+    views: tuple[str, ...] = ()
 
     @property
     def size(self) -> tuple[int, int]:
@@ -63,13 +74,23 @@ class _Damaged(Exception):
     """The header contradicts itself; the text says how, as the second half of a sentence."""
 
 
-def parse_header(path: Path) -> ExrHeader:
-    """Read and check the header and the table of chunks of the OpenEXR file `path`.
+class _Chunks(NamedTuple):
+    """How many chunks a part has, how many of them (the first) its largest level, and the bytes each has before its
+    pixels; the last four of those are the pixels' number.
+    """
+
+    count: int
+    largest: int
+    head: int
+
+
+def parse_headers(path: Path) -> tuple[ExrHeader, ...]:
+    """Read and check the headers of all parts and the tables of chunks of the OpenEXR file `path`.
 
     Raises
     ------
     BadInputError
-        Absent, not a file, not OpenEXR, damaged, cut off, or of a kind that isn't supported (deep, several parts).
+        Absent, not a file, not OpenEXR, damaged, cut off, or deep.
     """
     path = Path(path)
     try:
@@ -83,13 +104,16 @@ def parse_header(path: Path) -> ExrHeader:
                 file.seek(0)
                 head = file.read(limit)
                 try:
-                    header, end, chunk_count, chunk_head = _parse(head, size)
+                    headers, at, chunks = _parse(head, size)
                     break
                 except (IndexError, struct.error):
                     if len(head) == size or limit == HEADER_BYTES[-1]:
                         raise _Damaged("ends within its header") from None
-            _check_chunks(file, end, chunk_count, chunk_head, size)
-        return header
+            end = at + 8 * sum(part.count for part in chunks)
+            for part in chunks:
+                _check_chunks(file, at, part, end, size)
+                at += 8 * part.count
+        return headers
     except _Damaged as error:
         raise BadInputError(f"Picture '{path}' {error}; write or copy it again.") from error
     except (OSError, ValueError) as error:
@@ -97,23 +121,47 @@ def parse_header(path: Path) -> ExrHeader:
         raise BadInputError(f"Picture '{path}' can't be read ({reason}); check the file and its rights.") from error
 
 
-def _parse(head: bytes, size: int) -> tuple[ExrHeader, int, int | None, int]:
-    """Parse `head`; also gives where it ends, how many chunks follow (None: unknown), and a chunk's head in bytes.
+def _parse(head: bytes, size: int) -> tuple[tuple[ExrHeader, ...], int, list[_Chunks]]:
+    """Parse `head`; also gives where it ends and what follows for each part.
 
     Running off the end of `head` raises IndexError or struct.error.
     """
     if not head:
         raise _Damaged("is empty")
     if head[:4] != MAGIC:
-        raise _Damaged("is not an OpenEXR file, the only kind of frame that holds radiance")
+        raise _Damaged("is not an OpenEXR file")
     (flags,) = struct.unpack_from("<I", head, 4)
     if flags & 0xFF != 2 or flags & ~(0xFF | TILED | LONG_NAMES | DEEP | MULTIPART):
         raise _Damaged("is of an unknown version of OpenEXR")
-    if flags & DEEP or flags & MULTIPART:
-        kind = "deep pixels" if flags & DEEP else "several parts"
-        raise _Damaged(f"holds {kind}, which isn't supported")
+    parts = []
+    attributes, at = _attributes(head, 8)
+    parts.append(attributes)
+    while flags & MULTIPART and head[at]:
+        attributes, at = _attributes(head, at)
+        parts.append(attributes)
+        if len(parts) > MAX_PARTS:
+            raise _Damaged(f"has over {MAX_PARTS} parts")
+    at += bool(flags & MULTIPART)
+    if flags & DEEP or any(part.get("type", b"").startswith(b"deep") for part in parts):
+        raise _Damaged("holds deep pixels, which have no one colour; flatten it")
+    headers, chunks, bytes_in_all = [], [], 0
+    for part in parts:
+        header, pixel_bytes = _part(part)
+        width, height = window_size(header.data_window)
+        bytes_in_all += width * height * pixel_bytes
+        if bytes_in_all > max(FREE_BYTES, MAX_RATIO * size):
+            raise _Damaged(f"claims {width} x {height} pixels, more than its {size} bytes can hold")
+        headers.append(header)
+        tiled = flags & TILED if not flags & MULTIPART else part.get("type", b"").startswith(b"tiled")
+        largest, count = _tile_count(part, width, height, pixel_bytes) if tiled else _strip_count(part, height)
+        if flags & MULTIPART and part.get("chunkCount") != struct.pack("<i", count):
+            raise _Damaged("has a damaged chunkCount")
+        chunks.append(_Chunks(count, largest, (20 if tiled else 8) + (4 if flags & MULTIPART else 0)))
+    return tuple(headers), at, chunks
 
-    attributes, at = _attributes(head)
+
+def _part(attributes: dict[str, bytes]) -> tuple[ExrHeader, int]:
+    """The header that `attributes` make up, and the bytes of a pixel."""
     windows = []
     for name in ("dataWindow", "displayWindow"):
         if len(attributes.get(name, b"")) != 16:
@@ -124,37 +172,71 @@ def _parse(head: bytes, size: int) -> tuple[ExrHeader, int, int | None, int]:
             raise _Damaged(f"claims a {name} of {width} x {height} pixels")
         windows.append(window)
     channels, pixel_bytes = _channels(attributes.get("channels", b""))
-
-    width, height = window_size(windows[0])
-    if width * height * pixel_bytes > max(FREE_BYTES, MAX_RATIO * size):
-        raise _Damaged(f"claims {width} x {height} pixels, more than its {size} bytes can hold")
     if len(attributes.get("compression", b"")) != 1:
         raise _Damaged("does not name its compression")
-    if flags & TILED:
-        tiles = attributes.get("tiles", b"")
-        if len(tiles) != 9:
-            raise _Damaged("does not give the size of its tiles")
-        x, y, mode = struct.unpack("<IIB", tiles)
-        if not (0 < x <= 1 << 16 and 0 < y <= 1 << 16) or x * y * pixel_bytes > 1 << 30:
-            raise _Damaged(f"claims tiles of {x} x {y} pixels")
-        # Further levels of a mip-map follow the first one in the table; nothing here needs their number.
-        chunk_count = math.ceil(width / x) * math.ceil(height / y) if mode & 0xF == 0 else None
-        chunk_head = 20
-    else:
-        lines = LINES_PER_CHUNK.get(attributes["compression"][0])
-        chunk_count = math.ceil(height / lines) if lines else None
-        chunk_head = 8
     chroma = attributes.get("chromaticities")
     if chroma is not None and len(chroma) != 32:
         raise _Damaged("has a damaged attribute 'chromaticities'")
-    header = ExrHeader(channels, *windows, struct.unpack("<8f", chroma) if chroma else None)
-    return header, at, chunk_count, chunk_head
+    name, view = (attributes.get(key, b"").decode("latin-1") for key in ("name", "view"))
+    views = _strings(attributes.get("multiView", b""))
+    chromaticities = struct.unpack("<8f", chroma) if chroma else None
+    return ExrHeader(channels, *windows, chromaticities, name, view, views), pixel_bytes
 
 
-def _attributes(head: bytes) -> tuple[dict[str, bytes], int]:
-    """The header's attributes by name, and the position behind them."""
+def _strip_count(attributes: dict[str, bytes], height: int) -> tuple[int, int]:
+    lines = LINES_PER_CHUNK.get(attributes["compression"][0])
+    if lines is None:
+        raise _Damaged(f"has the compression {attributes['compression'][0]}, which isn't known")
+    return (math.ceil(height / lines),) * 2
+
+
+def _tile_count(attributes: dict[str, bytes], width: int, height: int, pixel_bytes: int) -> tuple[int, int]:
+    """Tiles of the largest level, and of all: one, those of a mip-map, or those of a rip-map."""
+    tiles = attributes.get("tiles", b"")
+    if len(tiles) != 9:
+        raise _Damaged("does not give the size of its tiles")
+    x, y, mode = struct.unpack("<IIB", tiles)
+    if not (0 < x <= 1 << 16 and 0 < y <= 1 << 16) or x * y * pixel_bytes > 1 << 30:
+        raise _Damaged(f"claims tiles of {x} x {y} pixels")
+    levels, up = mode & 0xF, mode >> 4
+    if levels > 2 or up > 1:
+        raise _Damaged("has unknown levels of tiles")
+    across = [math.ceil(n / x) for n in _level_sizes(width, up)]
+    down = [math.ceil(n / y) for n in _level_sizes(height, up)]
+    largest = across[0] * down[0]
+    if levels == 0:
+        return largest, largest
+    if levels == 2:
+        return largest, sum(across) * sum(down)
+    count = max(len(across), len(down))
+    across += across[-1:] * (count - len(across))
+    down += down[-1:] * (count - len(down))
+    return largest, sum(a * b for a, b in zip(across, down))
+
+
+def _level_sizes(size: int, up: int) -> list[int]:
+    """`size` halved until it is 1, rounded down or `up`."""
+    sizes = [size]
+    while sizes[-1] > 1:
+        sizes.append((sizes[-1] + up) // 2)
+    return sizes
+
+
+def _strings(data: bytes) -> tuple[str, ...]:
+    """A vector of strings, each with its length before it."""
+    found, at = [], 0
+    while at + 4 <= len(data):
+        (length,) = struct.unpack_from("<i", data, at)
+        if length < 0 or at + 4 + length > len(data):
+            raise _Damaged("has a damaged attribute 'multiView'")
+        found.append(data[at + 4 : at + 4 + length].decode("latin-1"))
+        at += 4 + length
+    return tuple(found)
+
+
+def _attributes(head: bytes, at: int) -> tuple[dict[str, bytes], int]:
+    """The attributes by name of the header at `at`, and the position behind them."""
     found: dict[str, bytes] = {}
-    at = 8
     while head[at]:
         name, at = _text(head, at)
         _, at = _text(head, at)
@@ -199,17 +281,18 @@ def _channels(data: bytes) -> tuple[dict[str, tuple[int, int]], int]:
     return channels, pixel_bytes
 
 
-def _check_chunks(file, table: int, count: int | None, chunk_head: int, size: int) -> None:
-    """Compare the table of chunks, which follows the header, with the file's size: so a cut-off file is found."""
-    if count is None:
-        return
-    if table + count * (8 + chunk_head) > size:
+def _check_chunks(file: BinaryIO, table: int, part: _Chunks, end: int, size: int) -> None:
+    """Compare the table of a part's chunks with the file's size, so that a cut-off file is found.
+
+    `end` is where all tables end.
+    """
+    if end + part.count * part.head > size:
         raise _Damaged("is cut off")
     file.seek(table)
-    offsets = struct.unpack(f"<{count}Q", file.read(8 * count))
-    if min(offsets) < table + 8 * count or max(offsets) + chunk_head > size:
+    offsets = struct.unpack(f"<{part.largest}Q", file.read(8 * part.largest))
+    if min(offsets) < end or max(offsets) + part.head > size:
         raise _Damaged("is cut off or was never finished")
-    file.seek(max(offsets) + chunk_head - 4)
+    file.seek(max(offsets) + part.head - 4)
     (length,) = struct.unpack("<i", file.read(4))
-    if length < 0 or max(offsets) + chunk_head + length > size:
+    if length < 0 or max(offsets) + part.head + length > size:
         raise _Damaged("is cut off")

@@ -20,6 +20,7 @@ from .layout import Layout, RawMesh, Reader, Reading
 from .meshes import MESH, find_mesh, read_mesh
 from .model import Frame
 from .nerfstudio_camera import check_model, lens_notes, positive, read_camera
+from .nerfstudio_exposures import ended, read_brackets, with_settings
 from .paths import EscapesError, inside
 from .pose import check_pose
 
@@ -27,8 +28,6 @@ FILE = "transforms.json"
 SPLITS = ("transforms_train.json", "transforms_val.json")
 """Read one after the other where `FILE` is absent; the test split is left alone."""
 TEST_SPLIT = "transforms_test.json"
-ENDING = ".exr"
-"""Tried where `file_path` has none, as in the NeRF-synthetic scenes."""
 BEFORE = [[0.0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]]
 """What nerfstudio did to COLMAP's world before it wrote down `applied_transform`."""
 ORIGINAL_MESH, STORED_MESH = "mesh-original", "mesh-stored"
@@ -83,6 +82,7 @@ def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], l
         names = [str(entry.get("file_path", i)) if isinstance(entry, dict) else str(i)
                  for i, (_, entry, _) in enumerate(listed)]
     frames: list[Frame] = []
+    told: list[tuple[dict[str, Any], dict[str, Any]]] = []
     problems: list[str] = []
     seen: set[Path] = set()
     for name, (top, entry, path) in zip(names, listed):
@@ -101,7 +101,9 @@ def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], l
             continue
         seen.add(frame.path)
         frames.append(frame)
-    return frames, problems, list(dict.fromkeys(notes))
+        told.append((top, entry))
+    frames, said = with_settings(frames, told)
+    return frames, problems, list(dict.fromkeys(notes + said))
 
 
 def _without_test(top: dict[str, Any], entries: list[Any]) -> tuple[list[Any], list[str]]:
@@ -150,20 +152,15 @@ def _name(entry: Any, index: int) -> str:
 
 def _frame(root: Path, top: dict[str, Any], entry: dict[str, Any], name: str, model: str, reading: Reading) -> Frame:
     """One frame; raises `BadInputError` where it can't be used."""
-    path = inside(root, entry.get("file_path"), name, reading.outside)
-    ended = path.with_name(path.name + ENDING)
-    try:
-        if not path.is_file() and (not path.suffix or ended.is_file()):
-            path = ended
-    except (OSError, ValueError) as error:  # a name that the system can't even ask for
-        raise BadInputError(f"Frame '{name}' has a file_path that can't be a file; mend it.") from error
+    path = ended(inside(root, entry.get("file_path"), name, reading.outside), name)
     mask = entry.get("mask_path")
     pose = check_pose(entry.get("transform_matrix"), name)
     exposure = positive(top, entry, "exposure", name, 1.0)
     saturation = positive(top, entry, "saturation", name, math.inf)
     camera = read_camera(top, entry, name, path, model, pose)
     mask_path = None if mask in (None, "") else inside(root, mask, name, reading.outside)
-    return Frame(name, path, camera, mask_path, exposure, saturation)
+    brackets = read_brackets(root, top, entry, name, reading.outside)
+    return Frame(name, path, camera, mask_path, exposure, saturation, brackets=brackets)
 
 
 # The mesh's world

@@ -1,4 +1,4 @@
-"""Pictures of every kind that a frame or mask may be stored in."""
+"""Pictures of every kind that a frame or mask may be stored in. The kind is told by the content, not by the name."""
 
 from __future__ import annotations
 
@@ -6,35 +6,120 @@ from pathlib import Path
 
 import numpy as np
 
-from .exr import Picture, read_exr, read_header
-from .png import png_size, read_png
+from ..errors import BadInputError
+from . import exr_header, radiance_hdr
+from .exr import exr_note, read_exr, read_header
+from .foreign import JPEG_MAGIC, foreign_info, is_foreign
+from .picture import Picture
+from .png import MAGIC, png_bits, png_size, read_png
+from .radiance_hdr import hdr_size, read_hdr
+from .transfer import decode
+
+EXR, HDR, PNG, JPEG, TIFF = "OpenEXR", "Radiance HDR", "PNG", "JPEG", "TIFF"
+ENDINGS = (".exr", ".hdr", ".pic", ".png", ".jpg", ".jpeg", ".tif", ".tiff")
+"""Of files that can be pictures, in the order in which a missing ending is tried."""
+
+
+def picture_kind(path: Path | str) -> str:
+    """One of the kinds above.
+
+    Raises
+    ------
+    BadInputError
+        The file is absent, empty, or of a kind that isn't known.
+    """
+    path = Path(path)
+    try:
+        # A pipe or a device would block or never end.
+        if not path.is_file():
+            what = "is not a file" if path.exists() else "does not exist"
+            raise BadInputError(f"Picture '{path}' {what}; check the capture's paths.")
+        with open(path, "rb") as file:
+            head = file.read(16)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise BadInputError(f"Picture '{path}' can't be read ({reason}); check the file and its rights.") from error
+    if not head:
+        raise BadInputError(f"Picture '{path}' is empty; write or copy it again.")
+    if is_foreign(head):
+        return JPEG if head.startswith(JPEG_MAGIC) else TIFF
+    for kind, magic in ((EXR, exr_header.MAGIC), (HDR, radiance_hdr.MAGIC), (PNG, MAGIC)):
+        if head.startswith(magic):
+            return kind
+    raise BadInputError(f"Picture '{path}' is not an OpenEXR, Radiance HDR, PNG, JPEG or TIFF file, or is damaged; "
+                        "write it as OpenEXR.")
 
 
 def picture_size(path: Path) -> tuple[int, int]:
-    """Width and height in pixels, from the header alone; finds a file that was cut off.
+    """Width and height in pixels, from the header alone; finds an OpenEXR file that was cut off.
 
     Raises
     ------
     BadInputError
         The file is absent, damaged, or of a kind that isn't supported.
     """
-    return read_header(path)
+    kind = picture_kind(path)
+    if kind in (JPEG, TIFF):
+        return foreign_info(path)[:2]
+    return {EXR: read_header, HDR: hdr_size, PNG: png_size}[kind](path)
 
 
-def mask_size(path: Path) -> tuple[int, int]:
-    """As `picture_size`, for a mask."""
-    return read_header(path) if path.suffix.lower() == ".exr" else png_size(path)
+mask_size = picture_size
 
 
-def read_picture(path: Path) -> Picture:
-    """A frame's numbers, linear Rec.709.
+def picture_bits(path: Path) -> int:
+    """Bits of a channel where numbers are codes of a curve, 8 or 16; 0 where they are linear floats.
 
     Raises
     ------
     BadInputError
-        The file is absent, damaged, or of a kind that isn't supported.
+        As `picture_size`.
     """
-    return read_exr(path)
+    kind = picture_kind(path)
+    if kind in (JPEG, TIFF):
+        return foreign_info(path)[2]
+    return png_bits(path) if kind == PNG else 0
+
+
+def picture_note(path: Path) -> str:
+    """What was chosen where a file holds several pictures, as the end of a sentence; '' for most."""
+    return exr_note(path) if picture_kind(path) == EXR else ""
+
+
+def read_picture(path: Path, transfer: str = "") -> Picture:
+    """A frame's numbers, linear Rec.709; 1 is the greatest code of a picture of 8 or 16 bits.
+
+    Parameters
+    ----------
+    transfer : str
+        Curve of codes (`transfer.to_linear`).
+
+    Raises
+    ------
+    BadInputError
+        The file is absent, damaged, of a kind that isn't supported, or has codes but no curve.
+    """
+    kind = picture_kind(path)
+    if kind == EXR:
+        return read_exr(path)
+    if kind == HDR:
+        return read_hdr(path)
+    if not transfer:
+        raise BadInputError(unstated(path))
+    if kind in (JPEG, TIFF):
+        raise BadInputError(f"Picture '{path}' is a {kind} file, which Blender has to decode; run `recover` where bpy "
+                            "is installed, or convert it to PNG.")
+    codes = read_png(path)
+    scale = np.float32(np.iinfo(codes.dtype).max)
+    count = codes.shape[2]
+    alpha = codes[..., -1] / scale if count in (2, 4) else None
+    return Picture(decode(np.repeat(codes[..., :1], 3, -1) if count < 3 else codes[..., :3], transfer), alpha)
+
+
+def unstated(path: Path | str) -> str:
+    """The sentence on a picture of codes whose curve nobody told."""
+    return (f"Picture '{path}' holds 8 or 16-bit codes, and tone-mapped frames give wrong light; give EXR or HDR "
+            "frames, or the codes' curve with --transfer (srgb, linear, or a gamma such as 2.2).")
 
 
 def read_mask(path: Path) -> np.ndarray:
@@ -45,7 +130,7 @@ def read_mask(path: Path) -> np.ndarray:
     BadInputError
         As `read_picture`.
     """
-    if path.suffix.lower() == ".exr":
-        return (read_exr(path).rgb > 0).any(-1)
+    if picture_kind(path) != PNG:
+        return (read_picture(path, "linear").rgb > 0).any(-1)
     pixels = read_png(path)
     return (pixels[..., : 1 if pixels.shape[2] < 3 else 3] > 0).any(-1)

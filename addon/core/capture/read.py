@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,14 +11,17 @@ import numpy as np
 
 from ..errors import BadInputError
 from . import instances
+from .brackets import fold, group_brackets, unfold
 from .clipping import find_clipping
 from .conventions import parse
+from .exposures import from_csv, from_exif
+from .frame_codes import with_curves
 from .id_pictures import read_ids
 from .layout import AS_FOUND, Layout, Reading
 from .mesh_repair import repair
 from .model import Capture, Frame, Mesh
 from .parts import connected_parts
-from .pictures import mask_size, picture_size, read_picture
+from .pictures import mask_size, picture_note, picture_size, read_picture
 from .readers import reader_for
 from .vote import vote
 
@@ -45,10 +49,31 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
     layout = reader.read(root, reading)
     convention = parse(reading.convention)
     layout = replace(layout, frames=convention.frames(layout.frames), mesh=convention.mesh(layout.mesh))
-    frames, more = _usable(root, layout)
+    frames, more = _usable(root, _exposed(layout, reading))
+    frames, grouped = group_brackets(frames)
     mesh, objects, warnings = _objects(layout, frames)
-    clipped, notes = find_clipping(frames, lambda path: read_picture(path).rgb)
-    return Capture(root, mesh, objects, clipped, (*warnings, *more, *notes), reader.name)
+    clipped, notes = find_clipping(unfold(frames), lambda path: read_picture(path).rgb)
+    frames = fold(frames, clipped)
+    notes = [*grouped, *_chosen(frames), *notes]
+    return Capture(root, mesh, objects, tuple(frames), (*warnings, *more, *notes), reader.name)
+
+
+def _exposed(layout: Layout, reading: Reading) -> Layout:
+    """The layout with each frame's exposure and curve as the user or the pictures themselves tell."""
+    frames, problems, notes = layout.frames, [], []
+    if reading.exposures is not None:
+        frames, problems, notes = from_csv(frames, reading.exposures)
+    else:
+        frames, notes = from_exif(frames)
+    frames, more, curves = with_curves(frames, reading.transfer)
+    return replace(layout, frames=frames, problems=[*layout.problems, *problems, *more],
+                   notes=[*layout.notes, *notes, *curves])
+
+
+def _chosen(frames: list[Frame]) -> list[str]:
+    """A sentence for each way in which one of several pictures in a file was chosen."""
+    counts = Counter(note for note in (picture_note(frame.path) for frame in frames) if note)
+    return [f"Taken in {count} of {len(frames)} frames: {note}." for note, count in counts.items()]
 
 
 def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str]]:
@@ -101,7 +126,7 @@ def _usable(root: Path, layout: Layout) -> tuple[list[Frame], list[str]]:
 def _check_frame(frame: Frame) -> None:
     """Look at the headers of a frame's pictures; raises `BadInputError`."""
     wanted = frame.camera.width, frame.camera.height
-    sizes = [(frame.path, picture_size(frame.path))]
+    sizes = [(path, picture_size(path)) for path in (frame.path, *(shot.path for shot in frame.brackets))]
     if frame.mask_path is not None:
         sizes.append((frame.mask_path, mask_size(frame.mask_path)))
     for path, (width, height) in sizes:
@@ -130,6 +155,9 @@ def describe(capture: Capture) -> dict[str, Any]:
         "extent_m": (high - low).tolist(),
         "frames": len(capture.frames),
         "resolutions": sizes,
+        "exposures": _exposures(capture),
+        "bracketed_frames": sum(bool(frame.brackets) for frame in capture.frames),
+        "curve_of_codes": next((frame.transfer for frame in capture.frames if frame.transfer), ""),
         "masks": sum(frame.mask_path is not None for frame in capture.frames),
         "instances": [
             {"object_id": one.object_id, "class_name": one.class_name, "triangles": counts.get(one.object_id, 0)}
@@ -137,3 +165,9 @@ def describe(capture: Capture) -> dict[str, Any]:
         ],
         "warnings": list(capture.warnings),
     }
+
+
+def _exposures(capture: Capture) -> list[float]:
+    """The least and the greatest exposure of any picture."""
+    values = [frame.exposure for frame in unfold(capture.frames)]
+    return [min(values), max(values)] if values else []

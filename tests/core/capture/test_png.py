@@ -8,7 +8,7 @@ import zlib
 import numpy as np
 import pytest
 
-from addon.core.capture.png import MAGIC, png_size, read_png, write_png
+from addon.core.capture.png import MAGIC, png_bits, png_size, read_png, write_png
 from addon.core.errors import BadInputError
 
 PICTURE = np.random.default_rng(0).integers(0, 256, (7, 9, 3), np.uint8)
@@ -74,16 +74,41 @@ def test_few_bits(tmp_path, bits):
         read_png(tmp_path / "a.png")
 
 
+def test_sixteen_bits(tmp_path):
+    values = np.random.default_rng(3).integers(0, 1 << 16, (5, 4, 3), np.uint16)
+    stored = values.astype(">u2").view(np.uint8).reshape(5, 4, 6)
+    (tmp_path / "a.png").write_bytes(png(filtered(stored, (4, 3, 1)), 4, 5, 16, 2))
+    np.testing.assert_array_equal(read_png(tmp_path / "a.png"), values)
+    assert png_bits(tmp_path / "a.png") == 16
+
+
+@pytest.mark.parametrize("size", [(1, 1), (3, 2), (8, 8), (13, 21)])
+@pytest.mark.parametrize("bits", [1, 8])
+def test_interlaced(tmp_path, size, bits):
+    width, height = size
+    values = np.random.default_rng(4).integers(0, 1 << bits, (height, width), np.uint8)
+    lines = b""
+    for y, x, down, right in ((0, 0, 8, 8), (0, 4, 8, 8), (4, 0, 8, 4), (0, 2, 4, 4), (2, 0, 4, 2), (0, 1, 2, 2),
+                              (1, 0, 2, 1)):
+        part = values[y::down, x::right]
+        if part.size:
+            part = np.packbits(part, axis=1) if bits == 1 else part
+            lines += filtered(part[..., None], (4, 2))
+    (tmp_path / "a.png").write_bytes(png(lines, width, height, bits, 0, interlaced=1))
+    np.testing.assert_array_equal(read_png(tmp_path / "a.png")[..., 0], values * (255 if bits == 1 else 1))
+
+
 @pytest.mark.parametrize("content, words", [
     (b"", "not a PNG"),
     (b"\xff\xd8\xff\xe0 jpeg", "not a PNG"),
     (png(bytes(20), 4, 4, 8, 0)[:-30], "damaged"),
     (png(bytes(3), 4, 4, 8, 0), "damaged"),
     (png(b"\x09" + bytes(19), 4, 4, 8, 0), "damaged"),
-    (png(bytes(20), 4, 4, 8, 0, interlaced=1), "interlaced"),
-    (png(bytes(40), 4, 4, 16, 0), "16-bit"),
+    (png(bytes(20), 4, 4, 8, 0, interlaced=2), "damaged"),
+    (png(bytes(20), 4, 4, 3, 0), "damaged"),
+    (png(bytes(20), 5000, 5000, 8, 0), "more than it can hold"),
     (png(bytes(20), 2**31, 2**31, 8, 0), "claims"),
-    (png(bytes(20), 4, 4, 8, 5), "isn't supported"),
+    (png(bytes(20), 4, 4, 8, 5), "damaged"),
     (png(bytes(20), 0, 4, 8, 0), "claims"),
 ])  # fmt: skip
 def test_what_is_no_png(tmp_path, content, words):

@@ -1,0 +1,59 @@
+"""From a picture's own primaries to linear Rec.709.
+
+Source: SMPTE RP 177 (primaries and white to XYZ); K. M. Lam's linear Bradford transform (white to white), as ICC.1:2022
+Annex E gives it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import BadInputError
+
+REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+"""x and y of red, green, blue and white; what a file without chromaticities means."""
+CIE_XYZ = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+"""Primaries of pictures that hold X, Y and Z: their white is a unit, not what the picture's maker adapted to."""
+BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+MAX_GAIN = 5000
+"""Primaries that need a greater factor span no colours."""
+
+
+def rgb_to_xyz(chromaticities: tuple[float, ...]) -> np.ndarray:
+    """(3, 3) matrix from RGB of these primaries to CIE XYZ with Y = 1 at white."""
+    x, y = np.array(chromaticities, float).reshape(4, 2).T
+    xyz = np.stack([x, y, 1 - x - y])
+    xyz[:, 3] /= y[3]
+    return xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])
+
+
+def luminance_weights(chromaticities: tuple[float, ...]) -> np.ndarray:
+    """Share of R, G and B in the luminance Y, (3,) float64 with sum 1."""
+    weights = rgb_to_xyz(chromaticities)[1]
+    return weights / weights.sum()
+
+
+def to_rec709(rgb: np.ndarray, chromaticities: tuple[float, ...], name: object) -> np.ndarray:
+    """Convert linear `rgb` ((h, w, 3) float32) from `chromaticities`; white becomes white (Bradford).
+
+    Raises
+    ------
+    BadInputError
+        The primaries span no colours; `name` is the file.
+    """
+    if np.allclose(chromaticities, REC709, atol=1e-3):
+        return rgb
+    try:
+        with np.errstate(all="raise"):
+            own, wanted = rgb_to_xyz(chromaticities), rgb_to_xyz(REC709)
+            adapted = own
+            if not np.allclose(chromaticities[:6], CIE_XYZ, atol=1e-3):
+                gain = (BRADFORD @ wanted.sum(1)) / (BRADFORD @ own.sum(1))
+                adapted = np.linalg.solve(BRADFORD, gain[:, None] * BRADFORD) @ own
+            matrix = np.linalg.solve(wanted, adapted)
+    except (ArithmeticError, np.linalg.LinAlgError):
+        matrix = np.full((3, 3), np.nan)
+    if not np.all(np.abs(matrix) < MAX_GAIN):
+        raise BadInputError(f"Picture '{name}' names primaries that span no colours; write it in linear Rec.709.")
+    with np.errstate(all="ignore"):
+        return rgb @ matrix.T.astype(np.float32)

@@ -1,0 +1,64 @@
+"""From the stored codes of 8 and 16-bit pictures to linear light.
+
+Only the curve that the user names is undone. What a camera or a grading did besides (a film-like shoulder, local
+contrast) is not in the file and can't be undone: such pictures give wrong light.
+Source: IEC 61966-2-1 (sRGB).
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from ..errors import BadInputError
+
+SRGB, LINEAR = "srgb", "linear"
+GAMMAS = (0.1, 10.0)
+"""Bounds of a gamma that anyone can mean."""
+TOP = {8: 253.5 / 255, 16: 1 - 2.0**-12}
+"""Share of the greatest code from which on a value counts as clipped: JPEG rings by a code or two, and 12 bits that
+were shifted into 16 end there."""
+
+
+def check_transfer(text: str) -> None:
+    """Raise `BadInputError` unless `text` is '' or names a curve."""
+    if text:
+        _gamma(text)
+
+
+def to_linear(values: np.ndarray, transfer: str) -> np.ndarray:
+    """Undo the curve `transfer` of `values` in 0...1; float64, of the same shape."""
+    values = np.asarray(values, np.float64)
+    if transfer == LINEAR:
+        return values
+    if transfer == SRGB:
+        return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+    return values ** _gamma(transfer)
+
+
+def decode(codes: np.ndarray, transfer: str) -> np.ndarray:
+    """Linear light, 1 at the greatest code, of `codes` (any shape, uint8 or uint16), float32."""
+    return _table(codes.dtype.itemsize * 8, transfer)[codes]
+
+
+def clip_level(bits: int, transfer: str) -> float:
+    """The linear value from which on a picture of `bits` a channel counts as clipped."""
+    return float(to_linear(np.array(TOP[bits]), transfer))
+
+
+@functools.lru_cache(maxsize=8)
+def _table(bits: int, transfer: str) -> np.ndarray:
+    return to_linear(np.linspace(0, 1, 1 << bits), transfer).astype(np.float32)
+
+
+def _gamma(text: str) -> float:
+    if text in (SRGB, LINEAR):
+        return 1.0
+    try:
+        gamma = float(text)
+    except ValueError:
+        gamma = 0.0
+    if not GAMMAS[0] <= gamma <= GAMMAS[1]:
+        raise BadInputError(f"There is no curve '{text}' of pictures; give srgb, linear, or a gamma such as 2.2.")
+    return gamma
