@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from . import instances
+from .conventions import AS_READ
 from .jsonfile import is_number, read_json
 from .layout import Layout, RawMesh, Reader, Reading
 from .meshes import MESH, find_mesh, read_mesh
@@ -30,8 +31,6 @@ SPLITS = ("transforms_train.json", "transforms_val.json")
 TEST_SPLIT = "transforms_test.json"
 BEFORE = [[0.0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]]
 """What nerfstudio did to COLMAP's world before it wrote down `applied_transform`."""
-ORIGINAL_MESH, STORED_MESH = "mesh-original", "mesh-stored"
-"""Values of `Reading.convention`: the mesh is in the world before `applied_transform`, or in the poses'."""
 MOST, FEW = 0.9, 0.1
 """The mesh counts as one of the original world where, moved to the poses' world, its box holds more than `MOST` of the
 cameras, and else fewer than `FEW`."""
@@ -199,21 +198,19 @@ def _in_frames_world(mesh: RawMesh, root: Path, top: dict[str, Any], frames: lis
     """The mesh in the world of the poses, and a sentence where that is not plain.
 
     nerfstudio writes its own point cloud in the poses' world, and so a mesh is expected there; one that was made by
-    COLMAP itself is not, and is moved as the file says where the cameras leave no doubt.
+    COLMAP itself is not, and is moved as the file says where the cameras leave no doubt. The convention 'as-read' keeps
+    it where it is; others come on top.
     """
     matrix = applied(root, top)
     if matrix is None or not len(mesh.vertices):
         return mesh, []
     moved = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
-    original = reading.convention == ORIGINAL_MESH
-    because = "as asked"
-    if reading.convention not in (ORIGINAL_MESH, STORED_MESH) and frames:
+    if reading.convention != AS_READ and frames:
         there, here = (_within(vertices, frames) for vertices in (moved, mesh.vertices))
-        original = there > MOST and here < FEW
-        because = f"{there:.0%} of the cameras are then within its box, and {here:.0%} else"
-    if original:
-        return replace(mesh, vertices=moved), [
-            f"'{mesh.name}' was moved from the original world to the poses' by 'applied_transform': {because}."]
+        if there > MOST and here < FEW:
+            return replace(mesh, vertices=moved), [
+                f"'{mesh.name}' was moved from the original world to the poses' by 'applied_transform': {there:.0%} of "
+                f"the cameras are then within its box, and {here:.0%} else; --convention {AS_READ} leaves it."]
     if top.get("applied_transform") is None and top.get("applied_scale") is None:
         return mesh, []
     return mesh, [f"The poses were moved by 'applied_transform' or 'applied_scale'; '{mesh.name}' was taken to have "

@@ -92,8 +92,7 @@ def _votes(scene: RayScene, frame: Frame, ids: np.ndarray, step: int) -> tuple[n
     chosen = np.zeros(ids.shape, bool)
     chosen[step // 2 :: step, step // 2 :: step] = True
     y, x = np.nonzero(same & chosen)
-    directions = camera.directions(np.stack([x + 0.5, y + 0.5], -1))
-    ok = np.isfinite(directions).all(1)  # where the lens shows nothing there is no direction
+    directions, ok = camera.rays(np.stack([x + 0.5, y + 0.5], -1))
     y, x, directions = y[ok], x[ok], directions[ok]
     hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
     hit = hits.triangle >= 0
