@@ -113,7 +113,8 @@ def shade(
     field = LightField(mesh, atlas, scene, fill_unseen(lit_diffuse.radiance, seen), environment)
     good = seen & (((lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= ENOUGH)) | (lit_diffuse.tier == SATURATED))
     unseen = [object_id for object_id, share in seen_share.items() if share == 0]
-    light = find_light(field, good if good.any() else seen, unseen, instances, seed)
+    tilted = tilt(mesh, noise)[atlas.triangle]
+    light = find_light(field, good if good.any() else seen, unseen, instances, seed, tilted)
     lamps = light.lamps
     radiance = field.radiance.copy()
     for lamp in lamps:
@@ -152,7 +153,7 @@ def shade(
         interpolate=interpolate, finest=finest, progress=progress, **how,
     )  # fmt: skip
     # A noisy mesh faces elsewhere than the surface did.
-    unsure = np.hypot(unsure, tilt(mesh, noise)[atlas.triangle])
+    unsure = np.hypot(unsure, tilted)
     rho, valid = quotient(lit_diffuse.radiance, E)
     albedo = fill(atlas, rho, valid & seen, class_of, emitters, np.hypot(doubt(lit_diffuse), unsure))
     return Shading(E, escaped, unsure, field.radiance, albedo, lamps, light.environment, light.notes, mirrors, points)

@@ -33,6 +33,9 @@ MIN_OPEN = 0.02
 """Share of the received directions that must lead outside for such a sky to be looked for."""
 MIN_SKY = 0.01
 """Part of the received light below which a part of the sky can't be solved for; its neighbours' radiance stays."""
+MOST_TILTED = 0.14
+"""Radians (8 degrees, as cells that count as flat). The living room perturbed, four seeds: its clipped lamp of 26.2
+comes out at 26.4 +- 0.8, and at 25.7 +- 1.2 with all elements of such cells."""
 SWEEPS = 2
 LEAST, ENOUGH = 30, 200
 """Elements with which a solution can be tried; those on flat spots from which on the others are left out."""
@@ -175,6 +178,7 @@ def find_light(
     unseen_objects: list[int],
     instances: tuple[Instance, ...],
     seed: int = 0,
+    tilted: np.ndarray | None = None,
 ) -> Light:
     """Lamps seen and unseen, and the sky.
 
@@ -186,8 +190,12 @@ def find_light(
         Elements whose L_d rests on enough clean observations, saturated ones included.
     unseen_objects : list of int
         Objects of which no frame saw anything.
+    tilted : (n,) float, optional
+        Radians, how far the mesh's noise may have turned each element: E of those turned much tells little.
     """
     flat = on_flat(field.atlas)
+    if tilted is not None:
+        flat &= tilted < MOST_TILTED
     element = _pick(field, _steady(field, good, flat) | _barely_seen(field, good), seed)
     if not len(element):
         return Light((), field.environment, ())
