@@ -15,9 +15,9 @@ import bpy
 
 from ..core.agreement.look import look
 from ..core.capture.conventions import AS_READ
+from ..core.capture.copies import converted, reading_through
 from ..core.capture.layout import AS_FOUND, Reading
 from ..core.capture.model import Capture
-from ..core.capture.pixels import read_pixels
 from ..core.capture.read import read_capture
 from ..core.errors import BadInputError, StorageError
 from ..core.memory import peak_memory
@@ -29,6 +29,7 @@ from ..core.store import Store
 from ..version import VERSION
 from . import result_images
 from .apply import import_capture, imported, whole
+from .load_picture import load_picture
 from .scene import write_scene
 from .scene_capture import check_own, polygons_of
 from .unwrap import unwrap
@@ -36,6 +37,8 @@ from .write_back import AUTO, is_own, putting_on
 
 STAGES = ("surface", "lit_diffuse", "shading", "specular")
 WRITE = "write"
+PICTURES = "stages/pictures"
+"""Where in the result folder copies of frames lie that the core can't read itself."""
 WEIGHTS = {"read": 1, "surface": 5, "lit_diffuse": 8, "shading": 17, "specular": 16, WRITE: 5}
 """Rough cost of the stages, for the estimate of the time left."""
 
@@ -100,12 +103,13 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     elif scene is not None and not import_first:
         imported(scene, capture)
     told = _look(capture, reading)
-    progress.done()
     with Store(out_folder) as store, _told(out_folder):
         if from_stage in STAGES:
             store.drop(STAGES[STAGES.index(from_stage):])
         faces = polygons_of(capture.root, capture.mesh)
-        recovery = Recovery(capture, store, settings, progress, partial(unwrap, polygons=faces))
+        readable = converted(capture, store.path(PICTURES), load_picture, progress)
+        progress.done()
+        recovery = Recovery(readable, store, settings, progress, partial(unwrap, polygons=faces))
         for stage in STAGES:
             getattr(recovery, stage)()
             if stage == until:
@@ -152,7 +156,7 @@ def _look(capture: Capture, reading: Reading) -> list[str]:
     BadInputError
         The poses are surely read wrongly, and how they would be right is known.
     """
-    found = look(capture, read_pixels, search=not reading.convention)
+    found = look(capture, reading_through(load_picture), search=not reading.convention)
     if found.best is not None:
         raise BadInputError(f"Capture '{capture.root}': {found.sentence()} Give that, or --convention {AS_READ} to go "
                             "on all the same.")

@@ -1,25 +1,15 @@
 """Pictures that need a decoder which the core has not: JPEG and TIFF. Their headers are read here.
 
-Their pixels are read by whatever the caller brings (Blender), once, into files that the core can read: `converted`.
+Their pixels are read by whatever the caller brings (Blender), once, into files that the core can read: `copies.py`.
 """
 
 from __future__ import annotations
 
-import os
 import struct
-from collections.abc import Callable
-from dataclasses import replace
-from hashlib import sha256
 from pathlib import Path
 
-import numpy as np
-
-from ..errors import BadInputError, StorageError
-from ..progress import Progress
-from .exr import write_exr
-from .model import Capture, Frame
+from ..errors import BadInputError
 from .picture import MAX_PIXELS
-from .png import write_png
 from .tiff_tags import BITS, HEIGHT, ORDERS, SAMPLE_FORMAT, WIDTH, exposure_tags, read_tags
 
 JPEG_MAGIC, TIFF_MAGIC = b"\xff\xd8\xff", tuple(ORDERS)
@@ -55,77 +45,6 @@ def exif_exposure(path: Path) -> dict[int, float]:
         return exposure_tags(data)
     at = data.find(b"Exif\0\0")
     return exposure_tags(data[at + 6 :]) if at >= 0 else {}
-
-
-def converted(capture: Capture, folder: Path, load: Callable[[Path], np.ndarray], progress: Progress) -> Capture:
-    """The capture with its foreign pictures replaced by copies in `folder` that the core can read.
-
-    A copy that is there already, of a picture that has not changed since, is taken as it is.
-
-    Parameters
-    ----------
-    load : callable
-        Gives a picture's codes, (h, w, 3) uint8 with row 0 the top, or its linear values, float32. Called from this
-        thread alone.
-
-    Raises
-    ------
-    BadInputError
-        A picture can't be decoded.
-    StorageError
-        The folder can't be written.
-    InterruptedRun
-    """
-    todo = {path for frame in capture.frames for path in _paths(frame) if _foreign(path)}
-    copies: dict[Path, Path] = {}
-    for i, path in enumerate(sorted(todo)):
-        copies[path] = _copy(path, folder, load)
-        progress.update((i + 1) / len(todo))
-    if not copies:
-        return capture
-    return replace(capture, frames=tuple(_moved(frame, copies) for frame in capture.frames))
-
-
-def _copy(path: Path, folder: Path, load: Callable[[Path], np.ndarray]) -> Path:
-    """Make the copy of `path`, of the same time, unless it is there."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        stat = path.stat()
-        unique = sha256(f"{path.absolute()} {stat.st_size} {stat.st_mtime_ns}".encode("utf-8", "surrogatepass"))
-        ending = ".png" if foreign_info(path)[2] == 8 else ".exr"
-        target = folder / f"{path.stem[:80]}-{unique.hexdigest()[:12]}{ending}"
-        if not target.is_file():
-            pixels = load(path)
-            if ending == ".png":
-                write_png(target, pixels, level=1)
-            else:
-                write_exr(target, pixels)
-            os.utime(target, ns=(stat.st_mtime_ns, stat.st_mtime_ns))  # stages know a picture by its time
-    except OSError as error:
-        raise StorageError(f"'{folder}' can't be written ({error.strerror or error}); free some space or choose "
-                           "another result folder.") from error
-    return target
-
-
-def _paths(frame: Frame) -> list[Path]:
-    more = [path for path in (frame.mask_path, frame.id_path) if path is not None]
-    return [frame.path, *more, *(shot.path for shot in frame.brackets)]
-
-
-def _moved(frame: Frame, copies: dict[Path, Path]) -> Frame:
-    def moved(path):
-        return copies.get(path, path)
-
-    return replace(frame, path=moved(frame.path), mask_path=moved(frame.mask_path), id_path=moved(frame.id_path),
-                   brackets=tuple(replace(shot, path=moved(shot.path)) for shot in frame.brackets))
-
-
-def _foreign(path: Path) -> bool:
-    try:
-        with open(path, "rb") as file:
-            return is_foreign(file.read(4))
-    except OSError as error:
-        raise BadInputError(f"'{path}' was taken away during the run; put it back and start anew.") from error
 
 
 def _head(path: Path) -> bytes:

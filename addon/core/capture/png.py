@@ -87,17 +87,18 @@ def read_png(path: Path | str) -> np.ndarray:
 
 
 def write_png(path: Path | str, array: np.ndarray, level: int = 6) -> None:
-    """Write `array` ((h, w, 3) uint8, row 0 the top), in whole or not at all; raises `StorageError`.
+    """Write `array` ((h, w, 3) uint8 or uint16, row 0 the top), in whole or not at all; raises `StorageError`.
 
     `level` is zlib's: 1 is five times as fast as 6, and the file a tenth larger.
     """
     array = np.ascontiguousarray(array)
-    if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] != 3:
-        raise ValueError(f"write_png takes (h, w, 3) uint8, not {array.shape} {array.dtype}")
+    if array.dtype not in (np.uint8, np.uint16) or array.ndim != 3 or array.shape[2] != 3:
+        raise ValueError(f"write_png takes (h, w, 3) uint8 or uint16, not {array.shape} {array.dtype}")
     height, width = array.shape[:2]
-    rows = np.zeros((height, width * 3 + 1), np.uint8)
-    rows[:, 1:] = array.reshape(height, -1)
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    stored = array.reshape(height, -1).astype(array.dtype.newbyteorder(">")).view(np.uint8)
+    rows = np.zeros((height, stored.shape[1] + 1), np.uint8)
+    rows[:, 1:] = stored
+    header = struct.pack(">IIBBBBB", width, height, array.dtype.itemsize * 8, 2, 0, 0, 0)
     chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), level)), (b"IEND", b""))
     write_bytes(path, MAGIC, *(struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
                                for kind, data in chunks))

@@ -7,8 +7,9 @@ import os
 import numpy as np
 import pytest
 
+from addon.core.capture.copies import converted, reading_through
 from addon.core.capture.fingerprint import fingerprint
-from addon.core.capture.foreign import converted, exif_exposure, foreign_info
+from addon.core.capture.foreign import exif_exposure, foreign_info
 from addon.core.capture.layout import Reading
 from addon.core.capture.pixels import read_pixels
 from addon.core.capture.read import read_capture
@@ -69,11 +70,16 @@ def test_frames_are_copied_once(capture, tmp_path):
     copies = converted(result, tmp_path / "copies", load, Progress())
     assert len(asked) == 10
     np.testing.assert_allclose(read_pixels(copies.frames[3]).radiance, CODES / 255, atol=1e-6)
+    np.testing.assert_array_equal(reading_through(load)(result.frames[3]).radiance,
+                                  read_pixels(copies.frames[3]).radiance)
+    asked.clear()
     again = converted(result, tmp_path / "copies", load, Progress())
-    assert len(asked) == 10 and fingerprint(again) == fingerprint(copies)
+    assert not asked and fingerprint(again) == fingerprint(copies)
+    before = fingerprint(copies)
     os.utime(capture.root / "images/003.jpg", (1, 1))
     changed = converted(result, tmp_path / "copies", load, Progress())
-    assert len(asked) == 11 and fingerprint(changed) != fingerprint(copies)
+    assert len(asked) == 1 and len(list((tmp_path / "copies").iterdir())) == 10
+    assert fingerprint(changed) != before
 
 
 def test_exif_gives_exposures(capture):

@@ -79,6 +79,8 @@ def test_sixteen_bits(tmp_path):
     stored = values.astype(">u2").view(np.uint8).reshape(5, 4, 6)
     (tmp_path / "a.png").write_bytes(png(filtered(stored, (4, 3, 1)), 4, 5, 16, 2))
     np.testing.assert_array_equal(read_png(tmp_path / "a.png"), values)
+    write_png(tmp_path / "b.png", values)
+    np.testing.assert_array_equal(read_png(tmp_path / "b.png"), values)
     assert png_bits(tmp_path / "a.png") == 16
 
 
