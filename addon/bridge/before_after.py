@@ -6,12 +6,14 @@ In background mode the pictures are rendered here. Beside a window the command l
 
 from __future__ import annotations
 
+import os
 import shutil
 import tempfile
 from pathlib import Path
 
 import bpy
 
+from ..core.atomic import TEMPORARY
 from ..core.errors import BadInputError, StorageError
 from ..core.progress import Progress
 from .pictures import beside, check_format, shoot
@@ -29,7 +31,11 @@ def render_pair(scene: bpy.types.Scene, out: Path, progress: Progress | None = N
     if scene.camera is None:
         raise BadInputError("The scene has no camera to render through; choose a frame of the capture first.")
     progress = progress or Progress()
-    folder = Path(tempfile.mkdtemp(prefix="scan_relight_"))
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=f"{TEMPORARY}{os.getpid()}-", dir=out.parent))
+    except OSError as error:
+        raise StorageError(f"'{out}' can't be written ({error.strerror or error}); choose another folder.") from error
     try:
         before, after = folder / f"before{ending}", folder / f"after{ending}"
         # No finer than that: Blender's handler of render statistics waits for Python, which waits for the render.

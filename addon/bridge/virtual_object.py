@@ -27,7 +27,7 @@ LOOKS = {
 }
 _UPRIGHT = 0.5
 """Least z of the normal of a surface that a thing can stand on."""
-_FLAT = 0.12
+_FLAT = 0.18
 """Metres around a place over which it has to be level to be taken for a floor or a table."""
 _PROBES = 400
 
@@ -173,13 +173,17 @@ def _flat_in_view(scene: bpy.types.Scene) -> Hit | None:
     """The level, flat surface that the picture shows nearest to its middle: a floor or a table, no leaf of a plant."""
     steps = [k / 24 - 0.5 for k in range(2, 23)]
     for x, y in sorted(((x, y) for x in steps for y in steps), key=lambda at: at[0] ** 2 + at[1] ** 2):
-        hit = cast(scene, *picture_ray(scene, 0.5 + x, 0.5 + y))
+        origin, direction = picture_ray(scene, 0.5 + x, 0.5 + y)
+        hit = cast(scene, origin, direction)
         if hit is None or hit.normal.z < 0.95:
             continue
         around = [cast(scene, hit.place + Vector((dx, dy, 0.05)), Vector((0, 0, -1)), 0.1)
                   for dx, dy in ((_FLAT, 0), (-_FLAT, 0), (0, _FLAT), (0, -_FLAT))]
-        if all(one and abs(one.place.z - hit.place.z) < 0.02 for one in around):
-            return hit
+        if not all(one and abs(one.place.z - hit.place.z) < 0.02 for one in around):
+            continue
+        above = [hit.place + Vector((dx, dy, 0.2)) for dx, dy in ((0, 0), (_FLAT, 0), (-_FLAT, 0))]
+        if not any(cast(scene, place, origin - place, (origin - place).length) for place in above):
+            return hit  # and what stands there is in sight
     return None
 
 
