@@ -20,6 +20,7 @@ from .errors import BadInputError
 from .evidence.collect import Evidence, collect
 from .evidence.page import make_page
 from .lit_diffuse.accumulate import LitDiffuse, accumulate
+from .lit_diffuse.from_texture import face_edge, lit_from_tiles
 from .material import METAL, SPECULAR, ObjectMaterial
 from .memory import peak_memory
 from .progress import Progress
@@ -30,7 +31,7 @@ from .shading.clipped import shade_clipped
 from .shading.environment import Environment, EnvironmentAccumulator
 from .shading.field import LightField
 from .shading.lamps import Lamp
-from .shading.mirrors import Mirror
+from .shading.mirrors import Mirror, known_mirror
 from .shading.neighbourhood import doubt
 from .shading.shade import Shading, shade
 from .specular.flat_mirrors import find_mirrors
@@ -129,11 +130,14 @@ class Recovery:
 
         def compute():
             mesh, noise = without_noise(capture.mesh) if self.settings.denoise_mesh else (capture.mesh, 0.0)
+            texel = self.settings.texel_size
+            if mesh.lit is not None:
+                texel = texel or face_edge(mesh) / self.settings.detail
             found = build_surface(
                 mesh,
                 [frame.camera for frame in capture.frames],
                 self._unwrap,
-                self.settings.texel_size,
+                texel,
                 self.settings.detail,
                 self.settings.atlas_size,
             )
@@ -182,6 +186,21 @@ class Recovery:
         frames = self._near.frames
 
         def compute():
+            value = from_frames() if frames else from_mesh()
+            arrays = {f"{i}.{f.name}": getattr(v, f.name) for i, v in enumerate(value) for f in dataclasses.fields(v)}
+            return value, arrays, {"bad_frames": self.bad_frames, "blind_frames": self.blind_frames}
+
+        def from_mesh():
+            if self._near.mesh.lit is None:
+                raise BadInputError("The capture has no frames, and no light stored on its mesh; give it either.")
+            lit = lit_from_tiles(
+                dataclasses.replace(self._near.mesh, vertices=surface.mesh.vertices), surface.atlas, self.progress
+            )
+            if not lit.seen.any():
+                raise BadInputError("The textures on the mesh hold no light at all; copy them again.")
+            return lit, Environment.dark(), Samples.none()
+
+        def from_frames():
             sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
             kept = SampleCollector(surface.atlas, len(frames), self.settings.seed)
 
@@ -199,9 +218,7 @@ class Recovery:
                     "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; "
                     "check the frames."
                 )
-            value = (lit, sky.result(), kept.result())
-            arrays = {f"{i}.{f.name}": getattr(v, f.name) for i, v in enumerate(value) for f in dataclasses.fields(v)}
-            return value, arrays, {"bad_frames": self.bad_frames, "blind_frames": self.blind_frames}
+            return lit, sky.result(), kept.result()
 
         def load(arrays, meta):
             self.bad_frames = list(meta.get("bad_frames", ()))
@@ -272,9 +289,11 @@ class Recovery:
 
     def _find_mirrors(self, field: LightField, lamps: tuple[Lamp, ...]) -> tuple[Mirror, ...]:
         s = self.settings
-        return find_mirrors(
+        found = find_mirrors(
             field, lamps, self.lit_diffuse(), self.samples(), self.capture.instances, s.threads, s.seed
         )
+        told = [known_mirror(mirror, field) for mirror in self._near.mirrors]
+        return (*found, *(one for one in told if one.object_id not in {mirror.object_id for mirror in found}))
 
     @cached_property
     def field(self) -> LightField:

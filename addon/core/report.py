@@ -86,7 +86,8 @@ def _report_lit(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> 
         warnings.append("Every frame is black; nothing can be said of any albedo.")
     area = atlas.area.sum()
     figures["unseen_share"] = float(atlas.area[~lit.seen].sum() / area)
-    figures["observations_median"] = float(np.median(lit.count[lit.seen]))
+    figures["observations_median"] = float(np.median(lit.count[lit.seen])) if run.capture.frames else 0.0
+    figures["lit_from"] = "frames" if run.capture.frames else "textures on the mesh"
     seen = np.bincount(atlas.object_id, lit.seen, int(atlas.object_id.max()) + 1)
     unseen = [i for i in run.capture.instances if i.object_id >= len(seen) or seen[i.object_id] == 0]
     if unseen:

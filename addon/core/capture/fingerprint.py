@@ -44,7 +44,7 @@ def fingerprint(capture: Capture) -> str:
             digest.update(f"{value!r};".encode("utf-8", "surrogatepass"))
 
     try:
-        add([capture.mesh, capture.instances, capture.frames])
+        add([capture.mesh, capture.instances, capture.frames, capture.mirrors])
     except OSError as error:
         raise BadInputError(f"'{error.filename}' was taken away during the run; put it back and start anew.") from error
     return digest.hexdigest()

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .model import Frame
+from .model import Frame, KnownMirror, LitTiles
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,8 @@ class RawMesh:
         Class name of each `object_id`, where the mesh itself tells.
     name : str
         The file, for messages.
+    lit : LitTiles or None
+        Light stored on it.
     """
 
     vertices: np.ndarray
@@ -73,6 +75,7 @@ class RawMesh:
     uv: np.ndarray | None = None
     names: dict[int, str] | None = None
     name: str = "mesh"
+    lit: LitTiles | None = None
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,8 @@ class Layout:
         One sentence for each frame that can't be used.
     notes : list of str
         Sentences on what is used, but may mean something else.
+    mirrors : list of KnownMirror
+        By the mesh's own object ids.
     """
 
     frames: list[Frame]
@@ -101,6 +106,7 @@ class Layout:
     names_file: str = ""
     problems: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    mirrors: list[KnownMirror] = field(default_factory=list)
 
 
 class Reader(NamedTuple):

@@ -57,7 +57,8 @@ def repair(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
     extent = float(np.ptp(vertices[triangles.ravel()], axis=0).max())
     if not USUAL_EXTENT[0] <= extent <= USUAL_EXTENT[1]:
         warnings.append(f"Mesh '{name}' is {extent:.3g} m across; captures are in metres.")
-    return replace(mesh, vertices=vertices, triangles=triangles, object_id=ids, uv=uv), warnings
+    lit = None if mesh.lit is None else mesh.lit.part(good)
+    return replace(mesh, vertices=vertices, triangles=triangles, object_id=ids, uv=uv, lit=lit), warnings
 
 
 def _has_area(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:

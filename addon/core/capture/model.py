@@ -6,7 +6,7 @@ centre lies at (0.5, 0.5); x runs right, y runs down. Radiance is linear Rec.709
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -192,6 +192,55 @@ class Instance:
 
 
 @dataclass(frozen=True)
+class LitTiles:
+    """Radiance that the capture stores on the mesh itself: a square tile for each face of its file.
+
+    Attributes
+    ----------
+    paths : tuple of Path
+        Square pictures of raw RGB half floats, row by row, linear Rec.709; without a header.
+    side : tuple of int
+        Edge of each picture in texels.
+    size : int
+        Edge of a tile in texels; tiles fill a picture row by row.
+    picture, tile : (t,) int32
+        Which tile of which picture each triangle shows.
+    uv : (t, 3, 2) float32
+        Its corners within the tile, 0...1: u along its rows, v from row to row.
+    """
+
+    paths: tuple[Path, ...]
+    side: tuple[int, ...]
+    size: int
+    picture: np.ndarray
+    tile: np.ndarray
+    uv: np.ndarray
+
+    def part(self, kept: np.ndarray) -> LitTiles:
+        """For some of the triangles ((t,) bool)."""
+        return replace(self, picture=self.picture[kept], tile=self.tile[kept], uv=self.uv[kept])
+
+
+@dataclass(frozen=True)
+class KnownMirror:
+    """A flat mirror that the capture itself tells of.
+
+    Attributes
+    ----------
+    object_id : int
+    point, normal : (3,) float64
+        Its plane.
+    reflectivity : float
+        Share of the radiance that it reflects.
+    """
+
+    object_id: int
+    point: np.ndarray
+    normal: np.ndarray
+    reflectivity: float
+
+
+@dataclass(frozen=True)
 class Mesh:
     """The room's triangles.
 
@@ -204,12 +253,15 @@ class Mesh:
         The instance that each triangle belongs to. Every value has an `Instance`.
     uv : (t, 3, 2) float32 or None
         The capture's own texture coordinates for each corner; may overlap and repeat.
+    lit : LitTiles or None
+        Its light, where the capture stores it on the mesh; used where there are no frames.
     """
 
     vertices: np.ndarray
     triangles: np.ndarray
     object_id: np.ndarray
     uv: np.ndarray | None = None
+    lit: LitTiles | None = None
 
 
 @dataclass(frozen=True)
@@ -228,6 +280,7 @@ class Capture:
         One sentence each, for the report.
     format : str
         What it was read as.
+    mirrors : tuple of KnownMirror
     """
 
     root: Path
@@ -236,3 +289,4 @@ class Capture:
     frames: tuple[Frame, ...]
     warnings: tuple[str, ...] = ()
     format: str = ""
+    mirrors: tuple[KnownMirror, ...] = ()

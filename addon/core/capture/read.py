@@ -13,7 +13,7 @@ from ..errors import BadInputError
 from . import instances
 from .brackets import fold, group_brackets, unfold
 from .clipping import find_clipping
-from .conventions import parse
+from .conventions import parse, upright
 from .exposures import from_csv, from_exif
 from .frame_codes import with_curves
 from .id_pictures import read_ids
@@ -55,7 +55,11 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
     clipped, notes = find_clipping(unfold(frames), lambda path: read_picture(path).rgb)
     frames = fold(frames, clipped)
     notes = [*grouped, *_chosen(frames), *notes]
-    return Capture(root, mesh, objects, tuple(frames), (*warnings, *more, *notes), reader.name)
+    known = {one.object_id for one in objects}
+    turn = upright(convention.up)
+    mirrors = tuple(replace(one, point=turn @ one.point, normal=turn @ one.normal)
+                    for one in layout.mirrors if one.object_id in known)
+    return Capture(root, mesh, objects, tuple(frames), (*warnings, *more, *notes), reader.name, mirrors)
 
 
 def _exposed(layout: Layout, reading: Reading) -> Layout:
@@ -95,7 +99,7 @@ def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str
                         count > 1 else "The mesh has no object_id on its faces and hangs together; the whole room is "
                         "taken as one object.")
     ids, objects, more = instances.assign(found, names, layout.names_file or instances.FILE)
-    return Mesh(raw.vertices, raw.triangles, ids, raw.uv), objects, warnings + more
+    return Mesh(raw.vertices, raw.triangles, ids, raw.uv, None if frames else raw.lit), objects, warnings + more
 
 
 def _usable(root: Path, layout: Layout) -> tuple[list[Frame], list[str]]:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..errors import BadInputError
-from . import colmap, nerfstudio
+from . import colmap, fipt, nerfstudio, replica, scannetpp, traj
 from .layout import Reader
 
-READERS: tuple[Reader, ...] = (nerfstudio.READER, colmap.READER)
+READERS: tuple[Reader, ...] = (replica.READER, fipt.SYNTHETIC, fipt.REAL, scannetpp.READER, traj.READER,
+                               nerfstudio.READER, colmap.READER)
 
 
 def reader_for(root: Path, name: str = "") -> Reader:

@@ -30,4 +30,5 @@ def near_origin(capture: Capture) -> Capture:
         pose[:3, 3] -= centre
         frames.append(replace(frame, camera=replace(frame.camera, camera_to_world=pose)))
     mesh = replace(capture.mesh, vertices=capture.mesh.vertices - centre)
-    return replace(capture, mesh=mesh, frames=tuple(frames))
+    mirrors = tuple(replace(mirror, point=mirror.point - centre) for mirror in capture.mirrors)
+    return replace(capture, mesh=mesh, frames=tuple(frames), mirrors=mirrors)

@@ -8,8 +8,14 @@ through it (`over_mirrors`). On the living room that took the albedo from 28.0 t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from ..capture.model import KnownMirror
+
+if TYPE_CHECKING:
+    from .field import LightField
 
 
 @dataclass(frozen=True)
@@ -29,6 +35,14 @@ class Mirror:
     point: np.ndarray
     normal: np.ndarray
     f0: np.ndarray
+
+
+def known_mirror(known: KnownMirror, field: LightField) -> Mirror:
+    """The mirror that a capture tells of, its normal turned to its object's front."""
+    own = field.mesh.object_id == known.object_id
+    turn = -1.0 if (field.normal[own] @ known.normal).sum() < 0 else 1.0
+    return Mirror(known.object_id, np.float32(known.point), np.float32(turn * known.normal),
+                  np.full(3, known.reflectivity, np.float32))
 
 
 def reflect(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:

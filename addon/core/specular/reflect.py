@@ -113,6 +113,7 @@ def fit_specular(
     intervals = ordered_map(lambda i: gloss_interval(choices[i], told.get(i)), wanted, threads)
     sure = dict(zip(wanted, intervals, strict=True))
 
+    flat = {mirror.object_id: tuple(float(x) for x in mirror.f0) for mirror in field.mirrors}
     materials = []
     for i in instances:
         if i.object_id in glowing:
@@ -122,6 +123,10 @@ def fit_specular(
             continue
         target = targets.get(i.object_id, -1)
         name = frame_names[target] if target >= 0 else None
+        if i.object_id in flat and i.object_id not in problems:  # nothing observed: the capture tells of it
+            materials.append(ObjectMaterial(i.object_id, i.class_name, METAL, phi=0.0, f0=flat[i.object_id],
+                                            note="A flat mirror, as the capture tells."))
+            continue
         material = _material(i, choices[i.object_id], problems.get(i.object_id), name, sure[i.object_id])
         if material.model == METAL and i.object_id in mirrors:
             material = replace(material, phi=0.0, roughness_low=0.0,

@@ -39,6 +39,12 @@ class Samples:
     direction: np.ndarray
     saturated: np.ndarray
 
+    @staticmethod
+    def none() -> Samples:
+        """Where there are no frames."""
+        whole, values = np.zeros(0, np.int32), np.zeros((0, 3), np.float32)
+        return Samples(whole, whole, values, values, np.zeros(0, bool))
+
 
 def choose_elements(atlas: Atlas, seed: int) -> np.ndarray:
     """Elements to keep observations of: up to `ELEMENTS_AN_OBJECT` for each object, at random, sorted."""

@@ -83,6 +83,8 @@ def build_surface(
     ----------
     unwrap : callable
         Gives atlas coordinates ((t, 3, 2) float32 in [0, 1], no overlap) for a mesh and an atlas size in texels.
+    cameras : sequence of Camera
+        None: normals stay as the mesh has them, and `texel_size` has to be given.
     texel_size : float
         Edge of an element in metres; 0 takes it from the frames' footprint.
     detail : float
@@ -96,7 +98,7 @@ def build_surface(
         No camera looks at the mesh.
     """
     facing, sides = oriented(mesh, cameras)
-    if sides.footprint <= 0:
+    if sides.footprint <= 0 and (cameras or not texel_size):
         raise BadInputError(
             "No camera of the capture looks at the mesh; check that transforms.json and mesh.ply share one frame."
         )
