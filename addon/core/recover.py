@@ -186,19 +186,13 @@ class Recovery:
         frames = self._near.frames
 
         def compute():
-            value = from_frames() if frames else from_mesh()
+            value = from_frames() if frames else (from_mesh(), Environment.dark(), Samples.none())
             arrays = {f"{i}.{f.name}": getattr(v, f.name) for i, v in enumerate(value) for f in dataclasses.fields(v)}
             return value, arrays, {"bad_frames": self.bad_frames, "blind_frames": self.blind_frames}
 
         def from_mesh():
-            if self._near.mesh.lit is None:
-                raise BadInputError("The capture has no frames, and no light stored on its mesh; give it either.")
-            lit = lit_from_tiles(
-                dataclasses.replace(self._near.mesh, vertices=surface.mesh.vertices), surface.atlas, self.progress
-            )
-            if not lit.seen.any():
-                raise BadInputError("The textures on the mesh hold no light at all; copy them again.")
-            return lit, Environment.dark(), Samples.none()
+            as_read = dataclasses.replace(self._near.mesh, vertices=surface.mesh.vertices)
+            return lit_from_tiles(as_read, surface.atlas, self.progress)
 
         def from_frames():
             sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))

@@ -41,9 +41,11 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
     Raises
     ------
     BadInputError
-        A texture was changed or taken away since it was read.
+        Nothing is stored, or no light; or a texture was changed or taken away since it was read.
     """
     lit, n = mesh.lit, len(atlas)
+    if lit is None:
+        raise BadInputError("The capture has no frames, and no light stored on its mesh; give it either.")
     of_triangle, area = _tiles(mesh)
     key = of_triangle[atlas.triangle]
     order = np.argsort(key, kind="stable")
@@ -65,6 +67,8 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
             progress.update(0.9 * part.stop / len(tiles))
     weight, clipped = sums[:, 3], sums[:, 4]
     seen = weight > 0
+    if not seen.any():
+        raise BadInputError("The textures on the mesh hold no light at all; copy them again.")
     radiance = np.full((n, 3), np.nan, np.float32)
     radiance[seen] = sums[seen, :3] / weight[seen, None]
     share = np.where(seen, clipped / np.maximum(weight, 1e-30), 0).astype(np.float32)
