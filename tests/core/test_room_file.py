@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from addon.core.capture.lenses import Cropped
+from addon.core.capture.lenses_colmap import polynomial
 from addon.core.capture.model import Camera, Capture, Frame, Instance, Mesh
 from addon.core.errors import BadInputError, MissingStageError
 from addon.core.material import METAL, ObjectMaterial
@@ -19,8 +21,9 @@ def a_capture(uv=None):
     pose = np.eye(4)
     pose[:3, 3] = 1, 2, 3
     mesh = Mesh(np.arange(12.0).reshape(4, 3), np.int32([[0, 1, 2], [1, 2, 3]]), np.int32([4, 7]), uv)
-    frames = tuple(Frame(f"frame {k}", Path(f"/capture/{k}.exr"), Camera(32, 24, 20.5, 21, 16, 12, pose))
-                   for k in range(3))
+    fisheye = Cropped(polynomial("OPENCV_FISHEYE", fisheye=True, numerator=(0.1, -0.02)), 0.9, 0.8)
+    frames = tuple(Frame(f"frame {k}", Path(f"/capture/{k}.exr"), Camera(32, 24, 20.5, 21, 16, 12, pose, lens))
+                   for k, lens in enumerate((None, fisheye, fisheye)))
     return Capture(Path("/capture"), mesh, (Instance(4, "sofa"), Instance(7, "")), frames, format="nerfstudio")
 
 
@@ -34,6 +37,7 @@ def test_there_and_back(tmp_path, with_uv):
     assert [(f.name, f.path) for f in back.frames] == [(f.name, f.path.absolute()) for f in capture.frames]
     for one, other in zip(back.frames, capture.frames):
         assert (one.camera.fx, one.camera.width) == (other.camera.fx, other.camera.width)
+        assert one.camera.lens == other.camera.lens
         assert np.array_equal(one.camera.camera_to_world, other.camera.camera_to_world)
     for name in ("vertices", "triangles", "object_id"):
         assert np.array_equal(getattr(back.mesh, name), getattr(capture.mesh, name))
