@@ -6,6 +6,7 @@ counterpart, and become the perspective without distortion.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -13,10 +14,14 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..core.capture.lenses import Equirectangular
+from ..core.capture.lens import Lens
+from ..core.capture.lenses import Cropped, Equirectangular
+from ..core.capture.lenses_told import lens_of, told_lens
 from ..core.capture.model import Camera, Frame
 from ..core.capture.pixel_rays import widest_angle
 
+LENS = "lens_model"
+"""Custom property of cameras with a lens: the lens, fx, fy, cx and cy as JSON, which Blender has no settings for."""
 _SENSOR = 36.0
 _WIDE = np.radians(80)
 """A lens that sees further than this from its axis is no perspective."""
@@ -38,7 +43,7 @@ def make_cameras(frames: Iterable[Frame], collection: bpy.types.Collection) -> l
     list of bpy.types.Object
         Named after the frames. Custom properties ``width``, ``height`` (pixels) and ``pixel_aspect`` (fx / fy) tell
         the render size each one is exact for; `use_camera` sets it. ``frame_path`` and ``frame_exposure`` tell the
-        frame's picture and what its radiance was multiplied by.
+        frame's picture and what its radiance was multiplied by; `LENS` is the lens, where there is one.
     """
     made = []
     for frame in frames:
@@ -74,6 +79,16 @@ def differing(frames: Iterable[Frame]) -> str:
         return ""
     return (f"The frames have {len(kinds)} different sizes or pixel shapes, which Blender keeps in the scene, not in a "
             "camera: set the render size from the camera's custom properties before you render through another one.")
+
+
+def kept_lens(thing: bpy.types.Object) -> tuple[Lens, tuple[float, ...]] | None:
+    """The lens that `make_cameras` left with a camera, and its fx, fy, cx, cy; None where it left none."""
+    try:
+        lens, pixels = json.loads(thing[LENS])
+        fx, fy, cx, cy = map(float, pixels)
+        return lens_of(lens), (fx, fy, cx, cy)
+    except (KeyError, TypeError, ValueError):
+        return None
 
 
 def unlike(frames: Iterable[Frame]) -> str:
@@ -115,8 +130,9 @@ def off_by(camera: Camera) -> float:
 
 
 def _is_wide(camera: Camera) -> bool:
-    return getattr(camera.lens, "fisheye", False) or getattr(getattr(camera.lens, "lens", None), "fisheye", False) \
-        or widest_angle(camera) > _WIDE
+    """Whether it becomes a panoramic camera."""
+    lens = camera.lens.lens if isinstance(camera.lens, Cropped) else camera.lens
+    return isinstance(lens, Equirectangular) or getattr(lens, "fisheye", False) or widest_angle(camera) > _WIDE
 
 
 def _angles(camera: Camera) -> np.ndarray:
@@ -177,5 +193,7 @@ def _camera_object(name: str, camera: Camera, collection) -> bpy.types.Object:
     thing = bpy.data.objects.new(name, data)
     thing.matrix_world = Matrix(np.asarray(camera.camera_to_world, np.float64).tolist())
     thing["width"], thing["height"], thing["pixel_aspect"] = camera.width, camera.height, aspect
+    if camera.lens is not None:
+        thing[LENS] = json.dumps([told_lens(camera.lens), [camera.fx, camera.fy, camera.cx, camera.cy]])
     collection.objects.link(thing)
     return thing

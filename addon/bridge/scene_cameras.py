@@ -17,6 +17,7 @@ import numpy as np
 from ..core.capture.exr import read_header
 from ..core.capture.model import Camera
 from ..core.errors import BadInputError
+from .cameras import kept_lens
 
 AUTO, ANIMATION, OBJECTS = "AUTO", "ANIMATION", "OBJECTS"
 
@@ -94,13 +95,18 @@ def camera_of(thing: bpy.types.Object, size: tuple[int, int], shown: tuple[float
     Raises
     ------
     BadInputError
-        The camera is no perspective one, or has no rigid place.
+        The camera is neither a perspective one nor one of `make_cameras`, or has no rigid place.
     """
     data = thing.data
-    if data.type != "PERSP":
+    kept = kept_lens(thing)
+    if data.type != "PERSP" and (kept is None or data.type != "PANO"):
         raise BadInputError(f"Camera '{thing.name}' is {data.type.lower()}; frames need perspective cameras.")
     width, height, aspect = shown
     fx, fy, cx, cy = pixel_lens(data, width, height, aspect)
+    lens = None
+    # A perspective that was changed since is no longer the one that the lens was kept for.
+    if kept is not None and (data.type == "PANO" or np.allclose(kept[1], (fx, fy, cx, cy), rtol=1e-3, atol=0.1)):
+        lens, (fx, fy, cx, cy) = kept
     # Pixels of the frame for each pixel of the picture, centre on centre.
     across, down = width / size[0], height / size[1]
     if method != "STRETCH":
@@ -111,7 +117,7 @@ def camera_of(thing: bpy.types.Object, size: tuple[int, int], shown: tuple[float
     if np.linalg.det(matrix[:3, :3]) < 0:
         raise BadInputError(f"Camera '{thing.name}' is mirrored; apply its scale.")
     return Camera(*size, fx / across, fy / down, size[0] / 2 + (cx - width / 2) / across,
-                  size[1] / 2 + (cy - height / 2) / down, matrix)
+                  size[1] / 2 + (cy - height / 2) / down, matrix, lens)
 
 
 def cameras_with_pictures(scene: bpy.types.Scene, among: Iterable[bpy.types.Object] = ()) -> list[bpy.types.Object]:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from addon.core.capture.exr import write_exr
+from addon.core.capture.lenses import Cropped, EnhancedUnified, Equirectangular
+from addon.core.capture.lenses_colmap import polynomial
 from addon.core.capture.model import Camera, Frame
 from addon.core.errors import BadInputError
 
@@ -49,6 +51,25 @@ def test_there_and_back(scene, tmp_path, name):
     for key in ("fx", "fy", "cx", "cy"):
         assert getattr(found, key) == pytest.approx(getattr(wanted, key), abs=1e-3), key
     np.testing.assert_allclose(found.camera_to_world, POSE, atol=1e-6)
+
+
+@pytest.mark.parametrize("lens", [
+    polynomial("RADIAL", numerator=(-0.1, 0.01)), Equirectangular(), EnhancedUnified(0.7, 1.1),
+    Cropped(polynomial("OPENCV_FISHEYE", fisheye=True, numerator=(0.02, 0.0)), 1.3, 1.4),
+])  # fmt: skip
+def test_lenses_there_and_back(scene, tmp_path, lens):
+    wanted = Camera(640, 480, 300.5, 310.0, 322.0, 235.0, POSE, lens)
+    [thing] = make_cameras([Frame("bent", tmp_path, wanted)], scene.collection)
+    bpy.context.view_layer.update()
+    found = camera_of(thing, (640, 480), frame_size(scene, thing))
+    half = camera_of(thing, (320, 240), frame_size(scene, thing))
+    for one, scale in ((found, 1), (half, 0.5)):
+        assert one.lens == lens
+        got = [one.fx, one.fy, one.cx, one.cy]
+        np.testing.assert_allclose(got, np.multiply([300.5, 310, 322, 235], scale), rtol=1e-6)
+    if thing.data.type == "PERSP":
+        thing.data.lens *= 2  # another lens since: the distortion no longer fits
+        assert camera_of(thing, (640, 480), frame_size(scene, thing)).lens is None
 
 
 @pytest.mark.parametrize("fit, size, aspect", list(itertools.product(
