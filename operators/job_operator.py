@@ -20,7 +20,7 @@ PERIOD = 0.1
 """Seconds between two looks at the job."""
 REDRAW = 0.5
 """Seconds between two pictures of the progress bar, unless the stage changes: drawing is the window's time."""
-SLICE = 0.06
+SLICE = 0.04
 """Seconds that the scene is worked at before the window is drawn again."""
 STAGES = {"": "Starting", "read": "Reading the capture", "surface": "Surface", "lit_diffuse": "Frames to texture",
           "shading": "Light and albedo", "specular": "Highlights", "write": "Writing"}

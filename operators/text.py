@@ -11,7 +11,7 @@ ICON = 20
 
 def say(layout, context, sentence: str, icon: str = "NONE") -> None:
     """Write `sentence` over as many lines as the region's width asks for; the icon stands before the first."""
-    scale = context.preferences.system.ui_scale
+    scale = context.preferences.system.ui_scale or 1.0  # 0 where there was never a window
     region = context.region
     room = (region.width if region else 300) - (MARGIN + (ICON if icon != "NONE" else 0)) * scale
     column = layout.column(align=True)
