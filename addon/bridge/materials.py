@@ -17,6 +17,7 @@ METALLIC = "Metallic"
 ROUGHNESS = "Roughness"
 IOR = "IOR"
 SPECULAR_LEVEL = "Specular IOR Level"
+ALPHA = "Alpha"
 EMISSION_COLOR = "Emission Color"
 EMISSION_STRENGTH = "Emission Strength"
 
@@ -45,12 +46,12 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
     Returns
     -------
     bpy.types.Material
-        Its custom properties ``scan_relight_model``, ``_phi``, ``_psi`` tell what was fitted.
+        Its custom properties ``scan_relight_model``, ``_phi``, ``_psi``, ``_transmission`` tell what was fitted.
     """
     material = bpy.data.materials.new(f"{description.class_name or 'Object'} {description.object_id}")
     nodes, links, principled = _fresh_tree(material)
     value = {name: principled.inputs[name] for name in (
-        BASE_COLOR, METALLIC, ROUGHNESS, IOR, SPECULAR_LEVEL, EMISSION_COLOR, EMISSION_STRENGTH)}
+        BASE_COLOR, METALLIC, ROUGHNESS, IOR, SPECULAR_LEVEL, EMISSION_COLOR, EMISSION_STRENGTH, ALPHA)}
     # The fitted lobe is single scattering.
     principled.distribution = "GGX"
     if description.phi is not None:  # else Blender's default, which shows nowhere while there is no specular lobe
@@ -72,9 +73,12 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
         if one_sided:
             _front_only(nodes, links, value[EMISSION_COLOR])
     elif base_color is not None:
+        # Glass lets a share of the light through straight on: no bending, as frames say nothing of it.
+        value[ALPHA].default_value = description.opacity
         links.new(_texture(nodes, links, base_color, (-400, 200)), value[BASE_COLOR])
     material["scan_relight_model"] = description.model
-    for name, number in (("phi", description.phi), ("psi", description.psi)):
+    for name in ("phi", "psi", "transmission"):
+        number = getattr(description, name)
         if number is not None:
             material[f"scan_relight_{name}"] = float(number)
     return material

@@ -8,7 +8,8 @@ LAMBERTIAN = "lambertian"
 SPECULAR = "specular"
 METAL = "metal"
 EMITTER = "emitter"
-MODELS = (LAMBERTIAN, SPECULAR, METAL, EMITTER)
+TRANSPARENT = "transparent"
+MODELS = (LAMBERTIAN, SPECULAR, METAL, EMITTER, TRANSPARENT)
 Z90 = 1.645
 """A 90 % interval is the value -+ this many standard errors."""
 
@@ -23,7 +24,8 @@ class ObjectMaterial:
     class_name : str
     model : str
         One of `MODELS`. 'lambertian': diffuse albedo alone. 'specular': diffuse albedo under the seed's microfacet
-        lobe. 'metal': the lobe alone, coloured. 'emitter': gives light; its albedo is unknown.
+        lobe. 'metal': the lobe alone, coloured. 'emitter': gives light; its albedo is unknown. 'transparent': shows
+        what lies behind it, as glass, or is cut out by a mask that the mesh does not have; set apart, not modelled.
     phi : float or None
         GGX alpha of the lobe, 0...1 (Blender's Roughness is its square root). None where there is no lobe.
     psi : float or None
@@ -32,6 +34,10 @@ class ObjectMaterial:
         Metal only: coloured F0, linear Rec.709.
     emission : (3,) tuple of float or None
         Emitter only: radiance, linear Rec.709.
+    transmission : float or None
+        Transparent only: share of a background's radiance that passes the object; of a cut-out, the share of holes.
+    surfaces : float or None
+        Glass only: how many of its surfaces a ray crosses; None of a cut-out.
     target_frame : str or None
         Name of the frame that showed the highlight best (assumptions A1, A2).
     residual : float or None
@@ -58,6 +64,8 @@ class ObjectMaterial:
     psi: float | None = None
     f0: tuple[float, float, float] | None = None
     emission: tuple[float, float, float] | None = None
+    transmission: float | None = None
+    surfaces: float | None = None
     target_frame: str | None = None
     residual: float | None = None
     residual_lambertian: float | None = None
@@ -68,3 +76,10 @@ class ObjectMaterial:
     specular_high: float | None = None
     scores: dict[str, float] = field(default_factory=dict)
     note: str = ""
+
+    @property
+    def opacity(self) -> float:
+        """Blender's Alpha: share of the light that each surface of the object stops; 1 but for glass."""
+        if self.transmission is None or self.surfaces is None:
+            return 1.0
+        return 1 - min(max(self.transmission, 0.0), 1.0) ** (1 / max(self.surfaces, 1.0))

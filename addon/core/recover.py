@@ -21,12 +21,12 @@ from .evidence.collect import Evidence, collect
 from .evidence.page import make_page
 from .lit_diffuse.accumulate import LitDiffuse, accumulate
 from .lit_diffuse.from_texture import face_edge, lit_from_tiles
-from .material import METAL, SPECULAR, ObjectMaterial
+from .material import METAL, SPECULAR, TRANSPARENT, ObjectMaterial
 from .memory import peak_memory
 from .progress import Progress
 from .report import make_report
 from .settings import Settings
-from .shading.albedo import Albedo, fill, quotient
+from .shading.albedo import NONE, Albedo, fill, quotient
 from .shading.clipped import shade_clipped
 from .shading.environment import Environment, EnvironmentAccumulator
 from .shading.field import LightField
@@ -333,13 +333,18 @@ class Recovery:
     def albedo(self) -> Albedo:
         """The final albedo: of L_d less its specular part, under all that glossy things throw."""
         lit, shading, found = self.lit_diffuse(), self.shading(), self.specular()
-        if not found.specular.any() and not found.excess.any():
+        apart = [m.object_id for m in found.materials if m.model == TRANSPARENT]
+        if not found.specular.any() and not found.excess.any() and not apart:
             return shading.albedo
         rho, valid = quotient(np.maximum(lit.radiance - found.specular, 0), self.irradiance)
         class_of = {i.object_id: i.class_name for i in self.capture.instances}
         emitters = {lamp.object_id for lamp in shading.lamps}
         error = np.hypot(doubt(lit), shading.doubt)
-        return fill(self.surface().atlas, rho, valid & lit.seen, class_of, emitters, error)
+        atlas = self.surface().atlas
+        albedo = fill(atlas, rho, valid & lit.seen, class_of, emitters, error)
+        # What shows its background has no albedo that was measured.
+        origin = np.where(np.isin(atlas.object_id, apart), np.int8(NONE), albedo.origin)
+        return dataclasses.replace(albedo, origin=origin)
 
     def base_color(self) -> np.ndarray:
         """Base Color of each element for Cycles' Principled, (n, 3) float32."""
@@ -354,6 +359,9 @@ class Recovery:
             elif m.model == SPECULAR:
                 # Above 1 the object would reflect more than all light, and a room of it would never grow dark.
                 color[own] = np.minimum(base_color(color[own], m.psi, m.phi), 1)
+            elif m.model == TRANSPARENT and m.opacity < 1:
+                # Each surface reflects as much less as it lets pass.
+                color[own] = np.minimum(color[own] / max(1 - m.transmission, 0.01), 1)
         return color
 
     @cached_property

@@ -16,8 +16,8 @@ UNKNOWN, LEAST_SPREAD = 0.7, 0.3
 """Relative error of an albedo that was taken from other objects: where there are too few to tell, and at least."""
 
 MEASURED, FILLED, NONE = 2, 1, 0
-"""How an element's albedo came about: measured; filled in from its object; no reflectance (an emitter, or an object
-nobody saw)."""
+"""How an element's albedo came about: measured; filled in from its object; no reflectance (an emitter, an object
+nobody saw, or one that shows what is behind it)."""
 
 
 @dataclass(frozen=True)

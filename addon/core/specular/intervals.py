@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..material import LAMBERTIAN, METAL, Z90
+from ..material import METAL, SPECULAR, Z90
 from .fit import fit_lobe
 from .layout import Layout, Problem
 from .models import HOW, METAL_PSI, Choice
@@ -47,7 +47,7 @@ UNKNOWN = GlossInterval((0.0, 1.0), (0.0, METAL_PSI))
 
 def gloss_interval(choice: Choice, problem: Problem | None) -> GlossInterval:
     """The intervals of what was chosen for an object, from the observations that it was fitted to."""
-    if choice.model == LAMBERTIAN or choice.fit is None:
+    if choice.model not in (SPECULAR, METAL) or choice.fit is None:
         return UNKNOWN
     roughness, specular = float(np.sqrt(choice.fit.phi)), max(float(np.mean(choice.fit.psi)), 1e-4)
     own = choice.sigmas > 0 and problem is not None

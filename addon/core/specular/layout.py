@@ -91,7 +91,7 @@ class Layout:
         self.there = self._laid(np.ones(self.count, np.float32))
         mean = np.bincount(group, problem.radiance[order].mean(1), shape[1]) / views
         # with a floor at a tenth of the object's level
-        level = np.maximum(mean, 0.1 * np.median(mean) + 1e-12).astype(np.float32)
+        self._level = level = np.maximum(mean, 0.1 * np.median(mean) + 1e-12).astype(np.float32)
         self.inflate = np.ones(shape[1], np.float32)
         if free:
             self.inflate = np.sqrt(views / np.maximum(views - 1, 1)).astype(np.float32)
@@ -106,6 +106,14 @@ class Layout:
     def views(self) -> float:
         """Of an element, on average."""
         return self.count / self.there.shape[1]
+
+    def each(self, values: np.ndarray) -> np.ndarray:
+        """Values of the observations ((m, c)) as (c, v, g) float32; 0 where there is none."""
+        return self._laid(values.T)
+
+    def relative(self, radiance: np.ndarray) -> np.ndarray:
+        """The same of a radiance ((m, 3)), over the elements' own levels."""
+        return self._laid(radiance.T) / self._level
 
     def _laid(self, values: np.ndarray) -> np.ndarray:
         """(..., m) values as (..., v, g) float32."""

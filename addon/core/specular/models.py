@@ -6,10 +6,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..material import LAMBERTIAN, METAL, SPECULAR
+from ..material import LAMBERTIAN, METAL, SPECULAR, TRANSPARENT
 from .fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs, huber
 from .layout import Layout, Problem
 from .lobes import nearest
+from .see_through import SeeThrough, is_sure
 
 LEAST_PSI = 0.02
 """No solid dielectric reflects less at normal incidence (n = 1.33); a smaller fitted psi is no lobe at all."""
@@ -42,7 +43,7 @@ class Choice:
     Attributes
     ----------
     model : str
-        LAMBERTIAN, SPECULAR or METAL.
+        LAMBERTIAN, SPECULAR, METAL or TRANSPARENT.
     fit : LobeFit or None
         The best lobe, also where it was not taken; None if there was too little to fit.
     gain : float
@@ -62,6 +63,8 @@ class Choice:
     scores: dict[str, float] = field(default_factory=dict)
     metal: LobeFit | None = None
     """A metal's lobe that serves better than any other model, but not beyond doubt."""
+    see_through: SeeThrough | None = None
+    """How the object shows what is behind it; it is TRANSPARENT then."""
 
 
 def _gain(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
@@ -143,6 +146,19 @@ def choose_model(problem: Problem) -> Choice:
     return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores, likely)
 
 
+def set_apart(choice: Choice, found: SeeThrough | None) -> Choice:
+    """An object's choice, TRANSPARENT where its frames surely show what is behind it."""
+    if found is None:
+        return choice
+    scores = choice.scores | {TRANSPARENT: found.score}
+    if not is_sure(found):
+        return replace(choice, scores=scores)
+    what = f"cut out, with holes over {found.transmission:.0%} of it" if found.cut_out else (
+        f"transparent: {found.transmission:.0%} of what is behind it passes")
+    note = f"Set apart as {what}. Its own colour is uncertain."
+    return Choice(TRANSPARENT, None, found.gain, found.sigmas, note, scores, see_through=found)
+
+
 def adopt_from_class(
     choices: dict[int, Choice], problems: dict[int, Problem], class_of: dict[int, str]
 ) -> dict[int, Choice]:
@@ -151,9 +167,10 @@ def adopt_from_class(
     The class's model is that of the member with the strongest evidence, its lobe the median over the members of that
     model, weighted by evidence. Members keep their own lobe where their frames set it apart from that. Objects
     whose own frames decide nothing take over the class's, but not where it raises their cost by more than `EXCLUDED`.
-    Among metals, one whose frames favour metal without being sure of it is one.
+    What is set apart neither gives nor takes. Among metals, one whose frames favour metal without being sure of it is
+    one.
     """
-    result = dict(choices)
+    result, choices = dict(choices), {i: choice for i, choice in choices.items() if choice.model != TRANSPARENT}
     for name in sorted(set(class_of[object_id] for object_id in choices)):
         members = {i: choice for i, choice in choices.items() if class_of[i] == name}
         if all(choice.model == LAMBERTIAN for choice in members.values()):

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..capture.model import Instance
 from ..lit_diffuse.accumulate import LitDiffuse
-from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, ObjectMaterial
+from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, ObjectMaterial
 from ..parallel import ordered_map
 from ..progress import Progress
 from ..shading.field import LightField
@@ -17,9 +17,10 @@ from .fit import fit_lobe
 from .glossy_light import Excess, glossy_light
 from .intervals import GlossInterval, gloss_interval
 from .layout import Problem
-from .models import Choice, adopt_from_class, choose_model, metal_f0
+from .models import Choice, adopt_from_class, choose_model, metal_f0, set_apart
 from .problems import Problems
 from .samples import Samples
+from .see_through import judge, look_behind
 from .separate import specular_in_median, spread_over_object
 from .targets import score_frames, target_frame
 
@@ -48,7 +49,7 @@ class Specular:
     materials : tuple of ObjectMaterial
         One for each instance, by object_id.
     specular : (n, 3) float32
-        Part of each element's L_d that is specular.
+        Part of each element's L_d that is specular, or came through it from behind.
     excess : (n, 3) float32
         What is to be added to E, as glossy things throw more on each element than their L_d says.
     """
@@ -96,7 +97,16 @@ def fit_specular(
     wanted = [i.object_id for i in instances if i.object_id not in glowing]
 
     def look(object_id: int) -> tuple[Choice, Problem | None, int]:
-        return _look(maker, object_id, samples, len(frame_names), way, rays, object_id in mirrors)
+        choice, problem, target, index = _look(
+            maker, object_id, samples, len(frame_names), way, rays, object_id in mirrors
+        )
+        if way == "frames" and choice.fit is not None and object_id not in mirrors:
+            element, direction = samples.element[index], samples.direction[index]
+            behind = look_behind(field, lit_diffuse.seen, element, direction, object_id)
+            lobe = None if choice.model == LAMBERTIAN else choice.fit
+            scale = max(1.4826 * choice.fit.residual, 1e-4)
+            choice = set_apart(choice, judge(problem, behind, lobe, scale))
+        return choice, problem, target
 
     problems, choices, targets = {}, {}, {}
     for object_id, found in zip(wanted, ordered_map(look, wanted, threads), strict=True):
@@ -134,9 +144,12 @@ def fit_specular(
         materials.append(material)
 
     specular = np.zeros((len(field.atlas), 3), np.float32)
-    glossy = [m for m in materials if m.model == SPECULAR] if refine else []
+    glass = [m for m in materials if m.model == TRANSPARENT and m.surfaces is not None]
+    glossy = [m for m in materials if m.model == SPECULAR] + glass if refine else []
 
     def separate(material: ObjectMaterial) -> tuple[np.ndarray, np.ndarray]:
+        if material.model == TRANSPARENT:
+            return _without_background(material, field, lit_diffuse.seen, maker, samples)
         return _separate(material, field, maker, samples, max(rays // SEPARATE_RAYS, 16))
 
     for done, (own, part) in enumerate(ordered_map(separate, glossy, threads)):
@@ -156,29 +169,34 @@ def fit_specular(
 
 def _look(
     maker: Problems, object_id: int, samples: Samples, frames: int, way: str, rays: int, mirror: bool
-) -> tuple[Choice, Problem | None, int]:
-    """Model, observations and target frame (-1: none) of one object."""
+) -> tuple[Choice, Problem | None, int, np.ndarray]:
+    """Model, observations, target frame (-1: none) of one object, and which of the samples the observations are."""
     index = maker.pick(object_id, SCREEN_ELEMENTS, FIT_VIEWS)
     if not len(index):
-        return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, -1
+        return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, -1, index
     problem = maker.problem(index, max(rays // SCREEN_RAYS, 16))
     target = target_frame(
         score_frames(samples.frame[index], problem.light.A[:, TARGET_PHI], problem.lit_diffuse, frames)
     )
     if way == "frames":
-        return (*_by_frames(maker, object_id, problem, rays, mirror), target)
-    return (*_by_target(maker, object_id, samples.frame, target, rays), target)
+        choice, problem, index = _by_frames(maker, object_id, index, problem, rays, mirror)
+    else:
+        choice, problem = _by_target(maker, object_id, samples.frame, target, rays)
+    return choice, problem, target, index
 
 
-def _by_frames(maker: Problems, object_id: int, screen: Problem, rays: int, mirror: bool) -> tuple[Choice, Problem]:
+def _by_frames(
+    maker: Problems, object_id: int, index: np.ndarray, screen: Problem, rays: int, mirror: bool
+) -> tuple[Choice, Problem, np.ndarray]:
     """Choose a model; in two looks, as only some objects deserve the second. A `mirror` was looked at before."""
     first = choose_model(screen)
     fit = first.fit
     hopeless = fit is None or fit.cost > HOPELESS * fit.cost_lambertian
     if hopeless and first.model != METAL or mirror and first.model == METAL:
-        return first, screen
-    problem = maker.problem(maker.pick(object_id, FIT_ELEMENTS, FIT_VIEWS, seed=1), rays)
-    return choose_model(problem), problem
+        return first, screen, index
+    index = maker.pick(object_id, FIT_ELEMENTS, FIT_VIEWS, seed=1)
+    problem = maker.problem(index, rays)
+    return choose_model(problem), problem, index
 
 
 def _by_target(maker: Problems, object_id: int, frame: np.ndarray, target: int, rays: int) -> tuple[Choice, Problem]:
@@ -210,6 +228,11 @@ def _material(
         "scores": choice.scores,
         "note": choice.note,
     }
+    if choice.model == TRANSPARENT:
+        found = choice.see_through
+        return ObjectMaterial(
+            **common, transmission=found.transmission, surfaces=None if found.cut_out else found.surfaces
+        )
     if choice.model == LAMBERTIAN:
         return ObjectMaterial(**(common | {"residual": common["residual_lambertian"]}))
     if choice.model == METAL:
@@ -228,4 +251,20 @@ def _separate(
         return own, np.zeros((len(own), 3), np.float32)
     light = maker.light(index, rays, material.phi)
     element, part = specular_in_median(samples, index, material.psi * light.A[:, 0] + light.B[:, 0])
+    return own, spread_over_object(field.atlas, own, element, part)
+
+
+def _without_background(
+    material: ObjectMaterial, field: LightField, seen: np.ndarray, maker: Problems, samples: Samples
+) -> tuple[np.ndarray, np.ndarray]:
+    """A glass object's elements (n,), and the part of their L_d that came from behind, (n, 3)."""
+    own = np.flatnonzero(field.atlas.object_id == material.object_id)
+    index = maker.pick(material.object_id, SEPARATE_ELEMENTS, SEPARATE_VIEWS, least=1, seed=2)
+    if not len(index):
+        return own, np.zeros((len(own), 3), np.float32)
+    behind = look_behind(field, seen, samples.element[index], samples.direction[index], material.object_id)
+    index, passed = index[behind.known], np.float32(material.transmission) * behind.radiance[behind.known]
+    if not len(index):
+        return own, np.zeros((len(own), 3), np.float32)
+    element, part = specular_in_median(samples, index, passed)
     return own, spread_over_object(field.atlas, own, element, part)

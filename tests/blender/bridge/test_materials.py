@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from addon.core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR, ObjectMaterial
+from addon.core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, ObjectMaterial
 
 bpy = pytest.importorskip("bpy")
 
@@ -35,6 +35,16 @@ def test_specular(scene, psi):
     assert value("Roughness") == pytest.approx(0.4) and f0(value) == pytest.approx(psi, rel=1e-5)
     assert material["scan_relight_model"] == SPECULAR
     assert (material["scan_relight_phi"], material["scan_relight_psi"]) == (0.16, psi)
+
+
+@pytest.mark.parametrize(("surfaces", "alpha"), [(1, 0.36), (2, 0.2), (None, 1)], ids=["sheet", "slab", "cut out"])
+def test_transparent(scene, surfaces, alpha):
+    """Both surfaces of a slab together pass what was seen to pass; what is cut out stays opaque."""
+    image = bpy.data.images.new("base", 4, 4)
+    material = make_material(ObjectMaterial(3, "Pane", TRANSPARENT, transmission=0.64, surfaces=surfaces), image)
+    inputs, value = sockets(material)
+    assert value("Alpha") == pytest.approx(alpha) and f0(value) == 0 and inputs["Base Color"].links
+    assert material["scan_relight_transmission"] == 0.64
 
 
 @pytest.mark.parametrize("psi", [-0.1, 0.0, 0.99, 1.0, 7.0])
