@@ -305,8 +305,10 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         return EXIT_OK
     extent = " x ".join(f"{length:.2f}" for length in facts["extent_m"])
     sizes = ", ".join(f"{count} of {size}" for size, count in facts["resolutions"].items())
+    lenses = ", ".join(f"{count} of {name}" for name, count in facts["lenses"].items())
+    lenses = f"; lenses: {lenses}" if set(facts["lenses"]) - {"PINHOLE"} else ""
     print(f"{facts['capture']} ({facts['format']})", file=stream)
-    print(f"  frames     {facts['frames']}: {sizes} pixels; {facts['masks']} with a mask", file=stream)
+    print(f"  frames     {facts['frames']}: {sizes} pixels; {facts['masks']} with a mask{lenses}", file=stream)
     print(f"  mesh       {facts['triangles']} triangles, {facts['vertices']} vertices, {facts['area_m2']:.1f} m2, "
           f"{extent} m", file=stream)
     print(f"  instances  {len(facts['instances'])}", file=stream)

@@ -31,7 +31,7 @@ MESHES = ("dense/meshed-poisson.ply", "dense/meshed-delaunay.ply", "dense/0/mesh
 POINTS = ("fused.ply", "dense/fused.ply", "dense/0/fused.ply", "sparse.ply", "points3D.ply")
 """Clouds of points, which are no mesh."""
 UP = ("COLMAP's world has no up of its own; +Z was taken as up and a unit as a metre. Align the model "
-      "(colmap model_aligner) or name a --convention if the room lies on its side.")
+      "(colmap model_aligner) if the room lies on its side, or name the axis that points up (--convention up:-y).")
 MAX_SIZE = 2**17
 
 

@@ -22,7 +22,11 @@ def pixel_rays(camera: Camera) -> tuple[np.ndarray, np.ndarray | None]:
     return _pixel_rays(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.lens)
 
 
-@functools.lru_cache(maxsize=8)
+KEPT = 4
+"""Lenses whose rays are kept: a rig's cameras, or one for each thread; 24 bytes a pixel each."""
+
+
+@functools.lru_cache(maxsize=KEPT)
 def _pixel_rays(width: int, height: int, fx: float, fy: float, cx: float, cy: float,
                 lens: Lens | None) -> tuple[np.ndarray, np.ndarray | None]:
     x = np.broadcast_to((np.arange(width) + 0.5 - cx) / fx, (height, width))

@@ -146,9 +146,11 @@ def describe(capture: Capture) -> dict[str, Any]:
     low, high = corners.min((0, 1)), corners.max((0, 1))
     area = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
     sizes: dict[str, int] = {}
-    for frame in capture.frames:
-        size = f"{frame.camera.width}x{frame.camera.height}"
-        sizes[size] = sizes.get(size, 0) + 1
+    lenses: dict[str, int] = {}
+    for camera in (frame.camera for frame in capture.frames):
+        for counted, key in ((sizes, f"{camera.width}x{camera.height}"),
+                             (lenses, "PINHOLE" if camera.lens is None else camera.lens.name)):
+            counted[key] = counted.get(key, 0) + 1
     return {
         "capture": str(capture.root),
         "format": capture.format,
@@ -159,6 +161,7 @@ def describe(capture: Capture) -> dict[str, Any]:
         "extent_m": (high - low).tolist(),
         "frames": len(capture.frames),
         "resolutions": sizes,
+        "lenses": lenses,
         "exposures": _exposures(capture),
         "bracketed_frames": sum(bool(frame.brackets) for frame in capture.frames),
         "curve_of_codes": next((frame.transfer for frame in capture.frames if frame.transfer), ""),

@@ -402,6 +402,9 @@ def test_a_picture_that_changes_during_the_run(capture):
 def test_describe(capture):
     told = describe(read_capture(capture.root))
     assert (told["triangles"], told["frames"], told["resolutions"]) == (12, 10, {"8x6": 10})
+    assert told["lenses"] == {"PINHOLE": 10}
+    capture.frame(3, k1=0.1)
+    assert describe(read_capture(capture.root))["lenses"] == {"PINHOLE": 9, "OPENCV": 1}
     assert told["extent_m"] == [5, 4, 3] and told["bounds_m"] == [[0, 0, 0], [5, 4, 3]]
     assert told["area_m2"] == pytest.approx(2 * (5 * 4 + 5 * 3 + 4 * 3))
     assert told["instances"][2] == {"object_id": 2, "class_name": "side 2", "triangles": 2}
