@@ -21,7 +21,7 @@ from .evidence.collect import Evidence, collect
 from .evidence.page import make_page
 from .lit_diffuse.accumulate import LitDiffuse, accumulate
 from .lit_diffuse.from_texture import face_edge, lit_from_tiles
-from .material import METAL, SPECULAR, TRANSPARENT, ObjectMaterial
+from .material import TRANSPARENT, ObjectMaterial
 from .memory import peak_memory
 from .progress import Progress
 from .report import make_report
@@ -34,6 +34,7 @@ from .shading.lamps import Lamp
 from .shading.mirrors import Mirror, known_mirror
 from .shading.neighbourhood import doubt
 from .shading.shade import Shading, shade
+from .specular.compensation import base_colors
 from .specular.flat_mirrors import find_mirrors
 from .specular.reflect import Specular, fit_specular
 from .specular.samples import SampleCollector, Samples
@@ -348,21 +349,7 @@ class Recovery:
 
     def base_color(self) -> np.ndarray:
         """Base Color of each element for Cycles' Principled, (n, 3) float32."""
-        from .specular.compensation import base_color
-
-        atlas = self.surface().atlas
-        color = self.albedo.rho.copy()
-        for m in self.materials():
-            own = atlas.object_id == m.object_id
-            if m.model == METAL:
-                color[own] = m.f0
-            elif m.model == SPECULAR:
-                # Above 1 the object would reflect more than all light, and a room of it would never grow dark.
-                color[own] = np.minimum(base_color(color[own], m.psi, m.phi), 1)
-            elif m.model == TRANSPARENT and m.opacity < 1:
-                # Each surface reflects as much less as it lets pass.
-                color[own] = np.minimum(color[own] / max(1 - m.transmission, 0.01), 1)
-        return color
+        return base_colors(self.albedo.rho, self.surface().atlas.object_id, self.materials())
 
     @cached_property
     def evidence(self) -> Evidence:

@@ -6,7 +6,11 @@ layer reflects, E(psi, phi). Base Color must be the albedo / (1 - E) for the dif
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
+
+from ..material import METAL, SPECULAR, TRANSPARENT, ObjectMaterial
 
 _PSI = np.array([0.0, 0.0025, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.6, 0.9])
 _ROUGHNESS = np.linspace(0.1, 1.0, 10)
@@ -68,6 +72,29 @@ def base_color(albedo: np.ndarray, psi: float | np.ndarray, phi: float | np.ndar
     """
     kept = np.broadcast_to(1 - layer_reflectance(psi, phi), albedo.shape[:1])
     return (albedo / kept[:, None]).astype(albedo.dtype)
+
+
+def base_colors(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[ObjectMaterial]) -> np.ndarray:
+    """Base Color of every element, (n, 3) float32, 0...1.
+
+    Parameters
+    ----------
+    albedo : (n, 3) float32
+    object_id : (n,) int
+    materials : iterable of ObjectMaterial
+    """
+    color = albedo.copy()
+    for m in materials:
+        own = object_id == m.object_id
+        if m.model == METAL:
+            color[own] = m.f0
+        elif m.model == SPECULAR:
+            # Above 1 the object would reflect more than all light, and a room of it would never grow dark.
+            color[own] = np.minimum(base_color(color[own], m.psi, m.phi), 1)
+        elif m.model == TRANSPARENT and m.opacity < 1:
+            # Each surface reflects as much less as it lets pass.
+            color[own] = np.minimum(color[own] / max(1 - m.transmission, 0.01), 1)
+    return color
 
 
 def _between(knots, x):
