@@ -137,15 +137,11 @@ class Recovery:
             found = build_surface(
                 mesh,
                 [frame.camera for frame in capture.frames],
-                self._unwrap,
-                texel,
-                self.settings.detail,
-                self.settings.atlas_size,
+                self._unwrap, texel, self.settings.detail, self.settings.atlas_size,
             )
             sign = np.where((found.mesh.triangles == capture.mesh.triangles).all(1), 1, -1).astype(np.int8)
             arrays = {"uv": found.uv, "sign": sign, "both": found.both_sides}
-            if noise:
-                arrays["vertices"] = mesh.vertices
+            arrays |= {"vertices": mesh.vertices} if noise else {}
             return dataclasses.replace(found, noise=noise), arrays, {"size": found.atlas.size, "noise": noise}
 
         def load(arrays, meta):
@@ -154,15 +150,14 @@ class Recovery:
                 mesh = dataclasses.replace(mesh, vertices=arrays["vertices"])
             uv = None if mesh.uv is None else turned(mesh.uv, sign)
             facing = dataclasses.replace(mesh, triangles=turned(mesh.triangles, sign), uv=uv)
-            found = from_uv(mesh, facing, sign, arrays["uv"], int(meta["size"]), arrays["both"])
-            return dataclasses.replace(found, noise=float(meta["noise"]))
+            return from_uv(mesh, facing, sign, arrays["uv"], int(meta["size"]), arrays["both"], float(meta["noise"]))
 
         return self._stage("surface", load, compute)
 
     def room_mesh(self) -> Mesh:
         """The mesh that the stages worked on, where the capture has it: normals face the frames, noise is out of it."""
         mesh = self.surface().mesh
-        moved = mesh.vertices - self._near.mesh.vertices
+        moved = mesh.vertices - self._near.mesh.vertices  # by itself, so that what did not move is exact
         return dataclasses.replace(mesh, vertices=self.capture.mesh.vertices + moved)
 
     def _read(self, frame: Frame) -> Pixels:

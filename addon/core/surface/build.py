@@ -113,10 +113,11 @@ def build_surface(
 
 
 def from_uv(
-    mesh: Mesh, facing: Mesh, sign: np.ndarray, uv: np.ndarray, size: int, both_sides: np.ndarray
+    mesh: Mesh, facing: Mesh, sign: np.ndarray, uv: np.ndarray, size: int, both_sides: np.ndarray,
+    noise: float = 0.0,
 ) -> Surface:
     """The surface for a known layout."""
     atlas = make_atlas(facing, turned(uv, sign), size)
     scale = uv_scale(mesh, uv)
     scene = RayScene(facing.vertices, facing.triangles)
-    return Surface(facing, atlas, scene, uv, 1 / max(scale * size, 1e-12), both_sides)
+    return Surface(facing, atlas, scene, uv, 1 / max(scale * size, 1e-12), both_sides, noise)
