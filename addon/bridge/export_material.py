@@ -11,6 +11,7 @@ from ..core.capture.png import write_png
 from . import relight_lamps
 from .images import image_array
 from .materials import (
+    ALPHA,
     BASE_COLOR,
     EMISSION_COLOR,
     EMISSION_STRENGTH,
@@ -57,7 +58,7 @@ def plain_copy(material: bpy.types.Material, textures: Path, pictures: dict, lev
     made = plain_material(
         material.name, tuple(value[BASE_COLOR].default_value[:3]), value[ROUGHNESS].default_value,
         specular, value[METALLIC].default_value, ior, emission(material),
-        None if image is None else _picture(image, textures, pictures))
+        None if image is None else _picture(image, textures, pictures), value[ALPHA].default_value)
     made.use_backface_culling = bool(value[EMISSION_COLOR].links) and relight_lamps.is_lamp(material)
     return made
 

@@ -84,10 +84,17 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
     return material
 
 
+def opacity(material: bpy.types.Material) -> float:
+    """Alpha of a material's Principled node; 1 where it has none."""
+    nodes = material.node_tree.nodes if material.node_tree else ()
+    shader = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
+    return 1.0 if shader is None else shader.inputs[ALPHA].default_value
+
+
 def plain_material(name: str, colour: tuple[float, float, float] = (0.5, 0.5, 0.5), roughness: float = 0.5,
                    specular: float = 0.5, metallic: float = 0.0, ior: float = 1.5,
                    emission: tuple[float, float, float] = (0.0, 0.0, 0.0),
-                   base_color: bpy.types.Image | None = None) -> bpy.types.Material:
+                   base_color: bpy.types.Image | None = None, alpha: float = 1.0) -> bpy.types.Material:
     """A Principled material of plain numbers and at most a picture over the atlas, such as any program understands.
 
     `specular` is Specular IOR Level, 0.5 being what `ior` says; `colour` and `emission` are linear Rec.709.
@@ -98,7 +105,7 @@ def plain_material(name: str, colour: tuple[float, float, float] = (0.5, 0.5, 0.
     value[BASE_COLOR].default_value = (*colour, 1)
     value[ROUGHNESS].default_value, value[METALLIC].default_value = roughness, metallic
     value[SPECULAR_LEVEL].default_value, value[IOR].default_value = specular, ior
-    value[EMISSION_STRENGTH].default_value = 0.0
+    value[EMISSION_STRENGTH].default_value, value[ALPHA].default_value = 0.0, alpha
     if any(emission):
         _emit(nodes, links, value, emission, None)
     if base_color is not None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import bpy
 from mathutils import Matrix, Quaternion, Vector
 
-from .relight_room import bounds, cast, view_direction
+from .relight_room import bounds, cast, leaves, view_direction
 
 _CLEAR = 0.05
 """Metres that a light keeps off what is behind it."""
@@ -83,7 +83,7 @@ def sun_place(scene: bpy.types.Scene, target: Vector, ignored: bpy.types.Object 
     for up in (14, 20, 28, 36):
         for side in beside:
             direction = _towards(-view_direction(scene), side, up)
-            if cast(scene, above, direction) is None and _is_enclosed(scene, above):
+            if leaves(scene, above, direction) and _is_enclosed(scene, above):
                 origin = above + direction * (_exit(above, direction, low, high) + 1.0)
                 return Placement(origin, _facing(-direction), 1.0, 1.2, outside=True)
     direction = max((_towards(-view_direction(scene), side, up) for side in beside[:6] for up in (16, 24)),

@@ -14,7 +14,7 @@ from mathutils import Vector
 
 from ..core.errors import BadInputError
 from .images import RADIANCE, image_array
-from .relight_room import bounds, cast, room_light
+from .relight_room import bounds, leaves, room_light
 
 RECOVERED = "scan_relight_recovered_world"
 """Custom property of the scene: its world before another picture took its place."""
@@ -182,7 +182,7 @@ def is_open(scene: bpy.types.Scene) -> bool:
         for k in range(128):
             z = 1 - (2 * k + 1) / 128
             r = math.sqrt(1 - z * z)
-            if cast(scene, place, Vector((r * math.cos(golden * k), r * math.sin(golden * k), z))) is None:
+            if leaves(scene, place, Vector((r * math.cos(golden * k), r * math.sin(golden * k), z))):
                 return True
     return False
 

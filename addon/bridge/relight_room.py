@@ -11,6 +11,7 @@ from mathutils import Vector
 
 from ..core.errors import BadInputError
 from .images import image_array
+from .materials import opacity
 from .mesh_objects import OBJECT_ID
 
 ROOM_LIGHT = "scan_relight_room_light"
@@ -57,6 +58,18 @@ def cast(scene: bpy.types.Scene, origin: Vector, direction: Vector, distance: fl
     if not hit:
         return None
     return Hit(place, -normal if normal.dot(direction) > 0 else normal, (place - origin).length, thing)
+
+
+def leaves(scene: bpy.types.Scene, origin: Vector, direction: Vector) -> bool:
+    """Whether a ray leaves the room; what lets most of the light through, such as a pane, does not hold it."""
+    for _ in range(8):
+        hit = cast(scene, origin, direction)
+        if hit is None:
+            return True
+        if not any(opacity(slot.material) < 0.5 for slot in hit.thing.material_slots if slot.material):
+            return False
+        origin = hit.place + direction.normalized() * 1e-4
+    return False
 
 
 def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:

@@ -25,6 +25,7 @@ KNOWN = (
     ObjectMaterial(3, "tap", METAL, phi=0.04, f0=(0.9, 0.8, 0.5)),
     ObjectMaterial(4, "lamp", EMITTER, emission=(6.0, 3.0, 1.5)),
     ObjectMaterial(5, "sheet lamp", EMITTER, emission=(0.8, 0.4, 0.2)),
+    ObjectMaterial(6, "pane", METAL, phi=0.01, f0=(0.5, 0.5, 0.5)),
 )
 
 
@@ -41,6 +42,8 @@ def things(scene, tmp_path):
         thing.location = known.object_id, 0, 0
         thing[OBJECT_ID] = known.object_id
         scene.collection.objects.link(thing)
+    pane = next(n for n in bpy.data.materials["pane 6"].node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+    pane.inputs["Alpha"].default_value = 0.25
     bpy.context.view_layer.update()
     return scene
 
@@ -99,7 +102,7 @@ def test_what_is_read_back_is_what_the_materials_say(things, tmp_path, ending):
         assert np.allclose(base_colour(inputs["Base Color"]), COLOUR, atol=0.004)
         uv = np.array([item.vector[:] for item in thing.data.uv_layers.active.uv])
         assert np.allclose(sorted(uv.tolist()), sorted(UV.tolist()), atol=1e-4)
-    table, wall, tap = (found[name][1] for name in ("table", "wall", "tap"))
+    table, wall, tap, pane = (found[name][1] for name in ("table", "wall", "tap", "pane"))
     assert table["Roughness"].default_value == pytest.approx(0.3, abs=1e-3)
     assert table["IOR"].default_value == pytest.approx(ior_of(0.06), abs=1e-3)
     f0 = ((wall["IOR"].default_value - 1) / (wall["IOR"].default_value + 1)) ** 2
@@ -109,6 +112,8 @@ def test_what_is_read_back_is_what_the_materials_say(things, tmp_path, ending):
     for name, radiance in (("lamp", (6.0, 3.0, 1.5)), ("sheet lamp", (0.8, 0.4, 0.2))):
         assert np.allclose(light(found[name][1]), radiance, rtol=1e-3)
     assert light(wall).max() == 0
+    assert tap["Alpha"].default_value == pytest.approx(1)
+    assert pane["Alpha"].default_value == pytest.approx(0.25, abs=1e-3)
     if not usd:
         assert found["sheet lamp"][2].use_backface_culling and not found["lamp"][2].use_backface_culling
     place = found["table"][0].matrix_world.translation

@@ -110,6 +110,11 @@ def test_a_closed_room_is_told_from_an_open_one(scene):
                               ("c", (0, 1, 1), (math.pi / 2, 0, 0)), ("d", (0, -1, 1), (math.pi / 2, 0, 0))):
         wall = sheet(scene, name, 2.0, place, turn)
     assert not outside.is_open(scene)
+    shader = next(n for n in wall.data.materials[0].node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+    shader.inputs["Alpha"].default_value = 0.1  # a pane
+    assert outside.is_open(scene)
+    shader.inputs["Alpha"].default_value = 0.8
+    assert not outside.is_open(scene)
     bpy.data.objects.remove(wall)
     assert outside.is_open(scene)
 
