@@ -4,6 +4,7 @@
 import bpy
 
 from ..addon.core.errors import ScanRelightError
+from . import results
 
 
 def look_items() -> list[tuple[str, str, str]]:
@@ -51,7 +52,9 @@ class SCAN_RELIGHT_OT_look(bpy.types.Operator):
         from ..addon.bridge import look
 
         try:
-            look.set_look(context.scene, self.look)
+            chosen = results.folder_of(context.scene)
+            fits = chosen is not None and look.recovered(context.scene, chosen)
+            look.set_look(context.scene, self.look, chosen if fits else None)
         except ScanRelightError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

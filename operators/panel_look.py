@@ -31,6 +31,9 @@ class SCAN_RELIGHT_PT_look(SidebarPanel, bpy.types.Panel):
             return
         self.say(layout, context, f"{look.LOOKS[shown].text}.")
         self.say(layout, context, "Renders show the materials all the same.", "RESTRICT_RENDER_OFF")
+        if scene.view_settings.view_transform not in ("Standard", "Raw") and not look.LOOKS[shown].light:
+            self.say(layout, context, "Colours are exact under the view transform Standard (Render, Color "
+                     "Management).", "INFO")
         space = context.space_data
         if space is not None and space.type == "VIEW_3D" and space.shading.type in ("SOLID", "WIREFRAME"):
             self.say(layout, context, "Visible in Material Preview.", "INFO")

@@ -10,7 +10,7 @@ from .select_result_object import select
 
 ICONS = {"lambertian": "SHADING_SOLID", "specular": "SHADING_TEXTURE", "metal": "SHADING_RENDERED",
          "emitter": "LIGHT_AREA"}
-SIGNS = {"sure": "CHECKMARK", "fair": "REMOVE", "unsure": "QUESTION", "unknown": "BLANK1"}
+SIGNS = {"sure": "CHECKMARK", "fair": "DOT", "unsure": "QUESTION", "unknown": "BLANK1"}
 MODELS = [("ALL", "All models", "Show every object"),
           ("lambertian", "Lambertian", "Only objects without a highlight"),
           ("specular", "Specular", "Only objects with a highlight over their colour"),
@@ -123,8 +123,9 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
             head = layout.split(factor=0.52)
             head.label(text="Object")
             row = head.row()
-            for text in ("Rough", "F0", ""):
-                row.label(text=text)
+            row.label(text="Rough")
+            row.label(text="F0")
+            row.label(text="", icon="BLANK1")
             layout.template_list("SCAN_RELIGHT_UL_results", "", scene, "objects", scene, "scan_relight_row", rows=6)
         else:
             self.say(layout, context, f"{len(found.objects)} objects in '{found.folder.name}'; none of them is in "

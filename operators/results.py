@@ -148,7 +148,7 @@ def facts(one: dict[str, Any]) -> list[tuple[str, str]]:
     if evidence.get("seen_share") is not None:
         found.append(("Seen", f"{evidence['seen_share']:.0%} of {evidence.get('area', 0):.3g} m\u00b2"))
     if evidence.get("observations") is not None:
-        found.append(("Views of a spot", f"{evidence['observations']:.0f}"))
+        found.append(("Views", f"{evidence['observations']:.0f}"))
     return [*found, ("Certainty", certainty(one).capitalize())]
 
 

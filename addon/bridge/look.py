@@ -79,15 +79,21 @@ def recovered(scene: bpy.types.Scene, folder: Path | None = None) -> list[bpy.ty
     """The objects that wear materials of a result folder (of any, where none is given)."""
     return [thing for thing in scene.objects
             if thing.type == "MESH" and OBJECT_ID in thing and ATLAS_UV in thing.data.uv_layers and not thing.library
-            and (folder is None or Path(thing.get(RESULT, folder)) == folder)]
+            and (folder is None or _told(thing) in (None, folder))]
+
+
+def _told(thing: bpy.types.Object) -> Path | None:
+    """The result folder that an object's material came from; None where it was moved away or never told."""
+    told = thing.get(RESULT)
+    return Path(told) if told and Path(told).is_dir() else None
 
 
 def result_of(scene: bpy.types.Scene) -> Path | None:
     """The result folder of a scene's recovered objects; that of an opened scene.blend is where the file lies."""
     things = recovered(scene)
-    told = next((thing[RESULT] for thing in reversed(things) if RESULT in thing), None)
+    told = next(filter(None, map(_told, reversed(things))), None)
     if told:
-        return Path(told)
+        return told
     if things and bpy.data.filepath:
         return Path(bpy.data.filepath).parent
     return None
