@@ -9,13 +9,14 @@ from .panel import SidebarPanel
 from .select_result_object import select
 
 ICONS = {"lambertian": "SHADING_SOLID", "specular": "SHADING_TEXTURE", "metal": "SHADING_RENDERED",
-         "emitter": "LIGHT_AREA"}
+         "emitter": "LIGHT_AREA", "transparent": "MOD_OPACITY"}
 SIGNS = {"sure": "CHECKMARK", "fair": "DOT", "unsure": "QUESTION", "unknown": "BLANK1"}
 MODELS = [("ALL", "All models", "Show every object"),
           ("lambertian", "Lambertian", "Only objects without a highlight"),
           ("specular", "Specular", "Only objects with a highlight over their colour"),
           ("metal", "Metal", "Only metals"),
-          ("emitter", "Lamps", "Only objects that give light")]
+          ("emitter", "Lamps", "Only objects that give light"),
+          ("transparent", "Transparent", "Only glass and objects with holes that the mesh does not have")]
 ORDERS = [("NAME", "Name", "By name"), ("MODEL", "Model", "By model, then by name"),
           ("CERTAINTY", "Least sure first", "By how sure the material is, the least sure first")]
 

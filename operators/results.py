@@ -133,7 +133,7 @@ def facts(one: dict[str, Any]) -> list[tuple[str, str]]:
     """Label and text of everything that the panel tells of an object."""
     model, evidence = one.get("model", ""), one.get("evidence") or {}
     found = [("Model", {"lambertian": "Lambertian (matt)", "specular": "Specular", "metal": "Metal",
-                        "emitter": "Lamp"}.get(model, model))]
+                        "emitter": "Lamp", "transparent": "Transparent"}.get(model, model))]
     phi = one.get("phi")
     if phi is not None:
         found.append(("Roughness", _between(max(phi, 0) ** 0.5, one.get("roughness_low"), one.get("roughness_high"))))

@@ -70,5 +70,5 @@ class ScanRelightScene(bpy.types.PropertyGroup):
     images: bpy.props.EnumProperty(
         name="Images", description="Where the recovered images are kept", items=IMAGES)
     copies: bpy.props.BoolProperty(
-        name="Copies where needed", description="Where modifiers or instances make an object's faces, put the material "
+        name="Make copies", description="Where modifiers or instances make an object's faces, put the material "
         "onto a copy of it and hide the object; without this such objects are left as they are", default=False)

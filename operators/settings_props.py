@@ -214,8 +214,8 @@ class SceneStageOperator(StageOperator):
     images: bpy.props.EnumProperty(
         name="Images", description="Where the recovered images are kept", items=IMAGES)
     copies: bpy.props.BoolProperty(
-        name="Copies", description="Where modifiers or instances make an object's faces, put the material onto a copy "
-        "of it and hide the object; without this such objects are left as they are", default=False)
+        name="Make copies", description="Where modifiers or instances make an object's faces, put the material onto a "
+        "copy of it and hide the object; without this such objects are left as they are", default=False)
 
     def work(self, context):
         """Run, then change the scene, so that a failed run leaves it alone."""

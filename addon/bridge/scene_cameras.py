@@ -19,6 +19,8 @@ from ..core.capture.model import Camera
 from ..core.errors import BadInputError
 from .cameras import kept_lens
 
+PROPERTIES = (("frame_exposure", "exposure"), ("exposure", "exposure"), ("saturation", "saturation"))
+"""Custom properties of a camera and what they say of its frame; `make_cameras` leaves the first."""
 AUTO, ANIMATION, OBJECTS = "AUTO", "ANIMATION", "OBJECTS"
 
 
@@ -191,7 +193,7 @@ def _view(scene, depsgraph, thing, moment, name) -> View:
     path = picture(back, moment, thing.name)
     size = read_header(path)
     camera = camera_of(thing.evaluated_get(depsgraph), size, frame_size(scene, thing), back.frame_method)
-    known = {key: float(thing[key]) for key in ("exposure", "saturation") if key in thing}
+    known = {name: float(thing[key]) for key, name in PROPERTIES if key in thing}
     return View(name, camera, path, **known)
 
 

@@ -20,8 +20,10 @@ import bpy
 import numpy as np
 
 from ..core.capture.layout import RawMesh
+from ..core.capture.lenses_told import told_lens
 from ..core.capture.mesh_repair import repair
 from ..core.capture.model import Mesh
+from ..core.capture.nerfstudio_camera import OWN_LENS
 from ..core.errors import BadInputError, MissingStageError, StorageError
 from . import scene_cameras
 from .scene_mesh import Part, SceneMesh, gather, joined
@@ -174,6 +176,8 @@ def _write(folder: Path, mesh: SceneMesh, parts: list[Part], views: list[scene_c
         pose[:3, 3] *= metre
         frame = {"file_path": place, "w": camera.width, "h": camera.height, "fl_x": camera.fx, "fl_y": camera.fy,
                  "cx": camera.cx, "cy": camera.cy, "transform_matrix": pose.tolist()}
+        if camera.lens is not None:
+            frame[OWN_LENS] = told_lens(camera.lens)
         frames.append(frame | {key: value for key in ("exposure", "saturation")
                                if (value := getattr(view, key)) is not None})
     _json(folder / "transforms.json", {"camera_model": "PINHOLE", "frames": frames})

@@ -125,7 +125,7 @@ def writing_back(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray,
             (edited, "edited since the capture and left as it is; capture the scene again"),
             (locked, "linked from another file, so no material went there; make it local (Object, Relations, Make "
              "Local)"),
-            (left, "modifiers or instances make the faces, so no material went there; write again with Copies on"),
+            (left, "modifiers or instances make the faces, so no material went there; write again with Make Copies on"),
             (torn_names, "faces that fold onto themselves show the texture of one part only")]
     return tuple(f"{few(names)}: {what}." for names, what in told if names)
 

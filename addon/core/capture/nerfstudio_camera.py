@@ -17,6 +17,7 @@ from .jsonfile import is_number
 from .lens import Lens
 from .lenses import Cropped, Equirectangular
 from .lenses_colmap import polynomial
+from .lenses_told import lens_of
 from .model import Camera
 from .pictures import picture_size
 
@@ -26,6 +27,8 @@ MODELS = (*PERSPECTIVE, FISHEYE, FISHEYE624, PANORAMA)
 RADIAL, TANGENTIAL = ("k1", "k2", "k3", "k4", "k5", "k6"), ("p1", "p2")
 LISTED = "distortion_params"
 CROP = "fisheye_crop_radius"
+OWN_LENS = "scan_relight_lens"
+"""A frame's lens as `lenses_told` writes it; stands in captures of a scene, which know more lenses than nerfstudio."""
 
 
 def check_model(top: dict[str, Any], entry: dict[str, Any], path: Path) -> str:
@@ -50,12 +53,20 @@ def read_camera(top: dict[str, Any], entry: dict[str, Any], name: str, picture: 
     centre = [entry.get(key, top.get(key, half)) for key, half in (("cx", width / 2), ("cy", height / 2))]
     if not all(is_number(value) for value in centre):
         raise BadInputError(f"Frame '{name}' has a principal point that is no number; mend its cx and cy.")
-    lens = _lens(top, entry, name, model)
+    told = entry.get(OWN_LENS)
+    lens = _lens(top, entry, name, model) if told is None else _own_lens(told, name)
     if model in (FISHEYE, FISHEYE624):
         radius = positive(top, entry, CROP, name, None)
         if radius is not None:
             lens = Cropped(lens, radius / fx, radius / fy)
     return Camera(width, height, fx, fy, float(centre[0]), float(centre[1]), pose, lens)
+
+
+def _own_lens(told: Any, name: str) -> Lens | None:
+    try:
+        return lens_of(told)
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        raise BadInputError(f"Frame '{name}' has a {OWN_LENS} that is none; capture the scene again.") from error
 
 
 def positive(top: dict[str, Any], entry: dict[str, Any], key: str, name: str, default: float | None) -> float | None:

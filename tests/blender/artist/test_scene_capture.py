@@ -5,14 +5,19 @@ import json
 import numpy as np
 import pytest
 
+from addon.core.capture.exr import write_exr
+from addon.core.capture.lenses import EnhancedUnified
+from addon.core.capture.lenses_colmap import polynomial
+from addon.core.capture.model import Camera, Frame
 from addon.core.capture.read import read_capture
 from addon.core.errors import BadInputError
 
 bpy = pytest.importorskip("bpy")
 
+from addon.bridge.cameras import make_cameras  # noqa: E402
 from addon.bridge.scene_capture import capture_scene, polygons_of, sources  # noqa: E402
 from addon.bridge.unwrap import unwrap  # noqa: E402
-from tests.blender.artist.artist_room import add_cameras, build_room, mesh_object  # noqa: E402
+from tests.blender.artist.artist_room import add_cameras, build_room, mesh_object, show  # noqa: E402
 
 
 @pytest.fixture
@@ -72,6 +77,22 @@ def test_frames_are_the_cameras(room, tmp_path, scene):
         thing = scene.objects[f"cam {k}"]
         np.testing.assert_allclose(frame.camera.camera_to_world, np.array(thing.matrix_world), atol=1e-6)
         assert frame.camera.fx == pytest.approx(18 / 36 * 48) and frame.camera.cx == pytest.approx(24 - 0.03 * 48)
+
+
+@pytest.mark.parametrize("lens", [polynomial("OPENCV", numerator=(-0.1, 0.01), tangential=(1e-3, 2e-3)),
+                                  EnhancedUnified(0.7, 1.1)])
+def test_lens_and_exposure_of_imported_cameras(scene, tmp_path, lens):
+    pose = np.array([[1, 0, 0, 0.1], [0, 1, 0, 0.2], [0, 0, 1, 3.0], [0, 0, 0, 1]])
+    write_exr(tmp_path / "photo.exr", np.ones((36, 48, 3), np.float32))
+    wanted = Camera(48, 36, 30.0, 31.0, 23.0, 19.0, pose, lens)
+    [camera] = make_cameras([Frame("photo", tmp_path / "photo.exr", wanted, exposure=0.25)], scene.collection)
+    show(camera, tmp_path / "photo.exr")
+    sheet = mesh_object("sheet", [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [(0, 1, 2, 3)])
+    bpy.context.view_layer.update()
+    capture, _ = captured(tmp_path / "capture", [sheet])
+    [frame] = capture.frames
+    assert frame.camera.lens == lens and frame.exposure == 0.25
+    np.testing.assert_allclose([frame.camera.fx, frame.camera.cy], [30.0, 19.0], rtol=1e-6)
 
 
 def test_the_scene_is_left_as_it_was(room, tmp_path, scene):
