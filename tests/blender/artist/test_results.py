@@ -1,0 +1,115 @@
+"""What the panel Results tells: read from the result folder, sorted, and never saved."""
+
+import importlib
+import json
+import os
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from tests.blender.artist.artist_room import box, mesh_object  # noqa: E402
+
+OBJECTS = [
+    {"object_id": 0, "model": "specular", "phi": 0.09, "psi": 0.04, "roughness_low": 0.1, "roughness_high": 0.7,
+     "evidence": {"albedo": [0.5, 0.5, 0.5], "albedo_low": [0.4] * 3, "albedo_high": [0.6] * 3, "seen_share": 0.5,
+                  "area": 2.0, "observations": 12}},
+    {"object_id": 1, "model": "lambertian", "phi": None, "psi": None, "roughness_low": 0.0, "roughness_high": 1.0,
+     "evidence": {"albedo": [0.5] * 3, "albedo_low": [0.45] * 3, "albedo_high": [0.55] * 3}},
+    {"object_id": 2, "model": "metal", "phi": 0.04, "f0": [0.9, 0.6, 0.3], "roughness_low": 0.1, "roughness_high": 0.4},
+    {"object_id": 3, "model": "emitter", "emission": [3.0, 2.0, 1.0]},
+]
+
+
+@pytest.fixture
+def results(ops):
+    """The registered package's module, with nothing read yet."""
+    module = importlib.import_module("scan_relight.operators.results")
+    module.forget()
+    return module
+
+
+@pytest.fixture
+def scene(ops, results, tmp_path):
+    for number, name in enumerate(("wall", "Apple", "tap", "lamp")):
+        mesh_object(name, *box((number, 0, 0), (number + 0.5, 1, 1)))["object_id"] = number
+    mesh_object("the user's own", *box((0, 2, 0), (1, 3, 1)))
+    (tmp_path / "materials.json").write_text(json.dumps({"objects": OBJECTS}))
+    bpy.context.scene.scan_relight.result_folder = str(tmp_path)
+    return bpy.context.scene
+
+
+def test_doubt(results):
+    found = [results.doubt(one) for one in OBJECTS]
+    assert found[:3] == pytest.approx([0.6, 0.1, 0.3]) and found[3] is None
+    assert [results.certainty(one) for one in OBJECTS] == ["unsure", "sure", "fair", "unknown"]
+
+
+def test_facts_name_what_is_known(results):
+    facts = dict(results.facts(OBJECTS[0]))
+    assert facts["Roughness"] == "0.30  (0.10 to 0.70)" and facts["Albedo"] == "0.50  (0.40 to 0.60)"
+    assert facts["Seen"] == "50% of 2 m\u00b2" and facts["Certainty"] == "Unsure"
+    assert dict(results.facts(OBJECTS[2]))["Specular F0"] == "0.60"
+    assert dict(results.facts(OBJECTS[3])) == {"Model": "Lamp", "Radiance": "3, 2, 1", "Certainty": "Unknown"}
+    assert results.facts({"model": "something new"})[0] == ("Model", "something new")
+
+
+@pytest.mark.parametrize("order, names", [
+    ("NAME", ["Apple", "lamp", "tap", "wall"]), ("MODEL", ["lamp", "Apple", "tap", "wall"]),
+    ("CERTAINTY", ["wall", "tap", "Apple", "lamp"])])
+def test_orders(scene, results, order, names):
+    key = importlib.import_module("scan_relight.operators.panel_results").order_key
+    known = results.result_of(scene).objects
+    things = [thing for thing in scene.objects if "object_id" in thing]
+    assert [thing.name for thing in sorted(things, key=lambda t: key(t.name, known[t["object_id"]], order))] == names
+
+
+def test_read_again_when_the_file_changes_and_only_then(scene, results, tmp_path, monkeypatch):
+    first = results.result_of(scene)
+    assert results.result_of(scene) is first
+    (tmp_path / "materials.json").write_text(json.dumps({"objects": OBJECTS[:2]}))
+    os.utime(tmp_path / "materials.json", (1, 1))
+    assert len(results.result_of(scene).objects) == 2
+
+
+@pytest.mark.parametrize("text", ["", "[1, 2]", "{\"objects\": 3}", "{\"objects\": [{\"model\": \"metal\"}]}"])
+def test_a_damaged_file_is_an_empty_result(scene, results, tmp_path, text):
+    (tmp_path / "materials.json").write_text(text)
+    found = results.result_of(scene)
+    assert found.objects == {}
+
+
+def test_rows_follow_the_active_object_and_select(scene):
+    wall, tap = scene.objects["wall"], scene.objects["tap"]
+    bpy.context.view_layer.objects.active = wall
+    assert scene.objects[scene.scan_relight_row] == wall
+    scene.scan_relight_row = scene.objects.find("tap")
+    assert bpy.context.view_layer.objects.active == tap and bpy.context.selected_objects == [tap]
+    assert "scan_relight_row" not in scene.keys()
+
+
+def test_selecting_by_number(scene, ops):
+    assert ops.select_result_object(object_id=1) == {"FINISHED"}
+    assert [thing.name for thing in bpy.context.selected_objects] == ["Apple"]
+    assert ops.select_result_object(object_id=3, extend=True) == {"FINISHED"}
+    assert len(bpy.context.selected_objects) == 2
+    with pytest.raises(RuntimeError, match="Object 9 is not in this scene"):
+        ops.select_result_object(object_id=9)
+    scene.objects["tap"].hide_set(True)
+    with pytest.raises(RuntimeError, match="'tap' is hidden; show it first"):
+        ops.select_result_object(object_id=2)
+
+
+def test_the_report(scene, ops, tmp_path):
+    with pytest.raises(RuntimeError, match="There is no report yet"):
+        ops.open_report()
+    (tmp_path / "report.html").write_text("<p>")
+    assert ops.open_report() == {"FINISHED"}
+
+
+@pytest.mark.parametrize("name", ["capture_from_scene", "restore_materials", "select_result_object", "look",
+                                  "open_report", "write"])
+def test_every_property_has_its_text(ops, name):
+    kind = getattr(ops, name).get_rna_type()
+    assert kind.description
+    assert all(one.description for one in kind.properties if one.identifier != "rna_type" and not one.is_hidden)
