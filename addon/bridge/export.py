@@ -17,6 +17,7 @@ import numpy as np
 
 from ..core.errors import BadInputError, StorageError
 from .export_material import plain_copy
+from .materials import opacity
 from .mesh_objects import OBJECT_ID
 
 GLB, GLTF, USD = ".glb", ".gltf", ".usd"
@@ -108,6 +109,8 @@ def remarks(ending: str, things: Iterable[bpy.types.Object], lamps: Iterable[bpy
     if FORMATS[ending] == "USD":
         told.append("USD's preview surface has no one-sided emission and Blender writes no Specular IOR Level to it: "
                     "objects without highlight get an index of refraction of 1 instead.")
+        if any(opacity(slot.material) < 0.99 for thing in things for slot in thing.material_slots if slot.material):
+            told.append("Blender 5.2 writes no Alpha to USD, so glass may be opaque there; glTF keeps it.")
     else:
         if any(lamp.type == "LIGHT" and lamp.data.type == "AREA" for lamp in lamps):
             told.append("glTF has no area lights, so they are left out.")

@@ -108,6 +108,20 @@ def shoot(scene: bpy.types.Scene, path: Path | str) -> None:
     with saving(path) as temporary:
         scene.render.filepath = str(temporary.absolute())
         bpy.ops.render.render(write_still=True, scene=scene.name)
+        if "EEVEE" in scene.render.engine and _is_black(temporary):
+            raise BadInputError("EEVEE gave a black picture: it needs a graphics card, which Blender has none of here; "
+                                "take Cycles.")
+
+
+def _is_black(path: Path) -> bool:
+    """Whether a picture holds nothing but zeros; EEVEE without a graphics card gives such a one without a word."""
+    if not path.exists():
+        return False
+    image = bpy.data.images.load(str(path.absolute()))
+    try:
+        return not image_array(image)[..., :3].any()
+    finally:
+        bpy.data.images.remove(image)
 
 
 @contextmanager

@@ -113,3 +113,14 @@ def test_a_place_that_cant_be_written_is_told(result, tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert relight(result, tmp_path / "file" / "x.png") == 1
     assert "can't be written" in capsys.readouterr().err
+
+
+def test_eevee_without_a_graphics_card_is_told_instead_of_a_black_picture(result, tmp_path, capsys):
+    """Where there is one, there is a picture."""
+    code = relight(result, tmp_path / "x.png", "--engine", "eevee")
+    err = capsys.readouterr().err
+    if code:
+        assert code == 2 and "take Cycles" in err and not list(tmp_path.iterdir())
+    else:
+        image = bpy.data.images.load(str(tmp_path / "x.png"))
+        assert max(image.pixels[:]) > 0.05
