@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
@@ -63,6 +64,14 @@ def image(folder: Path | str, name: str, where: str = RESULT, keep: bool = True,
     if where != PACK and bpy.data.filepath:
         relative_to(loaded, Path(bpy.data.filepath).parent)
     return loaded
+
+
+def drop_unused(folders: Iterable[str]) -> None:
+    """Remove the images of result folders other than `folders` that nothing shows."""
+    for one in list(bpy.data.images):
+        source = one.get(MARK)
+        if source and str(Path(source).parent) not in folders and one.users == int(one.use_fake_user):
+            bpy.data.images.remove(one)
 
 
 def _beside(source: Path) -> Path:

@@ -262,6 +262,7 @@ def restore(things: Iterable[bpy.types.Object]) -> tuple[int, tuple[str, ...]]:
             if key in thing:
                 del thing[key]
         drop_ours(worn)
+    result_images.drop_unused({thing[RESULT] for thing in bpy.data.objects if RESULT in thing})
     told = [(edited, "edited since; the mesh from before is back, and the edited one is kept among the file's meshes"),
             (slots, "material slots were added or removed since; as many old materials as there are slots are back")]
     return count, tuple(f"{few(names)}: {what}." for names, what in told if names)

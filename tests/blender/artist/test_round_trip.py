@@ -91,6 +91,7 @@ def test_there_and_back(ops, room, tmp_path):
     assert state(room) == before
     assert room["chair"].data == room["chair.001"].data and bpy.data.materials["red"] == old
     assert not [m for m in bpy.data.materials if "scan_relight_model" in m]
+    assert not [image for image in bpy.data.images if "scan_relight_image" in image]
     with pytest.raises(RuntimeError, match="wears a recovered material"):
         ops.restore_materials()
 
