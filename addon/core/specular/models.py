@@ -140,8 +140,10 @@ def choose_model(problem: Problem) -> Choice:
         if min(gain, more) > MIN_GAIN and likely is None:
             likely = fit_of_metal
     gain, sigmas = _gain(with_lobe, without)
-    if gain > MIN_GAIN and sigmas > MIN_SIGMAS and _dielectric(fit):
-        return Choice(SPECULAR, fit, gain, sigmas, scores=scores, metal=likely)
+    if gain > MIN_GAIN and sigmas > MIN_SIGMAS and fit.phi <= BROADEST_PHI:
+        # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
+        held = replace(fit, psi=np.minimum(fit.psi, METAL_PSI))
+        return Choice(SPECULAR, held, gain, sigmas, scores=scores, metal=likely)
     note = "Roughness and specular are not identifiable from these frames."
     return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores, likely)
 
