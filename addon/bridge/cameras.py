@@ -156,6 +156,17 @@ def _angles(camera: Camera) -> np.ndarray:
     return k / millimetres[-1] ** np.arange(1, 5)
 
 
+def _rim(camera: Camera) -> float:
+    """The angle from the axis at which the picture's circle ends, or the widest in the frame."""
+    widest = min(widest_angle(camera), np.pi)
+    if not isinstance(camera.lens, Cropped):
+        return widest
+    phi = np.arange(64) * (np.pi / 32)
+    rim = np.stack([camera.lens.across * np.cos(phi), camera.lens.down * np.sin(phi)], -1)
+    rays, seen = camera.lens.lens.unproject(rim)
+    return float(np.arccos(rays[:, 2].clip(-1, 1)).max()) if seen.all() else widest
+
+
 def _set_panorama(data: bpy.types.Camera, camera: Camera) -> None:
     """Make `data` a whole or partial panorama, or a fisheye."""
     data.type = "PANO"
@@ -166,7 +177,7 @@ def _set_panorama(data: bpy.types.Camera, camera: Camera) -> None:
         data.latitude_min, data.latitude_max = (y / camera.fy for y in (camera.cy - camera.height, camera.cy))
         return
     data.panorama_type = "FISHEYE_LENS_POLYNOMIAL"
-    data.fisheye_fov = 2 * min(widest_angle(camera), np.pi)
+    data.fisheye_fov = 2 * _rim(camera)
     # Its sign is Cycles' own; shifts count in the picture's width and height here.
     data.fisheye_polynomial_k0 = 0.0
     for power, k in enumerate(_angles(camera), 1):

@@ -102,6 +102,9 @@ def test_cycles_renders_through_lenses(scene, shoot, tmp_path, name, place):
     scene.render.film_transparent = True
     use_camera(scene, make_cameras([Frame(name, tmp_path, camera)], scene.collection)[0])
     alpha = shoot(camera.width, camera.height, 64)[..., 3].ravel()
+    if isinstance(camera.lens, Cropped):  # black there, and opaque
+        centres = (camera.pixel_centres() - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+        alpha = alpha * (np.hypot(*centres.T) < camera.lens.across - 0.05)
     alpha = alpha * camera.rays(camera.pixel_centres())[1]  # beyond the lens's circle Blender may show anything
     assert alpha.sum() > 1
     got = camera.pixel_centres().T @ alpha / alpha.sum()
@@ -133,3 +136,14 @@ def test_lenses_that_blender_lacks_are_told(scene, tmp_path):
     bent = Camera(640, 480, 250, 250, 320, 240, POSE, prism)
     assert 5 < off_by(bent) < 100 and "THIN_PRISM" in unlike([Frame("c", tmp_path, bent)])
     assert make_cameras([Frame("c", tmp_path, bent)], scene.collection)[0].data.type == "PANO"
+
+
+def test_a_crop_is_black_in_blender(scene, shoot, tmp_path):
+    camera = through("cropped")
+    scene.world = bpy.data.worlds.new("grey")
+    scene.world.color = 0.5, 0.5, 0.5
+    use_camera(scene, make_cameras([Frame("cropped", tmp_path, camera)], scene.collection)[0])
+    grey = shoot(camera.width, camera.height, 16)[..., 0]
+    y, x = np.mgrid[0.5 : camera.height, 0.5 : camera.width]
+    radius = np.hypot((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy)
+    assert (grey[radius < 1.55] > 0).all() and (grey[radius > 1.65] == 0).all()
