@@ -18,7 +18,7 @@ from .lenses_colmap import Intrinsics, intrinsics
 from .meshes import IMPORTED, MESH, find_mesh, read_mesh
 from .model import Camera, Frame
 from .paths import EscapesError, inside
-from .pose import check_pose
+from .pose import MAX_DISTANCE, check_pose
 
 MODELS = ("", "sparse/0", "sparse", "colmap/sparse/0", "colmap/sparse", "colmap/0", "colmap", "dense/sparse")
 """Where in a capture a model may lie."""
@@ -108,7 +108,8 @@ def camera_to_world(image: ColmapImage, name: str) -> np.ndarray:
     if not is_pose(image):
         raise BadInputError(f"Frame '{name}' has a pose that is not finite or whose quaternion is 0; export the model "
                             "again.")
-    w, x, y, z = np.array(image.quaternion) / np.linalg.norm(image.quaternion)
+    quaternion = np.array(image.quaternion) / np.abs(image.quaternion).max()  # first: squares of huge numbers are inf
+    w, x, y, z = quaternion / np.linalg.norm(quaternion)
     rotation = np.array([
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
@@ -116,6 +117,8 @@ def camera_to_world(image: ColmapImage, name: str) -> np.ndarray:
     ])  # fmt: skip
     pose = np.eye(4)
     pose[:3, :3] = rotation.T * (1, -1, -1)
+    if np.abs(image.translation).max() > 10 * MAX_DISTANCE:
+        raise BadInputError(f"Frame '{name}' lies over {MAX_DISTANCE:g} m from the origin; check the model's units.")
     pose[:3, 3] = -rotation.T @ image.translation
     return check_pose(pose, name)
 

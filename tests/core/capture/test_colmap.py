@@ -52,7 +52,7 @@ def test_the_same_frames_as_written(as_colmap, kind, place):
     assert len(got.warnings) == 1 and "no up" in got.warnings[0]
 
 
-@pytest.mark.parametrize("scale", [1.0, -2.5, 1e-3])
+@pytest.mark.parametrize("scale", [1.0, -2.5, 1e-3, 1e200])
 def test_quaternions_of_any_length(as_colmap, scale):
     capture, images, poses = as_colmap
     write_text(capture.root, CAMERA, [(n, [scale * v for v in q], *rest) for n, q, *rest in images])
@@ -147,6 +147,7 @@ def test_a_camera_that_is_not_listed(as_colmap):
     ({"quaternion": [math.nan, 0, 0, 1]}, "not finite"),
     ({"translation": [0, math.inf, 0]}, "not finite"),
     ({"translation": [0, 1e9, 0]}, "from the origin"),
+    ({"translation": [1e308, 1e308, 0]}, "from the origin"),
     ({"name": "000.exr"}, "listed twice"),
     ({"name": "gone.exr"}, "gone.exr"),
 ])  # fmt: skip
