@@ -8,10 +8,23 @@ EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 
 
+LONGEST = 2000
+"""Characters of a sentence; what is longer holds a file's content, and is shown by its two ends."""
+
+
+def one_line(sentence: str) -> str:
+    """The sentence as a console can show it: names in it may hold line breaks and what is no character at all."""
+    shown = "".join(c if c.isprintable() else "\ufffd" for c in sentence)
+    return shown if len(shown) <= LONGEST else f"{shown[:LONGEST // 2]} ... {shown[-LONGEST // 2:]}"
+
+
 class ScanRelightError(Exception):
     """Base of every error that is told to the user in one sentence."""
 
     exit_code = EXIT_FAILURE
+
+    def __init__(self, sentence: str = ""):
+        super().__init__(one_line(str(sentence)))
 
 
 class BadInputError(ScanRelightError):

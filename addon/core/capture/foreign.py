@@ -76,10 +76,15 @@ def _jpeg_info(data: bytes) -> tuple[int, int, int]:
 
 
 def _tiff_info(data: bytes, path: Path) -> tuple[int, int, int]:
-    if int.from_bytes(data[4:8], "little" if data.startswith(b"II") else "big") >= HEAD:
+    order = ORDERS[data[:4]]
+    (pointer,) = struct.unpack_from(order + "I", data, 4)
+    base = 0
+    if pointer + HEAD // 2 > len(data) >= HEAD:
+        base = max(pointer - HEAD // 2, 0)
         with open(path, "rb") as file:  # the directory often follows the pixels
-            data = file.read(1 << 30)
-    tags = read_tags(data)
+            file.seek(base)
+            data = file.read(HEAD)
+    tags = read_tags(data, pointer, order, base)
     bits = int(tags.get(BITS, 1))
     is_float = tags.get(SAMPLE_FORMAT) == FLOAT
     if bits not in ((16, 32) if is_float else (8, 16)):

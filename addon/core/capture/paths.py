@@ -6,6 +6,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 from ..errors import BadInputError
+from .model import Frame
 
 
 class EscapesError(BadInputError):
@@ -45,3 +46,24 @@ def inside(root: Path, value: Any, name: str, outside: bool = False, folder: Pat
     if PureWindowsPath(value).drive:  # written on Windows: there alone it may lead anywhere
         return Path(value)
     return (folder or root) / PurePosixPath(value.replace("\\", "/"))
+
+
+def check_links(root: Path, frame: Frame) -> None:
+    """Look where the links among a frame's files lead.
+
+    Raises
+    ------
+    EscapesError
+        A file that lies in the capture by its name lies outside by a link.
+    """
+    shots = (shot.path for shot in frame.brackets)
+    for path in (frame.path, *shots, frame.mask_path, frame.id_path):
+        if path is None or not path.is_relative_to(root):
+            continue
+        try:
+            inside_root = path.resolve().is_relative_to(root.resolve())
+        except (OSError, RuntimeError, ValueError):  # a loop, or a name that can't be: told when it is read
+            continue
+        if not inside_root:
+            raise EscapesError(f"Frame '{frame.name}': '{path}' is a link or lies behind one that leads out of the "
+                               f"capture '{root}'; allow that with --outside.")

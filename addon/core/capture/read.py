@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadInputError
+from ..errors import BadInputError, one_line
 from . import instances
 from .brackets import fold, group_brackets, unfold
+from .camera_check import check_camera
 from .clipping import find_clipping
 from .conventions import parse, upright
 from .exposures import from_csv, from_exif
@@ -21,6 +22,7 @@ from .layout import AS_FOUND, Layout, Reading
 from .mesh_repair import repair
 from .model import Capture, Frame, Mesh
 from .parts import connected_parts
+from .paths import EscapesError, check_links
 from .pictures import mask_size, picture_note, picture_size, read_picture
 from .readers import reader_for
 from .vote import vote
@@ -49,7 +51,7 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
     layout = reader.read(root, reading)
     convention = parse(reading.convention)
     layout = replace(layout, frames=convention.frames(layout.frames), mesh=convention.mesh(layout.mesh))
-    frames, more = _usable(root, _exposed(layout, reading))
+    frames, more = _usable(root, _exposed(layout, reading), reading.outside)
     frames, grouped = group_brackets(frames)
     mesh, objects, warnings = _objects(layout, frames)
     clipped, notes = find_clipping(unfold(frames), lambda path: read_picture(path).rgb)
@@ -59,7 +61,8 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
     turn = upright(convention.up)
     mirrors = tuple(replace(one, point=turn @ one.point, normal=turn @ one.normal)
                     for one in layout.mirrors if one.object_id in known)
-    return Capture(root, mesh, objects, tuple(frames), (*warnings, *more, *notes), reader.name, mirrors)
+    warnings = tuple(one_line(text) for text in (*warnings, *more, *notes))
+    return Capture(root, mesh, objects, tuple(frames), warnings, reader.name, mirrors)
 
 
 def _exposed(layout: Layout, reading: Reading) -> Layout:
@@ -102,13 +105,17 @@ def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str
     return Mesh(raw.vertices, raw.triangles, ids, raw.uv, None if frames else raw.lit), objects, warnings + more
 
 
-def _usable(root: Path, layout: Layout) -> tuple[list[Frame], list[str]]:
+def _usable(root: Path, layout: Layout, outside: bool) -> tuple[list[Frame], list[str]]:
     """The frames whose pictures are there and fit their cameras, and sentences on the others."""
     problems = list(layout.problems)
     good = []
     for frame in layout.frames:
         try:
+            if not outside:
+                check_links(root, frame)
             _check_frame(frame)
+        except EscapesError:
+            raise
         except BadInputError as error:
             problems.append(str(error))
         else:
@@ -128,7 +135,8 @@ def _usable(root: Path, layout: Layout) -> tuple[list[Frame], list[str]]:
 
 
 def _check_frame(frame: Frame) -> None:
-    """Look at the headers of a frame's pictures; raises `BadInputError`."""
+    """Look at a frame's camera and at the headers of its pictures; raises `BadInputError`."""
+    check_camera(frame.camera, frame.name)
     wanted = frame.camera.width, frame.camera.height
     sizes = [(path, picture_size(path)) for path in (frame.path, *(shot.path for shot in frame.brackets))]
     if frame.mask_path is not None:

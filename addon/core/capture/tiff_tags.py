@@ -15,33 +15,39 @@ MAX_TAGS = 4096
 TYPES = {3: ("H", 2), 4: ("I", 4), 5: ("II", 8), 11: ("f", 4), 12: ("d", 8)}  # short, long, rational, float, double
 
 
-def read_tags(data: bytes, pointer: int | None = None) -> dict[int, float]:
+def read_tags(data: bytes, pointer: int | None = None, order: str = "", base: int = 0) -> dict[int, float]:
     """First value of each numeric tag in the directory at `pointer` of the TIFF `data`; None takes the first directory.
+
+    Parameters
+    ----------
+    order, base : str, int
+        Of a piece of a file that begins at `base`: its byte order ('<' or '>'). '' takes it from the beginning.
 
     Raises
     ------
     ValueError
         `data` is no TIFF, or ends before its directory does.
     """
-    order = ORDERS.get(data[:4])
-    if order is None:
+    order = order or ORDERS.get(data[:4], "")
+    if not order:
         raise ValueError("no TIFF")
     try:
         if pointer is None:
             (pointer,) = struct.unpack_from(order + "I", data, 4)
-        (count,) = struct.unpack_from(order + "H", data, pointer)
+        (count,) = struct.unpack_from(order + "H", data, pointer - base)
         tags: dict[int, float] = {}
         for i in range(min(count, MAX_TAGS)):
-            at = pointer + 2 + 12 * i
+            at = pointer - base + 2 + 12 * i
             tag, kind, number = struct.unpack_from(order + "HHI", data, at)
             if kind not in TYPES or not number:
                 continue
             code, size = TYPES[kind]
             if number * size > 4:
                 (at,) = struct.unpack_from(order + "I", data, at + 8)
+                at -= base
             else:
                 at += 8
-            if at + size > len(data):
+            if at < 0 or at + size > len(data):
                 continue  # beyond what was read of the file, as large tables are
             value = struct.unpack_from(order + code, data, at)
             if kind != 5:

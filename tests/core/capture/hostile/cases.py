@@ -1,0 +1,155 @@
+"""Small valid captures of every format, whole: what the hostile tests then spoil, file by file."""
+
+from __future__ import annotations
+
+import shutil
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from addon.core.capture.exr import write_exr
+from addon.core.capture.layout import Reading
+from addon.core.capture.png import write_png
+from tests.core.capture.colmap_files import world_to_camera, write_binary, write_text
+from tests.core.capture.conftest import CORNERS, HEIGHT, SIDES, WIDTH, CaptureOnDisk
+
+COUNT = 4
+RNG = np.random.default_rng(0)
+RADIANCE = RNG.random((HEIGHT, WIDTH, 3)).astype(np.float32)
+CODES = RNG.integers(0, 250, (HEIGHT, WIDTH, 3), np.uint8)
+
+
+class Case(NamedTuple):
+    """A capture and the file of it that is spoiled.
+
+    Attributes
+    ----------
+    name : str
+    make : callable(root)
+        Writes the whole capture.
+    victim : str
+        The file, relative to the root.
+    reading : Reading
+    """
+
+    name: str
+    make: Callable[[Path], None]
+    victim: str
+    reading: Reading = Reading()
+
+
+def nerfstudio(root: Path) -> None:
+    """JSON poses, EXR frames, PLY mesh, a mask, brackets, settings."""
+    capture = CaptureOnDisk(root, COUNT)
+    for i in range(COUNT):
+        capture.picture(i, RADIANCE)
+    write_png(root / "mask.png", CODES)
+    capture.frame(0, mask_path="mask.png", exposure=1.0, saturation=5.0,
+                  brackets=[{"file_path": "images/001.exr", "exposure": 2.0}])
+    capture.transforms["frames"] = [frame for i, frame in enumerate(capture.transforms["frames"]) if i != 1]
+    capture.frame(1, shutter="1/60", iso=200, fl_x=6.0, k1=0.01)
+    capture.top(applied_transform=[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]], applied_scale=1.0,
+                camera_model="OPENCV", train_filenames=["images/000.exr"])
+
+
+def with_table(root: Path) -> None:
+    nerfstudio(root)
+    lines = [f"{i:03d},1/60,2.8,{100 * (i + 1)}" for i in range(COUNT)]
+    (root / "exposures.csv").write_text("\n".join(["name,shutter,aperture,iso", *lines]) + "\n")
+
+
+def with_binary_ply(root: Path) -> None:
+    nerfstudio(root)
+    head = ("ply\nformat binary_little_endian 1.0\n" + f"element vertex {len(CORNERS)}\n"
+            + "".join(f"property float {axis}\n" for axis in "xyz") + f"element face {len(SIDES)}\n"
+            + "property list uchar int vertex_indices\nproperty int object_id\nend_header\n")
+    body = b"".join(struct.pack("<3f", *corner) for corner in CORNERS)
+    body += b"".join(struct.pack("<B5i", 4, *side, i) for i, side in enumerate(SIDES))
+    (root / "mesh.ply").write_bytes(head.encode() + body)
+
+
+def with_pictures(ending: str, content: bytes | Callable[[Path], None]) -> Callable[[Path], None]:
+    """Frames of another kind than EXR; frame 0 alone is spoiled, the others are good."""
+    def make(root: Path) -> None:
+        capture = CaptureOnDisk(root, 6)
+        for i, frame in enumerate(capture.transforms["frames"]):
+            path = root / f"images/{i:03d}{ending}"
+            (root / frame["file_path"]).unlink()
+            frame["file_path"] = path.relative_to(root).as_posix()
+            content(path) if callable(content) else path.write_bytes(content)
+        capture.save()
+    return make
+
+
+def colmap(write) -> Callable[[Path], None]:
+    def make(root: Path) -> None:
+        capture = CaptureOnDisk(root, COUNT)
+        poses = [frame["transform_matrix"] for frame in capture.transforms["frames"]]
+        (root / "transforms.json").unlink()
+        images = [(i + 1, *world_to_camera(pose), 1, f"{i:03d}.exr") for i, pose in enumerate(poses)]
+        write(root / "sparse/0", {1: ("OPENCV", WIDTH, HEIGHT, (6.0, 6.5, 4.0, 3.0, 0.01, 0.0, 0.0, 0.0))}, images)
+    return make
+
+
+def hdr_content() -> bytes:
+    rgbe = np.concatenate([CODES | 128, np.full((HEIGHT, WIDTH, 1), 127, np.uint8)], -1)
+    body = b""
+    for line in rgbe:
+        body += bytes((2, 2, 0, WIDTH)) + b"".join(bytes((WIDTH,)) + channel.tobytes() for channel in line.T)
+    return f"#?RADIANCE\nEXPOSURE=2\nFORMAT=32-bit_rle_rgbe\n\n-Y {HEIGHT} +X {WIDTH}\n".encode() + body
+
+
+def png_content() -> bytes:
+    """16 bits, interlaced, all filters."""
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    lines = b""
+    for y, x, down, right in ((0, 0, 8, 8), (0, 4, 8, 8), (4, 0, 8, 4), (0, 2, 4, 4), (2, 0, 4, 2), (0, 1, 2, 2),
+                              (1, 0, 2, 1)):
+        part = CODES[y::down, x::right].astype(">u2")
+        lines += b"".join(bytes((k % 5,)) + line.tobytes() for k, line in enumerate(part) if part.size)
+    header = struct.pack(">IIBBBBB", WIDTH, HEIGHT, 16, 2, 0, 0, 1)
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(lines)) + chunk(b"IEND", b""))
+
+
+def write_frame(path: Path) -> None:
+    write_exr(path, RADIANCE)
+
+
+JPEG = bytes.fromhex("ffd8ffe000104a46494600010100000100010000ffc0000b080006000801011100")
+TIFF = (b"II*\0" + struct.pack("<IH", 8, 4) + struct.pack("<HHIHH", 256, 3, 1, WIDTH, 0)
+        + struct.pack("<HHIHH", 257, 3, 1, HEIGHT, 0) + struct.pack("<HHIHH", 258, 3, 1, 8, 0)
+        + struct.pack("<HHII", 0x8769, 4, 1, 8) + struct.pack("<I", 0))
+CODED = Reading(transfer="srgb")
+
+CASES = (
+    Case("poses", nerfstudio, "transforms.json"),
+    Case("objects", nerfstudio, "info_semantic.json"),
+    Case("ply", nerfstudio, "mesh.ply"),
+    Case("binary_ply", with_binary_ply, "mesh.ply"),
+    Case("mask", nerfstudio, "mask.png"),
+    Case("exposures", with_table, "exposures.csv"),
+    Case("hdr", with_pictures(".hdr", hdr_content()), "images/000.hdr"),
+    Case("png", with_pictures(".png", png_content()), "images/000.png", CODED),
+    Case("jpeg", with_pictures(".jpg", JPEG), "images/000.jpg", CODED),
+    Case("tiff", with_pictures(".tif", TIFF), "images/000.tif", CODED),
+    Case("colmap_cameras", colmap(write_text), "sparse/0/cameras.txt"),
+    Case("colmap_images", colmap(write_text), "sparse/0/images.txt"),
+    Case("colmap_binary_cameras", colmap(write_binary), "sparse/0/cameras.bin"),
+    Case("colmap_binary_images", colmap(write_binary), "sparse/0/images.bin"),
+)
+
+
+def fresh(case: Case, root: Path) -> tuple[Path, Reading]:
+    """The capture written anew; gives the victim's path and how to read the capture."""
+    shutil.rmtree(root, ignore_errors=True)
+    case.make(root)
+    reading = Reading(exposures=root / case.victim) if case.name == "exposures" else case.reading
+    return root / case.victim, reading
+
+
