@@ -14,7 +14,12 @@ import pytest
 ROOT = Path(__file__).resolve().parents[4]
 COUNT, SEED = (int(os.environ.get(f"HOSTILE_{name}", usual)) for name, usual in (("EXAMPLES", "60"), ("SEED", "0")))
 PICTURE = np.round(np.random.default_rng(5).random((33, 41, 3)), 1).astype(np.float16)
-PLANES = {c: np.ascontiguousarray(PICTURE[..., i]) for i, c in enumerate("RGB")}
+
+
+def planes(prefix: str = "") -> dict[str, np.ndarray]:
+    """New ones each time, as the library makes its own of those that it is given."""
+    return {f"{prefix}{c}": np.ascontiguousarray(PICTURE[..., i]) for i, c in enumerate("RGB")}
+
 
 CHILD = """
 import resource, signal, sys
@@ -39,7 +44,7 @@ print("all", len(sys.argv) - 1, "good", good)
 
 def one_part(path, **header):
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage} | header
-    OpenEXR.File(header, PLANES).write(str(path))
+    OpenEXR.File(header, planes()).write(str(path))
 
 
 def tiled(path):
@@ -49,8 +54,8 @@ def tiled(path):
 
 
 def parts(path):
-    layers = {f"diffuse.{name}": plane for name, plane in PLANES.items()}
-    OpenEXR.File([OpenEXR.Part({}, PLANES, "rgba"), OpenEXR.Part({}, layers, "other")]).write(str(path))
+    both = [OpenEXR.Part({}, planes(), "rgba"), OpenEXR.Part({}, planes("diffuse."), "other")]
+    OpenEXR.File(both).write(str(path))
 
 
 KINDS = {"scanlines": one_part, "tiles": tiled, "parts": parts,
@@ -62,6 +67,8 @@ def spoiled(content: bytes, head: int, rng: np.random.Generator) -> bytes:
     """One to four blows, most of them within the first `head` bytes."""
     content = bytearray(content)
     for _ in range(rng.integers(1, 5)):
+        if not content:
+            break
         at = int(rng.integers(0, min(head, len(content)) if rng.random() < 0.7 else len(content)))
         what = rng.integers(0, 6)
         if what == 0:
