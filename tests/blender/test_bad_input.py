@@ -219,7 +219,7 @@ REFUSED = {
     "no triangle has an area": (lambda c: mesh(c, lambda v, t, o: (v * 0, t, o)), "no triangle with an area"),
     "a face points nowhere": (lambda c: mesh(c, outside), "points to vertex 1000000"),
     "no mesh": (lambda c: (c / "mesh.ply").unlink(), "mesh.ply' does not exist"),
-    "no poses": (lambda c: (c / "transforms.json").unlink(), "it needs one of: transforms.json"),
+    "no poses": (lambda c: (c / "transforms.json").unlink(), "it needs one of: .*transforms.json"),
     "poses that are no JSON": (lambda c: (c / "transforms.json").write_text('{"frames": ['), "not valid JSON"),
     "poses of another kind": (lambda c: (c / "transforms.json").write_text("[1]"), "no JSON object"),
     "objects of another kind": (lambda c: (c / "info_semantic.json").write_text('{"objects": 3}'), "no list 'objects'"),
