@@ -78,5 +78,5 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
         if isinstance(value, (list, tuple)) and all(isinstance(one, str) for one in value):
             for sentence in value:
                 self.say(layout, context, sentence, "INFO")
-        elif isinstance(value, (str, int, float)) and value not in ("", None) and not isinstance(value, bool):
+        elif isinstance(value, (str, int, float)) and value not in ("", 0, None) and not isinstance(value, bool):
             self.say(layout, context, f"{label}: {value}", "INFO")
