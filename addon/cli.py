@@ -308,7 +308,8 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     lenses = ", ".join(f"{count} of {name}" for name, count in facts["lenses"].items())
     lenses = f"; lenses: {lenses}" if set(facts["lenses"]) - {"PINHOLE"} else ""
     print(f"{facts['capture']} ({facts['format']})", file=stream)
-    print(f"  frames     {facts['frames']}: {sizes} pixels; {facts['masks']} with a mask{lenses}", file=stream)
+    told = f": {sizes} pixels; {facts['masks']} with a mask{lenses}" if facts["frames"] else ""
+    print(f"  frames     {facts['frames']}{told}", file=stream)
     print(f"  mesh       {facts['triangles']} triangles, {facts['vertices']} vertices, {facts['area_m2']:.1f} m2, "
           f"{extent} m", file=stream)
     print(f"  instances  {len(facts['instances'])}", file=stream)

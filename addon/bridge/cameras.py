@@ -47,7 +47,7 @@ def make_cameras(frames: Iterable[Frame], collection: bpy.types.Collection) -> l
     """
     made = []
     for frame in frames:
-        thing = _camera_object(frame.name, frame.camera, collection)
+        thing = make_view(frame.name, frame.camera, collection)
         thing["frame_path"], thing["frame_exposure"] = str(Path(frame.path).absolute()), float(frame.exposure)
         made.append(thing)
     return made
@@ -186,7 +186,8 @@ def _set_panorama(data: bpy.types.Camera, camera: Camera) -> None:
     data.shift_y = camera.cy / camera.height - 0.5
 
 
-def _camera_object(name: str, camera: Camera, collection) -> bpy.types.Object:
+def make_view(name: str, camera: Camera, collection: bpy.types.Collection) -> bpy.types.Object:
+    """Make a camera object that belongs to no frame and link it to a collection."""
     data = bpy.data.cameras.new(name)
     data.sensor_fit = "HORIZONTAL"
     data.sensor_width = _SENSOR

@@ -102,7 +102,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         check_own(capture.root)  # what is absent is told now, not after the work
     elif scene is not None and not import_first:
         imported(scene, capture)
-    told = _look(capture, reading)
+    told = _look(capture, reading) if capture.frames else []
     with Store(out_folder) as store, _told(out_folder):
         if from_stage in STAGES:
             store.drop(STAGES[STAGES.index(from_stage):])

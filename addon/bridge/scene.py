@@ -17,7 +17,8 @@ import numpy as np
 from ..core.capture.model import Capture
 from ..core.errors import StorageError
 from ..core.material import EMITTER, LAMBERTIAN, ObjectMaterial
-from .cameras import differing, make_cameras, unlike, use_camera
+from ..core.surface.overview import overview
+from .cameras import differing, make_cameras, make_view, unlike, use_camera
 from .images import load_image, relative_to
 from .materials import make_material
 from .mesh_objects import is_open, make_objects
@@ -110,8 +111,8 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
         world = set_world(scene, environment if environment.exists() else None)
         images.update((n.name, n.image) for n in world.node_tree.nodes if n.type == "TEX_ENVIRONMENT")
         _prepare(scene, median_radiance)
-        if cameras:
-            use_camera(scene, cameras[0])
+        view = cameras[0] if cameras else make_view("overview", overview(capture.mesh), eyes)
+        use_camera(scene, view)
     warnings = tuple(filter(None, (differing(capture.frames), unlike(capture.frames))))
     return BuiltScene(top, objects, cameras, list(images.values()), warnings)
 
