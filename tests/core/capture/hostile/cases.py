@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import struct
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -121,11 +123,61 @@ def write_frame(path: Path) -> None:
     write_exr(path, RADIANCE)
 
 
-JPEG = bytes.fromhex("ffd8ffe000104a46494600010100000100010000ffc0000b080006000801011100")
+def mesh_only(root: Path) -> CaptureOnDisk:
+    """The mesh and the frames; the poses are for the caller to write in another way."""
+    capture = CaptureOnDisk(root, COUNT)
+    (root / "transforms.json").unlink()
+    return capture
+
+
+def traj(root: Path) -> None:
+    capture = mesh_only(root)
+    (root / "images").rename(root / "results")
+    flip = np.diag([1.0, -1, -1, 1])
+    for i in range(COUNT):
+        (root / f"results/{i:03d}.exr").rename(root / f"results/frame{i:06d}.exr")
+    poses = [np.array(frame["transform_matrix"]) @ flip for frame in capture.transforms["frames"]]
+    (root / "traj.txt").write_text("".join(" ".join(map(repr, pose.ravel().tolist())) + "\n" for pose in poses))
+    (root / "cam_params.json").write_text(json.dumps(
+        {"camera": {"w": WIDTH, "h": HEIGHT, "fx": 6.0, "fy": 6.5, "cx": 4.0, "cy": 3.0, "scale": 6553.5}}))
+
+
+def scannetpp(root: Path) -> None:
+    capture = mesh_only(root)
+    poses = [frame["transform_matrix"] for frame in capture.transforms["frames"]]
+    (root / "dslr").mkdir()
+    (root / "scans").mkdir()
+    (root / "images").rename(root / "dslr/resized_images")
+    (root / "mesh.ply").rename(root / "scans/mesh_aligned_0.05.ply")
+    images = [(i + 1, *world_to_camera(pose), 1, f"{i:03d}.exr") for i, pose in enumerate(poses)]
+    write_text(root / "dslr/colmap", {1: ("PINHOLE", WIDTH, HEIGHT, (6.0, 6.5, 4.0, 3.0))}, images)
+    (root / "scans/segments.json").write_text(json.dumps({"segIndices": [i // 2 for i in range(len(CORNERS))]}))
+    groups = [{"objectId": i, "id": i, "label": f"thing {i}", "segments": [i]} for i in range(4)]
+    (root / "scans/segments_anno.json").write_text(json.dumps({"segGroups": groups}))
+    (root / "dslr/train_test_lists.json").write_text(json.dumps({"train": ["000.exr"], "test": ["003.exr"]}))
+
+
+def fipt_real(root: Path) -> None:
+    capture = mesh_only(root)
+    (root / "Image").mkdir()
+    lines = [str(COUNT)]
+    for i, frame in enumerate(capture.transforms["frames"]):
+        (root / f"images/{i:03d}.exr").rename(root / f"Image/{i:03d}_0001.exr")
+        pose = np.array(frame["transform_matrix"])
+        for row in (pose[:3, 3], pose[:3, 3] - pose[:3, 2], pose[:3, 1]):
+            lines.append(" ".join(map(repr, row.tolist())))
+    (root / "cam.txt").write_text("\n".join(lines) + "\n")
+    k = "6.0 0.0 4.0\n0.0 6.5 3.0\n0.0 0.0 1.0\n"
+    (root / "K_list.txt").write_text(f"{COUNT}\n" + k * COUNT)
+
+
+JPEG = bytesJPEG = bytes.fromhex("ffd8ffe000104a46494600010100000100010000ffc0000b080006000801011100")
 TIFF = (b"II*\0" + struct.pack("<IH", 8, 4) + struct.pack("<HHIHH", 256, 3, 1, WIDTH, 0)
         + struct.pack("<HHIHH", 257, 3, 1, HEIGHT, 0) + struct.pack("<HHIHH", 258, 3, 1, 8, 0)
         + struct.pack("<HHII", 0x8769, 4, 1, 8) + struct.pack("<I", 0))
 CODED = Reading(transfer="srgb")
+ON_PLY = Reading(mesh=Path("mesh.ply"))
+"""The format's own mesh is an OBJ file, which needs Blender."""
 
 CASES = (
     Case("poses", nerfstudio, "transforms.json"),
@@ -142,6 +194,13 @@ CASES = (
     Case("colmap_images", colmap(write_text), "sparse/0/images.txt"),
     Case("colmap_binary_cameras", colmap(write_binary), "sparse/0/cameras.bin"),
     Case("colmap_binary_images", colmap(write_binary), "sparse/0/images.bin"),
+    Case("traj", traj, "traj.txt"),
+    Case("traj_camera", traj, "cam_params.json"),
+    Case("scannetpp_segments", scannetpp, "scans/segments.json"),
+    Case("scannetpp_objects", scannetpp, "scans/segments_anno.json"),
+    Case("scannetpp_lists", scannetpp, "dslr/train_test_lists.json"),
+    Case("fipt_cameras", fipt_real, "cam.txt", ON_PLY),
+    Case("fipt_intrinsics", fipt_real, "K_list.txt", ON_PLY),
 )
 
 
@@ -150,6 +209,8 @@ def fresh(case: Case, root: Path) -> tuple[Path, Reading]:
     shutil.rmtree(root, ignore_errors=True)
     case.make(root)
     reading = Reading(exposures=root / case.victim) if case.name == "exposures" else case.reading
+    if reading.mesh is not None:
+        reading = replace(reading, mesh=root / reading.mesh)
     return root / case.victim, reading
 
 

@@ -90,6 +90,7 @@ def test_spoiled(case, tmp_path):
     root = tmp_path / "capture"
     victim, reading = fresh(case, root)
     good = victim.read_bytes()
+    assert read_capture(root, reading).frames  # before it is spoiled
     attempt(root, victim, reading)
     ways = bytes_spoiled(good) | json_spoiled(good) if victim.suffix == ".json" else bytes_spoiled(good)
 
