@@ -56,18 +56,7 @@ def read_exr(path: Path | str) -> Picture:
     layer, _ = _supported(path)
     header = layer.header
     names = (*layer.colour, *([layer.alpha] if layer.alpha else []))
-    try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
-            if not file.parts:  # how the library tells of pixels that it failed to decode
-                raise ValueError("its pixels can't be decoded")
-            # Copies: the arrays belong to the file, and it closes.
-            channels = file.channels(layer.part)
-            planes = [np.array(channels[name].pixels, np.float32) for name in names]
-    except MemoryError as error:
-        raise BadInputError(f"Picture '{path}' does not fit in memory; scale it down.") from error
-    except Exception as error:  # the library raises whatever comes; none of it means anything to a user
-        reason = " ".join(str(error).split())[-120:]
-        raise BadInputError(f"Picture '{path}' is damaged ({reason}); write or copy it again.") from error
+    planes = [plane.astype(np.float32, copy=False) for plane in _planes(path, layer.part, names)]
     width, height = window_size(header.data_window)
     for name, plane in zip(names, planes):
         x, y = header.channels[name]
@@ -85,6 +74,44 @@ def read_exr(path: Path | str) -> Picture:
         rgb = _place(rgb, header, np.nan)
         alpha = None if alpha is None else _place(alpha, header, 0.0)
     return Picture(rgb, alpha)
+
+
+def read_numbers(path: Path | str) -> np.ndarray:
+    """The numbers of the picture `path` as they are stored, not taken as colours: (h, w, c) in their own type.
+
+    Raises
+    ------
+    BadInputError
+        As `read_exr`, or the data window is not the display window.
+    """
+    path = Path(path)
+    headers = parse_headers(path)
+    if len(headers) == 1 and list(headers[0].channels.values()) == [(1, 1)]:  # one channel of any name
+        header, part, names = headers[0], 0, tuple(headers[0].channels)
+    else:
+        layer, _ = _supported(path)
+        header, part, names = layer.header, layer.part, layer.colour
+    width, height = window_size(header.data_window)
+    planes = _planes(path, part, names)
+    if header.data_window != header.display_window or any(plane.shape != (height, width) for plane in planes):
+        raise BadInputError(f"Picture '{path}' is cropped, or its channels differ in size; write it whole.")
+    return np.stack(planes, -1)
+
+
+def _planes(path: Path, part: int, names: tuple[str, ...]) -> list[np.ndarray]:
+    """Channels of a part, in their own types; raises `BadInputError` where they can't be decoded."""
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            if not file.parts:  # how the library tells of pixels that it failed to decode
+                raise ValueError("its pixels can't be decoded")
+            # Copies: the arrays belong to the file, and it closes.
+            channels = file.channels(part)
+            return [np.array(channels[name].pixels) for name in names]
+    except MemoryError as error:
+        raise BadInputError(f"Picture '{path}' does not fit in memory; scale it down.") from error
+    except Exception as error:  # the library raises whatever comes; none of it means anything to a user
+        reason = " ".join(str(error).split())[-120:]
+        raise BadInputError(f"Picture '{path}' is damaged ({reason}); write or copy it again.") from error
 
 
 def write_exr(path: Path | str, array: np.ndarray, half: bool = False) -> None:

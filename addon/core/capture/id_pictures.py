@@ -7,20 +7,22 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
-from .exr import read_exr
+from .exr import read_numbers
 from .model import Frame
+from .pictures import EXR, PNG, picture_kind
 from .png import read_png
 
 OFF = 0.02
 """An id in a float channel is this near to a whole number; further off, pictures were blended or are no ids."""
-EXACT = 1 << 24
-"""From here on float32 leaves out whole numbers."""
+EXACT = {2: 1 << 11, 4: 1 << 24, 8: 1 << 53}
+"""Up to here floats of so many bytes hold every whole number."""
 
 
 def read_ids(frame: Frame) -> np.ndarray:
     """The ids of a frame's pixels, (height, width) int64.
 
-    OpenEXR: a channel of whole numbers; of RGB, all three alike. PNG: grey, or the number r + 256 g + 65536 b.
+    OpenEXR: a channel of whole numbers of any type, exact; of several, all alike. PNG: grey of 8 or 16 bits, or the
+    number r + 256 g + 65536 b of colours (16 bits: with 65536 for 256).
 
     Raises
     ------
@@ -28,26 +30,33 @@ def read_ids(frame: Frame) -> np.ndarray:
         The picture can't be read, or holds no ids.
     """
     path = Path(frame.id_path)
-    if path.suffix.lower() == ".exr":
-        return _whole(read_exr(path).rgb, path)
+    if picture_kind(path) == EXR:
+        return _whole(read_numbers(path), path)
+    if picture_kind(path) != PNG:
+        raise BadInputError(f"Picture '{path}' is no OpenEXR or PNG file; ids need one that loses nothing.")
     pixels = read_png(path)
-    pixels = pixels.reshape(*pixels.shape[:2], -1).astype(np.int64)
-    if pixels.shape[2] < 3 or ((pixels[..., 0] == pixels[..., 1]) & (pixels[..., 0] == pixels[..., 2])).all():
+    step = np.iinfo(pixels.dtype).max + 1
+    pixels = pixels.astype(np.int64)
+    if pixels.shape[2] < 3 or (pixels[..., :3] == pixels[..., :1]).all():
         return pixels[..., 0]
-    return pixels[..., 0] + 256 * pixels[..., 1] + 65536 * pixels[..., 2]
+    return pixels[..., 0] + step * pixels[..., 1] + step**2 * pixels[..., 2]
 
 
-def _whole(rgb: np.ndarray, path: Path) -> np.ndarray:
-    values = rgb[..., 0]
-    if not np.isfinite(rgb).all():
+def _whole(stored: np.ndarray, path: Path) -> np.ndarray:
+    """The ids in the channels ((h, w, c)) of an OpenEXR file."""
+    values = stored[..., 0]
+    if not np.isfinite(stored).all():
         raise BadInputError(f"Picture '{path}' has ids that are not finite; write whole numbers.")
-    if not (rgb == values[..., None]).all():
+    if not (stored == values[..., None]).all():
         raise BadInputError(f"Picture '{path}' has differing channels, which is no picture of ids; write the ids to "
                             "one channel.")
+    if values.dtype.kind != "f":
+        return values.astype(np.int64)
     ids = np.rint(values.astype(np.float64))
     if np.abs(values - ids).max(initial=0) > OFF:
         raise BadInputError(f"Picture '{path}' has values between whole numbers, which are no ids; write it without "
                             "filtering.")
-    if np.abs(ids).max(initial=0) >= EXACT:
-        raise BadInputError(f"Picture '{path}' has ids from {EXACT} on, which a float can't hold; number them from 0.")
+    if np.abs(ids).max(initial=0) > EXACT[values.dtype.itemsize]:
+        raise BadInputError(f"Picture '{path}' has ids above {EXACT[values.dtype.itemsize]}, which its floats can't "
+                            "hold; write them as whole numbers (uint), or number them from 0.")
     return ids.astype(np.int64)

@@ -18,13 +18,13 @@ from .jsonfile import is_number, read_json
 from .layout import Layout, RawMesh, Reader, Reading
 from .meshes import IMPORTED, find_mesh, read_mesh
 from .model import Camera, Frame
+from .pictures import ENDINGS
 from .pose import check_pose
 
 POSES, PARAMETERS, FOLDER = "traj.txt", "cam_params.json", "results"
 TO_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 """From x right, y down, z forward to x right, y up, z backward."""
-PICTURE = re.compile(r"^frame(\d+)\.(exr|hdr|png|tif|tiff|jpg|jpeg)$", re.IGNORECASE)
-LINEAR = (".exr", ".hdr")
+PICTURE = re.compile(r"^frame(\d+)$", re.IGNORECASE)
 MAX_BYTES = 1 << 28
 
 
@@ -36,11 +36,11 @@ def read(root: Path, reading: Reading) -> Layout:
     BadInputError
         The poses, the camera or the mesh can't be read, or there are no pictures.
     """
-    frames, problems, notes = read_frames(root, reading)
+    frames, problems, notes = read_frames(root)
     return Layout(frames, _mesh(root, reading), problems=problems, notes=notes)
 
 
-def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], list[str]]:
+def read_frames(root: Path) -> tuple[list[Frame], list[str], list[str]]:
     """The frames, sentences on those that can't be used, and on what may mean something else."""
     camera = _camera(root)
     lines = _lines(root / POSES)
@@ -59,8 +59,7 @@ def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], l
         except BadInputError as error:
             problems.append(str(error))
             continue
-        transfer = "" if path.suffix.lower() in LINEAR else reading.transfer
-        frames.append(Frame(name, path, replace(camera, camera_to_world=pose @ TO_OPENGL), transfer=transfer))
+        frames.append(Frame(name, path, replace(camera, camera_to_world=pose @ TO_OPENGL)))
     idle = len(lines) - len(set(pictures) & set(range(len(lines))))
     notes = [f"{idle} of {len(lines)} lines of {POSES} have no picture."] if idle else []
     return frames, problems, notes
@@ -113,10 +112,10 @@ def _matrix(line: str, name: str) -> np.ndarray:
 def _pictures(folder: Path) -> dict[int, Path]:
     """The picture of each line; of several kinds the one that holds most: they are listed in that order."""
     found: dict[int, Path] = {}
-    order = {ending: place for place, ending in enumerate((".exr", ".hdr", ".tif", ".tiff", ".png", ".jpg", ".jpeg"))}
+    order = {ending: place for place, ending in enumerate(ENDINGS)}
     for path in folder.iterdir() if folder.is_dir() else ():
-        match = PICTURE.match(path.name)
-        if match and path.is_file() and len(match[1]) < 10:
+        match = PICTURE.match(path.stem)
+        if match and path.suffix.lower() in order and path.is_file() and len(match[1]) < 10:
             other = found.get(int(match[1]))
             if other is None or order[path.suffix.lower()] < order[other.suffix.lower()]:
                 found[int(match[1])] = path

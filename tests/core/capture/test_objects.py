@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from dataclasses import replace
 
 import numpy as np
+import OpenEXR
 import pytest
 
 from addon.core.capture.exr import write_exr
@@ -113,7 +116,7 @@ def test_what_no_pixel_sees_takes_its_neighbours_ids(room, tmp_path):
 
 def test_pictures_that_are_no_ids_are_told(room, tmp_path):
     [frame, *_] = frames_of(room, tmp_path)
-    for values, told in ((0.5, "between whole numbers"), (np.nan, "not finite"), (3e7, "float can't hold")):
+    for values, told in ((0.5, "between whole numbers"), (np.nan, "not finite"), (3e7, "floats can't hold")):
         write_exr(frame.id_path, np.full((frame.camera.height, frame.camera.width, 3), values, np.float32))
         with pytest.raises(BadInputError, match=told):
             vote(room.mesh.vertices, room.mesh.triangles, [frame], read_ids)
@@ -124,3 +127,32 @@ def test_pictures_that_are_no_ids_are_told(room, tmp_path):
     write_exr(frame.id_path, np.zeros((frame.camera.height, frame.camera.width, 3), np.float32))
     with pytest.raises(BadInputError, match="shows any of the mesh"):
         vote(room.mesh.vertices, room.mesh.triangles, [away], read_ids)
+
+
+@pytest.mark.parametrize("dtype, value", [(np.uint32, 4_000_000_001), (np.float32, 16_777_215), (np.float16, 2047)])
+@pytest.mark.parametrize("names", ["Z", ("R", "G", "B"), ("object.id",)])
+def test_large_ids_are_exact(room, tmp_path, dtype, value, names):
+    plane = np.full((3, 4), value, dtype)
+    plane[0, 0] = value - 1
+    header = {"type": OpenEXR.scanlineimage, "chromaticities": (0.7, 0.3, 0.2, 0.7, 0.1, 0.1, 0.3, 0.3)}
+    with OpenEXR.File(header, {name: plane for name in names}) as file:
+        file.write(str(tmp_path / "ids.exr"))
+    frame = Frame("a", tmp_path / "ids.exr", all_round((1, 1, 1))[0], id_path=tmp_path / "ids.exr")
+    np.testing.assert_array_equal(read_ids(frame), plane.astype(np.int64))
+
+
+def test_ids_of_16_bits(tmp_path):
+    plane = np.array([[0, 300], [65535, 7]], ">u2")
+    rows = b"".join(b"\0" + row.tobytes() for row in plane)
+    chunks = ((b"IHDR", struct.pack(">IIBBBBB", 2, 2, 16, 0, 0, 0, 0)), (b"IDAT", zlib.compress(rows)), (b"IEND", b""))
+    path = tmp_path / "ids.png"
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(struct.pack(">I", len(data)) + kind + data
+                     + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks))
+    assert read_ids(Frame("a", path, all_round((1, 1, 1))[0], id_path=path)).tolist() == plane.tolist()
+
+
+def test_a_picture_that_loses_is_refused(tmp_path):
+    path = tmp_path / "ids.jpg"
+    path.write_bytes(b"\xff\xd8\xff\xe0" + bytes(40))
+    with pytest.raises(BadInputError, match="loses nothing"):
+        read_ids(Frame("a", path, all_round((1, 1, 1))[0], id_path=path))
