@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
+from . import instances
 from .jsonfile import is_number, read_json
 from .layout import Layout, RawMesh, Reader, Reading
 from .meshes import IMPORTED, find_mesh, read_mesh
@@ -34,10 +35,12 @@ def read(root: Path, reading: Reading) -> Layout:
     Raises
     ------
     BadInputError
-        The poses, the camera or the mesh can't be read, or there are no pictures.
+        The poses, the camera, the mesh or the list of objects can't be read, or there are no pictures.
     """
     frames, problems, notes = read_frames(root)
-    return Layout(frames, _mesh(root, reading), problems=problems, notes=notes)
+    semantic = root / instances.FILE
+    names = instances.read_instances(semantic) if semantic.exists() else None
+    return Layout(frames, _mesh(root, reading), names, instances.FILE, problems, notes)
 
 
 def read_frames(root: Path) -> tuple[list[Frame], list[str], list[str]]:
