@@ -60,11 +60,13 @@ def read_sorted_faces(path: Path, faces: int) -> list[np.ndarray]:
     words = np.frombuffer(content[: len(content) // 4 * 4], "<u4").astype(np.int64)
     chunks, at = [], 2
     while at + 2 <= len(words):
-        end = at + 2 + int(words[at] + (words[at + 1] << 32))
+        end = at + 2 + (int(words[at]) | int(words[at + 1]) << 32)
+        if end > len(words):
+            break
         chunks.append(words[at + 2 : end])
         at = end
     listed = np.concatenate(chunks) if chunks else np.zeros(0, np.int64)
-    whole = len(listed) == faces and (np.bincount(listed, minlength=faces) == 1).all()
+    whole = len(listed) == faces and listed.max(initial=0) < faces and len(np.unique(listed)) == faces
     if at != len(words) or not whole or len(chunks) != words[0] + (words[1] << 32):
         raise BadInputError(f"'{path}' does not list each of the mesh's {faces} faces once; take it away or copy it "
                             "again.")

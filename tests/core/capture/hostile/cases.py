@@ -18,6 +18,8 @@ from addon.core.capture.layout import Reading
 from addon.core.capture.png import write_png
 from tests.core.capture.colmap_files import world_to_camera, write_binary, write_text
 from tests.core.capture.conftest import CORNERS, HEIGHT, SIDES, WIDTH, CaptureOnDisk
+from tests.core.replica_on_disk import ReplicaOnDisk
+from tests.core.rooms import lit_box, make_room
 
 COUNT = 4
 RNG = np.random.default_rng(0)
@@ -171,7 +173,14 @@ def fipt_real(root: Path) -> None:
     (root / "K_list.txt").write_text(f"{COUNT}\n" + k * COUNT)
 
 
-JPEG = bytesJPEG = bytes.fromhex("ffd8ffe000104a46494600010100000100010000ffc0000b080006000801011100")
+def replica(root: Path) -> None:
+    room = make_room(lit_box(lamps=(((0.3, 0.7), (0.3, 0.7)),)), 0.3)
+    ReplicaOnDisk(root, room, np.ones((len(room.atlas.object_id), 3)), edge=1.0, order_file=True)
+    pane = {"plane_w": [0, 0, 1, 0], "boundary_w": [[0, 0, 0], [1, 0, 0], [1, 1, 0]], "reflectivity": 0.9}
+    (root / "glass.sur").write_text(json.dumps([pane]))
+
+
+JPEG = bytesJPEG = bytesJPEG = bytes.fromhex("ffd8ffe000104a46494600010100000100010000ffc0000b080006000801011100")
 TIFF = (b"II*\0" + struct.pack("<IH", 8, 4) + struct.pack("<HHIHH", 256, 3, 1, WIDTH, 0)
         + struct.pack("<HHIHH", 257, 3, 1, HEIGHT, 0) + struct.pack("<HHIHH", 258, 3, 1, 8, 0)
         + struct.pack("<HHII", 0x8769, 4, 1, 8) + struct.pack("<I", 0))
@@ -194,6 +203,11 @@ CASES = (
     Case("colmap_images", colmap(write_text), "sparse/0/images.txt"),
     Case("colmap_binary_cameras", colmap(write_binary), "sparse/0/cameras.bin"),
     Case("colmap_binary_images", colmap(write_binary), "sparse/0/images.bin"),
+    Case("replica_tiles", replica, "textures/parameters.json"),
+    Case("replica_order", replica, "habitat/sorted_faces.bin"),
+    Case("replica_mesh", replica, "mesh.ply"),
+    Case("replica_objects", replica, "habitat/mesh_semantic.ply"),
+    Case("replica_panes", replica, "glass.sur"),
     Case("traj", traj, "traj.txt"),
     Case("traj_camera", traj, "cam_params.json"),
     Case("scannetpp_segments", scannetpp, "scans/segments.json"),
