@@ -93,3 +93,23 @@ def test_a_broken_file_is_one_sentence(tmp_path, name, content):
 def test_an_absent_file_is_one_sentence(tmp_path):
     with pytest.raises(BadInputError, match="does not exist"):
         import_mesh(tmp_path / "a.obj")
+
+
+@pytest.mark.parametrize("kind", ["obj", "glb"])
+def test_a_mesh_that_is_being_edited_stays_so(scene, tmp_path, kind):
+    mesh = bpy.data.meshes.new("mine")
+    mesh.from_pydata([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [], [(0, 1, 2)])
+    mine = bpy.data.objects.new("mine", mesh)
+    scene.collection.objects.link(mine)
+    bpy.context.view_layer.objects.active = mine
+    mine.select_set(True)
+    path = tmp_path / f"a.{kind}"
+    if kind == "glb":
+        bpy.ops.export_scene.gltf(filepath=str(path), use_selection=True, export_format="GLB")
+    else:
+        path.write_text(QUAD + "f 1 2 3 4\n")
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert len(import_mesh(path).triangles) == (1 if kind == "glb" else 2)
+    assert mine.mode == "EDIT" and mine.select_get()
+    assert bpy.context.view_layer.objects.active == mine and len(scene.collection.all_objects) == 1
+    bpy.ops.object.mode_set(mode="OBJECT")
