@@ -96,7 +96,7 @@ def recovered(blender, user, tiny_capture, tmp_path_factory) -> Path:
     """The result of the installed extension's command line, without a window."""
     out = tmp_path_factory.mktemp("command") / "result"
     told = subprocess.run([blender, "--background", "--command", "scan_relight", "recover", str(tiny_capture),
-                           "--out", str(out), "--preset", "draft"], env=environment(user), capture_output=True,
-                          text=True)
+                           "--out", str(out), "--preset", "draft", "--shading-rays", "256"], env=environment(user),
+                          capture_output=True, text=True)
     assert told.returncode == 0, told.stdout + told.stderr
     return out

@@ -7,6 +7,8 @@ is `answer-N.json`. A question whose value is a generator goes on in the next ti
 """
 
 import json
+import os
+import signal
 import sys
 import time
 import traceback
@@ -116,6 +118,17 @@ def phase():
     """What the run does: its operator's part, its state, its stage."""
     job = module("addon.bridge.job").current()
     return "none" if job is None else f"{job.facts.get('phase')}/{job.state}/{job.stage}"
+
+
+def pause_in(stage):
+    """Wait for a stage of the run, and have its process stand still there until it is sent SIGCONT."""
+    for _ in range(3000):
+        job = module("addon.bridge.job").current()
+        if job is not None and job.running and job.stage == stage:
+            os.kill(job.process_id, signal.SIGSTOP)
+            return job.stage
+        yield
+    raise RuntimeError(f"the run never came to {stage}: {phase()}")
 
 
 def watch_own_code():
