@@ -14,32 +14,40 @@ ICONS = {"WINDOW": "LIGHT_AREA", "SOFTBOX": "MESH_PLANE", "SPOT": "LIGHT_SPOT", 
 
 
 class SCAN_RELIGHT_UL_lamps(bpy.types.UIList):
-    """The lamps of the scan."""
+    """The lamps of the scan, each by the first object that wears it.
+
+    Not a list of materials: for each of those Blender renders a picture, and its shaders, before it draws the panel.
+    """
 
     bl_idname = "SCAN_RELIGHT_UL_lamps"
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index):
         """Switch, name, colour, strength."""
-        lamp = item.scan_relight_lamp
-        row = layout.row(align=True)
-        row.prop(lamp, "on", text="", icon="OUTLINER_OB_LIGHT" if lamp.on else "LIGHT", emboss=False)
-        row.label(text=item.name)
-        value = row.row(align=True)
-        value.enabled = lamp.on
-        colour = value.row(align=True)
-        colour.scale_x = 0.4
-        colour.enabled = relight_lamps.colour(item) is not None
-        colour.prop(lamp, "colour", text="")
-        strength = value.row(align=True)
-        strength.scale_x = 0.7
-        strength.prop(lamp, "factor", text="")
+        column = layout.column(align=True)
+        for material in relight_lamps.lamps_by_object(context.scene).get(item.name, ()):
+            lamp = material.scan_relight_lamp
+            row = column.row(align=True)
+            row.prop(lamp, "on", text="", icon="OUTLINER_OB_LIGHT" if lamp.on else "LIGHT", emboss=False)
+            row.label(text=material.name, translate=False)
+            value = row.row(align=True)
+            value.enabled = lamp.on
+            colour = value.row(align=True)
+            colour.scale_x = 0.4
+            colour.enabled = relight_lamps.colour(material) is not None
+            colour.prop(lamp, "colour", text="")
+            strength = value.row(align=True)
+            strength.scale_x = 0.7
+            strength.prop(lamp, "factor", text="")
 
     def filter_items(self, context, data, name):
-        """Of all materials, this scene's lamps."""
-        lamps = {material.name for material in relight_lamps.find_lamps(context.scene)}
-        wanted = self.filter_name.casefold()
-        return [self.bitflag_filter_item if material.name in lamps and wanted in material.name.casefold() else 0
-                for material in getattr(data, name)], []
+        """Of all objects, one for each lamp; sorted by the lamps' names."""
+        wanted, lamps = self.filter_name.casefold(), relight_lamps.lamps_by_object(context.scene)
+        names = [" ".join(lamp.name for lamp in lamps.get(thing.name, ())) for thing in getattr(data, name)]
+        shown = [self.bitflag_filter_item if found and wanted in found.casefold() else 0 for found in names]
+        places = [0] * len(names)
+        for place, number in enumerate(sorted(range(len(names)), key=names.__getitem__)):
+            places[number] = place
+        return shown, places
 
 
 class RelightPanel(SidebarPanel):
@@ -66,13 +74,13 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
             return
         studio, lamps = scene.scan_relight_studio, relight_lamps.find_lamps(scene)
         if lamps:
-            layout.template_list("SCAN_RELIGHT_UL_lamps", "", bpy.data, "materials", studio, "lamp", rows=3)
+            layout.template_list("SCAN_RELIGHT_UL_lamps", "", scene, "objects", studio, "lamp", rows=3)
             row = layout.row(align=True)
             row.operator("scan_relight.switch_lamps", text="All On", icon="OUTLINER_OB_LIGHT").on = True
             row.operator("scan_relight.switch_lamps", text="All Off", icon="LIGHT").on = False
-            chosen = bpy.data.materials[studio.lamp] if studio.lamp < len(bpy.data.materials) else None
-            if chosen in lamps:
-                self.numbers(layout, context, chosen)
+            chosen = scene.objects[studio.lamp].name if studio.lamp < len(scene.objects) else ""
+            for lamp in relight_lamps.lamps_by_object(scene).get(chosen, ()):
+                self.numbers(layout, context, lamp)
         else:
             self.say(layout, context, "The scan has no lamp.", "INFO")
         layout.operator("scan_relight.restore_light", icon="LOOP_BACK")

@@ -30,8 +30,19 @@ def is_lamp(material: bpy.types.Material | None) -> bool:
 
 def find_lamps(scene: bpy.types.Scene) -> list[bpy.types.Material]:
     """The materials of all recovered lamps in a scene, each once, sorted by name."""
-    found = {slot.material for thing in scene.objects if thing.type == "MESH" for slot in thing.material_slots}
-    return sorted(filter(is_lamp, found), key=lambda material: material.name)
+    return sorted(sum(lamps_by_object(scene).values(), []), key=lambda material: material.name)
+
+
+def lamps_by_object(scene: bpy.types.Scene) -> dict[str, list[bpy.types.Material]]:
+    """Each lamp of a scene once, under the name of the first object that wears it."""
+    found, seen = {}, set()
+    for thing in scene.objects:
+        for slot in thing.material_slots if thing.type == "MESH" else ():
+            if slot.material not in seen:
+                seen.add(slot.material)
+                if is_lamp(slot.material):
+                    found.setdefault(thing.name, []).append(slot.material)
+    return found
 
 
 def lamp_named(scene: bpy.types.Scene, name: str) -> list[bpy.types.Material]:
