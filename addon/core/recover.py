@@ -42,7 +42,7 @@ from .store import Store, key
 from .surface.build import Surface, build_surface, from_uv, turned
 from .surface.denoise import without_noise
 
-CODE = 16
+CODE = 17
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 

@@ -12,6 +12,7 @@ from ..lit_diffuse.accumulate import ENOUGH, LitDiffuse
 from ..lit_diffuse.visibility import CLEAN, SATURATED
 from ..progress import Progress
 from ..surface.atlas import Atlas
+from ..surface.creases import crease_doubt
 from ..surface.mesh_noise import tilt
 from ..surface.rays import RayScene
 from .albedo import Albedo, fill, quotient
@@ -152,8 +153,9 @@ def shade(
         field, lit, rays=rays, emitter_rays=emitter_rays, portal_rays=portal_rays,
         interpolate=interpolate, finest=finest, progress=progress, **how,
     )  # fmt: skip
-    # A noisy mesh faces elsewhere than the surface did.
-    unsure = np.hypot(unsure, tilted)
+    # A noisy mesh faces elsewhere than the surface did; near a crease the light of two sides is mixed.
+    creased = crease_doubt(mesh, atlas, float(np.sqrt(np.median(atlas.area))))
+    unsure = np.sqrt(unsure**2 + tilted**2 + creased**2)
     rho, valid = quotient(lit_diffuse.radiance, E)
     albedo = fill(atlas, rho, valid & seen, class_of, emitters, np.hypot(doubt(lit_diffuse), unsure))
     return Shading(E, escaped, unsure, field.radiance, albedo, lamps, light.environment, light.notes, mirrors, points)
