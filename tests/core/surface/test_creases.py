@@ -1,0 +1,66 @@
+"""Where a mesh bends, and what is in doubt for it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon.core.capture.model import Mesh
+from addon.core.surface.atlas import Atlas
+from addon.core.surface.creases import DOUBT, REACH, crease_doubt, edge_angles
+
+TEXEL = 0.01
+
+
+def folded(angle: float, turned: bool = False, apart: bool = False) -> Mesh:
+    """Two squares of a metre that meet at x = 1 under `angle`; windings alike or not, vertices joined or listed twice."""
+    c, s = np.cos(angle), np.sin(angle)
+    flat = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+    bent = [(1, 0, 0), (1 + c, 0, s), (1 + c, 1, s), (1, 1, 0)]
+    second = [(4, 6, 5), (4, 7, 6)] if turned else [(4, 5, 6), (4, 6, 7)]
+    vertices = np.array(flat + bent, float)
+    if not apart:
+        second = [tuple({4: 1, 7: 2}.get(i, i) for i in t) for t in second]
+    triangles = np.array([(0, 1, 2), (0, 2, 3), *second], np.int32)
+    return Mesh(vertices, triangles, np.zeros(4, np.int32))
+
+
+def elements(points: list, triangle: list) -> Atlas:
+    """An atlas of which only places and triangles matter."""
+    n = len(points)
+    none = np.zeros(n, np.int32)
+    return Atlas(1, np.zeros((4, 3, 2), np.float32), none, np.int32(triangle), np.float32(points),
+                 np.tile(np.float32([0, 0, 1]), (n, 1)), none, np.full(n, TEXEL**2, np.float32), none)  # fmt: skip
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.05, 0.5, np.pi / 2])
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("apart", [False, True])
+def test_the_angle_at_a_fold(angle, turned, apart):
+    angles = edge_angles(folded(angle, turned, apart))
+    assert angles[0, 0] == pytest.approx(angle, abs=1e-3)  # edge 1-2, opposite corner 0
+    assert angles[0, 1] == pytest.approx(0, abs=1e-3)  # the square's diagonal
+    assert angles[1, 0] == pytest.approx(np.pi / 2)  # a border
+    assert angles.shape == (4, 3)
+
+
+def test_three_sheets_at_one_edge_have_no_flat_one():
+    mesh = folded(0.0)
+    third = np.array([(1, 0, 1), (1, 1, 1)], float)
+    mesh = Mesh(np.concatenate([mesh.vertices, third]), np.concatenate([mesh.triangles, [[1, 2, len(mesh.vertices)]]]),
+                np.zeros(5, np.int32))  # fmt: skip
+    assert edge_angles(mesh).max() == pytest.approx(np.pi / 2)
+
+
+def test_doubt_is_full_at_a_crease_and_gone_beyond_its_reach():
+    mesh = folded(np.pi / 2)
+    off = np.array([0.0, 0.5, 0.99 * REACH, 1.01 * REACH, 20]) * TEXEL
+    atlas = elements([(1 - x, 0.4, 0) for x in off], [0] * 5)
+    doubt = crease_doubt(mesh, atlas, TEXEL)
+    assert doubt[0] == pytest.approx(DOUBT) and (np.diff(doubt) <= 0).all()
+    assert doubt[2] > 0 and (doubt[3:] == 0).all()
+
+
+def test_a_flat_surface_is_not_in_doubt():
+    atlas = elements([(0.999, 0.4, 0), (0.5, 0.5, 0)], [0, 0])
+    assert (crease_doubt(folded(0.0), atlas, TEXEL) == 0).all()
