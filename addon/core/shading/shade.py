@@ -153,9 +153,11 @@ def shade(
         field, lit, rays=rays, emitter_rays=emitter_rays, portal_rays=portal_rays,
         interpolate=interpolate, finest=finest, progress=progress, **how,
     )  # fmt: skip
-    # A noisy mesh faces elsewhere than the surface did; near a crease the light of two sides is mixed.
-    creased = crease_doubt(mesh, atlas, float(np.sqrt(np.median(atlas.area))))
-    unsure = np.sqrt(unsure**2 + tilted**2 + creased**2)
+    # A noisy mesh faces elsewhere than the surface did.
+    unsure = np.hypot(unsure, tilted)
+    if sampler != "uniform":  # the paper's way, whose rays alone leave more noise than creases do
+        # Near a crease the light of two sides is mixed.
+        unsure = np.hypot(unsure, crease_doubt(mesh, atlas, float(np.sqrt(np.median(atlas.area)))))
     rho, valid = quotient(lit_diffuse.radiance, E)
     albedo = fill(atlas, rho, valid & seen, class_of, emitters, np.hypot(doubt(lit_diffuse), unsure))
     return Shading(E, escaped, unsure, field.radiance, albedo, lamps, light.environment, light.notes, mirrors, points)

@@ -1,4 +1,4 @@
-"""Near a crease an element's irradiance is in doubt: its texel, the pixels and the facets mix the light of both sides."""
+"""Near a crease an element's irradiance is in doubt: texel, pixels and facets mix the light of both sides."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ REACH = 1.5
 """Texels from the edge up to which it is felt, less and less."""
 KNEE = 0.1
 """Radians from which on a crease has its full effect: a facet of a curved moulding is no smoother than a corner."""
+THIN = 1e-3
+"""A triangle of less height, relative to its longest edge, faces no sure way: an edge with it tells of no bend."""
 DOUBT = 0.3
 """Relative standard error of the irradiance right at a crease. Living room, white panelling: 0.25 to 0.4 there and
 0.07 to 0.12 on flat parts."""
@@ -22,9 +24,13 @@ DOUBT = 0.3
 
 def edge_angles(mesh: Mesh) -> np.ndarray:
     """Angle in radians, 0...pi/2, by which the surface bends at each triangle's edges, (t, 3); edge k lies opposite
-    corner k. Windings don't matter. Where an edge has no other triangle, pi/2: what goes on there is not known."""
+    corner k. Windings don't matter. Where an edge has no other triangle, pi/2: what goes on there is not known. 0 at a
+    sliver's edges."""
     points, faces, _ = welded(mesh, WELD)
-    normal, _ = triangle_geometry(mesh)
+    normal, area = triangle_geometry(mesh)
+    corners = mesh.vertices[mesh.triangles]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
+    sliver = np.repeat(2 * area < THIN * longest**2, 3)
     ends = np.sort(np.stack([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]], 1), 2).reshape(-1, 2)
     _, edge, count = np.unique(ends[:, 0] * len(points) + ends[:, 1], return_inverse=True, return_counts=True)
     edge = edge.ravel()
@@ -38,6 +44,7 @@ def edge_angles(mesh: Mesh) -> np.ndarray:
     cosine[order] = np.abs((own[order] * own[following]).sum(1))
     angle = np.arccos(np.clip(cosine, 0, 1))
     angle[count[edge] == 1] = np.pi / 2
+    angle[np.bincount(edge, sliver, len(count))[edge] > 0] = 0
     return angle.reshape(-1, 3)
 
 

@@ -24,7 +24,8 @@ def welded(mesh: Mesh, tolerance: float = 0.0) -> tuple[np.ndarray, np.ndarray, 
     place : (v,) int
         The point of each vertex.
     """
-    cells = np.floor(mesh.vertices / tolerance) if tolerance > 0 else mesh.vertices
+    # Rounded, not cut off: what lies on round numbers, as a drawn room does, is then in the middle of a cell.
+    cells = np.round(mesh.vertices / tolerance) if tolerance > 0 else mesh.vertices
     _, first, place = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     place = place.ravel()
     return mesh.vertices[first].astype(np.float64), place[mesh.triangles], place

@@ -13,7 +13,7 @@ TEXEL = 0.01
 
 
 def folded(angle: float, turned: bool = False, apart: bool = False) -> Mesh:
-    """Two squares of a metre that meet at x = 1 under `angle`; windings alike or not, vertices joined or listed twice."""
+    """Two squares of a metre that meet at x = 1 under `angle`; windings alike or not, vertices listed once or twice."""
     c, s = np.cos(angle), np.sin(angle)
     flat = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
     bent = [(1, 0, 0), (1 + c, 0, s), (1 + c, 1, s), (1, 1, 0)]
@@ -64,3 +64,11 @@ def test_doubt_is_full_at_a_crease_and_gone_beyond_its_reach():
 def test_a_flat_surface_is_not_in_doubt():
     atlas = elements([(0.999, 0.4, 0), (0.5, 0.5, 0)], [0, 0])
     assert (crease_doubt(folded(0.0), atlas, TEXEL) == 0).all()
+
+
+def test_slivers_tell_of_no_bend():
+    mesh = folded(0.0)
+    vertices = np.concatenate([mesh.vertices, [(0.5, -1e-5, 3e-6)]])  # beside the edge from corner 0 to 1
+    with_sliver = Mesh(vertices, np.concatenate([mesh.triangles, [[0, len(vertices) - 1, 1]]]), np.zeros(5, np.int32))
+    angles = edge_angles(with_sliver)
+    assert angles[0, 2] == 0 and (angles[4] == 0).all() and angles[1, 0] == pytest.approx(np.pi / 2)
