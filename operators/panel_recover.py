@@ -104,7 +104,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         if report is not None and job.state == jobs.DONE and job.facts.get("until") == "write":
             layout.operator("wm.path_open", text="Open Report", icon="URL").filepath = str(report)
         if job.warnings:
-            header, body = layout.panel("scan_relight_warnings", default_closed=False)
+            header, body = layout.panel("scan_relight_warnings", default_closed=True)
             header.label(text=f"{len(job.warnings)} warning{'s' * (len(job.warnings) > 1)}")
             if body is not None:
                 for sentence in job.warnings:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -19,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[2]
 @pytest.fixture(scope="session")
 def blender() -> str:
     """The executable that is tested."""
-    found = os.environ.get("BLENDER") or shutil.which("blender")
+    found = os.environ.get("BLENDER")
     if reason := missing(found):
         pytest.skip(f"the window is not tested: {reason}")
     return found

@@ -129,9 +129,12 @@ class Window:
             time.sleep(0.05)
         return value
 
-    def click(self, *words: str, top: bool = True) -> None:
-        """Press the sidebar's button whose Python command, or whose property's path, holds all `words`."""
-        found = self.ask(f"find({words!r}, top={top})", patience=300)
+    def click(self, *words: str, top: bool = True, across: tuple[float, ...] = (0.5, 0.25, 0.75)) -> None:
+        """Press the sidebar's button whose Python command, or whose property's path, holds all `words`.
+
+        It is looked for at these shares of the sidebar's width, from its top or from where it is scrolled to.
+        """
+        found = self.ask(f"find({words!r}, across={across!r}, top={top})", patience=300)
         assert isinstance(found, list), f"no button {words} among {found['seen']}"
         self.click_at(*found)
 

@@ -19,7 +19,8 @@ import bpy
 TAB = "Scan Relight"
 STALL = 0.1
 FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
-state = {"next": 0, "task": None, "last": None, "stalls": [], "own": [], "phases": [], "watching": False}
+state = {"next": 0, "task": None, "last": None, "stalls": [], "own": [], "phases": [], "watching": False,
+         "known": {}}
 
 
 def module(name):
@@ -88,6 +89,13 @@ def find(words, across=(0.5, 0.25, 0.75, 0.12, 0.9), top=True):
     Returns x and y, from the window's upper left corner, where its text holds all `words`; else all that was found.
     """
     window, seen = bpy.context.window_manager.windows[0], {}
+    for text, (x, y) in list(state["known"].items()):  # where it was seen before
+        if all(word in text for word in words):
+            window.cursor_warp(x, window.height - y)
+            yield
+            yield
+            if under_mouse() == text:
+                return [x, y]
     if top:
         scroll(-100000)
         yield
@@ -95,7 +103,7 @@ def find(words, across=(0.5, 0.25, 0.75, 0.12, 0.9), top=True):
         region = place("UI")["region"]
         for share in across:
             x = region.x + round((region.width - 40) * share) + 8
-            for y in range(region.y + region.height - 16, region.y + 6, -11):
+            for y in range(region.y + region.height - 16, region.y + 6, -15):
                 window.cursor_warp(x, y)
                 yield
                 yield
@@ -104,6 +112,7 @@ def find(words, across=(0.5, 0.25, 0.75, 0.12, 0.9), top=True):
                 if text and all(word in text for word in words):
                     yield
                     if under_mouse() == text:  # still there after what the mouse had Blender draw
+                        state["known"].update(seen)
                         return list(seen[text])
         before = region.view2d.region_to_view(0, 0)
         scroll(region.height * 0.6)

@@ -105,9 +105,9 @@ answer = choices.result_folder, choices.preset, list(choices.bl_rna.properties.k
     assert not {"job", "progress", "state", "running"} & set(kept[2])
     assert window.ask(JOB) is None and window.ask(ROOM) == 15
     assert window.ask("bpy.ops.scan_relight.look.poll() and bpy.ops.scan_relight.switch_lamps.poll()")
-    window.click("scan_relight.look(", "'ALBEDO'")
+    window.click("scan_relight.look(", "'ALBEDO'", across=(0.75,))
     window.wait_for("module('addon.bridge.look').current(bpy.context.scene) == 'ALBEDO'")
-    window.click("scan_relight.switch_lamps(", "on=False", top=False)
+    window.click("scan_relight.switch_lamps(", "on=False", top=False, across=(0.75,))
     lamps = "module('addon.bridge.relight_lamps')"
     window.wait_for(f"not any({lamps}.is_on(one) for one in {lamps}.find_lamps(bpy.context.scene))")
     window.picture(pictures / "08-reopened.png")
