@@ -33,7 +33,7 @@ class SCAN_RELIGHT_UL_results(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
         """Name, roughness, specular, certainty."""
         one = self.known.get(item.get("object_id"), {})
-        split = layout.split(factor=0.52)
+        split = layout.split(factor=0.6)
         split.label(text=item.name, icon=ICONS.get(one.get("model"), "BLANK1"), translate=False)
         row = split.row()
         texts = columns(one)
@@ -121,7 +121,7 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
                      "is finished.", "INFO")
             return
         if any(thing.get("object_id") in found.objects for thing in scene.objects if thing.type == "MESH"):
-            head = layout.split(factor=0.52)
+            head = layout.split(factor=0.6)
             head.label(text="Object")
             row = head.row()
             row.label(text="Rough")

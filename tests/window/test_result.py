@@ -33,10 +33,12 @@ space.shading.type, space.region_3d.view_perspective = "SOLID", "CAMERA"
 def test_a_click_on_a_result_selects_its_object(window, pictures):
     x, y = window.ask("find(('scan_relight_row',), across=(0.3,))")
     window.click_at(x, y)
+    window.wait_for("len(bpy.context.view_layer.objects.selected) == 1", patience=20)
     first = window.ask("bpy.context.view_layer.objects.active.name")
     window.click_at(x, y + 46)
-    second = window.ask("bpy.context.view_layer.objects.active.name")
-    assert first != second and window.ask("[one.name for one in bpy.context.view_layer.objects.selected]") == [second]
+    second = window.wait_for("(lambda name: name if name != %r else '')(bpy.context.view_layer.objects.active.name)"
+                             % first)
+    assert window.ask("[one.name for one in bpy.context.view_layer.objects.selected]") == [second]
     known = window.ask("[module('operators.results').result_of(bpy.context.scene).objects[bpy.data.objects[name]"
                        f"['object_id']]['model'] for name in {[first, second]!r}]")
     assert set(known) <= {"lambertian", "specular", "metal", "emitter", "transparent"}
