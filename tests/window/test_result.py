@@ -36,8 +36,8 @@ def test_a_click_on_a_result_selects_its_object(window, pictures):
     window.wait_for("len(bpy.context.view_layer.objects.selected) == 1", patience=20)
     first = window.ask("bpy.context.view_layer.objects.active.name")
     window.click_at(x, y + 46)
-    second = window.wait_for("(lambda name: name if name != %r else '')(bpy.context.view_layer.objects.active.name)"
-                             % first)
+    window.wait_for(f"bpy.context.view_layer.objects.active.name != {first!r}")
+    second = window.ask("bpy.context.view_layer.objects.active.name")
     assert window.ask("[one.name for one in bpy.context.view_layer.objects.selected]") == [second]
     known = window.ask("[module('operators.results').result_of(bpy.context.scene).objects[bpy.data.objects[name]"
                        f"['object_id']]['model'] for name in {[first, second]!r}]")
