@@ -33,12 +33,12 @@ class SCAN_RELIGHT_UL_results(bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
         """Name, roughness, specular, certainty."""
         one = self.known.get(item.get("object_id"), {})
-        split = layout.split(factor=0.6)
+        texts = columns(one)
+        split = layout.split(factor=0.52 if any(texts) else 0.86)  # long names may use what stays empty
         split.label(text=item.name, icon=ICONS.get(one.get("model"), "BLANK1"), translate=False)
         row = split.row()
-        texts = columns(one)
-        row.label(text=texts[0])
-        row.label(text=texts[1])
+        for text in texts if any(texts) else ():
+            row.label(text=text)
         row.label(text="", icon=SIGNS[results.certainty(one)])
 
     def draw_filter(self, context, layout):
@@ -121,7 +121,7 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
                      "is finished.", "INFO")
             return
         if any(thing.get("object_id") in found.objects for thing in scene.objects if thing.type == "MESH"):
-            head = layout.split(factor=0.6)
+            head = layout.split(factor=0.52)
             head.label(text="Object")
             row = head.row()
             row.label(text="Rough")
@@ -171,7 +171,7 @@ class SCAN_RELIGHT_PT_stages(SidebarPanel, bpy.types.Panel):
         for name, label in results.STAGES:
             told = stages.get(name)
             row = column.row(align=True)
-            split = row.split(factor=0.62)
+            split = row.split(factor=0.522)
             split.label(text=label)
             seconds = (told or {}).get("seconds")
             split.label(text="" if seconds is None else "stored" if told.get("stored") else duration(seconds))

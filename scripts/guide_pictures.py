@@ -13,6 +13,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 from PIL import Image
@@ -23,6 +24,13 @@ sys.path.insert(0, str(ROOT))
 from tests.window import driver  # noqa: E402
 from tests.window.driver import Screen, Window, environment, missing  # noqa: E402
 
+SIZE = 1360, 1240
+"""The whole sidebar at once."""
+BAR = 560, 60, 1120, 960
+KEPT = {"empty": None, "capture": BAR, "shading": BAR, "done": None, "results": (300, 60, 1120, 1140), "albedo": None,
+        "light": None, "object": None, "before-after": None}
+"""The steps that the guide shows, and the part of the window."""
+LARGEST = 145_000
 JOB = "module('addon.bridge.job').current()"
 ACTIVE = "module('operators.job_operator').active()"
 LAMPS = "module('addon.bridge.relight_lamps')"
@@ -41,7 +49,7 @@ def main() -> int:
     if reason := missing(blender):
         sys.exit(f"The window can't be shown here: {reason}.")
     full = ROOT / "build" / "guide"
-    driver.SIZE = 1360, 1240  # the whole sidebar at once
+    driver.SIZE = SIZE
     with tempfile.TemporaryDirectory() as scratch:
         user = Path(scratch) / "user"
         user.mkdir()
@@ -67,6 +75,12 @@ def play(window: Window, options, full: Path) -> None:
         window.picture(path)
         print(path.name, flush=True)
 
+    recover(window, options, picture)
+    relight(window, picture)
+
+
+def recover(window: Window, options, picture) -> None:
+    """From an empty scene to the recovered room, seen through a frame's camera."""
     result = options.capture.with_name(options.capture.name + "-result")
     window.ask("""
 for thing in list(bpy.data.objects):
@@ -86,32 +100,47 @@ choices.result_folder, choices.preset = {str(result)!r}, {options.preset!r}
         window.wait_for(f"{JOB}.stage == {stage!r} or not {JOB}.running", patience=300)
         picture(stage)
     window.wait_for(f"{ACTIVE} is None", patience=600)
+    look_through(window, options.frame)
+    picture("done")
+
+
+def look_through(window: Window, frame: int) -> None:
+    """Through a frame's camera, without the signs for cameras and lamps."""
     window.ask(f"""
+bpy.context.scene.scan_relight_studio.show_frame = False
 with bpy.context.temp_override(**place()):
-    bpy.ops.scan_relight.match_frame("INVOKE_DEFAULT", True, index={options.frame})
+    bpy.ops.scan_relight.match_frame("INVOKE_DEFAULT", True, index={frame})
     bpy.ops.view3d.view_center_camera()
 space = place()["area"].spaces.active
 space.overlay.show_extras = space.overlay.show_relationship_lines = space.overlay.show_outline_selected = False
+space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
 """)
-    picture("done")
+
+
+def relight(window: Window, picture) -> None:
+    """What was found, then another light."""
     x, y = window.ask("find(('scan_relight_row',), across=(0.3,))")
     window.click_at(x, y + 46)
     picture("results")
     window.click("scan_relight.look(", "'ALBEDO'", top=False, across=(0.75,))
+    compiled(window)
     picture("albedo")
     window.click("scan_relight.look(", "'MATERIAL'", top=False, across=(0.25,))
     window.ask("""
 shading = place()["area"].spaces.active.shading
 shading.use_scene_lights = shading.use_scene_world = True
 """)
+    compiled(window)
     picture("material")
     window.click("scan_relight.switch_lamps(", "on=False", top=False, across=(0.75,))
     window.click("scan_relight.add_light(", "'WINDOW'", top=False, across=(0.25,))
+    compiled(window)
     picture("light")
     window.ask("""
 with bpy.context.temp_override(**place()):
     bpy.ops.scan_relight.add_virtual("INVOKE_DEFAULT", True, shape="MONKEY", look="GLOSSY", size=0.5)
 """)
+    compiled(window)
     picture("object")
     window.click("scan_relight.before_after(", top=False, across=(0.5,))
     window.wait_for(f"{ACTIVE} is not None")
@@ -119,21 +148,45 @@ with bpy.context.temp_override(**place()):
     picture("before-after")
 
 
+def compiled(window: Window, patience: float = 150.0) -> None:
+    """Wait until the viewport has its shaders: until two pictures of it, some seconds apart, are alike."""
+    time.sleep(45.0)  # nothing moves while it is at it
+    until, last = time.monotonic() + patience, None
+    while time.monotonic() < until:
+        now = window.picture().crop((0, 200, 700, SIZE[1] - 200)).tobytes()
+        if now == last:
+            return
+        last = now
+        time.sleep(4.0)
+
+
 def scale(full: Path, out: Path) -> None:
-    """Pictures for the guide: scaled, in few colours; and all of them on one sheet."""
+    """Pictures for the guide: cut to what they show, scaled, in few colours; and every step on one sheet."""
     out.mkdir(parents=True, exist_ok=True)
     small = []
     for path in sorted(full.glob("*.png")):
         with Image.open(path) as picture:
-            picture.resize((1000, round(1000 * picture.height / picture.width)), Image.Resampling.LANCZOS).quantize(
-                128, dither=Image.Dither.NONE).save(out / path.name.partition("-")[2], optimize=True)
-            small.append(picture.convert("RGB").resize((400, round(400 * picture.height / picture.width)),
-                                                       Image.Resampling.LANCZOS))
+            picture = picture.convert("RGB")
+            name = path.stem.partition("-")[2]
+            if name in KEPT:
+                part = picture.crop(KEPT[name] or (0, 0, *picture.size))
+                width = min(part.width, 860)
+                save(part.resize((width, round(width * part.height / part.width)), Image.Resampling.LANCZOS),
+                     out / f"{name}.png")
+            small.append(picture.resize((320, round(320 * picture.height / picture.width)), Image.Resampling.LANCZOS))
     rows = -(-len(small) // 3)
-    sheet = Image.new("RGB", (3 * 404 - 4, rows * (small[0].height + 4) - 4), "white")
+    sheet = Image.new("RGB", (3 * 324 - 4, rows * (small[0].height + 4) - 4), "white")
     for number, picture in enumerate(small):
-        sheet.paste(picture, (number % 3 * 404, number // 3 * (small[0].height + 4)))
-    sheet.quantize(128, dither=Image.Dither.NONE).save(out / "sequence.png", optimize=True)
+        sheet.paste(picture, (number % 3 * 324, number // 3 * (small[0].height + 4)))
+    save(sheet, out / "sequence.png")
+
+
+def save(picture: Image.Image, path: Path) -> None:
+    """In as many colours as `LARGEST` bytes allow."""
+    for colours in (128, 64, 40, 24):
+        picture.quantize(colours, dither=Image.Dither.NONE).save(path, optimize=True)
+        if path.stat().st_size <= LARGEST:
+            return
 
 
 if __name__ == "__main__":
