@@ -206,9 +206,12 @@ def _ply(mesh: SceneMesh, metre: float) -> bytes:
 
 
 def bring(source: Path, target: Path) -> None:
-    """Let `target` be the picture `source`: a link, or a copy where the system has none."""
+    """Let `target` be the picture `source`: the same file by another name, or a copy on another disk.
+
+    Not a symbolic link: one that leads out of a capture is refused where nobody asked for it.
+    """
     source = source.resolve()
-    for way in (os.symlink, os.link, shutil.copy2):
+    for way in (os.link, shutil.copy2):
         try:
             way(source, target)
             return
