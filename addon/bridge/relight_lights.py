@@ -17,6 +17,7 @@ import bpy
 from mathutils import Matrix, Vector
 
 from ..core.errors import BadInputError
+from .own_collection import own_collection
 from .relight_aim import Placement, softbox_place, spot_place, sun_place, window_place
 from .relight_room import OBJECT, room_light, target_of
 
@@ -70,7 +71,7 @@ def add_light(scene: bpy.types.Scene, preset: str, strength: float = 1.0, aim: s
     light.matrix_world = Matrix.LocRotScale(place.origin, place.rotation, None)
     light[KIND] = preset
     light.visible_camera = False  # it lights the picture; it is not part of it
-    _collection(scene).objects.link(light)
+    own_collection(scene, COLLECTION).objects.link(light)
     return light
 
 
@@ -110,16 +111,6 @@ def _lamp(preset: str, place: Placement, distance: float, irradiance: float) -> 
     else:
         data.energy = irradiance * (area + math.pi * distance ** 2)
     return data
-
-
-def _collection(scene) -> bpy.types.Collection:
-    """The scene's collection of new lights."""
-    for part in scene.collection.children:
-        if part.name.split(".")[0] == COLLECTION:
-            return part
-    part = bpy.data.collections.new(COLLECTION)
-    scene.collection.children.link(part)
-    return part
 
 
 def aim_at(light: bpy.types.Object, target: Vector) -> None:

@@ -11,6 +11,7 @@ from mathutils import Matrix, Vector
 
 from ..core.errors import BadInputError
 from .materials import plain_material
+from .own_collection import own_collection
 from .relight_room import Hit, bounds, cast, depsgraph_of, picture_ray
 
 KIND = "scan_relight_virtual"
@@ -73,7 +74,7 @@ def add_virtual(scene: bpy.types.Scene, shape: str, size: float = 0.3, look: str
         thing.modifiers.new("Smooth", "SUBSURF").render_levels = 2
     points = np.array([vertex.co for vertex in mesh.vertices])
     thing.scale = (size / float(np.ptp(points, axis=0).max()),) * 3
-    collection_of(scene).objects.link(thing)
+    own_collection(scene, COLLECTION).objects.link(thing)
     set_look(thing, look)
     if shape == MONKEY and scene.camera:
         way = scene.camera.matrix_world.translation - at.place
@@ -236,13 +237,3 @@ def _drop(scene, points: np.ndarray, height: float) -> float:
         if hit:
             gaps.append(z - hit.place.z)
     return min(gaps, default=0.0)
-
-
-def collection_of(scene: bpy.types.Scene) -> bpy.types.Collection:
-    """The scene's collection of virtual objects, made where absent."""
-    for part in scene.collection.children:
-        if part.name.split(".")[0] == COLLECTION:
-            return part
-    part = bpy.data.collections.new(COLLECTION)
-    scene.collection.children.link(part)
-    return part

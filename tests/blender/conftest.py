@@ -12,6 +12,26 @@ import pytest
 os.environ.setdefault("BLENDER_USER_EXTENSIONS", tempfile.mkdtemp())
 
 
+def honest(scene):
+    """Cycles without anything that trades truth for calm pictures."""
+    cycles = scene.cycles
+    cycles.device, cycles.seed, cycles.pixel_filter_type = "CPU", 0, "BOX"
+    cycles.use_adaptive_sampling, cycles.use_denoising = False, False
+    cycles.sample_clamp_indirect, cycles.blur_glossy = 0, 0
+
+
+@pytest.fixture
+def scene():
+    """An empty factory scene, black world, rendered by an honest Cycles."""
+    bpy = pytest.importorskip("bpy")
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.render.use_compositing = scene.render.use_sequencer = False
+    honest(scene)
+    return scene
+
+
 @pytest.fixture(scope="module")
 def package(root):
     """The checkout as the registered package `scan_relight`."""

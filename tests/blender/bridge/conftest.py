@@ -10,21 +10,6 @@ os.environ.setdefault("BLENDER_USER_EXTENSIONS", tempfile.mkdtemp())
 
 
 @pytest.fixture
-def scene():
-    """An empty factory scene, black world, Cycles without anything that trades truth for calm pictures."""
-    bpy = pytest.importorskip("bpy")
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.engine = "CYCLES"
-    scene.render.use_compositing = scene.render.use_sequencer = False
-    cycles = scene.cycles
-    cycles.device, cycles.seed, cycles.pixel_filter_type = "CPU", 0, "BOX"
-    cycles.use_adaptive_sampling, cycles.use_denoising = False, False
-    cycles.sample_clamp_indirect, cycles.blur_glossy = 0, 0
-    return scene
-
-
-@pytest.fixture
 def shoot(scene, tmp_path):
     """Render `scene` through its camera: ``shoot(width, height, samples)`` gives (height, width, 4) float32, row 0 at
     the top, linear Rec.709, background transparent if the scene says so."""

@@ -8,6 +8,8 @@ import tempfile
 import numpy as np
 import pytest
 
+from tests.blender.conftest import honest
+
 os.environ.setdefault("BLENDER_USER_EXTENSIONS", tempfile.mkdtemp())
 
 QUICK = ("--shading-rays", "16", "--specular-rays", "4", "--emitter-rays", "2", "--refine", "0", "--texel-size", "0.1",
@@ -26,18 +28,6 @@ def result(tmp_path_factory, tiny_capture, root):
 
 
 @pytest.fixture
-def scene():
-    """An empty factory scene, black world, Cycles without anything that trades truth for calm pictures."""
-    bpy = pytest.importorskip("bpy")
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.engine = "CYCLES"
-    scene.render.use_compositing = scene.render.use_sequencer = False
-    honest(scene)
-    return scene
-
-
-@pytest.fixture
 def room(result):
     """The recovered room, opened."""
     bpy = pytest.importorskip("bpy")
@@ -45,13 +35,6 @@ def room(result):
     scene = bpy.context.scene
     honest(scene)
     return scene
-
-
-def honest(scene):
-    cycles = scene.cycles
-    cycles.device, cycles.seed, cycles.pixel_filter_type = "CPU", 0, "BOX"
-    cycles.use_adaptive_sampling, cycles.use_denoising = False, False
-    cycles.sample_clamp_indirect, cycles.blur_glossy = 0, 0
 
 
 @pytest.fixture

@@ -1,8 +1,6 @@
 """The operators and properties of the artist's side, in the background."""
 
 import importlib
-import importlib.util
-import sys
 
 import numpy as np
 import pytest
@@ -12,21 +10,6 @@ bpy = pytest.importorskip("bpy")
 OPERATORS = ("switch_lamps", "restore_lamp", "restore_light", "add_light", "remove_lights", "use_hdri",
              "use_studio_light", "match_frame", "add_virtual", "place_object", "virtual_look", "pick_place",
              "before_after", "export")
-
-
-@pytest.fixture(scope="module")
-def package(root):
-    """The checkout as the registered package `scan_relight`."""
-    spec = importlib.util.spec_from_file_location("scan_relight", root / "__init__.py",
-                                                  submodule_search_locations=[str(root)])
-    package = importlib.util.module_from_spec(spec)
-    sys.modules["scan_relight"] = package
-    spec.loader.exec_module(package)
-    package.register()
-    yield package
-    package.unregister()
-    for name in [name for name in sys.modules if name.split(".")[0] == "scan_relight"]:
-        del sys.modules[name]
 
 
 @pytest.fixture
