@@ -28,7 +28,7 @@ SIZE = 1360, 1240
 """The whole sidebar at once."""
 BAR = 560, 60, 1120, 960
 KEPT = {"empty": None, "capture": BAR, "shading": BAR, "done": None, "results": (300, 60, 1120, 1140), "albedo": None,
-        "light": None, "object": None, "before-after": None}
+        "light": None, "object": None}
 """The steps that the guide shows, and the part of the window."""
 LARGEST = 145_000
 JOB = "module('addon.bridge.job').current()"
@@ -63,6 +63,8 @@ def main() -> int:
             window.close()
             screen.close()
     scale(full, options.out)
+    with Image.open(options.capture.with_name(options.capture.name + "-result") / "before_after.png") as pair:
+        save(pair.convert("RGB"), options.out / "relit.png")
     return 0
 
 
