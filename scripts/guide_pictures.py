@@ -30,7 +30,9 @@ BAR = 560, 60, 1120, 960
 KEPT = {"empty": None, "capture": BAR, "shading": BAR, "done": None, "results": (300, 60, 1120, 1140), "albedo": None,
         "light": None, "object": None}
 """The steps that the guide shows, and the part of the window."""
-LARGEST = 145_000
+LARGEST = 149_000
+TILE = 212
+"""Width of a picture on the sheet."""
 JOB = "module('addon.bridge.job').current()"
 ACTIVE = "module('operators.job_operator').active()"
 LAMPS = "module('addon.bridge.relight_lamps')"
@@ -175,11 +177,12 @@ def scale(full: Path, out: Path) -> None:
                 width = min(part.width, 860)
                 save(part.resize((width, round(width * part.height / part.width)), Image.Resampling.LANCZOS),
                      out / f"{name}.png")
-            small.append(picture.resize((320, round(320 * picture.height / picture.width)), Image.Resampling.LANCZOS))
-    rows = -(-len(small) // 3)
-    sheet = Image.new("RGB", (3 * 324 - 4, rows * (small[0].height + 4) - 4), "white")
+            size = TILE, round(TILE * picture.height / picture.width)
+            small.append(picture.resize(size, Image.Resampling.LANCZOS))
+    rows = -(-len(small) // 4)
+    sheet = Image.new("RGB", (4 * (TILE + 4) - 4, rows * (small[0].height + 4) - 4), "white")
     for number, picture in enumerate(small):
-        sheet.paste(picture, (number % 3 * 324, number // 3 * (small[0].height + 4)))
+        sheet.paste(picture, (number % 4 * (TILE + 4), number // 4 * (small[0].height + 4)))
     save(sheet, out / "sequence.png")
 
 
