@@ -34,7 +34,7 @@ class SCAN_RELIGHT_UL_results(bpy.types.UIList):
         """Name, roughness, specular, certainty."""
         one = self.known.get(item.get("object_id"), {})
         texts = columns(one)
-        split = layout.split(factor=0.52 if any(texts) else 0.86)  # long names may use what stays empty
+        split = layout.split(factor=0.52 if any(texts) else 0.9)  # long names may use what stays empty
         split.label(text=item.name, icon=ICONS.get(one.get("model"), "BLANK1"), translate=False)
         row = split.row()
         for text in texts if any(texts) else ():
