@@ -6,8 +6,8 @@ from pathlib import Path
 
 import bpy
 
+from ..addon.core.capture.formats import FORMATS
 from ..addon.core.capture.layout import Reading
-from ..addon.core.capture.readers import READERS
 
 FOUND = "FOUND"
 CURVES = (("FOUND", "Not given", "Pictures of 8 and 16 bits are refused, as their curve is unknown"),
@@ -20,7 +20,7 @@ NAMES = ("reading_format", "reading_mesh", "reading_outside", "reading_transfer"
 def format_items() -> list[tuple[str, str, str]]:
     """Items of an enumeration of the formats."""
     return [(FOUND, "From the folder", "Find the format from what the folder holds"),
-            *((reader.name, reader.name, f"Known by {reader.wants}") for reader in READERS)]
+            *((name, name, f"Known by {wants}") for name, wants in FORMATS.items())]
 
 
 def with_reading(cls):

@@ -17,7 +17,6 @@ import numpy as np
 from ..core.capture.model import Capture
 from ..core.errors import StorageError
 from ..core.material import EMITTER, LAMBERTIAN, ObjectMaterial
-from ..core.surface.overview import overview
 from .cameras import differing, make_cameras, make_view, unlike, use_camera
 from .images import load_image, relative_to
 from .materials import make_material
@@ -111,10 +110,16 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
         world = set_world(scene, environment if environment.exists() else None)
         images.update((n.name, n.image) for n in world.node_tree.nodes if n.type == "TEX_ENVIRONMENT")
         _prepare(scene, median_radiance)
-        view = cameras[0] if cameras else make_view("overview", overview(capture.mesh), eyes)
-        use_camera(scene, view)
+        use_camera(scene, cameras[0] if cameras else _overview(capture, eyes))
     warnings = tuple(filter(None, (differing(capture.frames), unlike(capture.frames))))
     return BuiltScene(top, objects, cameras, list(images.values()), warnings)
+
+
+def _overview(capture: Capture, collection: bpy.types.Collection) -> bpy.types.Object:
+    """A camera for a capture that has none."""
+    from ..core.surface.overview import overview  # not earlier: Blender's start should not wait for embreex
+
+    return make_view("overview", overview(capture.mesh), collection)
 
 
 def write_scene(path: Path | str, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],

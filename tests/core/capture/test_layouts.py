@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from addon.core.capture.exr import write_exr
+from addon.core.capture.formats import FORMATS
 from addon.core.capture.layout import RawMesh, Reading
 from addon.core.capture.png import write_png
 from addon.core.capture.read import read_capture
+from addon.core.capture.readers import READERS
 from addon.core.errors import BadInputError
 from tests.core.capture.layouts_on_disk import as_fipt, as_fipt_real, as_scannetpp, as_traj
 
@@ -252,3 +254,7 @@ def test_scannetpp_a_small_object_on_a_large_one(source, tmp_path):
     got = read_capture(root)
     assert [one.class_name for one in got.instances] == ["side 2", "room"]
     assert (got.mesh.object_id == 2).sum() == 2
+
+
+def test_the_light_list_of_formats_is_the_readers():
+    assert [(reader.name, reader.wants) for reader in READERS] == list(FORMATS.items())

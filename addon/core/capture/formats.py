@@ -1,0 +1,12 @@
+"""Names of the formats and the files by which each is known: what Blender's start needs of them, without the readers."""
+
+FORMATS = {
+    "replica": "textures/parameters.json beside mesh.ply",
+    "fipt": "train/transforms.json beside scene.obj",
+    "fipt-real": "cam.txt and K_list.txt",
+    "scannet++": "dslr/colmap and scans/mesh_aligned_0.05.ply",
+    "traj": "traj.txt and results/frame000000.exr",
+    "nerfstudio": "transforms.json",
+    "colmap": "cameras and images of a COLMAP model (.bin or .txt)",
+}
+"""In the order of `readers.READERS`."""
