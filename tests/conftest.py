@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 from pathlib import Path
 
@@ -12,6 +13,8 @@ import pytest
 os.environ.setdefault("BLENDER_USER_EXTENSIONS", tempfile.mkdtemp())  # no installed extension shadows the checkout
 
 ROOT = Path(__file__).resolve().parent.parent
+
+_STATUS = pytest.StashKey[int]()
 
 
 @pytest.fixture(scope="session")
@@ -41,3 +44,16 @@ def tiny_capture(tmp_path_factory) -> Path:
     from addon.bridge.demo_render import render_capture
 
     return render_capture(tmp_path_factory.mktemp("tiny") / "capture", "tiny")
+
+
+def pytest_sessionfinish(session, exitstatus):
+    """Keep the status for `pytest_unconfigure`."""
+    session.config.stash[_STATUS] = int(exitstatus)
+
+
+def pytest_unconfigure(config):
+    """End at once, all being told: Blender 4.5 as a module can wait for ever for a thread of its own."""
+    if "bpy" in sys.modules and not hasattr(config, "workerinput") and _STATUS in config.stash:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(config.stash[_STATUS])
