@@ -22,12 +22,12 @@ from .cli_relight import add_relight, relight_command
 from .console import ConsoleProgress, StopWish, duration, own_console, unexpected
 from .core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_OK, BadInputError, ScanRelightError
 from .core.settings import PRESETS, Settings
+from .core.stages import RUN_STAGES, WRITE
 from .leash import JsonProgress, Leash, MemoryGuard
 from .settings_info import setting_infos
 from .version import VERSION
 
 COMMAND = "scan_relight"
-RUN_STAGES = ("surface", "lit_diffuse", "shading", "specular", "write")
 DEMO_SIZES = ("tiny", "small", "large")
 EXIT_CODES = """\
 exit codes: 0 done, 1 failure, 2 bad input, 130 interrupted (what is finished is kept; the same command goes on from
@@ -97,7 +97,7 @@ def make_parser() -> argparse.ArgumentParser:
                          help="folder with transforms.json, mesh.ply, info_semantic.json and the frames")
     recover.add_argument("--out", metavar="RESULT", type=Path, required=True, help="folder to write, made if missing")
     add_reading(recover)
-    recover.add_argument("--until", metavar="STAGE", choices=RUN_STAGES, default="write",
+    recover.add_argument("--until", metavar="STAGE", choices=RUN_STAGES, default=WRITE,
                          help=f"last stage to do: {', '.join(RUN_STAGES)} (default write, which is all)")
     recover.add_argument("--from-stage", metavar="STAGE", choices=RUN_STAGES,
                          help="do this stage and all later ones anew, though they are stored")
@@ -242,7 +242,7 @@ def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     elif not arguments.quiet:
         for warning in report.get("warnings", ()):
             print(f"Warning: {warning}", file=stream)
-        made = arguments.out / ("scene.blend" if arguments.until == RUN_STAGES[-1] else "stages")
+        made = arguments.out / ("scene.blend" if arguments.until == WRITE else "stages")
         print(f"Done in {duration(report['seconds'])}: {made}", file=stream)
     return EXIT_OK
 

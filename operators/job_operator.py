@@ -15,6 +15,7 @@ import bpy
 from ..addon.bridge import job as jobs
 from ..addon.console import duration, unexpected
 from ..addon.core.errors import ScanRelightError
+from ..addon.core.stages import LABELS
 
 PERIOD = 0.1
 """Seconds between two looks at the job."""
@@ -22,16 +23,15 @@ REDRAW = 0.5
 """Seconds between two pictures of the progress bar, unless the stage changes: drawing is the window's time."""
 SLICE = 0.04
 """Seconds that the scene is worked at before the window is drawn again."""
-STAGES = {"": "Starting", "read": "Reading the capture", "surface": "Surface", "lit_diffuse": "Frames to texture",
-          "shading": "Light and albedo", "specular": "Highlights", "write": "Writing"}
-"""What the stages are called in front of artists."""
 
 
 def stage_text(job: jobs.Job) -> str:
     """What a job does now, in words."""
     if job.stopping:
         return "Stopping"
-    return STAGES.get(job.stage, job.stage.replace("_", " ").capitalize())
+    if not job.stage:
+        return "Starting"
+    return LABELS.get(job.stage, job.stage.replace("_", " ").capitalize())
 
 
 def progress_text(job: jobs.Job) -> str:

@@ -8,6 +8,7 @@ import bpy
 
 from ..addon.bridge import job as jobs
 from ..addon.console import duration
+from ..addon.core.stages import WRITE
 from ..addon.settings_info import setting_infos
 from . import preferences
 from .job_operator import active, bar
@@ -101,7 +102,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
             self.say(layout, context, f"{job.facts.get('title', 'Run')}: done in {duration(job.seconds)}.", "CHECKMARK")
         result = job.facts.get("result_folder")
         report = Path(result) / "report.html" if result else None
-        if report is not None and job.state == jobs.DONE and job.facts.get("until") == "write":
+        if report is not None and job.state == jobs.DONE and job.facts.get("until") == WRITE:
             layout.operator("wm.path_open", text="Open Report", icon="URL").filepath = str(report)
         if job.warnings:
             header, body = layout.panel("scan_relight_warnings", default_closed=True)

@@ -4,6 +4,7 @@
 import bpy
 
 from ..addon.console import duration
+from ..addon.core.stages import LABELS, RUN_STAGES
 from . import results
 from .panel import SidebarPanel
 from .select_result_object import select
@@ -168,11 +169,11 @@ class SCAN_RELIGHT_PT_stages(SidebarPanel, bpy.types.Panel):
         stages = results.result_of(context.scene).stages
         self.say(self.layout, context, "Run again from a stage on; those before it are taken as they are stored.")
         column = self.layout.column(align=True)
-        for name, label in results.STAGES:
+        for name in RUN_STAGES:
             told = stages.get(name)
             row = column.row(align=True)
             split = row.split(factor=0.522)
-            split.label(text=label)
+            split.label(text=LABELS[name])
             seconds = (told or {}).get("seconds")
             split.label(text="" if seconds is None else "stored" if told.get("stored") else duration(seconds))
             again = row.operator("scan_relight.run", text="", icon="FILE_REFRESH")

@@ -12,8 +12,6 @@ import bpy
 from . import preferences
 
 MATERIALS, REPORT, PAGE = "materials.json", "report.json", "report.html"
-STAGES = (("surface", "Surface"), ("lit_diffuse", "Frames to texture"), ("shading", "Light and albedo"),
-          ("specular", "Highlights"), ("write", "Writing"))
 SURE, FAIR = 0.15, 0.4
 """Doubt (`doubt`) up to which an object counts as sure, and as fairly sure."""
 

@@ -3,8 +3,9 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
+from ..addon.core.stages import RUN_STAGES
 from . import preferences, reading_props
-from .settings_props import RUN_STAGES, CaptureOperator, setting_infos, setting_value
+from .settings_props import CaptureOperator, setting_infos, setting_value
 
 TARGETS = {
     "recover": "Recover the capture beside this window; what is finished already is not done again",

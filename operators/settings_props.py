@@ -12,13 +12,13 @@ import bpy
 from ..addon.console import unexpected
 from ..addon.core.errors import BadInputError, ScanRelightError
 from ..addon.core.settings import PRESETS, Settings
+from ..addon.core.stages import RUN_STAGES, WRITE
 from ..addon.leash import MemoryGuard
 from ..addon.settings_info import SettingInfo, setting_infos
 from . import preferences, reading_props
 from .job_operator import JobOperator, active
 from .reading_props import with_reading
 
-RUN_STAGES = ("surface", "lit_diffuse", "shading", "specular", "write")
 PRESET_TEXTS = {
     "draft": "A first look: coarse texels, few rays",
     "normal": "Texels as fine as the frames, rays enough for most rooms",
@@ -207,7 +207,7 @@ class StageOperator(CaptureOperator):
 class SceneStageOperator(StageOperator):
     """A stage operator whose end also changes the scene, in one undo step."""
 
-    until = RUN_STAGES[-1]
+    until = WRITE
     import_first = True
     target: bpy.props.EnumProperty(
         name="Onto", description="Which objects the materials go onto", items=TARGETS)

@@ -17,6 +17,7 @@ from ..core.memory import peak_memory
 from ..core.progress import Progress
 from ..core.recover import Recovery
 from ..core.settings import PRESETS, Settings
+from ..core.stages import STAGES
 from ..core.store import Store
 from .run import Options, SkippedStage
 from .table import BASELINE, Curves, Table
@@ -59,7 +60,7 @@ def recovered(capture: Capture, settings: Settings, folder: Path, progress: Prog
     shutil.rmtree(folder, ignore_errors=True)
     with Store(folder) as store:
         recovery = Recovery(capture, store, settings, progress, unwrap)
-        for stage in ("surface", "lit_diffuse", "shading", "specular"):
+        for stage in STAGES:
             getattr(recovery, stage)()
     shutil.rmtree(folder, ignore_errors=True)
     return recovery
@@ -122,7 +123,7 @@ def _cost_table(capture: Capture, scratch: Path, options: Options) -> Table:
         settings = dataclasses.replace(plain, detail=detail)
         took = once(lambda: recovered(changed, settings, scratch / "cost", Progress()))  # noqa: B023
         recovery = took.value
-        seconds = [recovery.log[stage]["seconds"] for stage in ("surface", "lit_diffuse", "shading", "specular")]
+        seconds = [recovery.log[stage]["seconds"] for stage in STAGES]
         first.setdefault(what, took.cpu_seconds)
         rows.append((what, len(recovery.surface().atlas), len(capture.mesh.triangles) * 4**cut, False, *seconds,
                      took.cpu_seconds, took.cpu_seconds / first[what]))

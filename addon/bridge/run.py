@@ -25,6 +25,7 @@ from ..core.progress import Progress, ProgressEvent
 from ..core.recover import Recovery
 from ..core.room_file import ROOM, write_room
 from ..core.settings import Settings
+from ..core.stages import READ, RUN_STAGES, STAGES, WRITE
 from ..core.store import Store
 from ..version import VERSION
 from . import result_images
@@ -35,11 +36,9 @@ from .scene_capture import check_own, polygons_of
 from .unwrap import unwrap
 from .write_back import AUTO, is_own, putting_on
 
-STAGES = ("surface", "lit_diffuse", "shading", "specular")
-WRITE = "write"
 PICTURES = "stages/pictures"
 """Where in the result folder copies of frames lie that the core can't read itself."""
-WEIGHTS = {"read": 1, "surface": 5, "lit_diffuse": 8, "shading": 17, "specular": 16, WRITE: 5}
+WEIGHTS = {READ: 1, "surface": 5, "lit_diffuse": 8, "shading": 17, "specular": 16, WRITE: 5}
 """Rough cost of the stages, for the estimate of the time left."""
 
 
@@ -63,7 +62,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     settings : Settings
     progress : Progress
     until : str
-        One of `STAGES`, or `WRITE` for all of them, the images and scene.blend.
+        One of `stages.RUN_STAGES`; `WRITE` for all of them, the images and scene.blend.
     scene : bpy.types.Scene, optional
         With `WRITE`: also put the materials onto the capture's objects in this scene, and leave all else that is open
         as it is. Without one, scene.blend is made from an empty file.
@@ -87,15 +86,14 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     ScanRelightError
         One sentence for the user.
     """
-    if until not in (*STAGES, WRITE):
-        raise BadInputError(f"There is no stage '{until}'; choose one of {', '.join((*STAGES, WRITE))}.")
-    if from_stage is not None and from_stage not in (*STAGES, WRITE):
-        raise BadInputError(f"There is no stage '{from_stage}'; choose one of {', '.join((*STAGES, WRITE))}.")
+    for stage in (until, from_stage):
+        if stage is not None and stage not in RUN_STAGES:
+            raise BadInputError(f"There is no stage '{stage}'; choose one of {', '.join(RUN_STAGES)}.")
     capture_folder, out_folder = Path(capture_folder), Path(out_folder)
     if out_folder.resolve() == capture_folder.resolve():
         raise BadInputError(f"Result folder '{out_folder}' is the capture itself; choose another.")
     started = time.monotonic()
-    progress.stage("read")
+    progress.stage(READ)
     capture = read_capture(capture_folder, reading)
     own = is_own(capture.root, target)
     if scene is not None and own:
