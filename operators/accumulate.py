@@ -16,7 +16,3 @@ class SCAN_RELIGHT_OT_accumulate(StageOperator, bpy.types.Operator):
     bl_description = "Project the frames onto the surface and take each element's median"
     bl_options = set()  # the scene stays as it is: no undo step
     until = "lit_diffuse"
-
-    def work(self, context):
-        """Run the stages up to this one."""
-        return self.run(context, self.until)

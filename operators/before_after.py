@@ -10,9 +10,10 @@ import bpy
 
 from ..addon.bridge import before_after, pictures
 from ..addon.core.errors import BadInputError
-from .job_operator import JobOperator, active
+from . import poll
+from .job_operator import JobOperator
 from .relight_base import RelightOperator, default_folder
-from .relight_props import ENGINES
+from .relight_props import ENGINE
 
 FILE = "before_after.png"
 
@@ -28,7 +29,7 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
     filepath: bpy.props.StringProperty(
         name="File", description="Picture to write; by default before_after.png in the result folder",
         subtype="FILE_PATH", options={"SKIP_SAVE"})
-    engine: bpy.props.EnumProperty(name="Engine", description="Renders the two pictures", items=ENGINES)
+    engine: ENGINE
     samples: bpy.props.IntProperty(name="Samples", description="For each pixel; 0 takes the scene's", min=0, default=64)
     percentage: bpy.props.IntProperty(
         name="Size", description="Of the scene's render size", subtype="PERCENTAGE", min=1, max=1000, default=100)
@@ -36,15 +37,9 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
     @classmethod
     def poll(cls, context):
         """A camera is needed, and no other run."""
-        if not super().poll(context):
-            return False
-        if context.scene.camera is None:
-            cls.poll_message_set("The scene has no camera to render through; choose a frame first.")
-            return False
-        if active() is not None:
-            cls.poll_message_set("A run is going on; stop it first or wait for its end.")
-            return False
-        return True
+        return (super().poll(context) and poll.check(
+            cls, context.scene.camera is not None, "The scene has no camera to render through; choose a frame first.")
+            and poll.no_run(cls))
 
     def target(self, scene) -> Path:
         """The file to write."""

@@ -6,8 +6,8 @@ from pathlib import Path
 import bpy
 
 from ..addon.core.errors import ScanRelightError
-from . import preferences
-from .settings_props import CaptureOperator
+from . import poll, preferences
+from .settings_props import can_start
 
 FOLDER = "scene_capture"
 
@@ -40,12 +40,9 @@ class SCAN_RELIGHT_OT_capture_from_scene(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Whether there is a mesh to capture."""
-        if not CaptureOperator.poll.__func__(cls, context):
-            return False
-        if not any(thing.type not in ("CAMERA", "LIGHT") for thing in context.selected_objects):
-            cls.poll_message_set("Select the objects of the room first.")
-            return False
-        return True
+        return can_start(cls, context) and poll.check(
+            cls, any(thing.type not in ("CAMERA", "LIGHT") for thing in context.selected_objects),
+            "Select the objects of the room first.")
 
     def invoke(self, context, event):
         """Ask which frames."""

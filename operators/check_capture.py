@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..addon.core.errors import ScanRelightError
-from . import findings, reading_props
+from . import findings, poll, reading_props
 
 
 class SCAN_RELIGHT_OT_check_capture(bpy.types.Operator):
@@ -18,10 +18,7 @@ class SCAN_RELIGHT_OT_check_capture(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """A folder is needed."""
-        if context.scene is None or not context.scene.scan_relight.capture_folder:
-            cls.poll_message_set("Choose the capture's folder first.")
-            return False
-        return True
+        return poll.has_capture(cls, context)
 
     def execute(self, context):
         """With a window beside it; in the background at once."""

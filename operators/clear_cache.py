@@ -3,8 +3,7 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from . import preferences
-from .job_operator import active
+from . import poll, preferences
 
 
 class SCAN_RELIGHT_OT_clear_cache(bpy.types.Operator):
@@ -22,10 +21,7 @@ class SCAN_RELIGHT_OT_clear_cache(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Not while a run may be writing there."""
-        if active() is not None:
-            cls.poll_message_set("A run is going on; stop it first or wait for its end.")
-            return False
-        return True
+        return poll.no_run(cls)
 
     def invoke(self, context, event):
         """Ask first."""

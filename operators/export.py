@@ -7,6 +7,7 @@ import bpy
 
 from ..addon.bridge import export
 from ..addon.core.errors import BadInputError
+from . import poll
 from .relight_base import RelightOperator, default_folder
 
 FORMATS = ((".glb", "glTF (.glb)", "One file; most viewers and game engines"),
@@ -40,12 +41,8 @@ class SCAN_RELIGHT_OT_export(RelightOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Something to export."""
-        if not super().poll(context):
-            return False
-        if not any(thing.type == "MESH" for thing in context.scene.objects):
-            cls.poll_message_set("The scene has no mesh to export.")
-            return False
-        return True
+        return super().poll(context) and poll.check(
+            cls, any(thing.type == "MESH" for thing in context.scene.objects), "The scene has no mesh to export.")
 
     def invoke(self, context, event):
         """Choose the file."""

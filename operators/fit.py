@@ -16,7 +16,3 @@ class SCAN_RELIGHT_OT_fit(StageOperator, bpy.types.Operator):
     bl_description = "Fit roughness and specular of each object"
     bl_options = set()  # the scene stays as it is: no undo step
     until = "specular"
-
-    def work(self, context):
-        """Run the stages up to this one."""
-        return self.run(context, self.until)

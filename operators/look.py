@@ -4,7 +4,7 @@
 import bpy
 
 from ..addon.core.errors import ScanRelightError
-from . import results
+from . import poll, results
 
 
 def look_items() -> list[tuple[str, str, str]]:
@@ -39,13 +39,10 @@ class SCAN_RELIGHT_OT_look(bpy.types.Operator):
         """Whether anything recovered is there."""
         from ..addon.bridge import look
 
-        if context.scene is None or not look.recovered(context.scene):
-            cls.poll_message_set("No object of this scene wears recovered materials; run the recovery first.")
-            return False
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave the editing mode for object mode first.")
-            return False
-        return True
+        return poll.check(
+            cls, context.scene is not None and bool(look.recovered(context.scene)),
+            "No object of this scene wears recovered materials; run the recovery first."
+        ) and poll.object_mode(cls, context)
 
     def execute(self, context):
         """Switch."""

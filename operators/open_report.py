@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from . import results
+from . import poll, results
 
 
 class SCAN_RELIGHT_OT_open_report(bpy.types.Operator):
@@ -18,10 +18,8 @@ class SCAN_RELIGHT_OT_open_report(bpy.types.Operator):
     def poll(cls, context):
         """Whether there is a page."""
         folder = results.folder_of(context.scene) if context.scene else None
-        if folder is None or not (folder / results.PAGE).is_file():
-            cls.poll_message_set("There is no report yet; run the recovery to its end first.")
-            return False
-        return True
+        return poll.check(cls, folder is not None and (folder / results.PAGE).is_file(),
+                          "There is no report yet; run the recovery to its end first.")
 
     def execute(self, context):
         """Open it; in the background only say where it lies."""

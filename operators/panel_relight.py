@@ -21,10 +21,12 @@ class SCAN_RELIGHT_UL_lamps(bpy.types.UIList):
 
     bl_idname = "SCAN_RELIGHT_UL_lamps"
 
+    lamps: dict = {}  # what the last `filter_items` found, as it comes before the rows
+
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index):
         """Switch, name, colour, strength."""
         column = layout.column(align=True)
-        for material in relight_lamps.lamps_by_object(context.scene).get(item.name, ()):
+        for material in self.lamps.get(item.name, ()):
             lamp = material.scan_relight_lamp
             row = column.row(align=True)
             row.prop(lamp, "on", text="", icon="OUTLINER_OB_LIGHT" if lamp.on else "LIGHT", emboss=False)
@@ -41,7 +43,8 @@ class SCAN_RELIGHT_UL_lamps(bpy.types.UIList):
 
     def filter_items(self, context, data, name):
         """Of all objects, one for each lamp; sorted by the lamps' names."""
-        wanted, lamps = self.filter_name.casefold(), relight_lamps.lamps_by_object(context.scene)
+        wanted = self.filter_name.casefold()
+        lamps = type(self).lamps = relight_lamps.lamps_by_object(context.scene)
         names = [" ".join(lamp.name for lamp in lamps.get(thing.name, ())) for thing in getattr(data, name)]
         shown = [self.bitflag_filter_item if found and wanted in found.casefold() else 0 for found in names]
         places = [0] * len(names)
@@ -72,14 +75,14 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
         if not has_room(scene):
             self.say(layout, context, "Recover a capture, or open a result's scene.blend, to light it anew.", "INFO")
             return
-        studio, lamps = scene.scan_relight_studio, relight_lamps.find_lamps(scene)
+        studio, lamps = scene.scan_relight_studio, relight_lamps.lamps_by_object(scene)
         if lamps:
             layout.template_list("SCAN_RELIGHT_UL_lamps", "", scene, "objects", studio, "lamp", rows=3)
             row = layout.row(align=True)
             row.operator("scan_relight.switch_lamps", text="All On", icon="OUTLINER_OB_LIGHT").on = True
             row.operator("scan_relight.switch_lamps", text="All Off", icon="LIGHT").on = False
             chosen = scene.objects[studio.lamp].name if studio.lamp < len(scene.objects) else ""
-            for lamp in relight_lamps.lamps_by_object(scene).get(chosen, ()):
+            for lamp in lamps.get(chosen, ()):
                 self.numbers(layout, context, lamp)
         else:
             self.say(layout, context, "The scan has no lamp.", "INFO")

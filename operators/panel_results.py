@@ -3,6 +3,7 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
+from ..addon.bridge.mesh_objects import OBJECT_ID
 from ..addon.console import duration
 from ..addon.core.stages import LABELS, RUN_STAGES
 from . import results
@@ -33,7 +34,7 @@ class SCAN_RELIGHT_UL_results(bpy.types.UIList):
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
         """Name, roughness, specular, certainty."""
-        one = self.known.get(item.get("object_id"), {})
+        one = self.known.get(item.get(OBJECT_ID), {})
         texts = columns(one)
         split = layout.split(factor=0.52 if any(texts) else 0.9)  # long names may use what stays empty
         split.label(text=item.name, icon=ICONS.get(one.get("model"), "BLANK1"), translate=False)
@@ -56,7 +57,7 @@ class SCAN_RELIGHT_UL_results(bpy.types.UIList):
         known = type(self).known = found.objects if found else {}
         shown, keys = [], []
         for thing in things:
-            one = known.get(thing.get("object_id")) if thing.type == "MESH" else None
+            one = known.get(thing.get(OBJECT_ID)) if thing.type == "MESH" else None
             passes = one is not None and self.model in ("ALL", one.get("model"))
             passes = passes and self.filter_name.lower() in thing.name.lower()
             shown.append(self.bitflag_filter_item if passes else 0)
@@ -121,7 +122,7 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
             self.say(layout, context, "No result yet: run the recovery to its end, or choose the folder of one that "
                      "is finished.", "INFO")
             return
-        if any(thing.get("object_id") in found.objects for thing in scene.objects if thing.type == "MESH"):
+        if any(thing.get(OBJECT_ID) in found.objects for thing in scene.objects if thing.type == "MESH"):
             head = layout.split(factor=0.52)
             head.label(text="Object")
             row = head.row()
@@ -133,7 +134,7 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
             self.say(layout, context, f"{len(found.objects)} objects in '{found.folder.name}'; none of them is in "
                      "this scene. Import the capture to see them.", "INFO")
         thing = context.active_object
-        one = found.objects.get(thing.get("object_id")) if thing is not None and thing.type == "MESH" else None
+        one = found.objects.get(thing.get(OBJECT_ID)) if thing is not None and thing.type == "MESH" else None
         if one is not None:
             self.details(layout.box(), context, thing.name, one)
         layout.operator("scan_relight.open_report", icon="URL")

@@ -1,14 +1,14 @@
 """`bpy.ops.scan_relight.*` for the light: switch and restore lamps, add lights, another picture around the room."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
-from pathlib import Path
-
 import bpy
 
 from ..addon.bridge import relight_lamps, relight_lights, relight_outside, relight_state
 from ..addon.core.errors import BadInputError
+from . import poll
 from .relight_base import RelightOperator
 from .relight_props import AIMS
+from .select_result_object import make_active
 
 PRESETS = (("WINDOW", "Window", "A window's soft, cool light from the side"),
            ("SOFTBOX", "Softbox", "A studio light beside the camera"),
@@ -56,12 +56,8 @@ class SCAN_RELIGHT_OT_restore_light(RelightOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Only where anything differs."""
-        if not super().poll(context):
-            return False
-        if not relight_state.is_relit(context.scene):
-            cls.poll_message_set("The light is as it was captured.")
-            return False
-        return True
+        return super().poll(context) and poll.check(
+            cls, relight_state.is_relit(context.scene), "The light is as it was captured.")
 
     def work(self, context):
         """All of it."""
@@ -88,10 +84,7 @@ class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
     def work(self, context):
         """Add it and make it the active object."""
         light = relight_lights.add_light(context.scene, self.preset, self.strength, self.aim, context.object)
-        for thing in context.selected_objects:
-            thing.select_set(False)
-        light.select_set(True)
-        context.view_layer.objects.active = light
+        make_active(context, light)
 
 
 class SCAN_RELIGHT_OT_remove_lights(RelightOperator, bpy.types.Operator):
@@ -104,16 +97,18 @@ class SCAN_RELIGHT_OT_remove_lights(RelightOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Only where there are any."""
-        if not super().poll(context):
-            return False
-        if not relight_lights.added_lights(context.scene):
-            cls.poll_message_set("No light was added here.")
-            return False
-        return True
+        return super().poll(context) and poll.check(
+            cls, bool(relight_lights.added_lights(context.scene)), "No light was added here.")
 
     def work(self, context):
         """All of them."""
         relight_lights.remove_lights(context.scene)
+
+
+def put_around(scene, picture: str) -> list[str]:
+    """Put a picture around the room, scaled to a day outside such a room; returns warnings."""
+    relight_outside.use_hdri(scene, picture, relight_outside.usual_radiance(scene))
+    return relight_outside.remarks(scene)
 
 
 class SCAN_RELIGHT_OT_use_hdri(RelightOperator, bpy.types.Operator):
@@ -135,14 +130,10 @@ class SCAN_RELIGHT_OT_use_hdri(RelightOperator, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def work(self, context):
-        """Scale it to a day outside such a room."""
+        """The chosen file."""
         if not self.filepath:
             raise BadInputError("Choose the picture first.")
-        scene = context.scene
-        relight_outside.use_hdri(scene, bpy.path.abspath(self.filepath), relight_outside.usual_radiance(scene))
-        if not relight_outside.is_open(scene):
-            return ["The scanned room is closed, so the picture around it sends no light in."]
-        return []
+        return put_around(context.scene, bpy.path.abspath(self.filepath))
 
 
 _items: list[tuple[str, str, str]] = []  # Blender keeps no reference to what a callback returns
@@ -166,17 +157,10 @@ class SCAN_RELIGHT_OT_use_studio_light(RelightOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Some builds have none."""
-        if not super().poll(context):
-            return False
-        if not relight_outside.studio_lights():
-            cls.poll_message_set("This Blender comes without its HDR pictures; choose a file instead.")
-            return False
-        return True
+        return super().poll(context) and poll.check(
+            cls, bool(relight_outside.studio_lights()),
+            "This Blender comes without its HDR pictures; choose a file instead.")
 
     def work(self, context):
         """As any other picture."""
-        scene = context.scene
-        relight_outside.use_hdri(scene, Path(self.picture), relight_outside.usual_radiance(scene))
-        if not relight_outside.is_open(scene):
-            return ["The scanned room is closed, so the picture around it sends no light in."]
-        return []
+        return put_around(context.scene, self.picture)

@@ -7,6 +7,7 @@ import bpy
 from ..addon.bridge.mesh_objects import OBJECT_ID
 from ..addon.console import unexpected
 from ..addon.core.errors import ScanRelightError
+from . import poll
 
 
 class RelightOperator:
@@ -18,17 +19,9 @@ class RelightOperator:
     @classmethod
     def poll(cls, context):
         """Whether the operator can run now; where not, one sentence says what is missing."""
-        if context.scene is None:
-            cls.poll_message_set("There is no scene to work in.")
-            return False
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave the editing mode for object mode first.")
-            return False
-        if cls.needs_room and not has_room(context.scene):
-            cls.poll_message_set("The scene holds no scanned room yet; recover a capture or open a result's "
-                                 "scene.blend.")
-            return False
-        return True
+        return poll.has_scene(cls, context) and poll.object_mode(cls, context) and poll.check(
+            cls, not cls.needs_room or has_room(context.scene),
+            "The scene holds no scanned room yet; recover a capture or open a result's scene.blend.")
 
     def execute(self, context):
         """Do the work; every error that is foreseen becomes one sentence."""

@@ -13,11 +13,20 @@ AIMS = (("VIEW", "View", "What the middle of the camera's picture shows"),
         ("CURSOR", "3D Cursor", "Where the 3D cursor is"),
         ("OBJECT", "Object", "The active object"))
 PLACES = AIMS[:2]
-SHAPES = (("SPHERE", "Sphere", "A ball"), ("CUBE", "Cube", "A cube"), ("MONKEY", "Suzanne", "Blender's monkey"))
 LOOKS = (("MATTE", "Matte", "Grey, like chalk"), ("GLOSSY", "Glossy", "Red lacquer"),
          ("MIRROR", "Mirror", "Polished metal, to see the room's light in"))
-ENGINES = (("CYCLES", "Cycles", "Path tracing: the room's own light bounces"),
-           ("EEVEE", "EEVEE", "Quick; indirect light and large lamps are only approximate"))
+
+
+# Shared by the panel's choices and the operators that they go to.
+SHAPE = bpy.props.EnumProperty(
+    name="Shape", description="What is set into the room", items=(
+        ("SPHERE", "Sphere", "A ball"), ("CUBE", "Cube", "A cube"), ("MONKEY", "Suzanne", "Blender's monkey")))
+LOOK = bpy.props.EnumProperty(name="Material", description="Of the new object", items=LOOKS, default="MIRROR")
+SIZE = bpy.props.FloatProperty(
+    name="Size", description="Its largest extent", subtype="DISTANCE", min=0.001, soft_max=2.0, default=0.3)
+ENGINE = bpy.props.EnumProperty(name="Engine", description="Renders the two pictures", items=(
+    ("CYCLES", "Cycles", "Path tracing: the room's own light bounces"),
+    ("EEVEE", "EEVEE", "Quick; indirect light and large lamps are only approximate")))
 
 
 def _lamp(group):
@@ -93,11 +102,10 @@ class ScanRelightStudio(bpy.types.PropertyGroup):
         name="Strength", description="Of a new light; 1 keeps the scene's exposure readable", min=0.0, soft_max=4.0,
         default=1.0, step=5, precision=2)
     place: bpy.props.EnumProperty(name="Place", description="Where an object is set down", items=PLACES)
-    shape: bpy.props.EnumProperty(name="Shape", description="What is set into the room", items=SHAPES)
-    look: bpy.props.EnumProperty(name="Material", description="Of the new object", items=LOOKS, default="MIRROR")
-    size: bpy.props.FloatProperty(
-        name="Size", description="Its largest extent", subtype="DISTANCE", min=0.001, soft_max=2.0, default=0.3)
-    engine: bpy.props.EnumProperty(name="Engine", description="Renders the two pictures", items=ENGINES)
+    shape: SHAPE
+    look: LOOK
+    size: SIZE
+    engine: ENGINE
     samples: bpy.props.IntProperty(
         name="Samples", description="For each pixel; more is calmer and slower", min=1, soft_max=4096, default=64)
     percentage: bpy.props.IntProperty(

@@ -6,6 +6,7 @@ import bpy
 from ..addon.bridge import match_frame
 from ..addon.bridge.cameras import frame_cameras
 from ..addon.core.errors import BadInputError
+from . import poll
 from .relight_base import RelightOperator
 
 
@@ -23,12 +24,8 @@ class SCAN_RELIGHT_OT_match_frame(RelightOperator, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Only with cameras of a capture."""
-        if not super().poll(context):
-            return False
-        if not frame_cameras(context.scene):
-            cls.poll_message_set("The scene has no camera of a capture; import a capture first.")
-            return False
-        return True
+        return super().poll(context) and poll.check(
+            cls, bool(frame_cameras(context.scene)), "The scene has no camera of a capture; import a capture first.")
 
     def work(self, context):
         """Set the camera; in a window, look through it."""

@@ -8,8 +8,10 @@ from ..addon.bridge import virtual_object as virtual
 from ..addon.bridge.mesh_objects import OBJECT_ID
 from ..addon.bridge.relight_room import cast
 from ..addon.core.errors import ScanRelightError
+from . import poll
 from .relight_base import RelightOperator
-from .relight_props import LOOKS, PLACES, SHAPES
+from .relight_props import LOOK, LOOKS, PLACES, SHAPE, SIZE
+from .select_result_object import make_active
 
 
 def surface(scene, place: str, ignored=None):
@@ -24,19 +26,15 @@ class SCAN_RELIGHT_OT_add_virtual(RelightOperator, bpy.types.Operator):
     bl_label = "Add Object"
     bl_description = "Set a simple object onto a surface of the room, in its light"
 
-    shape: bpy.props.EnumProperty(name="Shape", description="What is set into the room", items=SHAPES)
-    look: bpy.props.EnumProperty(name="Material", description="Of the new object", items=LOOKS, default="MIRROR")
-    size: bpy.props.FloatProperty(
-        name="Size", description="Its largest extent", subtype="DISTANCE", min=0.001, soft_max=2.0, default=0.3)
+    shape: SHAPE
+    look: LOOK
+    size: SIZE
     place: bpy.props.EnumProperty(name="Place", description="Where it is set down", items=PLACES)
 
     def work(self, context):
         """Add it and make it the active object."""
         thing = virtual.add_virtual(context.scene, self.shape, self.size, self.look, surface(context.scene, self.place))
-        for other in context.selected_objects:
-            other.select_set(False)
-        thing.select_set(True)
-        context.view_layer.objects.active = thing
+        make_active(context, thing)
 
 
 class OwnObject(RelightOperator):
@@ -48,10 +46,8 @@ class OwnObject(RelightOperator):
         if not super().poll(context):
             return False
         thing = context.object
-        if thing is None or thing.type != "MESH" or OBJECT_ID in thing:
-            cls.poll_message_set("Select an object of your own, not one of the scan.")
-            return False
-        return True
+        return poll.check(cls, thing is not None and thing.type == "MESH" and OBJECT_ID not in thing,
+                          "Select an object of your own, not one of the scan.")
 
 
 class SCAN_RELIGHT_OT_place_object(OwnObject, bpy.types.Operator):
@@ -102,12 +98,8 @@ class SCAN_RELIGHT_OT_pick_place(OwnObject, bpy.types.Operator):
         context.workspace.status_text_set("Click: set down here   ESC or right click: back to where it was")
         return {"RUNNING_MODAL"}
 
-    def execute(self, context):
-        """Without a mouse: in the middle of the view."""
-        return super().execute(context)
-
     def work(self, context):
-        """In the middle of the view."""
+        """Without a mouse: in the middle of the view."""
         virtual.stand(context.scene, context.object)
 
     def modal(self, context, event):

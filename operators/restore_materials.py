@@ -3,6 +3,8 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
+from . import poll
+
 
 class SCAN_RELIGHT_OT_restore_materials(bpy.types.Operator):
     """Give the objects back what they wore before."""
@@ -21,13 +23,9 @@ class SCAN_RELIGHT_OT_restore_materials(bpy.types.Operator):
         """Whether anything wears recovered materials over its own."""
         from ..addon.bridge.write_back import wearing
 
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave the editing mode for object mode first.")
-            return False
-        if context.scene is None or not wearing(context.scene.objects):
-            cls.poll_message_set("No object of this scene wears a recovered material over its own.")
-            return False
-        return True
+        return poll.object_mode(cls, context) and poll.check(
+            cls, context.scene is not None and bool(wearing(context.scene.objects)),
+            "No object of this scene wears a recovered material over its own.")
 
     def execute(self, context):
         """Give them back."""

@@ -3,9 +3,8 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.core.stages import RUN_STAGES
-from . import preferences, reading_props
-from .settings_props import CaptureOperator, setting_infos, setting_value
+from . import poll, preferences, reading_props
+from .settings_props import FROM_STAGE, can_start, setting_infos, setting_value
 
 TARGETS = {
     "recover": "Recover the capture beside this window; what is finished already is not done again",
@@ -24,10 +23,7 @@ class SCAN_RELIGHT_OT_run(bpy.types.Operator):
     target: bpy.props.EnumProperty(
         name="Operator", description="What is run", default="recover",
         items=[(name, name.replace("_", " ").capitalize(), text) for name, text in TARGETS.items()])
-    from_stage: bpy.props.EnumProperty(
-        name="Again from", description="Do this stage and all later ones anew, though they are stored",
-        items=[("NONE", "Nothing", "Go on from what is stored"),
-               *((name, name.replace("_", " ").capitalize(), "") for name in RUN_STAGES)])
+    from_stage: FROM_STAGE
 
     @classmethod
     def description(cls, context, properties):
@@ -39,12 +35,7 @@ class SCAN_RELIGHT_OT_run(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """As for what is run, and a capture has to be chosen."""
-        if not CaptureOperator.poll.__func__(cls, context):
-            return False
-        if not context.scene.scan_relight.capture_folder:
-            cls.poll_message_set("Choose the capture's folder first.")
-            return False
-        return True
+        return can_start(cls, context) and poll.has_capture(cls, context)
 
     def execute(self, context):
         """Hand the choices over."""

@@ -10,7 +10,7 @@ from ..addon.core.settings import PRESETS, Settings
 from ..addon.settings_info import setting_infos
 from . import findings
 from .reading_props import with_reading
-from .settings_props import IMAGES, preset_items, setting_value, with_settings
+from .settings_props import COPIES, IMAGES, preset_items, setting_value, with_settings
 
 
 def preset_chosen(choices, context) -> None:
@@ -67,8 +67,5 @@ class ScanRelightScene(bpy.types.PropertyGroup):
         name="Preset", description="What all settings start from", items=preset_items(), default="normal",
         update=preset_chosen)
     settings: bpy.props.PointerProperty(type=ScanRelightSettings)
-    images: bpy.props.EnumProperty(
-        name="Images", description="Where the recovered images are kept", items=IMAGES)
-    copies: bpy.props.BoolProperty(
-        name="Make copies", description="Where modifiers or instances make an object's faces, put the material "
-        "onto a copy of it and hide the object; without this such objects are left as they are", default=False)
+    images: IMAGES
+    copies: COPIES

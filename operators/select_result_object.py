@@ -3,11 +3,23 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
+from ..addon.bridge.mesh_objects import OBJECT_ID
+from . import poll
+
 
 def result_objects(scene) -> dict[int, bpy.types.Object]:
     """The recovered objects of a scene by `object_id`; of several imports the last one's."""
-    return {thing["object_id"]: thing for thing in scene.objects
-            if thing.type == "MESH" and isinstance(thing.get("object_id"), int)}
+    return {thing[OBJECT_ID]: thing for thing in scene.objects
+            if thing.type == "MESH" and isinstance(thing.get(OBJECT_ID), int)}
+
+
+def make_active(context, thing: bpy.types.Object, extend: bool = False) -> None:
+    """Select an object, with `extend` beside what is selected, and make it the active one."""
+    if not extend:
+        for other in context.view_layer.objects.selected:
+            other.select_set(False)
+    thing.select_set(True)
+    context.view_layer.objects.active = thing
 
 
 def select(context, thing: bpy.types.Object, extend: bool = False) -> str:
@@ -16,11 +28,7 @@ def select(context, thing: bpy.types.Object, extend: bool = False) -> str:
         return f"Object '{thing.name}' is not in this view layer; include its collection first."
     if not thing.visible_get():
         return f"Object '{thing.name}' is hidden; show it first."
-    if not extend:
-        for other in context.view_layer.objects.selected:
-            other.select_set(False)
-    thing.select_set(True)
-    context.view_layer.objects.active = thing
+    make_active(context, thing, extend)
     return ""
 
 
@@ -39,10 +47,7 @@ class SCAN_RELIGHT_OT_select_result_object(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Only in object mode."""
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave the editing mode for object mode first.")
-            return False
-        return context.scene is not None
+        return poll.object_mode(cls, context) and context.scene is not None
 
     def execute(self, context):
         """Select it."""

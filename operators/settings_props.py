@@ -15,8 +15,8 @@ from ..addon.core.settings import PRESETS, Settings
 from ..addon.core.stages import RUN_STAGES, WRITE
 from ..addon.leash import MemoryGuard
 from ..addon.settings_info import SettingInfo, setting_infos
-from . import preferences, reading_props
-from .job_operator import JobOperator, active
+from . import poll, preferences, reading_props
+from .job_operator import JobOperator
 from .reading_props import with_reading
 
 PRESET_TEXTS = {
@@ -29,9 +29,18 @@ TARGETS = [("AUTO", "What was captured", "Imported objects of a scan; your own o
            ("IMPORTED", "Imported objects", "The objects that Import Capture made"),
            ("SELECTED", "Your own objects", "The objects that were selected when the scene was captured; what they "
             "wear now is kept and can be restored")]
-IMAGES = [("RESULT", "In the result folder", "Refer to the images where they are"),
-          ("FOLDER", "Beside the file", "Copy the images into a folder beside the saved .blend"),
-          ("PACK", "Packed", "Keep the images within the .blend")]
+IMAGES = bpy.props.EnumProperty(
+    name="Images", description="Where the recovered images are kept", items=[
+        ("RESULT", "In the result folder", "Refer to the images where they are"),
+        ("FOLDER", "Beside the file", "Copy the images into a folder beside the saved .blend"),
+        ("PACK", "Packed", "Keep the images within the .blend")])
+COPIES = bpy.props.BoolProperty(
+    name="Make copies", description="Where modifiers or instances make an object's faces, put the material onto a "
+    "copy of it and hide the object; without this such objects are left as they are", default=False)
+FROM_STAGE = bpy.props.EnumProperty(
+    name="Again from", description="Do this stage and all later ones anew, though they are stored",
+    items=[("NONE", "Nothing", "Go on from what is stored"),
+           *((name, name.replace("_", " ").capitalize(), "") for name in RUN_STAGES)])
 PACKAGES = ("scipy", "embreex", "OpenEXR")
 
 
@@ -67,6 +76,13 @@ def missing_packages() -> tuple[str, ...]:
     return tuple(name for name in PACKAGES if importlib.util.find_spec(name) is None)
 
 
+def can_start(operator, context) -> bool:
+    """What everything asks in `poll` that reads a capture; also those that only start another operator."""
+    missing = missing_packages()
+    return (poll.check(operator, not missing, f"{' and '.join(missing)} missing: install the extension again.")
+            and poll.has_scene(operator, context) and poll.object_mode(operator, context) and poll.no_run(operator))
+
+
 def preset_items() -> list[tuple[str, str, str]]:
     """Items of an enumeration of the presets."""
     return [(name, name.capitalize(), PRESET_TEXTS.get(name, "")) for name in PRESETS]
@@ -87,19 +103,7 @@ class CaptureOperator(JobOperator):
     @classmethod
     def poll(cls, context):
         """Whether the operator can run now; where not, one sentence says what is missing."""
-        if missing_packages():
-            cls.poll_message_set(f"{' and '.join(missing_packages())} missing: install the extension again.")
-            return False
-        if context.scene is None:
-            cls.poll_message_set("There is no scene to work in.")
-            return False
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave the editing mode for object mode first.")
-            return False
-        if active() is not None:
-            cls.poll_message_set("A run is going on; stop it first or wait for its end.")
-            return False
-        return True
+        return can_start(cls, context)
 
     def invoke(self, context, event):
         """Ask for the folders and settings."""
@@ -145,12 +149,13 @@ class StageOperator(CaptureOperator):
     preset: bpy.props.EnumProperty(
         name="Preset", description="What the settings that are not given start from", items=preset_items(),
         default="normal")
-    from_stage: bpy.props.EnumProperty(
-        name="Again from", description="Do this stage and all later ones anew, though they are stored",
-        items=[("NONE", "Nothing", "Go on from what is stored"),
-               *((name, name.replace("_", " ").capitalize(), "") for name in RUN_STAGES)])
+    from_stage: FROM_STAGE
     paper: bpy.props.BoolProperty(
         name="As in the paper", description="The published method; the other settings are not looked at", default=False)
+
+    def work(self, context) -> list[str]:
+        """Run the stages up to the operator's own; returns warnings."""
+        return self.run(context, self.until)
 
     def draw(self, context):
         """The dialog: what is to be decided; all else comes from the preset or from who calls."""
@@ -211,11 +216,8 @@ class SceneStageOperator(StageOperator):
     import_first = True
     target: bpy.props.EnumProperty(
         name="Onto", description="Which objects the materials go onto", items=TARGETS)
-    images: bpy.props.EnumProperty(
-        name="Images", description="Where the recovered images are kept", items=IMAGES)
-    copies: bpy.props.BoolProperty(
-        name="Make copies", description="Where modifiers or instances make an object's faces, put the material onto a "
-        "copy of it and hide the object; without this such objects are left as they are", default=False)
+    images: IMAGES
+    copies: COPIES
 
     def work(self, context):
         """Run, then change the scene, so that a failed run leaves it alone."""

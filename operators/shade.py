@@ -16,7 +16,3 @@ class SCAN_RELIGHT_OT_shade(StageOperator, bpy.types.Operator):
     bl_description = "Gather the light that falls on each element and divide it out"
     bl_options = set()  # the scene stays as it is: no undo step
     until = "shading"
-
-    def work(self, context):
-        """Run the stages up to this one."""
-        return self.run(context, self.until)

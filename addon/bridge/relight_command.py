@@ -105,7 +105,6 @@ def relight(result: Path, light: Light, out: Path, camera: str | None = None, sa
 
 def apply_light(scene: bpy.types.Scene, light: Light) -> list[str]:
     """Change a scene's light; returns remarks, raises `BadInputError` where something is unknown."""
-    remarks: list[str] = []
     if light.lamps is not None:
         set_lamps(scene, light.lamps)
     if light.hdri is not None:
@@ -119,9 +118,7 @@ def apply_light(scene: bpy.types.Scene, light: Light) -> list[str]:
         relight_outside.set_factor(scene.world, light.world_strength)
     for preset, strength in light.added.items():
         add_light(scene, preset, strength)
-    if light.hdri is not None and not relight_outside.is_open(scene):
-        remarks.append("The scanned room is closed, so the picture around it sends no light in.")
-    return remarks
+    return relight_outside.remarks(scene) if light.hdri is not None else []
 
 
 def set_lamps(scene: bpy.types.Scene, text: str) -> None:

@@ -187,6 +187,11 @@ def is_open(scene: bpy.types.Scene) -> bool:
     return False
 
 
+def remarks(scene: bpy.types.Scene) -> list[str]:
+    """What there is to say, in sentences, of a picture around this room."""
+    return [] if is_open(scene) else ["The scanned room is closed, so the picture around it sends no light in."]
+
+
 def studio_lights() -> list[Path]:
     """The equirectangular pictures that come with Blender; some builds have none."""
     folder = bpy.utils.system_resource("DATAFILES", path="studiolights/world")
