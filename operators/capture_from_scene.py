@@ -1,8 +1,6 @@
 """`bpy.ops.scan_relight.capture_from_scene`: the selected objects and the cameras' backgrounds become a capture."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
-from pathlib import Path
-
 import bpy
 
 from ..addon.core.errors import ScanRelightError
@@ -67,9 +65,8 @@ class SCAN_RELIGHT_OT_capture_from_scene(bpy.types.Operator):
         from ..addon.bridge.scene_capture import capture_scene
 
         choices = context.scene.scan_relight
-        chosen = self.result_folder or choices.result_folder
-        folder = Path(bpy.path.abspath(chosen)) / FOLDER if chosen else \
-            preferences.result_folder("", bpy.data.filepath or "unsaved") / FOLDER
+        folder = preferences.result_folder(self.result_folder or choices.result_folder,
+                                           bpy.data.filepath or "unsaved") / FOLDER
         first, last = (None, None) if self.whole_range else (self.frame_start, self.frame_end)
         try:
             for sentence in capture_scene(context, folder, context.selected_objects, self.cameras, first, last,

@@ -8,6 +8,7 @@ import bpy
 
 from ..addon.bridge import job as jobs
 from . import reading_props
+from .job_operator import redraw
 
 _found: dict[tuple, jobs.Job | dict | str] = {}
 
@@ -41,8 +42,6 @@ def begin(choices) -> None:
     found = _found[key(choices)] = jobs.Job(command(words))
 
     def watch():
-        from .job_operator import redraw
-
         if found.running:
             return 0.2
         redraw(bpy.context)
@@ -51,10 +50,15 @@ def begin(choices) -> None:
     bpy.app.timers.register(watch, first_interval=0.2)
 
 
+def facts(job: jobs.Job) -> dict:
+    """What a job that runs `info --json` said; raises ValueError where that is no JSON."""
+    return json.loads(job.text[job.text.index("{"):])
+
+
 def _result(job: jobs.Job) -> dict | str:
     if job.state == jobs.DONE:
         try:
-            return json.loads(job.text[job.text.index("{"):])
+            return facts(job)
         except ValueError:
             return "The capture was read, but what was found can't be understood; start Blender anew."
     return job.sentence if job.state == jobs.FAILED else "The check was stopped; check again."

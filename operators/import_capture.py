@@ -7,7 +7,7 @@ import tempfile
 
 import bpy
 
-from . import reading_props
+from . import findings, reading_props
 from .settings_props import CaptureOperator
 
 
@@ -37,11 +37,9 @@ class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
 
     def load(self, job):
         """The capture as it was read."""
-        import json
-
         from ..addon.core.room_file import read_capture_file
 
-        job.warnings.extend(json.loads(job.text[job.text.index("{"):])["warnings"])
+        job.warnings.extend(findings.facts(job)["warnings"])
         return read_capture_file(job.facts["scratch"])[0]
 
     def tidy(self, job):

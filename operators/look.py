@@ -3,15 +3,14 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
+from ..addon.bridge import look
 from ..addon.core.errors import ScanRelightError
 from . import poll, results
 
 
 def look_items() -> list[tuple[str, str, str]]:
     """Items of an enumeration of the looks."""
-    from ..addon.bridge.look import LOOKS
-
-    return [(name, one.label, one.text) for name, one in LOOKS.items()]
+    return [(name, one.label, one.text) for name, one in look.LOOKS.items()]
 
 
 class SCAN_RELIGHT_OT_look(bpy.types.Operator):
@@ -30,15 +29,11 @@ class SCAN_RELIGHT_OT_look(bpy.types.Operator):
     @classmethod
     def description(cls, context, properties):
         """The tooltip of the chosen look."""
-        from ..addon.bridge.look import LOOKS
-
-        return f"{LOOKS[properties.look].text}. Only the viewport changes, never a render"
+        return f"{look.LOOKS[properties.look].text}. Only the viewport changes, never a render"
 
     @classmethod
     def poll(cls, context):
         """Whether anything recovered is there."""
-        from ..addon.bridge import look
-
         return poll.check(
             cls, context.scene is not None and bool(look.recovered(context.scene)),
             "No object of this scene wears recovered materials; run the recovery first."
@@ -46,8 +41,6 @@ class SCAN_RELIGHT_OT_look(bpy.types.Operator):
 
     def execute(self, context):
         """Switch."""
-        from ..addon.bridge import look
-
         try:
             chosen = results.folder_of(context.scene)
             fits = chosen is not None and look.recovered(context.scene, chosen)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ..addon.bridge import job
 from . import text
 
 
@@ -23,7 +22,10 @@ class SidebarPanel:
         """Write `sentence` over as many lines as the panel's width asks for."""
         text.say(layout, context, sentence, icon)
 
-    @staticmethod
-    def job():
-        """The run that is going on, or None."""
-        return job.running()
+
+def places(keys: list) -> list[int]:
+    """Where each of `keys` stands when they are sorted, as `UIList.filter_items` returns it."""
+    found = [0] * len(keys)
+    for place, number in enumerate(sorted(range(len(keys)), key=keys.__getitem__)):
+        found[number] = place
+    return found

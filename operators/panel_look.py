@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ..addon.bridge import look
 from .panel import SidebarPanel
 
 
@@ -16,8 +17,6 @@ class SCAN_RELIGHT_PT_look(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context):
         """One button a look."""
-        from ..addon.bridge import look
-
         layout, scene = self.layout, context.scene
         if not look.recovered(scene):
             self.say(layout, context, "Shows albedo, light and coverage in the viewport, once materials are recovered.",

@@ -6,7 +6,7 @@ import bpy
 
 from ..addon.bridge import match_frame, relight_lamps, relight_lights, relight_outside
 from ..addon.bridge.cameras import frame_cameras
-from .panel import SidebarPanel
+from .panel import SidebarPanel, places
 from .relight import PRESETS
 from .relight_base import has_room
 
@@ -47,10 +47,7 @@ class SCAN_RELIGHT_UL_lamps(bpy.types.UIList):
         lamps = type(self).lamps = relight_lamps.lamps_by_object(context.scene)
         names = [" ".join(lamp.name for lamp in lamps.get(thing.name, ())) for thing in getattr(data, name)]
         shown = [self.bitflag_filter_item if found and wanted in found.casefold() else 0 for found in names]
-        places = [0] * len(names)
-        for place, number in enumerate(sorted(range(len(names)), key=names.__getitem__)):
-            places[number] = place
-        return shown, places
+        return shown, places(names)
 
 
 class RelightPanel(SidebarPanel):

@@ -7,7 +7,7 @@ from ..addon.bridge.mesh_objects import OBJECT_ID
 from ..addon.console import duration
 from ..addon.core.stages import LABELS, RUN_STAGES
 from . import results
-from .panel import SidebarPanel
+from .panel import SidebarPanel, places
 from .select_result_object import select
 
 ICONS = {"lambertian": "SHADING_SOLID", "specular": "SHADING_TEXTURE", "metal": "SHADING_RENDERED",
@@ -62,11 +62,7 @@ class SCAN_RELIGHT_UL_results(bpy.types.UIList):
             passes = passes and self.filter_name.lower() in thing.name.lower()
             shown.append(self.bitflag_filter_item if passes else 0)
             keys.append(order_key(thing.name, one or {}, self.order))
-        ranked = sorted(range(len(keys)), key=keys.__getitem__)
-        places = [0] * len(ranked)
-        for place, number in enumerate(ranked):
-            places[number] = place
-        return shown, places
+        return shown, places(keys)
 
 
 def order_key(name: str, one: dict, order: str) -> tuple:
@@ -83,9 +79,7 @@ def columns(one: dict) -> tuple[str, str]:
     """Roughness and specular F0 of a row; empty where it has no highlight."""
     if one.get("phi") is None:
         return "", ""
-    value = one.get("psi")
-    if value is None:
-        value = sum(one["f0"]) / 3 if one.get("f0") else None
+    value = results.specular(one)
     return f"{max(one['phi'], 0) ** 0.5:.2f}", "" if value is None else f"{value:.2f}"
 
 

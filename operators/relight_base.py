@@ -44,5 +44,4 @@ def has_room(scene: bpy.types.Scene) -> bool:
 
 def default_folder(scene: bpy.types.Scene) -> str:
     """Where pictures and exports go unless told: the result folder, else beside the file, else nowhere ('')."""
-    chosen = scene.scan_relight.result_folder
-    return bpy.path.abspath(chosen) if chosen else bpy.path.abspath("//")
+    return bpy.path.abspath(scene.scan_relight.result_folder or "//")

@@ -70,15 +70,20 @@ class ScanRelightOutside(bpy.types.PropertyGroup):
         set=lambda self, value: relight_outside.set_rotation(self.id_data, value))
 
 
+def look_through(studio, index: int) -> str:
+    """Make the scene's camera that of a frame, its picture shown as chosen; returns what `match_frame` says."""
+    return match_frame.match_frame(studio.id_data, index, studio.show_frame, studio.frame_alpha, studio.frame_front,
+                                   bpy.path.abspath(studio.id_data.scan_relight.capture_folder))
+
+
 def _set_frame(studio, index):
-    match_frame.match_frame(studio.id_data, index, studio.show_frame, studio.frame_alpha, studio.frame_front,
-                            bpy.path.abspath(studio.id_data.scan_relight.capture_folder))
+    look_through(studio, min(max(index, 0), max(len(frame_cameras(studio.id_data)) - 1, 0)))
 
 
 def _frame_changed(studio, context):
     index = match_frame.current(studio.id_data)
     if index >= 0:
-        _set_frame(studio, index)
+        look_through(studio, index)
 
 
 class ScanRelightStudio(bpy.types.PropertyGroup):
@@ -88,7 +93,7 @@ class ScanRelightStudio(bpy.types.PropertyGroup):
     frame: bpy.props.IntProperty(
         name="Frame", description="Look through the camera of this frame of the capture: its lens, its size",
         get=lambda self: max(match_frame.current(self.id_data), 0),
-        set=lambda self, value: _set_frame(self, min(max(value, 0), max(len(frame_cameras(self.id_data)) - 1, 0))))
+        set=_set_frame)
     show_frame: bpy.props.BoolProperty(
         name="Show Its Picture", description="Lay the frame's picture behind the scene, under the scene's exposure",
         default=True, update=_frame_changed)

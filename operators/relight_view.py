@@ -8,6 +8,7 @@ from ..addon.bridge.cameras import frame_cameras
 from ..addon.core.errors import BadInputError
 from . import poll
 from .relight_base import RelightOperator
+from .relight_props import look_through
 
 
 class SCAN_RELIGHT_OT_match_frame(RelightOperator, bpy.types.Operator):
@@ -29,13 +30,12 @@ class SCAN_RELIGHT_OT_match_frame(RelightOperator, bpy.types.Operator):
 
     def work(self, context):
         """Set the camera; in a window, look through it."""
-        scene, studio = context.scene, context.scene.scan_relight_studio
+        scene = context.scene
         count = len(frame_cameras(scene))
         index = (match_frame.current(scene) + self.step) % count if self.step else self.index
         if index >= count:
             raise BadInputError(f"There is no frame {index}; the capture's last one is {count - 1}.")
-        told = match_frame.match_frame(scene, index, studio.show_frame, studio.frame_alpha, studio.frame_front,
-                                       bpy.path.abspath(scene.scan_relight.capture_folder))
+        told = look_through(scene.scan_relight_studio, index)
         space = context.space_data
         if space is not None and space.type == "VIEW_3D" and space.region_3d is not None:
             space.region_3d.view_perspective = "CAMERA"

@@ -9,6 +9,7 @@ from typing import Any
 
 import bpy
 
+from ..addon.bridge import look
 from . import preferences
 
 MATERIALS, REPORT, PAGE = "materials.json", "report.json", "report.html"
@@ -42,8 +43,6 @@ _read: dict[Path, tuple[tuple, Result]] = {}
 
 def folder_of(scene: bpy.types.Scene) -> Path | None:
     """The result folder that a scene's panel is about: the chosen one, or that of its recovered objects."""
-    from ..addon.bridge import look
-
     choices = scene.scan_relight
     if choices.result_folder:
         return Path(bpy.path.abspath(choices.result_folder))
@@ -121,6 +120,11 @@ def certainty(one: dict[str, Any]) -> str:
     return "sure" if value <= SURE else "fair" if value <= FAIR else "unsure"
 
 
+def specular(one: dict[str, Any]) -> float | None:
+    """An object's reflectance at normal incidence; a metal's is the mean of its colours'."""
+    return one["psi"] if one.get("psi") is not None else _mean(one.get("f0"))
+
+
 def _mean(value) -> float | None:
     if isinstance(value, (list, tuple)) and value and all(isinstance(one, (int, float)) for one in value):
         return sum(value) / len(value)
@@ -135,7 +139,7 @@ def facts(one: dict[str, Any]) -> list[tuple[str, str]]:
     phi = one.get("phi")
     if phi is not None:
         found.append(("Roughness", _between(max(phi, 0) ** 0.5, one.get("roughness_low"), one.get("roughness_high"))))
-    value = one.get("psi") if one.get("psi") is not None else _mean(one.get("f0"))
+    value = specular(one)
     if value is not None:
         found.append(("Specular F0", _between(value, one.get("specular_low"), one.get("specular_high"))))
     if model == "emitter" and one.get("emission") is not None:

@@ -35,7 +35,6 @@ TILE = 212
 """Width of a picture on the sheet."""
 JOB = "module('addon.bridge.job').current()"
 ACTIVE = "module('operators.job_operator').active()"
-LAMPS = "module('addon.bridge.relight_lamps')"
 
 
 def main() -> int:

@@ -16,7 +16,7 @@ from ..core.shading.albedo import MEASURED
 from ..core.surface.rays import RayScene
 from .demo_room import room
 from .images import image_array
-from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, METALLIC, ROUGHNESS
+from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, METALLIC, MODEL, ROUGHNESS
 from .mesh_objects import ATLAS_UV, OBJECT_ID
 
 MIN_COSINE = 0.2
@@ -72,7 +72,7 @@ def describe(thing, measured: np.ndarray) -> dict:
     """What the material of a recovered object says: model, mean base colour, roughness, F0, radiance."""
     material = thing.data.materials[0]
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    model = material["scan_relight_model"]
+    model = material[MODEL]
     glossy = material.get("scan_relight_phi") is not None
     emission = shader.inputs[EMISSION_COLOR].default_value[:3]
     strength = shader.inputs[EMISSION_STRENGTH].default_value

@@ -20,7 +20,6 @@ from .export_material import plain_copy
 from .materials import opacity
 from .mesh_objects import OBJECT_ID
 
-GLB, GLTF, USD = ".glb", ".gltf", ".usd"
 FORMATS = {".glb": "GLB", ".gltf": "GLTF_SEPARATE", ".usdc": "USD", ".usd": "USD", ".usda": "USD", ".usdz": "USD"}
 """By ending."""
 ROOM, SELECTED, ALL = "ROOM", "SELECTED", "ALL"

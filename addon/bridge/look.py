@@ -8,6 +8,7 @@ where a file is opened without the add-on. One material serves the whole room, a
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +17,7 @@ import bpy
 from ..core.errors import BadInputError
 from .apply import RESULT
 from .images import RADIANCE
+from .materials import mix_node
 from .mesh_objects import ATLAS_UV, OBJECT_ID
 from .result_images import image
 
@@ -146,13 +148,19 @@ def clear(scene: bpy.types.Scene, but: bpy.types.NodeTree | None = None) -> int:
 
     The node group `but` is kept for what comes next.
     """
+    count = _take_off(scene.objects)
+    _sweep(but)
+    return count
+
+
+def _take_off(things: Iterable[bpy.types.Object]) -> int:
+    """Remove the look's modifiers; returns how many there were."""
     count = 0
-    for thing in scene.objects:
+    for thing in things:
         modifier = thing.modifiers.get(NAME)
         if modifier is not None and not thing.library:
             thing.modifiers.remove(modifier)
             count += 1
-    _sweep(but)
     return count
 
 
@@ -172,10 +180,7 @@ def _sweep(but: bpy.types.NodeTree | None = None) -> None:
 def refresh(scene: bpy.types.Scene) -> None:
     """Take the look off objects that wear no recovered material any more."""
     keep = set(recovered(scene))
-    for thing in scene.objects:
-        modifier = thing.modifiers.get(NAME)
-        if modifier is not None and thing not in keep and not thing.library:
-            thing.modifiers.remove(modifier)
+    _take_off(thing for thing in scene.objects if thing not in keep)
     _sweep()
 
 
@@ -281,13 +286,11 @@ def _ramp(tree, value, never):
     for k, (element, colour) in enumerate(zip(elements, RAMP)):
         element.position, element.color = k / (len(RAMP) - 1), (*colour, 1)
     tree.links.new(value, node.inputs[0])
-    mix = tree.nodes.new("ShaderNodeMix")
-    mix.data_type = "RGBA"
-    colours = [socket for socket in mix.inputs if socket.type == "RGBA"]
-    tree.links.new(never, next(socket for socket in mix.inputs if socket.type == "VALUE"))
-    tree.links.new(node.outputs[0], colours[0])
-    colours[1].default_value = NEVER
-    return next(socket for socket in mix.outputs if socket.type == "RGBA")
+    _, factor, seen, unseen, mixed = mix_node(tree.nodes)
+    tree.links.new(never, factor)
+    tree.links.new(node.outputs[0], seen)
+    unseen.default_value = NEVER
+    return mixed
 
 
 def _without_exposure(scene: bpy.types.Scene, socket) -> None:

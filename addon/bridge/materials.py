@@ -9,6 +9,8 @@ import bpy
 from ..core.material import EMITTER, METAL, SPECULAR, ObjectMaterial
 from .mesh_objects import ATLAS_UV
 
+MODEL = "scan_relight_model"
+"""Custom property of each recovered material: its description's model."""
 MAX_F0 = 0.9
 """The index of refraction grows without bound as F0 nears 1; this is an index of 38."""
 
@@ -76,7 +78,7 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
         # Glass lets a share of the light through straight on: no bending, as frames say nothing of it.
         value[ALPHA].default_value = description.opacity
         links.new(_texture(nodes, links, base_color, (-400, 200)), value[BASE_COLOR])
-    material["scan_relight_model"] = description.model
+    material[MODEL] = description.model
     for name in ("phi", "psi", "transmission"):
         number = getattr(description, name)
         if number is not None:
@@ -126,20 +128,27 @@ def _emit(nodes, links, value, radiance, image):
 
 def _front_only(nodes, links, socket):
     """Blacken an emission colour where the surface is seen from behind; the strength stays a plain number."""
-    mix = nodes.new("ShaderNodeMix")
-    mix.data_type, mix.location = "RGBA", (-250, -300)
-    # By type, as the node has sockets of the same name for each of its data types.
-    colours = [s for s in mix.inputs if s.type == "RGBA"]
-    factor = next(s for s in mix.inputs if s.type == "VALUE")
+    mix, factor, front, back, mixed = mix_node(nodes)
+    mix.location = (-250, -300)
     geometry = nodes.new("ShaderNodeNewGeometry")
     geometry.location = (-450, -350)
     links.new(geometry.outputs["Backfacing"], factor)
     if socket.links:
-        links.new(socket.links[0].from_socket, colours[0])
+        links.new(socket.links[0].from_socket, front)
     else:
-        colours[0].default_value = tuple(socket.default_value)
-    colours[1].default_value = (0, 0, 0, 1)
-    links.new(next(s for s in mix.outputs if s.type == "RGBA"), socket)
+        front.default_value = tuple(socket.default_value)
+    back.default_value = (0, 0, 0, 1)
+    links.new(mixed, socket)
+
+
+def mix_node(nodes):
+    """A node that mixes two colours, and its sockets: factor, the colours where that is 0 and 1, result."""
+    mix = nodes.new("ShaderNodeMix")
+    mix.data_type = "RGBA"
+    # By type, as the node has sockets of the same name for each of its data types.
+    colours = [s for s in mix.inputs if s.type == "RGBA"]
+    return (mix, next(s for s in mix.inputs if s.type == "VALUE"), *colours,
+            next(s for s in mix.outputs if s.type == "RGBA"))
 
 
 def _texture(nodes, links, image, place):

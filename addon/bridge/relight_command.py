@@ -133,7 +133,7 @@ def set_lamps(scene: bpy.types.Scene, text: str) -> None:
         if not sign:
             raise BadInputError(f"Option --lamps takes on, off or NAME=FACTOR, separated by commas, not '{part}'.")
         lamps = relight_lamps.lamp_named(scene, name)
-        wanted.append((lamps, None if value == "off" else 1.0 if value == "on" else _factor(value, "--lamps")))
+        wanted.append((lamps, None if value == "off" else 1.0 if value == "on" else _factor(value)))
     for lamps, value in wanted:
         for lamp in lamps:
             relight_lamps.set_on(lamp, value is not None)
@@ -167,14 +167,14 @@ def camera_named(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
     return found
 
 
-def _factor(text: str, option: str) -> float:
-    """A number of at least 0."""
+def _factor(text: str) -> float:
+    """A lamp's factor from the option ``--lamps``: a number of at least 0."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value >= 0):
-        raise BadInputError(f"Option {option} takes factors of at least 0, not '{text}'.")
+        raise BadInputError(f"Option --lamps takes factors of at least 0, not '{text}'.")
     return value
 
 

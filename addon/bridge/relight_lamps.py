@@ -10,9 +10,8 @@ import bpy
 
 from ..core.errors import BadInputError
 from ..core.material import EMITTER
-from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH
+from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, MODEL
 
-MODEL = "scan_relight_model"
 _STRENGTH, _COLOUR, _BASE = (f"scan_relight_recovered_{name}" for name in ("strength", "colour", "base"))
 _OFF, _FACTOR = "scan_relight_lamp_off", "scan_relight_lamp_factor"
 

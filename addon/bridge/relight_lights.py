@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 import bpy
-from mathutils import Matrix, Vector
+from mathutils import Matrix
 
 from ..core.errors import BadInputError
 from .own_collection import own_collection
@@ -111,9 +111,3 @@ def _lamp(preset: str, place: Placement, distance: float, irradiance: float) -> 
     else:
         data.energy = irradiance * (area + math.pi * distance ** 2)
     return data
-
-
-def aim_at(light: bpy.types.Object, target: Vector) -> None:
-    """Turn a light towards a place; where it stands stays."""
-    rotation = (target - light.matrix_world.translation).to_track_quat("-Z", "Y")
-    light.matrix_world = Matrix.LocRotScale(light.matrix_world.translation, rotation, None)

@@ -19,7 +19,7 @@ from ..core.errors import BadInputError, MissingStageError
 from ..core.material import LAMBERTIAN, ObjectMaterial
 from . import result_images
 from .apply import RESULT, applying, whole
-from .materials import make_material
+from .materials import MODEL, make_material
 from .mesh_objects import ATLAS_UV, OBJECT_ID
 from .relight_room import depsgraph_of
 from .scene_capture import Source, check_own, few, polygons_of, sharing, sources
@@ -322,5 +322,5 @@ def _without_ours(data: bpy.types.Mesh, aside: bool) -> None:
 def drop_ours(materials: Iterable[bpy.types.Material | None]) -> None:
     """Remove those recovered materials that nothing wears any more."""
     for material in {one for one in materials if one is not None}:
-        if "scan_relight_model" in material and not material.users and not material.library:
+        if MODEL in material and not material.users and not material.library:
             bpy.data.materials.remove(material)
