@@ -54,8 +54,7 @@ def read(root: Path, reading: Reading) -> Layout:
                             "or in 'sparse', 'sparse/0' or 'colmap'.")
     model = read_model(folder)
     mesh = _mesh(root, reading)
-    semantic = root / instances.FILE
-    names = instances.read_instances(semantic) if semantic.exists() else None
+    names = instances.names_in(root)
     frames, problems, notes = frames_of(model, root, _pictures(root, folder), reading)
     others = [path.name for path in sorted(folder.parent.iterdir())
               if path != folder and folder.name == "0" and model_files(path)]  # fmt: skip

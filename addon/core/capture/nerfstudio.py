@@ -55,8 +55,7 @@ def read(root: Path, reading: Reading) -> Layout:
     paths = find(root) or [root / FILE]
     top = read_json(paths[0])
     mesh = read_mesh(_mesh_path(root, top, reading), reading)
-    semantic = root / instances.FILE
-    names = instances.read_instances(semantic) if semantic.exists() else None
+    names = instances.names_in(root)
     frames, problems, notes = read_frames(root, reading)
     mesh, more = _in_frames_world(mesh, root, top, frames, reading)
     return Layout(frames, mesh, names, instances.FILE, problems, notes + more)

@@ -38,8 +38,7 @@ def read(root: Path, reading: Reading) -> Layout:
         The poses, the camera, the mesh or the list of objects can't be read, or there are no pictures.
     """
     frames, problems, notes = read_frames(root)
-    semantic = root / instances.FILE
-    names = instances.read_instances(semantic) if semantic.exists() else None
+    names = instances.names_in(root)
     return Layout(frames, _mesh(root, reading), names, instances.FILE, problems, notes)
 
 
