@@ -9,7 +9,7 @@ import numpy as np
 from ..capture.model import Camera
 from ..surface.rays import RayScene
 from .edges import Shown
-from .views import SmallView
+from .views import SmallView, sees
 
 OTHERS = 6
 """Views whose median is taken as what a spot looks like."""
@@ -35,16 +35,8 @@ def predicted(index: int, views: Sequence[SmallView], cameras: Sequence[Camera],
     nearest = [j for j in np.argsort(way, kind="stable") if j != index][:OTHERS]
     said = np.full((len(nearest), len(at)), np.nan, np.float32)
     for row, j in enumerate(nearest):
-        eye, view = cameras[j], views[j]
-        pixel, depth = eye.project(points)
-        inside = np.flatnonzero((depth > 0) & (pixel >= 1).all(1) & (pixel < (eye.width - 1, eye.height - 1)).all(1))
-        away = eye.centre - points[inside]
-        distance = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
-        origins = points[inside] + away / distance * (4 * scene.offset)
-        free = ~scene.occluded(np.float32(origins), np.float32(away / distance),
-                               np.float32(distance[:, 0] - 8 * scene.offset))  # fmt: skip
-        inside = inside[free]
-        said[row, inside] = bilinear(view.log.mean(-1), pixel[inside] - 0.5)
+        inside, pixels = sees(cameras[j], points, scene, margin=1)
+        said[row, inside] = bilinear(views[j].log.mean(-1), pixels - 0.5)
     enough = np.isfinite(said).sum(0) >= LEAST_VIEWS
     image = np.full(camera.height * camera.width, np.nan, np.float32)
     image[at[enough]] = np.nanmedian(said[:, enough], 0)

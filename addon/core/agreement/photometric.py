@@ -9,7 +9,7 @@ import numpy as np
 
 from ..capture.model import Camera
 from ..surface.rays import RayScene
-from .views import SmallView
+from .views import SmallView, sees
 
 GRID = 20
 """Rays along an edge of each view."""
@@ -59,15 +59,8 @@ def consistency(views: Sequence[SmallView], cameras: Sequence[Camera], scene: Ra
         for j, (other, eye) in enumerate(zip(views, cameras, strict=True)):
             if j == i:
                 continue
-            pixel, depth = eye.project(points)
-            inside = np.flatnonzero((depth > 0) & (pixel >= 0).all(1) & (pixel < (eye.width, eye.height)).all(1))
-            away = eye.centre - points[inside]
-            distance = np.linalg.norm(away, axis=1)
-            origins = points[inside] + away * (scene.offset / np.maximum(distance, 1e-12))[:, None] * 4
-            free = ~scene.occluded(np.float32(origins), np.float32(away / np.maximum(distance, 1e-12)[:, None]),
-                                   np.float32(distance - 8 * scene.offset))
-            inside = inside[free]
-            column, row = pixel[inside].astype(int).T
+            inside, pixels = sees(eye, points, scene)
+            column, row = pixels.astype(int).T
             theirs = other.log[row, column]
             known = np.isfinite(theirs).all(1)
             inside, theirs = inside[known], theirs[known]

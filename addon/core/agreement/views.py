@@ -9,6 +9,7 @@ import numpy as np
 
 from ..capture.model import Camera, Frame, Pixels
 from ..errors import BadInputError
+from ..surface.rays import RayScene
 
 COUNT = 16
 """Frames that are looked at, spread evenly."""
@@ -56,6 +57,32 @@ def small_views(frames: Sequence[Frame], read: Callable[[Frame], Pixels], count:
         camera = small_camera(frame.camera, step)
         views.append(SmallView(frame.name, camera, _small(pixels, camera, step), step))
     return views
+
+
+def sees(camera: Camera, points: np.ndarray, scene: RayScene, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Which points of the mesh a camera sees, none of its triangles before them, and at which pixels.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+    margin : float
+        Pixels along the picture's edges that don't count.
+
+    Returns
+    -------
+    which : (k,) int
+    pixels : (k, 2) float64
+        x and y.
+    """
+    pixels, depth = camera.project(points)
+    end = camera.width - margin, camera.height - margin
+    which = np.flatnonzero((depth > 0) & (pixels >= margin).all(1) & (pixels < end).all(1))
+    away = camera.centre - points[which]
+    distance = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
+    away /= distance
+    origins = points[which] + away * (4 * scene.offset)
+    free = ~scene.occluded(np.float32(origins), np.float32(away), np.float32(distance[:, 0] - 8 * scene.offset))
+    return which[free], pixels[which[free]]
 
 
 def _small(pixels: Pixels, camera: Camera, step: int) -> np.ndarray:
