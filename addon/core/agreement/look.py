@@ -161,12 +161,13 @@ def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True)
     normal, _ = triangle_geometry(capture.mesh)
     scene = _Scene(small_views(capture.frames, read), capture, RayScene(capture.mesh.vertices, capture.mesh.triangles),
                    normal)
-    plain = scene.whole(scene.colour(Convention()))
-    if plain.quality >= AGREE or not search or len(scene.views) < LEAST_VIEWS:
-        at = scene.shown(Convention())
-        moved = misalignments(scene.views, [v.camera for v in scene.views], at, scene.rays)
-        misaligned = moved if plain.quality >= AGREE else np.zeros(0)
-        return Agreement(plain, None, misaligned, False, _up(scene.views, Convention()))
+    seen = scene.shown(Convention())
+    plain = replace(scene.colour(Convention()), edge=edge_score(scene.views, seen))
+    if plain.quality >= AGREE:
+        moved = misalignments(scene.views, [v.camera for v in scene.views], seen, scene.rays)
+        return Agreement(plain, None, moved, False, _up(scene.views, Convention()))
+    if not search or len(scene.views) < LEAST_VIEWS:
+        return Agreement(plain, None, np.zeros(0), False, _up(scene.views, Convention()))
     best = _search(scene)
     better = best is not None and best.quality >= max(AGREE, plain.quality + BETTER)
     chosen = best.convention if better else Convention()
