@@ -64,9 +64,6 @@ def picture_size(path: Path) -> tuple[int, int]:
     return {EXR: read_header, HDR: hdr_size, PNG: png_size}[kind](path)
 
 
-mask_size = picture_size
-
-
 def picture_bits(path: Path) -> int:
     """Bits of a channel where numbers are codes of a curve, 8 or 16; 0 where they are linear floats.
 

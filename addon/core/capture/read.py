@@ -23,7 +23,7 @@ from .mesh_repair import repair
 from .model import Capture, Frame, Mesh
 from .parts import connected_parts
 from .paths import EscapesError, check_links
-from .pictures import mask_size, picture_note, picture_size, read_picture
+from .pictures import picture_note, picture_size, read_picture
 from .readers import reader_for
 from .vote import vote
 
@@ -138,9 +138,8 @@ def _check_frame(frame: Frame) -> None:
     """Look at a frame's camera and at the headers of its pictures; raises `BadInputError`."""
     check_camera(frame.camera, frame.name)
     wanted = frame.camera.width, frame.camera.height
-    sizes = [(path, picture_size(path)) for path in (frame.path, *(shot.path for shot in frame.brackets))]
-    if frame.mask_path is not None:
-        sizes.append((frame.mask_path, mask_size(frame.mask_path)))
+    masks = () if frame.mask_path is None else (frame.mask_path,)
+    sizes = [(path, picture_size(path)) for path in (frame.path, *(shot.path for shot in frame.brackets), *masks)]
     for path, (width, height) in sizes:
         if (width, height) != wanted:
             raise BadInputError(f"Frame '{frame.name}': '{path}' has {width} x {height} pixels, but its camera has "
