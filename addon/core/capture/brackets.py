@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .model import Frame, Shot
+from .model import Frame
 
 SAME_POSE = 1e-6
 """Metres, and entries of a rotation, within which two poses are one."""
@@ -115,10 +115,8 @@ def group_brackets(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
 
 def unfold(frames: Sequence[Frame]) -> list[Frame]:
     """Each exposure as a frame of its own, so that all pictures are looked at alike."""
-    return [one for frame in frames for one in (
-        replace(frame, brackets=()),
-        *(replace(frame, path=shot.path, exposure=shot.exposure, saturation=shot.saturation, brackets=())
-          for shot in frame.brackets))]
+    return [replace(frame, path=shot.path, exposure=shot.exposure, saturation=shot.saturation, brackets=())
+            for frame in frames for shot in frame.shots]
 
 
 def fold(frames: Sequence[Frame], exposures: Sequence[Frame]) -> list[Frame]:
@@ -132,8 +130,7 @@ def fold(frames: Sequence[Frame], exposures: Sequence[Frame]) -> list[Frame]:
 
 
 def _lead(frame: Frame, others: Sequence[Frame]) -> Frame:
-    return replace(frame, brackets=(*frame.brackets, *(shot for one in others for shot in (
-        Shot(one.path, one.exposure, one.saturation), *one.brackets))))
+    return replace(frame, brackets=(*frame.brackets, *(shot for one in others for shot in one.shots)))
 
 
 def _key(frame: Frame) -> tuple:

@@ -67,7 +67,7 @@ def reading_through(load: Load) -> Callable[[Frame], Pixels]:
 
 def _foreign(frames: Iterable[Frame]) -> list[Path]:
     """The pictures of the frames that the core can't read, each once."""
-    return sorted({path for frame in frames for path in _paths(frame) if _is_foreign(path)})
+    return sorted({path for frame in frames for path in frame.files if _is_foreign(path)})
 
 
 def _copy(path: Path, folder: Path, load: Load) -> Path:
@@ -89,11 +89,6 @@ def _copy(path: Path, folder: Path, load: Load) -> Path:
         raise StorageError(f"'{folder}' can't be written ({error.strerror or error}); free some space or choose "
                            "another result folder.") from error
     return target
-
-
-def _paths(frame: Frame) -> list[Path]:
-    more = [path for path in (frame.mask_path, frame.id_path) if path is not None]
-    return [frame.path, *more, *(shot.path for shot in frame.brackets)]
 
 
 def _moved(frame: Frame, copies: dict[Path, Path]) -> Frame:

@@ -31,7 +31,7 @@ def with_curves(frames: Sequence[Frame], transfer: str) -> tuple[list[Frame], li
     coded = 0
     for frame in frames:
         try:
-            bits = [picture_bits(path) for path in (frame.path, *(shot.path for shot in frame.brackets))]
+            bits = [picture_bits(shot.path) for shot in frame.shots]
         except BadInputError:
             found.append(frame)
             continue

@@ -163,6 +163,17 @@ class Frame:
     brackets: tuple[Shot, ...] = ()
     id_path: Path | None = None
 
+    @property
+    def shots(self) -> tuple[Shot, ...]:
+        """All exposures, its own first."""
+        return Shot(self.path, self.exposure, self.saturation), *self.brackets
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All pictures that belong to it: exposures, mask, ids."""
+        more = (self.mask_path, self.id_path)
+        return *(shot.path for shot in self.shots), *(path for path in more if path is not None)
+
 
 @dataclass(frozen=True)
 class Pixels:

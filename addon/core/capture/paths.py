@@ -56,9 +56,8 @@ def check_links(root: Path, frame: Frame) -> None:
     EscapesError
         A file that lies in the capture by its name lies outside by a link.
     """
-    shots = (shot.path for shot in frame.brackets)
-    for path in (frame.path, *shots, frame.mask_path, frame.id_path):
-        if path is None or not path.is_relative_to(root):
+    for path in frame.files:
+        if not path.is_relative_to(root):
             continue
         try:
             inside_root = path.resolve().is_relative_to(root.resolve())

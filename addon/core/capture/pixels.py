@@ -36,10 +36,10 @@ def read_pixels(frame: Frame) -> Pixels:
     if led is not None:  # beyond the lens's image circle
         seen &= led
     if frame.brackets:
-        shots = sorted((Shot(frame.path, frame.exposure, frame.saturation), *frame.brackets), key=lambda s: s.exposure)
+        shots = sorted(frame.shots, key=lambda s: s.exposure)
         radiance, valid, saturated = merge(_exposed(frame, shot, seen) for shot in shots)
     else:
-        rgb, valid, saturated, *_ = _exposed(frame, Shot(frame.path, frame.exposure, frame.saturation), seen)
+        rgb, valid, saturated, *_ = _exposed(frame, frame.shots[0], seen)
         with np.errstate(over="ignore", invalid="ignore"):
             radiance = rgb / np.float32(frame.exposure)
     valid &= np.isfinite(radiance).all(-1)

@@ -138,8 +138,8 @@ def _check_frame(frame: Frame) -> None:
     """Look at a frame's camera and at the headers of its pictures; raises `BadInputError`."""
     check_camera(frame.camera, frame.name)
     wanted = frame.camera.width, frame.camera.height
-    masks = () if frame.mask_path is None else (frame.mask_path,)
-    sizes = [(path, picture_size(path)) for path in (frame.path, *(shot.path for shot in frame.brackets), *masks)]
+    paths = (*(shot.path for shot in frame.shots), frame.mask_path)
+    sizes = [(path, picture_size(path)) for path in paths if path is not None]
     for path, (width, height) in sizes:
         if (width, height) != wanted:
             raise BadInputError(f"Frame '{frame.name}': '{path}' has {width} x {height} pixels, but its camera has "
