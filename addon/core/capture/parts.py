@@ -7,6 +7,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..surface.weld import same_place
+
 WELD = 1e-6
 """Share of the room's diagonal within which vertices are one: at seams and between triangles they are listed twice."""
 TINY = 1e-3
@@ -18,8 +20,7 @@ MOST = 64
 def weld(vertices: np.ndarray) -> np.ndarray:
     """A number for each place that vertices ((v, 3), finite) lie at, (v,) int64."""
     low, high = vertices.min(0), vertices.max(0)
-    step = max(WELD * float(np.linalg.norm(high - low)), 1e-12)
-    return np.unique(np.round((vertices - low) / step).astype(np.int64), axis=0, return_inverse=True)[1].ravel()
+    return same_place(vertices - low, max(WELD * float(np.linalg.norm(high - low)), 1e-12))[1]
 
 
 def connected_parts(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -8,13 +8,36 @@ from scipy import sparse
 from ..capture.model import Mesh
 
 
+def same_place(vertices: np.ndarray, tolerance: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Number the places that vertices lie at.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float
+        Finite.
+    tolerance : float
+        Metres. Vertices in one cell of a grid of this size are one; 0: equal to the last bit.
+
+    Returns
+    -------
+    first : (p,) int
+        A vertex of each place.
+    place : (v,) int64
+        The place of each vertex.
+    """
+    # Rounded, not cut off: what lies on round numbers, as a drawn room does, is then in the middle of a cell.
+    cells = np.round(vertices / tolerance) if tolerance > 0 else vertices
+    _, first, place = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+    return first, place.ravel()
+
+
 def welded(mesh: Mesh, tolerance: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices in one place as one point: at seams a mesh lists them twice.
 
     Parameters
     ----------
     tolerance : float
-        Metres. Vertices in one cell of a grid of this size are one; 0: equal to the last bit.
+        See `same_place`.
 
     Returns
     -------
@@ -24,10 +47,7 @@ def welded(mesh: Mesh, tolerance: float = 0.0) -> tuple[np.ndarray, np.ndarray, 
     place : (v,) int
         The point of each vertex.
     """
-    # Rounded, not cut off: what lies on round numbers, as a drawn room does, is then in the middle of a cell.
-    cells = np.round(mesh.vertices / tolerance) if tolerance > 0 else mesh.vertices
-    _, first, place = np.unique(cells, axis=0, return_index=True, return_inverse=True)
-    place = place.ravel()
+    first, place = same_place(mesh.vertices, tolerance)
     return mesh.vertices[first].astype(np.float64), place[mesh.triangles], place
 
 
