@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.capture.model import Capture
 from ..core.errors import MissingStageError
-from ..core.material import EMITTER, LAMBERTIAN, ObjectMaterial
+from ..core.material import EMITTER, ObjectMaterial, undescribed
 from . import result_images
 from .cameras import make_cameras
 from .match_frame import show_picture
@@ -135,8 +135,7 @@ def applying(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, mat
         layer = layers.get(ATLAS_UV) or layers.new(name=ATLAS_UV)
         layer.uv.foreach_set("vector", atlas_uv[own].astype(np.float32).ravel())
         layers.active, layer.active_render = layer, True
-        description = descriptions.get(instance.object_id) or ObjectMaterial(
-            instance.object_id, instance.class_name, LAMBERTIAN, note="no description")
+        description = descriptions.get(instance.object_id) or undescribed(instance.object_id, instance.class_name)
         thing.data.materials.clear()
         thing.data.materials.append(make_material(description, base_color))
         thing[RESULT] = str(folder)

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..core.capture.model import Capture
 from ..core.errors import StorageError
-from ..core.material import EMITTER, LAMBERTIAN, ObjectMaterial
+from ..core.material import EMITTER, ObjectMaterial, undescribed
 from .cameras import differing, make_cameras, make_view, unlike, use_camera
 from .images import load_image, relative_to
 from .materials import make_material
@@ -97,8 +97,7 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
         if instance.object_id not in objects:
             continue
         thing = objects[instance.object_id]
-        description = descriptions.get(instance.object_id) or ObjectMaterial(
-            instance.object_id, instance.class_name, LAMBERTIAN, note="no description")
+        description = descriptions.get(instance.object_id) or undescribed(instance.object_id, instance.class_name)
         one_sided = facing and description.model == EMITTER and is_open(thing.data)
         thing.data.materials.append(make_material(description, images.get(BASE_COLOR), one_sided=one_sided))
         if description.model == EMITTER:

@@ -16,7 +16,7 @@ from mathutils import Matrix
 
 from ..core.capture.model import Capture
 from ..core.errors import BadInputError, MissingStageError
-from ..core.material import LAMBERTIAN, ObjectMaterial
+from ..core.material import ObjectMaterial, undescribed
 from . import result_images
 from .apply import RESULT, applying, whole
 from .materials import MODEL, make_material
@@ -106,8 +106,7 @@ def writing_back(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray,
         if thing.library or thing.override_library:
             locked.append(source.name)
             continue
-        description = descriptions.get(source.object_id) or ObjectMaterial(
-            source.object_id, source.name, LAMBERTIAN, note="no description")
+        description = descriptions.get(source.object_id) or undescribed(source.object_id, source.name)
         own = corner_uv[source.corner_start:]
         if not source.own:
             made.append((source, thing, description, own))

@@ -83,3 +83,8 @@ class ObjectMaterial:
         if self.transmission is None or self.surfaces is None:
             return 1.0
         return 1 - min(max(self.transmission, 0.0), 1.0) ** (1 / max(self.surfaces, 1.0))
+
+
+def undescribed(object_id: int, class_name: str) -> ObjectMaterial:
+    """What an object is taken for of which nothing was recovered."""
+    return ObjectMaterial(object_id, class_name, LAMBERTIAN, note="no description")
