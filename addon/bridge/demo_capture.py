@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.capture.ply_write import ply_bytes
 from .demo_room import Thing
 
 FIELD_OF_VIEW = np.radians(78)
@@ -57,19 +58,11 @@ def truth(thing: Thing) -> dict:
 
 def write_mesh(path: Path, things: tuple[Thing, ...]) -> None:
     """All things as one binary PLY with an `object_id` on each face."""
-    corners, faces, first = [], {3: [], 4: []}, 0
+    corners, faces, first = [], [], 0
     for thing in things:
         vertices, index, _, _ = thing.faces()
-        record = np.empty(len(index), [("n", "u1"), ("v", "<i4", index.shape[1]), ("object_id", "<i4")])
-        record["n"], record["v"], record["object_id"] = index.shape[1], index + first, thing.object_id
-        faces[index.shape[1]].append(record)
-        corners.append(vertices.astype("<f4"))
+        corners.append(vertices.astype(np.float32))
+        faces.append((index + first, thing.object_id))
         first += len(vertices)
-    records = [record for kind in faces.values() for record in kind]
-    header = (
-        f"ply\nformat binary_little_endian 1.0\nelement vertex {first}\n"
-        "property float x\nproperty float y\nproperty float z\n"
-        f"element face {sum(map(len, records))}\nproperty list uchar int vertex_indices\nproperty int object_id\n"
-        "end_header\n"
-    )
-    path.write_bytes(header.encode() + b"".join(c.tobytes() for c in corners) + b"".join(r.tobytes() for r in records))
+    faces.sort(key=lambda one: one[0].shape[1])  # triangles, then quads
+    path.write_bytes(ply_bytes(np.concatenate(corners), faces))

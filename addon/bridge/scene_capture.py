@@ -24,6 +24,7 @@ from ..core.capture.lenses_told import told_lens
 from ..core.capture.mesh_repair import repair
 from ..core.capture.model import Mesh
 from ..core.capture.nerfstudio_camera import OWN_LENS
+from ..core.capture.ply_write import ply_bytes
 from ..core.errors import BadInputError, MissingStageError, StorageError
 from . import scene_cameras
 from .scene_mesh import Part, SceneMesh, gather, joined
@@ -164,7 +165,7 @@ def _write_whole(folder: Path, write) -> None:
 
 
 def _write(folder: Path, mesh: SceneMesh, parts: list[Part], views: list[scene_cameras.View], metre: float) -> None:
-    (folder / "mesh.ply").write_bytes(_ply(mesh, metre))
+    (folder / "mesh.ply").write_bytes(ply_bytes(mesh.vertices * metre, [(mesh.triangles, mesh.object_id)]))
     names = [{"id": part.object_id, "class_name": part.class_name, "name": part.name} for part in parts]
     _json(folder / "info_semantic.json", {"objects": names})
     (folder / "images").mkdir()
@@ -191,18 +192,6 @@ def _write(folder: Path, mesh: SceneMesh, parts: list[Part], views: list[scene_c
 
 def _json(path: Path, value) -> None:
     path.write_text(json.dumps(value, indent=1, ensure_ascii=False), encoding="utf-8")
-
-
-def _ply(mesh: SceneMesh, metre: float) -> bytes:
-    """The triangles as binary PLY, positions in double and in metres."""
-    record = np.empty(len(mesh.triangles), [("n", "u1"), ("v", "<i4", 3), ("object_id", "<i4")])
-    record["n"], record["v"], record["object_id"] = 3, mesh.triangles, mesh.object_id
-    header = (
-        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(mesh.vertices)}\n"
-        "property double x\nproperty double y\nproperty double z\n"
-        f"element face {len(record)}\nproperty list uchar int vertex_indices\nproperty int object_id\nend_header\n"
-    )
-    return header.encode() + (mesh.vertices * metre).astype("<f8").tobytes() + record.tobytes()
 
 
 def bring(source: Path, target: Path) -> None:
