@@ -16,6 +16,8 @@ from .lens import ahead
 
 STEEPEST = math.tan(math.radians(89.99))
 """Tangent of the widest angle that a perspective lens is followed to."""
+ROOT = 1e-12
+"""A denominator up to this counts as 0: where it only touches 0, rounding hides on which side of the root it is."""
 ENTRIES = 2049
 """Of the table from which the search for a radius starts."""
 AZIMUTHS = 64
@@ -113,12 +115,13 @@ class Polynomial:
         """Whether r_d grows with r, before the denominator's first root."""
         s = r * r
         n, d = _poly(self.numerator, s), _poly(self.denominator, s)
-        return (d > 0) & ((n + 2 * s * _slope(self.numerator, s)) * d > 2 * s * n * _slope(self.denominator, s))
+        return (d > ROOT) & ((n + 2 * s * _slope(self.numerator, s)) * d > 2 * s * n * _slope(self.denominator, s))
 
     def _definite(self, r: np.ndarray, phi: np.ndarray) -> np.ndarray:
         """Whether the Jacobian's symmetric part is positive definite."""
-        j = self._distort(r * np.cos(phi), r * np.sin(phi))[2]
-        return (j[0] + j[3]) / 2 > np.hypot((j[0] - j[3]) / 2, (j[1] + j[2]) / 2)
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # the last radius may be the root itself
+            j = self._distort(r * np.cos(phi), r * np.sin(phi))[2]
+            return (j[0] + j[3]) / 2 > np.hypot((j[0] - j[3]) / 2, (j[1] + j[2]) / 2)
 
     def _distort(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
         """The distorted point, and the Jacobian's four entries row by row."""

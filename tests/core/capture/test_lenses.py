@@ -95,6 +95,8 @@ STRONG = {
     "barrel and back": polynomial("OPENCV", numerator=(-0.4, 0.2), tangential=(0.01, -0.008)),
     "pincushion": polynomial("SIMPLE_RADIAL", numerator=(0.9,)),
     "rational with a pole": polynomial("FULL_OPENCV", numerator=(0.1,), denominator=(-0.3,)),
+    "a pole that is not round": polynomial("FULL_OPENCV", denominator=(0.25, -0.25, 0.0), tangential=(0.01, 0.0)),
+    "a pole of two roots": polynomial("FULL_OPENCV", numerator=(0.045,), denominator=(-2 * 0.8261, 0.8261**2)),
     "fisheye past 180 degrees": polynomial("OPENCV_FISHEYE", fisheye=True, numerator=(-0.02, 0.004, -0.001, 0.0001)),
     "fisheye that folds": polynomial("RADIAL_FISHEYE", fisheye=True, numerator=(-0.15, 0.0)),
     "prism": polynomial("THIN_PRISM_FISHEYE", fisheye=True, numerator=(0.05, -0.02), tangential=(0.008, -0.01),
