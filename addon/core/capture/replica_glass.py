@@ -131,4 +131,3 @@ def _inside(points: np.ndarray, pane: Pane) -> np.ndarray:
         if y0 != y1:
             odd ^= ((y0 > y) != (y1 > y)) & (x < (x1 - x0) * (y - y0) / (y1 - y0) + x0)
     return odd
-

@@ -20,6 +20,11 @@ def world_to_camera(pose: np.ndarray) -> tuple[list[float], list[float]]:
     return [w, x, y, z], (-rotation @ np.array(pose)[:3, 3]).tolist()
 
 
+def images_of(poses: Sequence, camera: int = 1, name: str = "{:03d}.exr") -> list[tuple]:
+    """Images as `write_text` takes them, of camera-to-world poses."""
+    return [(i + 1, *world_to_camera(pose), camera, name.format(i)) for i, pose in enumerate(poses)]
+
+
 def write_text(folder: Path, cameras: Numbered, images: Sequence[tuple], points: str = "10.5 20.25 -1 3 4 17") -> None:
     """`images`: (number, quaternion, translation, camera, name)."""
     folder.mkdir(parents=True, exist_ok=True)

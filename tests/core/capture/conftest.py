@@ -12,6 +12,8 @@ from addon.core.capture.exr import write_exr
 
 SHARED = Path(__file__).resolve().parents[4] / "shared"
 WIDTH, HEIGHT = 8, 6
+JPEG = bytes.fromhex("ffd8 ffe0 0010 4a46494600010100000100010000 ffc0 000b 08 0006 0008 01 011100")
+"""Of that size, gray, baseline, as far as the header goes."""
 
 
 def ply_text(vertices, faces, object_ids=None, uv=None) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from addon.core.capture.model import Capture, Frame, Mesh
-from tests.core.capture.colmap_files import world_to_camera, write_text
+from tests.core.capture.colmap_files import images_of, write_text
 
 OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
 FIPT = np.diag([-1.0, 1.0, -1.0, 1.0])
@@ -103,7 +103,4 @@ def as_scannetpp(capture: Capture, root: Path, names: dict[int, str]) -> None:
 def write_colmap(frames: tuple[Frame, ...], folder: Path, name: str) -> None:
     camera = frames[0].camera
     cameras = {1: ("PINHOLE", camera.width, camera.height, (camera.fx, camera.fy, camera.cx, camera.cy))}
-    images = [(i + 1, *world_to_camera(frame.camera.camera_to_world), 1, name.format(i))
-              for i, frame in enumerate(frames)]
-    folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder, cameras, images)
+    write_text(folder, cameras, images_of([frame.camera.camera_to_world for frame in frames], name=name))

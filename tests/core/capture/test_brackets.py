@@ -11,8 +11,8 @@ from addon.core.capture.pixels import read_pixels
 from addon.core.capture.png import write_png
 from addon.core.capture.read import read_capture
 from addon.core.errors import BadInputError
+from tests.core.capture.conftest import HEIGHT, WIDTH
 
-WIDTH, HEIGHT = 8, 6  # as the fixture's frames
 TIMES = (1 / 64, 1 / 8, 1.0, 8.0)
 SCENE = np.geomspace(1e-3, 300, HEIGHT * WIDTH).reshape(HEIGHT, WIDTH, 1) * [1, 0.8, 0.6]
 

@@ -15,14 +15,10 @@ from addon.core.capture.layout import AS_FOUND, Reading
 from addon.core.capture.lenses_polynomial import Polynomial
 from addon.core.capture.read import read_capture
 from addon.core.errors import BadInputError
-from tests.core.capture.colmap_files import world_to_camera, write_binary, write_text
+from tests.core.capture.colmap_files import images_of, world_to_camera, write_binary, write_text
 
 CAMERA = {1: ("PINHOLE", 8, 6, (6.0, 6.5, 4.0, 3.0))}
 WRITERS = {"text": write_text, "binary": write_binary}
-
-
-def images_of(poses, camera=1, name="{:03d}.exr"):
-    return [(i + 1, *world_to_camera(pose), camera, name.format(i)) for i, pose in enumerate(poses)]
 
 
 @pytest.fixture(params=["", "sparse/0", "sparse", "colmap/sparse/0"])

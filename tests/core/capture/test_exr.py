@@ -280,10 +280,7 @@ def test_what_is_no_picture(tmp_path):
 
 DAMAGED = """
 import resource, sys, time
-from addon.core.capture import exr_header
 from addon.core.capture.exr import read_exr
-from addon.core.capture.luma_chroma import to_rgb
-from addon.core.capture.primaries import REC709
 from addon.core.errors import BadInputError
 resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
 for path in sys.argv[1:]:

@@ -16,10 +16,8 @@ from addon.core.capture.read import read_capture
 from addon.core.capture.tiff_tags import EXPOSURE_TIME, ISO
 from addon.core.errors import BadInputError
 from addon.core.progress import Progress
+from tests.core.capture.conftest import HEIGHT, JPEG, WIDTH
 
-WIDTH, HEIGHT = 8, 6  # as the fixture's frames
-# Of that size, gray, baseline, as far as the header goes.
-JPEG = bytes.fromhex("ffd8 ffe0 0010 4a46494600010100000100010000 ffc0 000b 08 0006 0008 01 011100".replace(" ", ""))
 CODES = np.random.default_rng(0).integers(0, 200, (HEIGHT, WIDTH, 3), np.uint8)
 
 

@@ -14,8 +14,8 @@ from addon.core.capture.png import write_png
 from addon.core.capture.read import describe, read_capture
 from addon.core.capture.transfer import decode, to_linear
 from addon.core.errors import BadInputError
+from tests.core.capture.conftest import HEIGHT, WIDTH
 
-WIDTH, HEIGHT = 8, 6  # as the fixture's frames
 CODES = (np.arange(HEIGHT * WIDTH * 3) % 256).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)
 
 

@@ -13,9 +13,7 @@ from addon.core.capture.pixels import read_pixels
 from addon.core.capture.png import write_png
 from addon.core.capture.read import describe, read_capture
 from addon.core.errors import BadInputError
-from tests.core.capture.conftest import CORNERS, SIDES, ply_text
-
-HEIGHT, WIDTH = 6, 8
+from tests.core.capture.conftest import CORNERS, HEIGHT, SIDES, WIDTH, ply_text
 
 
 def refused(capture, words: str) -> str:

@@ -16,8 +16,8 @@ import numpy as np
 from addon.core.capture.exr import write_exr
 from addon.core.capture.layout import Reading
 from addon.core.capture.png import write_png
-from tests.core.capture.colmap_files import world_to_camera, write_binary, write_text
-from tests.core.capture.conftest import CORNERS, HEIGHT, SIDES, WIDTH, CaptureOnDisk
+from tests.core.capture.colmap_files import images_of, write_binary, write_text
+from tests.core.capture.conftest import CORNERS, HEIGHT, JPEG, SIDES, WIDTH, CaptureOnDisk
 from tests.core.replica_on_disk import ReplicaOnDisk
 from tests.core.rooms import lit_box, make_room
 
@@ -91,11 +91,9 @@ def with_pictures(ending: str, content: bytes | Callable[[Path], None]) -> Calla
 
 def colmap(write) -> Callable[[Path], None]:
     def make(root: Path) -> None:
-        capture = CaptureOnDisk(root, COUNT)
-        poses = [frame["transform_matrix"] for frame in capture.transforms["frames"]]
-        (root / "transforms.json").unlink()
-        images = [(i + 1, *world_to_camera(pose), 1, f"{i:03d}.exr") for i, pose in enumerate(poses)]
-        write(root / "sparse/0", {1: ("OPENCV", WIDTH, HEIGHT, (6.0, 6.5, 4.0, 3.0, 0.01, 0.0, 0.0, 0.0))}, images)
+        poses = [frame["transform_matrix"] for frame in mesh_only(root).transforms["frames"]]
+        camera = "OPENCV", WIDTH, HEIGHT, (6.0, 6.5, 4.0, 3.0, 0.01, 0.0, 0.0, 0.0)
+        write(root / "sparse/0", {1: camera}, images_of(poses))
     return make
 
 
@@ -151,8 +149,7 @@ def scannetpp(root: Path) -> None:
     (root / "scans").mkdir()
     (root / "images").rename(root / "dslr/resized_images")
     (root / "mesh.ply").rename(root / "scans/mesh_aligned_0.05.ply")
-    images = [(i + 1, *world_to_camera(pose), 1, f"{i:03d}.exr") for i, pose in enumerate(poses)]
-    write_text(root / "dslr/colmap", {1: ("PINHOLE", WIDTH, HEIGHT, (6.0, 6.5, 4.0, 3.0))}, images)
+    write_text(root / "dslr/colmap", {1: ("PINHOLE", WIDTH, HEIGHT, (6.0, 6.5, 4.0, 3.0))}, images_of(poses))
     (root / "scans/segments.json").write_text(json.dumps({"segIndices": [i // 2 for i in range(len(CORNERS))]}))
     groups = [{"objectId": i, "id": i, "label": f"thing {i}", "segments": [i]} for i in range(4)]
     (root / "scans/segments_anno.json").write_text(json.dumps({"segGroups": groups}))
@@ -180,7 +177,6 @@ def replica(root: Path) -> None:
     (root / "glass.sur").write_text(json.dumps([pane]))
 
 
-JPEG = bytesJPEG = bytesJPEG = bytes.fromhex("ffd8ffe000104a46494600010100000100010000ffc0000b080006000801011100")
 TIFF = (b"II*\0" + struct.pack("<IH", 8, 4) + struct.pack("<HHIHH", 256, 3, 1, WIDTH, 0)
         + struct.pack("<HHIHH", 257, 3, 1, HEIGHT, 0) + struct.pack("<HHIHH", 258, 3, 1, 8, 0)
         + struct.pack("<HHII", 0x8769, 4, 1, 8) + struct.pack("<I", 0))
@@ -226,5 +222,3 @@ def fresh(case: Case, root: Path) -> tuple[Path, Reading]:
     if reading.mesh is not None:
         reading = replace(reading, mesh=root / reading.mesh)
     return root / case.victim, reading
-
-
