@@ -17,8 +17,9 @@ from ..errors import BadInputError
 
 THRESHOLD = 16
 """Up to so many elements are left to the final insertion sort."""
-TWO_BYTES = (32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F), (4, 0x10C30C30C30C30C3), \
+SPREAD = (32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F), (4, 0x10C30C30C30C30C3), \
     (2, 0x1249249249249249)
+"""Shifts and masks that put two zeros behind each of 21 bits."""
 
 
 def morton(vertices: np.ndarray, split: float) -> np.ndarray:
@@ -29,7 +30,7 @@ def morton(vertices: np.ndarray, split: float) -> np.ndarray:
     code = np.zeros(len(points), np.uint64)
     for axis in range(3):
         spread = cells[:, axis] & np.uint64(0x1FFFFF)
-        for shift, mask in TWO_BYTES:
+        for shift, mask in SPREAD:
             spread = (spread | (spread << np.uint64(shift))) & np.uint64(mask)
         code += spread << np.uint64(axis)
     return code.astype(np.uint32)

@@ -57,8 +57,8 @@ def read(root: Path, reading: Reading) -> Layout:
         mesh = replace(mesh, object_id=ids)
     kind = _pictures(root)
     frames, problems, notes = colmap.frames_of(read_model(root / MODEL), root, root / kind.folder, reading)
-    if kind.pinhole:
-        frames = [_undistorted(frame, root) for frame in frames]
+    if kind.pinhole and frames:
+        frames = _undistorted(frames, root)
     frames, more = _chosen(frames, root)
     frames = [_masked(frame, root / kind.folder, root / kind.masks) for frame in frames]
     return Layout(frames, mesh, names, OBJECTS, problems, notes + more)
@@ -120,16 +120,17 @@ def _group(group: Any, i: int, root: Path) -> tuple[int, list[int]]:
     return number, own
 
 
-def _undistorted(frame: Frame, root: Path) -> Frame:
-    """The frame with the pinhole camera of the undistorted pictures."""
+def _undistorted(frames: list[Frame], root: Path) -> list[Frame]:
+    """The frames with the pinhole camera of the undistorted pictures."""
     top = read_json(root / PINHOLE)
     found = [top.get(key) for key in ("w", "h", "fl_x", "fl_y", "cx", "cy")]
     if not all(is_number(value) for value in found) or min(found[:4]) <= 0 or any(v != int(v) for v in found[:2]):
         raise BadInputError(f"'{root / PINHOLE}' does not give w, h, fl_x, fl_y, cx and cy; undistort the pictures "
                             "again.")
     width, height, fx, fy, cx, cy = found
-    return replace(frame, camera=replace(frame.camera, width=int(width), height=int(height), fx=float(fx),
-                                         fy=float(fy), cx=float(cx), cy=float(cy), lens=None))
+    pinhole = {"width": int(width), "height": int(height), "fx": float(fx), "fy": float(fy), "cx": float(cx),
+               "cy": float(cy), "lens": None}
+    return [replace(frame, camera=replace(frame.camera, **pinhole)) for frame in frames]
 
 
 def _chosen(frames: list[Frame], root: Path) -> tuple[list[Frame], list[str]]:

@@ -13,6 +13,7 @@ from addon.core.agreement.look import AGREE, look
 from addon.core.agreement.overlay import LINE, overlay
 from addon.core.capture.conventions import Convention, matrix, parse
 from addon.core.capture.model import Capture, Instance, Pixels
+from addon.core.errors import BadInputError
 
 MENDS = ["opencv", "fipt", "world-to-camera", "world:+x-z+y", "camera:+x-y-z,world:+x+z-y", "scale:100"]
 WIDTH, HEIGHT = 96, 72
@@ -119,8 +120,6 @@ def test_a_single_frame_and_a_blank_one(room):
 
 
 def test_unreadable_frames_are_passed_over(room):
-    from addon.core.errors import BadInputError
-
     capture, read = room
 
     def some(frame) -> Pixels:

@@ -44,7 +44,7 @@ def test_pixels_come_back(drawn):
     y, x = np.mgrid[0.5:HEIGHT, 0.5:WIDTH]
     points = np.stack([(x.ravel() - cx) / fx, (y.ravel() - cy) / fy], -1)
     rays, seen = lens.unproject(points)
-    assert np.isfinite(rays).all() and seen[points.__abs__().max(1).argmin()]
+    assert np.isfinite(rays).all() and seen[np.abs(points).max(1).argmin()]
     back, again = lens.project(rays[seen])
     assert np.abs((back - points[seen]) * (fx, fy)).max() < 1e-6
     assert (~again).sum() <= 3  # on the very rim

@@ -12,7 +12,8 @@ import pytest
 from addon.core.capture.layout import Reading
 from addon.core.capture.read import read_capture
 from addon.core.errors import BadInputError
-from tests.core.capture.hostile.cases import COUNT, Case, colmap, fresh, nerfstudio, write_text
+from tests.core.capture.colmap_files import write_text
+from tests.core.capture.hostile.cases import COUNT, Case, colmap, fresh, nerfstudio
 
 OUT = ("../secret.exr", "images/../../secret.exr", "/etc/passwd", "C:\\secret.exr", "C:secret.exr", "..\\secret.exr",
        "\\\\host\\share\\a.exr", "//host/share/a.exr", "\\secret.exr")
@@ -37,7 +38,7 @@ def test_poses(root, key, path):
         read_capture(root)
 
 
-@pytest.mark.parametrize("path", [path for path in OUT if " " not in path])
+@pytest.mark.parametrize("path", OUT)
 def test_colmap(root, path):
     fresh(Case("", colmap(write_text), "sparse/0/images.txt"), root)
     images = root / "sparse/0/images.txt"
