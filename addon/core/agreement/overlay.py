@@ -12,7 +12,6 @@ from ..evidence.colours import photo
 from ..surface.elements import triangle_geometry
 from ..surface.rays import RayScene
 from .edges import shown
-from .views import small_camera
 
 ROWS = 3
 WIDTH = 640
@@ -35,7 +34,7 @@ def overlay(capture: Capture, read: Callable[[Frame], Pixels], conventions: Sequ
     for frame in (capture.frames[i] for i in chosen):
         pixels = read(frame)
         step = max(1, -(-frame.camera.width // WIDTH))
-        camera = small_camera(frame.camera, step)
+        camera = frame.camera.coarser(step)
         radiance = pixels.radiance[: camera.height * step : step, : camera.width * step : step]
         lit = radiance[radiance.sum(-1) > 0]
         plain = photo(radiance, float(np.median(lit)) if len(lit) else 1.0)

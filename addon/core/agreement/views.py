@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -38,12 +38,6 @@ class SmallView:
     step: int
 
 
-def small_camera(camera: Camera, step: int) -> Camera:
-    """The camera of a picture whose pixels are `step` * `step` of the original's."""
-    return replace(camera, width=camera.width // step, height=camera.height // step, fx=camera.fx / step,
-                   fy=camera.fy / step, cx=camera.cx / step, cy=camera.cy / step)  # fmt: skip
-
-
 def small_views(frames: Sequence[Frame], read: Callable[[Frame], Pixels], count: int = COUNT) -> list[SmallView]:
     """`count` of the frames, evenly spread; those that can't be read are left out."""
     chosen = np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int)) if frames else ()
@@ -54,7 +48,7 @@ def small_views(frames: Sequence[Frame], read: Callable[[Frame], Pixels], count:
         except BadInputError:  # it will be told of where frames are read for good
             continue
         step = max(1, round(frame.camera.width / WIDTH))
-        camera = small_camera(frame.camera, step)
+        camera = frame.camera.coarser(step)
         views.append(SmallView(frame.name, camera, _small(pixels, camera, step), step))
     return views
 

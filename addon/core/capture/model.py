@@ -113,6 +113,11 @@ class Camera:
         known = angles[angles > 0]
         return float(np.median(known)) if len(known) else 1 / self.fx
 
+    def coarser(self, step: int) -> Camera:
+        """The camera of a picture whose pixels are `step` * `step` of this one's."""
+        return replace(self, width=self.width // step, height=self.height // step, fx=self.fx / step,
+                       fy=self.fy / step, cx=self.cx / step, cy=self.cy / step)  # fmt: skip
+
     def pixel_centres(self) -> np.ndarray:
         """Centres of all pixels row by row, (height * width, 2) float64."""
         y, x = np.mgrid[: self.height, : self.width]
