@@ -46,7 +46,7 @@ class ExrLayer:
     @property
     def has_chroma(self) -> bool:
         """Whether the colours are luminance and chroma."""
-        return self.colour[-1].endswith("BY")
+        return self.colour[-1].upper().endswith("BY")
 
 
 def choose_layer(headers: tuple[ExrHeader, ...], path: Path) -> tuple[ExrLayer, str]:

@@ -128,6 +128,13 @@ def test_chroma_of_smooth_colours():
     np.testing.assert_allclose(got, rgb, atol=0.05)  # the filter has nothing beyond the picture's edge
 
 
+def test_channels_in_small_letters_are_the_same(tmp_path):
+    planes = {"Y": PICTURE[..., 0], "RY": PICTURE[..., 1], "BY": PICTURE[..., 2]}
+    write_with_library(tmp_path / "a.exr", {name: plane.copy() for name, plane in planes.items()})
+    write_with_library(tmp_path / "b.exr", {name.lower(): plane.copy() for name, plane in planes.items()})
+    np.testing.assert_array_equal(read_exr(tmp_path / "a.exr").rgb, read_exr(tmp_path / "b.exr").rgb)
+
+
 def planes_of(array, prefix=""):
     return {f"{prefix}{c}": np.ascontiguousarray(array[..., i]) for i, c in enumerate("RGB")}
 
