@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from ..errors import BadInputError
+from .paths import absence
 from .picture import MAX_PIXELS
 
 MAGIC = b"\x76\x2f\x31\x01"
@@ -94,9 +95,7 @@ def parse_headers(path: Path) -> tuple[ExrHeader, ...]:
     """
     path = Path(path)
     try:
-        # A pipe or a device would block or never end.
-        if not path.is_file():
-            what = "is not a file" if path.exists() else "does not exist"
+        if what := absence(path):
             raise BadInputError(f"Picture '{path}' {what}; check the capture's paths.")
         size = path.stat().st_size
         with open(path, "rb") as file:

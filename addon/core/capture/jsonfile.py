@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadInputError
+from .paths import absence
 
 
 def read_json(path: Path) -> dict[str, Any]:
     """The object in the file `path`; raises `BadInputError` where it is absent, not JSON, or no object."""
     try:
-        if not path.is_file():  # a pipe or a device would block or never end
-            what = "is not a file" if path.exists() else "does not exist"
+        if what := absence(path):
             raise BadInputError(f"'{path}' {what}; check the capture.")
         value = json.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:

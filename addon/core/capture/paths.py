@@ -13,6 +13,11 @@ class EscapesError(BadInputError):
     """A path leads out of the capture's folder: no slip of one frame, so it is told at once."""
 
 
+def absence(path: Path) -> str:
+    """Why no file can be read at `path`, as the end of a sentence; '' where one can: pipes and devices never end."""
+    return "" if path.is_file() else "is not a file" if path.exists() else "does not exist"
+
+
 def inside(root: Path, value: Any, name: str, outside: bool = False, folder: Path | None = None) -> Path:
     """What a file calls `value`, as a path.
 

@@ -10,6 +10,7 @@ from ..errors import BadInputError
 from . import exr_header, radiance_hdr
 from .exr import exr_note, read_exr, read_header
 from .foreign import JPEG_MAGIC, foreign_info, is_foreign
+from .paths import absence
 from .picture import Picture
 from .png import MAGIC, png_bits, png_size, read_png
 from .radiance_hdr import hdr_size, read_hdr
@@ -30,9 +31,7 @@ def picture_kind(path: Path | str) -> str:
     """
     path = Path(path)
     try:
-        # A pipe or a device would block or never end.
-        if not path.is_file():
-            what = "is not a file" if path.exists() else "does not exist"
+        if what := absence(path):
             raise BadInputError(f"Picture '{path}' {what}; check the capture's paths.")
         with open(path, "rb") as file:
             head = file.read(16)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import BadInputError
+from .paths import absence
 from .ply_header import Element, parse_header
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
@@ -80,8 +81,7 @@ def read_ply(path: Path | str) -> PlyMesh:
     """
     path = Path(path)
     try:
-        if not path.is_file():
-            what = "is not a file" if path.exists() else "does not exist"
+        if what := absence(path):
             raise BadInputError(f"Mesh '{path}' {what}; a capture needs its mesh there.")
         return _parse(path.read_bytes())
     except (_Damaged, ValueError) as error:
