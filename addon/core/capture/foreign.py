@@ -42,7 +42,10 @@ def exif_exposure(path: Path) -> dict[int, float]:
     """Exposure time in seconds, f-number and ISO of the JPEG or TIFF `path`, by tag, as far as it tells."""
     data = _head(path)
     if not data.startswith(JPEG_MAGIC):
-        return exposure_tags(data)
+        try:
+            return exposure_tags(*_directory(data, path))
+        except (struct.error, KeyError):  # damaged, as its size will tell
+            return {}
     at = data.find(b"Exif\0\0")
     return exposure_tags(data[at + 6 :]) if at >= 0 else {}
 
@@ -75,7 +78,8 @@ def _jpeg_info(data: bytes) -> tuple[int, int, int]:
             at += 2 + max(int.from_bytes(data[at + 2 : at + 4], "big"), 2)
 
 
-def _tiff_info(data: bytes, path: Path) -> tuple[int, int, int]:
+def _directory(data: bytes, path: Path) -> tuple[bytes, int, str, int]:
+    """The piece of a TIFF around its first directory, as `read_tags` takes it; `data` is the file's beginning."""
     order = ORDERS[data[:4]]
     (pointer,) = struct.unpack_from(order + "I", data, 4)
     base = 0
@@ -84,7 +88,11 @@ def _tiff_info(data: bytes, path: Path) -> tuple[int, int, int]:
         with open(path, "rb") as file:  # the directory often follows the pixels
             file.seek(base)
             data = file.read(HEAD)
-    tags = read_tags(data, pointer, order, base)
+    return data, pointer, order, base
+
+
+def _tiff_info(data: bytes, path: Path) -> tuple[int, int, int]:
+    tags = read_tags(*_directory(data, path))
     bits = int(tags.get(BITS, 1))
     is_float = tags.get(SAMPLE_FORMAT) == FLOAT
     if bits not in ((16, 32) if is_float else (8, 16)):

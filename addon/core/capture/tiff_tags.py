@@ -34,6 +34,8 @@ def read_tags(data: bytes, pointer: int | None = None, order: str = "", base: in
     try:
         if pointer is None:
             (pointer,) = struct.unpack_from(order + "I", data, 4)
+        if pointer < base:
+            raise ValueError("begins before what was read of the file")
         (count,) = struct.unpack_from(order + "H", data, pointer - base)
         tags: dict[int, float] = {}
         for i in range(min(count, MAX_TAGS)):
@@ -59,12 +61,15 @@ def read_tags(data: bytes, pointer: int | None = None, order: str = "", base: in
     return tags
 
 
-def exposure_tags(data: bytes) -> dict[int, float]:
-    """Those of `EXPOSURE_TIME`, `F_NUMBER` and `ISO` that the EXIF of the TIFF `data` has; {} where it has none."""
+def exposure_tags(data: bytes, pointer: int | None = None, order: str = "", base: int = 0) -> dict[int, float]:
+    """Those of `EXPOSURE_TIME`, `F_NUMBER` and `ISO` that the EXIF of the TIFF `data` has; {} where it has none.
+
+    Parameters as of `read_tags`.
+    """
     try:
-        tags = read_tags(data)
+        tags = read_tags(data, pointer, order, base)
         if EXIF in tags:
-            tags |= read_tags(data, int(tags[EXIF]))
+            tags |= read_tags(data, int(tags[EXIF]), order, base)
     except ValueError:
         return {}
     return {tag: tags[tag] for tag in (EXPOSURE_TIME, F_NUMBER, ISO) if 0 < tags.get(tag, 0) < math.inf}

@@ -7,6 +7,7 @@ import struct
 import pytest
 
 from addon.core.capture.exposures import Settings, parse_number, relative
+from addon.core.capture.foreign import exif_exposure
 from addon.core.capture.layout import Reading
 from addon.core.capture.read import describe, read_capture
 from addon.core.capture.tiff_tags import EXPOSURE_TIME, F_NUMBER, ISO, exposure_tags
@@ -96,12 +97,12 @@ def test_bad_tables(capture, text, words):
         read_capture(capture.root, Reading(exposures=capture.root / "absent.csv"))
 
 
-def tiff(order: str, time, f_number, iso) -> bytes:
-    """A TIFF whose first directory points to EXIF's."""
-    head = {"<": b"II*\0", ">": b"MM\0*"}[order] + struct.pack(order + "I", 8)
-    first = struct.pack(order + "HHHIII", 1, 0x8769, 4, 1, 26, 0)
-    exif = struct.pack(order + "H", 3) + struct.pack(order + "HHII", EXPOSURE_TIME, 5, 1, 68)
-    exif += struct.pack(order + "HHII", F_NUMBER, 5, 1, 76) + struct.pack(order + "HHIHH", ISO, 3, 1, iso, 0)
+def tiff(order: str, time, f_number, iso, before: int = 0) -> bytes:
+    """A TIFF whose first directory points to EXIF's, with so many bytes of pixels before both."""
+    head = {"<": b"II*\0", ">": b"MM\0*"}[order] + struct.pack(order + "I", 8 + before) + bytes(before)
+    first = struct.pack(order + "HHHIII", 1, 0x8769, 4, 1, 26 + before, 0)
+    exif = struct.pack(order + "H", 3) + struct.pack(order + "HHII", EXPOSURE_TIME, 5, 1, 68 + before)
+    exif += struct.pack(order + "HHII", F_NUMBER, 5, 1, 76 + before) + struct.pack(order + "HHIHH", ISO, 3, 1, iso, 0)
     return head + first + exif + struct.pack(order + "I4I", 0, *time, *f_number)
 
 
@@ -111,3 +112,13 @@ def test_exif(order):
     assert exposure_tags(data) == {EXPOSURE_TIME: 1 / 250, F_NUMBER: 2.8, ISO: 400}
     for end in range(len(data)):
         exposure_tags(data[:end])  # whatever is cut off
+
+
+@pytest.mark.parametrize("before", [0, 600_000, 1_048_530, 3_000_000])
+def test_exif_behind_the_pixels(tmp_path, before):
+    data = tiff("<", (1, 250), (28, 10), 400, before)
+    (tmp_path / "a.tif").write_bytes(data)
+    assert exif_exposure(tmp_path / "a.tif") == {EXPOSURE_TIME: 1 / 250, F_NUMBER: 2.8, ISO: 400}
+    for end in (4, 7, 9, len(data) - 70):
+        (tmp_path / "a.tif").write_bytes(data[:end])
+        assert exif_exposure(tmp_path / "a.tif") == {}
