@@ -6,7 +6,7 @@ import math
 
 import bpy
 
-from ..core.material import EMITTER, METAL, SPECULAR, ObjectMaterial
+from ..core.material import EMITTER, LAMP_ALBEDO, METAL, SPECULAR, ObjectMaterial
 from .mesh_objects import ATLAS_UV
 
 MODEL = "scan_relight_model"
@@ -69,8 +69,9 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
         value[SPECULAR_LEVEL].default_value = 0.5
         value[BASE_COLOR].default_value = (*(min(max(c, 0.0), 1.0) for c in description.f0 or (0.5,) * 3), 1)
     elif description.model == EMITTER:
-        # What it reflects is unknown and already part of the radiance that was seen.
-        value[BASE_COLOR].default_value = (0, 0, 0, 1)
+        # An image holds all that was seen; of a description's radiance what the lamp reflects has been taken off.
+        grey = LAMP_ALBEDO if emission is None else 0.0
+        value[BASE_COLOR].default_value = (grey, grey, grey, 1)
         _emit(nodes, links, value, description.emission or (0.0, 0.0, 0.0), emission)
         if one_sided:
             _front_only(nodes, links, value[EMISSION_COLOR])

@@ -10,6 +10,9 @@ METAL = "metal"
 EMITTER = "emitter"
 TRANSPARENT = "transparent"
 MODELS = (LAMBERTIAN, SPECULAR, METAL, EMITTER, TRANSPARENT)
+LAMP_ALBEDO = 0.5
+"""What a lamp reflects can't be told under its own light. Shades and diffusers are white to grey: with its light off a
+lamp shows this grey. Black, it is a hole in the room (living room, lamps off: 1 % of the pixels, half of the error)."""
 Z90 = 1.645
 """A 90 % interval is the value -+ this many standard errors."""
 
@@ -33,7 +36,8 @@ class ObjectMaterial:
     f0 : (3,) tuple of float or None
         Metal only: coloured F0, linear Rec.709.
     emission : (3,) tuple of float or None
-        Emitter only: radiance, linear Rec.709.
+        Emitter only: the radiance that it gives of itself, linear Rec.709; what it reflects, as a grey of
+        `LAMP_ALBEDO`, comes on top.
     transmission : float or None
         Transparent only: share of a background's radiance that passes the object; of a cut-out, the share of holes.
     surfaces : float or None

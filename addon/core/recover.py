@@ -30,6 +30,7 @@ from .shading.albedo import NONE, Albedo, fill, quotient
 from .shading.clipped import shade_clipped
 from .shading.environment import Environment, EnvironmentAccumulator
 from .shading.field import LightField
+from .shading.fringes import FringeCollector, Fringes
 from .shading.lamps import Lamp
 from .shading.mirrors import Mirror, known_mirror
 from .shading.neighbourhood import doubt
@@ -42,7 +43,7 @@ from .store import Store, key
 from .surface.build import Surface, build_surface, from_uv, turned
 from .surface.denoise import without_noise
 
-CODE = 17
+CODE = 18
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -176,13 +177,13 @@ class Recovery:
             shape = (frame.camera.height, frame.camera.width)
             return Pixels(np.zeros((*shape, 3), np.float32), np.zeros(shape, bool), np.zeros(shape, bool))
 
-    def _accumulated(self) -> tuple[LitDiffuse, Environment, Samples]:
+    def _accumulated(self) -> tuple[LitDiffuse, Environment, Samples, Fringes]:
         """What the one pass over all frames gives."""
         surface = self.surface()
         frames = self._near.frames
 
         def compute():
-            value = from_frames() if frames else (from_mesh(), Environment.dark(), Samples.none())
+            value = from_frames() if frames else (from_mesh(), Environment.dark(), Samples.none(), Fringes.none())
             arrays = {f"{i}.{f.name}": getattr(v, f.name) for i, v in enumerate(value) for f in dataclasses.fields(v)}
             return value, arrays, {"bad_frames": self.bad_frames, "blind_frames": self.blind_frames}
 
@@ -193,10 +194,12 @@ class Recovery:
         def from_frames():
             sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
             kept = SampleCollector(surface.atlas, len(frames), self.settings.seed)
+            fringes = FringeCollector()
 
             def also(index, view, pixels, seen):
                 sky.add(view, pixels)
                 kept.add(index, seen)
+                fringes.add(view, pixels)
 
             lit = accumulate(
                 surface.mesh, surface.atlas, surface.scene, frames, self._read,
@@ -208,12 +211,12 @@ class Recovery:
                     "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; "
                     "check the frames."
                 )
-            return lit, sky.result(), kept.result()
+            return lit, sky.result(), kept.result(), fringes.result()
 
         def load(arrays, meta):
             self.bad_frames = list(meta.get("bad_frames", ()))
             self.blind_frames = list(meta.get("blind_frames", ()))
-            kinds = (LitDiffuse, Environment, Samples)
+            kinds = (LitDiffuse, Environment, Samples, Fringes)
             return tuple(
                 kind(**{f.name: arrays[f"{i}.{f.name}"] for f in dataclasses.fields(kind)})
                 for i, kind in enumerate(kinds)
@@ -245,6 +248,7 @@ class Recovery:
                     sampler=s.shading, rays=s.shading_rays, emitter_rays=s.emitter_rays, portal_rays=s.portal_rays,
                     interpolate=s.interpolate, threads=s.threads, seed=s.seed, progress=self.progress,
                     find_mirrors=self._find_mirrors if s.mirrors else None, noise=surface.noise,
+                    colours=self._accumulated()[3].colours(),
                 )  # fmt: skip
 
             found = shade_clipped(shaded, lit, surface.atlas)

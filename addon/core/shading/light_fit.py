@@ -6,7 +6,6 @@ radiance 1. What is minimised is the mean deviation of log albedo from its objec
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,7 +91,7 @@ class Sample:
         return float(np.exp(found.x)), self.spread(sent - np.log(received + 1e-12)), float(found.fun)
 
     def refine(
-        self, sent: np.ndarray, received: np.ndarray, thrown: Sequence[np.ndarray], start: np.ndarray,
+        self, sent: np.ndarray, received: np.ndarray, thrown: np.ndarray, start: np.ndarray,
         least: np.ndarray, most: np.ndarray,
     ) -> np.ndarray:
         """All radiances together, under the tighter cap.
@@ -101,10 +100,10 @@ class Sample:
         ----------
         sent, received : (m,) float64
             L_d, and E from all light but these.
-        thrown : sequence of (m,) float64
+        thrown : (m, k) float64
         start, least, most : (k,) float
         """
-        sent, thrown = np.log(np.maximum(sent, 1e-9)), np.stack(thrown, 1)
+        sent = np.log(np.maximum(sent, 1e-9))
         least, most = np.maximum(least, start / REACH), np.minimum(most, start * REACH)
         bounds = np.log(np.stack([np.minimum(least, most), most], 1))
 

@@ -80,8 +80,22 @@ def all_light(base: np.ndarray, lamps: list[Lamp], thrown: dict[int, np.ndarray]
     return total
 
 
+def shared_by_class(
+    colours: dict[int, np.ndarray], objects: list[int], instances: tuple[Instance, ...]
+) -> dict[int, np.ndarray]:
+    """The known colours, and for those of `objects` without one the mean of their class's."""
+    class_of = {i.object_id: i.class_name for i in instances}
+    result = dict(colours)
+    for one in objects:
+        alike = [colour for i, colour in colours.items() if class_of.get(i) == class_of.get(one)]
+        if one not in result and alike:
+            result[one] = np.mean(alike, 0)
+    return result
+
+
 def refined(sample: Sample, lamps: list[Lamp], thrown: dict[int, np.ndarray], least: dict[int, float],
-            instances: tuple[Instance, ...], seen: list[Lamp], sky: Sky, base: np.ndarray) -> list[Lamp]:
+            instances: tuple[Instance, ...], seen: list[Lamp], sky: Sky, base: np.ndarray,
+            colours: dict[int, np.ndarray]) -> list[Lamp]:
     """The lamps with refined radiances; those of the sky are refined in place.
 
     Parameters
@@ -92,6 +106,8 @@ def refined(sample: Sample, lamps: list[Lamp], thrown: dict[int, np.ndarray], le
         Luminance below which each would be no lamp.
     base : (m, 3) float64
         E from all light that the frames show.
+    colours : dict of (3,) float
+        Known colours of lamps: only their luminance is solved for.
     """
     fixed = [lamp for lamp in lamps if any(np.array_equal(lamp.radiance, other.radiance) for other in seen)]
     free = [lamp for lamp in lamps if not any(lamp is other for other in fixed)]
@@ -101,11 +117,15 @@ def refined(sample: Sample, lamps: list[Lamp], thrown: dict[int, np.ndarray], le
     others = Sky([G for i, G in enumerate(sky.thrown) if i not in parts],
                  [r for i, r in enumerate(sky.radiance) if i not in parts], False)
 
-    def solve(weights: np.ndarray, start: np.ndarray, known: np.ndarray | None = None) -> np.ndarray:
+    def thrown_by() -> np.ndarray:
+        """E that each of `free` and `parts` throws at radiance 1, (m, k)."""
+        return np.stack([*(thrown[lamp.object_id] for lamp in free), *(sky.thrown[i] for i in parts)], 1)
+
+    def solve(weights: np.ndarray, start: np.ndarray, bright: np.ndarray | None = None) -> np.ndarray:
         """Radiances of `free` and `parts` in the channel that `weights` ((3,)) makes.
 
-        With `known` luminances, under which the albedo's colour varies least: the texture and the errors of E that all
-        channels share are gone then.
+        With the luminance of all E ((m,)), `bright`, those under which the albedo's colour varies least: the texture
+        and the errors of E that all channels share are gone then.
         """
         low, high = np.zeros(len(start)), np.full(len(start), np.inf)
         for k, lamp in enumerate(free):
@@ -113,11 +133,9 @@ def refined(sample: Sample, lamps: list[Lamp], thrown: dict[int, np.ndarray], le
         for k, i in enumerate(parts, len(free)):
             low[k], high[k] = (bound @ weights for bound in sky.bounds(i))
         sent, others_light = sample.radiance @ weights, all_light(base, fixed, thrown, others)
-        own = [thrown[lamp.object_id] for lamp in free] + [sky.thrown[i] for i in parts]
-        if known is not None:
-            bright = others_light @ LUMINANCE + np.stack(own, 1) @ known
+        if bright is not None:
             sent = sent * bright / np.maximum(sample.radiance @ LUMINANCE, 1e-12)
-        return sample.refine(sent, others_light @ weights, own, start, low, high)
+        return sample.refine(sent, others_light @ weights, thrown_by(), start, low, high)
 
     def now() -> np.ndarray:
         return np.maximum([*(lamp.radiance for lamp in free), *(sky.radiance[i] for i in parts)], 1e-9)
@@ -133,8 +151,13 @@ def refined(sample: Sample, lamps: list[Lamp], thrown: dict[int, np.ndarray], le
         free = [lamp for lamp in free if not twins[lamp.object_id]]
         luminance = solve(LUMINANCE, now() @ LUMINANCE) if free or parts else luminance[:0]
     colour = now() * (luminance / (now() @ LUMINANCE))[:, None]
+    bright = all_light(base, fixed, thrown, others) @ LUMINANCE + thrown_by() @ luminance if len(colour) else None
+    told = np.array([lamp.object_id in colours for lamp in free] + [False] * len(parts), bool)
+    fixed += [replace(lamp, radiance=np.float32(colour[k])) for k, lamp in enumerate(free) if told[k]]
+    free = [lamp for lamp in free if lamp.object_id not in colours]
+    colour, luminance = colour[~told], luminance[~told]
     if len(colour):
-        by_channel = np.stack([solve(np.eye(3)[c], colour[:, c], luminance) for c in range(3)], 1)
+        by_channel = np.stack([solve(np.eye(3)[c], colour[:, c], bright) for c in range(3)], 1)
         share = by_channel @ LUMINANCE / luminance
         colour = np.where(np.abs(share - 1)[:, None] < AGREES, by_channel / share[:, None], colour)
     for k, i in enumerate(parts, len(free)):

@@ -86,6 +86,7 @@ def shade(
     progress: Progress | None = None,
     find_mirrors: Callable[[LightField, tuple[Lamp, ...]], tuple[Mirror, ...]] | None = None,
     noise: float = 0.0,
+    colours: dict[int, np.ndarray] | None = None,
 ) -> Shading:
     """Lamps, irradiance and albedo (Haefner et al. 2021, sec. 3.2, with aimed rays and interpolation by default).
 
@@ -95,6 +96,8 @@ def shade(
         Tells the flat mirrors once the lamps are known; light is then followed over them.
     noise : float
         Metres, what was taken out of the mesh's vertices.
+    colours : dict of (3,) float, optional
+        Colour of light of objects that were clipped (`fringes`).
 
     Raises
     ------
@@ -115,7 +118,7 @@ def shade(
     good = seen & (((lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= ENOUGH)) | (lit_diffuse.tier == SATURATED))
     unseen = [object_id for object_id, share in seen_share.items() if share == 0]
     tilted = tilt(mesh, noise)[atlas.triangle]
-    light = find_light(field, good if good.any() else seen, unseen, instances, seed, tilted)
+    light = find_light(field, good if good.any() else seen, unseen, instances, seed, tilted, colours)
     lamps = light.lamps
     radiance = field.radiance.copy()
     for lamp in lamps:

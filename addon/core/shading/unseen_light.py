@@ -20,7 +20,7 @@ from .irradiance import direct, gather
 from .lamps import AGREES, EMITTER_ALBEDO, Lamp, find_seen, twin
 from .light_fit import Sample, on_flat
 from .portals import find_portals
-from .refine_light import Sky, all_light, refined
+from .refine_light import Sky, all_light, refined, shared_by_class
 
 SAMPLES = 4000
 """Elements that the test looks at, spread evenly over the objects. Noise in E or G draws the solved radiance to 0: few
@@ -179,6 +179,7 @@ def find_light(
     instances: tuple[Instance, ...],
     seed: int = 0,
     tilted: np.ndarray | None = None,
+    colours: dict[int, np.ndarray] | None = None,
 ) -> Light:
     """Lamps seen and unseen, and the sky.
 
@@ -192,6 +193,8 @@ def find_light(
         Objects of which no frame saw anything.
     tilted : (n,) float, optional
         Radians, how far the mesh's noise may have turned each element: E of those turned much tells little.
+    colours : dict of (3,) float, optional
+        Colour of light that is known of unseen objects, of luminance 1.
     """
     flat = on_flat(field.atlas)
     if tilted is not None:
@@ -230,12 +233,13 @@ def find_light(
 
     sky = Sky([G[lit] for G in thrown_sky], guess, bool(environment.clipped.any()))
     lamps: list[Lamp] = []
+    colours = shared_by_class(colours or {}, unseen_objects, instances)
     for sweep in range(SWEEPS):
-        lamps = _solve_lamps(sample, thrown, least, instances, seen, sky, received[lit])
+        lamps = _solve_lamps(sample, thrown, least, instances, seen, sky, received[lit], colours)
         _solve_sky(sample, lamps, thrown, sky, received[lit])
         if not zones or sweep == SWEEPS - 1:
             break
-    lamps = refined(sample, lamps, thrown, least, instances, seen, sky, received[lit])
+    lamps = refined(sample, lamps, thrown, least, instances, seen, sky, received[lit], colours)
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))
     # With all light known, what looked like a lamp for want of it does so no more.
@@ -254,7 +258,7 @@ def _lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
     return radiance
 
 
-def _solve_lamps(sample: Sample, thrown, least, instances, seen, sky: Sky, base) -> list[Lamp]:
+def _solve_lamps(sample: Sample, thrown, least, instances, seen, sky: Sky, base, colours) -> list[Lamp]:
     """Unseen lamps, the one that explains most first; none once the gain falls below `MIN_GAIN`."""
     class_of = {i.object_id: i.class_name for i in instances}
     sent = sample.radiance @ LUMINANCE
@@ -271,22 +275,25 @@ def _solve_lamps(sample: Sample, thrown, least, instances, seen, sky: Sky, base)
             sample.best(sample.radiance[:, c], all_light(base, lamps, thrown, sky)[:, c], left[object_id])
             for c in range(3)
         ]
-        lamps.append(_coloured(object_id, *found[object_id], class_of, seen, sample.received, by_channel))
+        known = colours.get(object_id)
+        lamps.append(_coloured(object_id, *found[object_id], class_of, seen, sample.received, by_channel, known))
         del left[object_id]
     return lamps
 
 
-def _coloured(object_id, s, before, after, class_of, seen, received, by_channel) -> Lamp:
+def _coloured(object_id, s, before, after, class_of, seen, received, by_channel, known) -> Lamp:
     """Give a solved luminance its colour.
 
-    A seen lamp's of the same class if they agree; else what each channel says by itself, if together they make that
-    luminance; else that of the lamps, or of the light.
+    A seen lamp's of the same class if they agree; else that which is `known` from its edges; else what each channel
+    says by itself, if together they make that luminance; else that of the lamps, or of the light.
     """
     how = f"No frame sees it; solved from the light it throws (spread of log albedo {before:.3f} to {after:.3f})"
     same = twin(object_id, s, class_of, seen)
     if same is not None:
         note = f"{how}: {s:.3g}, near the seen lamp {same.object_id} of its class, whose radiance it takes."
         return Lamp(int(object_id), same.radiance, False, note)
+    if known is not None:
+        return Lamp(int(object_id), (s * known).astype(np.float32), False, how + "; its colour from its edges.")
     alike = [lamp for lamp in seen if class_of.get(lamp.object_id) == class_of.get(object_id)]
     if not alike and all(found is not None for found in by_channel):
         colour = np.float32([found[0] for found in by_channel])

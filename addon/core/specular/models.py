@@ -31,6 +31,9 @@ HOW = {SPECULAR: {"least_psi": LEAST_PSI, "prior": DIELECTRIC}, METAL: {"coloure
 MIN_GAIN = 0.02
 MIN_SIGMAS = 3.0
 """A lobe must lower the cost on elements that its fit has not seen by this share, and by this many standard errors."""
+SURELY_METAL = 2.0
+"""Standard errors by which a metal must also beat a dielectric over a diffuse part, once it has beaten a matt surface:
+that alone it does not stand or fall with, as it has to do without a diffuse part besides (`BARE`)."""
 MIN_ELEMENTS = 12
 EXCLUDED = 0.1
 """Rise of an object's cost from which on the lobe of its class is refused."""
@@ -63,6 +66,9 @@ class Choice:
     scores: dict[str, float] = field(default_factory=dict)
     metal: LobeFit | None = None
     """A metal's lobe that serves better than any other model, but not beyond doubt."""
+    bare: bool = False
+    """Whether a metal's lobe alone, with nothing of each element's own, explains the frames about as well as a metal's
+    does (`BARE`)."""
     see_through: SeeThrough | None = None
     """How the object shows what is behind it; it is TRANSPARENT then."""
 
@@ -129,13 +135,14 @@ def choose_model(problem: Problem) -> Choice:
     bare = min((_bare_metal(problem, layout, phi, metal, scale) for phi in layout.grid[layout.grid <= BROADEST_PHI]),
                key=lambda one: one[1].sum())
     found += [(*bare, without)] if _metallic(bare[0]) else []
+    no_diffuse = _metallic(bare[0]) and bool(bare[1].sum() <= BARE * without.sum())
     for fit_of_metal, with_metal, matt in found:
         scores[METAL] = min(float(with_metal.sum() / max(matt.sum(), 1e-30)), scores.get(METAL, np.inf))
         if _bare_metal(problem, layout, fit_of_metal.phi, metal, scale)[1].sum() > BARE * matt.sum():
             continue
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
         (gain, sigmas), (more, surely) = _gain(with_metal, matt), _gain(with_metal, with_lobe)
-        if min(gain, more) > MIN_GAIN and min(sigmas, surely) > MIN_SIGMAS:
+        if min(gain, more) > MIN_GAIN and sigmas > MIN_SIGMAS and surely > SURELY_METAL:
             return Choice(METAL, fit_of_metal, gain, sigmas, scores=scores)
         if min(gain, more) > MIN_GAIN and likely is None:
             likely = fit_of_metal
@@ -143,9 +150,9 @@ def choose_model(problem: Problem) -> Choice:
     if gain > MIN_GAIN and sigmas > MIN_SIGMAS and fit.phi <= BROADEST_PHI:
         # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
         held = replace(fit, psi=np.minimum(fit.psi, METAL_PSI))
-        return Choice(SPECULAR, held, gain, sigmas, scores=scores, metal=likely)
+        return Choice(SPECULAR, held, gain, sigmas, scores=scores, metal=likely, bare=no_diffuse)
     note = "Roughness and specular are not identifiable from these frames."
-    return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores, likely)
+    return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores, likely, no_diffuse)
 
 
 def set_apart(choice: Choice, found: SeeThrough | None) -> Choice:
@@ -170,7 +177,8 @@ def adopt_from_class(
     model, weighted by evidence. Members keep their own lobe where their frames set it apart from that. Objects
     whose own frames decide nothing take over the class's, but not where it raises their cost by more than `EXCLUDED`.
     What is set apart neither gives nor takes. Among metals, one whose frames favour metal without being sure of it is
-    one.
+    one; and one whose frames a metal's lobe explains alone, without any diffuse part, takes over that of the class: a
+    metal on a bumpy mesh shows the room where no ray finds it, and looks like anything, but not like diffuse light.
     """
     result, choices = dict(choices), {i: choice for i, choice in choices.items() if choice.model != TRANSPARENT}
     for name in sorted(set(class_of[object_id] for object_id in choices)):
@@ -181,12 +189,17 @@ def adopt_from_class(
         found = {i: choice for i, choice in members.items() if choice.model != LAMBERTIAN}
         if not found:
             continue
-        source = max(found, key=lambda i: found[i].sigmas)
+        # What a metal explains as well says nothing against the metals of its class.
+        clear = {i: choice for i, choice in found.items() if choice.model == METAL or not choice.bare}
+        source = max(clear or found, key=lambda i: found[i].sigmas)
         model = _pooled([c for c in found.values() if c.model == found[source].model], found[source])
         for i, choice in members.items():
             if model.model == METAL != choice.model and choice.metal is not None:
                 note = "Not beyond doubt by itself; others of its class are metal."
                 result[i] = replace(choice, model=METAL, fit=choice.metal, note=note)
+            elif model.model == METAL != choice.model and choice.bare:
+                note = f"Needs no diffuse part, like object {source} of its class, which is metal."
+                result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
             elif choice.model == LAMBERTIAN and not _refused(model.fit, choice.fit, problems.get(i)):
                 note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)

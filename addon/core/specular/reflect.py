@@ -8,7 +8,7 @@ import numpy as np
 
 from ..capture.model import Instance
 from ..lit_diffuse.accumulate import LitDiffuse
-from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, ObjectMaterial
+from ..material import EMITTER, LAMBERTIAN, LAMP_ALBEDO, METAL, SPECULAR, TRANSPARENT, ObjectMaterial
 from ..parallel import ordered_map
 from ..progress import Progress
 from ..shading.field import LightField
@@ -128,7 +128,8 @@ def fit_specular(
     for i in instances:
         if i.object_id in glowing:
             lamp = glowing[i.object_id]
-            radiance = tuple(float(x) for x in lamp.radiance)
+            own = field.atlas.object_id == i.object_id
+            radiance = given_off(lamp.radiance, np.median(irradiance[own], 0) if own.any() else np.zeros(3))
             materials.append(ObjectMaterial(i.object_id, i.class_name, EMITTER, emission=radiance, note=lamp.note))
             continue
         target = targets.get(i.object_id, -1)
@@ -165,6 +166,12 @@ def fit_specular(
             sent, seen, irradiance[seen], threads=threads, seed=seed, progress=progress, share=(0.85, 1.0)
         )
     return Specular(tuple(materials), specular, excess)
+
+
+def given_off(radiance: np.ndarray, irradiance: np.ndarray) -> tuple[float, float, float]:
+    """What a lamp gives of itself of the `radiance` ((3,)) that it was seen with, under E ((3,)); never all of it."""
+    reflected = np.minimum(LAMP_ALBEDO * irradiance / np.pi, LAMP_ALBEDO * radiance)
+    return tuple(float(x) for x in radiance - reflected)
 
 
 def _look(

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from addon.core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, ObjectMaterial
+from addon.core.material import EMITTER, LAMBERTIAN, LAMP_ALBEDO, METAL, SPECULAR, TRANSPARENT, ObjectMaterial
 
 bpy = pytest.importorskip("bpy")
 
@@ -62,4 +62,5 @@ def test_metal(scene):
 def test_emitter(scene, radiance):
     _, value = sockets(make_material(ObjectMaterial(3, "Lamp", EMITTER, emission=radiance)))
     assert tuple(c * value("Emission Strength") for c in value("Emission Color"))[:3] == pytest.approx(radiance)
-    assert max(value("Emission Color")[:3]) == 1 and f0(value) == 0 and tuple(value("Base Color")) == (0, 0, 0, 1)
+    assert max(value("Emission Color")[:3]) == 1 and f0(value) == 0
+    assert tuple(value("Base Color")) == (*[LAMP_ALBEDO] * 3, 1)
