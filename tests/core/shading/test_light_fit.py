@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from addon.core.capture.model import Instance
 from addon.core.shading.environment import EnvironmentAccumulator
 from addon.core.shading.lamps import Lamp
 from addon.core.shading.light_fit import Sample, on_flat
-from addon.core.shading.refine_light import Sky, refined
+from addon.core.shading.refine_light import Sky, refined, shared_by_class
 from tests.core.rooms import look_at, make_room, quad
 from tests.core.shading.test_environment import FAR_BELOW, add
 
@@ -35,23 +36,42 @@ def test_a_lamp_and_the_sky_are_refined_together(bound):
     sky = Sky([sky_light], [TRUE[1] * (0.8 if bound else 2)], bound)
     sky.solved.add(0)
     start = Lamp(7, np.float32([12, 12, 12]), False, "How.")
-    lamps = refined(found, [start], {7: lamp_light}, {7: 0.1}, (), [], sky, base)
+    lamps = refined(found, [start], {7: lamp_light}, {7: 0.1}, (), [], sky, base, {})
     assert np.allclose(lamps[0].radiance, TRUE[0], rtol=0.08) and lamps[0].note == "How."
     assert np.allclose(sky.radiance[0], TRUE[1], rtol=0.1)
     assert ("clipped" in sky.notes()[0]) == bound
+
+
+def test_a_known_colour_is_kept():
+    """The lamp's from its edges: only its luminance is solved for, and the sky gets what is left."""
+    found, base, (lamp_light, sky_light) = sample()
+    sky = Sky([sky_light], [TRUE[1] * 2], False)
+    sky.solved.add(0)
+    told = TRUE[0] / (TRUE[0] @ LUMINANCE)
+    start = Lamp(7, np.float32(12 * told), False, "How.")
+    (lamp,) = refined(found, [start], {7: lamp_light}, {7: 0.1}, (), [], sky, base, {7: told})
+    np.testing.assert_allclose(lamp.radiance / (lamp.radiance @ LUMINANCE), told, rtol=1e-5)
+    assert lamp.radiance @ LUMINANCE == pytest.approx(TRUE[0] @ LUMINANCE, rel=0.08)
+    assert np.allclose(sky.radiance[0], TRUE[1], rtol=0.1)
+
+
+def test_a_colour_is_shared_by_a_class():
+    instances = (Instance(1, "lamp"), Instance(2, "lamp"), Instance(3, "wall"))
+    shared = shared_by_class({1: TRUE[0]}, [1, 2, 3], instances)
+    assert sorted(shared) == [1, 2] and (shared[2] == TRUE[0]).all()
 
 
 def test_a_lower_bound_holds():
     found, base, (lamp_light, sky_light) = sample()
     sky = Sky([sky_light], [2 * TRUE[1]], True)
     sky.solved.add(0)
-    refined(found, [Lamp(7, np.float32(TRUE[0]), False)], {7: lamp_light}, {7: 0.1}, (), [], sky, base)
+    refined(found, [Lamp(7, np.float32(TRUE[0]), False)], {7: lamp_light}, {7: 0.1}, (), [], sky, base, {})
     assert (sky.radiance[0] >= 2 * TRUE[1] - 1e-6).all()
 
 
 def test_nothing_to_refine():
     found, base, _ = sample()
-    assert refined(found, [], {}, {}, (), [], Sky([], [], False), base) == []
+    assert refined(found, [], {}, {}, (), [], Sky([], [], False), base, {}) == []
 
 
 def test_flat_spots():
