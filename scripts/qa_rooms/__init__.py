@@ -1,0 +1,1 @@
+"""Rooms of several kinds, rendered with truth, to find out where the recovery fails."""

@@ -1,0 +1,49 @@
+"""Furnished rooms with truth, rendered by Cycles as captures, for finding out where the recovery fails.
+
+    python -m scripts.qa_rooms make KIND OUT [--seed 1] [--frames 48] [--size 240x180] [--samples 64] [--views 6]
+        [--denoise]
+    python -m scripts.qa_rooms score CAPTURE RESULT
+
+KIND is kitchen, bathroom, bedroom, office or hall. `score` needs no rendering; it reads what `scan-relight recover
+CAPTURE --out RESULT` left. Run from the repository's root.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+
+def main(argv: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="qa_rooms", description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    make = commands.add_parser("make", help="render a room")
+    make.add_argument("kind")
+    make.add_argument("out", type=Path)
+    make.add_argument("--seed", type=int, default=1)
+    make.add_argument("--frames", type=int, default=48)
+    make.add_argument("--size", default="240x180")
+    make.add_argument("--samples", type=int, default=64)
+    make.add_argument("--views", type=int, default=6)
+    make.add_argument("--denoise", action="store_true")
+    score = commands.add_parser("score", help="compare a result with the truth")
+    score.add_argument("capture", type=Path)
+    score.add_argument("result", type=Path)
+    given = parser.parse_args(argv)
+    if given.command == "make":
+        from .render import render
+        from .rooms import ROOMS
+
+        width, height = map(int, given.size.split("x"))
+        room = ROOMS[given.kind](given.seed)
+        render(room, given.out, given.frames, (width, height), given.samples, given.views, given.denoise)
+    else:
+        from .score import table
+
+        sys.stdout.write(table(given.capture, given.result))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,134 @@
+"""A room under construction: things are added one by one, in colours and gloss that the seed changes a little."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from addon.bridge.demo_room import Paint, Thing, box, grid
+
+from .shapes import tube, wall
+
+
+@dataclass(frozen=True)
+class Finish(Paint):
+    """A paint that may also be a metal (its albedo is then its F0) or thin clear glass."""
+
+    metallic: bool = False
+    glass: bool = False
+
+
+@dataclass
+class FurnishedRoom:
+    """A room under construction.
+
+    Attributes
+    ----------
+    size : tuple of float
+    walk : tuple of float
+        Low x, low y, high x, high y of where the camera may be.
+    pitch : tuple of float
+        Lowest and highest gaze, degrees.
+    sky, ground : tuple of float
+        Radiance from outside, above and below the horizon.
+    sun : tuple or None
+        Where it shines to (3,), colour (3,), irradiance.
+    windows : list
+        Rectangles (origin, across, up) that light comes in by.
+    """
+
+    name: str
+    seed: int
+    size: tuple[float, float, float]
+    walk: tuple[float, float, float, float]
+    pitch: tuple[float, float] = (-45, 35)
+    sky: tuple[float, float, float] = (0, 0, 0)
+    ground: tuple[float, float, float] = (0, 0, 0)
+    sun: tuple | None = None
+    windows: list = field(default_factory=list)
+    things: list[Thing] = field(default_factory=list)
+    smooth: set[int] = field(default_factory=set)
+
+    def __post_init__(self):
+        self.rng = np.random.default_rng([self.seed, sum(map(ord, self.name))])
+
+    def add(self, class_name: str, shapes, *finishes: Finish, slots=None, smooth: bool = False) -> None:
+        """One more object. Smooth ones are shaded round, and their quads are split."""
+        quads, uv = np.concatenate([s[0] for s in shapes]), np.concatenate([s[1] for s in shapes])
+        slot = np.repeat([0] * len(shapes) if slots is None else slots, [len(s[0]) for s in shapes])
+        if smooth:
+            self.smooth.add(len(self.things))
+        self.things.append(Thing(len(self.things), class_name, quads, uv, slot, finishes, smooth))
+
+    def tint(self, colour, spread: float = 0.12) -> np.ndarray:
+        """The colour a little changed by the seed."""
+        return np.clip(np.asarray(colour) * self.rng.uniform(1 - spread, 1 + spread, 3), 0.005, 0.92)
+
+    def matt(self, *colour) -> Finish:
+        """Diffuse."""
+        return Finish(np.float32(self.tint(colour)))
+
+    def matt_picture(self, picture) -> Finish:
+        """Diffuse, with a texture."""
+        return Finish(picture)
+
+    def gloss(self, roughness: float, colour, spread: float = 0.2) -> Finish:
+        """Plastic, lacquer, ceramics: F0 .04."""
+        colour = np.asarray(colour, np.float32)
+        colour = np.float32(self.tint(colour)) if colour.ndim == 1 else colour
+        return Finish(colour, float(roughness * self.rng.uniform(1 - spread, 1 + spread)), 0.04)
+
+    def metal(self, roughness: float, colour) -> Finish:
+        """F0 by channel."""
+        return Finish(np.float32(colour), roughness, 0.5, metallic=True)
+
+    def lamp(self, *radiance) -> Finish:
+        """What shines."""
+        return Finish(
+            np.zeros(3, np.float32), emission=tuple(float(r * self.rng.uniform(0.85, 1.15)) for r in radiance)
+        )
+
+    def shell(self, floor: Finish, ceiling: Finish, walls, holes=()) -> None:
+        """Floor, ceiling and four walls (y = 0, x = X, y = Y, x = 0; equal finishes make one object); holes by wall."""
+        x, y, z = self.size
+        self.add("floor", [grid((0, 0, 0), (x, 0, 0), (0, y, 0), 14, 14)], floor)
+        self.add("ceiling", [grid((0, y, z), (x, 0, 0), (0, -y, 0), 14, 14)], ceiling)
+        frames = [((x, 0, 0), (-x, 0, 0)), ((x, y, 0), (0, -y, 0)), ((0, y, 0), (x, 0, 0)), ((0, 0, 0), (0, y, 0))]
+        holes = dict(holes)
+        parts = {}
+        for k, (finish, (origin, across)) in enumerate(zip(walls, frames)):
+            parts.setdefault(id(finish), (finish, []))[1].append(wall(origin, across, (0, 0, z), holes.get(k, ())))
+            for a, b, c, d in holes.get(k, ()):
+                unit = np.asarray(across, float) / np.linalg.norm(across)
+                self.windows.append(
+                    (np.asarray(origin, float) + unit * a + (0, 0, c), unit * (b - a), np.array([0, 0, d - c]))
+                )
+        for finish, shapes in parts.values():
+            self.add("wall", shapes, finish)
+
+    def window_frame(self, finish: Finish) -> None:
+        """A frame of bars around and across each window."""
+        for origin, across, up in self.windows:
+            bars = []
+            for a in (0, 0.5, 1):
+                at = origin + across * a
+                bars.append(tube([at, at + up], 0.03, 6))
+            for b in (0, 1):
+                at = origin + up * b
+                bars.append(tube([at, at + across], 0.03, 6))
+            self.add("window frame", bars, finish)
+
+
+STEEL, CHROME, BRASS, COPPER, GOLD = (
+    (0.56, 0.55, 0.53),
+    (0.55, 0.56, 0.57),
+    (0.76, 0.6, 0.33),
+    (0.9, 0.58, 0.45),
+    (0.98, 0.76, 0.36),
+)
+
+
+def legs(x0, y0, x1, y1, height, thick):
+    """Four square legs."""
+    return [box((a, b, 0.002), (a + thick, b + thick, height)) for a in (x0, x1 - thick) for b in (y0, y1 - thick)]

@@ -1,0 +1,322 @@
+"""Render a furnished room as a capture with truth, laid out like the captures that results are scored on."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import bpy
+import numpy as np
+import OpenEXR
+from mathutils import Matrix
+
+from addon.bridge import demo_render
+from addon.bridge.demo_capture import FIELD_OF_VIEW, frame_path, write_all_but_frames
+from addon.bridge.demo_room import look_at
+from addon.bridge.materials import BASE_COLOR, METALLIC
+from addon.core.capture.exr import write_exr
+from addon.core.capture.model import Camera
+from addon.core.surface.rays import RayScene
+
+from .furnish import FurnishedRoom
+
+RELIT = ("A", (0.25, 60.0, 45.0, 30.0))
+"""Name of the one new light; half its edge and its radiance."""
+
+
+def walk(room: FurnishedRoom, count: int, phase: float, scene: RayScene) -> np.ndarray:
+    """Poses (count, 4, 4) of a person who strolls about and looks around; turned away from what is too near."""
+    x0, y0, x1, y1 = room.walk
+    low, high = np.radians(room.pitch)
+    poses = []
+    for k in range(count):
+        t = 2 * np.pi * (k + phase) / count
+        eye = np.array(
+            [
+                (x0 + x1) / 2 + (x1 - x0) / 2 * np.cos(t + phase),
+                (y0 + y1) / 2 + (y1 - y0) / 2 * np.sin(2 * t + 1),
+                1.45 + 0.25 * np.sin(3 * t + phase),
+            ]
+        )
+        yaw, tilt = 2 * t + 0.8 * np.sin(3 * t + 2 * phase), (low + high) / 2 + (high - low) / 2 * np.sin(5 * t + 2)
+        for turn in range(12):
+            gaze = yaw + turn * 0.55
+            pose = look_at(eye, eye + (np.cos(gaze) * np.cos(tilt), np.sin(gaze) * np.cos(tilt), np.sin(tilt)))
+            camera = Camera(16, 12, 8 / np.tan(FIELD_OF_VIEW / 2), 8 / np.tan(FIELD_OF_VIEW / 2), 8, 6, pose)
+            ways = camera.directions(camera.pixel_centres())
+            hits = scene.intersect(np.broadcast_to(eye.astype(np.float32), ways.shape), ways)
+            depth = np.where(hits.triangle >= 0, hits.distance, 10.0)
+            if depth.min() > 0.3 and np.median(depth) > 1.0:
+                break
+        poses.append(pose)
+    return np.array(poses)
+
+
+def objects_seen(camera: Camera, object_id: np.ndarray, scene: RayScene) -> np.ndarray:
+    """Object at each pixel's centre, (h, w) int; -1 where none is."""
+    ways = camera.directions(camera.pixel_centres())
+    hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), ways.shape), ways)
+    found = np.where(hits.triangle >= 0, object_id[np.maximum(hits.triangle, 0)], -1)
+    return found.reshape(camera.height, camera.width)
+
+
+def truth_of(room: FurnishedRoom) -> list[dict]:
+    """What is true of each object, as truth/materials.json has it."""
+    rows = []
+    for thing in room.things:
+        paint = thing.paints[0]
+        glass, metal = paint.glass, paint.metallic
+        kind = "diffuse" if not paint.f0 else "dielectric" if glass else "roughconductor" if metal else "roughplastic"
+        rows.append({
+            "id": thing.object_id, "class_name": thing.class_name, "bsdf": kind,
+            "emission": None if paint.emission is None else list(paint.emission),
+            "alpha": paint.roughness**2 if paint.f0 and not glass else None,
+            "f0": None if metal else paint.f0, "metallic": float(metal), "masked": glass, "base_factor": 1.0,
+            "base_color": [round(float(c), 4) for c in thing.mean_albedo()],
+        })  # fmt: skip
+    return rows
+
+
+def build(room: FurnishedRoom, scene) -> None:
+    """All things, the sky and the sun in the Blender scene."""
+    for thing in room.things:
+        made = demo_render.build(thing)
+        scene.collection.objects.link(made)
+        for paint, material in zip(thing.paints, made.data.materials):
+            tree = material.node_tree
+            shader = next((n for n in tree.nodes if n.type == "BSDF_PRINCIPLED"), None)
+            if paint.metallic:
+                shader.inputs[METALLIC].default_value = 1.0
+            if paint.glass:
+                _clear(tree)
+        if thing.object_id in room.smooth:
+            made.data.shade_smooth()
+            made.data.set_sharp_from_angle(angle=np.radians(40))
+    if any(room.sky):
+        scene.world = _sky(room)
+        for origin, across, up in room.windows:
+            light = bpy.data.lights.new("portal", "AREA")
+            light.shape, light.size, light.size_y = "RECTANGLE", np.linalg.norm(across), np.linalg.norm(up)
+            light.cycles.is_portal = True
+            a, u = across / np.linalg.norm(across), up / np.linalg.norm(up)
+            middle = origin + across / 2 + up / 2
+            inwards = np.array([room.size[0] / 2, room.size[1] / 2, middle[2]]) - middle
+            n = np.cross(a, u) * np.sign(np.cross(a, u) @ inwards)
+            pose = np.eye(4)
+            pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = np.cross(u, -n), u, -n, middle
+            _link(scene, light, pose)
+    if room.sun:
+        towards, colour, power = room.sun
+        light = bpy.data.lights.new("sun", "SUN")
+        light.energy, light.color, light.angle = power, colour, np.radians(1.5)
+        _link(scene, light, look_at((0, 0, 0), towards))
+
+
+def _link(scene, data, pose) -> None:
+    thing = bpy.data.objects.new(data.name, data)
+    thing.matrix_world = Matrix(np.asarray(pose).tolist())
+    scene.collection.objects.link(thing)
+
+
+def _clear(tree) -> None:
+    """Thin clear glass: light goes straight through or is mirrored."""
+    nodes, links = tree.nodes, tree.links
+    mix, fresnel = nodes.new("ShaderNodeMixShader"), nodes.new("ShaderNodeFresnel")
+    gloss = nodes.new("ShaderNodeBsdfGlossy")
+    gloss.inputs["Roughness"].default_value, fresnel.inputs["IOR"].default_value = 0.0, 1.5
+    links.new(fresnel.outputs[0], mix.inputs[0])
+    links.new(nodes.new("ShaderNodeBsdfTransparent").outputs[0], mix.inputs[1])
+    links.new(gloss.outputs[0], mix.inputs[2])
+    links.new(mix.outputs[0], next(n for n in nodes if n.type == "OUTPUT_MATERIAL").inputs["Surface"])
+
+
+def _sky(room: FurnishedRoom):
+    """A world that is bright above the horizon, brightest near it, and earthy below."""
+    world = bpy.data.worlds.new("sky")
+    if world.node_tree is None:
+        world.use_nodes = True
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    nodes.clear()
+    place, split, ramp = (nodes.new(f"ShaderNode{n}") for n in ("TexCoord", "SeparateXYZ", "ValToRGB"))
+    shine, out = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
+    top = max(room.sky)
+    add = nodes.new("ShaderNodeMath")
+    add.operation = "MULTIPLY_ADD"
+    add.inputs[1].default_value = add.inputs[2].default_value = 0.5
+    stops = ramp.color_ramp.elements
+    stops[0].position, stops[0].color = 0.49, (*(c / top for c in room.ground), 1)
+    stops[1].position, stops[1].color = 0.51, (*(min(1.0, 1.15 * c / top) for c in room.sky), 1)
+    higher = stops.new(0.8)
+    higher.color = (*(0.6 * c / top for c in room.sky), 1)
+    shine.inputs["Strength"].default_value = top
+    links.new(place.outputs["Generated"], split.inputs[0])
+    links.new(split.outputs["Z"], add.inputs[0])
+    links.new(add.outputs[0], ramp.inputs[0])
+    links.new(ramp.outputs[0], shine.inputs["Color"])
+    links.new(shine.outputs[0], out.inputs["Surface"])
+    return world
+
+
+def _override(scene) -> None:
+    """Every surface shows its base colour as light."""
+    scene.world = None
+    for material in bpy.data.materials:
+        tree = material.node_tree
+        shader = next((n for n in tree.nodes if n.type == "BSDF_PRINCIPLED"), None)
+        light = tree.nodes.new("ShaderNodeEmission")
+        light.inputs[0].default_value = (0, 0, 0, 1)
+        if shader:
+            socket = shader.inputs[BASE_COLOR]
+            light.inputs[0].default_value = tuple(socket.default_value)
+            if socket.links:
+                tree.links.new(socket.links[0].from_socket, light.inputs[0])
+        tree.links.new(light.outputs[0], next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL").inputs["Surface"])
+
+
+def _relight(scene, room: FurnishedRoom, pose: np.ndarray) -> None:
+    """All lights off but one new one, which shines on one side."""
+    scene.world = None
+    for thing in list(scene.collection.objects):
+        if thing.type == "LIGHT":
+            bpy.data.objects.remove(thing)
+    for material in bpy.data.materials:
+        for node in material.node_tree.nodes:
+            if node.type == "EMISSION":
+                node.inputs["Strength"].default_value = 0
+    mesh = bpy.data.meshes.new("light")
+    mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
+    material = bpy.data.materials.new("light")
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    side, front, shine, out = (
+        nodes.new(f"ShaderNode{n}") for n in ("NewGeometry", "Math", "Emission", "OutputMaterial")
+    )
+    top = max(RELIT[1][1:])
+    front.operation, front.inputs[0].default_value = "MULTIPLY_ADD", 1.0
+    front.inputs[1].default_value, front.inputs[2].default_value = -top, top
+    links.new(side.outputs["Backfacing"], front.inputs[0])
+    links.new(front.outputs[0], shine.inputs["Strength"])
+    shine.inputs["Color"].default_value = (*(c / top for c in RELIT[1][1:]), 1)
+    links.new(shine.outputs[0], out.inputs["Surface"])
+    mesh.materials.append(material)
+    _link(scene, mesh, pose)
+
+
+def render(
+    room: FurnishedRoom, folder: Path, frames: int, size: tuple[int, int], samples: int, held_out: int, denoise: bool
+) -> None:
+    """Write the capture `folder` with its truth/.
+
+    Parameters
+    ----------
+    room : FurnishedRoom
+    folder : Path
+        Must not be there yet.
+    frames, held_out : int
+        How many frames are taken, and how many views with truth.
+    size : tuple of int
+        Width and height.
+    samples : int
+        For each pixel of a frame; truth has twice as many.
+    denoise : bool
+        What few samples leave in frames and held-out pictures; never in truth's light.
+    """
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    write_all_but_frames(folder, room.things, np.eye(4)[None], size)
+    vertices, triangles, object_id = _triangles(room)
+    rays = RayScene(vertices, triangles)
+    poses, held = walk(room, frames, 0.0, rays), walk(room, held_out, 0.43, rays)
+    _transforms(folder / "transforms.json", poses, size, frame_path)
+    truth = folder / "truth"
+    (truth / "materials.json").write_text(json.dumps(truth_of(room), indent=1))
+    _transforms(truth / "transforms.json", held, size, lambda k: f"image/view_{k:03d}.exr")
+    scene = bpy.context.scene
+    build(room, scene)
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    camera.data.sensor_fit, camera.data.angle, camera.data.clip_start = "HORIZONTAL", FIELD_OF_VIEW, 0.01
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    demo_render.set_up_cycles(scene, size, samples)
+    scene.cycles.use_denoising = denoise
+    scene.cycles.use_light_tree = True
+    # What is cut off after few bounces would look like light that E has too much of: 3 % in a white room after 6.
+    scene.cycles.max_bounces = scene.cycles.diffuse_bounces = 24
+    scene.cycles.glossy_bounces = 12
+    image = scene.render.image_settings
+    image.file_format, image.color_mode, image.color_depth = "OPEN_EXR", "RGB", "16"
+
+    def shoot(pose, path):
+        camera.matrix_world = Matrix(pose.tolist())
+        scene.render.filepath = str(path)
+        bpy.ops.render.render(write_still=True)
+
+    for k, pose in enumerate(poses):
+        shoot(pose, folder / frame_path(k))
+    # Held-out views: the picture, and what light and colour it is made of.
+    layer = scene.view_layers[0]
+    layer.use_pass_diffuse_direct = layer.use_pass_diffuse_indirect = layer.use_pass_diffuse_color = True
+    scene.cycles.samples = 2 * samples
+    image.file_format, image.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    for name in ("image", "albedo", "object_id", "diffuse_light", "diffuse_color", f"relight_{RELIT[0]}"):
+        (truth / name).mkdir()
+    for k, pose in enumerate(held):
+        name = f"view_{k:03d}.exr"
+        shoot(pose, truth / "all.exr")
+        planes = OpenEXR.File(str(truth / "all.exr"), separate_channels=True).channels()
+
+        def layer_of(kind, planes=planes):
+            return np.stack([planes[f"{layer.name}.{kind}.{c}"].pixels for c in "RGB"], -1)
+
+        write_exr(truth / "image" / name, layer_of("Combined"))
+        write_exr(truth / "diffuse_light" / name, layer_of("DiffDir") + layer_of("DiffInd"))
+        write_exr(truth / "diffuse_color" / name, layer_of("DiffCol"))
+        focal = size[0] / 2 / np.tan(FIELD_OF_VIEW / 2)
+        view = Camera(*size, focal, focal, size[0] / 2, size[1] / 2, pose)
+        ids = objects_seen(view, object_id, rays).astype(np.float32)
+        write_exr(truth / "object_id" / name, np.repeat(ids[..., None], 3, 2))
+    (truth / "all.exr").unlink()
+    image.file_format = "OPEN_EXR"
+    lit = np.diag([RELIT[1][0], -RELIT[1][0], -1.0, 1.0])
+    x0, y0, x1, y1 = room.walk
+    lit[:3, 3] = (x0 + 0.25 * (x1 - x0), (y0 + y1) / 2, room.size[2] - 0.35)
+    (truth / "relight.json").write_text(
+        json.dumps({RELIT[0]: {"rectangle_to_world_z_up": lit.tolist(), "radiance": list(RELIT[1][1:])}}, indent=1)
+    )
+    _relight(scene, room, lit)
+    for k, pose in enumerate(held[: max(1, held_out // 3)]):
+        shoot(pose, truth / f"relight_{RELIT[0]}" / f"view_{k:03d}.exr")
+    bpy.data.objects.remove(scene.collection.objects["light"])
+    _override(scene)
+    scene.cycles.samples, scene.cycles.use_denoising = 16, False
+    for k, pose in enumerate(held):
+        shoot(pose, truth / "albedo" / f"view_{k:03d}.exr")
+
+
+def _triangles(room: FurnishedRoom) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The room's vertices (v, 3), triangles (t, 3) and the triangles' objects (t,)."""
+    quads = np.concatenate([thing.quads for thing in room.things])
+    first = 4 * np.arange(len(quads))[:, None, None]
+    triangles = (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
+    ids = np.repeat([thing.object_id for thing in room.things], [2 * len(thing.quads) for thing in room.things])
+    return quads.reshape(-1, 3).astype(np.float32), triangles.astype(np.int32), ids
+
+
+def _transforms(path: Path, poses: np.ndarray, size: tuple[int, int], name) -> None:
+    width, height = size
+    focal = width / 2 / np.tan(FIELD_OF_VIEW / 2)
+    path.write_text(
+        json.dumps(
+            {
+                "camera_model": "PINHOLE",
+                "w": width,
+                "h": height,
+                "fl_x": focal,
+                "fl_y": focal,
+                "cx": width / 2,
+                "cy": height / 2,
+                "frames": [{"file_path": name(k), "transform_matrix": pose.tolist()} for k, pose in enumerate(poses)],
+            },
+            indent=1,
+        )
+    )

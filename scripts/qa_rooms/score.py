@@ -1,0 +1,209 @@
+"""A result against a room's truth, without rendering: scores, and which stage an object's error comes from.
+
+The albedo of an element is pi L_d / E. The truth's views hold E / pi (diffuse_light) and the albedo (diffuse_color), so
+for each object the median of estimate / truth is known for the albedo, for L_d and for E, channel by channel.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from addon.benchmark.truth_views import projected_truth, psnr, views
+from addon.core.capture.exr import read_exr
+from addon.core.capture.read import read_capture
+from addon.core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR
+from addon.core.progress import Progress
+from addon.core.recover import Recovery
+from addon.core.settings import Settings
+from addon.core.shading.albedo import MEASURED
+from addon.core.store import Store
+
+LEAST_PIXELS = 100
+UNTOLD = 0.5
+"""Blender's Roughness where the result says none."""
+KINDS = {LAMBERTIAN: "diffuse", SPECULAR: "specular", METAL: "metal", EMITTER: "emitter"}
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def table(capture: Path, result: Path) -> str:
+    """All figures as text; RESULT/qa.json gets them too."""
+    found = compare(capture, result)
+    (result / "qa.json").write_text(json.dumps(found, indent=1))
+    lines = [f"{capture.name}"]
+    lines += [f"  {value:6.2f} dB  {name}" for name, value in found["psnr"].items()]
+    lines += [
+        f"  {found['roughness_by_pixel']:6.3f}     roughness, mean absolute error by pixel",
+        f"  {found['roughness_by_object']:6.3f}     roughness, mean absolute error by object",
+        f"  models right: {found['right']} of {found['of']}: {found['models']}",
+    ]
+    for lamp in found["lamps"]:
+        lines.append(
+            f"  lamp {lamp['id']} {lamp['class_name']}: {_three(lamp['found'])} (true {_three(lamp['true'])})"
+            f" {'seen' if lamp['seen'] else 'unseen'} {lamp['note']}"
+        )
+    lines += [f"  note: {note}" for note in found["notes"] + found["warnings"]]
+    lines.append(
+        "  objects, worst first: pixels, share of the squared error; estimate / truth of albedo | of L_d less its "
+        "specular part | of the median itself | of E; measured share; model found/true, roughness found/true, psi"
+    )
+    for row in found["objects"]:
+        lines.append(
+            f"  {row['id']:3d} {row['class_name'][:15]:15s} {row['pixels']:6d} {row['share']:6.1%}  "
+            f"{' | '.join(_three(row[kind]) for kind in ('albedo', 'L_d', 'median', 'E'))}  {row['measured']:4.0%}  "
+            f"{row['model']}/{row['true_model']} {_one(row['roughness'])}/{_one(row['true_roughness'])} "
+            f"{_one(row['psi'])}"
+        )
+    return "\n".join(lines) + "\n"
+
+
+def _three(x) -> str:
+    return "   -  " if x is None else " ".join(f"{v:5.2f}" for v in x)
+
+
+def _one(x) -> str:
+    return "-" if x is None else f"{x:.2f}"
+
+
+def compare(capture: Path, result: Path) -> dict:
+    """What `table` shows, as plain values."""
+    settings = Settings(**json.loads((result / "report.json").read_text())["settings"])
+    truth = {o["id"]: o for o in json.loads((capture / "truth" / "materials.json").read_text())}
+    with Store(result) as store:
+        recovery = Recovery(read_capture(capture), store, settings, Progress(), None)
+        seen, ids = views(capture, recovery), []
+        lit, shading, specular = recovery.lit_diffuse(), recovery.shading(), recovery.specular()
+        base, rho, E = recovery.base_color(), recovery.albedo.rho, recovery.irradiance
+        materials = {m.object_id: m for m in recovery.materials()}
+        measured = recovery.albedo.origin == MEASURED
+        warnings = recovery.report()["warnings"]
+    for view, frame in zip(seen, json.loads((capture / "truth" / "transforms.json").read_text())["frames"]):
+        name = Path(frame["file_path"]).name
+        view["id"] = np.rint(read_exr(capture / "truth" / "object_id" / name).rgb[..., 0]).astype(int).ravel()
+        for kind in ("diffuse_light", "diffuse_color"):
+            path = capture / "truth" / kind / name
+            view[kind] = read_exr(path).rgb.reshape(-1, 3) if path.exists() else np.full_like(view["truth"], np.nan)
+        ids.append(view["id"])
+    every = np.concatenate(ids)
+    pixels = {i: int((every == i).sum()) for i in truth}
+    split = {"albedo": rho, "L_d": np.maximum(lit.radiance - specular.specular, 0), "median": lit.radiance, "E": E}
+    ratios, share = _ratios(seen, split, base, truth)
+    scores = {"Base Color as written": psnr(seen, base)}
+    scores |= _scaled(seen, base)
+    scores["on measured elements only"] = psnr(seen, base, measured)
+    scores["the truth itself through the texels"] = psnr(seen, projected_truth(seen, len(E), base))
+    ids_of = recovery.surface().atlas.object_id
+    for name, kinds in (("E", ("E",)), ("L_d", ("L_d",)), ("E and L_d", ("E", "L_d"))):
+        fixed = base.copy()
+        for i, ratio in ratios.items():
+            own = ids_of == i
+            for kind in kinds:
+                if ratio.get(kind) is not None:
+                    fixed[own] *= np.asarray(ratio[kind]) if kind == "E" else 1 / np.maximum(ratio[kind], 0.05)
+        scores[f"Base Color with each object's {name} put right (one factor a channel)"] = psnr(seen, fixed)
+    rows, errors, models = [], [], {}
+    for i, true in truth.items():
+        mine = materials[i]
+        rough = None if mine.phi is None else float(np.sqrt(mine.phi))
+        kind = KINDS.get(mine.model, mine.model)
+        true_kind = (
+            "emitter"
+            if true["emission"]
+            else "metal"
+            if true["metallic"]
+            else "diffuse"
+            if true["bsdf"] == "diffuse"
+            else "specular"
+        )
+        true_rough = None if true["alpha"] is None or true["emission"] else float(np.sqrt(true["alpha"]))
+        own = np.isin(ids_of, [i])
+        rows.append({
+            "id": i, "class_name": true["class_name"], "pixels": pixels[i], "share": share.get(i, 0.0),
+            **{k: ratios.get(i, {}).get(k) for k in split},
+            "measured": float(measured[own].mean()) if own.any() else 0.0,
+            "model": kind, "true_model": true_kind, "roughness": rough, "true_roughness": true_rough,
+            "psi": mine.psi, "f0": mine.f0,
+            "true_f0": true["base_color"] if true["metallic"] and "base_color" in true else None,
+            "scores": mine.scores, "note": mine.note,
+        })  # fmt: skip
+        if pixels[i] < LEAST_PIXELS or true["masked"] or true["bsdf"] == "dielectric":
+            continue
+        if true_rough is not None:
+            errors.append((abs((UNTOLD if rough is None else rough) - true_rough), pixels[i]))
+        models[f"{true_kind} as {kind}"] = models.get(f"{true_kind} as {kind}", 0) + 1
+    lamps = {lamp.object_id: lamp for lamp in shading.lamps}
+    lamp_rows = [
+        {
+            "id": i,
+            "class_name": truth[i]["class_name"],
+            "true": truth[i]["emission"],
+            "found": lamps[i].radiance.tolist() if i in lamps else None,
+            "seen": lamps[i].seen if i in lamps else False,
+            "note": lamps[i].note if i in lamps else "",
+        }
+        for i in truth
+        if truth[i]["emission"] or i in lamps
+    ]
+    by_object, by_pixel = np.array([e for e, _ in errors] or [np.nan]), np.array([n for _, n in errors] or [1])
+    return {
+        "psnr": scores,
+        "roughness_by_pixel": float(np.average(by_object, weights=by_pixel)),
+        "roughness_by_object": float(by_object.mean()),
+        "models": models,
+        "of": sum(models.values()),
+        "right": sum(n for k, n in models.items() if len(set(k.split(" as "))) == 1),
+        "lamps": lamp_rows,
+        "notes": list(shading.notes),
+        "warnings": list(warnings),
+        "mirrors": [m.object_id for m in shading.mirrors],
+        "objects": sorted(rows, key=lambda row: -row["share"]),
+    }
+
+
+def _scaled(seen: list[dict], base: np.ndarray) -> dict[str, float]:
+    """PSNR after one scale, and after one for each channel."""
+    pairs = [(base[v["element"]].mean(0)[v["counts"]], v["truth"][v["counts"]]) for v in seen]
+    mine, true = (np.concatenate(x).astype(np.float64) for x in zip(*pairs))
+    one = (mine * true).sum() / (mine * mine).sum()
+    three = (mine * true).sum(0) / (mine * mine).sum(0)
+    return {
+        f"after one scale ({one:.3f})": psnr(seen, base * np.float32(one)),
+        f"after three scales ({', '.join(f'{x:.3f}' for x in three)})": psnr(seen, base * np.float32(three)),
+    }
+
+
+def _ratios(seen, split, base, truth) -> tuple[dict, dict]:
+    """Median of estimate / truth by object, quantity and channel; and each object's share of the squared error."""
+    found = {kind: [] for kind in split}
+    true = {kind: [] for kind in split}
+    ids, error = [], []
+    for view in seen:
+        ok = view["counts"]
+        ids.append(view["id"][ok])
+        error.append(
+            np.square(np.clip(base[view["element"]].mean(0)[ok], 0, 1) - np.clip(view["truth"][ok], 0, 1)).sum(1)
+        )
+        light, colour = view["diffuse_light"][ok], view["diffuse_color"][ok]
+        targets = {"albedo": colour, "L_d": light * colour, "median": light * colour, "E": np.pi * light}
+        for kind, values in split.items():
+            found[kind].append(values[view["element"]].mean(0)[ok])
+            true[kind].append(targets[kind])
+    ids, error = np.concatenate(ids), np.concatenate(error)
+    share = {int(i): float(error[ids == i].sum() / error.sum()) for i in np.unique(ids)}
+    ratios = {}
+    for i in truth:
+        own = ids == i
+        if own.sum() < 20:
+            continue
+        ratios[i] = {}
+        for kind in split:
+            a, b = np.concatenate(found[kind])[own], np.concatenate(true[kind])[own]
+            good = np.isfinite(a).all(1) & np.isfinite(b).all(1)
+            # The truth's light is noisy: sums over blocks of pixels are compared.
+            n = max(1, good.sum() // 40)
+            blocks = np.array_split(np.flatnonzero(good), n)
+            quotient = [a[part].sum(0) / np.maximum(b[part].sum(0), 1e-9) for part in blocks if len(part)]
+            ratios[i][kind] = np.median(quotient, 0).tolist() if quotient else None
+    return ratios, share
