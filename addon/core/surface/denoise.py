@@ -12,7 +12,8 @@ and no angle. What a mesh of large triangles measured well already is left alone
 its points by many times the noise.
 
 It is solved by Gauss-Newton steps with weights from the last one's angles, while `scale` goes down (graduated
-non-convexity, Blake and Zisserman 1987): first all is smoothed alike, then what stays sharp is let go.
+non-convexity, Blake and Zisserman 1987): first all is smoothed alike, then what stays sharp is let go. Last,
+what lies in flat parts is put into their planes (`planes`), which angles alone can't tell.
 """
 
 from __future__ import annotations
@@ -26,12 +27,13 @@ from scipy.sparse.linalg import cg
 
 from ..capture.model import Mesh
 from .mesh_noise import LEAST_NOISE, noise_of
+from .planes import onto_sheets
 from .weld import point_normals, ring_of, welded
 
 SCALES = np.geomspace(0.5, 0.02, 8)
 """Radians, one for each step."""
 FARTHEST = 3.0
-"""Times the noise, how far a point may go in all."""
+"""Times the noise, how far a point may go for the angles."""
 FLOOR = 1.0
 """Times the noise: a triangle lower than this is taken for so high, as the noise folds it over and its angle says
 little."""
@@ -203,4 +205,4 @@ def denoised(mesh: Mesh, noise: float) -> np.ndarray:
         # The angles are linear over small steps only.
         points = points + np.clip(step, -noise, noise)[:, None] * normal
         points = _within(points, measured, FARTHEST * noise)
-    return mesh.vertices + (points - measured)[place]
+    return mesh.vertices + (onto_sheets(measured, points, faces, noise) - measured)[place]
