@@ -125,14 +125,14 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
             # The file gets the mesh whose normals face the frames: its lamps shine on that side. And the one that the
             # materials were measured on: their colours fit its normals.
             facing = replace(capture, mesh=recovery.room_mesh())
-            write_room(store.folder, capture, surface.uv)
+            write_room(store.folder, capture, surface.first_uv)
             warnings = write_scene(store.path("scene.blend"), facing, surface.atlas.uv, materials, store.folder,
                                    recovery.median_radiance(), fresh=scene is None, facing=True)
             if scene is not None:
                 if import_first and not own:
                     import_capture(scene, capture)
-                warnings += whole(putting_on(scene, capture, surface.uv, materials, store.folder, target, images,
-                                             copies))
+                warnings += whole(putting_on(scene, capture, surface.first_uv, materials, store.folder, target,
+                                             images, copies))
             progress.done()
         report = recovery.report()
         if until == WRITE:

@@ -61,7 +61,7 @@ def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0, polygons: P
         Empty texels between two islands.
     polygons : Polygons, optional
         Keep the triangles of each face together, so that its corners have one coordinate each. A face that folds onto
-        itself is torn all the same.
+        itself is torn all the same. Further triangles of the mesh, the second sides of sheets, are faces each.
 
     Returns
     -------
@@ -75,10 +75,22 @@ def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0, polygons: P
     triangles, object_id = mesh.triangles[whole], mesh.object_id[whole]
     uv = np.zeros((len(mesh.triangles), 3, 2), np.float32)
     if polygons is not None:
+        polygons = _with_more(polygons, mesh.triangles)
         polygons = polygons._replace(corner=polygons.corner[whole])
     if len(triangles):
         uv[whole] = _unwrapped(mesh.vertices, triangles, object_id, size, margin_texels, polygons)
     return np.clip(np.nan_to_num(uv, nan=0.0, posinf=0.0, neginf=0.0), 0, 1)
+
+
+def _with_more(polygons, triangles):
+    """The faces, and one for each triangle beyond theirs."""
+    more = triangles[len(polygons.corner):]
+    if not len(more):
+        return polygons
+    corner = len(polygons.vertex) + np.arange(more.size).reshape(-1, 3)
+    return Polygons(np.r_[polygons.start, corner[:, 2] + 1].astype(polygons.start.dtype),
+                    np.r_[polygons.vertex, more.ravel()].astype(polygons.vertex.dtype),
+                    np.r_[polygons.corner, corner].astype(polygons.corner.dtype))
 
 
 def _unwrapped(vertices, triangles, object_id, size, margin_texels, polygons):

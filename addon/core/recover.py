@@ -40,10 +40,11 @@ from .specular.flat_mirrors import find_mirrors
 from .specular.reflect import Specular, fit_specular
 from .specular.samples import SampleCollector, Samples
 from .store import Store, key
-from .surface.build import Surface, build_surface, from_uv, turned
+from .surface.build import Surface, build_surface, from_uv
 from .surface.denoise import without_noise
+from .surface.two_sides import laid_apart, with_backs
 
-CODE = 18
+CODE = 19
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -140,26 +141,29 @@ class Recovery:
                 [frame.camera for frame in capture.frames],
                 self._unwrap, texel, self.settings.detail, self.settings.atlas_size,
             )
-            sign = np.where((found.mesh.triangles == capture.mesh.triangles).all(1), 1, -1).astype(np.int8)
-            arrays = {"uv": found.uv, "sign": sign, "both": found.both_sides}
+            first = found.mesh.triangles[: len(mesh.triangles)]
+            sign = np.where((first == mesh.triangles).all(1), 1, -1).astype(np.int8)
+            arrays = {"uv": found.uv, "sign": sign, "backs": found.backs}
             arrays |= {"vertices": mesh.vertices} if noise else {}
             return dataclasses.replace(found, noise=noise), arrays, {"size": found.atlas.size, "noise": noise}
 
         def load(arrays, meta):
-            mesh, sign = capture.mesh, arrays["sign"]
+            mesh = capture.mesh
             if "vertices" in arrays:
                 mesh = dataclasses.replace(mesh, vertices=arrays["vertices"])
-            uv = None if mesh.uv is None else turned(mesh.uv, sign)
-            facing = dataclasses.replace(mesh, triangles=turned(mesh.triangles, sign), uv=uv)
-            return from_uv(mesh, facing, sign, arrays["uv"], int(meta["size"]), arrays["both"], float(meta["noise"]))
+            mesh = with_backs(mesh, arrays["backs"])
+            return from_uv(mesh, arrays["sign"], arrays["uv"], int(meta["size"]), float(meta["noise"]))
 
         return self._stage("surface", load, compute)
 
     def room_mesh(self) -> Mesh:
-        """The mesh that the stages worked on, where the capture has it: normals face the frames, noise is out of it."""
-        mesh = self.surface().mesh
-        moved = mesh.vertices - self._near.mesh.vertices  # by itself, so that what did not move is exact
-        return dataclasses.replace(mesh, vertices=self.capture.mesh.vertices + moved)
+        """The mesh that the stages worked on, where the capture has it: normals face the frames, noise is out of it.
+
+        A sheet's second side is a little apart from the first.
+        """
+        mesh, before = self.surface().mesh, self._near.mesh.vertices
+        moved = mesh.vertices[: len(before)] - before  # by itself, so that what did not move is exact
+        return laid_apart(mesh, self.capture.mesh.vertices + moved)
 
     def _read(self, frame: Frame) -> Pixels:
         """A frame's pixels; one that turns out damaged counts as blind, unless too many are."""

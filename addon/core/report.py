@@ -58,22 +58,14 @@ def _evidence_figures(run: Recovery) -> dict[str, float]:
 def _report_surface(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:
     surface = run.surface()
     _, area = triangle_geometry(surface.mesh)
-    share = float(area[surface.both_sides].sum() / area.sum())
-    figures["both_sides_share"] = share
+    figures["two_sided_share"] = float(area[surface.backs].sum() / area.sum())
     figures["mesh_noise_metres"] = surface.noise
     if surface.noise:
-        moved = np.linalg.norm(run.room_mesh().vertices - run.capture.mesh.vertices, axis=1)
+        captured = run.capture.mesh.vertices
+        moved = np.linalg.norm(run.room_mesh().vertices[: len(captured)] - captured, axis=1)
         warnings.append(
             f"The mesh has noise of {1000 * surface.noise:.1f} mm along its normals; it was smoothed, edges kept, its "
             f"vertices moved by {1000 * np.sqrt(np.mean(moved**2)):.1f} mm; turn off denoise_mesh to use it as it is."
-        )
-    if share > 0.01:
-        objects, count = np.unique(surface.mesh.object_id[surface.both_sides], return_counts=True)
-        class_of = {i.object_id: i.class_name for i in run.capture.instances}
-        names = ", ".join(f"{class_of[i]} ({i})" for i in objects[np.argsort(-count, kind="stable")][:5].tolist())
-        warnings.append(
-            f"{share:.1%} of the surface is a sheet that frames see from both sides ({names}): it has the light of one "
-            "side, and throws that to both; give it two faces, a little apart."
         )
 
 

@@ -130,8 +130,11 @@ class Captured:
         (root / "info_semantic.json").write_text(json.dumps({"objects": objects}))
 
     def unwrap(self, mesh, size: int) -> np.ndarray:
-        assert len(mesh.triangles) == len(self.uv)
-        return self.uv
+        backs = len(mesh.triangles) - len(self.uv)
+        assert backs == (0 if mesh.backs is None else len(mesh.backs))
+        if not backs:
+            return self.uv
+        return np.concatenate([0.5 * self.uv, 0.5 * self.uv[mesh.backs][:, [0, 2, 1]] + np.float32([0.5, 0])])
 
     def recover(self, settings: Settings = QUICK) -> Result:
         """A whole run; whatever it gives has been looked through for values that are none."""

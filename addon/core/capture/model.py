@@ -271,6 +271,9 @@ class Mesh:
         The capture's own texture coordinates for each corner; may overlap and repeat.
     lit : LitTiles or None
         Its light, where the capture stores it on the mesh; used where there are no frames.
+    backs : (s,) int32 or None
+        None in captures. The last s triangles are the second sides of these, in the same place with the other winding:
+        sheets that frames see from both sides (`surface.two_sides`).
     """
 
     vertices: np.ndarray
@@ -278,6 +281,7 @@ class Mesh:
     object_id: np.ndarray
     uv: np.ndarray | None = None
     lit: LitTiles | None = None
+    backs: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

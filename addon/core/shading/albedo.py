@@ -94,8 +94,9 @@ def fill(
     left = error.copy()
     by_class: dict[str, list[np.ndarray]] = {}
     bare = []
-    order = np.argsort(atlas.object_id, kind="stable")
-    for own in np.split(order, np.flatnonzero(np.diff(atlas.object_id[order])) + 1):
+    part = _parts(atlas, valid)
+    order = np.argsort(part, kind="stable")
+    for own in np.split(order, np.flatnonzero(np.diff(part[order])) + 1):
         object_id = int(atlas.object_id[own[0]])
         if object_id in emitters:
             result[own], origin[own], left[own] = 0, NONE, 0
@@ -112,6 +113,15 @@ def fill(
         origin[own] = NONE
         left[own] = _spread(alike if alike and len(alike) > 2 else known)
     return Albedo(np.clip(result, 0, MAX_ALBEDO).astype(np.float32), origin, above, left)
+
+
+def _parts(atlas: Atlas, valid: np.ndarray) -> np.ndarray:
+    """Numbers of what is filled in together: objects, a sheet's second side by itself if it was measured, (n,) int."""
+    if atlas.back is None:
+        return atlas.object_id
+    part = 2 * atlas.object_id.astype(np.int64) + atlas.back
+    measured = np.bincount(part, valid, 2 * int(atlas.object_id.max()) + 2).reshape(-1, 2) > 0
+    return np.where(measured.all(1)[atlas.object_id], part, part - atlas.back)
 
 
 def _spread(albedos: list[np.ndarray]) -> float:

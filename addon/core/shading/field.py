@@ -26,7 +26,8 @@ class LightField:
         L_d of each element, no NaN.
     lamps : iterable of int
         Objects that give light. They do so on the side that the normals show, which is the side the frames see: a
-        lamp that is a bare rectangle under a ceiling does not light the gap above it.
+        lamp that is a bare rectangle under a ceiling does not light the gap above it. So does each side of a sheet
+        that has two (`Mesh.backs`).
     """
 
     def __init__(
@@ -41,8 +42,7 @@ class LightField:
         self.mesh, self.atlas, self.scene, self.environment = mesh, atlas, scene, environment
         self.radiance = np.ascontiguousarray(radiance, np.float32)
         self.normal, _ = triangle_geometry(mesh)
-        self.one_sided = np.isin(mesh.object_id, list(lamps))
-        self._lamps = bool(self.one_sided.any())
+        self._say_lamps(lamps)
         self.mirrors: tuple[Mirror, ...] = ()
         self.mirror_of = np.full(len(mesh.triangles), -1, np.int8)
         self.lookup = ElementLookup(mesh, atlas)
@@ -56,9 +56,15 @@ class LightField:
         other.radiance = np.ascontiguousarray(radiance, np.float32)
         other.environment = environment or self.environment
         if lamps is not None:
-            other.one_sided = np.isin(self.mesh.object_id, list(lamps))
-            other._lamps = bool(other.one_sided.any())
+            other._say_lamps(lamps)
         return other
+
+    def _say_lamps(self, lamps: Iterable[int]) -> None:
+        self.one_sided = np.isin(self.mesh.object_id, list(lamps))
+        self._lamps = bool(self.one_sided.any())
+        if self.mesh.backs is not None:  # rays meet no side from behind, but are aimed at points on either
+            self.one_sided[self.mesh.backs] = True
+            self.one_sided[len(self.mesh.triangles) - len(self.mesh.backs) :] = True
 
     def with_mirrors(self, mirrors: tuple[Mirror, ...]) -> LightField:
         """The same room with flat mirrors that rays go on from."""

@@ -15,6 +15,7 @@ from ..surface.atlas import Atlas
 from ..surface.creases import crease_doubt
 from ..surface.mesh_noise import tilt
 from ..surface.rays import RayScene
+from ..surface.two_sides import fronts
 from .albedo import Albedo, fill, quotient
 from .environment import Environment
 from .field import LightField
@@ -117,7 +118,8 @@ def shade(
     field = LightField(mesh, atlas, scene, fill_unseen(lit_diffuse.radiance, seen), environment)
     good = seen & (((lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= ENOUGH)) | (lit_diffuse.tier == SATURATED))
     unseen = [object_id for object_id, share in seen_share.items() if share == 0]
-    tilted = tilt(mesh, noise)[atlas.triangle]
+    single, sheet = fronts(mesh)
+    tilted = tilt(single, noise)[sheet[atlas.triangle]]
     light = find_light(field, good if good.any() else seen, unseen, instances, seed, tilted, colours)
     lamps = light.lamps
     radiance = field.radiance.copy()

@@ -32,6 +32,8 @@ class Atlas:
     padding : (size * size,) int32
         The element whose value a texel shows: its own, or the nearest one of the same object within the padding;
         -1 for empty texels.
+    back : (n,) bool or None
+        On the second side of a sheet (`Mesh.backs`); None where there is no such sheet.
     """
 
     size: int
@@ -43,6 +45,7 @@ class Atlas:
     object_id: np.ndarray
     area: np.ndarray
     padding: np.ndarray
+    back: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.texel)

@@ -13,6 +13,7 @@ from .atlas import Atlas
 from .elements import make_atlas, triangle_geometry, uv_scale
 from .orientation import Sides, seen_sides
 from .rays import RayScene
+from .two_sides import with_backs
 
 EXPECTED_FILL = 0.55
 """Share of the atlas that islands usually cover; only the unwrapping's margin depends on it."""
@@ -26,15 +27,15 @@ class Surface:
     Attributes
     ----------
     mesh : Mesh
-        The capture's, with windings turned so that normals face the cameras.
+        The capture's, with windings turned so that normals face the cameras; then the second sides of the sheets that
+        these see both sides of (`Mesh.backs`).
     atlas : Atlas
     scene : RayScene
     uv : (t, 3, 2) float32
-        The atlas coordinates in the corner order of the capture's own mesh.
+        The atlas coordinates in the corner order of the capture's own mesh; then those of the second sides, turned
+        alike.
     texel_size : float
         Edge of a surface element in metres.
-    both_sides : (t,) bool
-        Triangles that frames see from either side, of which the elements stand for one.
     noise : float
         What was taken out of the capture's vertices: standard deviation along the normals, in metres.
     """
@@ -44,8 +45,17 @@ class Surface:
     scene: RayScene
     uv: np.ndarray
     texel_size: float
-    both_sides: np.ndarray
     noise: float = 0.0
+
+    @property
+    def first_uv(self) -> np.ndarray:
+        """`uv` of the capture's own triangles. Where a mesh must stay as it is, its sheets show the side seen more."""
+        return self.uv[: len(self.uv) - len(self.backs)]
+
+    @property
+    def backs(self) -> np.ndarray:
+        """The triangles that have a second side, (s,) int32."""
+        return np.zeros(0, np.int32) if self.mesh.backs is None else self.mesh.backs
 
 
 def turned(corners: np.ndarray, sign: np.ndarray) -> np.ndarray:
@@ -55,12 +65,18 @@ def turned(corners: np.ndarray, sign: np.ndarray) -> np.ndarray:
     return result
 
 
-def oriented(mesh: Mesh, cameras: Sequence[Camera]) -> tuple[Mesh, Sides]:
-    """The mesh with normals towards the cameras, and what these see of each triangle."""
+def oriented(mesh: Mesh, cameras: Sequence[Camera]) -> Sides:
+    """What the cameras see of each triangle."""
     normal, _ = triangle_geometry(mesh)
-    sides = seen_sides(mesh, normal, RayScene(mesh.vertices, mesh.triangles), cameras)
-    uv = None if mesh.uv is None else turned(mesh.uv, sides.sign)
-    return replace(mesh, triangles=turned(mesh.triangles, sides.sign), uv=uv), sides
+    return seen_sides(mesh, normal, RayScene(mesh.vertices, mesh.triangles), cameras)
+
+
+def facing(mesh: Mesh, sign: np.ndarray) -> Mesh:
+    """The mesh with its windings turned where `sign` is negative, second sides ((s,) `Mesh.backs`) like their first."""
+    if mesh.backs is not None:
+        sign = np.concatenate([sign, sign[mesh.backs]])
+    uv = None if mesh.uv is None else turned(mesh.uv, sign)
+    return replace(mesh, triangles=turned(mesh.triangles, sign), uv=uv)
 
 
 def atlas_size(area: float, texel: float, largest: int) -> int:
@@ -97,11 +113,12 @@ def build_surface(
     BadInputError
         No camera looks at the mesh.
     """
-    facing, sides = oriented(mesh, cameras)
+    sides = oriented(mesh, cameras)
     if sides.footprint <= 0 and (cameras or not texel_size):
         raise BadInputError(
             "No camera of the capture looks at the mesh; check that transforms.json and mesh.ply share one frame."
         )
+    mesh = with_backs(mesh, np.flatnonzero(sides.both))
     _, area = triangle_geometry(mesh)
     texel = texel_size or sides.footprint / detail
     size = atlas_size(float(area.sum()), texel, largest)
@@ -109,15 +126,14 @@ def build_surface(
     # The islands' true scale sets the size that makes a texel as large as wished.
     scale = uv_scale(mesh, uv)
     size = int(np.clip(np.ceil(1 / max(texel * scale, 1e-12) / STEP) * STEP, SMALLEST, largest // STEP * STEP))
-    return from_uv(mesh, facing, sides.sign, uv, size, sides.both)
+    return from_uv(mesh, sides.sign, uv, size)
 
 
-def from_uv(
-    mesh: Mesh, facing: Mesh, sign: np.ndarray, uv: np.ndarray, size: int, both_sides: np.ndarray,
-    noise: float = 0.0,
-) -> Surface:
-    """The surface for a known layout."""
-    atlas = make_atlas(facing, turned(uv, sign), size)
+def from_uv(mesh: Mesh, sign: np.ndarray, uv: np.ndarray, size: int, noise: float = 0.0) -> Surface:
+    """The surface for a known layout of a mesh `with_backs`, and the sign of each of its first sides."""
+    towards = facing(mesh, sign)
+    every = sign if mesh.backs is None else np.concatenate([sign, sign[mesh.backs]])
+    atlas = make_atlas(towards, turned(uv, every), size)
     scale = uv_scale(mesh, uv)
-    scene = RayScene(facing.vertices, facing.triangles)
-    return Surface(facing, atlas, scene, uv, 1 / max(scale * size, 1e-12), both_sides, noise)
+    scene = RayScene(towards.vertices, towards.triangles, towards.backs)
+    return Surface(towards, atlas, scene, uv, 1 / max(scale * size, 1e-12), noise)

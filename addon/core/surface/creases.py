@@ -7,6 +7,7 @@ import numpy as np
 from ..capture.model import Mesh
 from .atlas import Atlas
 from .elements import triangle_geometry
+from .two_sides import fronts, other_way
 from .weld import welded
 
 WELD = 1e-5
@@ -25,7 +26,10 @@ DOUBT = 0.3
 def edge_angles(mesh: Mesh) -> np.ndarray:
     """Angle in radians, 0...pi/2, by which the surface bends at each triangle's edges, (t, 3); edge k lies opposite
     corner k. Windings don't matter. Where an edge has no other triangle, pi/2: what goes on there is not known. 0 at a
-    sliver's edges."""
+    sliver's edges. A sheet's second side bends as its first one does."""
+    if mesh.backs is not None:
+        angle = edge_angles(fronts(mesh)[0])
+        return np.concatenate([angle, other_way(angle[mesh.backs])])
     points, faces, _ = welded(mesh, WELD)
     normal, area = triangle_geometry(mesh)
     corners = mesh.vertices[mesh.triangles]

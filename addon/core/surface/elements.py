@@ -114,6 +114,7 @@ def make_atlas(mesh: Mesh, uv: np.ndarray, size: int) -> Atlas:
         object_id=mesh.object_id[triangle],
         area=(area[triangle] / count[triangle]).astype(np.float32),
         padding=_padding(texel, size),
+        back=None if mesh.backs is None else triangle >= len(mesh.triangles) - len(mesh.backs),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..capture.model import Camera, Mesh
 from .rays import RayScene
+from .two_sides import two_sided
 
 PIXEL_STEP = 4
 """Every fourth pixel in x and y votes."""
@@ -26,7 +27,7 @@ class Sides(NamedTuple):
     footprint : float
         Edge in metres of the surface that a pixel covers: the lower quartile over all rays that hit.
     both : (t,) bool
-        Triangles that are seen from either side: they can carry one side's light only.
+        Triangles whose two sides are seen, each alone or as parts of a sheet (`two_sides.two_sided`).
     """
 
     sign: np.ndarray
@@ -70,4 +71,8 @@ def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequenc
     together = np.concatenate(footprints) if footprints else np.zeros(0, np.float32)
     footprint = float(np.percentile(together, 25)) if len(together) else 0.0
     both = sides.min(0) >= np.maximum(LEAST_SHARE * sides.sum(0), LEAST_VOTES)
+    if sides[0].any() and sides[1].any():
+        sheets, turned = two_sided(mesh, sides)
+        sign = np.where(sheets, turned, sign)
+        both |= sheets
     return Sides(sign.astype(np.float32), footprint, both)

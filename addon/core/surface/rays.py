@@ -45,15 +45,24 @@ class RayScene:
     vertices : (v, 3) float
         World, metres.
     triangles : (t, 3) int
+    backs : (s,) int, optional
+        As in `Mesh`: the last s triangles are the second sides of these. A ray meets the side that it comes from.
     """
 
-    def __init__(self, vertices: np.ndarray, triangles: np.ndarray):
+    def __init__(self, vertices: np.ndarray, triangles: np.ndarray, backs: np.ndarray | None = None):
         low, high = vertices.min(0), vertices.max(0)
         self.diagonal = float(np.linalg.norm(high - low))
         # Far from the origin float32 itself is coarser than that: 1 mm at 10 km.
         coarse = float(np.spacing(np.float32(np.abs([low, high]).max())))
         self.offset = max(RELATIVE_OFFSET * self.diagonal, 4 * coarse)
         self.triangle_count = len(triangles)
+        self._back = None
+        if backs is not None and len(backs):
+            triangles = triangles[: len(triangles) - len(backs)]
+            self._back = np.full(len(triangles), -1, np.int32)
+            self._back[backs] = np.arange(len(triangles), self.triangle_count)
+            a, b, c = (vertices[triangles[:, i]] for i in range(3))
+            self._normal = np.cross(b - a, c - a).astype(np.float32)
         self._scene = EmbreeScene()
         self._mesh = TriangleMesh(
             self._scene, np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(triangles, np.int32)
@@ -78,7 +87,18 @@ class RayScene:
             return Hits(np.zeros(0, np.int32), none, none, none)
         found = self._run(origins, directions, output=True)
         triangle = found["primID"]
-        return Hits(triangle, found["u"], found["v"], np.where(triangle < 0, np.float32(np.inf), found["tfar"]))
+        hits = Hits(triangle, found["u"], found["v"], np.where(triangle < 0, np.float32(np.inf), found["tfar"]))
+        return hits if self._back is None else self._by_side(hits, directions)
+
+    def _by_side(self, hits: Hits, directions: np.ndarray) -> Hits:
+        """The hits credited to the side of a sheet that the rays came from."""
+        sheet = np.flatnonzero((hits.triangle >= 0) & (self._back[hits.triangle] >= 0))
+        met = hits.triangle[sheet]
+        at = sheet[np.einsum("ij,ij->i", directions[sheet], self._normal[met]) > 0]
+        triangle, u, v = hits.triangle.copy(), hits.u.copy(), hits.v.copy()
+        triangle[at] = self._back[triangle[at]]
+        u[at], v[at] = hits.v[at], hits.u[at]  # the other winding
+        return Hits(triangle, u, v, hits.distance)
 
     def occluded(self, origins: np.ndarray, directions: np.ndarray, distances: np.ndarray) -> np.ndarray:
         """True where something lies between an origin and `distances` ((n,) float32, metres) along its ray."""
