@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from addon.core.recover import Recovery
 from addon.core.settings import PAPER, Settings
 from addon.core.shading.albedo import MEASURED
 from addon.core.store import Store
-from tests.core.rooms import Room, all_round, box_sides, lit_box, make_room, picture, radiosity
+from tests.core.rooms import Room, all_round, box_sides, lit_box, make_room, picture, quad, radiosity
 
 SIZE = (2.0, 2.0, 2.0)
 TEXEL = 0.2
@@ -66,6 +66,47 @@ def lamp_light(room: Room, albedo=GREY, lamp=(10, 9, 8)) -> np.ndarray:
 def lit_by(room, quads, albedo, emission) -> np.ndarray:
     """Radiance of a room's elements where `quads` are all that gives and reflects light; nonsense on others."""
     return radiosity(replace(room, quads=tuple(quads)), albedo, emission)
+
+
+@dataclass(frozen=True)
+class BetweenRooms:
+    """A bright room, its albedo `near`, and a dim one, `far`; one quad, object 8, is the wall between them at x = 2.
+
+    `shown(camera, index)` is what a camera sees: of the quad, the side that it stands on.
+    """
+
+    room: Room
+    shown: Callable
+    views: list[Camera]
+    near: dict[int, float]
+    far: dict[int, float]
+
+
+def sheet_between_rooms() -> BetweenRooms:
+    """See `BetweenRooms`; the quad has albedo 0.4 towards the bright room and 0.8 towards the dim one."""
+    left = [q for q in lit_box(SIZE, (LAMP,)) if q.object_id != 3]
+    right = [replace(q, corner=q.corner + np.array([2.0, 0, 0]), object_id=q.object_id + 10)
+             for q in lit_box(SIZE, (LAMP,)) if q.object_id != 2]  # fmt: skip
+    sheet = replace(box_sides(SIZE)[3], object_id=8)
+    room = make_room([*left, sheet, *right], TEXEL)
+    near, far = {0: 0.5, 1: 0.7, 2: 0.3, 4: 0.5, 5: 0.6, 8: 0.4}, {10: 0.5, 11: 0.7, 13: 0.3, 14: 0.5, 15: 0.6, 8: 0.8}
+    back = quad((2, 0, 0), (0, 2, 0), (0, 0, 2), 8)
+    bright = lit_by(room, [*left, sheet], near, {6: (10, 10, 10)})
+    dim = lit_by(room, [*right, back], far, {16: (0.5, 0.5, 0.5)})
+    on_sheet = room.atlas.object_id == 8
+    light = np.where((room.atlas.object_id >= 10)[:, None], dim, bright)
+    turned = replace(room.atlas, normal=np.where(on_sheet[:, None], -room.atlas.normal, room.atlas.normal))
+    other = replace(room)
+    other.__dict__["atlas"] = turned
+    behind = lit_by(other, [*right, back], far, {16: (0.5, 0.5, 0.5)})
+    from_right = np.where(on_sheet[:, None], behind, light)
+    eyes = (0.8, 0.9, 0.7), (1.3, 1.1, 1.2), (0.7, 1.3, 1.4)
+    views = cameras([*eyes, *eyes[:2], *[(x + 2, y, z) for x, y, z in eyes]])
+
+    def shown(camera, _):
+        return picture(room, camera, from_right if camera.centre[0] > 2 else light).radiance
+
+    return BetweenRooms(room, shown, views, near, far)
 
 
 class Captured:

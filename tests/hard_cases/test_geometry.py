@@ -22,6 +22,7 @@ from tests.hard_cases.rooms import (
     lamp_light,
     lamp_room,
     lit_by,
+    sheet_between_rooms,
 )
 
 
@@ -136,36 +137,13 @@ def test_wall_of_two_faces_between_two_rooms(capture, expect):
 
 
 def test_sheet_seen_from_both_sides(capture, expect):
-    """One quad between a bright and a dim room, of another colour on either side: each has its own light and colour."""
-    left = [q for q in lit_box(SIZE, (LAMP,)) if q.object_id != 3]
-    right = [replace(q, corner=q.corner + np.array([2.0, 0, 0]), object_id=q.object_id + 10)
-             for q in lit_box(SIZE, (LAMP,)) if q.object_id != 2]  # fmt: skip
-    sheet = replace(box_sides(SIZE)[3], object_id=8)
-    room = make_room([*left, sheet, *right], TEXEL)
-    near, far = {0: 0.5, 1: 0.7, 2: 0.3, 4: 0.5, 5: 0.6, 8: 0.4}, {10: 0.5, 11: 0.7, 13: 0.3, 14: 0.5, 15: 0.6, 8: 0.8}
-    back = quad((2, 0, 0), (0, 2, 0), (0, 0, 2), 8)
-    bright = lit_by(room, [*left, sheet], near, {6: (10, 10, 10)})
-    dim = lit_by(room, [*right, back], far, {16: (0.5, 0.5, 0.5)})
-    on_sheet = room.atlas.object_id == 8
-    light = np.where((room.atlas.object_id >= 10)[:, None], dim, bright)
-    turned = replace(room.atlas, normal=np.where(on_sheet[:, None], -room.atlas.normal, room.atlas.normal))
-    other = replace(room)
-    other.__dict__["atlas"] = turned
-    behind = lit_by(other, [*right, back], far, {16: (0.5, 0.5, 0.5)})
-    from_right = np.where(on_sheet[:, None], behind, light)
-
-    def shown(camera, index):
-        from tests.core.rooms import picture
-
-        return picture(room, camera, from_right if camera.centre[0] > 2 else light).radiance
-
-    eyes = (0.8, 0.9, 0.7), (1.3, 1.1, 1.2), (0.7, 1.3, 1.4)
-    views = cameras([*eyes, *eyes[:2], *[(x + 2, y, z) for x, y, z in eyes]])
-    run = capture(room, shown, views=views).recover()
-    expect("the bright room", run.worst({i: near[i] for i in near if i != 8}), CLOSE)
-    expect("the dim room", run.worst({i: far[i] for i in far if i != 8}), CLOSE)
+    """One quad between a bright and a dim room, of another colour on either side: each side has its own."""
+    case = sheet_between_rooms()
+    run = capture(case.room, case.shown, views=case.views).recover()
+    expect("the bright room", run.worst({i: case.near[i] for i in case.near if i != 8}), CLOSE)
+    expect("the dim room", run.worst({i: case.far[i] for i in case.far if i != 8}), CLOSE)
     own = run.measured(8)
-    for name, x, rho in (("bright", -1, near[8]), ("dim", 1, far[8])):
+    for name, x, rho in (("bright", -1, case.near[8]), ("dim", 1, case.far[8])):
         side = own & (x * run.atlas.normal[:, 0] > 0.9)
         assert side.sum() > 100
         expect(f"the sheet's {name} side", float(np.abs(np.median(run.albedo.rho[side], 0) / rho - 1).max()), CLOSE)
