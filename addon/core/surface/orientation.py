@@ -9,7 +9,7 @@ import numpy as np
 
 from ..capture.model import Camera, Mesh
 from .rays import RayScene
-from .two_sides import two_sided
+from .two_sides import two_sided, worth_it
 
 PIXEL_STEP = 4
 """Every fourth pixel in x and y votes."""
@@ -73,6 +73,6 @@ def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequenc
     both = sides.min(0) >= np.maximum(LEAST_SHARE * sides.sum(0), LEAST_VOTES)
     if sides[0].any() and sides[1].any():
         sheets, turned = two_sided(mesh, sides)
-        sign = np.where(sheets, turned, sign)
-        both |= sheets
+        both = worth_it(mesh, both | sheets)
+        sign = np.where(both & sheets, turned, sign)
     return Sides(sign.astype(np.float32), footprint, both)

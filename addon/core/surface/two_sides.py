@@ -15,10 +15,14 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..capture.model import Mesh
+from .elements import triangle_geometry
 from .weld import point_normals, welded
 
 LEAST_SHARE, LEAST_RAYS = 0.05, 4
 """A sheet is given two sides if this share of the rays that met it, and so many, met the side that is seen less."""
+LEAST_OF_OBJECT, LEAST_OF_ROOM = 0.1, 0.01
+"""Sheets that are less of their object's surface, and of the room's, are left as they are: single leaves of a plant,
+whose two sides are alike, only cost elements, and views that its other elements would be judged by."""
 GAP = 4e-5
 """Between a sheet's two sides where it is rendered, as a share of the room's diagonal: 0.3 mm in a room of 7 m."""
 UPRIGHT = 0.3
@@ -77,6 +81,15 @@ def two_sided(mesh: Mesh, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     seen = np.minimum(front, back) >= np.maximum(LEAST_SHARE * (front + back), LEAST_RAYS)
     both = (seen & bordered & one_surface)[sheet]
     return both, np.where(front >= back, 1, -1)[sheet] * ways.astype(np.float32)
+
+
+def worth_it(mesh: Mesh, both: np.ndarray) -> np.ndarray:
+    """Those of the triangles `both` that are a substantial part of their object or of the room, (t,) bool."""
+    _, area = triangle_geometry(mesh)
+    count = int(mesh.object_id.max()) + 1
+    own, sheets = (np.bincount(mesh.object_id, weight, count) for weight in (area, area * both))
+    large = (sheets >= LEAST_OF_OBJECT * own) | (sheets >= LEAST_OF_ROOM * area.sum())
+    return both & large[mesh.object_id]
 
 
 def with_backs(mesh: Mesh, which: np.ndarray) -> Mesh:

@@ -15,7 +15,7 @@ from addon.core.surface.creases import edge_angles
 from addon.core.surface.elements import make_atlas, triangle_geometry
 from addon.core.surface.orientation import seen_sides
 from addon.core.surface.rays import RayScene
-from addon.core.surface.two_sides import fronts, laid_apart, two_sided, with_backs
+from addon.core.surface.two_sides import fronts, laid_apart, two_sided, with_backs, worth_it
 from tests.core.rooms import DARK, box_sides, look_at, make_room, quad
 
 ROUND = 24
@@ -91,6 +91,17 @@ def test_moebius_strip_has_no_two_sides():
     triangles = np.concatenate([np.stack([low, next_low, next_high], 1), np.stack([low, next_high, high], 1)])
     mesh = Mesh(vertices, triangles.astype(np.int32), np.zeros(len(triangles), np.int32))
     assert not two_sided(mesh, np.full((2, len(triangles)), 50))[0].any()
+
+
+def test_little_of_an_object_and_of_the_room_is_left_as_it_is():
+    """One leaf of a plant; the same leaf as an object of its own; a wall of a scan that is one object."""
+    leaf = quad((0, 0, 0), (0.1, 0, 0), (0, 0.1, 0), 1)
+    others = [quad((i, 0, 1), (0.1, 0, 0), (0, 0.1, 0), 1) for i in range(20)]
+    room = [quad((0, 0, 2), (5, 0, 0), (0, 5, 0), 0), quad((0, 0, 4), (1, 0, 0), (0, 1, 0), 0)]
+    for quads, told in (([leaf, *others, *room], False), ([leaf, *room], True), ([room[1], room[0]], True)):
+        both = np.zeros(2 * len(quads), bool)
+        both[:2] = True
+        np.testing.assert_array_equal(worth_it(make_room(quads).mesh, both), both & told)
 
 
 def test_backs_lie_on_their_fronts_and_face_the_other_way():
