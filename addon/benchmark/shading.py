@@ -68,7 +68,7 @@ def reference(room: LitRoom, element: np.ndarray, options: Options) -> np.ndarra
     def run(part: slice) -> None:
         p, n, own = position[part], normal[part], options.seed + 31 + part.start
         around, _, _ = gather(field, bright, p, n, rays, lamp_rays, own, portals, portal_rays)
-        E[part] = around + direct(field, bright, p, n, rays, lamp_rays, own + 1)
+        E[part] = around + direct(field, bright, p, n, rays, lamp_rays, own + 1)[0]
 
     for_blocks(run, len(element), 16, options.threads)
     return E
@@ -104,7 +104,7 @@ def _aimed(field: LightField, bright, portals, position, normal, rays: int, seed
     lamp_rays = (rays // 8 if portals else rays // 4) if len(bright) else 0
     around = rays - lamp_rays - portal_rays
     E, _, _ = gather(field, bright, position, normal, around, lamp_rays, seed, portals, portal_rays)
-    return E + direct(field, bright, position, normal, around, lamp_rays, seed + 1)
+    return E + direct(field, bright, position, normal, around, lamp_rays, seed + 1)[0]
 
 
 def _alternatives(room: LitRoom, seed: int) -> dict[str, tuple[tuple[int, ...], Callable]]:

@@ -133,7 +133,7 @@ def direct(
     rays: int,
     emitter_rays: int,
     seed: int,
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray]:
     """The bright triangles' part of E by rays aimed at points on them.
 
     Parameters
@@ -145,12 +145,15 @@ def direct(
 
     Returns
     -------
-    (n, 3) float32
+    irradiance : (n, 3) float32
         Radiance * steradian.
+    noise : (n,) float32
+        Its standard error, mean of the channels: how far the first half of the rays is from the second. Each half is
+        well spread by itself, the whole more so; this is rather too much. One place's own says little.
     """
-    total = np.zeros((len(position), 3), np.float32)
+    total, noise = np.zeros((len(position), 3), np.float32), np.zeros(len(position), np.float32)
     if not len(bright) or not emitter_rays:
-        return total
+        return total, noise
     rng = np.random.default_rng(seed)
     # The receivers share a few patterns of points: all that depends on the point alone is looked up once.
     pick = sample_bright(bright, shifted(sobol(emitter_rays, seed, 3), PATTERNS, rng))
@@ -184,7 +187,9 @@ def direct(
         weight = np.zeros(distance.shape, np.float32)
         weight[row, ray] = cosine / np.maximum(share, 1e-20)
         total[part] = np.matmul(weight[:, None], light[pattern])[:, 0]
-    return total
+        weight[:, emitter_rays // 2:] *= -1
+        noise[part] = np.abs(np.matmul(weight[:, None], light[pattern])[:, 0]).mean(1)
+    return total, noise
 
 
 def uniform(

@@ -153,7 +153,7 @@ def _irradiance(field: LightField, element: np.ndarray, seed: int) -> np.ndarray
     def run(part: slice) -> None:
         p, n, own = position[part], normal[part], seed + part.start
         around, _, _ = gather(field, bright, p, n, RAYS, EMITTER_RAYS, own, portals, PORTAL_RAYS)
-        E[part] = around + direct(field, bright, p, n, RAYS, EMITTER_RAYS, own + 1)
+        E[part] = around + direct(field, bright, p, n, RAYS, EMITTER_RAYS, own + 1)[0]
 
     for_blocks(run, len(element), ELEMENTS_AT_ONCE, 0)
     return E

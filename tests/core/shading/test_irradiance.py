@@ -39,7 +39,7 @@ def lamp():
 
 def both(field, bright, normals, position, normal, rays, emitter_rays, seed=0):
     around, _, _ = gather(field, bright, position, normal, rays, emitter_rays, seed)
-    return around + direct(field, bright, position, normal, rays, emitter_rays, seed + 1)
+    return around + direct(field, bright, position, normal, rays, emitter_rays, seed + 1)[0]
 
 
 def test_polygon_formula_is_the_form_factor():

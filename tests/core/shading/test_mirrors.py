@@ -69,7 +69,7 @@ def test_without_the_mirror_nothing_comes(corner):
     _, field = corner
     position, normal = places()
     bright = bright_triangles(field)
-    assert not direct(field, bright, position, normal, 16, 64, 0).any()  # the lamp's back is dark
+    assert not direct(field, bright, position, normal, 16, 64, 0)[0].any()  # the lamp's back is dark
     assert not direct_over_mirrors(field, bright, position, normal, 64, 0).any()
 
 
