@@ -44,7 +44,7 @@ from .surface.build import Surface, build_surface, from_uv
 from .surface.denoise import without_noise
 from .surface.two_sides import laid_apart, with_backs
 
-CODE = 19
+CODE = 21
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -286,10 +286,7 @@ class Recovery:
         return self._stage("shading", load, compute)
 
     def _find_mirrors(self, field: LightField, lamps: tuple[Lamp, ...]) -> tuple[Mirror, ...]:
-        s = self.settings
-        found = find_mirrors(
-            field, lamps, self.lit_diffuse(), self.samples(), self.capture.instances, s.threads, s.seed
-        )
+        found = find_mirrors(field, lamps, self.samples(), self.capture.instances, self.settings.seed)
         told = [known_mirror(mirror, field) for mirror in self._near.mirrors]
         return (*found, *(one for one in told if one.object_id not in {mirror.object_id for mirror in found}))
 

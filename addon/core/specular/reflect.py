@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ..parallel import ordered_map
 from ..progress import Progress
 from ..shading.field import LightField
 from ..shading.lamps import Lamp
+from ..shading.mirrors import Mirror
 from .fit import fit_lobe
 from .glossy_light import Excess, glossy_light
 from .intervals import GlossInterval, gloss_interval
@@ -32,6 +33,8 @@ SCREEN_RAYS = 4
 """The first look is at fewer elements and with so many times fewer rays; it drops what a lobe makes much worse."""
 HOPELESS = 1.15
 """A lobe that raises the cost by this factor in the first look needs no second."""
+UNRESOLVED = 0.17
+"""Roughness up to which the frames show a mirror: a lobe of phi 0.03 is as wide as a few pixels."""
 SEPARATE_ELEMENTS = 2500
 SEPARATE_VIEWS = 9
 SEPARATE_RAYS = 8
@@ -91,16 +94,14 @@ def fit_specular(
     InterruptedRun
         From `progress`.
     """
-    glowing, mirrors = {lamp.object_id: lamp for lamp in lamps}, {mirror.object_id for mirror in field.mirrors}
+    glowing, mirrors = {lamp.object_id: lamp for lamp in lamps}, {mirror.object_id: mirror for mirror in field.mirrors}
     # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
     maker = Problems(field, lit_diffuse, samples, threads=1, seed=seed)
-    wanted = [i.object_id for i in instances if i.object_id not in glowing]
+    wanted = [i.object_id for i in instances if i.object_id not in glowing and i.object_id not in mirrors]
 
     def look(object_id: int) -> tuple[Choice, Problem | None, int]:
-        choice, problem, target, index = _look(
-            maker, object_id, samples, len(frame_names), way, rays, object_id in mirrors
-        )
-        if way == "frames" and choice.fit is not None and object_id not in mirrors:
+        choice, problem, target, index = _look(maker, object_id, samples, len(frame_names), way, rays)
+        if way == "frames" and choice.fit is not None:
             element, direction = samples.element[index], samples.direction[index]
             behind = look_behind(field, lit_diffuse.seen, element, direction, object_id)
             lobe = None if choice.model == LAMBERTIAN else choice.fit
@@ -123,7 +124,6 @@ def fit_specular(
     intervals = ordered_map(lambda i: gloss_interval(choices[i], told.get(i)), wanted, threads)
     sure = dict(zip(wanted, intervals, strict=True))
 
-    flat = {mirror.object_id: tuple(float(x) for x in mirror.f0) for mirror in field.mirrors}
     materials = []
     for i in instances:
         if i.object_id in glowing:
@@ -132,17 +132,13 @@ def fit_specular(
             radiance = given_off(lamp.radiance, np.median(irradiance[own], 0) if own.any() else np.zeros(3))
             materials.append(ObjectMaterial(i.object_id, i.class_name, EMITTER, emission=radiance, note=lamp.note))
             continue
-        target = targets.get(i.object_id, -1)
-        name = frame_names[target] if target >= 0 else None
-        if i.object_id in flat and i.object_id not in problems:  # nothing observed: the capture tells of it
-            materials.append(ObjectMaterial(i.object_id, i.class_name, METAL, phi=0.0, f0=flat[i.object_id],
-                                            note="A flat mirror, as the capture tells."))
+        if i.object_id in mirrors:
+            seen = int((field.atlas.object_id[samples.element] == i.object_id).sum())
+            materials.append(_flat_mirror(i, mirrors[i.object_id], seen))
             continue
-        material = _material(i, choices[i.object_id], problems.get(i.object_id), name, sure[i.object_id])
-        if material.model == METAL and i.object_id in mirrors:
-            material = replace(material, phi=0.0, roughness_low=0.0,
-                               note="A flat mirror; its lobe is narrower than the frames resolve.")
-        materials.append(material)
+        target = targets[i.object_id]
+        name = frame_names[target] if target >= 0 else None
+        materials.append(_material(i, choices[i.object_id], problems.get(i.object_id), name, sure[i.object_id]))
 
     specular = np.zeros((len(field.atlas), 3), np.float32)
     glass = [m for m in materials if m.model == TRANSPARENT and m.surfaces is not None]
@@ -175,7 +171,7 @@ def given_off(radiance: np.ndarray, irradiance: np.ndarray) -> tuple[float, floa
 
 
 def _look(
-    maker: Problems, object_id: int, samples: Samples, frames: int, way: str, rays: int, mirror: bool
+    maker: Problems, object_id: int, samples: Samples, frames: int, way: str, rays: int
 ) -> tuple[Choice, Problem | None, int, np.ndarray]:
     """Model, observations, target frame (-1: none) of one object, and which of the samples the observations are."""
     index = maker.pick(object_id, SCREEN_ELEMENTS, FIT_VIEWS)
@@ -186,20 +182,20 @@ def _look(
         score_frames(samples.frame[index], problem.light.A[:, TARGET_PHI], problem.lit_diffuse, frames)
     )
     if way == "frames":
-        choice, problem, index = _by_frames(maker, object_id, index, problem, rays, mirror)
+        choice, problem, index = _by_frames(maker, object_id, index, problem, rays)
     else:
         choice, problem = _by_target(maker, object_id, samples.frame, target, rays)
     return choice, problem, target, index
 
 
 def _by_frames(
-    maker: Problems, object_id: int, index: np.ndarray, screen: Problem, rays: int, mirror: bool
+    maker: Problems, object_id: int, index: np.ndarray, screen: Problem, rays: int
 ) -> tuple[Choice, Problem, np.ndarray]:
-    """Choose a model; in two looks, as only some objects deserve the second. A `mirror` was looked at before."""
+    """Choose a model; in two looks, as only some objects deserve the second."""
     first = choose_model(screen)
     fit = first.fit
     hopeless = fit is None or fit.cost > HOPELESS * fit.cost_lambertian
-    if hopeless and first.model != METAL or mirror and first.model == METAL:
+    if hopeless and first.model != METAL:
         return first, screen, index
     index = maker.pick(object_id, FIT_ELEMENTS, FIT_VIEWS, seed=1)
     problem = maker.problem(index, rays)
@@ -213,6 +209,15 @@ def _by_target(maker: Problems, object_id: int, frame: np.ndarray, target: int, 
     if len(problem.element) < 3:
         return Choice(LAMBERTIAN, None, note="No frame shows enough of it."), problem
     return Choice(SPECULAR, fit_lobe(problem, "target")), problem
+
+
+def _flat_mirror(instance: Instance, mirror: Mirror, observations: int) -> ObjectMaterial:
+    """The description of a mirror that was found before the shading, or that the capture tells of."""
+    note = "A flat mirror: the frames show the room in it." if observations else "A flat mirror, as the capture tells."
+    return ObjectMaterial(
+        instance.object_id, instance.class_name, METAL, phi=0.0, f0=tuple(float(x) for x in mirror.f0),
+        observations=observations, roughness_low=0.0, roughness_high=UNRESOLVED if observations else 0.0, note=note,
+    )  # fmt: skip
 
 
 def _material(

@@ -1,0 +1,68 @@
+"""Flat mirrors are told by the room that they show, from frames summed up without the code under test."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from addon.core.capture.model import Instance
+from addon.core.shading.lamps import Lamp
+from addon.core.specular.flat_mirrors import find_mirrors
+from addon.core.specular.samples import Samples
+from tests.core.glossy_box import Box
+
+SILVER = np.array([0.9, 0.85, 0.8])
+FLOOR = (Instance(0, "floor"),)
+
+
+@pytest.fixture(scope="module")
+def box():
+    return Box()
+
+
+def frames(box, f0, diffuse=0.0, noise=0.1, tilt=0.0, seed=0):
+    """The floor's samples: the mirrored room times f0 over a diffuse part; the floor truly faces `tilt` off +Z."""
+    element, direction, frame = box.views(120, 10)
+    normal = np.array([np.sin(tilt), 0, np.cos(tilt)])
+    w = direction.astype(float)
+    along = 2 * (w @ normal)[:, None] * normal - w
+    origin = box.room.atlas.position[element].astype(float) + [0, 0, 1e-6]
+    seen = f0 * box.arriving(origin, along) + diffuse
+    seen = seen * np.exp(np.random.default_rng(seed).normal(0, noise, seen.shape))
+    return Samples(element.astype(np.int32), frame.astype(np.int32), np.float32(seen), direction,
+                   np.zeros(len(element), bool))
+
+
+def test_a_mirror(box):
+    (mirror,) = find_mirrors(box.field, (), frames(box, SILVER), FLOOR)
+    assert mirror.object_id == 0 and abs(mirror.point[2]) < 1e-5
+    np.testing.assert_allclose(mirror.f0, SILVER, rtol=0.05)
+    assert np.degrees(np.arccos(min(mirror.normal[2], 1))) < 0.2
+
+
+def test_the_plane_of_a_scan_is_put_right(box):
+    """The mesh is off by half a degree: what is mirrored says how the mirror hangs."""
+    (mirror,) = find_mirrors(box.field, (), frames(box, SILVER, tilt=np.radians(0.5)), FLOOR)
+    assert np.degrees(np.arcsin(mirror.normal[0])) == pytest.approx(0.5, abs=0.2)
+    assert abs(np.degrees(np.arcsin(mirror.normal[1]))) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("f0", "diffuse"),
+    [(0.0, 0.5), (0.04, 0.3), (0.06, 0.0)],  # matt; lacquer; a black pane
+)
+def test_what_is_no_mirror(box, f0, diffuse):
+    assert find_mirrors(box.field, (), frames(box, f0, diffuse), FLOOR) == ()
+
+
+def test_too_little_to_tell(box):
+    samples = frames(box, SILVER)
+    few = Samples(*(getattr(samples, name)[:90] for name in ("element", "frame", "radiance", "direction", "saturated")))
+    assert find_mirrors(box.field, (), few, FLOOR) == ()
+    assert find_mirrors(box.field, (), replace(samples, saturated=np.ones(len(samples.element), bool)), FLOOR) == ()
+
+
+def test_a_lamp_is_no_mirror(box):
+    assert find_mirrors(box.field, (Lamp(0, np.ones(3), True),), frames(box, SILVER), FLOOR) == ()
