@@ -17,6 +17,9 @@ from .over_mirrors import direct_over_mirrors
 from .portals import Portals
 
 RAYS_AT_ONCE = 1 << 16
+BOTH_HALVES = 0.75
+"""Two halves of well-spread rays are better together than two that know nothing of each other (living room: the
+halves' difference is 1.35 times the scatter over seeds)."""
 
 
 def gather(
@@ -148,8 +151,8 @@ def direct(
     irradiance : (n, 3) float32
         Radiance * steradian.
     noise : (n,) float32
-        Its standard error, mean of the channels: how far the first half of the rays is from the second. Each half is
-        well spread by itself, the whole more so; this is rather too much. One place's own says little.
+        Its standard error, mean of the channels: how far the first half of the rays is from the second, less
+        `BOTH_HALVES`. One place's own says little.
     """
     total, noise = np.zeros((len(position), 3), np.float32), np.zeros(len(position), np.float32)
     if not len(bright) or not emitter_rays:
@@ -188,7 +191,7 @@ def direct(
         weight[row, ray] = cosine / np.maximum(share, 1e-20)
         total[part] = np.matmul(weight[:, None], light[pattern])[:, 0]
         weight[:, emitter_rays // 2:] *= -1
-        noise[part] = np.abs(np.matmul(weight[:, None], light[pattern])[:, 0]).mean(1)
+        noise[part] = BOTH_HALVES * np.abs(np.matmul(weight[:, None], light[pattern])[:, 0]).mean(1)
     return total, noise
 
 
