@@ -156,7 +156,7 @@ def test_light_of_either_side_goes_its_own_way():
     bright = bright_triangles(field)
     for emitter_rays in (0, 64):
         total, _, _ = gather(field, bright, place, normal, 256, emitter_rays, 1)
-        total += direct(field, bright, place, normal, 256, emitter_rays, 2)
+        total += direct(field, bright, place, normal, 256, emitter_rays, 2)[0]
         # From its middle the tube covers all but the caps: 1 - 2 pi / 4 (1 - cos 45 deg) of the half sphere or so.
         assert 0.6 * 3 * np.pi < total[0].mean() < 3 * np.pi
         assert total[1:].max() < 1e-6
