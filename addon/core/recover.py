@@ -35,6 +35,7 @@ from .shading.lamps import Lamp
 from .shading.mirrors import Mirror, known_mirror
 from .shading.neighbourhood import doubt
 from .shading.shade import Shading, shade
+from .shading.sun import Sun, put_in
 from .specular.compensation import base_colors
 from .specular.flat_mirrors import find_mirrors
 from .specular.reflect import Specular, fit_specular
@@ -44,7 +45,7 @@ from .surface.build import Surface, build_surface, from_uv
 from .surface.denoise import without_noise
 from .surface.two_sides import laid_apart, with_backs
 
-CODE = 24
+CODE = 25
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -259,7 +260,9 @@ class Recovery:
             arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "doubt", "radiance")}
             arrays |= {"rho": found.albedo.rho, "origin": found.albedo.origin, "error": found.albedo.error}
             arrays |= {"sky": found.environment.radiance, "sky_seen": found.environment.observations}
+            sun = found.sun and {k: np.asarray(v).tolist() for k, v in dataclasses.asdict(found.sun).items()}
             meta = {
+                "sun": sun,
                 "above_one": found.albedo.above_one,
                 "points": found.points,
                 "mirrors": [
@@ -281,6 +284,7 @@ class Recovery:
                 a["irradiance"], a["escaped"], a["doubt"], a["radiance"],
                 Albedo(a["rho"], a["origin"], meta["above_one"], a["error"]),
                 lamps, Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
+                meta["sun"] and Sun(**{k: np.float32(v) if isinstance(v, list) else v for k, v in meta["sun"].items()}),
             )  # fmt: skip
 
         return self._stage("shading", load, compute)
@@ -296,7 +300,7 @@ class Recovery:
         surface, shading = self.surface(), self.shading()
         lamps = [lamp.object_id for lamp in shading.lamps]
         room = LightField(surface.mesh, surface.atlas, surface.scene, shading.radiance, shading.environment, lamps)
-        return room.with_mirrors(shading.mirrors)
+        return room.with_mirrors(shading.mirrors).with_sun(shading.sun)
 
     def specular(self) -> Specular:
         """phi, psi and the model of every object."""
@@ -378,7 +382,7 @@ class Recovery:
         for done, (name, values) in enumerate(images.items()):
             self.store.write_exr(f"{name}.exr", atlas.image(values)[::-1])
             self.progress.update(0.5 * done / len(images))
-        self.store.write_exr("environment.exr", shading.environment.radiance[::-1])
+        self.store.write_exr("environment.exr", put_in(shading.environment, shading.sun)[::-1])
         known = {one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects}
         objects = [dataclasses.asdict(m) | known.get(m.object_id, {}) for m in self.materials()]
         self.store.write_json("materials.json", {"objects": objects})

@@ -104,6 +104,10 @@ def _report_shading(run: Recovery, figures: dict[str, Any], warnings: list[str])
         "lamps": [lamp.object_id for lamp in shading.lamps],
         "mirrors": [mirror.object_id for mirror in shading.mirrors],
     }
+    if shading.sun is not None:
+        sun = shading.sun
+        figures["sun"] = {"direction": [float(x) for x in sun.direction], "seen": sun.seen,
+                          "irradiance": [float(x) for x in sun.irradiance]}  # fmt: skip
     warnings += [f"Lamp {lamp.object_id}: {lamp.note}" for lamp in shading.lamps if lamp.note]
     warnings += shading.notes
     if shading.albedo.above_one > 0.05:

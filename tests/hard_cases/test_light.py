@@ -6,10 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
+from addon.core.capture.read import read_capture
 from addon.core.material import EMITTER
+from addon.core.progress import Progress
+from addon.core.recover import Recovery
 from addon.core.shading.albedo import MEASURED
-from tests.core.rooms import all_round, box_sides, lit_box, look_at, make_room, polygon_irradiance, quad
+from addon.core.store import Store
+from tests.core import sunny
+from tests.core.rooms import all_round, box_sides, lit_box, look_at, make_room, picture, polygon_irradiance, quad
 from tests.hard_cases.rooms import (
     CLOSE,
     DEFAULT,
@@ -239,3 +245,84 @@ def test_lamp_that_no_frame_sees(capture, expect, level):
     assert lamp.model == EMITTER and "solved" in lamp.note
     expect("its radiance", float(np.abs(np.array(lamp.emission) / (10 * level) - 1).max()), 0.1)
     expect("the walls", run.worst(GREY), NOISY)
+
+
+SUNNY = replace(QUICK, texel_size=0.05)
+OUT_OF_THE_SUN = (1.9, 0.5, 0.4), (1.7, 1.7, 0.5), (0.4, 0.4, 1.4), (0.5, 1.6, 1.5)
+IN_THE_SUN = (1.5, 0.9, 0.3), (1.3, 1.1, 0.5)
+
+
+def sunny_views(eyes, width: int = 56) -> list:
+    return [camera for eye in eyes for camera in all_round(eye, width)]
+
+
+def off_in_patch(run, radius: float = sunny.RADIUS) -> float:
+    """Relative error of the floor's albedo where the sun falls on it, the worst channel."""
+    own = (sunny.sun_on(run.room, radius=radius) > 0.95 * sunny.TOWARDS[2]) & (run.room.atlas.object_id == 0)
+    position = run.room.atlas.position[own]
+    _, element = cKDTree(run.atlas.position[run.of(0)]).query(position)
+    rho = run.albedo.rho[np.flatnonzero(run.of(0))[element]]
+    return float(np.abs(np.median(rho, 0) / np.float32(sunny.ALBEDO[0]) - 1).max())
+
+
+def degrees_off(direction) -> float:
+    return float(np.degrees(np.arccos(np.clip(np.dot(direction, sunny.TOWARDS), -1, 1))))
+
+
+def test_sun_that_no_frame_sees(capture, expect):
+    """A patch of sun on the floor; the frames see the sky through the window, but never where the sun stands."""
+    room, window = sunny.sunny_room(), sunny.sides()[1]
+    eyes = np.array(OUT_OF_THE_SUN)
+    assert not sunny.in_sun(eyes, np.broadcast_to(sunny.TOWARDS, eyes.shape), sunny.TOWARDS, window).any()
+    taken = capture(room, sunny.light(room), views=sunny_views(eyes), outside=sunny.SKY)
+    run = taken.recover(SUNNY)
+    run.room = room
+    sun = run.shading.sun
+    assert sun is not None and not sun.seen and "A sun that no frame sees was solved" in run.text
+    expect("direction of the sun, degrees", degrees_off(sun.direction), 0.5)
+    expect("its irradiance", float(np.abs(sun.irradiance / sunny.SUN - 1).max()), 0.2)
+    expect("albedo of floor and walls", run.worst(sunny.ALBEDO), 0.1)
+    expect("albedo of the floor in the sun", off_in_patch(run), 0.15)
+    with Store(run.folder) as store:
+        again = Recovery(read_capture(taken.root), store, SUNNY, Progress(), taken.unwrap)
+        kept = again.shading().sun
+        assert again.log["shading"]["stored"]
+    assert (kept.direction == sun.direction).all() and (kept.irradiance == sun.irradiance).all()
+    assert (kept.radius, kept.seen, kept.note) == (sun.radius, sun.seen, sun.note)
+    assert run.report["figures"]["sun"]["seen"] is False
+
+
+def test_sun_that_the_frames_see(capture, expect):
+    """The same patch; a sun of 2 degrees' radius is in the pictures, unclipped."""
+    room, radius = sunny.sunny_room(), np.radians(2)
+
+    def shown(camera, index):
+        image = picture(room, camera, light, sunny.SKY).radiance
+        directions = camera.directions(camera.pixel_centres())
+        hits = room.scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
+        disc = (hits.triangle < 0) & (directions @ sunny.TOWARDS > np.cos(radius))
+        image.reshape(-1, 3)[disc] += np.float32(sunny.SUN / (np.pi * radius**2))
+        return image
+
+    light = sunny.light(room, radius=radius)
+    run = capture(room, shown, views=sunny_views((*OUT_OF_THE_SUN, *IN_THE_SUN), 112)).recover(SUNNY)
+    run.room = room
+    sun = run.shading.sun
+    assert sun is not None and sun.seen and "The frames see the sun" in run.text
+    expect("direction of the sun, degrees; the map's texels have 1.4", degrees_off(sun.direction), 0.7)
+    expect("its irradiance", float(np.abs(sun.irradiance / sunny.SUN - 1).max()), 0.2)
+    expect("albedo of floor and walls", run.worst(sunny.ALBEDO), 0.1)
+    expect("albedo of the floor in the sun", off_in_patch(run, radius), 0.15)
+
+
+def test_bright_paper_is_no_sun(capture, expect):
+    """A white sheet on a dark floor, in reach of the window, under the sky alone."""
+    room = sunny.sunny_room()
+    albedo = sunny.ALBEDO | {0: 0.06}
+    light = sunny.light(room, albedo, sun=np.zeros(3))
+    at = room.atlas.position
+    sheet = (room.atlas.object_id == 0) & ((at[:, :2] > (0.6, 0.5)) & (at[:, :2] < (1.3, 1.3))).all(1)
+    light[sheet] *= 0.85 / 0.06
+    run = capture(room, light, views=sunny_views(OUT_OF_THE_SUN), outside=sunny.SKY).recover(SUNNY)
+    expect("no sun is made up", float(run.shading.sun is not None), 0)
+    expect("albedo of the walls", run.worst({i: albedo[i] for i in (1, 2, 3, 4, 5)}), 0.1)

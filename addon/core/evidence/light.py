@@ -6,7 +6,7 @@ how much further they differ from E is the error of E, be it its rays' or its in
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..shading.field import LightField
 from ..shading.over_surface import irradiance
 from ..shading.shade import Shading
 from ..surface.atlas import Atlas
-from .calibration import CLIPPED_UNSURE, LAMP_UNSURE, ROUGH_LIGHT, SKY_UNSURE
+from .calibration import CLIPPED_UNSURE, LAMP_UNSURE, ROUGH_LIGHT, SKY_UNSURE, SUN_UNSURE
 
 SPOTS = 4000
 RAYS = {"rays": 128, "emitter_rays": 32, "portal_rays": 32}
@@ -101,7 +101,12 @@ def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, doubt: np
     kinds = [luminance * (surface | solved), luminance * surface * off, luminance * solved * LAMP_UNSURE]
     sky = (shading.environment.radiance @ LUMINANCE) * (shading.environment.observations == 0)
     sky = np.stack([sky, np.zeros_like(sky), SKY_UNSURE * sky], -1).astype(np.float32)
-    return field.with_light(np.stack(kinds, 1), Environment(sky, shading.environment.observations))
+    sun = None
+    if shading.sun is not None and not shading.sun.seen:
+        level = float(shading.sun.irradiance @ LUMINANCE)
+        sun = replace(shading.sun, irradiance=np.float32([level, 0, SUN_UNSURE * level]))
+    room = field.with_light(np.stack(kinds, 1), Environment(sky, shading.environment.observations))
+    return room.with_sun(sun)
 
 
 def light_evidence(
@@ -126,7 +131,7 @@ def light_evidence(
 
     hidden = unsure_light(field, shading, lit, doubt)
     shares = np.zeros((len(chosen), 3), np.float32)
-    if hidden.radiance.any() or hidden.environment.radiance.any():
+    if hidden.radiance.any() or hidden.environment.radiance.any() or hidden.sun is not None:
         part = irradiance(hidden, chosen, **SHARE_RAYS, **how, seed=seed + 7)[0]
         shares = np.clip(part / np.maximum(shading.irradiance[chosen] @ LUMINANCE, 1e-20)[:, None], 0, 1)
     return LightEvidence(

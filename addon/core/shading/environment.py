@@ -86,6 +86,15 @@ class Environment:
         """Radiance from unit `directions` ((n, 3) float32, away from the room): (n, 3) float32."""
         return self.radiance.reshape(-1, 3)[_bin(directions, self.radiance.shape[0])]
 
+    def refilled(self, radiance: np.ndarray) -> Environment:
+        """The map with another `radiance` where frames saw it; the rest is filled in from that."""
+        return Environment(_fill(radiance, self.observations), self.observations, self.clipped)
+
+    def known(self, directions: np.ndarray) -> np.ndarray:
+        """Whether frames tell the radiance from unit `directions` ((n, 3)): seen, and not clipped; (n,) bool."""
+        cell = _bin(directions, self.radiance.shape[0])
+        return ((self.observations > 0) & ~self.clipped).ravel()[cell]
+
 
 def _bin(directions: np.ndarray, height: int) -> np.ndarray:
     """Flat index of the map's cell that each direction falls in."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from ..surface.elements import ElementLookup, triangle_geometry
 from ..surface.rays import Hits, RayScene
 from .environment import Environment
 from .mirrors import Mirror
+
+if TYPE_CHECKING:
+    from .sun import Sun
 
 FLAT = np.cos(np.radians(2.0))
 """Triangles turned less than this against a mirror's plane belong to it."""
@@ -44,6 +48,7 @@ class LightField:
         self.normal, _ = triangle_geometry(mesh)
         self._say_lamps(lamps)
         self.mirrors: tuple[Mirror, ...] = ()
+        self.sun: Sun | None = None
         self.mirror_of = np.full(len(mesh.triangles), -1, np.int8)
         self.lookup = ElementLookup(mesh, atlas)
 
@@ -74,6 +79,12 @@ class LightField:
         for i, mirror in enumerate(mirrors):
             flat = np.abs(self.normal @ mirror.normal) > FLAT
             other.mirror_of[flat & (self.mesh.object_id == mirror.object_id)] = i
+        return other
+
+    def with_sun(self, sun: Sun | None) -> LightField:
+        """The same room with a sun, or without one. Rays don't meet it: its part of E is `sun.sunlight`."""
+        other = self.with_light(self.radiance)
+        other.sun = sun
         return other
 
     def elements(self, hits: Hits) -> np.ndarray:

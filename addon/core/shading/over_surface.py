@@ -12,6 +12,7 @@ from .field import LightField
 from .interpolate import interpolated
 from .irradiance import direct, gather, uniform
 from .portals import find_portals
+from .sun import sunlight
 from .texel_blocks import TexelBlocks
 
 ELEMENTS_AT_ONCE = 1 << 13
@@ -72,7 +73,7 @@ def irradiance(
     points : int
         How many places were gathered at.
     doubt : (m,) float32
-        Relative error of E by interpolation and by the aimed rays' noise.
+        Relative error of E by interpolation, by the aimed rays' noise and at the edges of the sun's light.
     """
     atlas = field.atlas
     position, normal = atlas.position[element], atlas.normal[element]
@@ -133,6 +134,17 @@ def irradiance(
         aiming.next()
         return found
 
+    def shine(index: np.ndarray) -> np.ndarray:
+        """The sun's part of E and its error, (k, 4) float32."""
+        found, edge = np.empty((len(index), 4), np.float32), _texel_edge(atlas)
+
+        def run(part: slice) -> None:
+            at = index[part]
+            found[part] = sunlight(field.scene, field.sun, position[at], normal[at], edge, seed + 2 + part.start)
+
+        for_blocks(run, len(index), ELEMENTS_AT_ONCE, threads)
+        return found
+
     value = blocks.evaluate(around, step, np.inf)
     total, escaped, contrast = value[:, :3].copy(), value[:, 3].copy(), value[:, 4]
     noise = np.zeros(len(total), np.float32)
@@ -140,8 +152,12 @@ def irradiance(
         lamps = blocks.evaluate(aim, step, SMOOTH, total.mean(1))
         total += lamps[:, :3]
         noise = _evened(position, lamps[:, 3])
-    level = np.maximum(total.mean(1), 1e-20)
-    return total, escaped, points, np.hypot(contrast * value[:, :3].mean(1), noise) / level
+    unsure = np.hypot(contrast * value[:, :3].mean(1), noise)
+    if field.sun is not None:
+        shone = blocks.evaluate(shine, step, SMOOTH, total.mean(1))
+        total += shone[:, :3]
+        unsure = np.hypot(unsure, shone[:, 3])
+    return total, escaped, points, unsure / np.maximum(total.mean(1), 1e-20)
 
 
 def _evened(position: np.ndarray, noise: np.ndarray) -> np.ndarray:

@@ -23,7 +23,8 @@ from .lamps import Lamp
 from .mirrors import Mirror
 from .neighbourhood import doubt
 from .over_surface import finest_spacing, irradiance
-from .unseen_light import find_light
+from .sun import Sun, taken_out
+from .sunlit import find_all_light
 
 
 @dataclass(frozen=True)
@@ -43,13 +44,15 @@ class Shading:
     albedo : Albedo
     lamps : tuple of Lamp
     environment : Environment
-        With the unseen sky solved for where it could be.
+        With the unseen sky solved for where it could be, without the sun.
     notes : tuple of str
         What was solved for, one sentence each.
     mirrors : tuple of Mirror
         Flat mirrors that light was followed over.
     points : int
         Places at which the hemisphere was gathered.
+    sun : Sun or None
+        Its part is in `irradiance`.
     """
 
     irradiance: np.ndarray
@@ -62,6 +65,7 @@ class Shading:
     notes: tuple[str, ...]
     mirrors: tuple[Mirror, ...]
     points: int
+    sun: Sun | None = None
 
 
 def fill_unseen(radiance: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -115,12 +119,15 @@ def shade(
     how = {"sampler": sampler, "threads": threads, "seed": seed}
 
     # 1. All light. What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
-    field = LightField(mesh, atlas, scene, fill_unseen(lit_diffuse.radiance, seen), environment)
+    environment, sun = taken_out(environment)
+    field = LightField(mesh, atlas, scene, fill_unseen(lit_diffuse.radiance, seen), environment).with_sun(sun)
     good = seen & (((lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= ENOUGH)) | (lit_diffuse.tier == SATURATED))
     unseen = [object_id for object_id, share in seen_share.items() if share == 0]
     single, sheet = fronts(mesh)
     tilted = tilt(single, noise)[sheet[atlas.triangle]]
-    light = find_light(field, good if good.any() else seen, unseen, instances, seed, tilted, colours)
+    light, sun = find_all_light(field, good if good.any() else seen, unseen, instances, seed, tilted, colours)
+    field = field.with_sun(sun)
+    notes = light.notes if sun is None else (*light.notes, sun.note)
     lamps = light.lamps
     radiance = field.radiance.copy()
     for lamp in lamps:
@@ -165,4 +172,6 @@ def shade(
         unsure = np.hypot(unsure, crease_doubt(mesh, atlas, float(np.sqrt(np.median(atlas.area)))))
     rho, valid = quotient(lit_diffuse.radiance, E)
     albedo = fill(atlas, rho, valid & seen, class_of, emitters, np.hypot(doubt(lit_diffuse), unsure))
-    return Shading(E, escaped, unsure, field.radiance, albedo, lamps, light.environment, light.notes, mirrors, points)
+    return Shading(
+        E, escaped, unsure, field.radiance, albedo, lamps, light.environment, notes, mirrors, points, sun
+    )

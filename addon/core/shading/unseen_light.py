@@ -21,6 +21,7 @@ from .lamps import AGREES, EMITTER_ALBEDO, Lamp, find_seen, twin
 from .light_fit import Sample, on_flat
 from .portals import find_portals
 from .refine_light import Sky, all_light, refined, shared_by_class
+from .sun import sunlight
 
 SAMPLES = 4000
 """Elements that the test looks at, spread evenly over the objects. Noise in E or G draws the solved radiance to 0: few
@@ -44,6 +45,31 @@ ELEMENTS_AT_ONCE = 1 << 10
 
 
 @dataclass(frozen=True)
+class Thrown:
+    """E at the sample, without any sun, as it took its rays to find: what a second solution needs no rays for.
+
+    Attributes
+    ----------
+    received : (m, 3) float64
+        From what the frames saw.
+    sky : list of (m,) float64
+        From each part of the sky at radiance 1.
+    element : (k,) int
+        Those of the sample that tell of lamps.
+    lamps : dict of (k,) float64
+        E there from each unseen object at radiance 1.
+    least : dict of float
+        Luminance below which each would be no lamp.
+    """
+
+    received: np.ndarray
+    sky: list[np.ndarray]
+    element: np.ndarray
+    lamps: dict[int, np.ndarray]
+    least: dict[int, float]
+
+
+@dataclass(frozen=True)
 class Light:
     """All light of the room, as far as it can be known.
 
@@ -54,11 +80,19 @@ class Light:
         With the unseen parts of the sky solved for where they could be.
     notes : tuple of str
         What was solved, one sentence each.
+    element : (m,) int
+        Those that it was solved at.
+    received : (m, 3) float64
+        E there by all of this light.
+    thrown : Thrown, optional
     """
 
     lamps: tuple[Lamp, ...]
     environment: Environment
     notes: tuple[str, ...]
+    element: np.ndarray
+    received: np.ndarray
+    thrown: Thrown | None = None
 
 
 def _pick(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:
@@ -110,10 +144,11 @@ def _with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[
     if field.environment.seen:
         return field, ()
     everywhere = Environment.only(np.ones((1, 2), np.float32))
-    thrown = _irradiance(field.with_light(np.zeros_like(field.radiance), everywhere), element, seed)[:, 0]
+    dark = field.with_sun(None).with_light(np.zeros_like(field.radiance), everywhere)
+    thrown = irradiance_at(dark, element, seed)[:, 0]
     if thrown.mean() < MIN_OPEN * np.pi:
         return field, ()
-    received = _irradiance(field.with_light(_evened(field)), element, seed)
+    received = irradiance_at(field.with_light(_evened(field)), element, seed)
     object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
     left = np.ones(len(element), bool)
     for _ in range(SWEEPS):
@@ -144,8 +179,8 @@ def _with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[
     return field.with_light(field.radiance, sky), (note,)
 
 
-def _irradiance(field: LightField, element: np.ndarray, seed: int) -> np.ndarray:
-    """E of a few elements by both estimators, (m, 3) float64."""
+def irradiance_at(field: LightField, element: np.ndarray, seed: int) -> np.ndarray:
+    """E of a few elements by both estimators, and from the sun, (m, 3) float64."""
     bright, portals = bright_triangles(field), find_portals(field, seed)
     position, normal = field.atlas.position[element], field.atlas.normal[element]
     E = np.empty((len(element), 3))
@@ -156,20 +191,27 @@ def _irradiance(field: LightField, element: np.ndarray, seed: int) -> np.ndarray
         E[part] = around + direct(field, bright, p, n, RAYS, EMITTER_RAYS, own + 1)[0]
 
     for_blocks(run, len(element), ELEMENTS_AT_ONCE, 0)
-    return E
+    return E if field.sun is None else E + from_sun(field, element)
+
+
+def from_sun(field: LightField, element: np.ndarray) -> np.ndarray:
+    """The sun's part of E, (m, 3) float32."""
+    atlas = field.atlas
+    edge = float(np.sqrt(np.median(atlas.area)))
+    return sunlight(field.scene, field.sun, atlas.position[element], atlas.normal[element], edge)[:, :3]
 
 
 def _thrown_by_object(field: LightField, element: np.ndarray, object_id: int, seed: int) -> np.ndarray:
     """E from one object at radiance 1 and nothing else, (m,) float64."""
     alone = np.repeat((field.atlas.object_id == object_id)[:, None], 3, 1).astype(np.float32)
-    lit = field.with_light(alone, Environment.dark(), [object_id])
-    return _irradiance(lit, element, seed)[:, 0]
+    lit = field.with_sun(None).with_light(alone, Environment.dark(), [object_id])
+    return irradiance_at(lit, element, seed)[:, 0]
 
 
 def _most_reflected(field: LightField, object_id: int, seed: int) -> float:
     """Luminance that an object would send out at an albedo of `EMITTER_ALBEDO`, in the median over its elements."""
     own = _pick(field, field.atlas.object_id == object_id, seed)[:500]
-    return EMITTER_ALBEDO / np.pi * float(np.median(_irradiance(field, own, seed) @ LUMINANCE))
+    return EMITTER_ALBEDO / np.pi * float(np.median(irradiance_at(field, own, seed) @ LUMINANCE))
 
 
 def find_light(
@@ -180,6 +222,7 @@ def find_light(
     seed: int = 0,
     tilted: np.ndarray | None = None,
     colours: dict[int, np.ndarray] | None = None,
+    before: Light | None = None,
 ) -> Light:
     """Lamps seen and unseen, and the sky.
 
@@ -195,13 +238,16 @@ def find_light(
         Radians, how far the mesh's noise may have turned each element: E of those turned much tells little.
     colours : dict of (3,) float, optional
         Colour of light that is known of unseen objects, of luminance 1.
+    before : Light, optional
+        What was found in the same room without its sun.
     """
     flat = on_flat(field.atlas)
     if tilted is not None:
         flat &= tilted < MOST_TILTED
     element = _pick(field, _steady(field, good, flat) | _barely_seen(field, good), seed)
     if not len(element):
-        return Light((), field.environment, ())
+        return Light((), field.environment, (), element, np.zeros((0, 3)))
+    old = before.thrown if before is not None and field.environment.seen else None
     field, found = _with_whole_sky(field, element, seed)
     environment, atlas = field.environment, field.atlas
     zones = environment.unseen_zones() if environment.seen else []
@@ -210,11 +256,14 @@ def find_light(
     known = environment
     for zone in zones:
         known = known.with_zone(zone, np.zeros(3, np.float32))
-    received = _irradiance(field.with_light(_evened(field), known), element, seed)
-    dark = np.zeros_like(field.radiance)
-    thrown_sky = [
-        _irradiance(field.with_light(dark, Environment.only(zone)), element, seed)[:, 0] for zone in zones
+    dark, unlit = np.zeros_like(field.radiance), field.with_sun(None)
+    received = old.received if old else irradiance_at(unlit.with_light(_evened(field), known), element, seed)
+    thrown_sky = old.sky if old else [
+        irradiance_at(unlit.with_light(dark, Environment.only(zone)), element, seed)[:, 0] for zone in zones
     ]
+    sunless = received
+    if field.sun is not None:
+        received = received + from_sun(field, element)
     guess = [environment.zone_mean(zone).astype(np.float64) for zone in zones]
     filled = received + sum(G[:, None] * s for G, s in zip(thrown_sky, guess, strict=True))
     seen = find_seen(atlas.object_id[element], field.radiance[element], filled)
@@ -222,14 +271,16 @@ def find_light(
     if (lit & flat[element]).sum() >= ENOUGH:
         lit &= flat[element]
     if lit.sum() < LEAST:
-        return Light(tuple(seen), environment, found)
+        return Light(tuple(seen), environment, found, element, filled)
     sent = field.radiance[element[lit]].astype(np.float64)
     sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit])
-    thrown = {i: _thrown_by_object(field, sample.element, i, seed) for i in unseen_objects}
-
-    # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
-    lit_room = field.with_light(field.radiance, environment)
-    least = {i: _most_reflected(lit_room, i, seed) for i in unseen_objects}
+    if old and np.array_equal(old.element, sample.element):
+        thrown, least = old.lamps, old.least
+    else:
+        thrown = {i: _thrown_by_object(field, sample.element, i, seed) for i in unseen_objects}
+        # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
+        lit_room = field.with_light(field.radiance, environment)
+        least = {i: _most_reflected(lit_room, i, seed) for i in unseen_objects}
 
     sky = Sky([G[lit] for G in thrown_sky], guess, bool(environment.clipped.any()))
     lamps: list[Lamp] = []
@@ -243,14 +294,15 @@ def find_light(
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))
     # With all light known, what looked like a lamp for want of it does so no more.
-    everything = _irradiance(
-        field.with_light(_lit_by(field, lamps), environment, [lamp.object_id for lamp in lamps]), element, seed
+    everything = irradiance_at(
+        field.with_light(lit_by(field, lamps), environment, [lamp.object_id for lamp in lamps]), element, seed
     )
     sure = find_seen(atlas.object_id[element], field.radiance[element], everything)
-    return Light(tuple(sure) + tuple(lamps), environment, found + tuple(sky.notes()))
+    kept = Thrown(sunless, thrown_sky, sample.element, thrown, least)
+    return Light(tuple(sure) + tuple(lamps), environment, found + tuple(sky.notes()), element, everything, kept)
 
 
-def _lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
+def lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
     """L_d with the radiance of lamps put in, (n, 3) float32."""
     radiance = field.radiance.copy()
     for lamp in lamps:

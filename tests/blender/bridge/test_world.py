@@ -6,6 +6,8 @@ import pytest
 from addon.core.capture.exr import write_exr
 from addon.core.capture.model import Camera, Frame
 from addon.core.errors import BadInputError
+from addon.core.shading.environment import Environment
+from addon.core.shading.sun import Sun, put_in
 
 bpy = pytest.importorskip("bpy")
 
@@ -60,3 +62,34 @@ def test_a_missing_file_is_told(scene, tmp_path):
     with pytest.raises(BadInputError, match="environment.exr can't be opened"):
         set_world(scene, tmp_path / "environment.exr")
     assert scene.world is None
+
+
+@pytest.mark.parametrize("rows", [64, 512])
+def test_a_sun_lights_a_plane_and_throws_its_shadow(scene, shoot, look, tmp_path, rows):
+    """A white floor under the written sun and a dim sky: E / pi in the light, the sky alone under a board."""
+    direction = np.array([0.48, -0.3, 0.7]) / np.linalg.norm([0.48, -0.3, 0.7])
+    sun = Sun(np.float32(direction), np.float32([12, 9, 6]))
+    sky = Environment(np.full((rows, 2 * rows, 3), 0.1, np.float32), np.ones((rows, 2 * rows), np.int32))
+    write_exr(tmp_path / "environment.exr", put_in(sky, sun)[::-1])
+    set_world(scene, tmp_path / "environment.exr")
+    material = bpy.data.materials.new("white")
+    if material.node_tree is None:
+        material.use_nodes = True
+    nodes = material.node_tree.nodes
+    nodes.clear()
+    white, output = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeOutputMaterial")
+    white.inputs["Color"].default_value = (1, 1, 1, 1)
+    material.node_tree.links.new(white.outputs[0], output.inputs["Surface"])
+    board = 1.5 * direction
+    for name, middle, half in (("floor", (0, 0, 0), 1.0), ("board", board, 0.1)):
+        corners = [np.add(middle, (half * x, half * y, 0)).tolist() for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        mesh = bpy.data.meshes.new(name)
+        mesh.from_pydata(corners, [], [(0, 1, 2, 3)])
+        mesh.materials.append(material)
+        scene.collection.objects.link(bpy.data.objects.new(name, mesh))
+    scene.cycles.max_bounces = 0
+    look((0, 0, 1.0), width=1.0)  # below the board, straight down
+    got = shoot(40, 40, 128)[..., :3]
+    lit = np.median(got[2:8].reshape(-1, 3), 0)
+    np.testing.assert_allclose(lit, 0.1 + sun.irradiance * direction[2] / np.pi, rtol=0.03)
+    np.testing.assert_allclose(got[18:22, 18:22].mean((0, 1)), 0.1, atol=0.02)

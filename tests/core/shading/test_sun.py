@@ -1,0 +1,175 @@
+"""The sun: found by its patch, taken out of the map of the sky and put into it, its shadows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon.core.lit_diffuse.accumulate import LitDiffuse
+from addon.core.shading.emitters import LUMINANCE
+from addon.core.shading.environment import Environment
+from addon.core.shading.shade import shade
+from addon.core.shading.sun import RADIUS, Sun, put_in, sunlight, taken_out
+from tests.core import sunny
+from tests.core.rooms import make_room, quad
+
+
+def measured(room, radiance, noise=0.03, texture=0.15, seed=0) -> LitDiffuse:
+    """L_d as frames would give it. `texture`: spread of log albedo between patches of 20 cm."""
+    rng = np.random.default_rng(seed)
+    cells = np.floor(room.atlas.position * 5).astype(int) @ [1, 31, 977]
+    patch = rng.normal(0, texture, cells.max() - cells.min() + 1)[cells - cells.min()][:, None]
+    n = len(room.atlas)
+    L = (radiance * np.exp(rng.normal(0, noise, (n, 3)) + patch)).astype(np.float32)
+    return LitDiffuse(L, L, L, np.full(n, 9, np.int32), np.zeros(n, np.int8), np.zeros(n, np.float32))
+
+
+def sky_map(seen=None) -> Environment:
+    """A sky of the room's radiance, seen all over the window but where the sun stands; or where `seen` says so."""
+    radiance = np.broadcast_to(np.float32(sunny.SKY), (64, 128, 3)).copy()
+    count = np.zeros((64, 128), np.int32)
+    count[20:40] = 1  # below 22 degrees: the sun stands higher
+    return Environment(radiance, count if seen is None else seen)
+
+
+def run(room, radiance, environment=None, **more):
+    environment = environment or sky_map()
+    return shade(room.mesh, room.instances, room.atlas, room.scene, measured(room, radiance, **more), environment,
+                 rays=64, emitter_rays=16, portal_rays=32, threads=2)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def room():
+    return sunny.sunny_room()
+
+
+def angle(a, b) -> float:
+    return float(np.degrees(np.arccos(np.clip(np.dot(a, b), -1, 1))))
+
+
+def test_a_sun_that_no_frame_sees_is_found_by_its_patch(room):
+    found = run(room, sunny.light(room))
+    assert found.sun is not None and not found.sun.seen
+    assert angle(found.sun.direction, sunny.TOWARDS) < 0.6
+    assert np.allclose(found.sun.irradiance, sunny.SUN, rtol=0.15)
+    assert any("sun" in note and "azimuth" in note for note in found.notes)
+    patch = sunny.sun_on(room) > 0.9 * sunny.TOWARDS[2]
+    floor = patch & (room.atlas.object_id == 0)
+    assert floor.sum() > 100
+    assert np.allclose(np.median(found.albedo.rho[floor], 0), sunny.ALBEDO[0], rtol=0.15)
+
+
+def test_without_a_sun_none_is_made_up(room):
+    found = run(room, sunny.light(room, sun=np.zeros(3)))
+    assert found.sun is None and not any("sun" in note for note in found.notes)
+
+
+def poster(points, low, high):
+    return ((points > low) & (points < high)).all(1)
+
+
+def test_paper_and_posters_are_no_sun(room):
+    """A sheet of albedo 0.9 on a floor of 0.06, and a bright poster on a dark wall, opposite the window."""
+    L = sunny.light(room, sunny.ALBEDO | {0: 0.06, 2: 0.08}, sun=np.zeros(3))
+    at = room.atlas.position
+    sheet = (room.atlas.object_id == 0) & poster(at[:, :2], (0.8, 0.6), (1.4, 1.2))
+    hung = (room.atlas.object_id == 2) & poster(at[:, 1:], (0.5, 0.6), (1.3, 1.4))
+    L[sheet] *= 0.9 / 0.06
+    L[hung] *= 0.9 / 0.08
+    assert run(room, L, texture=0.1).sun is None
+
+
+def test_what_a_lamp_lights_is_no_sun(room):
+    """A spotlight that the mesh lacks throws a round spot on the floor, brighter than all else."""
+    def spot(points, normals):
+        off = np.linalg.norm(points - (1.1, 1.0, 0.0), axis=1)
+        return (np.float64([12, 11, 9]) * np.clip((0.4 - off) / 0.05, 0, 1)[:, None]) * (normals[:, 2:] > 0.9)
+
+    found = run(room, sunny.light(room, sun=np.zeros(3), extra=spot), texture=0.1)
+    assert found.sun is None
+
+
+def test_no_sun_is_looked_for_where_frames_saw_the_sky(room):
+    """The same patch, but every direction of the sky is known."""
+    assert run(room, sunny.light(room), sky_map(np.ones((64, 128), np.int32))).sun is None
+
+
+def with_disc(direction, irradiance, rows=256, sky=1.0):
+    blank = Environment(np.full((rows, 2 * rows, 3), sky, np.float32), np.ones((rows, 2 * rows), np.int32))
+    sun = Sun(np.float32(direction), np.float32(irradiance))
+    radiance = put_in(blank, sun)
+    return Environment(radiance, np.ones(radiance.shape[:2], np.int32)), sun
+
+
+def irradiance_of(radiance, direction):
+    """E of a facing surface, from all texels of a map."""
+    height = len(radiance)
+    v, u = (np.indices(radiance.shape[:2]).T + 0.5).T / [[[height]], [[2 * height]]]
+    latitude, longitude = (v - 0.5) * np.pi, (0.5 - u) * 2 * np.pi
+    way = np.stack([np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude), np.sin(latitude)], -1)
+    solid = np.cos(latitude) * (np.pi / height) ** 2
+    cosine = np.maximum(way @ direction, 0)
+    return np.einsum("hwc,hw->c", radiance.astype(float), solid * cosine), way, solid
+
+
+@pytest.mark.parametrize("rows", [1, 64, 512])
+@pytest.mark.parametrize("direction", [(0.6, 0.0, 0.8), (-0.9999, 0.001, 0.01), (-0.8, -0.0005, -0.6)])
+def test_a_sun_in_the_map_gives_its_irradiance_from_its_place(rows, direction):
+    direction = np.array(direction) / np.linalg.norm(direction)
+    dark = Environment(np.zeros((rows, 2 * rows, 3), np.float32), np.zeros((rows, 2 * rows), np.int32))
+    radiance = put_in(dark, Sun(np.float32(direction), np.float32([30, 20, 10]), RADIUS))
+    assert len(radiance) >= 512
+    E, way, solid = irradiance_of(radiance, direction)
+    assert np.allclose(E, [30, 20, 10], rtol=1e-3)
+    middle = np.einsum("hwj,hw->j", way, radiance[..., 0] * solid)
+    assert angle(middle / np.linalg.norm(middle), direction) < 0.05
+
+
+def test_a_seen_sun_comes_out_of_the_map_and_goes_back_in():
+    direction = np.array([0.5, 0.3, 0.6]) / np.linalg.norm([0.5, 0.3, 0.6])
+    shown, sun = with_disc(direction, (40, 30, 20))
+    left, found = taken_out(shown)
+    assert found.seen and angle(found.direction, direction) < 0.1
+    assert np.allclose(found.irradiance, sun.irradiance, rtol=0.02)
+    assert np.allclose(left.radiance, 1.0, atol=1e-4)
+    whole, _, _ = irradiance_of(put_in(left, found), direction)
+    assert np.allclose(whole, irradiance_of(shown.radiance, direction)[0], rtol=0.01)
+
+
+def test_what_is_no_sun_stays_in_the_map():
+    plain = Environment(np.random.default_rng(0).uniform(0.5, 5, (64, 128, 3)).astype(np.float32),
+                        np.ones((64, 128), np.int32))  # fmt: skip
+    assert taken_out(plain) == (plain, None)
+    two, _ = with_disc((0.6, 0, 0.8), (40, 30, 20))
+    other, _ = with_disc((0, 0.8, 0.6), (40, 30, 20))
+    both = Environment(two.radiance + other.radiance, two.observations)
+    assert taken_out(both)[1] is None
+    clipped = two.radiance[..., 0] > 10
+    assert taken_out(Environment(two.radiance, two.observations, clipped))[1] is None
+    faint, _ = with_disc((0.6, 0, 0.8), (0.01, 0.01, 0.01))
+    assert taken_out(faint)[1] is None
+    assert taken_out(Environment.dark())[1] is None
+
+
+def test_a_seen_sun_lights_the_room_without_noise(room):
+    """E in the patch is that of sun and sky, though the sun is half a texel of the map."""
+    blank = sky_map(np.ones((64, 128), np.int32))
+    shown = Environment(put_in(blank, Sun(np.float32(sunny.TOWARDS), np.float32(sunny.SUN))), np.ones((512, 1024), int))
+    found = run(room, sunny.light(room), shown, texture=0.0)
+    assert found.sun.seen and np.allclose(found.sun.irradiance, sunny.SUN, rtol=0.03)
+    patch = (sunny.sun_on(room) > 0.99 * sunny.TOWARDS[2]) & (room.atlas.object_id == 0)
+    rho = found.albedo.rho[patch]
+    assert np.allclose(np.median(rho, 0), sunny.ALBEDO[0], rtol=0.05)
+    assert np.percentile(np.abs(rho / np.float32(sunny.ALBEDO[0]) - 1), 95) < 0.15
+
+
+def test_the_edge_of_a_shadow_is_in_doubt():
+    floor = make_room([quad((0, 0, 0), (1, 0, 0), (0, 1, 0), 0), quad((-1, -1, 1), (1.5, 0, 0), (0, 3, 0), 1)], 0.02)
+    sun = Sun(np.float32([0, 0, 1]), np.float32([3, 2, 1]))
+    own = floor.atlas.object_id == 0
+    x = floor.atlas.position[own, 0]
+    found = sunlight(floor.scene, sun, floor.atlas.position[own], floor.atlas.normal[own], 0.02)
+    assert np.allclose(found[x > 0.53], [3, 2, 1, 0]) and (found[x < 0.47] == 0).all()
+    edge = np.abs(x - 0.5) < 0.012
+    assert edge.any() and (found[edge, 3] > 0.3).mean() > 0.5
+    assert found[:, :3] @ LUMINANCE == pytest.approx(found[:, 0] / 3 * float(sun.irradiance @ LUMINANCE), abs=1e-5)
