@@ -14,19 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..surface.rays import RayScene
 from .emitters import LUMINANCE
 from .environment import Environment
 from .field import LightField
-from .light_fit import COARSE, Sample
-from .sun import Sun, around, shadow
+from .sun import Sun, around
+from .sun_spots import LIT, Edges, Guess, Spots, visible
 
-OVER = 1.2
-"""Elements that reflect more than this share of what they get are short of light."""
-STANDS_OUT = 1.0
-"""So may be those whose log albedo is so far above their object's median (2.7 times)."""
 FEWEST = 12
-"""With fewer of both in the sample no sun is looked for."""
+"""With fewer in the sample that stand out, no sun is looked for."""
 GRID = float(np.radians(4.0))
 REACHED = 0.05
 """Least share of what stands out that a direction must reach."""
@@ -37,9 +32,9 @@ NEAR, DENSE = 0.3, 2000
 """Metres around what stands out; elements from there, and from elsewhere on the same objects, for the refinement."""
 SHARP = np.radians([2.0, 1.0, 0.5])
 """Steps of the direction, with a point-like sun."""
-EDGES, PAIR = 2000, 0.12
+EDGES = 2000
 """Elements that the last refinement looks at: those over which the shadows' edges pass within `ASTRAY` of the
-direction; and how far apart two of them may lie, in metres, to be compared."""
+direction."""
 ASTRAY = float(np.radians(2.5))
 SOFT = np.radians([0.8, 0.4, 0.2])
 RADII = np.radians([0.27, 0.5, 0.75, 1.0])
@@ -68,108 +63,7 @@ def _ring(count: int) -> np.ndarray:
     return np.stack([np.cos(angle), np.sin(angle)], 1)
 
 
-@dataclass(frozen=True)
-class _Guess:
-    """A sun as far as it is known.
-
-    Attributes
-    ----------
-    direction : (3,) float32
-    cost : float
-        What is left of the quantity that was minimised.
-    strength : float
-        Irradiance, luminance.
-    radius : float
-    """
-
-    direction: np.ndarray
-    cost: float
-    strength: float = 0.0
-    radius: float = 0.0
-
-
-class _Spots:
-    """Elements and what is known of them; asks for shadows.
-
-    Parameters
-    ----------
-    element : (m,) int
-    received : (m, 3) float64
-        E there, without the sun.
-    """
-
-    def __init__(self, field: LightField, element: np.ndarray, received: np.ndarray):
-        atlas = field.atlas
-        self.scene, self.atlas = field.scene, atlas
-        self.position, self.normal = atlas.position[element], atlas.normal[element]
-        self.sample = Sample(element, atlas.object_id[element], field.radiance[element].astype(np.float64), received)
-        self.edge = float(np.sqrt(np.median(atlas.area)))
-
-    def __len__(self) -> int:
-        return len(self.position)
-
-    def log_albedo(self, thrown: np.ndarray | float = 0.0, strength: float = 0.0, weights=LUMINANCE) -> np.ndarray:
-        """Of the channel that `weights` make, with a sun, (m,)."""
-        sent = np.pi * (self.sample.radiance @ weights)
-        received = self.sample.received @ weights + strength * thrown
-        return np.log(np.maximum(sent, 1e-12)) - np.log(np.maximum(received, 1e-12))
-
-    def over(self, thrown: np.ndarray | float = 0.0, strength: float = 0.0) -> np.ndarray:
-        """Elements short of light, (m,) bool."""
-        return self.log_albedo(thrown, strength) > np.log(OVER)
-
-    def stands_out(self) -> np.ndarray:
-        """Those, and what is much brighter than the rest of its object, (m,) bool."""
-        value = self.log_albedo()
-        return self.over() | (value - self.medians(value, np.ones(len(self), bool)) > STANDS_OUT)
-
-    def thrown(self, direction: np.ndarray, radius: float = 0.0) -> np.ndarray:
-        """E at an irradiance of 1, (m,) float32; without a radius that of a point in the sky."""
-        if radius:
-            return shadow(self.scene, Sun(direction, np.ones(3), radius), self.position, self.normal, self.edge, 0)[0]
-        return visible(self.scene, direction, self.position, self.normal)
-
-    def medians(self, values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """For each element the median of `values` over the chosen ones of its object, (m,); NaN where none is."""
-        group = self.sample.group
-        order = np.flatnonzero(chosen)[np.lexsort((values[chosen], group[chosen]))]
-        count = np.bincount(group[chosen], minlength=int(group.max(initial=0)) + 1)
-        found = np.full(len(count), np.nan)
-        start = np.concatenate([[0], np.cumsum(count)[:-1]])
-        found[count > 0] = values[order[(start + count // 2)[count > 0]]]
-        return found[group]
-
-    def strength(self, thrown: np.ndarray, weights=LUMINANCE) -> float:
-        """Irradiance that makes what is lit as bright as it is, if its albedo is that of its object's shaded rest."""
-        lit = thrown > 0.02
-        rho = np.exp(self.medians(self.log_albedo(weights=weights), thrown <= 0))
-        use = lit & np.isfinite(rho)
-        if use.sum() < 3:
-            return 0.0
-        sent, received = np.pi * (self.sample.radiance @ weights), self.sample.received @ weights
-        return max(float(np.median((sent[use] / rho[use] - received[use]) / thrown[use])), 0.0)
-
-    def spread(self, thrown: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
-        return self.sample.spread(self.log_albedo(thrown, strength), COARSE)
-
-    def explained(self, direction: np.ndarray) -> _Guess:
-        """The direction with its strength and the spread that it leaves."""
-        thrown = self.thrown(direction)
-        strength = self.strength(thrown)
-        return _Guess(direction, self.spread(thrown, strength), strength)
-
-
-def visible(scene: RayScene, direction: np.ndarray, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Cosine of a direction where nothing hides it, else 0, (n,) float32."""
-    cosine = np.maximum(normal @ np.asarray(direction, np.float32), 0)
-    facing = np.flatnonzero(cosine > 0)
-    way = np.broadcast_to(np.float32(direction), (len(facing), 3))
-    start = scene.off_surface(position[facing], normal[facing])
-    cosine[facing[scene.occluded(start, way, np.full(len(facing), np.inf, np.float32))]] = 0
-    return cosine
-
-
-def _on_grid(even: _Spots, environment: Environment) -> list[_Guess]:
+def _on_grid(even: Spots, environment: Environment) -> list[Guess]:
     """Directions of the grid that may be the sun's, the best first."""
     value = even.log_albedo()
     excess = value - np.minimum(even.medians(value, np.ones(len(even), bool)), 0)
@@ -183,14 +77,14 @@ def _on_grid(even: _Spots, environment: Environment) -> list[_Guess]:
     reached = np.bincount(ray[~hidden], weight[spot[~hidden]], len(way)) / max(weight.sum(), 1e-9)
     best = np.argsort(-reached, kind="stable")[:KEPT]
     guesses = [even.explained(way[k]) for k in best if reached[k] > REACHED]
-    chosen: list[_Guess] = []
+    chosen: list[Guess] = []
     for guess in sorted(guesses, key=lambda one: one.cost):
         if all(guess.direction @ one.direction < np.cos(1.5 * GRID) for one in chosen):
             chosen.append(guess)
     return chosen[:TRIED]
 
 
-def _searched(cost: Callable[[np.ndarray], _Guess], guess: _Guess, steps: np.ndarray) -> _Guess:
+def _searched(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np.ndarray) -> Guess:
     """The direction of least cost near a guess: the best of eight neighbours, again and again, by smaller steps."""
     for step in steps:
         for _ in range(4):
@@ -199,25 +93,6 @@ def _searched(cost: Callable[[np.ndarray], _Guess], guess: _Guess, steps: np.nda
                 break
             guess = new
     return guess
-
-
-class _Edges:
-    """Neighbours on the same object along the edges of a patch: light and shade that are right leave them alike."""
-
-    def __init__(self, spots: _Spots):
-        self.spots = spots
-        key = np.concatenate([spots.position, 0.2 * spots.normal, 100.0 * spots.sample.group[:, None]], 1)
-        far, other = cKDTree(key).query(key, k=min(9, len(key)), distance_upper_bound=PAIR)
-        self.a, k = np.nonzero(np.isfinite(far[:, 1:]))
-        self.b = other[:, 1:][self.a, k]
-
-    def differ(self, thrown: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
-        """Mean difference of log albedo between neighbours, each held at `COARSE`."""
-        value = self.spots.log_albedo(thrown, strength)
-        return float(np.minimum(np.abs(value[self.a] - value[self.b]), COARSE).mean()) if len(self.a) else 0.0
-
-    def explained(self, direction: np.ndarray, strength: float, radius: float) -> _Guess:
-        return _Guess(direction, self.differ(self.spots.thrown(direction, radius), strength), strength, radius)
 
 
 def _along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -229,7 +104,7 @@ def _along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng
     return np.sort(rng.choice(mixed, min(len(mixed), EDGES), replace=False))
 
 
-def _pool(field: LightField, good: np.ndarray, even: _Spots, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def _pool(field: LightField, good: np.ndarray, even: Spots, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Elements of the objects on which something stands out ((k,)), and whether they lie `NEAR` that ((k,) bool)."""
     atlas, out = field.atlas, even.stands_out()
     pool = np.flatnonzero(good & np.isin(atlas.object_id, even.sample.object_id[out]))
@@ -252,7 +127,7 @@ class SolvedSun:
     """
 
     sun: Sun
-    _spots: _Spots
+    _spots: Spots
     _before: float
     _after: float
 
@@ -295,7 +170,7 @@ def find_sun(
     free = ~np.isin(field.atlas.object_id[element], lamps)
     if free.sum() < FEWEST:
         return None
-    even = _Spots(field, element[free], received[free])
+    even = Spots(field, element[free], received[free])
     if even.stands_out().sum() < FEWEST:
         return None
     guesses = _on_grid(even, field.environment)
@@ -306,7 +181,7 @@ def find_sun(
     chosen = [rng.choice(part, min(len(part), count), replace=False)
               for part, count in ((pool[near], DENSE * 2 // 3), (pool[~near], DENSE // 3))]  # fmt: skip
     dense = np.sort(np.concatenate(chosen))
-    spots = _Spots(field, dense, irradiance(dense))
+    spots = Spots(field, dense, irradiance(dense))
     tried = [_searched(spots.explained, spots.explained(one.direction), SHARP) for one in guesses]
     best, before = min(tried, key=lambda one: one.cost), spots.spread()
     if best.cost > (1 - MIN_GAIN) * before:
@@ -314,10 +189,10 @@ def find_sun(
     along = _along_edges(field, pool, best.direction, rng)
     if len(along) < FEWEST:
         return None
-    edges = _Edges(_Spots(field, along, irradiance(along)))
+    edges = Edges(Spots(field, along, irradiance(along)))
     found = min((edges.explained(best.direction, best.strength, r) for r in RADII), key=lambda one: one.cost)
     for steps in (SOFT, SOFT[1:]):
-        def cost(way: np.ndarray, now: _Guess = found) -> _Guess:
+        def cost(way: np.ndarray, now: Guess = found) -> Guess:
             return edges.explained(way, now.strength, now.radius)
 
         found = _searched(cost, found, steps)
@@ -326,7 +201,7 @@ def find_sun(
         found = min((edges.explained(found.direction, strength, r) for r in RADII), key=lambda one: one.cost)
     thrown = spots.thrown(found.direction, found.radius)
     after = spots.spread(thrown, found.strength)
-    short = spots.over() & (thrown > 0.02)
+    short = spots.over() & (thrown > LIT)
     left = short & spots.over(thrown, found.strength)
     if (
         found.cost > (1 - MIN_GAIN) * edges.differ()
@@ -337,7 +212,7 @@ def find_sun(
     return SolvedSun(_coloured(spots, found.direction, found.radius, before, after), spots, before, after)
 
 
-def _coloured(spots: _Spots, direction: np.ndarray, radius: float, before: float, after: float) -> Sun:
+def _coloured(spots: Spots, direction: np.ndarray, radius: float, before: float, after: float) -> Sun:
     """The sun with what each channel says of its irradiance, held near the luminance's."""
     thrown = spots.thrown(direction, radius)
     luminance = spots.strength(thrown)

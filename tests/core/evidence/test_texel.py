@@ -116,8 +116,9 @@ def light_of(room, off: float, seen_lamp: bool):
     field = room.field(radiance).with_light(radiance, lamps=[6])
     n = len(room.atlas)
     shading = SimpleNamespace(
-        irradiance=np.zeros((n, 3), np.float32), environment=DARK, lamps=(Lamp(6, np.full(3, 20.0), seen_lamp),)
-    )
+        irradiance=np.zeros((n, 3), np.float32), environment=DARK, sun=None,
+        lamps=(Lamp(6, np.full(3, 20.0), seen_lamp),),
+    )  # fmt: skip
     lamp = room.atlas.object_id == 6
     sign = np.random.default_rng(0).choice([-1, 1], n)[:, None]
     shading.irradiance[:] = np.pi * radiance / room.by_object(ALBEDO, 1.0) * np.exp(off * sign)
