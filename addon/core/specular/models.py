@@ -24,6 +24,9 @@ BARE = 2.0
 """A metal has no diffuse part. Its lobe alone, with nothing of each element's own, may cost up to so many times what
 each element's own mean does (errors of the light field and of the mesh): metals in the living room had 0.1 to 1.4,
 dielectrics and matt things whose lobe looked like a metal's 2.4 to 60, there and in four small rooms."""
+BARE_AT_MOST, MUCH = 3.0, 0.2
+"""The same where a metal takes away more than this share of what a matt surface costs, and of what a dielectric does:
+thin legs of steel, 32 elements in 5 views, had 2.4."""
 BROADEST_PHI = 0.5
 """A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface."""
 HOW = {SPECULAR: {"least_psi": LEAST_PSI, "prior": DIELECTRIC}, METAL: {"coloured": True}}
@@ -142,10 +145,11 @@ def choose_model(problem: Problem) -> Choice:
     no_diffuse = _metallic(bare[0]) and bool(bare[1].sum() <= BARE * without.sum())
     for fit_of_metal, with_metal, matt in found:
         scores[METAL] = min(float(with_metal.sum() / max(matt.sum(), 1e-30)), scores.get(METAL, np.inf))
-        if _bare_metal(problem, layout, fit_of_metal.phi, metal, scale)[1].sum() > BARE * matt.sum():
-            continue
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
         (gain, sigmas), (more, surely) = _gain(with_metal, matt), _gain(with_metal, with_lobe)
+        most = BARE_AT_MOST if min(gain, more) > MUCH else BARE
+        if _bare_metal(problem, layout, fit_of_metal.phi, metal, scale)[1].sum() > most * matt.sum():
+            continue
         if min(gain, more) > MIN_GAIN and sigmas > MIN_SIGMAS and surely > SURELY_METAL:
             return Choice(METAL, fit_of_metal, gain, sigmas, scores=scores)
         if min(gain, more) > MIN_GAIN and likely is None:
