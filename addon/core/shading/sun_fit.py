@@ -41,7 +41,7 @@ RADII = np.radians([0.27, 0.5, 0.75, 1.0])
 """Discs that are tried: thin clouds, and pictures and meshes that are not sharp, soften the edges."""
 MIN_GAIN = 0.1
 """The spread of log albedo around the patch, and the differences of neighbours along its edges, must each fall by at
-least this share. A bedroom with a sun: 0.39 and 0.25, its striped blanket being what is left; a box with one: 0.63 and
+least this share. A bedroom with a sun: 0.28 to 0.39 and 0.25, with a striped blanket in it; a box with one: 0.63 and
 0.65. A living room without one: 0.01. Bright rectangles on a box's floor: up to 0.45, but no gain along the edges."""
 EXPLAINED = 0.5
 """Share of the elements short of light within the patch that must not be so with the sun."""
