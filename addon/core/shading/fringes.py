@@ -108,5 +108,7 @@ def _excess(
     if not fringe.any() or not behind.any():
         return np.zeros((0, 3))
     excess = radiance[fringe].astype(np.float64) - np.median(radiance[behind], 0)
-    level = float((radiance[spot] @ LUMINANCE).min())
+    # Clipped to inf, pixels have no value: the brightest of the fringe is all that is known of the sensor.
+    bound = (radiance[spot] @ LUMINANCE)[radiance[spot].any(1)]
+    level = float(bound.min()) if len(bound) else float((radiance[fringe] @ LUMINANCE).max())
     return excess[(excess.min(1) >= 0) & (excess @ LUMINANCE >= LEAST_EXCESS * level)]
