@@ -11,6 +11,7 @@ from .emitters import bright_triangles
 from .field import LightField
 from .interpolate import interpolated
 from .irradiance import direct, gather, uniform
+from .less_noise import less_noise
 from .portals import find_portals
 from .sun import sunlight
 from .texel_blocks import TexelBlocks
@@ -20,8 +21,6 @@ FINEST_SHARE = 0.005
 """Least distance of two gathering points, and edge of the texel blocks, as a share of the room; a texel where that is
 larger. Finer texels then cost look-ups, and rays only where the lamps' light changes; coarse ones are not interpolated
 over (texels of 4 cm in 2 by 2 blocks: relative RMSE 0.15 instead of 0.05)."""
-NOISE_CELL = 0.1
-"""Edge in metres of the cells over which the aimed rays' noise is averaged."""
 SMOOTH = 0.05
 """Relative deviation of the lamps' light between a block's corners up to which it is interpolated."""
 
@@ -150,21 +149,11 @@ def irradiance(
     noise = np.zeros(len(total), np.float32)
     if lamp_rays:
         lamps = blocks.evaluate(aim, step, SMOOTH, total.mean(1))
-        total += lamps[:, :3]
-        noise = _evened(position, lamps[:, 3])
+        shown, noise = less_noise(position, normal, lamps[:, :3], lamps[:, 3])
+        total += shown
     unsure = np.hypot(contrast * value[:, :3].mean(1), noise)
     if field.sun is not None:
         shone = blocks.evaluate(shine, step, SMOOTH, total.mean(1))
         total += shone[:, :3]
         unsure = np.hypot(unsure, shone[:, 3])
     return total, escaped, points, unsure / np.maximum(total.mean(1), 1e-20)
-
-
-def _evened(position: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """Root mean square of the noise ((m,)) over cells of `NOISE_CELL`, (m,) float32."""
-    cell = np.floor(position / NOISE_CELL).astype(np.int64)
-    cell -= cell.min(0, initial=0)
-    extent = cell.max(0, initial=0) + 1
-    key = (cell[:, 0] * extent[1] + cell[:, 1]) * extent[2] + cell[:, 2]
-    _, group, count = np.unique(key, return_inverse=True, return_counts=True)
-    return np.sqrt(np.bincount(group, noise.astype(np.float64) ** 2) / count)[group].astype(np.float32)

@@ -1,0 +1,68 @@
+"""Noise goes where light is smooth, and stays light at edges."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon.core.shading.less_noise import CELL, less_noise
+
+SIDE, TEXEL = 100, 0.01
+
+
+def wall(light, noise, seed=0):
+    """A wall of 1 m with `light` ((k, k)) in all channels, with noise; positions, normals and both."""
+    rng = np.random.default_rng(seed)
+    y, x = np.mgrid[:SIDE, :SIDE] * TEXEL
+    position = np.float32(np.stack([x.ravel(), np.full(x.size, 2.0), y.ravel()], 1))
+    normal = np.broadcast_to(np.float32([0, 1, 0]), position.shape)
+    clean = np.repeat(light.ravel()[:, None], 3, 1)
+    seen = clean + rng.normal(0, noise, (clean.shape[0], 1))
+    return position, normal, np.float32(clean), np.float32(seen), np.full(len(clean), noise, np.float32)
+
+
+def error(a, b):
+    return float(np.sqrt(np.mean((a - b) ** 2)))
+
+
+def test_smooth_light_loses_its_noise():
+    """A slope is no rest; a fifth of the noise is left, and less than that is told only where it is true."""
+    slope = 1 + 0.5 * np.mgrid[:SIDE, :SIDE][1] / SIDE
+    position, normal, clean, seen, noise = wall(slope, 0.1)
+    found, left = less_noise(position, normal, seen, noise)
+    assert error(found, clean) < 0.03 and error(seen, clean) > 0.09
+    assert 0.5 * error(found, clean) < left.mean() < 3 * error(found, clean)
+
+
+def test_a_shadows_edge_stays():
+    half = np.where(np.mgrid[:SIDE, :SIDE][1] < 43, 1.0, 2.0)
+    position, normal, clean, seen, noise = wall(half, 0.05)
+    found, _ = less_noise(position, normal, seen, noise)
+    beside = np.abs(position[:, 0] - 0.43) < CELL / 2
+    assert error(found[beside], clean[beside]) < 0.06  # no more than the noise itself
+    assert error(found[~beside], clean[~beside]) < 0.03
+
+
+def test_without_noise_nothing_changes():
+    rng = np.random.default_rng(1)
+    position, normal, clean, _, _ = wall(rng.random((SIDE, SIDE)), 0)
+    found, left = less_noise(position, normal, clean, np.zeros(len(clean), np.float32))
+    np.testing.assert_allclose(found, clean, atol=1e-5)
+    assert not left.any()
+
+
+@pytest.mark.parametrize("count", [1, 5])
+def test_too_few_to_tell(count):
+    position, normal, _, seen, noise = (x[:count] for x in wall(np.ones((SIDE, SIDE)), 0.1))
+    found, left = less_noise(position, normal, seen, noise)
+    np.testing.assert_allclose(found, seen, atol=1e-6)
+    np.testing.assert_allclose(left, noise, rtol=1e-5)
+
+
+def test_two_sides_of_a_sheet_are_told_apart():
+    position, normal, _, _, _ = wall(np.ones((SIDE, SIDE)), 0)
+    front = np.arange(len(position)) % 2 == 0
+    normal = np.where(front[:, None], normal, -normal)
+    light = np.repeat(np.where(front, 1.0, 3.0)[:, None], 3, 1).astype(np.float32)
+    found, _ = less_noise(position, normal, light, np.full(len(light), 1.0, np.float32))
+    np.testing.assert_allclose(found, light, atol=1e-4)
