@@ -11,8 +11,37 @@ from ..capture.model import Pixels
 from ..lit_diffuse.visibility import FrameView
 
 MAX_HEIGHT = 512
+PROFILE, STEEPEST = 3.0, 3.0
+"""Degrees over which the sky's change with the height is smoothed, and how far it may go either way."""
 NEAR = np.radians(8)
 """Angle over which what was seen of the sky says something of its surroundings."""
+
+
+@dataclass(frozen=True)
+class Zone:
+    """A part of the sky whose radiance is not known but for its pattern.
+
+    Attributes
+    ----------
+    weight : (h, 2h) float32
+        How far each direction belongs to it, 0...1.
+    pattern : (h, 2h) float32
+        Its radiance at a mean of 1, times the weight.
+    """
+
+    weight: np.ndarray
+    pattern: np.ndarray
+
+
+def _solid(weight: np.ndarray) -> np.ndarray:
+    """Weights ((h, 2h)) times what each row covers of the sphere."""
+    height = len(weight)
+    return np.cos((np.arange(height) + 0.5) / height * np.pi - np.pi / 2)[:, None] * weight
+
+
+def _levelled(pattern: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """The pattern, scaled so that its mean over the weights is 1."""
+    return (pattern * (_solid(weight).sum() / max(_solid(pattern).sum(), 1e-20))).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -48,15 +77,16 @@ class Environment:
         return Environment(np.zeros((1, 2, 3), np.float32), np.zeros((1, 2), np.int32))
 
     @staticmethod
-    def only(zone: np.ndarray) -> Environment:
-        """Radiance as given by the weights `zone` ((h, 2h) float32), in all channels alike."""
-        return Environment(np.repeat(zone[..., None], 3, -1).astype(np.float32), np.zeros(zone.shape, np.int32))
+    def only(pattern: np.ndarray) -> Environment:
+        """Radiance as `pattern` ((h, 2h) float32) has it, in all channels alike."""
+        return Environment(np.repeat(pattern[..., None], 3, -1).astype(np.float32), np.zeros(pattern.shape, np.int32))
 
-    def unseen_zones(self) -> list[np.ndarray]:
-        """Weights ((h, 2h) float32) of the unseen directions above and below the horizon.
+    def unseen_zones(self) -> list[Zone]:
+        """The unseen directions above and below the horizon.
 
-        0 where a frame saw the direction, towards 1 the further it lies from those: near them the neighbours'
-        radiance is as good a guess as any.
+        The weight is 0 where a frame saw the direction, towards 1 the further it lies from those: near them the
+        neighbours' radiance is as good a guess as any. Within a zone radiance goes with the height as it does where the
+        frames saw it: skies change more with the height than around.
         """
         unseen = self.observations == 0
         height, width = unseen.shape
@@ -65,21 +95,35 @@ class Environment:
         weight = (1 - np.exp(-angle / NEAR)).astype(np.float32)
         above = (np.arange(height) >= height / 2)[:, None]
         zones = [np.where(side, weight, np.float32(0)) for side in (above, ~above)]
-        return [zone for zone in zones if zone.any()]
+        profile = self._profile()[:, None]
+        return [Zone(zone, _levelled(zone * profile, zone)) for zone in zones if zone.any()]
 
-    def clipped_zone(self) -> np.ndarray:
-        """Weights ((h, 2h) float32) of the directions of which only a lower bound is known."""
-        return self.clipped.astype(np.float32)
+    def _profile(self) -> np.ndarray:
+        """Median luminance of what frames saw at each height, (h,) float32; of the nearest height that they saw."""
+        height = len(self.observations)
+        known = (self.observations > 0) & ~self.clipped
+        rows = np.flatnonzero(known.any(1))
+        if not len(rows):
+            return np.ones(height, np.float32)
+        level = [np.median(self.radiance[row, known[row]].mean(1)) for row in rows]
+        profile = np.interp(np.arange(height), rows, level)
+        profile = ndimage.gaussian_filter1d(profile, np.radians(PROFILE) / np.pi * height, mode="nearest")
+        middle = max(float(np.median(profile[rows])), 1e-12)
+        return np.clip(profile / middle, 1 / STEEPEST, STEEPEST).astype(np.float32)
 
-    def zone_mean(self, zone: np.ndarray) -> np.ndarray:
+    def clipped_zone(self) -> Zone:
+        """The directions of which only a lower bound is known."""
+        weight = self.clipped.astype(np.float32)
+        return Zone(weight, weight)
+
+    def zone_mean(self, zone: Zone) -> np.ndarray:
         """Mean radiance over a zone, weighted by solid angle: (3,) float32."""
-        height = len(zone)
-        rows = np.cos((np.arange(height) + 0.5) / height * np.pi - np.pi / 2)[:, None] * zone
-        return (self.radiance * rows[..., None]).sum((0, 1)) / max(rows.sum(), 1e-12)
+        share = _solid(zone.weight)
+        return (self.radiance * share[..., None]).sum((0, 1)) / max(share.sum(), 1e-12)
 
-    def with_zone(self, zone: np.ndarray, radiance: np.ndarray) -> Environment:
-        """The same map with `radiance` ((3,)) mixed in by the weights of a zone."""
-        mixed = self.radiance * (1 - zone[..., None]) + zone[..., None] * radiance
+    def with_zone(self, zone: Zone, radiance: np.ndarray) -> Environment:
+        """The same map with a mean `radiance` ((3,)) mixed in by the weights of a zone, in its pattern."""
+        mixed = self.radiance * (1 - zone.weight[..., None]) + zone.pattern[..., None] * radiance
         return Environment(mixed.astype(np.float32), self.observations, self.clipped)
 
     def __call__(self, directions: np.ndarray) -> np.ndarray:

@@ -259,7 +259,7 @@ def find_light(
     dark, unlit = np.zeros_like(field.radiance), field.with_sun(None)
     received = old.received if old else irradiance_at(unlit.with_light(_evened(field), known), element, seed)
     thrown_sky = old.sky if old else [
-        irradiance_at(unlit.with_light(dark, Environment.only(zone)), element, seed)[:, 0] for zone in zones
+        irradiance_at(unlit.with_light(dark, Environment.only(zone.pattern)), element, seed)[:, 0] for zone in zones
     ]
     sunless = received
     if field.sun is not None:
