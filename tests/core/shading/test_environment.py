@@ -106,3 +106,44 @@ def test_a_closed_room_has_no_sky():
     environment = EnvironmentAccumulator(0.1).result()
     assert not environment.seen and not environment.radiance.any()
     assert not environment(np.float32([[0, 0, 1]])).any()
+
+
+def half_seen(height: int = 32):
+    """A sky that is brighter at the horizon, of which a window showed an eighth of the way round, up to 45 degrees."""
+    elevation = ((np.arange(height) + 0.5) / height - 0.5) * np.pi
+    truth = np.repeat((1 + 3 * np.exp(-np.abs(elevation) / 0.3))[:, None], 2 * height, 1)
+    seen = np.zeros(truth.shape, bool)
+    seen[np.abs(elevation) < np.radians(45), : height // 4] = True
+    radiance = np.repeat(np.where(seen, truth, truth[seen].mean())[..., None], 3, -1).astype(np.float32)
+    return truth, Environment(radiance, seen.astype(np.int32)), elevation
+
+
+def test_unseen_sky_goes_with_the_height_as_the_seen():
+    truth, environment, elevation = half_seen()
+    height = len(truth)
+    zone = environment.unseen_zones()[0]
+    solved = environment.with_zone(zone, environment.zone_mean(zone))
+    far = np.s_[height // 2 :, height : height + height // 2]  # the other side of the window, above the horizon
+    ratio = solved.radiance[far][..., 0] / truth[far]
+    flat = environment.zone_mean(zone)[0] / truth[far]
+    assert np.ptp(ratio[: height // 4], axis=0).max() < 0.5 * np.ptp(flat[: height // 4], axis=0).max()
+    known = environment.observations > 0
+    assert np.array_equal(solved.radiance[known], environment.radiance[known])
+
+
+def test_a_zones_mean_is_what_was_solved():
+    _, environment, elevation = half_seen()
+    for zone in environment.unseen_zones():
+        assert zone.pattern.min() >= 0 and (zone.pattern > 0).sum() == (zone.weight > 0).sum()
+        solid = np.cos(elevation)[:, None]
+        assert (zone.pattern * solid).sum() == pytest.approx((zone.weight * solid).sum(), rel=1e-4)
+        level = zone.pattern[zone.weight > 0.9] / zone.weight[zone.weight > 0.9]
+        assert 1.2 < level.max() / level.min() <= 9
+
+
+def test_a_sky_of_one_height_has_no_profile():
+    seen = np.zeros((16, 32), np.int32)
+    seen[9] = 1
+    environment = Environment(np.ones((16, 32, 3), np.float32), seen)
+    for zone in environment.unseen_zones():
+        np.testing.assert_allclose(zone.pattern, zone.weight, rtol=1e-5)
