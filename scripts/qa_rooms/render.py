@@ -24,6 +24,10 @@ RELIT = ("A", (0.25, 60.0, 45.0, 30.0))
 """Name of the one new light; half its edge and its radiance."""
 
 
+TOO_NEW = (5, 0)
+"""Blender from which on a multilayer file of the module holds the combined pass alone (seen in 5.2)."""
+
+
 def walk(room: FurnishedRoom, count: int, phase: float, scene: RayScene) -> np.ndarray:
     """Poses (count, 4, 4) of a person who strolls about and looks around; turned away from what is too near."""
     x0, y0, x1, y1 = room.walk
@@ -222,6 +226,8 @@ def render(
     denoise : bool
         What few samples leave in frames and held-out pictures; never in truth's light.
     """
+    if bpy.app.version >= TOO_NEW:
+        raise SystemExit(f"Rooms are made with Blender 4.5: {bpy.app.version_string} as a module writes no passes.")
     bpy.ops.wm.read_factory_settings(use_empty=True)
     write_all_but_frames(folder, room.things, np.eye(4)[None], size)
     vertices, triangles, object_id = _triangles(room)

@@ -11,12 +11,14 @@ bpy = pytest.importorskip("bpy")
 
 from addon.core.capture.exr import read_exr  # noqa: E402
 from addon.core.capture.read import read_capture  # noqa: E402
-from scripts.qa_rooms.render import render  # noqa: E402
+from scripts.qa_rooms.render import TOO_NEW, render  # noqa: E402
 from scripts.qa_rooms.rooms import ROOMS  # noqa: E402
 
 
 @pytest.fixture(scope="module")
 def office(tmp_path_factory):
+    if bpy.app.version >= TOO_NEW:
+        pytest.skip("rooms are made with Blender 4.5: newer modules write no passes")
     folder = tmp_path_factory.mktemp("rooms") / "office"
     render(ROOMS["office"](1), folder, 3, (40, 30), 8, 2, False)
     return folder
