@@ -126,5 +126,3 @@ def _report_shading(run: Recovery, figures: dict[str, Any], warnings: list[str])
         warnings.append(
             f"{escaped:.0%} of the rays leave the mesh, but no frame sees what lies there; it was taken as dark."
         )
-
-

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..capture.model import Camera, Pixels
+from ..capture.model import Pixels
 from ..capture.pixels import read_pixels
 from ..material import METAL, SPECULAR
 from ..shading.emitters import bright_triangles
@@ -85,7 +85,7 @@ def view(run: Recovery, index: int) -> View:
     """Frame `index` made small, and predicted."""
     frame = run.frames[index]
     step = -(-frame.camera.width // WIDTH)
-    pixels, camera = _smaller(read_pixels(frame), step), _coarser(frame.camera, step)
+    pixels, camera = _smaller(read_pixels(frame), step), frame.camera.coarser(step)
     directions, seen = camera.rays(camera.pixel_centres())
     origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
     room, surface = run.field, run.surface()
@@ -123,13 +123,6 @@ def _add_lobes(run: Recovery, predicted: np.ndarray, element: np.ndarray, direct
         if m.model == METAL:
             predicted[at] = 0
         predicted[at] += f0 * light.A[:, 0] + light.B[:, 0]
-
-
-def _coarser(camera: Camera, step: int) -> Camera:
-    return replace(
-        camera, width=camera.width // step, height=camera.height // step,
-        fx=camera.fx / step, fy=camera.fy / step, cx=camera.cx / step, cy=camera.cy / step,
-    )  # fmt: skip
 
 
 def _smaller(pixels: Pixels, step: int) -> Pixels:

@@ -22,7 +22,7 @@ class ElementGroups:
     """
 
     def __init__(self, atlas: Atlas):
-        spacing = CELL * float(np.sqrt(np.median(atlas.area))) if len(atlas) else 1.0
+        spacing = CELL * atlas.texel_edge if len(atlas) else 1.0
         cell = np.floor(atlas.position / max(spacing, 1e-12)).astype(np.int64)
         cell -= cell.min(0, initial=0)
         side = 2 * np.abs(atlas.normal).argmax(1)

@@ -71,6 +71,11 @@ class Environment:
         """Whether any frame saw the outside at all."""
         return bool(self.observations.any())
 
+    @property
+    def told(self) -> np.ndarray:
+        """Directions whose radiance frames tell: seen, and not clipped; (h, 2h) bool."""
+        return (self.observations > 0) & ~self.clipped
+
     @staticmethod
     def dark() -> Environment:
         """No light from outside."""
@@ -101,7 +106,7 @@ class Environment:
     def _profile(self) -> np.ndarray:
         """Median luminance of what frames saw at each height, (h,) float32; of the nearest height that they saw."""
         height = len(self.observations)
-        known = (self.observations > 0) & ~self.clipped
+        known = self.told
         rows = np.flatnonzero(known.any(1))
         if not len(rows):
             return np.ones(height, np.float32)
@@ -135,9 +140,9 @@ class Environment:
         return Environment(_fill(radiance, self.observations), self.observations, self.clipped)
 
     def known(self, directions: np.ndarray) -> np.ndarray:
-        """Whether frames tell the radiance from unit `directions` ((n, 3)): seen, and not clipped; (n,) bool."""
+        """Whether frames tell the radiance from unit `directions` ((n, 3)), (n,) bool."""
         cell = _bin(directions, self.radiance.shape[0])
-        return ((self.observations > 0) & ~self.clipped).ravel()[cell]
+        return self.told.ravel()[cell]
 
 
 def _bin(directions: np.ndarray, height: int) -> np.ndarray:

@@ -38,18 +38,15 @@ class Fringes:
     object_id : (k,) int32
     colour : (k, 3) float32
         Linear Rec.709 of luminance 1.
-    count : (k,) int32
-        Pixels that it rests on.
     """
 
     object_id: np.ndarray
     colour: np.ndarray
-    count: np.ndarray
 
     @staticmethod
     def none() -> Fringes:
         """Where nothing is clipped."""
-        return Fringes(np.zeros(0, np.int32), np.zeros((0, 3), np.float32), np.zeros(0, np.int32))
+        return Fringes(np.zeros(0, np.int32), np.zeros((0, 3), np.float32))
 
     def colours(self) -> dict[int, np.ndarray]:
         """Colour of each object, (3,) float64."""
@@ -67,17 +64,13 @@ class FringeCollector:
         clipped = pixels.saturated
         if not clipped.any():
             return
-        spots, count = ndimage.label(clipped, AROUND)
+        spots, _ = ndimage.label(clipped, AROUND)
         usable = pixels.valid & ~clipped
         far_from_any = ~ndimage.binary_dilation(clipped, AROUND, NEAR)
         for index, box in enumerate(ndimage.find_objects(spots), 1):
             ids = view.object_id[box][spots[box] == index]
-            ids = ids[ids >= 0]
-            size = int((spots[box] == index).sum())
-            if size < LEAST_PIXELS or len(ids) <= LEAST_SHARE * size:
-                continue
-            owner = np.bincount(ids)
-            if owner.max() <= LEAST_SHARE * size:
+            owner = np.bincount(ids[ids >= 0], minlength=1)
+            if len(ids) < LEAST_PIXELS or owner.max() <= LEAST_SHARE * len(ids):
                 continue
             around = tuple(slice(max(side.start - FAR, 0), side.stop + FAR) for side in box)
             excess = _excess(
@@ -95,8 +88,7 @@ class FringeCollector:
             return Fringes.none()
         colour = np.array([np.median(excess / (excess @ LUMINANCE)[:, None], 0) for excess in found.values()])
         colour /= (colour @ LUMINANCE)[:, None]
-        count = [len(excess) for excess in found.values()]
-        return Fringes(np.array(list(found), np.int32), colour.astype(np.float32), np.array(count, np.int32))
+        return Fringes(np.array(list(found), np.int32), colour.astype(np.float32))
 
 
 def _excess(

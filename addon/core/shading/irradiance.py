@@ -189,9 +189,10 @@ def direct(
         share = emitter_rays * aimed + rays * cosine / np.float32(np.pi)
         weight = np.zeros(distance.shape, np.float32)
         weight[row, ray] = cosine / np.maximum(share, 1e-20)
-        total[part] = np.matmul(weight[:, None], light[pattern])[:, 0]
+        shown = light[pattern]
+        total[part] = np.matmul(weight[:, None], shown)[:, 0]
         weight[:, emitter_rays // 2:] *= -1
-        noise[part] = BOTH_HALVES * np.abs(np.matmul(weight[:, None], light[pattern])[:, 0]).mean(1)
+        noise[part] = BOTH_HALVES * np.abs(np.matmul(weight[:, None], shown)[:, 0]).mean(1)
     return total, noise
 
 

@@ -42,14 +42,11 @@ def less_noise(
         group, count = _cells(position, normal, k / GRIDS)
         fitted = _planes(position, light, group, count)
         rest = (light - fitted).mean(1)
-        enough = count >= LEAST
-        known = np.maximum(count, 1)
-        n2 = np.bincount(group, noise.astype(np.float64) ** 2, len(count)) / known
-        v = np.bincount(group, rest.astype(np.float64) ** 2, len(count)) / known
-        keep = np.where(enough, np.maximum(v - n2, 0) / np.maximum(v, 1e-30), 1)
+        n2, v = (np.bincount(group, x.astype(np.float64) ** 2, len(count)) / count for x in (noise, rest))
+        keep = np.where(count >= LEAST, np.maximum(v - n2, 0) / np.maximum(v, 1e-30), 1)
         result += fitted + keep[group, None].astype(np.float32) * (light - fitted)
         # A plane has four numbers of its own.
-        left += (n2 * (keep**2 + (1 - keep) ** 2 * np.minimum(4 / known, 1)))[group]
+        left += (n2 * (keep**2 + (1 - keep) ** 2 * np.minimum(4 / count, 1)))[group]
     return (result / np.float32(GRIDS)), np.sqrt(left / GRIDS).astype(np.float32)
 
 

@@ -28,16 +28,12 @@ SMOOTH = 0.05
 def finest_spacing(atlas: Atlas, share: float = FINEST_SHARE) -> float:
     """Least distance of two gathering points, metres."""
     extent = np.sort(np.ptp(atlas.position, axis=0))
-    return max(_texel_edge(atlas), share * float(np.sqrt(extent[1] * extent[2])))
-
-
-def _texel_edge(atlas: Atlas) -> float:
-    return float(np.sqrt(np.median(atlas.area)))
+    return max(atlas.texel_edge, share * float(np.sqrt(extent[1] * extent[2])))
 
 
 def block_step(atlas: Atlas) -> int:
     """Edge in texels of the blocks that light is interpolated in: a power of two."""
-    return 1 << max(int(np.log2(finest_spacing(atlas) / _texel_edge(atlas) + 1e-6)), 0)
+    return 1 << max(int(np.log2(finest_spacing(atlas) / atlas.texel_edge + 1e-6)), 0)
 
 
 def irradiance(
@@ -135,7 +131,7 @@ def irradiance(
 
     def shine(index: np.ndarray) -> np.ndarray:
         """The sun's part of E and its error, (k, 4) float32."""
-        found, edge = np.empty((len(index), 4), np.float32), _texel_edge(atlas)
+        found, edge = np.empty((len(index), 4), np.float32), atlas.texel_edge
 
         def run(part: slice) -> None:
             at = index[part]

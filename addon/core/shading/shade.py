@@ -169,7 +169,7 @@ def shade(
     unsure = np.hypot(unsure, tilted)
     if sampler != "uniform":  # the paper's way, whose rays alone leave more noise than creases do
         # Near a crease the light of two sides is mixed.
-        unsure = np.hypot(unsure, crease_doubt(mesh, atlas, float(np.sqrt(np.median(atlas.area)))))
+        unsure = np.hypot(unsure, crease_doubt(mesh, atlas, atlas.texel_edge))
     rho, valid = quotient(lit_diffuse.radiance, E)
     albedo = fill(atlas, rho, valid & seen, class_of, emitters, np.hypot(doubt(lit_diffuse), unsure))
     return Shading(

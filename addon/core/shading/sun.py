@@ -137,7 +137,7 @@ def taken_out(environment: Environment) -> tuple[Environment, Sun | None]:
     A clipped sun is none that was seen: its light is solved for.
     """
     luminance = environment.radiance @ LUMINANCE
-    seen = (environment.observations > 0) & ~environment.clipped
+    seen = environment.told
     if not seen.any():
         return environment, None
     way, solid = _directions(len(luminance))

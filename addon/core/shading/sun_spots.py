@@ -68,7 +68,7 @@ class Spots:
         self.scene, self.atlas = field.scene, atlas
         self.position, self.normal = atlas.position[element], atlas.normal[element]
         self.sample = Sample(element, atlas.object_id[element], field.radiance[element].astype(np.float64), received)
-        self.edge = float(np.sqrt(np.median(atlas.area)))
+        self.edge = atlas.texel_edge
 
     def __len__(self) -> int:
         return len(self.position)

@@ -38,7 +38,7 @@ class TexelBlocks:
         self._size, self._threads = atlas.size, threads
         self._row, self._column = np.divmod(atlas.texel[element].astype(np.int32), np.int32(atlas.size))
         self._position, self._normal = atlas.position[element], atlas.normal[element]
-        self._edge = float(np.sqrt(np.median(atlas.area)))
+        self._edge = atlas.texel_edge
         self._at = np.full(atlas.size * atlas.size, -1, np.int32)
         self._at[atlas.texel[element]] = np.arange(len(element), dtype=np.int32)
 

@@ -197,8 +197,7 @@ def irradiance_at(field: LightField, element: np.ndarray, seed: int) -> np.ndarr
 def from_sun(field: LightField, element: np.ndarray) -> np.ndarray:
     """The sun's part of E, (m, 3) float32."""
     atlas = field.atlas
-    edge = float(np.sqrt(np.median(atlas.area)))
-    return sunlight(field.scene, field.sun, atlas.position[element], atlas.normal[element], edge)[:, :3]
+    return sunlight(field.scene, field.sun, atlas.position[element], atlas.normal[element], atlas.texel_edge)[:, :3]
 
 
 def _thrown_by_object(field: LightField, element: np.ndarray, object_id: int, seed: int) -> np.ndarray:

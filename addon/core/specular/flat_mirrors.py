@@ -117,6 +117,4 @@ def _mirrored(
     first = np.array([[0, 0], [TILT, 0], [0, TILT]])
     how = {"initial_simplex": first, "maxfev": TILTS, "xatol": 3e-4, "fatol": 1e-3}
     best = minimize(lambda by: -compare(turned(by))[2], first[0], method="Nelder-Mead", options=how).x
-    if compare(turned(best))[2] > compare(turned(first[0]))[2]:
-        normal = turned(best)[0]
-    return normal.astype(np.float32), np.clip(f0, 0.02, 1).astype(np.float32)
+    return turned(best)[0].copy(), np.clip(f0, 0.02, 1).astype(np.float32)

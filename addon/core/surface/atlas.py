@@ -50,6 +50,11 @@ class Atlas:
     def __len__(self) -> int:
         return len(self.texel)
 
+    @property
+    def texel_edge(self) -> float:
+        """Edge of a usual element, metres."""
+        return float(np.sqrt(np.median(self.area)))
+
     def image(self, values: np.ndarray, empty: float = 0.0) -> np.ndarray:
         """Spread values of the elements ((n,) or (n, c)) over the image, islands padded: (size, size[, c])."""
         flat = np.full((self.size * self.size, *values.shape[1:]), empty, values.dtype)

@@ -71,10 +71,14 @@ def oriented(mesh: Mesh, cameras: Sequence[Camera]) -> Sides:
     return seen_sides(mesh, normal, RayScene(mesh.vertices, mesh.triangles), cameras)
 
 
+def _every(mesh: Mesh, sign: np.ndarray) -> np.ndarray:
+    """The signs of a mesh's first sides, and the same for its second ones."""
+    return sign if mesh.backs is None else np.concatenate([sign, sign[mesh.backs]])
+
+
 def facing(mesh: Mesh, sign: np.ndarray) -> Mesh:
     """The mesh with its windings turned where `sign` is negative, second sides ((s,) `Mesh.backs`) like their first."""
-    if mesh.backs is not None:
-        sign = np.concatenate([sign, sign[mesh.backs]])
+    sign = _every(mesh, sign)
     uv = None if mesh.uv is None else turned(mesh.uv, sign)
     return replace(mesh, triangles=turned(mesh.triangles, sign), uv=uv)
 
@@ -132,8 +136,7 @@ def build_surface(
 def from_uv(mesh: Mesh, sign: np.ndarray, uv: np.ndarray, size: int, noise: float = 0.0) -> Surface:
     """The surface for a known layout of a mesh `with_backs`, and the sign of each of its first sides."""
     towards = facing(mesh, sign)
-    every = sign if mesh.backs is None else np.concatenate([sign, sign[mesh.backs]])
-    atlas = make_atlas(towards, turned(uv, every), size)
+    atlas = make_atlas(towards, turned(uv, _every(mesh, sign)), size)
     scale = uv_scale(mesh, uv)
     scene = RayScene(towards.vertices, towards.triangles, towards.backs)
     return Surface(towards, atlas, scene, uv, 1 / max(scale * size, 1e-12), noise)
