@@ -59,11 +59,14 @@ def direct_over_mirrors(
             met = (hits.triangle >= 0) & (field.mirror_of[hits.triangle] == field.mirrors.index(mirror))
             useful, travelled = useful[met], hits.distance[met]
             turn = origin[useful] + travelled[:, None] * direction[useful]
-            rest = distance[useful] - travelled
+            turn = field.scene.off_surface(turn, np.broadcast_to(mirror.normal, turn.shape))
+            # To the point itself: where the mesh is a millimetre off the mirror's plane, the mirrored way would end
+            # behind it as often as before it, and the lamp would be in its own shadow.
+            rest = pick.point[useful] - turn
+            left = np.sqrt(np.einsum("ij,ij->i", rest, rest))
             hidden = field.scene.occluded(
-                field.scene.off_surface(turn, np.broadcast_to(mirror.normal, turn.shape)),
-                after[useful], rest * np.float32(1 - 1e-4) - 2 * field.scene.offset,
-            )  # fmt: skip
+                turn, rest / np.maximum(left, 1e-12)[:, None], left * np.float32(1 - 1e-4) - field.scene.offset
+            )
             useful = useful[~hidden]
             element = field.lookup(pick.triangle[useful], pick.u[useful], pick.v[useful])
             weight = cosine[useful] * np.abs(facing[useful]) / (distance[useful] ** 2 * pick.density[useful])

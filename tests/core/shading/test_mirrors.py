@@ -65,6 +65,19 @@ def test_a_lamp_over_a_mirror_is_its_image(corner):
     assert E.mean() == pytest.approx((truth[:, :1] * LAMP * F0).mean(), rel=0.01)
 
 
+@pytest.mark.parametrize("shift, tilt", [(0.004, 0.0), (-0.004, 0.0), (0.0, 0.003), (0.0, -0.003)])
+def test_a_plane_that_is_a_little_off_the_mesh_casts_no_shadow(corner, shift, tilt):
+    """The image is then off by millimetres, and so is the light; the lamp must not hide itself."""
+    _, field = corner
+    position, normal = places()
+    tilted = np.float32([np.cos(tilt), 0, np.sin(tilt)])
+    glass = Mirror(2, np.float32([shift, 0, 1]), tilted, F0)
+    field = field.with_mirrors((glass,))
+    E = direct_over_mirrors(field, bright_triangles(field), position, normal, 256, 0)
+    truth = polygon_irradiance(position.astype(float), normal.astype(float), [lamp_at(-2.0)])
+    assert E.mean() == pytest.approx((truth[:, :1] * LAMP * F0).mean(), rel=0.02)
+
+
 def test_without_the_mirror_nothing_comes(corner):
     _, field = corner
     position, normal = places()
