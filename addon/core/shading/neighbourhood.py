@@ -16,7 +16,9 @@ from ..parallel import blocks
 from ..surface.atlas import Atlas
 
 NEIGHBOURS = 64
-REFERENCES = 4000
+ALIKE = 0.7
+"""A wider neighbourhood speaks for a place if its median is within so many widths of the nearest neighbours' own."""
+REFERENCES = 4096
 """Well-measured elements of an object that neighbours are sought among: a thinned set reaches further around."""
 CELL_TEXELS = 6.0
 """Edge of the cells that share one prior."""
@@ -47,8 +49,8 @@ def doubt(lit: LitDiffuse) -> np.ndarray:
     return np.where(lit.seen & (lit.tier != SATURATED), error, np.inf).astype(np.float32)
 
 
-def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Median and width of log albedo around each place, (m, 3) and (m,)."""
+def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Median and width of the log albedo of the nearest references, (m, 3) and (m,)."""
     # At most an eighth of the object: a small object's ends are not each other's surroundings.
     k = min(NEIGHBOURS, max(len(references) // 8, 3), len(references))
     near = cKDTree(references).query(position, k=k, workers=-1)[1].reshape(len(position), k)
@@ -59,6 +61,23 @@ def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) ->
         middle[part] = np.median(around, 1)
         width[part] = 1.4826 * np.median(np.abs(around - middle[part, None]).mean(2), 1)
     return middle, np.maximum(width, np.float32(0.02))
+
+
+def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Median and width of log albedo around each place, from as far around as it stays the same: (m, 3) and (m,).
+
+    `references` are in random order: half of them reach twice as far (in area) with as many neighbours.
+    """
+    middle, width = _around(position, references, log_rho)
+    first, allowed = middle.copy(), ALIKE * width
+    todo, count = np.arange(len(position)), len(references) // 2
+    while count >= 8 * NEIGHBOURS and len(todo):
+        wider = _around(position[todo], references[:count], log_rho[:count])
+        alike = np.abs(wider[0] - first[todo]).mean(1) <= allowed[todo]
+        todo = todo[alike]
+        middle[todo], width[todo] = wider[0][alike], wider[1][alike]
+        count //= 2
+    return middle, width
 
 
 def steadied(
@@ -88,8 +107,7 @@ def steadied(
     sure = known[error[known] <= max(SURE, float(np.median(error[known])))]
     if len(sure) < NEIGHBOURS:
         sure = known
-    if len(sure) > REFERENCES:
-        sure = np.random.default_rng(seed).choice(sure, REFERENCES, replace=False)
+    sure = np.random.default_rng(seed).permutation(sure)[:REFERENCES]
     cell = CELL_TEXELS * float(np.sqrt(np.median(atlas.area[own])))
     place = np.floor((position - position.min(0)) / max(cell, 1e-9)).astype(np.int64)
     extent = place.max(0) + 1
