@@ -7,6 +7,7 @@ import pytest
 
 from addon.core.lit_diffuse.accumulate import LitDiffuse
 from addon.core.lit_diffuse.visibility import CLEAN, EDGE, SATURATED
+from addon.core.shading import neighbourhood
 from addon.core.shading.albedo import FILLED, MEASURED, fill
 from addon.core.shading.neighbourhood import EDGE_DOUBT, FEW, LEAST_DOUBT, SURE, doubt, steadied
 from tests.core.rooms import make_room, quad
@@ -82,6 +83,38 @@ def test_colour_is_drawn_in_as_well(atlas):
     error = np.full(len(atlas), GOOD)
     rho[1000], error[1000] = (0.1, 0.3, 0.6), POOR
     assert np.allclose(run(atlas, rho, error)[1000], (0.6, 0.3, 0.1), rtol=0.03)
+
+
+def blotch(atlas, size):
+    """A square in the middle of the wall, and the third of its elements that are in doubt."""
+    inside = (np.abs(atlas.position[:, :2] - 1.5) < size / 2).all(1)
+    poor = inside & (np.random.default_rng(1).random(len(atlas)) < 0.3)
+    return inside, poor
+
+
+def test_errors_that_neighbours_share_lose_their_say_further_out(monkeypatch):
+    """A blotch of light that is 10 % off, as wide as the nearest neighbourhood, on a wall measured to 15 %."""
+    wall = make_room([quad((0, 0, 0), (3, 0, 0), (0, 3, 0), 0)], 0.03).atlas
+    inside, _ = blotch(wall, 0.5)
+    _, poor = blotch(wall, 0.3)
+    rho = 0.5 * np.exp(np.random.default_rng(0).normal(0, 0.15, (len(wall), 1))).repeat(3, 1)
+    rho[inside] *= 1.1
+    error = np.where(poor, POOR, 0.15)
+    wide = np.median(run(wall, rho, error)[poor])
+    monkeypatch.setattr(neighbourhood, "ALIKE", 0)
+    near = np.median(run(wall, rho, error)[poor])
+    assert abs(wide / 0.5 - 1) < 0.03 and near / 0.5 - 1 > 0.05
+
+
+def test_surroundings_that_differ_are_left_out(atlas, monkeypatch):
+    """A dark square no larger than that on a bright wall: what is in doubt in it stays dark."""
+    _, poor = blotch(atlas, 0.3)
+    inside, _ = blotch(atlas, 0.5)
+    noise = np.exp(np.random.default_rng(0).normal(0, 0.03, (len(atlas), 3)))
+    rho, error = grey(np.where(inside, 0.2, 0.6)) * noise, np.where(poor, POOR, GOOD)
+    assert np.allclose(run(atlas, rho, error)[poor], 0.2, rtol=0.1)
+    monkeypatch.setattr(neighbourhood, "ALIKE", np.inf)
+    assert np.median(run(atlas, rho, error)[poor]) > 0.4
 
 
 @pytest.mark.parametrize("axis", [0, 1])
