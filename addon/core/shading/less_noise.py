@@ -21,7 +21,12 @@ TURNED = 4
 def less_noise(
     position: np.ndarray, normal: np.ndarray, light: np.ndarray, noise: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Light with less noise, and the noise that is left.
+    """Light with less noise, and how noisy it was around each place.
+
+    Over seeds a third of the noise is left (a kitchen with seven small lamps: .030 of E, from .081). Where rays disagree,
+    though, lamps are near or hidden in part, and E is off for reasons that all rays share: mesh, texel, the lamp's own
+    evenness. So doubt in E goes by what there was (kitchen: albedo of 25.7 dB, 24.0 by what is left; elsewhere the same
+    within .3 dB).
 
     Parameters
     ----------
@@ -35,9 +40,9 @@ def less_noise(
     -------
     light : (m, 3) float32
     noise : (m,) float32
-        The same over the whole of a cell.
+        Root mean square over the cells around.
     """
-    result, left = np.zeros_like(light), np.zeros(len(light))
+    result, around = np.zeros_like(light), np.zeros(len(light))
     for k in range(GRIDS):
         group, count = _cells(position, normal, k / GRIDS)
         fitted = _planes(position, light, group, count)
@@ -45,9 +50,8 @@ def less_noise(
         n2, v = (np.bincount(group, x.astype(np.float64) ** 2, len(count)) / count for x in (noise, rest))
         keep = np.where(count >= LEAST, np.maximum(v - n2, 0) / np.maximum(v, 1e-30), 1)
         result += fitted + keep[group, None].astype(np.float32) * (light - fitted)
-        # A plane has four numbers of its own.
-        left += (n2 * (keep**2 + (1 - keep) ** 2 * np.minimum(4 / count, 1)))[group]
-    return (result / np.float32(GRIDS)), np.sqrt(left / GRIDS).astype(np.float32)
+        around += n2[group]
+    return (result / np.float32(GRIDS)), np.sqrt(around / GRIDS).astype(np.float32)
 
 
 def _cells(position: np.ndarray, normal: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
