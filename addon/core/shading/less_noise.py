@@ -23,10 +23,10 @@ def less_noise(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Light with less noise, and how noisy it was around each place.
 
-    Over seeds a third of the noise is left (a kitchen with seven small lamps: .030 of E, from .081). Where rays disagree,
-    though, lamps are near or hidden in part, and E is off for reasons that all rays share: mesh, texel, the lamp's own
-    evenness. So doubt in E goes by what there was (kitchen: albedo of 25.7 dB, 24.0 by what is left; elsewhere the same
-    within .3 dB).
+    Over seeds a third of the noise is left (a kitchen with seven small lamps: .030 of E, from .081). Where rays
+    disagree, though, lamps are near or hidden in part, and E is off for reasons that all rays share: mesh, texel, the
+    lamp's own evenness. So doubt in E goes by what there was (kitchen: albedo of 25.7 dB, 24.0 by what is left; in four
+    other rooms -.2 to +.1 dB, after one scale -.3 to +.5).
 
     Parameters
     ----------
