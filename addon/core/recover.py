@@ -21,9 +21,10 @@ from .evidence.collect import Evidence, collect
 from .evidence.page import make_page
 from .lit_diffuse.accumulate import LitDiffuse, accumulate
 from .lit_diffuse.from_texture import face_edge, lit_from_tiles
+from .lit_diffuse.poses import Poses, Texture, refine_poses
 from .material import TRANSPARENT, ObjectMaterial
 from .memory import peak_memory
-from .progress import Progress
+from .progress import Progress, Rounds
 from .report import make_report
 from .settings import Settings
 from .shading.albedo import NONE, Albedo, fill, quotient
@@ -32,7 +33,7 @@ from .shading.environment import Environment, EnvironmentAccumulator
 from .shading.field import LightField
 from .shading.fringes import FringeCollector, Fringes
 from .shading.lamps import Lamp
-from .shading.mirrors import Mirror, known_mirror
+from .shading.mirrors import Mirror, in_their_planes, known_mirror
 from .shading.neighbourhood import doubt
 from .shading.shade import Shading, shade
 from .shading.sun import Sun, put_in
@@ -45,7 +46,7 @@ from .surface.build import Surface, build_surface, from_uv
 from .surface.denoise import without_noise
 from .surface.two_sides import laid_apart, with_backs
 
-CODE = 31
+CODE = 32
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -89,8 +90,8 @@ class Recovery:
 
     @property
     def frames(self) -> tuple[Frame, ...]:
-        """The capture's, in the coordinates that the stages work in."""
-        return self._near.frames
+        """The capture's, in the coordinates that the stages work in, where they were found to be."""
+        return self.poses().of(self._near.frames)
 
     # Each stage's key: the stage before, and the settings that it heeds.
 
@@ -98,7 +99,7 @@ class Recovery:
     def _keys(self) -> dict[str, str]:
         s = self.settings
         surface = key("surface", CODE, fingerprint(self.capture), s.texel_size, s.detail, s.atlas_size, s.denoise_mesh)
-        lit = key("lit_diffuse", surface, s.median, s.frame_order, s.seed)
+        lit = key("lit_diffuse", surface, s.refine_poses, s.median, s.frame_order, s.seed)
         shading = key(
             "shading", lit, s.shading, s.shading_rays, s.emitter_rays, s.portal_rays, s.interpolate,
             s.mirrors, s.seed,
@@ -166,15 +167,30 @@ class Recovery:
         moved = mesh.vertices[: len(before)] - before  # by itself, so that what did not move is exact
         return laid_apart(mesh, self.capture.mesh.vertices + moved)
 
+    def written_mesh(self) -> Mesh:
+        """`room_mesh` as the scene gets it. Mirrors of a noisy mesh lie in the planes that what they show tells."""
+        mesh = self.room_mesh()
+        if not self.surface().noise:
+            return mesh
+        return dataclasses.replace(mesh, vertices=in_their_planes(mesh, self.shading().mirrors))
+
+    def room_poses(self) -> Poses:
+        """Where the frames were found to be, in the capture's coordinates."""
+        poses = self.poses().camera_to_world.copy()
+        for pose, was, near in zip(poses, self.capture.frames, self._near.frames, strict=True):
+            pose[:3, 3] += was.camera.centre - near.camera.centre
+        return dataclasses.replace(self.poses(), camera_to_world=poses)
+
     def _read(self, frame: Frame) -> Pixels:
         """A frame's pixels; one that turns out damaged counts as blind, unless too many are."""
         try:
             pixels = read_pixels(frame)
-            if not pixels.valid.any():
+            if not pixels.valid.any() and frame.name not in self.blind_frames:
                 self.blind_frames.append(frame.name)
             return pixels
         except BadInputError as error:
-            self.bad_frames.append(f"{error} It was left out.")
+            if (told := f"{error} It was left out.") not in self.bad_frames:
+                self.bad_frames.append(told)
             if len(self.bad_frames) > MAX_BAD_SHARE * len(self.capture.frames):
                 raise BadInputError(
                     f"{len(self.bad_frames)} of {len(self.capture.frames)} frames can't be read; the first: {error}"
@@ -182,23 +198,36 @@ class Recovery:
             shape = (frame.camera.height, frame.camera.width)
             return Pixels(np.zeros((*shape, 3), np.float32), np.zeros(shape, bool), np.zeros(shape, bool))
 
-    def _accumulated(self) -> tuple[LitDiffuse, Environment, Samples, Fringes]:
-        """What the one pass over all frames gives."""
-        surface = self.surface()
-        frames = self._near.frames
+    def _accumulated(self) -> tuple[LitDiffuse, Environment, Samples, Fringes, Poses]:
+        """What the passes over all frames give."""
+        surface, s = self.surface(), self.settings
+        as_read = self._near.frames
 
         def compute():
-            value = from_frames() if frames else (from_mesh(), Environment.dark(), Samples.none(), Fringes.none())
+            value = from_frames() if as_read else from_mesh()
             arrays = {f"{i}.{f.name}": getattr(v, f.name) for i, v in enumerate(value) for f in dataclasses.fields(v)}
             return value, arrays, {"bad_frames": self.bad_frames, "blind_frames": self.blind_frames}
 
         def from_mesh():
-            as_read = dataclasses.replace(self._near.mesh, vertices=surface.mesh.vertices)
-            return lit_from_tiles(as_read, surface.atlas, self.progress)
+            mesh = dataclasses.replace(self._near.mesh, vertices=surface.mesh.vertices)
+            lit = lit_from_tiles(mesh, surface.atlas, self.progress)
+            return lit, Environment.dark(), Samples.none(), Fringes.none(), Poses.as_read(())
 
         def from_frames():
+            rounds = Rounds(self.progress, 0, 1)
+            found = one_pass(as_read, rounds)
+            if not s.refine_poses:
+                return *found, Poses.as_read(as_read)
+            rounds.next()
+            lit, sky = found[:2]
+            room = LightField(surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), sky)
+            poses = refine_poses(as_read, self._read, Texture(room, lit.seen), threads=s.threads, progress=rounds)
+            rounds.next()
+            return *(one_pass(poses.of(as_read), rounds) if poses.moved.any() else found), poses
+
+        def one_pass(frames, progress):
             sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
-            kept = SampleCollector(surface.atlas, len(frames), self.settings.seed)
+            kept = SampleCollector(surface.atlas, len(frames), s.seed)
             fringes = FringeCollector()
 
             def also(index, view, pixels, seen):
@@ -208,8 +237,8 @@ class Recovery:
 
             lit = accumulate(
                 surface.mesh, surface.atlas, surface.scene, frames, self._read,
-                median=self.settings.median, order=self.settings.frame_order, seed=self.settings.seed,
-                threads=self.settings.threads, folder=self.store.folder, also=also, progress=self.progress,
+                median=s.median, order=s.frame_order, seed=s.seed,
+                threads=s.threads, folder=self.store.folder, also=also, progress=progress,
             )  # fmt: skip
             if not lit.seen.any():
                 raise BadInputError(
@@ -221,7 +250,7 @@ class Recovery:
         def load(arrays, meta):
             self.bad_frames = list(meta.get("bad_frames", ()))
             self.blind_frames = list(meta.get("blind_frames", ()))
-            kinds = (LitDiffuse, Environment, Samples, Fringes)
+            kinds = (LitDiffuse, Environment, Samples, Fringes, Poses)
             return tuple(
                 kind(**{f.name: arrays[f"{i}.{f.name}"] for f in dataclasses.fields(kind)})
                 for i, kind in enumerate(kinds)
@@ -240,6 +269,10 @@ class Recovery:
     def samples(self) -> Samples:
         """Observations kept one by one for the specular fit."""
         return self._accumulated()[2]
+
+    def poses(self) -> Poses:
+        """Where the frames were found to be."""
+        return self._accumulated()[4]
 
     def shading(self) -> Shading:
         """Lamps, irradiance and albedo."""

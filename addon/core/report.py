@@ -76,6 +76,14 @@ def _report_lit(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> 
         warnings.append(f"{count} frames have no valid pixel (the first: {first}); all are NaN, inf or masked.")
     if not lit.radiance[lit.seen].any():
         warnings.append("Every frame is black; nothing can be said of any albedo.")
+    poses = run.poses()
+    if np.isfinite(poses.shift):
+        figures |= {"pose_shift_pixels": float(poses.shift), "poses_refined": int(poses.moved.sum())}
+    if poses.moved.any():
+        warnings.append(
+            f"Frames lay {poses.shift:.1f} pixels beside what all of them show together; the poses of "
+            f"{poses.moved.sum()} of {len(poses.moved)} were put right; turn off refine_poses to use them as read."
+        )
     area = atlas.area.sum()
     figures["unseen_share"] = float(atlas.area[~lit.seen].sum() / area)
     figures["observations_median"] = float(np.median(lit.count[lit.seen])) if run.capture.frames else 0.0

@@ -22,6 +22,9 @@ class Settings:
     denoise_mesh : bool
         Take a scanned mesh's noise out of it, edges kept, for all that is computed and for the scene that is written. A
         mesh without noise, and objects in your own scene, stay as they are.
+    refine_poses : bool
+        Put frames right that lie beside what all of them show together. Good poses stay as they are, and so do cameras
+        in your own scene.
     median : str
         'adaptive' (exact for short videos, batched beyond), 'batched' (exact for a spot's first 20 observations, close
         beyond, in fixed memory), 'exact' (all observations go to disk), 'p2' (the paper's P-square) or 'mean'.
@@ -56,6 +59,7 @@ class Settings:
     detail: float = 1.0
     atlas_size: int = 4096
     denoise_mesh: bool = True
+    refine_poses: bool = True
     median: str = "adaptive"
     frame_order: str = "shuffled"
     shading: str = "aimed"
@@ -91,8 +95,9 @@ class Settings:
             raise BadInputError("Settings shading_rays and specular_rays must be at least 1, atlas_size at least 64.")
 
 
-PAPER = Settings(denoise_mesh=False, median="p2", frame_order="capture", shading="uniform", shading_rays=10000,
-                 emitter_rays=0, portal_rays=0, interpolate=False, mirrors=False, specular="target", refine=0)
+PAPER = Settings(denoise_mesh=False, refine_poses=False, median="p2", frame_order="capture", shading="uniform",
+                 shading_rays=10000, emitter_rays=0, portal_rays=0, interpolate=False, mirrors=False, specular="target",
+                 refine=0)
 """Haefner et al. 2021: P-square in video order, uniform rays, one target frame."""
 DRAFT = Settings(detail=0.5, shading_rays=48, emitter_rays=16, portal_rays=16, specular_rays=96)
 """A first look: texels of two pixels' edge, few rays."""

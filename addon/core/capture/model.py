@@ -198,6 +198,18 @@ class Pixels:
     valid: np.ndarray
     saturated: np.ndarray
 
+    def coarser(self, step: int) -> Pixels:
+        """Means over `step` * `step` pixels, as `Camera.coarser` has them: valid where all are, clipped where any."""
+        if step == 1:
+            return self
+        height, width = (n // step * step for n in self.valid.shape)
+
+        def blocks(values: np.ndarray) -> np.ndarray:
+            return values[:height, :width].reshape(height // step, step, width // step, step, *values.shape[2:])
+
+        return Pixels(blocks(self.radiance).mean((1, 3)), blocks(self.valid).all((1, 3)),
+                      blocks(self.saturated).any((1, 3)))  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Instance:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..capture.model import Pixels
 from ..capture.pixels import read_pixels
 from ..material import METAL, SPECULAR
 from ..shading.emitters import bright_triangles
@@ -85,7 +84,7 @@ def view(run: Recovery, index: int) -> View:
     """Frame `index` made small, and predicted."""
     frame = run.frames[index]
     step = -(-frame.camera.width // WIDTH)
-    pixels, camera = _smaller(read_pixels(frame), step), frame.camera.coarser(step)
+    pixels, camera = read_pixels(frame).coarser(step), frame.camera.coarser(step)
     directions, seen = camera.rays(camera.pixel_centres())
     origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
     room, surface = run.field, run.surface()
@@ -123,15 +122,3 @@ def _add_lobes(run: Recovery, predicted: np.ndarray, element: np.ndarray, direct
         if m.model == METAL:
             predicted[at] = 0
         predicted[at] += f0 * light.A[:, 0] + light.B[:, 0]
-
-
-def _smaller(pixels: Pixels, step: int) -> Pixels:
-    """Means over `step` * `step` pixels; good where all of them are."""
-    height, width = (n // step * step for n in pixels.valid.shape)
-
-    def blocks(values):
-        return values[:height, :width].reshape(height // step, step, width // step, step, *values.shape[2:])
-
-    return Pixels(
-        blocks(pixels.radiance).mean((1, 3)), blocks(pixels.valid).all((1, 3)), blocks(pixels.saturated).any((1, 3))
-    )

@@ -12,10 +12,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..capture.model import KnownMirror
+from ..capture.model import KnownMirror, Mesh
+from ..surface.elements import triangle_geometry
 
 if TYPE_CHECKING:
     from .field import LightField
+
+
+SAME = np.cos(np.radians(5.0))
+"""Triangles turned less than this against a mirror's plane are put into it: a scan's are off by a degree or two, bevels
+by more."""
 
 
 @dataclass(frozen=True)
@@ -48,3 +54,31 @@ def known_mirror(known: KnownMirror, field: LightField) -> Mirror:
 def reflect(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Directions ((n, 3)) mirrored at a plane with the given unit normal ((3,))."""
     return vectors - 2 * (vectors @ normal)[:, None] * normal
+
+
+def in_their_planes(mesh: Mesh, mirrors: tuple[Mirror, ...]) -> np.ndarray:
+    """The mesh's vertices with those of mirrors put where the room that they show says that their planes lie.
+
+    A renderer reflects at the mesh's own triangles, which a scan's noise turns by some tenths of a degree; what a
+    mirror shows moves by twice that. Which way it faces is told by what it shows (`specular.flat_mirrors`), how far off
+    it lies by its vertices. A mirror that is one side of a sheet (`Mesh.backs`) stays as it is.
+
+    Returns
+    -------
+    (v, 3) float64
+    """
+    normal, area = triangle_geometry(mesh)
+    vertices = mesh.vertices.copy()
+    sheets = [] if mesh.backs is None else np.unique(mesh.object_id[mesh.backs])
+    for mirror in mirrors:
+        if mirror.object_id in sheets:
+            continue
+        way = mirror.normal.astype(np.float64)
+        flat = np.flatnonzero((mesh.object_id == mirror.object_id) & (np.abs(normal @ way) > SAME))
+        if not len(flat):
+            continue
+        corners = vertices[mesh.triangles[flat]]
+        centre = np.average(corners.mean(1), axis=0, weights=area[flat])
+        own = np.unique(mesh.triangles[flat])
+        vertices[own] -= ((vertices[own] - centre) @ way)[:, None] * way
+    return vertices
