@@ -13,6 +13,7 @@ import pytest
 from addon.benchmark.pipeline import cut_in_four
 from addon.core.capture.exr import read_exr
 from addon.core.capture.read import read_capture
+from addon.core.lit_diffuse import poses as poses_found
 from addon.core.progress import Progress
 from addon.core.recover import Recovery
 from addon.core.store import Store
@@ -136,3 +137,41 @@ def test_noise_of_a_mesh_is_measured_and_curvature_is_none():
     assert np.median(tilt(noisy)) == pytest.approx(1.2 * 0.004 / (0.05 / np.sqrt(2)), rel=0.3)
     # Once it is taken out, half of that stays in doubt, also where nothing can be measured any more.
     assert np.median(tilt(with_vertices(bent), 0.004)) == pytest.approx(0.6 * 0.004 / (0.05 / np.sqrt(2)), rel=0.3)
+
+
+def patches(room) -> np.ndarray:
+    """A value for each cube of 70 cm of space, (n, 3)."""
+    cell = np.floor(room.atlas.position / 0.7).astype(int) % 16
+    return np.random.default_rng(0).uniform(0.2, 2, (16, 16, 16, 3)).astype(np.float32)[tuple(cell.T)]
+
+
+def test_poses_are_put_right_stored_and_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(poses_found, "LEAST_SHIFT", 0.25)  # the pictures are tiny
+    far = np.array([4e5, 5e5, 300.0])
+    disk = OnDisk(tmp_path / "true", light=patches, shift=far)
+    off = read_capture(perturbed(disk, tmp_path / "off", "--poses", "20", "3"))
+    true = np.stack([frame.camera.camera_to_world for frame in read_capture(disk.root).frames])
+    read = np.stack([frame.camera.camera_to_world for frame in off.frames])
+
+    def poses(settings=CHEAP):
+        with Store(tmp_path / "result") as store:
+            run = Recovery(off, store, settings, Progress(), disk.unwrap)
+            return run.room_poses(), run.frames, run.report()
+
+    found, frames, report = poses()
+    angle = [np.mean([turned(a, b) for a, b in zip(true, some)]) for some in (read, found.camera_to_world)]
+    assert angle[1] < 0.95 * angle[0]
+    assert report["figures"]["poses_refined"] == found.moved.sum() > 4
+    assert report["figures"]["pose_shift_pixels"] > 0.3
+    assert any("beside what all of them show" in warning for warning in report["warnings"])
+    # In the capture's coordinates, and around the origin where the stages work.
+    way = found.camera_to_world[:, :3, 3] - read[:, :3, 3]
+    assert 0 < np.linalg.norm(way, axis=1).max() < 0.1
+    near = np.stack([frame.camera.camera_to_world for frame in frames])
+    assert np.ptp(found.camera_to_world[:, :3, 3] - near[:, :3, 3], axis=0).max() < 1e-6
+    again, _, report = poses()
+    assert report["stages"]["lit_diffuse"]["stored"]
+    assert np.array_equal(again.camera_to_world, found.camera_to_world)
+    as_read, _, report = poses(replace(CHEAP, refine_poses=False))
+    assert np.array_equal(as_read.camera_to_world[:, :3, :3], read[:, :3, :3]) and not as_read.moved.any()
+    assert "pose_shift_pixels" not in report["figures"]

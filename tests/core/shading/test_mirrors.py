@@ -9,10 +9,10 @@ import pytest
 
 from addon.core.shading.emitters import bright_triangles
 from addon.core.shading.irradiance import direct, gather
-from addon.core.shading.mirrors import Mirror, reflect
+from addon.core.shading.mirrors import Mirror, in_their_planes, reflect
 from addon.core.shading.over_mirrors import direct_over_mirrors
 from addon.core.specular.flat_mirrors import plane_of
-from tests.core.rooms import box_sides, make_room, polygon_irradiance, quad
+from tests.core.rooms import box_sides, make_room, polygon_irradiance, quad, split
 
 F0 = np.float32([0.9, 0.8, 0.7])
 LAMP = np.float32([10, 20, 30])
@@ -131,3 +131,20 @@ def test_a_plane_is_found_and_a_box_is_not(corner):
     whole.atlas, whole.mesh = one, replace(room.mesh, object_id=together)
     assert plane_of(whole, 0) is None
     assert plane_of(whole, 99) is None
+
+
+def test_a_noisy_mirror_is_written_in_the_plane_that_it_shows():
+    """A pane of many triangles with a bevel, off by a degree and by noise."""
+    glass, bevel = quad((0, 2, 0), (1, 0, 0), (0, 0, 1), 3), quad((0, 2, 1), (1, 0, 0), (0, 0.02, 0.02), 3)
+    pane = make_room([*split(glass, 4), bevel, quad((0, 0, 0), (1, 0, 0), (0, 1, 0), 4)], 0.1).mesh
+    vertices = pane.vertices.copy()
+    front = np.arange(len(vertices)) < 4 * 16
+    vertices[front, 1] += np.tan(np.radians(1)) * (vertices[front, 0] - 0.5)
+    mesh = replace(pane, vertices=vertices)
+    mirror = Mirror(3, np.float32([9, 9, 9]), np.float32([0, -1, 0]), np.ones(3, np.float32))
+    found = in_their_planes(mesh, (mirror,))
+    assert np.abs(found[front, 1] - 2).max() < 1e-3
+    assert np.array_equal(found[~front], vertices[~front])
+    assert np.array_equal(in_their_planes(mesh, ()), vertices)
+    backs = replace(mesh, backs=np.array([0], np.int32))
+    assert np.array_equal(in_their_planes(backs, (mirror,)), vertices)
