@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, minimum_filter
@@ -19,7 +20,9 @@ from scipy.ndimage import gaussian_filter, minimum_filter
 from ..capture.model import Camera, Frame, Pixels
 from ..parallel import ordered_map
 from ..progress import Progress, Rounds
-from ..shading.field import LightField
+
+if TYPE_CHECKING:
+    from ..shading.field import LightField
 
 CHECKED = 16
 """Frames, evenly spread, that tell whether poses are off."""
