@@ -19,19 +19,20 @@ from .capture.recentre import near_origin
 from .errors import BadInputError
 from .evidence.collect import Evidence, collect
 from .evidence.page import make_page
-from .lit_diffuse.accumulate import LitDiffuse, accumulate
+from .lit_diffuse.accumulate import LitDiffuse
 from .lit_diffuse.from_texture import face_edge, lit_from_tiles
-from .lit_diffuse.poses import Poses, Texture, refine_poses
+from .lit_diffuse.poses import Poses
 from .material import TRANSPARENT, ObjectMaterial
 from .memory import peak_memory
-from .progress import Progress, Rounds
+from .passes import all_passes
+from .progress import Progress
 from .report import make_report
 from .settings import Settings
 from .shading.albedo import NONE, Albedo, fill, quotient
 from .shading.clipped import shade_clipped
-from .shading.environment import Environment, EnvironmentAccumulator
+from .shading.environment import Environment
 from .shading.field import LightField
-from .shading.fringes import FringeCollector, Fringes
+from .shading.fringes import Fringes
 from .shading.lamps import Lamp
 from .shading.mirrors import Mirror, in_their_planes, known_mirror
 from .shading.neighbourhood import doubt
@@ -40,7 +41,7 @@ from .shading.sun import Sun, put_in
 from .specular.compensation import base_colors
 from .specular.flat_mirrors import find_mirrors
 from .specular.reflect import Specular, fit_specular
-from .specular.samples import SampleCollector, Samples
+from .specular.samples import Samples
 from .store import Store, key
 from .surface.build import Surface, build_surface, from_uv
 from .surface.denoise import without_noise
@@ -200,11 +201,13 @@ class Recovery:
 
     def _accumulated(self) -> tuple[LitDiffuse, Environment, Samples, Fringes, Poses]:
         """What the passes over all frames give."""
-        surface, s = self.surface(), self.settings
-        as_read = self._near.frames
+        surface, frames = self.surface(), self._near.frames
 
         def compute():
-            value = from_frames() if as_read else from_mesh()
+            value = (
+                all_passes(surface, frames, self._read, self.settings, self.store.folder, self.progress)
+                if frames else from_mesh()
+            )  # fmt: skip
             arrays = {f"{i}.{f.name}": getattr(v, f.name) for i, v in enumerate(value) for f in dataclasses.fields(v)}
             return value, arrays, {"bad_frames": self.bad_frames, "blind_frames": self.blind_frames}
 
@@ -212,40 +215,6 @@ class Recovery:
             mesh = dataclasses.replace(self._near.mesh, vertices=surface.mesh.vertices)
             lit = lit_from_tiles(mesh, surface.atlas, self.progress)
             return lit, Environment.dark(), Samples.none(), Fringes.none(), Poses.as_read(())
-
-        def from_frames():
-            rounds = Rounds(self.progress, 0, 1)
-            found = one_pass(as_read, rounds)
-            if not s.refine_poses:
-                return *found, Poses.as_read(as_read)
-            rounds.next()
-            lit, sky = found[:2]
-            room = LightField(surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), sky)
-            poses = refine_poses(as_read, self._read, Texture(room, lit.seen), threads=s.threads, progress=rounds)
-            rounds.next()
-            return *(one_pass(poses.of(as_read), rounds) if poses.moved.any() else found), poses
-
-        def one_pass(frames, progress):
-            sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
-            kept = SampleCollector(surface.atlas, len(frames), s.seed)
-            fringes = FringeCollector()
-
-            def also(index, view, pixels, seen):
-                sky.add(view, pixels)
-                kept.add(index, seen)
-                fringes.add(view, pixels)
-
-            lit = accumulate(
-                surface.mesh, surface.atlas, surface.scene, frames, self._read,
-                median=s.median, order=s.frame_order, seed=s.seed,
-                threads=s.threads, folder=self.store.folder, also=also, progress=progress,
-            )  # fmt: skip
-            if not lit.seen.any():
-                raise BadInputError(
-                    "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; "
-                    "check the frames."
-                )
-            return lit, sky.result(), kept.result(), fringes.result()
 
         def load(arrays, meta):
             self.bad_frames = list(meta.get("bad_frames", ()))

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -107,7 +108,7 @@ class Texture:
     field: LightField
     seen: np.ndarray
 
-    @property
+    @cached_property
     def floor(self) -> float:
         """Radiance that is added before the logarithm."""
         return max(FLOOR * float(np.median(self.field.radiance[self.seen])), 1e-30)

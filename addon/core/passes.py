@@ -1,0 +1,90 @@
+"""The passes over all frames: what L_d, the sky, the specular fit and the lamps' edges each take from them.
+
+One pass, and a second where the first tells that poses are off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from .capture.model import Frame, Pixels
+from .errors import BadInputError
+from .lit_diffuse.accumulate import LitDiffuse, accumulate
+from .lit_diffuse.poses import Poses, Texture, refine_poses
+from .progress import Progress, Rounds
+from .settings import Settings
+from .shading.environment import Environment, EnvironmentAccumulator
+from .shading.field import LightField
+from .shading.fringes import FringeCollector, Fringes
+from .specular.samples import SampleCollector, Samples
+from .surface.build import Surface
+
+Seen = tuple[LitDiffuse, Environment, Samples, Fringes]
+
+
+def one_pass(
+    surface: Surface,
+    frames: Sequence[Frame],
+    read: Callable[[Frame], Pixels],
+    settings: Settings,
+    folder: Path,
+    progress: Progress | Rounds,
+) -> Seen:
+    """Read every frame once.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the exact median keeps observations meanwhile.
+
+    Raises
+    ------
+    BadInputError
+        From `read`, or as no frame shows any of the mesh.
+    InterruptedRun
+        From `progress`.
+    """
+    sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
+    kept = SampleCollector(surface.atlas, len(frames), settings.seed)
+    fringes = FringeCollector()
+
+    def also(index, view, pixels, seen):
+        sky.add(view, pixels)
+        kept.add(index, seen)
+        fringes.add(view, pixels)
+
+    lit = accumulate(
+        surface.mesh, surface.atlas, surface.scene, frames, read, median=settings.median, order=settings.frame_order,
+        seed=settings.seed, threads=settings.threads, folder=folder, also=also, progress=progress,
+    )  # fmt: skip
+    if not lit.seen.any():
+        raise BadInputError(
+            "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; check the frames."
+        )
+    return lit, sky.result(), kept.result(), fringes.result()
+
+
+def all_passes(
+    surface: Surface,
+    frames: Sequence[Frame],
+    read: Callable[[Frame], Pixels],
+    settings: Settings,
+    folder: Path,
+    progress: Progress,
+) -> tuple[LitDiffuse, Environment, Samples, Fringes, Poses]:
+    """What `one_pass` finds, and the poses it is found with: as read, or put right. Parameters and errors are its."""
+    rounds = Rounds(progress, 0, 1)
+    found = one_pass(surface, frames, read, settings, folder, rounds)
+    if not settings.refine_poses:
+        return *found, Poses.as_read(frames)
+    lit, sky = found[:2]
+    room = LightField(surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), sky)
+    rounds.next()
+    poses = refine_poses(frames, read, Texture(room, lit.seen), threads=settings.threads, progress=rounds)
+    if poses.moved.any():
+        rounds.next()
+        found = one_pass(surface, poses.of(frames), read, settings, folder, rounds)
+    return *found, poses
