@@ -12,7 +12,6 @@ from addon.core.capture.png import read_png
 from addon.core.evidence.colours import HEAT, encoded, heat, photo
 from addon.core.evidence.pictures import BLOCK, worst_blocks
 from addon.core.evidence.png import png
-from addon.core.evidence.views import _smaller
 from addon.core.specular.intervals import UNKNOWN, gloss_interval
 from addon.core.specular.models import Choice, choose_model
 from tests.core.glossy_box import Box
@@ -48,7 +47,7 @@ def test_frames_are_made_small_by_means():
     image = np.arange(7 * 9 * 3, dtype=np.float32).reshape(7, 9, 3)
     valid = np.ones((7, 9), bool)
     valid[0, 0] = False
-    small = _smaller(pixels_of(image, valid), 2)
+    small = pixels_of(image, valid).coarser(2)
     assert small.radiance.shape == (3, 4, 3) and np.allclose(small.radiance[1, 1], image[2:4, 2:4].mean((0, 1)))
     assert not small.valid[0, 0] and small.valid.sum() == 11
 
