@@ -59,6 +59,9 @@ FARTHEST = 4.0
 """Pixels; a longer shift is not found by following gradients, and the frame is left where it is."""
 STRAY = 4.0
 """Times the median shift: so is a frame that would go farther than this. It shows mirrors, or something that moved."""
+WORSE = 1.05
+"""A frame goes back if it then fits this much worse. What it costs is mostly what the texture has wrong: without any
+slack a third of two rooms' frames went back, most of them from better places."""
 SKY = 100.0
 """Times the room's diagonal, where rays that escape are taken to end."""
 
@@ -284,7 +287,7 @@ def refine_poses(
         for i, step in enumerate(ordered_map(look, list(zip(frames, before, strict=True)), threads)):
             if progress is not None:
                 progress.update((turn + (i + 1) / len(frames)) / ROUNDS)
-            if step is None or step.shift > farthest or step.cost > cost[i]:
+            if step is None or step.shift > farthest or step.cost > WORSE * cost[i]:
                 stays[i] = True
             else:
                 cameras[i], cost[i] = moved(cameras[i], step.way), step.cost
