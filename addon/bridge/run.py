@@ -124,8 +124,9 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
             surface, materials = recovery.surface(), recovery.materials()
             # The file gets the mesh whose normals face the frames: its lamps shine on that side. And the one that the
             # materials were measured on: their colours fit its normals.
-            facing = replace(capture, mesh=recovery.written_mesh(), frames=recovery.room_poses().of(capture.frames))
-            write_room(store.folder, replace(capture, frames=facing.frames), surface.first_uv)
+            posed = replace(capture, frames=recovery.room_poses().of(capture.frames))
+            facing = replace(posed, mesh=recovery.written_mesh())
+            write_room(store.folder, posed, surface.first_uv)
             warnings = write_scene(store.path("scene.blend"), facing, surface.atlas.uv, materials, store.folder,
                                    recovery.median_radiance(), fresh=scene is None, facing=True)
             if scene is not None:

@@ -146,6 +146,12 @@ def lit_box(size=(4.0, 3.0, 2.5), lamps=(((0.4, 0.6), (0.4, 0.6)),)) -> list[Qua
 # Cameras and pictures
 
 
+def patches(room: Room, edge: float, seed: int = 0) -> np.ndarray:
+    """A value for each cube of space with edges of so many metres, (n, 3) float32."""
+    cell = np.floor(room.atlas.position / edge).astype(int) % 16
+    return np.random.default_rng(seed).uniform(0.2, 2, (16, 16, 16, 3)).astype(np.float32)[tuple(cell.T)]
+
+
 def look_at(eye, target, width: int = 48, height: int = 48, fov: float = 90.0) -> Camera:
     """A camera at `eye`; `fov` is the horizontal angle in degrees."""
     eye, target = np.array(eye, float), np.array(target, float)

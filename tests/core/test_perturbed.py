@@ -20,7 +20,7 @@ from addon.core.store import Store
 from addon.core.surface.mesh_noise import noise_of, tilt
 from addon.core.surface.weld import point_normals, welded
 from tests.core.on_disk import ALBEDO, CHEAP, LAMP, OnDisk
-from tests.core.rooms import make_room, quad, split
+from tests.core.rooms import make_room, patches, quad, split
 
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "perturb_capture.py"
 pytestmark = pytest.mark.usefixtures("few_samples")
@@ -139,16 +139,10 @@ def test_noise_of_a_mesh_is_measured_and_curvature_is_none():
     assert np.median(tilt(with_vertices(bent), 0.004)) == pytest.approx(0.6 * 0.004 / (0.05 / np.sqrt(2)), rel=0.3)
 
 
-def patches(room) -> np.ndarray:
-    """A value for each cube of 70 cm of space, (n, 3)."""
-    cell = np.floor(room.atlas.position / 0.7).astype(int) % 16
-    return np.random.default_rng(0).uniform(0.2, 2, (16, 16, 16, 3)).astype(np.float32)[tuple(cell.T)]
-
-
 def test_poses_are_put_right_stored_and_told(tmp_path, monkeypatch):
     monkeypatch.setattr(poses_found, "LEAST_SHIFT", 0.25)  # the pictures are tiny
     far = np.array([4e5, 5e5, 300.0])
-    disk = OnDisk(tmp_path / "true", light=patches, shift=far)
+    disk = OnDisk(tmp_path / "true", light=lambda room: patches(room, 0.7), shift=far)
     off = read_capture(perturbed(disk, tmp_path / "off", "--poses", "20", "3"))
     true = np.stack([frame.camera.camera_to_world for frame in read_capture(disk.root).frames])
     read = np.stack([frame.camera.camera_to_world for frame in off.frames])

@@ -49,7 +49,7 @@ def small_views(frames: Sequence[Frame], read: Callable[[Frame], Pixels], count:
             continue
         step = max(1, round(frame.camera.width / WIDTH))
         camera = frame.camera.coarser(step)
-        views.append(SmallView(frame.name, camera, _small(pixels, camera, step), step))
+        views.append(SmallView(frame.name, camera, _small(pixels, step), step))
     return views
 
 
@@ -79,15 +79,10 @@ def sees(camera: Camera, points: np.ndarray, scene: RayScene, margin: float = 0.
     return which[free], pixels[which[free]]
 
 
-def _small(pixels: Pixels, camera: Camera, step: int) -> np.ndarray:
+def _small(pixels: Pixels, step: int) -> np.ndarray:
     """Logarithm of the mean over blocks; a block with a pixel that says nothing is NaN."""
-    shape = camera.height, step, camera.width, step
-
-    def blocks(image: np.ndarray) -> np.ndarray:
-        return image[: camera.height * step, : camera.width * step].reshape(*shape, -1)
-
-    radiance = blocks(pixels.radiance).mean((1, 3), dtype=np.float64)
-    valid = blocks(pixels.valid).all((1, 3))[..., 0]
-    lit = radiance[valid]
+    small = pixels.coarser(step)
+    lit = small.radiance[small.valid]
     floor = 1e-3 * float(np.median(lit)) if len(lit) else 1.0
-    return np.where(valid[..., None], np.log(np.maximum(radiance, max(floor, 1e-30))), np.nan).astype(np.float32)
+    return np.where(small.valid[..., None], np.log(np.maximum(small.radiance, max(floor, 1e-30))), np.nan).astype(
+        np.float32)

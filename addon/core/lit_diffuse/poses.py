@@ -21,6 +21,7 @@ from scipy.ndimage import gaussian_filter, minimum_filter
 from ..capture.model import Camera, Frame, Pixels
 from ..parallel import ordered_map
 from ..progress import Progress, Rounds
+from ..weighted import weighted_median
 
 if TYPE_CHECKING:
     from ..shading.field import LightField
@@ -212,15 +213,8 @@ def step_of(camera: Camera, pixels: Pixels, texture: Texture) -> Step | None:
     telling = steep[y, x] ** 2
     way = _fit(np.column_stack([change, np.ones(len(x))]), residual, telling)
     far = float(np.sqrt(((flow @ way) ** 2).sum(1).mean()))
-    left = np.abs(residual - _median(residual, telling))
+    left = np.abs(residual - weighted_median(residual, telling))
     return Step(way, far, float(np.average(np.minimum(left, TUNING * LEAST_SPREAD), weights=telling)))
-
-
-def _median(values: np.ndarray, weight: np.ndarray) -> float:
-    """Weighted median of (m,) values."""
-    order = np.argsort(values)
-    summed = np.cumsum(weight[order])
-    return float(values[order[np.searchsorted(summed, summed[-1] / 2)]])
 
 
 def _fit(change: np.ndarray, residual: np.ndarray, telling: np.ndarray) -> np.ndarray:
@@ -233,7 +227,7 @@ def _fit(change: np.ndarray, residual: np.ndarray, telling: np.ndarray) -> np.nd
     way = np.zeros(7)
     for _ in range(REWEIGHTED):
         left = residual - change @ way
-        spread = max(1.4826 * _median(np.abs(left), telling), LEAST_SPREAD)
+        spread = max(1.4826 * weighted_median(np.abs(left), telling), LEAST_SPREAD)
         weight = INDEPENDENT / spread**2 / (1 + (left / (TUNING * spread)) ** 2)
         weighted = change * weight[:, None]
         way = np.linalg.solve(weighted.T @ change + prior, weighted.T @ residual)
@@ -281,16 +275,15 @@ def refine_poses(
         return Poses.as_read(frames, shift)
     cameras = [frame.camera for frame in frames]
     cost, farthest = np.full(len(frames), np.inf), min(FARTHEST, STRAY * shift)
-    stays = np.zeros(len(frames), bool)
+    moves = np.ones(len(frames), bool)
     for turn in range(ROUNDS):
-        before = list(cameras)
-        for i, step in enumerate(ordered_map(look, list(zip(frames, before, strict=True)), threads)):
+        todo = np.flatnonzero(moves)
+        steps = ordered_map(look, [(frames[i], cameras[i]) for i in todo], threads)
+        for done, (i, step) in enumerate(zip(todo, steps, strict=True), 1):
             if progress is not None:
-                progress.update((turn + (i + 1) / len(frames)) / ROUNDS)
+                progress.update((turn + done / len(todo)) / ROUNDS)
             if step is None or step.shift > farthest or step.cost > WORSE * cost[i]:
-                stays[i] = True
+                cameras[i], moves[i] = frames[i].camera, False
             else:
                 cameras[i], cost[i] = moved(cameras[i], step.way), step.cost
-    poses = np.stack([frame.camera.camera_to_world if stay else camera.camera_to_world
-                      for frame, camera, stay in zip(frames, cameras, stays, strict=True)])  # fmt: skip
-    return Poses(poses, np.array(shift), ~stays)
+    return Poses(np.stack([camera.camera_to_world for camera in cameras]), np.array(shift), moves)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..material import LAMBERTIAN, METAL, SPECULAR, TRANSPARENT
+from ..weighted import weighted_median
 from .fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs, huber
 from .layout import Layout, Problem
 from .lobes import nearest
@@ -240,15 +241,10 @@ def _together(members: dict[int, Choice]) -> dict[int, Choice]:
 def _pooled(found: list[Choice], best: Choice) -> Choice:
     """`best` with the median phi and psi of several choices, weighted by their evidence."""
     weight = np.square([choice.sigmas for choice in found])
-    phi = _weighted_median(np.array([choice.fit.phi for choice in found]), weight)
-    psi = [_weighted_median(values, weight) for values in np.array([choice.fit.psi for choice in found]).T]
+    phi = weighted_median(np.array([choice.fit.phi for choice in found]), weight)
+    psi = [weighted_median(values, weight) for values in np.array([choice.fit.psi for choice in found]).T]
     return replace(best, fit=replace(best.fit, phi=phi, psi=np.array(psi)))
 
-
-def _weighted_median(values: np.ndarray, weight: np.ndarray) -> float:
-    """The first value, in rising order, that at least half of the weight does not exceed."""
-    order = np.argsort(values)
-    return float(values[order][np.searchsorted(np.cumsum(weight[order]), weight.sum() / 2)])
 
 
 def _refused(lobe: LobeFit, own: LobeFit | None, problem: Problem | None) -> bool:

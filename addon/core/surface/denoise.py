@@ -126,12 +126,12 @@ def _unfolded(points: np.ndarray, faces: np.ndarray, noise: float) -> np.ndarray
     A thin plate on the graph of edges, the stiffer the shorter these truly are against the noise.
     """
     count = len(points)
-    near = ring_of(faces, count).tocoo()
+    ring = ring_of(faces, count)
+    near, degree = ring.tocoo(), np.maximum(np.diff(ring.indptr), 1)
     length = np.linalg.norm(points[near.row] - points[near.col], axis=1)
-    degree = np.maximum(np.bincount(near.row, minlength=count), 1)
     squared = np.bincount(near.row, length**2, count) / degree
     for _ in range(AROUND):
-        squared = (squared + np.bincount(near.row, squared[near.col], count)) / (1 + degree)
+        squared = (squared + ring @ squared) / (1 + degree)
     # Both ends' noise is in a length as it is measured.
     true = np.sqrt(np.maximum(squared - 2 * noise**2, (SHORTEST * noise) ** 2))
     weight = sparse.csr_matrix((1 / np.maximum(length, noise), (near.row, near.col)), (count, count))

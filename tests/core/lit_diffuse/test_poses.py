@@ -13,22 +13,16 @@ from addon.core.lit_diffuse.accumulate import accumulate
 from addon.core.lit_diffuse.poses import LEAST_SHIFT, Poses, Texture, moved, refine_poses
 from addon.core.progress import Progress
 from tests.core.lit_diffuse.test_accumulate import frames_of
-from tests.core.rooms import all_round, box_sides, make_room, picture, quad
+from tests.core.rooms import all_round, box_sides, make_room, patches, picture, quad
 
 EYES = [(0.8 + 0.4 * i, 0.7 + 0.5 * (i * 3 % 4), 1.1 + 0.2 * (i * 5 % 3)) for i in range(7)]
 WIDTH = 96
 
 
-def patches(room, seed: int = 0) -> np.ndarray:
-    """A value for each cube of 30 cm of space, (n, 3)."""
-    cell = np.floor(room.atlas.position / 0.3).astype(int) % 16
-    return np.random.default_rng(seed).uniform(0.2, 2, (16, 16, 16, 3)).astype(np.float32)[tuple(cell.T)]
-
-
 class Filmed:
     """A box, a block in it, and pictures of them from poses that are `off` (radians, metres) in what is told."""
 
-    def __init__(self, light=patches, off=(0.008, 0.015)):
+    def __init__(self, light=lambda room: patches(room, 0.3), off=(0.008, 0.015)):
         block = [quad((1.8, 1.2, 0.9), (0, 0.6, 0), (0.6, 0, 0), 6), quad((1.8, 1.2, 0), (0.6, 0, 0), (0, 0, 0.9), 6),
                  quad((2.4, 1.2, 0), (0, 0.6, 0), (0, 0, 0.9), 6), quad((2.4, 1.8, 0), (-0.6, 0, 0), (0, 0, 0.9), 6),
                  quad((1.8, 1.8, 0), (0, -0.6, 0), (0, 0, 0.9), 6)]  # fmt: skip
@@ -99,7 +93,7 @@ def test_without_texture_nothing_is_said():
 
 def test_frames_that_are_no_good_harm_no_other(filmed):
     """One frame shows something else altogether, one is masked out, one is brighter by a stop than told."""
-    other, before = Filmed(lambda room: patches(room, 1)), filmed.apart(filmed.told)
+    other, before = Filmed(lambda room: patches(room, 0.3, 1)), filmed.apart(filmed.told)
     bright = int(np.argsort(before)[3 * len(before) // 4])
     strange, blind = [i for i in range(3) if i != bright][:2]
     kept = list(filmed.pictures)
