@@ -53,24 +53,28 @@ class Sample:
         L_d.
     received : (m, 3) float64
         E from all light known so far.
+    most : float
+        Elements that an object counts for at most; of one that has more each counts less.
     """
 
     element: np.ndarray
     object_id: np.ndarray
     radiance: np.ndarray
     received: np.ndarray
+    most: float = np.inf
 
     def __post_init__(self):
         ids, self.group = np.unique(self.object_id, return_inverse=True)
         count = np.bincount(self.group, minlength=len(ids))
         start = np.concatenate([[0], np.cumsum(count)[:-1]])
         self._middle = start + count // 2
+        self._weight = np.minimum(1, self.most / count)[self.group] if (count > self.most).any() else None
 
     def spread(self, log_albedo: np.ndarray, cap: float = COARSE) -> float:
         """Mean absolute deviation of log albedo ((m,)) from its object's median, each held at `cap`."""
         order = np.lexsort((log_albedo, self.group))
         median = log_albedo[order[self._middle]]
-        return float(np.minimum(np.abs(log_albedo - median[self.group]), cap).mean())
+        return float(np.average(np.minimum(np.abs(log_albedo - median[self.group]), cap), weights=self._weight))
 
     def best(self, sent: np.ndarray, received: np.ndarray, thrown: np.ndarray) -> tuple[float, float, float] | None:
         """The radiance s that explains best what is `sent`, with the spread before and after; None if unbounded."""

@@ -26,6 +26,10 @@ from .sun import sunlight
 SAMPLES = 4000
 """Elements that the test looks at, spread evenly over the objects. Noise in E or G draws the solved radiance to 0: few
 elements with many rays each find more of it than many with few (a sky of 1.7: 16,000 with 64 rays give 1.4)."""
+CLIPPED_SAMPLES = 16000
+"""The same where lamps are clipped, as then all albedos hang on the solution; no object counts for more than it does
+among `SAMPLES`. The living room perturbed, lamps over the truth for eight scans and two seeds: 0.98 +- 0.065 with 4,000
+elements, 1.01 +- 0.035 with 16,000, 1.07 +- 0.02 where large objects count for more."""
 MIN_GAIN = 0.03
 """A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share."""
 MIN_SKY_GAIN = 0.1
@@ -95,12 +99,12 @@ class Light:
     thrown: Thrown | None = None
 
 
-def _pick(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:
-    """At most `SAMPLES` good elements, evenly over the objects that have them."""
+def _pick(field: LightField, good: np.ndarray, seed: int, samples: int = SAMPLES) -> np.ndarray:
+    """At most so many good elements, evenly over the objects that have them."""
     rng = np.random.default_rng(seed)
     element = np.flatnonzero(good)
     objects = field.atlas.object_id[element]
-    each = max(SAMPLES // max(len(np.unique(objects)), 1), 50)
+    each = max(samples // max(len(np.unique(objects)), 1), 50)
     chosen = []
     for object_id in np.unique(objects):
         own = element[objects == object_id]
@@ -243,7 +247,9 @@ def find_light(
     flat = on_flat(field.atlas)
     if tilted is not None:
         flat &= tilted < MOST_TILTED
-    element = _pick(field, _steady(field, good, flat) | _barely_seen(field, good), seed)
+    clipped = any(i in (colours or {}) for i in unseen_objects)
+    samples = CLIPPED_SAMPLES if clipped else SAMPLES
+    element = _pick(field, _steady(field, good, flat) | _barely_seen(field, good), seed, samples)
     if not len(element):
         return Light((), field.environment, (), element, np.zeros((0, 3)))
     old = before.thrown if before is not None and field.environment.seen else None
@@ -272,7 +278,9 @@ def find_light(
     if lit.sum() < LEAST:
         return Light(tuple(seen), environment, found, element, filled)
     sent = field.radiance[element[lit]].astype(np.float64)
-    sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit])
+    # About half of the elements are on flat spots, of large objects as of small ones.
+    most = SAMPLES / len(np.unique(atlas.object_id[element])) / 2 if clipped else np.inf
+    sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit], most)
     if old and np.array_equal(old.element, sample.element):
         thrown, least = old.lamps, old.least
     else:
