@@ -28,8 +28,8 @@ SAMPLES = 4000
 elements with many rays each find more of it than many with few (a sky of 1.7: 16,000 with 64 rays give 1.4)."""
 CLIPPED_SAMPLES = 16000
 """The same where lamps are clipped, as then all albedos hang on the solution; no object counts for more than it does
-among `SAMPLES`. The living room perturbed, lamps over the truth for eight scans and two seeds: 0.98 +- 0.065 with 4,000
-elements, 1.01 +- 0.035 with 16,000, 1.07 +- 0.02 where large objects count for more."""
+among `SAMPLES`. Lamps over the truth in perturbed living rooms, two seeds each: 0.99 +- 0.06 with 4,000 elements (seven
+scans), 1.01 +- 0.035 with 16,000 (six), 1.07 +- 0.02 where large objects count for more (three)."""
 MIN_GAIN = 0.03
 """A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share."""
 MIN_SKY_GAIN = 0.1
