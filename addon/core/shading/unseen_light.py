@@ -26,10 +26,10 @@ from .sun import sunlight
 SAMPLES = 4000
 """Elements that the test looks at, spread evenly over the objects. Noise in E or G draws the solved radiance to 0: few
 elements with many rays each find more of it than many with few (a sky of 1.7: 16,000 with 64 rays give 1.4)."""
-CLIPPED_SAMPLES = 16000
-"""The same where lamps are clipped, as then all albedos hang on the solution; no object counts for more than it does
-among `SAMPLES`. Lamps over the truth in perturbed living rooms, two seeds each: 0.99 +- 0.06 with 4,000 elements (seven
-scans), 1.01 +- 0.035 with 16,000 (six), 1.07 +- 0.02 where large objects count for more (three)."""
+CLIPPED = 4
+"""Times as many where lamps are clipped, as then all albedos hang on the solution; no object counts for more than it
+does among `SAMPLES`. Lamps over the truth in perturbed living rooms, two seeds each: 0.99 +- 0.06 with 4,000 elements
+(seven scans), 1.01 +- 0.035 with 16,000 (six), 1.07 +- 0.02 where large objects count for more (three)."""
 MIN_GAIN = 0.03
 """A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share."""
 MIN_SKY_GAIN = 0.1
@@ -99,7 +99,7 @@ class Light:
     thrown: Thrown | None = None
 
 
-def _pick(field: LightField, good: np.ndarray, seed: int, samples: int = SAMPLES) -> np.ndarray:
+def _pick(field: LightField, good: np.ndarray, seed: int, samples: int) -> np.ndarray:
     """At most so many good elements, evenly over the objects that have them."""
     rng = np.random.default_rng(seed)
     element = np.flatnonzero(good)
@@ -213,7 +213,7 @@ def _thrown_by_object(field: LightField, element: np.ndarray, object_id: int, se
 
 def _most_reflected(field: LightField, object_id: int, seed: int) -> float:
     """Luminance that an object would send out at an albedo of `EMITTER_ALBEDO`, in the median over its elements."""
-    own = _pick(field, field.atlas.object_id == object_id, seed)[:500]
+    own = _pick(field, field.atlas.object_id == object_id, seed, SAMPLES)[:500]
     return EMITTER_ALBEDO / np.pi * float(np.median(irradiance_at(field, own, seed) @ LUMINANCE))
 
 
@@ -248,8 +248,8 @@ def find_light(
     if tilted is not None:
         flat &= tilted < MOST_TILTED
     clipped = any(i in (colours or {}) for i in unseen_objects)
-    samples = CLIPPED_SAMPLES if clipped else SAMPLES
-    element = _pick(field, _steady(field, good, flat) | _barely_seen(field, good), seed, samples)
+    usable = _steady(field, good, flat) | _barely_seen(field, good)
+    element = _pick(field, usable, seed, CLIPPED * SAMPLES if clipped else SAMPLES)
     if not len(element):
         return Light((), field.environment, (), element, np.zeros((0, 3)))
     old = before.thrown if before is not None and field.environment.seen else None

@@ -15,7 +15,8 @@ from scipy.spatial import cKDTree
 
 from .weld import ring_of
 
-STIFFEST = 16.0
+STIFFEST = 4.0
+"""Of the first plate, as the noise over half an edge's length."""
 SHORTEST, AROUND = 0.25, 3
 """Times the noise, edges are taken for no shorter; and rings of neighbours that their lengths are taken over. A bottle
 cap of 4 cm with edges of 2 mm under 4 to 5 mm of noise: normals off by 16 (half of it smooth) and 32 degrees in the
@@ -47,15 +48,16 @@ def unfolded(points: np.ndarray, faces: np.ndarray, noise: float) -> tuple[np.nd
     crowded : (p,) float64
         0 where a point speaks for itself, 1 where only a crowd of them does.
     """
-    near = ring_of(faces, len(points)).tocoo()
+    ring = ring_of(faces, len(points))
+    near = ring.tocoo()
     length = np.linalg.norm(points[near.row] - points[near.col], axis=1)
     by_length, by_shortest = (_mean(near, 1 / np.maximum(length, noise) ** power) for power in (1, 2))
-    stiff = np.minimum(2 * noise / _true(_usual_length(near, length), noise), np.sqrt(STIFFEST)) ** 4
+    stiff = np.minimum(2 * noise / _true(_usual_length(ring, near, length), noise), STIFFEST) ** 4
     fine = noise / _true(_shortest_length(near, length, by_shortest), noise)
     crowded = _in_crowds(points, noise) * np.clip((fine - FINE) / (FINEST - FINE), 0, 1)
     system = sparse.eye(len(points))
     # Points of no triangle, as of parts too small to have a shape, have nothing to be drawn to.
-    meant = sparse.diags(np.bincount(near.row, minlength=len(points)) > 0, dtype=float)
+    meant = sparse.diags(np.diff(ring.indptr) > 0, dtype=float)
     for mean, stiffness in ((by_length, stiff), (by_shortest, crowded * fine**4)):
         bend = meant - mean
         system = system + bend.T @ sparse.diags(stiffness) @ bend
@@ -75,14 +77,12 @@ def _mean(near: sparse.coo_matrix, weight: np.ndarray) -> sparse.csr_matrix:
     return sparse.csr_matrix((weight / np.maximum(total, 1e-300)[near.row], (near.row, near.col)), near.shape)
 
 
-def _usual_length(near: sparse.coo_matrix, length: np.ndarray) -> np.ndarray:
+def _usual_length(ring: sparse.csr_matrix, near: sparse.coo_matrix, length: np.ndarray) -> np.ndarray:
     """Root mean square of the edges around each point, (p,)."""
-    count = near.shape[0]
-    ring = sparse.csr_matrix((np.ones(len(length)), (near.row, near.col)), near.shape)
-    degree = np.diff(ring.indptr)
-    squared = np.bincount(near.row, length**2, count) / np.maximum(degree, 1)
+    degree = np.maximum(np.diff(ring.indptr), 1)
+    squared = np.bincount(near.row, length**2, len(degree)) / degree
     for _ in range(AROUND):
-        squared = (squared + ring @ squared) / (1 + np.maximum(degree, 1))
+        squared = (squared + ring @ squared) / (1 + degree)
     return np.sqrt(squared)
 
 
@@ -102,7 +102,5 @@ def _true(length: np.ndarray, noise: float) -> np.ndarray:
 
 def _in_crowds(points: np.ndarray, noise: float) -> np.ndarray:
     """Points that have `CROWD` nearby, (p,) bool."""
-    if len(points) < CROWD:
-        return np.zeros(len(points), bool)
     distance, _ = cKDTree(points).query(points, [CROWD], distance_upper_bound=NEAR * noise)
     return np.isfinite(distance[:, 0])
