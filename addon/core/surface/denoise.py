@@ -16,7 +16,8 @@ nothing: there x0 is what the crowd makes of them (`unfold`), and x stays near i
 
 It is solved by Gauss-Newton steps with weights from the last one's angles, while `scale` goes down (graduated
 non-convexity, Blake and Zisserman 1987): first all is smoothed alike, then what stays sharp is let go. Last,
-what lies in flat parts is put into their planes (`planes`), which angles alone can't tell.
+what lies in flat parts is put into their planes (`planes`), which angles alone can't tell, and cracks that the noise
+opened are closed (`cracks`).
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..capture.model import Mesh
+from .cracks import closed
 from .mesh_noise import LEAST_NOISE, noise_of
 from .planes import onto_sheets
 from .unfold import solved, unfolded
@@ -189,4 +191,5 @@ def denoised(mesh: Mesh, noise: float) -> np.ndarray:
         # The angles are linear over small steps only.
         points = points + np.clip(step, -noise, noise)[:, None] * normal
         points = _within(points, measured, FARTHEST * noise)
-    return mesh.vertices + (onto_sheets(measured, points, faces, noise) - measured)[place]
+    points = closed(onto_sheets(measured, points, faces, noise), faces, noise)
+    return mesh.vertices + (points - measured)[place]
