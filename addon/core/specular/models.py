@@ -252,7 +252,8 @@ def _refused(lobe: LobeFit, own: LobeFit | None, problem: Problem | None) -> boo
     if problem is None or len(np.unique(problem.element)) < MIN_ELEMENTS:
         return False
     if own is not None:
-        lobe = replace(lobe, kappa_lambertian=own.kappa_lambertian, residual=own.residual)
+        # How its diffuse part darkens is the object's own matter, with the class's lobe as without.
+        lobe = replace(lobe, kappa=own.kappa, kappa_lambertian=own.kappa_lambertian, residual=own.residual)
     return gain_of(lobe, problem)[0] < -EXCLUDED
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from addon.core.material import LAMBERTIAN, METAL, SPECULAR
+from addon.core.specular import models
 from addon.core.specular.fit import fit_lobe
 from addon.core.specular.models import METAL_PSI, Choice, adopt_from_class, choose_model, metal_f0
 from tests.core.glossy_box import Box
@@ -115,6 +116,19 @@ def test_the_class_helps_out(seen):
         assert "object 0" in result[taker].note and result[taker].sigmas == 0
     assert result[3] is matt and result[4] is nothing
     assert choices[1] is nothing  # what was handed in is left alone
+
+
+def test_how_another_darkens_says_nothing_against_its_lobe(seen, monkeypatch):
+    """How the diffuse part darkens towards grazing views is an object's own matter, with a lobe as without one."""
+    sure, matt = choose_model(seen["glossy"]), choose_model(seen["matt"])
+    asked = []
+    monkeypatch.setattr(models, "gain_of", lambda fit, problem: asked.append(fit) or (0.0, 0.0))
+    own = replace(matt, fit=replace(matt.fit, kappa=0.6))
+    source = replace(sure, fit=replace(sure.fit, kappa=0.3))
+    result = adopt_from_class({0: source, 1: own}, {1: seen["matt"]}, {0: "floor", 1: "floor"})
+    assert [fit.kappa for fit in asked] == [0.6] and asked[0].phi == sure.fit.phi
+    assert asked[0].kappa_lambertian == matt.fit.kappa_lambertian
+    assert result[1].model == SPECULAR
 
 
 def test_nobody_to_take_over_from(seen):
