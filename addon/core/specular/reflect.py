@@ -76,6 +76,7 @@ def fit_specular(
     refine: int = 2,
     threads: int = 0,
     seed: int = 0,
+    noise: float = 0.0,
     progress: Progress | None = None,
 ) -> Specular:
     """Fit every object (Haefner et al. 2021, sec. 3.3 and 3.4) and find the specular part of L_d.
@@ -88,6 +89,8 @@ def fit_specular(
         E of each element, from L_d.
     refine : int
         0 leaves L_d as the median gave it; 1 takes the lobes out of it; 2 also corrects E for what they really throw.
+    noise : float
+        What was taken out of the mesh, in metres.
 
     Raises
     ------
@@ -103,7 +106,7 @@ def fit_specular(
         choice, problem, target, index = _look(maker, object_id, samples, len(frame_names), way, rays)
         if way == "frames" and choice.fit is not None:
             element, direction = samples.element[index], samples.direction[index]
-            behind = look_behind(field, lit_diffuse.seen, element, direction, object_id)
+            behind = look_behind(field, lit_diffuse.seen, element, direction, object_id, noise)
             lobe = None if choice.model == LAMBERTIAN else choice.fit
             scale = max(1.4826 * choice.fit.residual, 1e-4)
             choice = set_apart(choice, judge(problem, behind, lobe, scale))
