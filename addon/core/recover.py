@@ -47,7 +47,7 @@ from .surface.build import Surface, build_surface, from_uv
 from .surface.denoise import without_noise
 from .surface.two_sides import laid_apart, with_backs
 
-CODE = 35
+CODE = 36
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -267,10 +267,7 @@ class Recovery:
                 "sun": sun,
                 "above_one": found.albedo.above_one,
                 "points": found.points,
-                "mirrors": [
-                    {name: np.asarray(value).tolist() for name, value in dataclasses.asdict(mirror).items()}
-                    for mirror in found.mirrors
-                ],
+                "mirrors": [mirror.as_lists() for mirror in found.mirrors],
                 "notes": list(found.notes),
                 "lamps": [dataclasses.asdict(lamp) | {"radiance": lamp.radiance.tolist()} for lamp in found.lamps],
             }
@@ -278,10 +275,7 @@ class Recovery:
 
         def load(a, meta):
             lamps = tuple(Lamp(**(d | {"radiance": np.float32(d["radiance"])})) for d in meta["lamps"])
-            mirrors = tuple(
-                Mirror(d["object_id"], *(np.float32(d[name]) for name in ("point", "normal", "f0")))
-                for d in meta["mirrors"]
-            )
+            mirrors = tuple(Mirror.from_lists(d) for d in meta["mirrors"])
             return Shading(
                 a["irradiance"], a["escaped"], a["doubt"], a["radiance"],
                 Albedo(a["rho"], a["origin"], meta["above_one"], a["error"]),
@@ -292,7 +286,8 @@ class Recovery:
         return self._stage("shading", load, compute)
 
     def _find_mirrors(self, field: LightField, lamps: tuple[Lamp, ...]) -> tuple[Mirror, ...]:
-        found = find_mirrors(field, lamps, self.samples(), self.capture.instances, self.settings.seed)
+        noisy = self.surface().noise > 0
+        found = find_mirrors(field, lamps, self.samples(), self.capture.instances, self.settings.seed, noisy)
         told = [known_mirror(mirror, field) for mirror in self._near.mirrors]
         return (*found, *(one for one in told if one.object_id not in {mirror.object_id for mirror in found}))
 
@@ -314,7 +309,7 @@ class Recovery:
                 self.capture.instances, self.field, lit, shading.irradiance, shading.lamps, self.samples(),
                 [frame.name for frame in self.capture.frames],
                 way=s.specular, rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
-                progress=self.progress,
+                noise=self.surface().noise, progress=self.progress,
             )  # fmt: skip
             arrays = {"specular": found.specular, "excess": found.excess}
             return found, arrays, {"materials": [dataclasses.asdict(m) for m in found.materials]}

@@ -12,6 +12,8 @@ field has there is one number, F0. Anything else shows its own light:
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.optimize import minimize
 
@@ -19,6 +21,8 @@ from ..capture.model import Instance
 from ..shading.field import FLAT, LightField
 from ..shading.lamps import Lamp
 from ..shading.mirrors import Mirror
+from .facets import facets_of
+from .mirrored import Views, sides_of, turned
 from .samples import Samples
 
 FLAT_SHARE = 0.8
@@ -26,16 +30,13 @@ FLAT_SHARE = 0.8
 PLANE_SHARE = 0.02
 """How far from that plane, as a share of the object's size."""
 ELEMENTS = 400
-LEAST = 100
-"""Observations whose mirrored direction shows something that frames saw; with fewer nothing is said."""
 TOGETHER = 0.6
 """Least correlation, within the elements, of what they show and of what a mirror would."""
 LEAST_F0 = 0.2
 """A black pane shows the room mirrored as well, as a dielectric: by 0.04 to 0.1 as it is looked at."""
-DARK = 1e-5
-"""What nobody saw is dark in the field so far."""
-TILT, TILTS = 0.01, 40
-"""Radians by which the plane is turned first to fit what is mirrored, and how often: a scan's planes are off."""
+TILT, TILTS, FITTED = 0.01, 40, 6000
+"""Radians by which the plane is turned first to fit what is mirrored, how often, and observations for it: a scan's
+planes are off."""
 
 
 def plane_of(field: LightField, object_id: int) -> tuple[np.ndarray, np.ndarray] | None:
@@ -58,9 +59,16 @@ def plane_of(field: LightField, object_id: int) -> tuple[np.ndarray, np.ndarray]
 
 
 def find_mirrors(
-    field: LightField, lamps: tuple[Lamp, ...], samples: Samples, instances: tuple[Instance, ...], seed: int = 0
+    field: LightField, lamps: tuple[Lamp, ...], samples: Samples, instances: tuple[Instance, ...], seed: int = 0,
+    noisy: bool = False,
 ) -> tuple[Mirror, ...]:
-    """Flat objects whose frames show the room mirrored."""
+    """Flat objects whose frames show the room mirrored.
+
+    Parameters
+    ----------
+    noisy : bool
+        The mesh had noise: their bevels are looked for, too (`facets`).
+    """
     rng = np.random.default_rng(seed)
     owner = field.atlas.object_id[samples.element]
     glowing = {lamp.object_id for lamp in lamps}
@@ -75,46 +83,34 @@ def find_mirrors(
         elements = np.unique(samples.element[own])
         if len(elements) > ELEMENTS:
             own = own[np.isin(samples.element[own], rng.choice(elements, ELEMENTS, replace=False))]
-        found = _mirrored(field, samples, own, normal)
+        found = _mirrored(Views.of(field, samples, own), field.atlas.normal[samples.element[own]], normal)
         if found is not None:
             mirrors.append(Mirror(instance.object_id, point, *found))
+    if noisy:
+        mirrors = [replace(mirror, **dict(zip(("facets", "facing"), facets_of(field, samples, mirror), strict=True)))
+                   for mirror in mirrors]  # fmt: skip
     return tuple(mirrors)
 
 
-def _mirrored(
-    field: LightField, samples: Samples, index: np.ndarray, normal: np.ndarray
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Normal and F0 ((3,) float32 each) of the mirror that these observations see, None if they see none."""
-    element, direction = samples.element[index], samples.direction[index]
-    position, facing = field.atlas.position[element], field.atlas.normal[element]
-    origin = field.scene.off_surface(position, facing)
+def _mirrored(views: Views, facing: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Normal and F0 ((3,) float32 each) of the mirror that these observations see, None if they see none.
 
-    def compare(normals: np.ndarray) -> tuple[float, float, float, np.ndarray]:
-        """Deviation from the mirrored room, from the elements' own means, their correlation, and F0."""
-        along = 2 * np.einsum("ij,ij->i", direction, normals)[:, None] * normals - direction
-        shown = field.along(origin, along.astype(np.float32))[0]
-        known = shown.mean(1) > DARK
-        if known.sum() < LEAST:
-            return np.inf, 0.0, 0.0, np.zeros(3)
-        seen, shown = samples.radiance[index[known]], shown[known]
-        a, b = (np.log(np.maximum(x.mean(1), DARK)) for x in (seen, shown))
-        _, group, count = np.unique(element[known], return_inverse=True, return_counts=True)
-        own_a, own_b = (x - (np.bincount(group, x) / count)[group] for x in (a, b))
-        together = float(np.mean(own_a * own_b) / max(own_a.std() * own_b.std(), 1e-12))
-        off = float(np.median(np.abs(a - b - np.median(a - b))))
-        return off, float(np.median(np.abs(own_a))), together, np.median(seen / np.maximum(shown, DARK), 0)
-
-    off, own, together, f0 = compare(facing)
+    Parameters
+    ----------
+    facing : (m, 3) float32
+        Normals of their elements.
+    normal : (3,) float32
+        Of the mesh's plane.
+    """
+    off, own, together, f0 = views.compare(facing)
     if not (off < own and together > TOGETHER and f0.mean() > LEAST_F0):
         return None
-    across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    sides = np.stack([across, np.cross(normal, across)]) / np.linalg.norm(across)
-
-    def turned(by: np.ndarray) -> np.ndarray:
-        way = normal + by @ sides
-        return np.broadcast_to(np.float32(way / np.linalg.norm(way)), facing.shape)
-
-    first = np.array([[0, 0], [TILT, 0], [0, TILT]])
-    how = {"initial_simplex": first, "maxfev": TILTS, "xatol": 3e-4, "fatol": 1e-3}
-    best = minimize(lambda by: -compare(turned(by))[2], first[0], method="Nelder-Mead", options=how).x
-    return turned(best)[0].copy(), np.clip(f0, 0.02, 1).astype(np.float32)
+    sides = sides_of(normal)
+    few = views.part(np.arange(0, len(views), -(-len(views) // FITTED)))
+    by = np.zeros(2)
+    # What goes together finds the way from farther, what is least off tells it more closely.
+    for cost in (lambda way: -few.compare(way)[2], few.off):
+        first = by + TILT * np.array([[0, 0], [1, 0], [0, 1]])
+        how = {"initial_simplex": first, "maxfev": TILTS, "xatol": 3e-4, "fatol": 1e-4}
+        by = minimize(lambda x, cost=cost: cost(turned(normal, sides, x)), by, method="Nelder-Mead", options=how).x
+    return turned(normal, sides, by), np.clip(f0, 0.02, 1).astype(np.float32)
