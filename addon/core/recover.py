@@ -47,7 +47,7 @@ from .surface.build import Surface, build_surface, from_uv
 from .surface.denoise import without_noise
 from .surface.two_sides import laid_apart, with_backs
 
-CODE = 36
+CODE = 37
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -285,9 +285,9 @@ class Recovery:
 
         return self._stage("shading", load, compute)
 
-    def _find_mirrors(self, field: LightField, lamps: tuple[Lamp, ...]) -> tuple[Mirror, ...]:
-        noisy = self.surface().noise > 0
-        found = find_mirrors(field, lamps, self.samples(), self.capture.instances, self.settings.seed, noisy)
+    def _find_mirrors(self, field: LightField, lamps: tuple[Lamp, ...] | None) -> tuple[Mirror, ...]:
+        noisy = lamps is not None and self.surface().noise > 0
+        found = find_mirrors(field, lamps or (), self.samples(), self.capture.instances, self.settings.seed, noisy)
         told = [known_mirror(mirror, field) for mirror in self._near.mirrors]
         return (*found, *(one for one in told if one.object_id not in {mirror.object_id for mirror in found}))
 

@@ -89,7 +89,7 @@ def shade(
     threads: int = 0,
     seed: int = 0,
     progress: Progress | None = None,
-    find_mirrors: Callable[[LightField, tuple[Lamp, ...]], tuple[Mirror, ...]] | None = None,
+    find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None = None,
     noise: float = 0.0,
     colours: dict[int, np.ndarray] | None = None,
 ) -> Shading:
@@ -98,7 +98,8 @@ def shade(
     Parameters
     ----------
     find_mirrors : callable, optional
-        Tells the flat mirrors once the lamps are known; light is then followed over them.
+        Tells the flat mirrors, as light is followed over them: with None for the lamps before those are known, and
+        again with them.
     noise : float
         Metres, what was taken out of the mesh's vertices.
     colours : dict of (3,) float, optional
@@ -125,8 +126,10 @@ def shade(
     unseen = [object_id for object_id, share in seen_share.items() if share == 0]
     single, sheet = fronts(mesh)
     tilted = tilt(single, noise)[sheet[atlas.triangle]]
+    # Mirrors first: what hangs opposite or over one gets light over it, which lamps would have to answer for.
+    field = field.with_mirrors(find_mirrors(field, None) if find_mirrors else ())
     light, sun = find_all_light(field, good if good.any() else seen, unseen, instances, seed, tilted, colours)
-    field = field.with_sun(sun)
+    field = field.with_mirrors(()).with_sun(sun)
     notes = light.notes if sun is None else (*light.notes, sun.note)
     lamps = light.lamps
     radiance = field.radiance.copy()

@@ -232,7 +232,8 @@ def find_light(
     Parameters
     ----------
     field : LightField
-        With L_d filled in; what nobody saw must be dark in it, or it would hide the light looked for.
+        With L_d filled in; what nobody saw must be dark in it, or it would hide the light looked for. With its
+        mirrors, as far as they are known.
     good : (n,) bool
         Elements whose L_d rests on enough clean observations, saturated ones included.
     unseen_objects : list of int
@@ -249,6 +250,8 @@ def find_light(
         flat &= tilted < MOST_TILTED
     clipped = any(i in (colours or {}) for i in unseen_objects)
     usable = _steady(field, good, flat) | _barely_seen(field, good)
+    # What a mirror shows is no albedo.
+    usable &= ~np.isin(field.atlas.object_id, [mirror.object_id for mirror in field.mirrors])
     element = _pick(field, usable, seed, CLIPPED * SAMPLES if clipped else SAMPLES)
     if not len(element):
         return Light((), field.environment, (), element, np.zeros((0, 3)))

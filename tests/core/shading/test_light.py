@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from addon.core.lit_diffuse.accumulate import LitDiffuse
 from addon.core.shading.emitters import LUMINANCE, bright_triangles
 from addon.core.shading.lamps import find_seen
+from addon.core.shading.mirrors import Mirror
 from addon.core.shading.shade import shade
-from tests.core.rooms import DARK, Quad, box_sides, cut, lit_box, make_room, quad, radiosity, split
+from tests.core.rooms import DARK, Quad, around, box_sides, cut, lit_box, make_room, quad, radiosity, split
 
 ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}
 TWO = (((0.3, 0.7), (0.2, 0.3)), ((0.3, 0.7), (0.7, 0.8)))
@@ -74,6 +76,35 @@ def test_the_only_lamp_may_be_unseen():
         solved.append(float(found[0].radiance @ LUMINANCE))
     assert np.mean(solved) == pytest.approx(10, rel=0.15)
     assert np.allclose(solved, 10, rtol=0.25)
+
+
+def test_light_over_a_mirror_is_not_the_lamps():
+    """The wall at x = 0 is a mirror, so the room is half of one of twice the length, whose light radiosity knows."""
+    X, Y, Z = 4.0, 3.0, 2.5
+
+    def ceiling(sign: float, lamp_id: int) -> list[Quad]:
+        half = quad((0 if sign > 0 else -X, 0, Z), (0, Y, 0), (X, 0, 0), 1)
+        lamp = (0.05, 0.2) if sign > 0 else (0.8, 0.95)
+        glow = cut(half, (0.4, 0.6), lamp)
+        return [*around(half, (0.4, 0.6), lamp), quad(glow.corner, glow.edge_u, glow.edge_v, lamp_id)]
+
+    floor, _, mirror, far, left, right = box_sides((X, Y, Z))
+    one = make_room([floor, mirror, far, left, right, *ceiling(1, 6)], 0.2)
+    image = [quad((-X, 0, 0), (X, 0, 0), (0, Y, 0), 0), quad((-X, 0, 0), (0, Y, 0), (0, 0, Z), 3),
+             quad((-X, 0, 0), (0, 0, Z), (X, 0, 0), 4), quad((-X, Y, 0), (X, 0, 0), (0, 0, Z), 5)]  # fmt: skip
+    whole = make_room([floor, far, left, right, *ceiling(1, 6), *image, *ceiling(-1, 8)], 0.2)
+    L = radiosity(whole, ALBEDO, {6: (10, 9, 8), 8: (10, 9, 8)})
+    place = [np.c_[room.atlas.position, 100 * room.atlas.object_id] for room in (one, whole)]
+    L = L[cKDTree(place[1]).query(place[0])[1]]
+    L[one.atlas.object_id == 2] = 0.5  # whatever frames made of it
+    lit = measured(one, L, {6}, texture=0.1)
+    glass = Mirror(2, np.float32([0, 0, 0]), np.float32([1, 0, 0]), np.ones(3, np.float32))
+
+    (lamp,) = run(one, lit, find_mirrors=lambda field, lamps: (glass,)).lamps
+    assert lamp.object_id == 6 and not lamp.seen
+    assert lamp.radiance @ LUMINANCE == pytest.approx(np.float32([10, 9, 8]) @ LUMINANCE, rel=0.12)
+    # Told of only once the lamps are known, what it throws passes for another lamp.
+    assert len(run(one, lit, find_mirrors=lambda field, lamps: () if lamps is None else (glass,)).lamps) > 1
 
 
 def test_a_furnace_has_no_lamps():
