@@ -26,6 +26,9 @@ FLAT = 0.99
 """Least length of a cell's mean normal (8 degrees). E of a bumpy spot is uncertain, and more so that from a small
 light: as an error of the regressor it draws the light's radiance down. The same two lamps, mesh off by 5 mm, under a
 cap of 1: 10 and 15 with all elements, 21 and 22 with those on flat spots."""
+ALIKE, SAME_COLOUR = 0.25, 0.1
+"""Log albedo, of all channels together and apart, by which objects of one class may differ to be of one kind. Lamps
+that are off by a tenth part objects under them from others under the sky by up to .1."""
 REACH = 3.0
 """The refined radiance stays within this factor of where it started."""
 
@@ -39,6 +42,53 @@ def on_flat(atlas: Atlas) -> np.ndarray:
     _, group, count = np.unique(key + atlas.object_id, return_inverse=True, return_counts=True)
     total = np.stack([np.bincount(group, atlas.normal[:, k], len(count)) for k in range(3)], 1)
     return (np.linalg.norm(total, axis=1) >= FLAT * count)[group]
+
+
+class _Grouping:
+    """Values in groups ((m,) int, 0 to k - 1), whose elements weigh differently."""
+
+    def __init__(self, group: np.ndarray, weight: np.ndarray):
+        self.group, self._weight = group, weight
+        self._before = np.concatenate([[0.0], np.cumsum(np.bincount(group, weight))])
+
+    def medians(self, values: np.ndarray) -> np.ndarray:
+        """Of each value ((m,)), its group's weighted median."""
+        order = np.lexsort((values, self.group))
+        reached = np.cumsum(self._weight[order])
+        middle = (self._before[:-1] + self._before[1:]) / 2
+        at = np.minimum(np.searchsorted(reached, middle), len(order) - 1)
+        return values[order[at]][self.group]
+
+
+def kinds_of(object_id: np.ndarray, log_albedo: np.ndarray, class_of: dict[int, str]) -> np.ndarray:
+    """Number objects of one class that seem to be of one paint alike.
+
+    Parameters
+    ----------
+    object_id : (m,) int
+    log_albedo : (m, 3) float
+    class_of : dict of str
+
+    Returns
+    -------
+    (m,) int64
+        The same for elements of objects whose albedo is within `ALIKE` of their class's median, and its colour within
+        `SAME_COLOUR`; else the object's own.
+    """
+    ids, group = np.unique(object_id, return_inverse=True)
+    median = np.stack([np.median(log_albedo[group == k], 0) for k in range(len(ids))])
+    names = np.array([class_of.get(int(i), "") for i in ids])
+    kind = np.arange(len(ids))
+    classes = np.unique(names)
+    # One class for all is none.
+    for name in classes if len(classes) > 1 else ():
+        own = np.flatnonzero(names == name)
+        off = median[own] - np.median(median[own], 0)
+        alike = np.abs(off.mean(1)) < ALIKE
+        alike &= (np.abs(off - off.mean(1, keepdims=True)) < SAME_COLOUR).all(1)
+        if alike.sum() > 1:
+            kind[own[alike]] = kind[own[alike][0]]
+    return kind[group]
 
 
 @dataclass
@@ -55,6 +105,8 @@ class Sample:
         E from all light known so far.
     most : float
         Elements that an object counts for at most; of one that has more each counts less.
+    kind : (m,) int, optional
+        Objects that are alike (`kinds_of`): deviations are then taken from the median of these as well.
     """
 
     element: np.ndarray
@@ -62,19 +114,21 @@ class Sample:
     radiance: np.ndarray
     received: np.ndarray
     most: float = np.inf
+    kind: np.ndarray | None = None
 
     def __post_init__(self):
-        ids, self.group = np.unique(self.object_id, return_inverse=True)
-        count = np.bincount(self.group, minlength=len(ids))
-        start = np.concatenate([[0], np.cumsum(count)[:-1]])
-        self._middle = start + count // 2
-        self._weight = np.minimum(1, self.most / count)[self.group] if (count > self.most).any() else None
+        _, self.group = np.unique(self.object_id, return_inverse=True)
+        self._weight = np.minimum(1, self.most / np.bincount(self.group))[self.group]
+        self._groupings = [_Grouping(self.group, self._weight)]
+        if self.kind is not None:
+            self._groupings.append(_Grouping(np.unique(self.kind, return_inverse=True)[1], self._weight))
 
     def spread(self, log_albedo: np.ndarray, cap: float = COARSE) -> float:
-        """Mean absolute deviation of log albedo ((m,)) from its object's median, each held at `cap`."""
-        order = np.lexsort((log_albedo, self.group))
-        median = log_albedo[order[self._middle]]
-        return float(np.average(np.minimum(np.abs(log_albedo - median[self.group]), cap), weights=self._weight))
+        """Mean absolute deviation of log albedo ((m,)) from its object's median, each held at `cap`; with kinds, the
+        mean of that and of the same from its kind's median.
+        """
+        off = [np.minimum(np.abs(log_albedo - by.medians(log_albedo)), cap) for by in self._groupings]
+        return float(np.average(np.mean(off, 0), weights=self._weight))
 
     def best(self, sent: np.ndarray, received: np.ndarray, thrown: np.ndarray) -> tuple[float, float, float] | None:
         """The radiance s that explains best what is `sent`, with the spread before and after; None if unbounded."""

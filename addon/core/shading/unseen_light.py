@@ -7,7 +7,7 @@ by one, then all that was solved is refined together.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from .environment import Environment
 from .field import LightField
 from .irradiance import direct, gather
 from .lamps import AGREES, EMITTER_ALBEDO, Lamp, find_seen, twin
-from .light_fit import Sample, on_flat
+from .light_fit import Sample, kinds_of, on_flat
 from .portals import find_portals
 from .refine_light import Sky, all_light, refined, shared_by_class
 from .sun import sunlight
@@ -300,6 +300,9 @@ def find_light(
         _solve_sky(sample, lamps, thrown, sky, received[lit])
         if not zones or sweep == SWEEPS - 1:
             break
+    log_albedo = np.log(np.maximum(sent, 1e-9) / np.maximum(all_light(received[lit], lamps, thrown, sky), 1e-12))
+    class_of = {i.object_id: i.class_name for i in instances}
+    sample = replace(sample, kind=kinds_of(sample.object_id, log_albedo, class_of))
     lamps = refined(sample, lamps, thrown, least, instances, seen, sky, received[lit], colours)
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from addon.core.capture.model import Instance
 from addon.core.shading.environment import EnvironmentAccumulator
 from addon.core.shading.lamps import Lamp
-from addon.core.shading.light_fit import Sample, on_flat
+from addon.core.shading.light_fit import Sample, kinds_of, on_flat
 from addon.core.shading.refine_light import Sky, refined, shared_by_class
 from tests.core.rooms import look_at, make_room, quad
 from tests.core.shading.test_environment import FAR_BELOW, add
@@ -97,3 +99,39 @@ def test_a_clipped_sky_is_a_bound_and_gives_way_to_what_is_not():
     assert other.any() and np.allclose(environment.radiance[other].mean(), 7, atol=0.6)
     assert (environment.clipped_zone().weight > 0).sum() == clipped.sum()
     assert environment.with_zone(environment.clipped_zone(), np.float32([20] * 3)).clipped is clipped
+
+
+def test_kinds_are_objects_of_one_class_and_paint():
+    """0 and 1 alike, 2 of another colour, 3 much darker; 4 alike but of another class, 5 alone in its own."""
+    same = [0.5, 0.4, 0.3]
+    albedo = np.log([same, [0.55, 0.44, 0.33], [0.5, 0.4, 0.4], [0.2, 0.16, 0.12], same, [1, 1, 1]])
+    class_of = dict.fromkeys(range(4), "wall") | {4: "floor", 5: "door"}
+    ids = np.repeat(np.arange(6), 30)
+    kind = kinds_of(ids, albedo[ids] + np.random.default_rng(0).normal(0, 0.05, (180, 1)), class_of)
+    first = kind[::30]
+    assert first[0] == first[1] and len(set(first.tolist())) == 5
+    assert (kind == np.repeat(first, 30)).all()
+    assert len(set(kinds_of(ids, albedo[ids], dict.fromkeys(range(6), "thing")).tolist())) == 6
+    assert len(set(kinds_of(ids, albedo[ids], {}).tolist())) == 6
+
+
+def test_objects_of_a_kind_tell_of_the_lamp_that_lights_one_of_them():
+    """Each has the same light all over, so neither tells by itself."""
+    rng = np.random.default_rng(1)
+    ids, m = np.repeat([0, 1], 200), 400
+    thrown = np.where(ids == 0, 1e-6, 0.1)
+    received = np.ones(m)
+    sent = 0.5 / np.pi * (received + 20 * thrown) * np.exp(rng.normal(0, 0.1, m))
+    how = sent, received, thrown[:, None], np.array([14.0]), np.array([0.1]), np.array([1e3])
+    alone = Sample(np.arange(m), ids, sent[:, None].repeat(3, 1), received[:, None].repeat(3, 1))
+    together = replace(alone, kind=np.zeros(m, int))
+    assert together.refine(*how)[0] == pytest.approx(20, rel=0.05)
+    assert abs(alone.refine(*how)[0] - 20) > 2
+
+
+def test_heavy_objects_do_not_outweigh_the_median():
+    """An object of many elements counts for `most` of them in the median of its kind, too."""
+    ids = np.repeat([0, 1, 2], [30, 30, 600])
+    log_albedo = np.repeat([0.0, 0.1, 0.2], [30, 30, 600])
+    one = Sample(np.arange(660), ids, np.ones((660, 3)), np.ones((660, 3)), 30.0, np.zeros(660, int))
+    assert one.spread(log_albedo) == pytest.approx((0.1 + 0 + 0.1) / 3 / 2, abs=1e-9)
