@@ -89,9 +89,9 @@ def find_mirrors(
         found = _mirrored(Views.of(field, samples, own), field.atlas.normal[samples.element[own]], normal)
         if found is not None:
             mirrors.append(Mirror(instance.object_id, point, *found))
-    if noisy:
-        mirrors = [replace(mirror, **dict(zip(("facets", "facing"), facets_of(field, samples, mirror), strict=True)))
-                   for mirror in mirrors]  # fmt: skip
+    for i, mirror in enumerate(mirrors if noisy else ()):
+        facets, facing = facets_of(field, samples, mirror)
+        mirrors[i] = replace(mirror, facets=facets, facing=facing)
     return tuple(mirrors)
 
 
