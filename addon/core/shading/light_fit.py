@@ -49,16 +49,16 @@ class _Grouping:
     """Values in groups ((m,) int, 0 to k - 1), whose elements weigh differently."""
 
     def __init__(self, group: np.ndarray, weight: np.ndarray):
-        self.group, self._weight = group, weight
-        self._before = np.concatenate([[0.0], np.cumsum(np.bincount(group, weight))])
+        self._group, self._weight = group, weight
+        before = np.concatenate([[0.0], np.cumsum(np.bincount(group, weight))])
+        self._middle = (before[:-1] + before[1:]) / 2
 
     def medians(self, values: np.ndarray) -> np.ndarray:
         """Of each value ((m,)), its group's weighted median."""
-        order = np.lexsort((values, self.group))
+        order = np.lexsort((values, self._group))
         reached = np.cumsum(self._weight[order])
-        middle = (self._before[:-1] + self._before[1:]) / 2
-        at = np.minimum(np.searchsorted(reached, middle), len(order) - 1)
-        return values[order[at]][self.group]
+        at = np.minimum(np.searchsorted(reached, self._middle), len(order) - 1)
+        return values[order[at]][self._group]
 
 
 def kinds_of(object_id: np.ndarray, log_albedo: np.ndarray, class_of: dict[int, str]) -> np.ndarray:

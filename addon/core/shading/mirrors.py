@@ -108,18 +108,13 @@ def in_their_planes(mesh: Mesh, mirrors: tuple[Mirror, ...]) -> np.ndarray:
         facing = np.broadcast_to(way, (len(mesh.triangles), 3)).copy()
         facing[mirror.facets] = mirror.facing
         own, corner = np.unique(mesh.triangles[face], return_inverse=True)
-        _, place = same_place(vertices[own], SAME_PLACE)
+        first, place = same_place(vertices[own], SAME_PLACE)
         corner = place[corner.reshape(-1, 3)]
         height = vertices[own] @ way
         flat = vertices[own] - height[:, None] * way
-        height[:] = _heights(corner, flat[_first(place)], height[_first(place)], facing[face], way, area[face])[place]
+        height = _heights(corner, flat[first], height[first], facing[face], way, area[face])[place]
         vertices[own] = flat + height[:, None] * way
     return vertices
-
-
-def _first(place: np.ndarray) -> np.ndarray:
-    """One vertex of each place."""
-    return np.unique(place, return_index=True)[1]
 
 
 def _heights(corner: np.ndarray, flat: np.ndarray, height: np.ndarray, facing: np.ndarray, way: np.ndarray,
