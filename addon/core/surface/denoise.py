@@ -15,9 +15,11 @@ Where points are crowded, closer together than a third of the noise, none of the
 nothing: there x0 is what the crowd makes of them (`unfold`), and x stays near it.
 
 It is solved by Gauss-Newton steps with weights from the last one's angles, while `scale` goes down (graduated
-non-convexity, Blake and Zisserman 1987): first all is smoothed alike, then what stays sharp is let go. Last,
-what lies in flat parts is put into their planes (`planes`), which angles alone can't tell, and cracks that the noise
-opened are closed (`cracks`).
+non-convexity, Blake and Zisserman 1987): first all is smoothed alike, then what stays sharp is let go. An angle that
+the points don't tell well is no flatter for that: its weight goes by theta^2 and its variance (the expectation step for
+a Lorentzian as a mixture of normal distributions, Tipping and Lawrence 2005), which draws from the linear system tell.
+Last, what lies in flat parts is put into their planes (`planes`), which angles alone can't tell, and cracks that the
+noise opened are closed (`cracks`).
 """
 
 from __future__ import annotations
@@ -37,6 +39,9 @@ from .weld import point_normals, ring_of, welded
 
 SCALES = np.geomspace(0.5, 0.02, 8)
 """Radians, one for each step."""
+DRAWS = 6
+"""From each step's posterior. Without (0) the living room's objects are 2.13 mm and 7.3 degrees off under 2.9 mm of
+independent noise, with 3 2.06 mm and 7.1, with 6 2.06 mm and 7.0; half smooth 4.08 mm and 9.2, with 6 4.01 and 9.0."""
 FARTHEST = 3.0
 """Times the noise, how far a point may go for the angles."""
 FLOOR = 1.0
@@ -123,17 +128,30 @@ def dihedral(
 
 
 def _linear(
-    points: np.ndarray, normal: np.ndarray, hinges: Hinges, held: np.ndarray, noise: float, scale: float
-) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix, sparse.csr_matrix]:
+    points: np.ndarray, normal: np.ndarray, hinges: Hinges, held: np.ndarray, variance: np.ndarray, noise: float,
+    scale: float,
+) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix, sparse.csr_matrix]:  # fmt: skip
     """Angles, their weights, their change by each point's way along its normal, and the normal equations' matrix."""
     count = len(points)
     theta, gradient = dihedral(points, hinges, FLOOR * noise)
-    weight = 1 / (scale**2 + theta**2)
+    weight = 1 / (scale**2 + theta**2 + variance)
     ends = (hinges.a, hinges.b, hinges.c, hinges.d)
     values = np.concatenate([(by * normal[at]).sum(1) for by, at in zip(gradient, ends)])
     rows = np.tile(np.arange(len(theta)), 4)
     change = sparse.csr_matrix((values, (rows, np.concatenate(ends))), (len(theta), count))
     return theta, weight, change, (sparse.diags(held) + change.T @ sparse.diags(weight) @ change).tocsr()
+
+
+def _variance(
+    held: np.ndarray, weight: np.ndarray, change: sparse.csr_matrix, system: sparse.csr_matrix, rng: np.random.Generator
+) -> np.ndarray:
+    """What the angles' posterior variance is, (e,), by draws from it: the system's solution for noise as it expects."""
+    total = np.zeros(len(weight))
+    for _ in range(DRAWS):
+        by_points = np.sqrt(held) * rng.standard_normal(len(held))
+        by_angles = change.T @ (np.sqrt(weight) * rng.standard_normal(len(weight)))
+        total += (change @ solved(system, by_points + by_angles)) ** 2
+    return total / max(DRAWS, 1)
 
 
 def _within(points: np.ndarray, measured: np.ndarray, farthest: float) -> np.ndarray:
@@ -183,13 +201,15 @@ def denoised(mesh: Mesh, noise: float) -> np.ndarray:
     points, crowded = unfolded(measured, faces, noise)
     points = _within(points, measured, FARTHEST * noise)
     told, held = measured + crowded[:, None] * (points - measured), (1 + HELD * crowded) / noise**2
+    variance, rng = np.zeros(len(hinges.a)), np.random.default_rng(0)
     for scale in SCALES:
         normal = point_normals(points, faces)
-        theta, weight, change, system = _linear(points, normal, hinges, held, noise, scale)
+        theta, weight, change, system = _linear(points, normal, hinges, held, variance, noise, scale)
         gone = ((points - told) * normal).sum(1)
         step = solved(system, -gone * held - change.T @ (weight * theta))
         # The angles are linear over small steps only.
         points = points + np.clip(step, -noise, noise)[:, None] * normal
         points = _within(points, measured, FARTHEST * noise)
+        variance = _variance(held, weight, change, system, rng)
     points = closed(onto_sheets(measured, points, faces, noise), faces, noise)
     return mesh.vertices + (points - measured)[place]

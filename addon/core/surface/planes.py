@@ -8,7 +8,7 @@ the points' distance against the prediction interval of the plane fitted so far.
 its points tell well which way it faces, they lie about as far off as the noise takes them, and a bend (quadratic terms)
 explains them no better than chance would. Spheres, cushions and cylinders fail the last and stay as they are. A region
 that ends at creases all around and whose bend explains its points entirely is a sheet too, gently bent: the metal of a
-sconce.
+sconce. Steps and pillows no higher than the noise give themselves away as neighbours share them (`moran`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
+
+from .moran import SURE, moran, usual
 
 NEAR, REACH = 3.0, 4.5
 """Times the noise (and the plane's own uncertainty), how far denoised points may lie off, of low triangles and of high
@@ -282,17 +284,31 @@ def sheets_of(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise
     noise : float
         Metres.
     """
-    grower = Grower(smooth, faces, noise)
-    sheets = []
-    for seed in grower.seeds():
-        if grower.tried[seed] or not grower.free[seed]:
-            continue
-        region = grower.grow(seed)
-        own = measured[np.unique(faces[region])]
-        found = sheet_of(own, region, float(grower.area[region].sum()), grower.outline(region), noise)
-        if found is not None:
-            grower.free[region] = False
-            sheets.append(found)
+
+    def found(most_alike: float) -> tuple[list[Sheet], list[float], Grower]:
+        """Sheets whose points' neighbours are off no more alike than that, how much they are, and the grower."""
+        grower = Grower(smooth, faces, noise)
+        sheets, index = [], []
+        for seed in grower.seeds():
+            if grower.tried[seed] or not grower.free[seed]:
+                continue
+            region = grower.grow(seed)
+            own = np.unique(faces[region])
+            sheet = sheet_of(measured[own], region, float(grower.area[region].sum()), grower.outline(region), noise)
+            if sheet is None:
+                continue
+            off[own] = sheet.tangent(measured[own])[1]
+            alike, error = moran(off, faces[region])
+            if alike <= most_alike + SURE * error:
+                grower.free[region] = False
+                sheets.append(sheet)
+                index.append(alike)
+        return sheets, index, grower
+
+    off = np.zeros(len(measured))
+    # A scan's smooth error is shared by neighbours, too: flat parts may be as much alike as most of the room's are.
+    sheets, index, grower = found(np.inf)
+    sheets, _, grower = found(usual(index, [float(grower.area[sheet.faces].sum()) for sheet in sheets]))
     return sheets, grower
 
 
