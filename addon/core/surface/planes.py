@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from .moran import SURE, moran, usual
+from .moran import SURE, moran, most_alike
 
 NEAR, REACH = 3.0, 4.5
 """Times the noise (and the plane's own uncertainty), how far denoised points may lie off, of low triangles and of high
@@ -285,7 +285,7 @@ def sheets_of(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise
         Metres.
     """
 
-    def found(most_alike: float) -> tuple[list[Sheet], list[float], Grower]:
+    def found(most: float) -> tuple[list[Sheet], list[float], Grower]:
         """Sheets whose points' neighbours are off no more alike than that, how much they are, and the grower."""
         grower = Grower(smooth, faces, noise)
         sheets, index = [], []
@@ -299,16 +299,16 @@ def sheets_of(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise
                 continue
             off[own] = sheet.tangent(measured[own])[1]
             alike, error = moran(off, faces[region])
-            if alike <= most_alike + SURE * error:
+            if alike <= most + SURE * error:
                 grower.free[region] = False
                 sheets.append(sheet)
                 index.append(alike)
         return sheets, index, grower
 
     off = np.zeros(len(measured))
-    # A scan's smooth error is shared by neighbours, too: flat parts may be as much alike as most of the room's are.
+    # A scan's smooth error is shared by neighbours, too: most of a room's flat parts tell how much.
     sheets, index, grower = found(np.inf)
-    sheets, _, grower = found(usual(index, [float(grower.area[sheet.faces].sum()) for sheet in sheets]))
+    sheets, _, grower = found(most_alike(index, [float(grower.area[sheet.faces].sum()) for sheet in sheets]))
     return sheets, grower
 
 

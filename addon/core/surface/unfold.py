@@ -65,10 +65,12 @@ def unfolded(points: np.ndarray, faces: np.ndarray, noise: float) -> tuple[np.nd
     return np.stack([solved(system, points[:, axis], points[:, axis]) for axis in range(3)], 1), crowded
 
 
-def solved(system: sparse.csr_matrix, right: np.ndarray, guess: np.ndarray | None = None) -> np.ndarray:
+def solved(
+    system: sparse.csr_matrix, right: np.ndarray, guess: np.ndarray | None = None, tolerance: float = TOLERANCE
+) -> np.ndarray:
     """The solution of a symmetric positive definite system, by conjugate gradients."""
     scaled = sparse.diags(1 / system.diagonal())
-    return cg(system, right, guess, rtol=TOLERANCE, maxiter=MOST_STEPS, M=scaled)[0]
+    return cg(system, right, guess, rtol=tolerance, maxiter=MOST_STEPS, M=scaled)[0]
 
 
 def _mean(near: sparse.coo_matrix, weight: np.ndarray) -> sparse.csr_matrix:

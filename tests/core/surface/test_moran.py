@@ -7,7 +7,7 @@ import pytest
 
 from addon.core.capture.model import Mesh
 from addon.core.surface import denoise, planes
-from addon.core.surface.moran import moran, usual
+from addon.core.surface.moran import SLACK, moran, most_alike
 from addon.core.surface.planes import sheets_of
 from tests.core.surface.test_denoise import NOISE, noisy
 from tests.core.surface.test_planes import sheet
@@ -47,9 +47,9 @@ def test_points_of_other_triangles_do_not_count():
 
 
 def test_the_usual_is_where_most_area_lies_and_not_below_zero():
-    assert usual([0.5, 0.1, 0.3], [1, 1, 10]) == 0.3
-    assert usual([-0.2, 0.4], [3, 1]) == 0
-    assert usual([], []) == 0
+    assert most_alike([0.5, 0.1, 0.3], [1, 1, 10]) == SLACK * 0.3
+    assert most_alike([-0.2, 0.4], [3, 1]) == 0
+    assert most_alike([], []) == 0
 
 
 def beside(wall: Mesh, other: Mesh) -> Mesh:
