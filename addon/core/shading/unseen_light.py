@@ -18,7 +18,7 @@ from .environment import Environment
 from .field import LightField
 from .irradiance import direct, gather
 from .lamps import AGREES, EMITTER_ALBEDO, Lamp, find_seen, twin
-from .light_fit import Sample, kinds_of, on_flat
+from .light_fit import CAP, CLIPPED_CAP, Sample, kinds_of, on_flat
 from .portals import find_portals
 from .refine_light import Sky, all_light, refined, shared_by_class
 from .sun import sunlight
@@ -302,7 +302,8 @@ def find_light(
             break
     log_albedo = np.log(np.maximum(sent, 1e-9) / np.maximum(all_light(received[lit], lamps, thrown, sky), 1e-12))
     class_of = {i.object_id: i.class_name for i in instances}
-    sample = replace(sample, kind=kinds_of(sample.object_id, log_albedo, class_of))
+    kind, cap = kinds_of(sample.object_id, log_albedo, class_of), CLIPPED_CAP if clipped else CAP
+    sample = replace(sample, kind=kind, cap=cap)
     lamps = refined(sample, lamps, thrown, least, instances, seen, sky, received[lit], colours)
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))
