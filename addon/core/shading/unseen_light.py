@@ -302,8 +302,8 @@ def find_light(
             break
     log_albedo = np.log(np.maximum(sent, 1e-9) / np.maximum(all_light(received[lit], lamps, thrown, sky), 1e-12))
     class_of = {i.object_id: i.class_name for i in instances}
-    kind, cap = kinds_of(sample.object_id, log_albedo, class_of), CLIPPED_CAP if clipped else CAP
-    sample = replace(sample, kind=kind, cap=cap)
+    kind = kinds_of(sample.object_id, log_albedo, class_of)
+    sample = replace(sample, kind=kind, cap=CLIPPED_CAP if clipped else CAP)
     lamps = refined(sample, lamps, thrown, least, instances, seen, sky, received[lit], colours)
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..weighted import weighted_median
+
 SURE = 3.0
 """Standard errors."""
 SLACK = 2.0
@@ -41,6 +43,4 @@ def most_alike(index: list[float], weight: list[float]) -> float:
     """
     if not index:
         return 0.0
-    order = np.argsort(index)
-    total = np.cumsum(np.asarray(weight)[order])
-    return SLACK * max(float(np.asarray(index)[order][np.searchsorted(total, total[-1] / 2)]), 0.0)
+    return SLACK * max(weighted_median(np.asarray(index), np.asarray(weight)), 0.0)

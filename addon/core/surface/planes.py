@@ -285,11 +285,11 @@ def sheets_of(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise
         Metres.
     """
 
-    def found(most: float) -> tuple[list[Sheet], list[float], Grower]:
-        """Sheets whose points' neighbours are off no more alike than that, how much they are, and the grower."""
-        grower = Grower(smooth, faces, noise)
+    def found(most: float) -> tuple[list[Sheet], list[float]]:
+        """Sheets whose points' neighbours are off no more alike than that, and how much they are."""
+        grower.free[:], grower.tried[:] = True, False
         sheets, index = [], []
-        for seed in grower.seeds():
+        for seed in seeds:
             if grower.tried[seed] or not grower.free[seed]:
                 continue
             region = grower.grow(seed)
@@ -303,12 +303,13 @@ def sheets_of(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise
                 grower.free[region] = False
                 sheets.append(sheet)
                 index.append(alike)
-        return sheets, index, grower
+        return sheets, index
 
-    off = np.zeros(len(measured))
+    grower, off = Grower(smooth, faces, noise), np.zeros(len(measured))
+    seeds = grower.seeds()
     # A scan's smooth error is shared by neighbours, too: most of a room's flat parts tell how much.
-    sheets, index, grower = found(np.inf)
-    sheets, _, grower = found(most_alike(index, [float(grower.area[sheet.faces].sum()) for sheet in sheets]))
+    sheets, index = found(np.inf)
+    sheets, _ = found(most_alike(index, [float(grower.area[sheet.faces].sum()) for sheet in sheets]))
     return sheets, grower
 
 
