@@ -33,6 +33,24 @@ def sphere(radius: float = 0.3, parts: int = 40) -> Mesh:
     return Mesh(radius * out / np.linalg.norm(out, axis=1, keepdims=True), box.triangles, box.object_id)
 
 
+def sheet(x: np.ndarray, y: np.ndarray, height) -> Mesh:
+    """A grid with `height(x, y)` over it."""
+    u, v = np.meshgrid(x, y, indexing="ij")
+    vertices = np.stack([u, v, height(u, v)], 2).reshape(-1, 3)
+    first = np.arange(u.size).reshape(u.shape)
+    a, b, c, d = (k.ravel() for k in (first[:-1, :-1], first[1:, :-1], first[1:, 1:], first[:-1, 1:]))
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return Mesh(vertices, triangles, np.zeros(len(triangles), np.int32))
+
+
+def tube(radius: float, length: float, around: int, along: int) -> Mesh:
+    """Open at both ends, of so many strips each way."""
+    flat = sheet(np.linspace(0, 2 * np.pi, around + 1), np.linspace(0, length, along + 1), lambda u, v: 0 * u)
+    u, v = flat.vertices[:, 0], flat.vertices[:, 1]
+    vertices = np.stack([radius * np.cos(u), radius * np.sin(u), v], 1)
+    return Mesh(np.round(vertices, 9), flat.triangles, flat.object_id)
+
+
 def noisy(mesh: Mesh, noise: float = NOISE, seed: int = 0) -> Mesh:
     """Moved along the normals, what lies in one place together."""
     points, faces, place = welded(mesh)
@@ -149,12 +167,7 @@ def test_a_clean_mesh_is_left_to_the_last_bit():
 
 def test_angles_that_points_do_not_tell_are_no_flatter_for_that(monkeypatch):
     """A leg 6 cm across of strips of 2 by 1.5 cm, under 3 mm of noise."""
-    turn, along = np.meshgrid(np.linspace(0, 2 * np.pi, 13), np.linspace(0, 0.5, 26), indexing="ij")
-    points = np.stack([0.03 * np.cos(turn), 0.03 * np.sin(turn), along], 2)
-    first = np.arange(turn.size).reshape(turn.shape)
-    a, b, c, d = (k.ravel() for k in (first[:-1, :-1], first[1:, :-1], first[1:, 1:], first[:-1, 1:]))
-    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    leg = Mesh(np.round(points.reshape(-1, 3), 9), triangles, np.zeros(len(triangles), np.int32))
+    leg = tube(0.03, 0.5, 12, 25)
     scans = [noisy(leg, 0.003, seed) for seed in range(4)]
 
     def left() -> float:

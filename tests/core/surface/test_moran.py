@@ -9,8 +9,7 @@ from addon.core.capture.model import Mesh
 from addon.core.surface import denoise, planes
 from addon.core.surface.moran import SLACK, moran, most_alike
 from addon.core.surface.planes import sheets_of
-from tests.core.surface.test_denoise import NOISE, noisy
-from tests.core.surface.test_planes import sheet
+from tests.core.surface.test_denoise import NOISE, noisy, sheet
 
 GRID = np.linspace(0, 1, 31)
 
@@ -32,9 +31,9 @@ def test_noise_is_nothing_and_waves_are_one():
     index, error = np.array(found).T
     assert index.mean() == pytest.approx(0, abs=0.005)
     assert index.std() == pytest.approx(error[0], rel=0.15)  # the error that it says is the error that it has
-    waves = np.sin(2 * np.pi * mesh.vertices[:, 0])
-    assert moran(waves, mesh.triangles)[0] == pytest.approx(1, abs=0.05)
-    assert moran(0 * waves, mesh.triangles)[0] == 0
+    slow = np.sin(2 * np.pi * mesh.vertices[:, 0])
+    assert moran(slow, mesh.triangles)[0] == pytest.approx(1, abs=0.05)
+    assert moran(0 * slow, mesh.triangles)[0] == 0
 
 
 def test_points_of_other_triangles_do_not_count():

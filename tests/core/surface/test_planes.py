@@ -12,17 +12,7 @@ from addon.core.surface import denoise, planes
 from addon.core.surface.planes import Sheet, neighbours_of, sheet_of, sheets_of
 from addon.core.surface.weld import welded
 from tests.core.rooms import make_room, quad, split
-from tests.core.surface.test_denoise import NOISE, cube, noisy, rms, smoothed, sphere, tilted
-
-
-def sheet(x: np.ndarray, y: np.ndarray, height) -> Mesh:
-    """A grid with `height(x, y)` over it."""
-    u, v = np.meshgrid(x, y, indexing="ij")
-    vertices = np.stack([u, v, height(u, v)], 2).reshape(-1, 3)
-    first = np.arange(u.size).reshape(u.shape)
-    a, b, c, d = (k.ravel() for k in (first[:-1, :-1], first[1:, :-1], first[1:, 1:], first[:-1, 1:]))
-    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    return Mesh(vertices, triangles, np.zeros(len(triangles), np.int32))
+from tests.core.surface.test_denoise import NOISE, cube, noisy, rms, sheet, smoothed, sphere, tilted, tube
 
 
 def board(thick: float, parts: int = 24) -> Mesh:
@@ -104,12 +94,9 @@ def test_what_is_round_is_not_faceted(noise, monkeypatch):
         return smooth
 
     monkeypatch.setattr(denoise, "onto_sheets", listed)
-    turn = np.linspace(0, 2 * np.pi, 41)
-    tube = sheet(turn, np.linspace(0, 1, 21), lambda u, v: 0 * u)
-    u, v = tube.vertices[:, 0], tube.vertices[:, 1]
-    tube = Mesh(np.round(np.stack([0.3 * np.cos(u), 0.3 * np.sin(u), v], 1), 9), tube.triangles, tube.object_id)
-    thin = Mesh(tube.vertices * [0.2, 0.2, 0.6], tube.triangles, tube.object_id)
-    for true in (sphere(0.3, 24), sphere(0.1, 20), tube, thin):
+    wide = tube(0.3, 1.0, 40, 20)
+    thin = Mesh(wide.vertices * [0.2, 0.2, 0.6], wide.triangles, wide.object_id)
+    for true in (sphere(0.3, 24), sphere(0.1, 20), wide, thin):
         denoise.denoised(noisy(true, noise), noise)
         assert not found
     denoise.denoised(noisy(cube(0.6), noise), noise)
