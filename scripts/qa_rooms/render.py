@@ -280,7 +280,7 @@ def render(
         focal = size[0] / 2 / np.tan(FIELD_OF_VIEW / 2)
         view = Camera(*size, focal, focal, size[0] / 2, size[1] / 2, pose)
         ids = objects_seen(view, object_id, rays).astype(np.float32)
-        write_exr(truth / "object_id" / name, np.repeat(ids[..., None], 3, 2))
+        write_exr(truth / "object_id" / name, ids)
     (truth / "all.exr").unlink()
     image.file_format = "OPEN_EXR"
     lit = np.diag([RELIT[1][0], -RELIT[1][0], -1.0, 1.0])

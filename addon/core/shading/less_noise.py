@@ -44,7 +44,7 @@ def less_noise(
     """
     result, around = np.zeros_like(light), np.zeros(len(light))
     for k in range(GRIDS):
-        group, count = _cells(position, normal, k / GRIDS)
+        group, count = cells(position, normal, k / GRIDS)
         fitted = _planes(position, light, group, count)
         rest = (light - fitted).mean(1)
         n2, v = (np.bincount(group, x.astype(np.float64) ** 2, len(count)) / count for x in (noise, rest))
@@ -54,7 +54,7 @@ def less_noise(
     return (result / np.float32(GRIDS)), np.sqrt(around / GRIDS).astype(np.float32)
 
 
-def _cells(position: np.ndarray, normal: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
+def cells(position: np.ndarray, normal: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
     """Cell of each element, by place and by the way that it faces, (m,) int; and the elements in each."""
     place = np.floor(position / CELL + shift).astype(np.int64)
     facing = np.round(normal * TURNED / 2).astype(np.int64) + TURNED

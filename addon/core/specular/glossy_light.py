@@ -2,8 +2,9 @@
 
 The light field takes a surface to send its L_d into all directions. A highlight is not in that median: a floor under a
 lamp sends it towards the ceiling, and no camera stood there; a metal sends the lamp, and its median shows a wall. Once
-the lobes are known, the difference is gathered: along a ray to a glossy element, its lobe towards where the ray came
-from, less what of the lobe (of a metal: all) was in the median. The rest of E stays as it was.
+the lobes are known, the difference is put right, less what of the lobe (of a metal: all) was in the median. What starts
+at bright triangles is followed from there (`caustics`); the rest is gathered: along a ray to a glossy element, its lobe
+towards where the ray came from. The rest of E stays as it was.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from ..shading.irradiance import gather
 from ..shading.over_surface import block_step, finest_spacing
 from ..shading.texel_blocks import TexelBlocks
 from ..surface.rays import Hits
+from .caustics import Lobes, caustics
 from .lobes import GRID, reflected_light
 
 RAYS, LOBE_RAYS = 32, 4
@@ -35,6 +37,9 @@ MOST_TAKEN = 0.5
 class Excess(LightField):
     """The room sending nothing but what its glossy elements send beyond their part of the light field.
 
+    Gathered by chance, a small lamp's highlights come as fireflies: in a kitchen with copper shades single places had
+    twice their light, and there were dark discs on the albedo around them (23.4 dB; 26.4 with `from_bright` apart).
+
     Parameters
     ----------
     room : LightField
@@ -48,7 +53,7 @@ class Excess(LightField):
         dark = room.with_light(np.zeros_like(room.radiance), Environment.dark(), ())
         self.__dict__.update(dark.__dict__)
         self.mirrors = ()  # light is followed over them in the room
-        self._room, self._bright, self._seed = room, bright_triangles(room), seed
+        self._lit, self._sources, self._seed = room, bright_triangles(room), seed
         self._inside = specular.copy()
         self._width = np.zeros(len(room.atlas), np.float32)
         self._f0 = np.zeros((len(room.atlas), 3), np.float32)
@@ -61,11 +66,19 @@ class Excess(LightField):
             self._f0[own] = m.f0 if m.model == METAL else m.psi
             if m.model == METAL:
                 self._inside[own] = room.radiance[own]
+        # What bright triangles send is followed from there.
+        self._aimed = self._sources.density[room.atlas.triangle] > 0
+        self._room = room.with_light(np.where(self._aimed[:, None], 0, room.radiance))
+        self._bright = bright_triangles(self._room)
 
     @property
     def any(self) -> bool:
         """Whether there is anything glossy at all."""
         return bool(self._width.any())
+
+    def from_bright(self) -> np.ndarray:
+        """The part of the excess that starts at bright triangles, at every element: radiance * steradian, (n, 3)."""
+        return caustics(self._lit, self._sources, Lobes(self._width, self._f0, self._inside), self._seed)
 
     def arriving(
         self, hits: Hits, element: np.ndarray, directions: np.ndarray, dark_in_mirrors: np.ndarray | None = None
@@ -83,7 +96,8 @@ class Excess(LightField):
                 self._room, self._bright, own, -directions[at], rays=LOBE_RAYS, grid=np.float32([phi]),
                 proposals=(float(phi),), threads=1, seed=self._seed + int(at[0]) + len(at),
             )  # fmt: skip
-            result[at] = self._f0[own] * light.A[:, 0] + light.B[:, 0] - self._inside[own]
+            taken = np.where(self._aimed[own, None], 0, self._inside[own])
+            result[at] = self._f0[own] * light.A[:, 0] + light.B[:, 0] - taken
         return result
 
 
@@ -128,4 +142,5 @@ def glossy_light(
         return interpolated(position[index], normal[index], lambda i: gathered(index[i]), finest, threads)[0]
 
     found = TexelBlocks(atlas, element, threads).evaluate(around, block_step(atlas), np.inf) - level
+    found += excess.from_bright()[element]
     return np.maximum(found, -MOST_TAKEN * irradiance).astype(np.float32)
