@@ -1,6 +1,6 @@
 """The passes over all frames: what L_d, the sky, the specular fit and the lamps' edges each take from them.
 
-One pass, and a second where the first tells that poses are off.
+One pass, a second where the first tells that poses are off, and one more that makes L_d sharper.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from .capture.model import Frame, Pixels
 from .errors import BadInputError
 from .lit_diffuse.accumulate import LitDiffuse, accumulate
 from .lit_diffuse.poses import Poses, Texture, refine_poses
+from .lit_diffuse.sharpen import sharpened
 from .progress import Progress, Rounds
 from .settings import Settings
 from .shading.environment import Environment, EnvironmentAccumulator
@@ -77,14 +78,20 @@ def all_passes(
 ) -> tuple[LitDiffuse, Environment, Samples, Fringes, Poses]:
     """What `one_pass` finds, and the poses it is found with: as read, or put right. Parameters and errors are its."""
     rounds = Rounds(progress, 0, 1)
-    found = one_pass(surface, frames, read, settings, folder, rounds)
-    if not settings.refine_poses:
-        return *found, Poses.as_read(frames)
-    lit, sky = found[:2]
-    room = LightField(surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), sky)
-    rounds.next()
-    poses = refine_poses(frames, read, Texture(room, lit.seen), threads=settings.threads, progress=rounds)
-    if poses.moved.any():
+    found, poses = one_pass(surface, frames, read, settings, folder, rounds), Poses.as_read(frames)
+    if settings.refine_poses:
+        lit, sky = found[:2]
+        room = LightField(surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), sky)
         rounds.next()
-        found = one_pass(surface, poses.of(frames), read, settings, folder, rounds)
+        poses = refine_poses(frames, read, Texture(room, lit.seen), threads=settings.threads, progress=rounds)
+        if poses.moved.any():
+            rounds.next()
+            found = one_pass(surface, poses.of(frames), read, settings, folder, rounds)
+    if settings.sharpen:
+        rounds.next()
+        lit = sharpened(
+            found[0], surface, poses.of(frames), read, median=settings.median, order=settings.frame_order,
+            seed=settings.seed, threads=settings.threads, folder=folder, progress=rounds,
+        )  # fmt: skip
+        found = (lit, *found[1:])
     return *found, poses

@@ -100,7 +100,7 @@ class Recovery:
     def _keys(self) -> dict[str, str]:
         s = self.settings
         surface = key("surface", CODE, fingerprint(self.capture), s.texel_size, s.detail, s.atlas_size, s.denoise_mesh)
-        lit = key("lit_diffuse", surface, s.refine_poses, s.median, s.frame_order, s.seed)
+        lit = key("lit_diffuse", surface, s.refine_poses, s.median, s.sharpen, s.frame_order, s.seed)
         shading = key(
             "shading", lit, s.shading, s.shading_rays, s.emitter_rays, s.portal_rays, s.interpolate,
             s.mirrors, s.seed,

@@ -28,6 +28,9 @@ class Settings:
     median : str
         'adaptive' (exact for short videos, batched beyond), 'batched' (exact for a spot's first 20 observations, close
         beyond, in fixed memory), 'exact' (all observations go to disk), 'p2' (the paper's P-square) or 'mean'.
+    sharpen : bool
+        Put back onto the lit diffuse texture what its blur took from it and the frames still show; one more look at
+        every frame.
     frame_order : str
         'shuffled' (fixed pseudo-random order) or 'capture' (video order, the paper's).
     shading : str
@@ -61,6 +64,7 @@ class Settings:
     denoise_mesh: bool = True
     refine_poses: bool = True
     median: str = "adaptive"
+    sharpen: bool = True
     frame_order: str = "shuffled"
     shading: str = "aimed"
     shading_rays: int = 128
@@ -95,11 +99,11 @@ class Settings:
             raise BadInputError("Settings shading_rays and specular_rays must be at least 1, atlas_size at least 64.")
 
 
-PAPER = Settings(denoise_mesh=False, refine_poses=False, median="p2", frame_order="capture", shading="uniform",
-                 shading_rays=10000, emitter_rays=0, portal_rays=0, interpolate=False, mirrors=False, specular="target",
-                 refine=0)
+PAPER = Settings(denoise_mesh=False, refine_poses=False, median="p2", sharpen=False, frame_order="capture",
+                 shading="uniform", shading_rays=10000, emitter_rays=0, portal_rays=0, interpolate=False, mirrors=False,
+                 specular="target", refine=0)
 """Haefner et al. 2021: P-square in video order, uniform rays, one target frame."""
-DRAFT = Settings(detail=0.5, shading_rays=48, emitter_rays=16, portal_rays=16, specular_rays=96)
+DRAFT = Settings(detail=0.5, sharpen=False, shading_rays=48, emitter_rays=16, portal_rays=16, specular_rays=96)
 """A first look: texels of two pixels' edge, few rays."""
 FINE = Settings(detail=1.5, shading_rays=384, emitter_rays=64, portal_rays=96, specular_rays=512)
 """What more time buys."""

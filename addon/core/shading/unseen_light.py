@@ -300,6 +300,7 @@ def find_light(
         _solve_sky(sample, lamps, thrown, sky, received[lit])
         if not zones or sweep == SWEEPS - 1:
             break
+    lamps, sky = _needed(sample, lamps, thrown, sky, received[lit], colours)
     log_albedo = np.log(np.maximum(sent, 1e-9) / np.maximum(all_light(received[lit], lamps, thrown, sky), 1e-12))
     class_of = {i.object_id: i.class_name for i in instances}
     kind = kinds_of(sample.object_id, log_albedo, class_of)
@@ -345,6 +346,22 @@ def _solve_lamps(sample: Sample, thrown, least, instances, seen, sky: Sky, base,
         lamps.append(_coloured(object_id, *found[object_id], class_of, seen, sample.received, by_channel, known))
         del left[object_id]
     return lamps
+
+
+def _needed(sample: Sample, lamps: list[Lamp], thrown, sky: Sky, base, colours) -> tuple[list[Lamp], Sky]:
+    """The lamps and sky found; lamps that nobody saw shine only where the sky alone, which is there, explains less."""
+    shining = [lamp for lamp in lamps if lamp.object_id in colours]
+    if not sky.thrown or len(shining) == len(lamps):
+        return lamps, sky
+    alone = Sky(sky.thrown, sky.guess, sky.clipped)
+    for _ in range(SWEEPS):
+        _solve_sky(sample, shining, thrown, alone, base)
+    sent = np.log(np.maximum(sample.radiance @ LUMINANCE, 1e-9))
+    with_lamps, without = (
+        sample.spread(sent - np.log(all_light(base, some, thrown, above) @ LUMINANCE + 1e-12))
+        for some, above in ((lamps, sky), (shining, alone))
+    )
+    return (lamps, sky) if with_lamps < (1 - MIN_GAIN) * without else (shining, alone)
 
 
 def _coloured(object_id, s, before, after, class_of, seen, received, by_channel, known) -> Lamp:

@@ -147,3 +147,15 @@ def test_a_sky_of_one_height_has_no_profile():
     environment = Environment(np.ones((16, 32, 3), np.float32), seen)
     for zone in environment.unseen_zones():
         np.testing.assert_allclose(zone.pattern, zone.weight, rtol=1e-5)
+
+
+def test_the_ground_is_filled_in_from_the_ground():
+    """Seen through one window: sky of 5 above the horizon, ground of 1 below."""
+    room = make_room([FAR_BELOW])
+    accumulator = EnvironmentAccumulator(0.05)
+    camera = look_at((0, 0, 0), (1, 0, 0), 24, 24, 60)
+    up = camera.directions(camera.pixel_centres())[:, 2].reshape(24, 24) > 0
+    add(accumulator, room, camera, np.where(up[..., None], 5.0, 1.0) * np.ones(3))
+    environment = accumulator.result()
+    half = len(environment.radiance) // 2
+    assert np.allclose(environment.radiance[:half], 1) and np.allclose(environment.radiance[half:], 5)

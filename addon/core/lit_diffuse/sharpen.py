@@ -1,0 +1,132 @@
+"""A sharper L_d: what the frames show and L_d, looked at through the same cameras, does not, is put back onto it.
+
+An observation is a pixel's mean over its footprint, taken between pixels, and L_d is the median of several of them: a
+tile's joint, a line of a board comes out paler than it is. So L_d is shown as each frame would show it, and the frame
+over that, a ratio, is projected back and multiplied onto L_d (iterative back-projection, Irani and Peleg 1991); its
+median over the frames leaves highlights out, as that of L_d does.
+
+One round. A second and a third changed bathroom, kitchen and living room by -.2 to +.2 dB.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import uniform_filter
+
+from ..capture.model import Camera, Frame, Pixels
+from ..parallel import ordered_map
+from ..progress import Progress, Rounds
+from ..surface.atlas import Atlas
+from ..surface.build import Surface
+from ..surface.elements import ElementLookup, triangle_geometry
+from .accumulate import ENOUGH, LitDiffuse, frame_order
+from .groups import ElementGroups
+from .medians import make_estimator
+from .visibility import CLEAN, Observations, observe, view_frame
+
+MIDDLE, CORNER = 2 / 3, 1 / 12
+"""Weights of a pixel's middle and corners: together they give what is quadratic over the pixel its true mean."""
+FLOOR = 0.02
+"""Share of the room's median radiance that is added to both sides of the ratio: in the dark it is all noise."""
+DETAIL = 0.02
+"""Share of its radiance by which an element must differ from the mean of the texels around it: where L_d is even, there
+is nothing to make sharper."""
+MOST = 2.0
+"""Times that L_d may become brighter or darker."""
+
+
+def sharpened(
+    lit: LitDiffuse,
+    surface: Surface,
+    frames: Sequence[Frame],
+    read: Callable[[Frame], Pixels],
+    *,
+    median: str = "adaptive",
+    order: str = "shuffled",
+    seed: int = 0,
+    threads: int = 0,
+    folder: Path | None = None,
+    progress: Progress | Rounds | None = None,
+) -> LitDiffuse:
+    """L_d with the detail that its own blur took from it, where `ENOUGH` clean observations tell.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        In the poses that `lit` was accumulated with.
+    read : callable
+        Gives a frame's pixels.
+    median, order, seed, threads, folder
+        As of `accumulate`.
+
+    Raises
+    ------
+    BadInputError
+        From `read`.
+    InterruptedRun
+        From `progress`.
+    """
+    atlas = surface.atlas
+    normal, _ = triangle_geometry(surface.mesh)
+    groups, lookup = ElementGroups(atlas), ElementLookup(surface.mesh, atlas)
+    wanted = frame_order(len(frames), order, seed)
+    floor = np.float32(max(FLOOR * float(np.median(lit.radiance[lit.seen])), 1e-30))
+    good = (lit.tier == CLEAN) & (lit.count >= ENOUGH) & _detailed(lit, atlas)
+
+    def look(index: int) -> Observations:
+        frame = frames[index]
+        pixels = read(frame)
+        shown = _shown(frame.camera, surface, lookup, lit)
+        known = np.isfinite(shown).all(-1)
+        ratio = (np.maximum(pixels.radiance, 0) + floor) / (np.where(known[..., None], shown, 0) + floor)
+        ratios = replace(pixels, radiance=ratio.astype(np.float32), valid=pixels.valid & known)
+        view = view_frame(frame.camera, surface.mesh, surface.scene, normal)
+        asked = groups.candidates(view)
+        return observe(view, ratios, atlas, surface.scene, asked[good[asked]])
+
+    with closing(make_estimator(median, len(atlas), folder, threads)) as estimator:
+        for done, seen in enumerate(ordered_map(look, wanted, threads)):
+            clean = np.flatnonzero(seen.tier == CLEAN)
+            estimator.add(seen.element.take(clean), seen.radiance.take(clean, 0))
+            if progress is not None:
+                progress.update((done + 1) / len(wanted))
+        found = estimator.result()
+    told = good & (found.count >= ENOUGH)
+    ratio = np.where(told[:, None], np.clip(found.median, 1 / MOST, MOST), 1).astype(np.float32)
+    return replace(lit, radiance=lit.radiance * ratio, lower=lit.lower * ratio, upper=lit.upper * ratio)
+
+
+def _detailed(lit: LitDiffuse, atlas: Atlas) -> np.ndarray:
+    """Elements that differ from the texels around them, (n,) bool."""
+    known = np.flatnonzero(lit.seen)
+    level = np.zeros((2, atlas.size**2), np.float32)
+    level[0, atlas.texel[known]] = lit.radiance[known].mean(1)
+    level[1, atlas.texel[known]] = 1
+    total, count = (uniform_filter(part.reshape(atlas.size, -1), 3).ravel()[atlas.texel] for part in level)
+    own = level[0, atlas.texel]
+    return np.abs(own - total / np.maximum(count, 1e-6)) > DETAIL * own
+
+
+def _shown(camera: Camera, surface: Surface, lookup: ElementLookup, lit: LitDiffuse) -> np.ndarray:
+    """L_d as a camera shows it, (height, width, 3) float32; NaN where a pixel shows what has none."""
+    width, height = camera.width, camera.height
+    corner = np.stack(np.meshgrid(np.arange(width + 1.0), np.arange(height + 1.0)), -1).reshape(-1, 2)
+
+    def traced(places: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+        directions, led = camera.rays(places)
+        origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
+        hits = surface.scene.intersect(origins, directions)
+        met = np.flatnonzero((hits.triangle >= 0) & led)
+        found = np.full((len(places), 3), np.nan, np.float32)
+        found[met] = lit.radiance.take(lookup(hits.triangle[met], hits.u[met], hits.v[met]), 0)
+        return found.reshape(*shape, 3)
+
+    around = traced(corner, (height + 1, width + 1))
+    around = around[1:, 1:] + around[1:, :-1] + around[:-1, 1:] + around[:-1, :-1]
+    middle = traced(camera.pixel_centres(), (height, width))
+    return np.float32(MIDDLE) * middle + np.float32(CORNER) * around
