@@ -27,10 +27,13 @@ class Zone:
         How far each direction belongs to it, 0...1.
     pattern : (h, 2h) float32
         Its radiance at a mean of 1, times the weight.
+    told : bool
+        Frames tell radiance on its side of the horizon.
     """
 
     weight: np.ndarray
     pattern: np.ndarray
+    told: bool = False
 
 
 def _solid(weight: np.ndarray) -> np.ndarray:
@@ -99,9 +102,9 @@ class Environment:
         angle = ndimage.distance_transform_edt(wide)[:, width : 2 * width] * (np.pi / height)
         weight = (1 - np.exp(-angle / NEAR)).astype(np.float32)
         above = (np.arange(height) >= height / 2)[:, None]
-        zones = [np.where(side, weight, np.float32(0)) for side in (above, ~above)]
+        zones = [(np.where(side, weight, np.float32(0)), bool((self.told & side).any())) for side in (above, ~above)]
         profile = self._profile()[:, None]
-        return [Zone(zone, _levelled(zone * profile, zone)) for zone in zones if zone.any()]
+        return [Zone(zone, _levelled(zone * profile, zone), told) for zone, told in zones if zone.any()]
 
     def _profile(self) -> np.ndarray:
         """Median luminance of what frames saw at each height, (h,) float32; of the nearest height that they saw."""

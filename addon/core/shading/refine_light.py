@@ -14,6 +14,10 @@ from .light_fit import Sample
 BELIEVED = 3.0
 """Further than this factor from all that was seen of the sky a solution is not believed: it may stand for something
 else."""
+DARKER = 1.25
+"""Nor one that is darker by more than this, where frames saw some of that side of the horizon: noise in E and G draws
+solutions down. The living room's ground, .22 where it was seen, came out at .08 and took two clipped lamps down with it
+(two perturbed scans: .95 of their luminance; .97 under 1.5, .994 under 1.25, 1.03 under 1.1)."""
 BRIGHTEST = 30.0
 """The same for a part of the sky that is clipped."""
 
@@ -30,6 +34,8 @@ class Sky:
         Radiance of the seen neighbours; of a clipped part the lower bound.
     clipped : bool
         The last part is what was seen, but clipped.
+    told : list of bool
+        Whether frames tell radiance on a part's side of the horizon.
     radiance : list of (3,) float64
     solved : set of int
         Parts of which the radiance was solved for.
@@ -38,11 +44,13 @@ class Sky:
     thrown: list[np.ndarray]
     guess: list[np.ndarray]
     clipped: bool
+    told: list[bool] = field(default_factory=list)
     radiance: list[np.ndarray] = field(default_factory=list)
     solved: set[int] = field(default_factory=set)
 
     def __post_init__(self):
         self.radiance = [g.copy() for g in self.guess]
+        self.told = self.told or [False] * len(self.guess)
 
     def _is_clipped(self, i: int) -> bool:
         return self.clipped and i == len(self.thrown) - 1
@@ -52,7 +60,7 @@ class Sky:
         guess = np.maximum(self.guess[i], 1e-12)
         if self._is_clipped(i):
             return guess, BRIGHTEST * guess
-        return guess / BELIEVED, np.full(3, BELIEVED * guess.max())
+        return guess / (DARKER if self.told[i] else BELIEVED), np.full(3, BELIEVED * guess.max())
 
     def notes(self) -> list[str]:
         """One sentence for each part that was solved."""

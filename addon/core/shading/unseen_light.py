@@ -292,7 +292,7 @@ def find_light(
         lit_room = field.with_light(field.radiance, environment)
         least = {i: _most_reflected(lit_room, i, seed) for i in unseen_objects}
 
-    sky = Sky([G[lit] for G in thrown_sky], guess, bool(environment.clipped.any()))
+    sky = Sky([G[lit] for G in thrown_sky], guess, bool(environment.clipped.any()), [zone.told for zone in zones])
     lamps: list[Lamp] = []
     colours = shared_by_class(colours or {}, unseen_objects, instances)
     for sweep in range(SWEEPS):
@@ -353,7 +353,7 @@ def _needed(sample: Sample, lamps: list[Lamp], thrown, sky: Sky, base, colours) 
     shining = [lamp for lamp in lamps if lamp.object_id in colours]
     if not sky.thrown or len(shining) == len(lamps):
         return lamps, sky
-    alone = Sky(sky.thrown, sky.guess, sky.clipped)
+    alone = Sky(sky.thrown, sky.guess, sky.clipped, sky.told)
     for _ in range(SWEEPS):
         _solve_sky(sample, shining, thrown, alone, base)
     sent = np.log(np.maximum(sample.radiance @ LUMINANCE, 1e-9))
