@@ -20,8 +20,9 @@ OWN = 0.7
 """Of the error that an element is left with once its neighbours have steadied it: the doubt it starts from
 (`neighbourhood.doubt`) is more than what was found."""
 TEXTURE = 0.7
-"""Of the contrast around a texel: pixels blur a texture and misplace it by about a texel. It was 1.0 before L_d was made
-sharper (`lit_diffuse.sharpen`); then the rooms' texels were held in 95.2 %, and at 0.7 in 94.4 % (16 frames of 72x54)."""
+"""Of the contrast around a texel: pixels blur a texture and misplace it by about a texel. It was 1.0 before L_d was
+made sharper (`lit_diffuse.sharpen`); since then 95.2 % of the rooms' texels were held by that, and 94.4 % by 0.7 (16
+frames of 72x54)."""
 AT_EDGES = 0.4
 """Relative error of what was only seen at depth edges: another surface is mixed in (thin things: 0.4 to 0.7)."""
 FILLED, FILLED_FLOOR = 0.6, 0.05
