@@ -88,6 +88,7 @@ def accumulate(
     seed: int = 0,
     threads: int = 0,
     folder: Path | None = None,
+    only: np.ndarray | None = None,
     also: Callable[[int, FrameView, Pixels, Observations], None] | None = None,
     progress: Progress | None = None,
 ) -> LitDiffuse:
@@ -105,6 +106,8 @@ def accumulate(
         'shuffled' or 'capture'.
     folder : Path, optional
         Where the exact median keeps observations meanwhile.
+    only : (n,) bool, optional
+        Elements to ask for; all where not given.
     also : callable, optional
         Called with each frame's index, view, pixels and observations, in this thread: others who want to see them.
 
@@ -124,7 +127,9 @@ def accumulate(
         frame = frames[index]
         pixels = read(frame)
         view = view_frame(frame.camera, mesh, scene, normal)
-        return int(index), view, pixels, observe(view, pixels, atlas, scene, groups.candidates(view))
+        asked = groups.candidates(view)
+        asked = asked if only is None else asked[only[asked]]
+        return int(index), view, pixels, observe(view, pixels, atlas, scene, asked)
 
     with ExitStack() as stack:
         for estimator in estimators.values():

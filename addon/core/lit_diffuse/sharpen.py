@@ -11,23 +11,18 @@ One round. A second and a third changed bathroom, kitchen and living room by -.2
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import uniform_filter
 
 from ..capture.model import Camera, Frame, Pixels
-from ..parallel import ordered_map
-from ..progress import Progress, Rounds
 from ..surface.atlas import Atlas
 from ..surface.build import Surface
-from ..surface.elements import ElementLookup, triangle_geometry
-from .accumulate import ENOUGH, LitDiffuse, frame_order
-from .groups import ElementGroups
-from .medians import make_estimator
-from .visibility import CLEAN, Observations, observe, view_frame
+from ..surface.elements import ElementLookup
+from .accumulate import ENOUGH, LitDiffuse, accumulate
+from .visibility import CLEAN
 
 MIDDLE, CORNER = 2 / 3, 1 / 12
 """Weights of a pixel's middle and corners: together they give what is quadratic over the pixel its true mean."""
@@ -45,13 +40,7 @@ def sharpened(
     surface: Surface,
     frames: Sequence[Frame],
     read: Callable[[Frame], Pixels],
-    *,
-    median: str = "adaptive",
-    order: str = "shuffled",
-    seed: int = 0,
-    threads: int = 0,
-    folder: Path | None = None,
-    progress: Progress | Rounds | None = None,
+    **how: Any,
 ) -> LitDiffuse:
     """L_d with the detail that its own blur took from it, where `ENOUGH` clean observations tell.
 
@@ -61,43 +50,31 @@ def sharpened(
         In the poses that `lit` was accumulated with.
     read : callable
         Gives a frame's pixels.
-    median, order, seed, threads, folder
-        As of `accumulate`.
+    **how
+        As `accumulate` takes it: median, order, seed, threads, folder, progress.
 
     Raises
     ------
     BadInputError
         From `read`.
     InterruptedRun
-        From `progress`.
+        From a progress.
     """
     atlas = surface.atlas
-    normal, _ = triangle_geometry(surface.mesh)
-    groups, lookup = ElementGroups(atlas), ElementLookup(surface.mesh, atlas)
-    wanted = frame_order(len(frames), order, seed)
+    lookup = ElementLookup(surface.mesh, atlas)
     floor = np.float32(max(FLOOR * float(np.median(lit.radiance[lit.seen])), 1e-30))
     good = (lit.tier == CLEAN) & (lit.count >= ENOUGH) & _detailed(lit, atlas)
 
-    def look(index: int) -> Observations:
-        frame = frames[index]
+    def ratios(frame: Frame) -> Pixels:
         pixels = read(frame)
         shown = _shown(frame.camera, surface, lookup, lit)
         known = np.isfinite(shown).all(-1)
         ratio = (np.maximum(pixels.radiance, 0) + floor) / (np.where(known[..., None], shown, 0) + floor)
-        ratios = replace(pixels, radiance=ratio.astype(np.float32), valid=pixels.valid & known)
-        view = view_frame(frame.camera, surface.mesh, surface.scene, normal)
-        asked = groups.candidates(view)
-        return observe(view, ratios, atlas, surface.scene, asked[good[asked]])
+        return replace(pixels, radiance=ratio.astype(np.float32), valid=pixels.valid & known)
 
-    with closing(make_estimator(median, len(atlas), folder, threads)) as estimator:
-        for done, seen in enumerate(ordered_map(look, wanted, threads)):
-            clean = np.flatnonzero(seen.tier == CLEAN)
-            estimator.add(seen.element.take(clean), seen.radiance.take(clean, 0))
-            if progress is not None:
-                progress.update((done + 1) / len(wanted))
-        found = estimator.result()
-    told = good & (found.count >= ENOUGH)
-    ratio = np.where(told[:, None], np.clip(found.median, 1 / MOST, MOST), 1).astype(np.float32)
+    found = accumulate(surface.mesh, atlas, surface.scene, frames, ratios, only=good, **how)
+    told = good & (found.tier == CLEAN) & (found.count >= ENOUGH)
+    ratio = np.where(told[:, None], np.clip(found.radiance, 1 / MOST, MOST), 1).astype(np.float32)
     return replace(lit, radiance=lit.radiance * ratio, lower=lit.lower * ratio, upper=lit.upper * ratio)
 
 
