@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from .few_elements import from_sun, irradiance_at
 from .field import LightField
 from .sun import Sun
 from .sun_fit import find_sun
-from .unseen_light import Light, find_light, from_sun, irradiance_at, lit_by
+from .unseen_light import Light, find_light, lit_by
 
 
 def find_all_light(

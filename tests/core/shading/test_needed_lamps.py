@@ -8,7 +8,7 @@ import pytest
 from addon.core.shading.lamps import Lamp
 from addon.core.shading.light_fit import Sample
 from addon.core.shading.refine_light import Sky
-from addon.core.shading.unseen_light import _needed
+from addon.core.shading.unseen_lamps import needed
 
 M, LAMP = 600, 9
 BASE = np.full((M, 3), 0.5)
@@ -25,7 +25,7 @@ def solved(sky: float, lamp: float, wrong_sky: float, wrong_lamp: float, shining
     found = Sky([FROM_SKY], [np.full(3, 2.5)], False)
     found.radiance[0] = np.full(3, wrong_sky)
     lamps = [Lamp(LAMP, np.full(3, wrong_lamp, np.float32), False)]
-    return _needed(sample, lamps, {LAMP: FROM_LAMP}, found, BASE, dict.fromkeys(shining, np.ones(3)))
+    return needed(sample, lamps, {LAMP: FROM_LAMP}, found, BASE, dict.fromkeys(shining, np.ones(3)))
 
 
 def test_a_lamp_that_the_sky_alone_makes_needless_goes():

@@ -1,0 +1,99 @@
+"""The elements at which light that no frame looked at is solved for, and E there by many rays each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..parallel import for_blocks
+from .emitters import BRIGHT, LUMINANCE, bright_triangles
+from .environment import Environment
+from .field import LightField
+from .irradiance import direct, gather
+from .lamps import EMITTER_ALBEDO
+from .portals import find_portals
+from .sun import sunlight
+
+LEAST = 30
+"""Elements with which a solution can be tried."""
+LAMP_ELEMENTS = 500
+"""Of an unseen object, at which what it could reflect is looked at."""
+RAYS, EMITTER_RAYS, PORTAL_RAYS = 256, 64, 64
+ELEMENTS_AT_ONCE = 1 << 10
+
+
+def pick(field: LightField, good: np.ndarray, seed: int, samples: int) -> np.ndarray:
+    """At most so many good elements, evenly over the objects that have them."""
+    rng = np.random.default_rng(seed)
+    element = np.flatnonzero(good)
+    objects = field.atlas.object_id[element]
+    each = max(samples // max(len(np.unique(objects)), 1), 50)
+    chosen = []
+    for object_id in np.unique(objects):
+        own = element[objects == object_id]
+        chosen.append(own if len(own) <= each else rng.choice(own, each, replace=False))
+    return np.sort(np.concatenate(chosen)) if chosen else np.zeros(0, np.int64)
+
+
+def steady(field: LightField, good: np.ndarray, flat: np.ndarray) -> np.ndarray:
+    """The good elements, (n,) bool: of an object with enough on flat spots, those."""
+    object_id = field.atlas.object_id
+    count = np.bincount(object_id, good & flat)
+    return good & (flat | (count < LEAST)[object_id])
+
+
+def barely_seen(field: LightField, good: np.ndarray) -> np.ndarray:
+    """Elements of bright objects that have no good one, (n,) bool: a lamp may be smaller than a pixel.
+
+    What nobody saw is dark in `field`, so it is not among them.
+    """
+    luminance, atlas = field.radiance @ LUMINANCE, field.atlas
+    seen = (luminance > 0) & ~np.isin(atlas.object_id, atlas.object_id[good])
+    level = BRIGHT * float((luminance * atlas.area).sum() / max(atlas.area.sum(), 1e-30))
+    objects = np.unique(atlas.object_id[seen])
+    bright = [i for i in objects if np.median(luminance[seen & (atlas.object_id == i)]) > level]
+    return seen & np.isin(atlas.object_id, bright)
+
+
+def evened(field: LightField) -> np.ndarray:
+    """L_d with the median of its object where nobody saw an element ((n, 3) float32): it is dark there in `field`."""
+    radiance, atlas = field.radiance.copy(), field.atlas
+    seen = radiance.any(1)
+    for object_id in np.unique(atlas.object_id[~seen]):
+        own = atlas.object_id == object_id
+        if (own & seen).any():
+            radiance[own & ~seen] = np.median(radiance[own & seen], 0)
+    return radiance
+
+
+def irradiance_at(field: LightField, element: np.ndarray, seed: int) -> np.ndarray:
+    """E of a few elements by both estimators, and from the sun, (m, 3) float64."""
+    bright, portals = bright_triangles(field), find_portals(field, seed)
+    position, normal = field.atlas.position[element], field.atlas.normal[element]
+    E = np.empty((len(element), 3))
+
+    def run(part: slice) -> None:
+        p, n, own = position[part], normal[part], seed + part.start
+        around, _, _ = gather(field, bright, p, n, RAYS, EMITTER_RAYS, own, portals, PORTAL_RAYS)
+        E[part] = around + direct(field, bright, p, n, RAYS, EMITTER_RAYS, own + 1)[0]
+
+    for_blocks(run, len(element), ELEMENTS_AT_ONCE, 0)
+    return E if field.sun is None else E + from_sun(field, element)
+
+
+def from_sun(field: LightField, element: np.ndarray) -> np.ndarray:
+    """The sun's part of E, (m, 3) float32."""
+    atlas = field.atlas
+    return sunlight(field.scene, field.sun, atlas.position[element], atlas.normal[element], atlas.texel_edge)[:, :3]
+
+
+def thrown_by_object(field: LightField, element: np.ndarray, object_id: int, seed: int) -> np.ndarray:
+    """E from one object at radiance 1 and nothing else, (m,) float64."""
+    alone = np.repeat((field.atlas.object_id == object_id)[:, None], 3, 1).astype(np.float32)
+    lit = field.with_sun(None).with_light(alone, Environment.dark(), [object_id])
+    return irradiance_at(lit, element, seed)[:, 0]
+
+
+def most_reflected(field: LightField, object_id: int, seed: int) -> float:
+    """Luminance that an object would send out at an albedo of `EMITTER_ALBEDO`, in the median over its elements."""
+    own = pick(field, field.atlas.object_id == object_id, seed, LAMP_ELEMENTS)
+    return EMITTER_ALBEDO / np.pi * float(np.median(irradiance_at(field, own, seed) @ LUMINANCE))
