@@ -29,6 +29,10 @@ METAL_SYSTEMATIC = 0.15
 ADOPTED = 0.1
 """Standard error of a roughness that was taken over from another object of the class."""
 
+LOOKS = 0.15
+"""The same of one that follows from how the object looks all over (`one_colour`): 14 metals in three rooms came out at
+-0.01 to 0.3 above the truth, 0.13 in the root mean square."""
+
 
 @dataclass(frozen=True)
 class GlossInterval:
@@ -50,9 +54,10 @@ def gloss_interval(choice: Choice, problem: Problem | None) -> GlossInterval:
     if choice.model not in (SPECULAR, METAL) or choice.fit is None:
         return UNKNOWN
     roughness, specular = float(np.sqrt(choice.fit.phi)), max(float(np.mean(choice.fit.psi)), 1e-4)
-    own = choice.sigmas > 0 and problem is not None
+    own = choice.sigmas > 0 and problem is not None and choice.looks is None
     spread = jackknife(problem, choice.model) if own else (0.0, 0.0)
-    width = Z90 * float(np.hypot(spread[0], ROUGHNESS_SYSTEMATIC if own else ADOPTED))
+    known = LOOKS if choice.looks is not None else ROUGHNESS_SYSTEMATIC if own else ADOPTED
+    width = Z90 * float(np.hypot(spread[0], known))
     systematic = METAL_SYSTEMATIC if choice.model == METAL else SPECULAR_SYSTEMATIC
     factor = float(np.exp(Z90 * np.hypot(min(spread[1] / specular, 1.0), systematic)))
     return GlossInterval(

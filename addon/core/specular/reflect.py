@@ -18,7 +18,8 @@ from .fit import fit_lobe
 from .glossy_light import Excess, glossy_light
 from .intervals import GlossInterval, gloss_interval
 from .layout import Problem
-from .models import Choice, adopt_from_class, choose_model, metal_f0, set_apart
+from .models import MIN_ELEMENTS, Choice, adopt_from_class, by_looks, choose_model, metal_f0, set_apart
+from .one_colour import compare
 from .problems import Problems
 from .samples import Samples
 from .see_through import judge, look_behind
@@ -33,6 +34,10 @@ SCREEN_RAYS = 4
 """The first look is at fewer elements and with so many times fewer rays; it drops what a lobe makes much worse."""
 HOPELESS = 1.15
 """A lobe that raises the cost by this factor in the first look needs no second."""
+LOOKS_VIEWS = 4
+"""Views of each element for the question whether an object looks like a metal all over (`one_colour`)."""
+LOOKS_LIKE_NONE = 1.5
+"""A metal whose spread is so many times the other's in the first look needs no second."""
 UNRESOLVED = 0.17
 """Roughness up to which the frames show a mirror: a lobe of phi 0.03 is as wide as a few pixels."""
 SEPARATE_ELEMENTS = 2500
@@ -110,6 +115,8 @@ def fit_specular(
             lobe = None if choice.model == LAMBERTIAN else choice.fit
             scale = max(1.4826 * choice.fit.residual, 1e-4)
             choice = set_apart(choice, judge(problem, behind, lobe, scale))
+        if way == "frames" and choice.model not in (METAL, TRANSPARENT):
+            choice, problem = _by_looks(maker, object_id, choice, problem, irradiance, rays)
         return choice, problem, target
 
     problems, choices, targets = {}, {}, {}
@@ -203,6 +210,21 @@ def _by_frames(
     index = maker.pick(object_id, FIT_ELEMENTS, FIT_VIEWS, seed=1)
     problem = maker.problem(index, rays)
     return choose_model(problem), problem, index
+
+
+def _by_looks(
+    maker: Problems, object_id: int, choice: Choice, problem: Problem | None, irradiance: np.ndarray, rays: int
+) -> tuple[Choice, Problem | None]:
+    """Ask whether an object looks like a metal all over; its choice and observations stay as they were if not."""
+    if problem is not None and len(np.unique(problem.element)) >= MIN_ELEMENTS:
+        first = compare(problem, irradiance)
+        if first is None or first.ratio > LOOKS_LIKE_NONE:
+            return choice, problem
+    index = maker.pick(object_id, FIT_ELEMENTS, LOOKS_VIEWS, least=1, seed=1)
+    whole = maker.problem(index, rays) if len(index) else None
+    looks = compare(whole, irradiance) if whole is not None else None
+    found = choice if looks is None else by_looks(choice, looks, whole)
+    return found, whole if found.looks is not None else problem
 
 
 def _by_target(maker: Problems, object_id: int, frame: np.ndarray, target: int, rays: int) -> tuple[Choice, Problem]:

@@ -1,0 +1,100 @@
+"""Matt, dielectric or metal, each of one colour: told apart with a single view of each element."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from addon.core.material import LAMBERTIAN, METAL
+from addon.core.specular.intervals import gloss_interval
+from addon.core.specular.models import Choice, adopt_from_class, by_looks
+from addon.core.specular.one_colour import compare
+from tests.core.glossy_box import GLOW, WALLS, Box
+from tests.core.rooms import polygon_irradiance
+from tests.core.specular.test_fit import paint, steps
+
+COPPER = np.array([0.9, 0.6, 0.3])
+CONTRAST = WALLS * np.array([1, 1, 0.2, 2.5, 0.3, 1.5])[:, None]
+"""A room to be seen in a metal: walls bright and dark."""
+UNSURE = Choice(LAMBERTIAN, None, note="Too few observations to look for a highlight.")
+
+
+@pytest.fixture(scope="module")
+def box():
+    return Box(CONTRAST)
+
+
+@pytest.fixture(scope="module")
+def irradiance(box):
+    atlas = box.room.atlas
+    E = np.zeros((len(atlas), 3))
+    for object_id, radiance in ({i: CONTRAST[i] for i in range(1, 6)} | {6: GLOW}).items():
+        quads = [quad for quad in box.room.quads if quad.object_id == object_id]
+        one = polygon_irradiance(atlas.position.astype(float), atlas.normal.astype(float), quads).sum(1)
+        E += one[:, None] * radiance
+    return E
+
+
+@pytest.fixture(scope="module")
+def floor(box, irradiance):
+    """Makes the problem of a floor of which each element is seen once."""
+
+    def make(phi, psi, rho, elements=120):
+        element, direction, _ = box.views(elements, 1)
+        return box.problem(element, direction, phi, psi, rho * irradiance[element] / np.pi, noise=0.05)
+
+    return make
+
+
+def test_a_metal(floor, irradiance):
+    problem = floor(0.11, COPPER, 0.0)
+    looks = compare(problem, irradiance)
+    assert looks.ratio < 0.5 and looks.sigmas > 4 and steps(looks.phi, 0.11) <= 1
+    choice = by_looks(UNSURE, looks, problem)
+    assert choice.model == METAL and choice.looks is looks and "metal" in choice.note
+    assert np.allclose(choice.fit.psi, COPPER, rtol=0.1)
+    low, high = gloss_interval(choice, problem).roughness
+    assert low < np.sqrt(0.11) < high and high - low > 0.4, "it is told from one view each: wide"
+
+
+@pytest.mark.parametrize(
+    ("phi", "psi", "rho"),
+    [(None, 0, 0.5), (0.06, 0.04, 0.5), (0.11, 0.04, 0.1), (0.06, 0.05, 0.01), (0.11, 0.05, 0.0)],
+    ids=["matt", "coated", "dark and coated", "black and coated", "nothing but a coat"],
+)
+def test_what_is_no_metal(floor, irradiance, phi, psi, rho):
+    """Least clear is black gloss: it shows the room as a metal does; a dielectric explains it as well."""
+    problem = floor(phi, psi, rho)
+    looks = compare(problem, irradiance)
+    assert by_looks(UNSURE, looks, problem) is UNSURE
+
+
+def test_texture_speaks_for_none(floor, irradiance):
+    problem = floor(None, 0, 0.5)
+    painted = replace(problem, radiance=problem.radiance * paint(problem.element) / 0.3)
+    assert by_looks(UNSURE, compare(painted, irradiance), painted) is UNSURE
+
+
+def test_what_follows_matt_light_stays_matt(floor, irradiance):
+    """A spread that errors of E explain says nothing, however much smaller the metal's is."""
+    problem = floor(0.11, COPPER, 0.0)
+    looks = compare(problem, irradiance)
+    flat = replace(looks, matt=0.12, dielectric=0.12, metal=0.03)
+    assert by_looks(UNSURE, flat, problem) is UNSURE
+
+
+def test_too_little_of_it(floor, irradiance):
+    assert compare(floor(0.11, COPPER, 0.0, elements=20), irradiance) is None
+
+
+def test_likely_metals_follow_their_class(floor, irradiance):
+    problem = floor(0.11, COPPER, 0.0)
+    looks = compare(problem, irradiance)
+    sure, likely = by_looks(UNSURE, looks, problem), by_looks(UNSURE, replace(looks, sigmas=2.0), problem)
+    assert likely.model == LAMBERTIAN and likely.metal is not None
+    result = adopt_from_class({0: sure, 1: likely}, {0: problem, 1: problem}, dict.fromkeys(range(2), "tap"))
+    assert result[1].model == METAL
+    alone = adopt_from_class({1: likely}, {1: problem}, {1: "tap"})
+    assert alone[1].model == LAMBERTIAN
