@@ -168,7 +168,7 @@ def find_light(
     else:
         thrown = {i: thrown_by_object(field, sample.element, i, seed) for i in unseen_objects}
         # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
-        lit_room = field.with_light(field.radiance, environment)
+        lit_room = field.with_light(evened(field), environment)
         least = {i: most_reflected(lit_room, i, seed) for i in unseen_objects}
 
     sky = Sky([G[lit] for G in thrown_sky], guess, bool(environment.clipped.any()), [zone.told for zone in zones])
@@ -197,8 +197,8 @@ def find_light(
 
 
 def lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
-    """L_d with the radiance of lamps put in, (n, 3) float32."""
-    radiance = field.radiance.copy()
+    """L_d with the radiance of lamps put in, and its object's where nobody saw an element, (n, 3) float32."""
+    radiance = evened(field)
     for lamp in lamps:
         radiance[field.atlas.object_id == lamp.object_id] = lamp.radiance
     return radiance

@@ -36,10 +36,11 @@ HOW = {SPECULAR: {"least_psi": LEAST_PSI, "prior": DIELECTRIC}, METAL: {"coloure
 MIN_GAIN = 0.02
 MIN_SIGMAS = 3.0
 """A lobe must lower the cost on elements that its fit has not seen by this share, and by this many standard errors."""
-LARGE_GAIN, LARGE_SIGMAS = 0.1, 2.0
+LARGE_GAIN, LARGE_SIGMAS, LARGE_ELEMENTS = 0.1, 2.0, 50
 """A lobe that takes so much off needs fewer standard errors: few elements show a small highlight, but what they show
 nothing else explains (a bathroom's tiles, 38,000 pixels: gain .16, 2.2; of what is truly matt in the living room and
-its perturbed scan nothing gains a tenth with less than 3)."""
+its perturbed scan nothing gains a tenth with less than 3). Not of a handful of elements (a cord, a pixel wide at most),
+whose standard error is no better known than that."""
 SURELY_METAL = 2.0
 """Standard errors by which a metal must also beat a dielectric over a diffuse part, once it has beaten a matt surface:
 that alone it does not stand or fall with, as it has to do without a diffuse part besides (`BARE`)."""
@@ -167,7 +168,8 @@ def choose_model(problem: Problem) -> Choice:
         if min(gain, more) > MIN_GAIN and likely is None:
             likely = fit_of_metal
     gain, sigmas = _gain(with_lobe, without)
-    sure = gain > MIN_GAIN and sigmas > MIN_SIGMAS or gain > LARGE_GAIN and sigmas > LARGE_SIGMAS
+    large = gain > LARGE_GAIN and layout.there.shape[1] >= LARGE_ELEMENTS
+    sure = gain > MIN_GAIN and sigmas > (LARGE_SIGMAS if large else MIN_SIGMAS)
     if sure and fit.phi <= BROADEST_PHI:
         # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
         held = replace(fit, psi=np.minimum(fit.psi, METAL_PSI))
@@ -234,7 +236,7 @@ def adopt_from_class(
         if not found:
             continue
         # What a metal explains as well says nothing against the metals of its class.
-        clear = {i: choice for i, choice in found.items() if choice.model == METAL or not choice.bare}
+        clear = {i: one for i, one in found.items() if one.model == METAL or not (one.bare or one.metal is not None)}
         source = max(clear or found, key=lambda i: found[i].sigmas)
         model = _pooled([c for c in found.values() if c.model == found[source].model], found[source])
         for i, choice in members.items():
@@ -278,7 +280,6 @@ def _pooled(found: list[Choice], best: Choice) -> Choice:
     phi = weighted_median(np.array([choice.fit.phi for choice in found]), weight)
     psi = [weighted_median(values, weight) for values in np.array([choice.fit.psi for choice in found]).T]
     return replace(best, fit=replace(best.fit, phi=phi, psi=np.array(psi)))
-
 
 
 def _refused(lobe: LobeFit, own: LobeFit | None, problem: Problem | None) -> bool:
