@@ -54,9 +54,11 @@ def less_noise(
     return (result / np.float32(GRIDS)), np.sqrt(around / GRIDS).astype(np.float32)
 
 
-def cells(position: np.ndarray, normal: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
+def cells(
+    position: np.ndarray, normal: np.ndarray, shift: float, size: float = CELL
+) -> tuple[np.ndarray, np.ndarray]:
     """Cell of each element, by place and by the way that it faces, (m,) int; and the elements in each."""
-    place = np.floor(position / CELL + shift).astype(np.int64)
+    place = np.floor(position / size + shift).astype(np.int64)
     facing = np.round(normal * TURNED / 2).astype(np.int64) + TURNED
     key = np.zeros(len(position), np.int64)
     for part in (*place.T, *facing.T):

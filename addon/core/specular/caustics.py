@@ -19,13 +19,19 @@ import numpy as np
 from ..shading.directions import cosine_hemisphere, sobol, tangent_frame, to_world
 from ..shading.emitters import BrightTriangles, sample_bright
 from ..shading.field import LightField
-from ..shading.less_noise import GRIDS, cells
+from ..shading.less_noise import CELL, GRIDS, cells
 from ..surface.atlas import Atlas
 from . import brdf
 
 PHOTONS = 1 << 18
 """Kitchen with seven small lamps: 26.37 dB of albedo with half as many, 26.43 with these and with four times these."""
 AT_ONCE = 1 << 15
+FINER = (CELL / 2, CELL / 4)
+"""Metres: cells where many photons come to lie. Light close to what throws it has edges that 12 cm lose: around spots
+the ceiling got up to half of its E taken away for what their rims no longer send (albedo 1.1 for .8)."""
+ENOUGH = 25
+"""Photons in a cell from which on the finer ones inside it begin to count; with twice as many they alone do. Albedo in
+a kitchen, with 25, 50, 100: 28.60, 28.57, 28.52 dB (28.43 with cells of 12 cm alone)."""
 LEAST = 1e-4
 """Cosine below which a direction runs along the surface."""
 
@@ -77,9 +83,9 @@ def caustics(
     (n, 3) float32
         Radiance * steradian, for every element.
     """
-    fallen = np.zeros((len(room.atlas), 3))
+    fallen = np.zeros((4, len(room.atlas)))  # the photons' power, by channel, and their number
     if not len(bright) or not lobes.phi.any():
-        return fallen.astype(np.float32)
+        return np.zeros((len(room.atlas), 3), np.float32)
     cube = sobol(photons, seed, 5)
     rng = np.random.default_rng([seed, 2])
     for start in range(0, photons, AT_ONCE):
@@ -101,8 +107,8 @@ def caustics(
 
 
 def _let_fall(fallen: np.ndarray, element: np.ndarray, power: np.ndarray) -> None:
-    for channel in range(3):
-        fallen[:, channel] += np.bincount(element, power[:, channel], len(fallen))
+    for row, values in zip(fallen, (*power.T, power.any(1)), strict=True):
+        row += np.bincount(element, values, len(row))
 
 
 def _met(room: LightField, light: _Light) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -144,11 +150,30 @@ def _sent_on(
 
 
 def _over_cells(atlas: Atlas, fallen: np.ndarray) -> np.ndarray:
-    """Power over area in cells of the surface, on several shifted grids; small cells count for what they hold."""
-    power, area = np.zeros_like(fallen), np.zeros(len(fallen))
+    """Power over area in cells of the surface, (n, 3) float32; in finer ones where enough photons lie."""
+    result, count = _density(atlas, fallen, np.arange(len(atlas)), CELL)
+    for size in FINER:
+        many = np.flatnonzero(count > ENOUGH)
+        if not len(many):
+            break
+        finer, in_finer = _density(atlas, fallen, many, size)
+        # By the coarser cell's number: where none of its photons lie there is no light, and few photons tell that.
+        share = np.clip(count[many] / ENOUGH - 1, 0, 1)[:, None]
+        result[many] += share * (finer - result[many])
+        count = np.zeros_like(count)
+        count[many] = in_finer
+    return result.astype(np.float32)
+
+
+def _density(atlas: Atlas, fallen: np.ndarray, element: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Power over area around some elements, (m, 3), and photons, (m,): means over cells of several shifted grids.
+
+    Small cells count for what they hold.
+    """
+    held, area = np.zeros((4, len(element))), np.zeros(len(element))
     for k in range(GRIDS):
-        group, count = cells(atlas.position, atlas.normal, k / GRIDS)
-        for channel in range(3):
-            power[:, channel] += np.bincount(group, fallen[:, channel], len(count))[group]
-        area += np.bincount(group, atlas.area, len(count))[group]
-    return (power / np.maximum(area, 1e-12)[:, None]).astype(np.float32)
+        group, _ = cells(atlas.position[element], atlas.normal[element], k / GRIDS, size)
+        for row, values in zip(held, fallen[:, element], strict=True):
+            row += np.bincount(group, values)[group]
+        area += np.bincount(group, atlas.area[element])[group]
+    return (held[:3] / np.maximum(area, 1e-12)).T, held[3] / GRIDS
