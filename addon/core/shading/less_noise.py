@@ -19,7 +19,7 @@ TURNED = 4
 
 
 def less_noise(
-    position: np.ndarray, normal: np.ndarray, light: np.ndarray, noise: np.ndarray
+    position: np.ndarray, normal: np.ndarray, light: np.ndarray, noise: np.ndarray, size: float = CELL
 ) -> tuple[np.ndarray, np.ndarray]:
     """Light with less noise, and how noisy it was around each place.
 
@@ -35,6 +35,8 @@ def less_noise(
         Any unit.
     noise : (m,) float32
         Standard error of the mean of its channels; its mean square over a cell is what counts.
+    size : float
+        Edge of the cells, metres: some times as far as neighbours share their noise.
 
     Returns
     -------
@@ -44,8 +46,8 @@ def less_noise(
     """
     result, around = np.zeros_like(light), np.zeros(len(light))
     for k in range(GRIDS):
-        group, count = cells(position, normal, k / GRIDS)
-        fitted = _planes(position, light, group, count)
+        group, count = cells(position, normal, k / GRIDS, size)
+        fitted = _planes(position, light, group, count, size)
         rest = (light - fitted).mean(1)
         n2, v = (np.bincount(group, x.astype(np.float64) ** 2, len(count)) / count for x in (noise, rest))
         keep = np.where(count >= LEAST, np.maximum(v - n2, 0) / np.maximum(v, 1e-30), 1)
@@ -68,7 +70,9 @@ def cells(
     return group.ravel(), count
 
 
-def _planes(position: np.ndarray, light: np.ndarray, group: np.ndarray, count: np.ndarray) -> np.ndarray:
+def _planes(
+    position: np.ndarray, light: np.ndarray, group: np.ndarray, count: np.ndarray, size: float
+) -> np.ndarray:
     """Least squares of light over the position, cell by cell: its values at the elements, (m, 3) float32."""
     cells = len(count)
 
@@ -76,7 +80,7 @@ def _planes(position: np.ndarray, light: np.ndarray, group: np.ndarray, count: n
         return np.bincount(group, values, cells) / count
 
     centre = np.stack([mean(position[:, k]) for k in range(3)], 1)
-    x = (position - centre[group]) / CELL
+    x = (position - centre[group]) / size
     middle = np.stack([mean(light[:, c]) for c in range(3)], 1)
     second = np.empty((cells, 3, 3))
     both = np.empty((cells, 3, 3))

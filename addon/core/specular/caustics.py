@@ -69,7 +69,7 @@ class _Light:
 def caustics(
     room: LightField, bright: BrightTriangles, lobes: Lobes, seed: int = 0, photons: int = PHOTONS
 ) -> np.ndarray:
-    """E by way of one glossy reflection of what bright triangles send, less what was taken for it, (n, 3) float32.
+    """E by way of one glossy reflection of what bright triangles send, less what was taken for it.
 
     Parameters
     ----------
@@ -80,16 +80,16 @@ def caustics(
 
     Returns
     -------
-    (n, 3) float32
-        Radiance * steradian, for every element.
+    (n, 6) float32
+        Radiance * steradian, for every element; and half the difference of the photons' two halves, the noise in it.
     """
-    fallen = np.zeros((4, len(room.atlas)))  # the photons' power, by channel, and their number
+    halves = np.zeros((2, 4, len(room.atlas)))  # the photons' power, by channel, and their number
     if not len(bright) or not lobes.phi.any():
-        return np.zeros((len(room.atlas), 3), np.float32)
+        return np.zeros((len(room.atlas), 6), np.float32)
     cube = sobol(photons, seed, 5)
     rng = np.random.default_rng([seed, 2])
     for start in range(0, photons, AT_ONCE):
-        part = cube[start : start + AT_ONCE]
+        part, fallen = cube[start : start + AT_ONCE], halves[2 * start // photons]
         pick = sample_bright(bright, part[None, :, :3])
         normal = bright.normal[pick.index]
         ways = to_world(cosine_hemisphere(part[:, None, 3:]), normal)[:, 0]
@@ -103,7 +103,7 @@ def caustics(
         sent = _sent_on(room, lobes, element, light, rng)
         element, _, at = _met(room, sent)
         _let_fall(fallen, element, sent.power[at])
-    return _over_cells(room.atlas, fallen)
+    return _over_cells(room.atlas, halves)
 
 
 def _let_fall(fallen: np.ndarray, element: np.ndarray, power: np.ndarray) -> None:
@@ -149,9 +149,11 @@ def _sent_on(
     return _Light(origin, ways, light.power[alive] * share[alive])
 
 
-def _over_cells(atlas: Atlas, fallen: np.ndarray) -> np.ndarray:
-    """Power over area in cells of the surface, (n, 3) float32; in finer ones where enough photons lie."""
-    result, count = _density(atlas, fallen, np.arange(len(atlas)), CELL)
+def _over_cells(atlas: Atlas, halves: np.ndarray) -> np.ndarray:
+    """Power over area in cells of the surface and its noise, (n, 6) float32; in finer ones where enough photons lie."""
+    (a, b), everything = halves, np.arange(len(atlas))
+    fallen = np.concatenate([a[:3] + b[:3], a[:3] - b[:3], a[3:] + b[3:]])
+    result, count = _density(atlas, fallen, everything, CELL)
     for size in FINER:
         many = np.flatnonzero(count > ENOUGH)
         if not len(many):
@@ -166,14 +168,14 @@ def _over_cells(atlas: Atlas, fallen: np.ndarray) -> np.ndarray:
 
 
 def _density(atlas: Atlas, fallen: np.ndarray, element: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Power over area around some elements, (m, 3), and photons, (m,): means over cells of several shifted grids.
+    """Power over area around some elements, (m, 6), and photons, (m,): means over cells of several shifted grids.
 
     Small cells count for what they hold.
     """
-    held, area = np.zeros((4, len(element))), np.zeros(len(element))
+    held, area = np.zeros((7, len(element))), np.zeros(len(element))
     for k in range(GRIDS):
         group, _ = cells(atlas.position[element], atlas.normal[element], k / GRIDS, size)
-        for row, values in zip(held, fallen[:, element], strict=True):
-            row += np.bincount(group, values)[group]
+        for row, values in zip(held, fallen, strict=True):
+            row += np.bincount(group, values[element])[group]
         area += np.bincount(group, atlas.area[element])[group]
-    return (held[:3] / np.maximum(area, 1e-12)).T, held[3] / GRIDS
+    return (held[:6] / np.maximum(area, 1e-12)).T, held[6] / GRIDS
