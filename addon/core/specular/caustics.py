@@ -83,7 +83,7 @@ def caustics(
     (n, 6) float32
         Radiance * steradian, for every element; and half the difference of the photons' two halves, the noise in it.
     """
-    halves = np.zeros((2, 4, len(room.atlas)))  # the photons' power, by channel, and their number
+    halves = np.zeros((2, 4, len(room.atlas)), np.float32)  # the photons' power, by channel, and their number
     if not len(bright) or not lobes.phi.any():
         return np.zeros((len(room.atlas), 6), np.float32)
     cube = sobol(photons, seed, 5)
@@ -151,7 +151,7 @@ def _sent_on(
 
 def _over_cells(atlas: Atlas, halves: np.ndarray) -> np.ndarray:
     """Power over area in cells of the surface and its noise, (n, 6) float32; in finer ones where enough photons lie."""
-    (a, b), everything = halves, np.arange(len(atlas))
+    (a, b), everything = halves, np.arange(halves.shape[2])
     fallen = np.concatenate([a[:3] + b[:3], a[:3] - b[:3], a[3:] + b[3:]])
     result, count = _density(atlas, fallen, everything, CELL)
     for size in FINER:
@@ -164,7 +164,7 @@ def _over_cells(atlas: Atlas, halves: np.ndarray) -> np.ndarray:
         result[many] += share * (finer - result[many])
         count = np.zeros_like(count)
         count[many] = in_finer
-    return result.astype(np.float32)
+    return result
 
 
 def _density(atlas: Atlas, fallen: np.ndarray, element: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
@@ -172,10 +172,11 @@ def _density(atlas: Atlas, fallen: np.ndarray, element: np.ndarray, size: float)
 
     Small cells count for what they hold.
     """
-    held, area = np.zeros((7, len(element))), np.zeros(len(element))
+    held, area = np.zeros((7, len(element)), np.float32), np.zeros(len(element), np.float32)
     for k in range(GRIDS):
         group, _ = cells(atlas.position[element], atlas.normal[element], k / GRIDS, size)
         for row, values in zip(held, fallen, strict=True):
             row += np.bincount(group, values[element])[group]
         area += np.bincount(group, atlas.area[element])[group]
-    return (held[:6] / np.maximum(area, 1e-12)).T, held[6] / GRIDS
+    held[:6] /= np.maximum(area, np.float32(1e-12))
+    return held[:6].T, held[6] / GRIDS
