@@ -200,7 +200,7 @@ def by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice:
     if looks.other < LOOKS_SPREAD or looks.ratio > LOOKS or looks.sigmas < LIKELY_SIGMAS:
         return choice
     f0 = metal_f0(problem, looks.phi)
-    if f0.mean() <= METAL_PSI:
+    if f0.min() <= METAL_PSI:  # no metal is that dark in any channel, gold has .3 in blue; reddish wood had .06
         return choice
     # Median sizes, as `LobeFit` has them.
     residual, matt = looks.metal / 1.4826, looks.matt / 1.4826
@@ -235,15 +235,17 @@ def adopt_from_class(
         found = {i: choice for i, choice in members.items() if choice.model != LAMBERTIAN}
         if not found:
             continue
-        # What a metal explains as well says nothing against the metals of its class.
-        clear = {i: one for i, one in found.items() if one.model == METAL or not (one.bare or one.metal is not None)}
-        source = max(clear or found, key=lambda i: found[i].sigmas)
+        # What a metal explains as well says nothing against the metals of its class; looks alone judge only their own.
+        views = any(one.model == METAL and one.looks is None for one in found.values())
+        unclear = {i for i, one in found.items() if one.model != METAL and (one.metal or views and one.bare)}
+        clear = found.keys() - unclear
+        source = max(sorted(clear) or found, key=lambda i: found[i].sigmas)
         model = _pooled([c for c in found.values() if c.model == found[source].model], found[source])
         for i, choice in members.items():
             if model.model == METAL != choice.model and choice.metal is not None:
                 note = "Not beyond doubt by itself; others of its class are metal."
                 result[i] = replace(choice, model=METAL, fit=choice.metal, note=note)
-            elif model.model == METAL != choice.model and choice.bare:
+            elif model.model == METAL != choice.model and choice.bare and views:
                 note = f"Needs no diffuse part, like object {source} of its class, which is metal."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
             elif choice.model == LAMBERTIAN and not _refused(model.fit, choice.fit, problems.get(i)):

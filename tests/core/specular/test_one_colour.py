@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.material import LAMBERTIAN, METAL
+from addon.core.material import LAMBERTIAN, METAL, SPECULAR
 from addon.core.specular.intervals import gloss_interval
 from addon.core.specular.models import Choice, adopt_from_class, by_looks
 from addon.core.specular.one_colour import compare
@@ -98,3 +98,18 @@ def test_likely_metals_follow_their_class(floor, irradiance):
     assert result[1].model == METAL
     alone = adopt_from_class({1: likely}, {1: problem}, {1: "tap"})
     assert alone[1].model == LAMBERTIAN
+
+
+def test_reddish_wood_is_no_copper(floor, irradiance):
+    """A dark lacquer that shows the room would need an F0 next to nothing in blue, which no metal has."""
+    problem = floor(0.11, np.array([0.77, 0.19, 0.06]), 0.0)
+    assert by_looks(UNSURE, compare(problem, irradiance), problem) is UNSURE
+
+
+def test_looks_do_not_judge_others_of_the_class(floor, irradiance):
+    """A table with a lobe of its own stays as it is, though a metal's lobe alone would serve it, too."""
+    problem = floor(0.11, COPPER, 0.0)
+    metal = by_looks(UNSURE, compare(problem, irradiance), problem)
+    table = replace(metal, model=SPECULAR, looks=None, bare=True, sigmas=8.0)
+    result = adopt_from_class({0: metal, 1: table}, {0: problem, 1: problem}, dict.fromkeys(range(2), "wood"))
+    assert result[1].model == SPECULAR and result[0].model == METAL
