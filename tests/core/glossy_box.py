@@ -9,7 +9,7 @@ import numpy as np
 from addon.core.shading.emitters import bright_triangles
 from addon.core.specular.fit import Problem
 from addon.core.specular.lobes import reflected_light
-from tests.core.rooms import lit_box, make_room
+from tests.core.rooms import lit_box, make_room, polygon_irradiance
 
 SIZE = np.array([4.0, 3.0, 2.5])
 LAMP = (1.6, 2.4), (1.2, 1.8)
@@ -32,6 +32,17 @@ class Box:
     @cached_property
     def bright(self):
         return bright_triangles(self.field)
+
+    @cached_property
+    def irradiance(self) -> np.ndarray:
+        """E of each element from walls and lamp, not from the floor, (n, 3)."""
+        atlas = self.room.atlas
+        E = np.zeros((len(atlas), 3))
+        for object_id, radiance in ({i: self.walls[i] for i in range(1, 6)} | {6: self.glow}).items():
+            quads = [quad for quad in self.room.quads if quad.object_id == object_id]
+            one = polygon_irradiance(atlas.position.astype(float), atlas.normal.astype(float), quads).sum(1)
+            E += one[:, None] * radiance
+        return E
 
     def arriving(self, origin, w) -> np.ndarray:
         """Radiance along rays from points within the box, (n, 3)."""

@@ -14,7 +14,7 @@ from addon.core.material import LAMBERTIAN, METAL, SPECULAR
 from addon.core.shading.emitters import bright_triangles
 from addon.core.specular.lobes import reflected_light
 from tests.core.glossy_box import GLOW, WALLS, Box
-from tests.core.rooms import box_sides, look_at, make_room, picture, polygon_irradiance
+from tests.core.rooms import box_sides, look_at, make_room, picture
 from tests.hard_cases.rooms import DEFAULT, PAPERS
 
 SETTINGS = replace(DEFAULT, specular_rays=128)
@@ -30,12 +30,8 @@ class GlossyFloor:
         self.phi, self.f0 = phi, np.asarray(f0, float) * np.ones(3)
         self.across = 10 if phi == 0.01 else 20
         at = room.atlas
-        E = np.zeros((len(at), 3))
-        for object_id, radiance in walls.items():
-            quads = [q for q in room.quads if q.object_id == object_id]
-            one = polygon_irradiance(at.position.astype(float), at.normal.astype(float), quads).sum(1)
-            E += one[:, None] * radiance
-        self.light = np.where((at.object_id == 0)[:, None], rho * E / np.pi, room.by_object(walls))
+        lit = rho * self.box.irradiance / np.pi
+        self.light = np.where((at.object_id == 0)[:, None], lit, room.by_object(walls))
         eyes = [(0.7, 0.7, 1.2), (3.3, 0.8, 1.6), (0.8, 2.2, 1.5), (3.1, 2.3, 1.1), (2.0, 0.4, 1.8), (2.0, 2.6, 1.0)]
         self.views = [look_at(eye, target, 30, 24, 80) for eye in eyes for target in ((1.6, 1.2, 0), (2.4, 1.8, 0))]
         self.views += [look_at((2, 1.5, 1.2), (2, 1.5, 1.2) + np.array(way), 24, 24, 100)

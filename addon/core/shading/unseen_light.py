@@ -143,8 +143,8 @@ def find_light(
     known = environment
     for zone in zones:
         known = known.with_zone(zone, np.zeros(3, np.float32))
-    dark, unlit = np.zeros_like(field.radiance), field.with_sun(None)
-    received = old.received if old else irradiance_at(unlit.with_light(evened(field), known), element, seed)
+    dark, even, unlit = np.zeros_like(field.radiance), evened(field), field.with_sun(None)
+    received = old.received if old else irradiance_at(unlit.with_light(even, known), element, seed)
     thrown_sky = old.sky if old else [
         irradiance_at(unlit.with_light(dark, Environment.only(zone.pattern)), element, seed)[:, 0] for zone in zones
     ]
@@ -168,7 +168,7 @@ def find_light(
     else:
         thrown = {i: thrown_by_object(field, sample.element, i, seed) for i in unseen_objects}
         # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
-        lit_room = field.with_light(evened(field), environment)
+        lit_room = field.with_light(even, environment)
         least = {i: most_reflected(lit_room, i, seed) for i in unseen_objects}
 
     sky = Sky([G[lit] for G in thrown_sky], guess, bool(environment.clipped.any()), [zone.told for zone in zones])

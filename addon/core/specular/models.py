@@ -11,12 +11,12 @@ from ..weighted import weighted_median
 from .fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs, huber
 from .layout import Layout, Problem
 from .lobes import nearest
-from .one_colour import OneColour
+from .one_colour import BROADEST_PHI, DIELECTRIC_PSI, OneColour
 from .see_through import SeeThrough, is_sure
 
 LEAST_PSI = 0.02
 """No solid dielectric reflects less at normal incidence (n = 1.33); a smaller fitted psi is no lobe at all."""
-DIELECTRIC = Prior(0.04, 0.01)
+DIELECTRIC = Prior(DIELECTRIC_PSI, 0.01)
 """Plastics, lacquers, glass and woods have n = 1.4 to 1.6, F0 = 0.03 to 0.05. A broad lobe can be a little broader and
 much stronger for nearly the same frames (living room's panels: phi 0.39 with psi 0.05 or 0.45 with 0.1): there this
 decides; where the frames tell, they outweigh it."""
@@ -29,8 +29,6 @@ dielectrics and matt things whose lobe looked like a metal's 2.4 to 60, there an
 BARE_AT_MOST, MUCH = 3.0, 0.2
 """The same where a metal takes away more than this share of what a matt surface costs, and of what a dielectric does:
 thin legs of steel, 32 elements in 5 views, had 2.4."""
-BROADEST_PHI = 0.5
-"""A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface."""
 HOW = {SPECULAR: {"least_psi": LEAST_PSI, "prior": DIELECTRIC}, METAL: {"coloured": True}}
 """What `fit_lobe` is told of each model."""
 MIN_GAIN = 0.02
@@ -48,7 +46,8 @@ MIN_ELEMENTS = 12
 LOOKS, LOOKS_SIGMAS = 0.9, 3.0
 """An object of one colour is metal if that leaves less than this share of the spread that matt and dielectric leave, by
 this many standard errors. Of 166 objects in the living room and five others, metals had 0.2 to 1.1 (the half of them
-below 0.8), everything else 0.92 and more, but for what `LOOKS_SPREAD` leaves out and a pane of glass (0.58)."""
+below 0.8), everything else 0.92 and more, but for what `LOOKS_SPREAD` leaves out and a pane of glass (0.58); reddish
+wood in a perturbed scan had 0.78 and an F0 that no metal has (`by_looks`)."""
 LIKELY_SIGMAS = 1.5
 """With so many it is metal if others of its class are."""
 LOOKS_SPREAD = 0.15

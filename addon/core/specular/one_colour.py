@@ -14,12 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..shading.emitters import LUMINANCE
+from .fit import robust_scale
 from .layout import Problem
 
 DIELECTRIC_PSI = 0.04
 """What a dielectric of one colour reflects at normal incidence (n = 1.5)."""
 BROADEST_PHI = 0.5
-"""As in `models`: broader lobes of a metal look like matt things."""
+"""A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface."""
 LEAST_OBSERVATIONS = 40
 TRIMMED = 3.0
 """Residuals count up to so many spreads."""
@@ -53,7 +54,7 @@ class OneColour:
     @property
     def ratio(self) -> float:
         """The metal's spread over that; below 1 speaks for metal."""
-        return self.metal / max(self.other, 1e-6)
+        return self.metal / self.other
 
 
 def compare(problem: Problem, irradiance: np.ndarray) -> OneColour | None:
@@ -102,4 +103,4 @@ def compare(problem: Problem, irradiance: np.ndarray) -> OneColour | None:
 
 def spread(residual: np.ndarray) -> float:
     """Robust standard deviation of residuals about 0."""
-    return 1.4826 * float(np.median(np.abs(residual)))
+    return robust_scale(np.abs(residual))

@@ -11,8 +11,7 @@ from addon.core.material import LAMBERTIAN, METAL, SPECULAR
 from addon.core.specular.intervals import gloss_interval
 from addon.core.specular.models import Choice, adopt_from_class, by_looks
 from addon.core.specular.one_colour import compare
-from tests.core.glossy_box import GLOW, WALLS, Box
-from tests.core.rooms import polygon_irradiance
+from tests.core.glossy_box import WALLS, Box
 from tests.core.specular.test_fit import paint, steps
 
 COPPER = np.array([0.9, 0.6, 0.3])
@@ -28,13 +27,7 @@ def box():
 
 @pytest.fixture(scope="module")
 def irradiance(box):
-    atlas = box.room.atlas
-    E = np.zeros((len(atlas), 3))
-    for object_id, radiance in ({i: CONTRAST[i] for i in range(1, 6)} | {6: GLOW}).items():
-        quads = [quad for quad in box.room.quads if quad.object_id == object_id]
-        one = polygon_irradiance(atlas.position.astype(float), atlas.normal.astype(float), quads).sum(1)
-        E += one[:, None] * radiance
-    return E
+    return box.irradiance
 
 
 @pytest.fixture(scope="module")
