@@ -4,8 +4,8 @@
         [--denoise]
     python -m scripts.qa_rooms score CAPTURE RESULT
 
-KIND is kitchen, bathroom, bedroom, office or hall. `score` needs no rendering; it reads what `scan-relight recover
-CAPTURE --out RESULT` left. Run from the repository's root.
+KIND is kitchen, bathroom, bedroom, office, hall or study. `score` needs no rendering; it reads what
+`scan-relight recover CAPTURE --out RESULT` left. Run from the repository's root.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from ..weighted import weighted_median
 from .fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs, huber
 from .layout import Layout, Problem
 from .lobes import nearest
-from .one_colour import BROADEST_PHI, DIELECTRIC_PSI, OneColour
+from .one_colour import BROADEST_PHI, DIELECTRIC_PSI, Coated, OneColour
 from .see_through import SeeThrough, is_sure
 
 LEAST_PSI = 0.02
@@ -43,15 +43,6 @@ SURELY_METAL = 2.0
 """Standard errors by which a metal must also beat a dielectric over a diffuse part, once it has beaten a matt surface:
 that alone it does not stand or fall with, as it has to do without a diffuse part besides (`BARE`)."""
 MIN_ELEMENTS = 12
-LOOKS, LOOKS_SIGMAS = 0.9, 3.0
-"""An object of one colour is metal if that leaves less than this share of the spread that matt and dielectric leave, by
-this many standard errors. Of 166 objects in the living room and five others, metals had 0.2 to 1.1 (the half of them
-below 0.8), everything else 0.92 and more, but for what `LOOKS_SPREAD` leaves out and a pane of glass (0.58); reddish
-wood in a perturbed scan had 0.78 and an F0 that no metal has (`by_looks`)."""
-LIKELY_SIGMAS = 1.5
-"""With so many it is metal if others of its class are."""
-LOOKS_SPREAD = 0.15
-"""What follows matt light as closely as this says nothing against it: errors of E and A are of that size."""
 EXCLUDED = 0.1
 """Rise of an object's cost from which on the lobe of its class is refused."""
 
@@ -88,8 +79,8 @@ class Choice:
     does (`BARE`)."""
     see_through: SeeThrough | None = None
     """How the object shows what is behind it; it is TRANSPARENT then."""
-    looks: OneColour | None = None
-    """What said that it is metal, where its views alone did not (`by_looks`)."""
+    looks: OneColour | Coated | None = None
+    """What said that it is metal or coated, where its views alone did not (`by_looks`)."""
 
 
 def _gain(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
@@ -190,29 +181,6 @@ def set_apart(choice: Choice, found: SeeThrough | None) -> Choice:
     return Choice(TRANSPARENT, None, found.gain, found.sigmas, note, scores, see_through=found)
 
 
-def by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice:
-    """An object's choice, METAL where one metal explains all of its surface and neither matt nor dielectric does.
-
-    For things that are small and thin: `problem` may hold elements of a single view. They are taken to be of one
-    colour; where they are not, texture widens all spreads and the choice stays.
-    """
-    if looks.other < LOOKS_SPREAD or looks.ratio > LOOKS or looks.sigmas < LIKELY_SIGMAS:
-        return choice
-    f0 = metal_f0(problem, looks.phi)
-    if f0.min() <= METAL_PSI:  # no metal is that dark in any channel, gold has .3 in blue; reddish wood had .06
-        return choice
-    # Median sizes, as `LobeFit` has them.
-    residual, matt = looks.metal / 1.4826, looks.matt / 1.4826
-    fit = LobeFit(looks.phi, f0, 0.0, 0.0, residual**2, matt**2, residual, matt)
-    if looks.sigmas < LOOKS_SIGMAS:
-        return replace(choice, metal=choice.metal or fit)
-    note = (
-        f"Its radiance spreads by {looks.metal:.2f} about a metal's, by {looks.other:.2f} about that of anything else "
-        "of one colour."
-    )
-    return replace(choice, model=METAL, fit=fit, gain=1 - looks.ratio, sigmas=looks.sigmas, note=note, looks=looks)
-
-
 def adopt_from_class(
     choices: dict[int, Choice], problems: dict[int, Problem], class_of: dict[int, str]
 ) -> dict[int, Choice]:
@@ -234,17 +202,18 @@ def adopt_from_class(
         found = {i: choice for i, choice in members.items() if choice.model != LAMBERTIAN}
         if not found:
             continue
-        # What a metal explains as well says nothing against the metals of its class; looks alone judge only their own.
+        # What a metal explains as well says nothing against metals of its class; looks alone judge none with a lobe.
         views = any(one.model == METAL and one.looks is None for one in found.values())
-        unclear = {i for i, one in found.items() if one.model != METAL and (one.metal or views and one.bare)}
-        clear = found.keys() - unclear
-        source = max(sorted(clear) or found, key=lambda i: found[i].sigmas)
-        model = _pooled([c for c in found.values() if c.model == found[source].model], found[source])
+        judges = {i: one for i, one in found.items() if not isinstance(one.looks, Coated)} or found
+        unclear = {i for i, one in judges.items() if one.model != METAL and (one.metal or views and one.bare)}
+        clear = judges.keys() - unclear
+        source = max(sorted(clear) or judges, key=lambda i: found[i].sigmas)
+        model = _pooled([c for c in judges.values() if c.model == found[source].model], found[source])
         for i, choice in members.items():
             if model.model == METAL != choice.model and choice.metal is not None:
                 note = "Not beyond doubt by itself; others of its class are metal."
                 result[i] = replace(choice, model=METAL, fit=choice.metal, note=note)
-            elif model.model == METAL != choice.model and choice.bare and views:
+            elif model.model == METAL != choice.model and choice.bare and (views or choice.model == LAMBERTIAN):
                 note = f"Needs no diffuse part, like object {source} of its class, which is metal."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
             elif choice.model == LAMBERTIAN and not _refused(model.fit, choice.fit, problems.get(i)):

@@ -14,12 +14,13 @@ from ..progress import Progress
 from ..shading.field import LightField
 from ..shading.lamps import Lamp
 from ..shading.mirrors import Mirror
+from .by_looks import coated_by_looks, metal_by_looks
 from .fit import fit_lobe
 from .glossy_light import Excess, glossy_light
 from .intervals import GlossInterval, gloss_interval
 from .layout import Problem
-from .models import MIN_ELEMENTS, Choice, adopt_from_class, by_looks, choose_model, metal_f0, set_apart
-from .one_colour import compare
+from .models import MIN_ELEMENTS, Choice, adopt_from_class, choose_model, metal_f0, set_apart
+from .one_colour import compare, compare_coat
 from .problems import Problems
 from .samples import Samples
 from .see_through import judge, look_behind
@@ -35,7 +36,7 @@ SCREEN_RAYS = 4
 HOPELESS = 1.15
 """A lobe that raises the cost by this factor in the first look needs no second."""
 LOOKS_VIEWS = 4
-"""Views of each element for the question whether an object looks like a metal all over (`one_colour`)."""
+"""Views of each element for the question whether an object looks like a metal or coated all over (`by_looks`)."""
 LOOKS_LIKE_NONE = 1.5
 """A metal whose spread is so many times the other's in the first look needs no second."""
 UNRESOLVED = 0.17
@@ -215,15 +216,19 @@ def _by_frames(
 def _by_looks(
     maker: Problems, object_id: int, choice: Choice, problem: Problem | None, irradiance: np.ndarray, rays: int
 ) -> tuple[Choice, Problem | None]:
-    """Ask whether an object looks like a metal all over; its choice and observations stay as they were if not."""
+    """Ask whether an object looks like a metal or coated all over; choice and observations stay as they were if not."""
     if problem is not None and len(np.unique(problem.element)) >= MIN_ELEMENTS:
-        first = compare(problem, irradiance)
-        if first is None or first.ratio > LOOKS_LIKE_NONE:
+        first, coat = compare(problem, irradiance), compare_coat(problem, irradiance)
+        if first is None or first.ratio > LOOKS_LIKE_NONE and (choice.model != LAMBERTIAN or coat.ratio > 1):
             return choice, problem
     index = maker.pick(object_id, FIT_ELEMENTS, LOOKS_VIEWS, least=1, seed=1)
     whole = maker.problem(index, rays) if len(index) else None
     looks = compare(whole, irradiance) if whole is not None else None
-    found = choice if looks is None else by_looks(choice, looks, whole)
+    if looks is None:
+        return choice, problem
+    found = metal_by_looks(choice, looks, whole)
+    if found.model == LAMBERTIAN:
+        found = coated_by_looks(found, compare_coat(whole, irradiance))
     return found, whole if found.looks is not None else problem
 
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from addon.core.material import LAMBERTIAN, METAL, SPECULAR
+from addon.core.specular.by_looks import coated_by_looks, metal_by_looks
 from addon.core.specular.intervals import gloss_interval
-from addon.core.specular.models import Choice, adopt_from_class, by_looks
-from addon.core.specular.one_colour import compare
+from addon.core.specular.models import Choice, adopt_from_class
+from addon.core.specular.one_colour import compare, compare_coat
 from tests.core.glossy_box import WALLS, Box
 from tests.core.specular.test_fit import paint, steps
 
@@ -45,7 +46,7 @@ def test_a_metal(floor, irradiance):
     problem = floor(0.11, COPPER, 0.0)
     looks = compare(problem, irradiance)
     assert looks.ratio < 0.5 and looks.sigmas > 4 and steps(looks.phi, 0.11) <= 1
-    choice = by_looks(UNSURE, looks, problem)
+    choice = metal_by_looks(UNSURE, looks, problem)
     assert choice.model == METAL and choice.looks is looks and "metal" in choice.note
     assert np.allclose(choice.fit.psi, COPPER, rtol=0.1)
     low, high = gloss_interval(choice, problem).roughness
@@ -61,13 +62,13 @@ def test_what_is_no_metal(floor, irradiance, phi, psi, rho):
     """Least clear is black gloss: it shows the room as a metal does; a dielectric explains it as well."""
     problem = floor(phi, psi, rho)
     looks = compare(problem, irradiance)
-    assert by_looks(UNSURE, looks, problem) is UNSURE
+    assert metal_by_looks(UNSURE, looks, problem) is UNSURE
 
 
 def test_texture_speaks_for_none(floor, irradiance):
     problem = floor(None, 0, 0.5)
     painted = replace(problem, radiance=problem.radiance * paint(problem.element) / 0.3)
-    assert by_looks(UNSURE, compare(painted, irradiance), painted) is UNSURE
+    assert metal_by_looks(UNSURE, compare(painted, irradiance), painted) is UNSURE
 
 
 def test_what_follows_matt_light_stays_matt(floor, irradiance):
@@ -75,7 +76,7 @@ def test_what_follows_matt_light_stays_matt(floor, irradiance):
     problem = floor(0.11, COPPER, 0.0)
     looks = compare(problem, irradiance)
     flat = replace(looks, matt=0.12, dielectric=0.12, metal=0.03)
-    assert by_looks(UNSURE, flat, problem) is UNSURE
+    assert metal_by_looks(UNSURE, flat, problem) is UNSURE
 
 
 def test_too_little_of_it(floor, irradiance):
@@ -85,7 +86,7 @@ def test_too_little_of_it(floor, irradiance):
 def test_likely_metals_follow_their_class(floor, irradiance):
     problem = floor(0.11, COPPER, 0.0)
     looks = compare(problem, irradiance)
-    sure, likely = by_looks(UNSURE, looks, problem), by_looks(UNSURE, replace(looks, sigmas=2.0), problem)
+    sure, likely = metal_by_looks(UNSURE, looks, problem), metal_by_looks(UNSURE, replace(looks, sigmas=2.0), problem)
     assert likely.model == LAMBERTIAN and likely.metal is not None
     result = adopt_from_class({0: sure, 1: likely}, {0: problem, 1: problem}, dict.fromkeys(range(2), "tap"))
     assert result[1].model == METAL
@@ -96,13 +97,53 @@ def test_likely_metals_follow_their_class(floor, irradiance):
 def test_reddish_wood_is_no_copper(floor, irradiance):
     """A dark lacquer that shows the room would need an F0 next to nothing in blue, which no metal has."""
     problem = floor(0.11, np.array([0.77, 0.19, 0.06]), 0.0)
-    assert by_looks(UNSURE, compare(problem, irradiance), problem) is UNSURE
+    assert metal_by_looks(UNSURE, compare(problem, irradiance), problem) is UNSURE
 
 
 def test_looks_do_not_judge_others_of_the_class(floor, irradiance):
     """A table with a lobe of its own stays as it is, though a metal's lobe alone would serve it, too."""
     problem = floor(0.11, COPPER, 0.0)
-    metal = by_looks(UNSURE, compare(problem, irradiance), problem)
+    metal = metal_by_looks(UNSURE, compare(problem, irradiance), problem)
     table = replace(metal, model=SPECULAR, looks=None, bare=True, sigmas=8.0)
     result = adopt_from_class({0: metal, 1: table}, {0: problem, 1: problem}, dict.fromkeys(range(2), "wood"))
     assert result[1].model == SPECULAR and result[0].model == METAL
+
+
+LEAF = np.array([0.03, 0.2, 0.03])
+"""A saturated colour: a coat shows in its dark channels."""
+
+
+@pytest.mark.parametrize("rho", [np.float64(0.01), LEAF], ids=["black", "green"])
+def test_a_coat(floor, irradiance, rho):
+    problem = floor(0.11, 0.04, rho)
+    looks = compare_coat(problem, irradiance)
+    assert looks.ratio < 0.7 and steps(looks.phi, 0.11) <= 1
+    choice = coated_by_looks(UNSURE, looks)
+    assert choice.model == SPECULAR and choice.looks is looks and np.allclose(choice.fit.psi, 0.04)
+    low, high = gloss_interval(choice, problem).roughness
+    assert low < np.sqrt(0.11) < high and high - low > 0.4
+
+
+def test_nothing_matt_is_coated(floor, irradiance):
+    problem = floor(None, 0, LEAF)
+    assert coated_by_looks(UNSURE, compare_coat(problem, irradiance)) is UNSURE
+    painted = replace(problem, radiance=problem.radiance * paint(problem.element) / 0.3)
+    assert coated_by_looks(UNSURE, compare_coat(painted, irradiance)) is UNSURE
+
+
+def test_what_a_coat_does_not_explain_either(floor, irradiance):
+    """A cord as thick as a pixel shows its background: coated it is off by less, but by far too much."""
+    looks = compare_coat(floor(0.11, 0.04, LEAF), irradiance)
+    assert coated_by_looks(UNSURE, replace(looks, matt=0.65, coated=0.4)) is UNSURE
+
+
+def test_a_coat_by_looks_gives_way_to_one_by_views(floor, irradiance):
+    """The class's lobe is that of its members whose views show it; who has none takes it over."""
+    problem = floor(0.11, 0.04, LEAF)
+    coat = coated_by_looks(UNSURE, compare_coat(problem, irradiance))
+    views = replace(coat, looks=None, fit=replace(coat.fit, phi=0.06), sigmas=3.5)
+    problems = dict.fromkeys(range(3), problem)
+    result = adopt_from_class({0: coat, 1: views, 2: UNSURE}, problems, dict.fromkeys(range(3), "jar"))
+    assert result[1].fit.phi == result[2].fit.phi == 0.06
+    alone = adopt_from_class({0: coat, 2: UNSURE}, problems, dict.fromkeys((0, 2), "jar"))
+    assert alone[2].model == SPECULAR and alone[2].fit.phi == coat.fit.phi
