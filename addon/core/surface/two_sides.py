@@ -18,7 +18,7 @@ from ..capture.model import Mesh
 from .elements import triangle_geometry
 from .weld import point_normals, welded
 
-LEAST_SHARE, LEAST_RAYS = 0.05, 4
+LEAST_SHARE, LEAST_RAYS = 0.025, 4
 """A sheet is given two sides if this share of the rays that met it, and so many, met the side that is seen less."""
 LEAST_OF_OBJECT, LEAST_OF_ROOM = 0.1, 0.01
 """Sheets that are less of their object's surface, and of the room's, are left as they are: single leaves of a plant,
