@@ -16,13 +16,15 @@ from ..surface.creases import crease_doubt
 from ..surface.mesh_noise import tilt
 from ..surface.rays import RayScene
 from ..surface.two_sides import fronts
-from .albedo import Albedo, fill, quotient
+from .albedo import MAX_ALBEDO, Albedo, fill, quotient
 from .environment import Environment
+from .few_elements import evened
 from .field import LightField
 from .lamps import Lamp
 from .mirrors import Mirror
 from .neighbourhood import doubt
 from .over_surface import finest_spacing, irradiance
+from .shades import BOUNCES, strongly_lit
 from .sun import Sun, taken_out
 from .sunlit import find_all_light
 
@@ -157,7 +159,20 @@ def shade(
         rho, valid = quotient(lit_diffuse.radiance, everywhere)
         guess = fill(atlas, rho, valid, class_of, emitters)
         radiance[dark] = guess.rho[dark] * everywhere[dark] / np.float32(np.pi)
+        seen_as = evened(field)[dark]
         field = field.with_light(radiance)
+        # Inside a shade light goes to and fro.
+        for _ in range(BOUNCES - 1):
+            shades = strongly_lit(atlas, dark, radiance[dark], seen_as)
+            radiance = field.radiance.copy()
+            for own in shades:
+                everywhere[own] = irradiance(field, own, **(rough | {"finest": finest}))[0]
+                rho, valid = quotient(lit_diffuse.radiance[own], everywhere[own])
+                told = valid & seen[own]
+                paint = np.clip(np.median(rho[told], 0), 0, MAX_ALBEDO) if told.any() else guess.rho[own]
+                radiance[own] = np.where(seen[own, None], radiance[own], paint * everywhere[own] / np.float32(np.pi))
+            field = field.with_light(radiance)
+        coarse_dark = everywhere[dark]
 
     # 3. The real thing, where there is an L_d to divide; elsewhere the rough values do.
     E = np.zeros((len(atlas), 3), np.float32)

@@ -28,6 +28,7 @@ from .field import LightField
 from .lamps import Lamp, find_seen
 from .light_fit import CAP, CLIPPED_CAP, Sample, kinds_of, on_flat
 from .refine_light import Sky, all_light, refined, shared_by_class
+from .shades import by_way_of_shade
 from .unseen_lamps import SWEEPS, needed, solve_lamps, solve_sky
 from .whole_sky import with_whole_sky
 
@@ -164,9 +165,9 @@ def find_light(
     most = SAMPLES / len(np.unique(atlas.object_id[element])) / 2 if clipped else np.inf
     sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit], most)
     if old and np.array_equal(old.element, sample.element):
-        thrown, least = old.lamps, old.least
+        direct, thrown, least = None, old.lamps, old.least
     else:
-        thrown = {i: thrown_by_object(field, sample.element, i, seed) for i in unseen_objects}
+        direct = thrown = {i: thrown_by_object(field, sample.element, i, seed) for i in unseen_objects}
         # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
         lit_room = field.with_light(even, environment)
         least = {i: most_reflected(lit_room, i, seed) for i in unseen_objects}
@@ -174,13 +175,15 @@ def find_light(
     sky = Sky([G[lit] for G in thrown_sky], guess, bool(environment.clipped.any()), [zone.told for zone in zones])
     lamps: list[Lamp] = []
     colours = shared_by_class(colours or {}, unseen_objects, instances)
-    for sweep in range(SWEEPS):
-        lamps = solve_lamps(sample, thrown, least, instances, seen, sky, received[lit], colours)
-        solve_sky(sample, lamps, thrown, sky, received[lit])
-        if not zones or sweep == SWEEPS - 1:
+    for shaded in (False, True):
+        for _ in range(SWEEPS if zones else 1):
+            lamps = solve_lamps(sample, thrown, least, instances, seen, sky, received[lit], colours)
+            solve_sky(sample, lamps, thrown, sky, received[lit])
+        lamps, sky = needed(sample, lamps, thrown, sky, received[lit], colours)
+        log_albedo = np.log(np.maximum(sent, 1e-9) / np.maximum(all_light(received[lit], lamps, thrown, sky), 1e-12))
+        if shaded or not lamps or thrown is not direct:
             break
-    lamps, sky = needed(sample, lamps, thrown, sky, received[lit], colours)
-    log_albedo = np.log(np.maximum(sent, 1e-9) / np.maximum(all_light(received[lit], lamps, thrown, sky), 1e-12))
+        thrown = direct | _by_shades(field, lamps, sample, log_albedo, direct, seed)
     class_of = {i.object_id: i.class_name for i in instances}
     kind = kinds_of(sample.object_id, log_albedo, class_of)
     sample = replace(sample, kind=kind, cap=CLIPPED_CAP if clipped else CAP)
@@ -194,6 +197,18 @@ def find_light(
     sure = find_seen(atlas.object_id[element], field.radiance[element], everything)
     kept = Thrown(sunless, thrown_sky, sample.element, thrown, least)
     return Light(tuple(sure) + tuple(lamps), environment, found + tuple(sky.notes()), element, everything, kept)
+
+
+def _by_shades(
+    field: LightField, lamps: list[Lamp], sample: Sample, log_albedo: np.ndarray, direct: dict, seed: int
+) -> dict[int, np.ndarray]:
+    """E at the sample from each of some lamps at radiance 1, with what comes by way of its shade."""
+    level = np.log(np.pi) + log_albedo.mean(1)
+    albedo = {int(i): float(np.exp(np.median(level[sample.object_id == i]))) for i in np.unique(sample.object_id)}
+    return {
+        lamp.object_id: direct[lamp.object_id] + by_way_of_shade(field, lamp, albedo, sample.element, seed)
+        for lamp in lamps
+    }
 
 
 def lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
