@@ -58,6 +58,14 @@ class LobeLight:
             self.A[chosen], self.B[chosen], self.A_noise[chosen], self.B_noise[chosen], self.grid
         )
 
+    def replaced(self, at: np.ndarray, other: LobeLight) -> LobeLight:
+        """With another's values for the observations `at` ((k,) indices), in its order."""
+        values = {}
+        for name in ("A", "B", "A_noise", "B_noise"):
+            values[name] = getattr(self, name).copy()
+            values[name][at] = getattr(other, name)
+        return LobeLight(**values, grid=self.grid)
+
 
 def nearest(grid: np.ndarray, phi: float) -> int:
     """Index of the phi next to this one, in roughness."""

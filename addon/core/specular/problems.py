@@ -9,8 +9,13 @@ from ..shading.emitters import bright_triangles
 from ..shading.field import LightField
 from .layout import Problem
 from .lobes import LobeLight, reflected_light
+from .one_colour import BROADEST_PHI, DIELECTRIC_PSI
 from .samples import Samples
 
+NOISY, AGAIN, NARROWEST_PHI = 0.2, 8, 0.02
+"""Noise of a dielectric's lobe, as a share of the radiance, from which on an observation gets so many times more rays.
+Highlights of a bulb half hidden in its shade had .4: a desk's psi came out at .11 with 256 rays each, at .06 with 2048,
+where .04 is true. One observation in 70 of the living room, in 20 of a study with such lamps."""
 LEAST_VIEWS = 4
 """Elements seen by fewer frames can't tell what changes with the view."""
 
@@ -67,22 +72,34 @@ class Problems:
         first, last = np.searchsorted(self._owner, [object_id, object_id + 1])
         return pick(self._samples, self._usable[first:last], elements, views, least, self._seed + seed)
 
-    def light(self, index: np.ndarray, rays: int, phi: float | None = None) -> LobeLight:
-        """A and B of observations: for the whole grid, or for the one width `phi` with rays of that width."""
-        known = {} if phi is None else {"grid": np.float32([phi]), "proposals": (phi,)}
-        return reflected_light(
-            self._field, self._bright, self._samples.element[index], self._samples.direction[index],
-            rays=rays, threads=self._threads, seed=self._seed, **known,
-        )  # fmt: skip
+    def light(self, index: np.ndarray, rays: int, phi: float | None = None, rough: bool = False) -> LobeLight:
+        """A and B of observations: for the whole grid, or for the one width `phi` with rays of that width.
 
-    def problem(self, index: np.ndarray, rays: int) -> Problem:
-        """The fit's problem over observations."""
+        Those that come out noisy are done again with more rays, unless it need only be `rough`.
+        """
+        how = {} if phi is None else {"grid": np.float32([phi]), "proposals": (phi,)}
+        how |= {"threads": self._threads, "seed": self._seed}
+
+        def light(some: np.ndarray, count: int) -> LobeLight:
+            element, direction = self._samples.element[some], self._samples.direction[some]
+            return reflected_light(self._field, self._bright, element, direction, rays=count, **how)
+
+        found = light(index, rays)
+        if rough:
+            return found
+        noisy = np.flatnonzero(_noise(found, self._samples.radiance[index]) > NOISY)
+        return found.replaced(noisy, light(index[noisy], AGAIN * rays)) if len(noisy) else found
+
+    def problem(self, index: np.ndarray, rays: int, rough: bool = False) -> Problem:
+        """The fit's problem over observations (see `light`)."""
         element = self._samples.element[index]
         cosine = np.einsum("ij,ij->i", self._field.atlas.normal[element], self._samples.direction[index])
-        return Problem(
-            element,
-            self._samples.radiance[index],
-            self._lit.radiance[element],
-            self.light(index, rays),
-            cosine,
-        )
+        radiance = self._samples.radiance[index]
+        return Problem(element, radiance, self._lit.radiance[element], self.light(index, rays, rough=rough), cosine)
+
+
+def _noise(light: LobeLight, radiance: np.ndarray) -> np.ndarray:
+    """Noise of a dielectric's lobe as a share of the radiance, (m,), at the width that has most of it."""
+    widths = np.flatnonzero((light.grid >= NARROWEST_PHI) & (light.grid <= BROADEST_PHI))
+    noise = DIELECTRIC_PSI * light.A_noise[:, widths] + light.B_noise[:, widths]
+    return np.abs(noise).mean(2).max(1, initial=0) / np.maximum(radiance.mean(1), 1e-12)

@@ -188,7 +188,7 @@ def _look(
     index = maker.pick(object_id, SCREEN_ELEMENTS, FIT_VIEWS)
     if not len(index):
         return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, -1, index
-    problem = maker.problem(index, max(rays // SCREEN_RAYS, 16))
+    problem = maker.problem(index, max(rays // SCREEN_RAYS, 16), rough=True)
     target = target_frame(
         score_frames(samples.frame[index], problem.light.A[:, TARGET_PHI], problem.lit_diffuse, frames)
     )
