@@ -25,7 +25,7 @@ LIKELY_SIGMAS = 1.5
 """With so many it is metal if others of its class are."""
 LOOKS_SPREAD = 0.15
 """What follows matt light as closely as this says nothing against it: errors of E and A are of that size."""
-COATED, COATED_SIGMAS = 0.85, 3.0
+COATED, COATED_SIGMAS = 0.9, 4.0
 """An object of one colour is coated if that leaves less than this share of the spread that matt leaves, by this many
 standard errors. Of what was called Lambertian in five rooms and two perturbed scans, nine coated things had less (black
 tubes 0.42, a hand rail 0.74, soap 0.75); what is truly matt had 0.88 and more, but for what `COATED_SPREAD` says."""

@@ -148,3 +148,13 @@ def test_a_class_may_be_sure_together(seen, sigmas, model):
     assert {choice.model for choice in result.values()} == {model}
     if model == SPECULAR:
         assert "together" in result[0].note
+
+
+def test_what_is_no_lobe_makes_no_class_sure(seen):
+    """Matt curtains gained by phi .87 and 1, surely; the one that gains by a lobe is not sure of it."""
+    fit = choose_model(seen["glossy"]).fit
+    broad = replace(fit, phi=0.9)
+    choices = {i: Choice(LAMBERTIAN, broad, 0.03, s, "Not sure.") for i, s in enumerate((3.5, 6.5))}
+    choices[2] = Choice(LAMBERTIAN, fit, 0.05, 2.5, "Not sure.")
+    result = adopt_from_class(choices, {}, dict.fromkeys(choices, "curtain"))
+    assert {choice.model for choice in result.values()} == {LAMBERTIAN}

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from addon.core.lit_diffuse.accumulate import LitDiffuse
 from addon.core.lit_diffuse.visibility import CLEAN
 from addon.core.material import TRANSPARENT
+from addon.core.specular import reflect
 from addon.core.specular.reflect import fit_specular
 from addon.core.specular.samples import Samples
 from addon.core.specular.see_through import look_behind
@@ -131,3 +134,18 @@ def test_what_lies_behind():
     assert np.median(np.abs(found.radiance - room.behind)) < 0.05
     hidden = look_behind(room.room.field(room.radiance), ~seen, room.element, room.direction.astype(np.float32), PANE)
     assert not hidden.known.any()
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.05, False), (0.5, True)])
+def test_a_few_elements_at_its_rim_do_not_make_it_glass(share, told, monkeypatch):
+    """The pixels of a pole three pixels wide are mixed with what is behind it; only there is that known."""
+
+    def at_the_rim(field, seen, element, direction, object_id, noise=0.0):
+        found = look_behind(field, seen, element, direction, object_id, noise)
+        y = field.atlas.position[element, 1] - 0.8
+        return replace(found, known=found.known & (y < share * 1.4))
+
+    monkeypatch.setattr(reflect, "look_behind", at_the_rim)
+    room = Room()
+    material, _, _ = room.recovered(0.1 + 0.5 * room.behind)
+    assert (material.model == TRANSPARENT) == told
