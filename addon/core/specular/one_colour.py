@@ -96,11 +96,11 @@ def compare(problem: Problem, irradiance: np.ndarray) -> OneColour | None:
     irradiance : (n, 3) float32
         E of each element of the surface.
     """
-    usable, E = _usable(problem, irradiance)
-    if usable.sum() < LEAST_OBSERVATIONS:
+    told = _told(problem, irradiance)
+    if told is None:
         return None
-    light, seen = problem.light, problem.radiance[usable]
-    log_I, element = np.log(seen @ LUMINANCE), problem.element[usable]
+    usable, seen, E, element = told
+    light, log_I = problem.light, np.log(seen @ LUMINANCE)
     widths = np.flatnonzero(light.grid <= BROADEST_PHI)
 
     def residual(predicted: np.ndarray) -> np.ndarray:
@@ -128,10 +128,10 @@ def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
     irradiance : (n, 3) float32
         E of each element of the surface.
     """
-    usable, E = _usable(problem, irradiance)
-    if usable.sum() < LEAST_OBSERVATIONS:
+    told = _told(problem, irradiance)
+    if told is None:
         return None
-    seen, element = problem.radiance[usable], problem.element[usable]
+    usable, seen, E, element = told
     widths = np.flatnonzero(problem.light.grid <= BROADEST_PHI)
     least = DARKEST * np.median(seen)
 
@@ -148,11 +148,15 @@ def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
     )
 
 
-def _usable(problem: Problem, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which observations tell something, (m,) bool, and E at those, (k, 3)."""
-    seen, E = problem.radiance @ LUMINANCE, irradiance[problem.element]
-    usable = (seen > 1e-3 * np.median(seen)) & (E @ LUMINANCE > 0)
-    return usable, E[usable]
+def _told(
+    problem: Problem, irradiance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+    """Which observations tell something, (m,) bool, and their radiance, E (k, 3) and element (k,); None if too few."""
+    bright, E = problem.radiance @ LUMINANCE, irradiance[problem.element]
+    usable = (bright > 1e-3 * np.median(bright)) & (E @ LUMINANCE > 0)
+    if usable.sum() < LEAST_OBSERVATIONS:
+        return None
+    return usable, problem.radiance[usable], E[usable], problem.element[usable]
 
 
 def _coat(problem: Problem, at: int) -> np.ndarray:
