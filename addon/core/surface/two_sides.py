@@ -18,8 +18,11 @@ from ..capture.model import Mesh
 from .elements import triangle_geometry
 from .weld import point_normals, welded
 
-LEAST_SHARE, LEAST_RAYS = 0.025, 4
+LEAST_SHARE, LEAST_RAYS = 0.05, 4
 """A sheet is given two sides if this share of the rays that met it, and so many, met the side that is seen less."""
+LESS_SHARE, MORE_RAYS = 0.025, 12
+"""Or this share, where they are so many: a floor lamp's shade had 17 of 590, and threw its inner side's light at the
+wall behind it. Bent tubes have 4 to 10 of some hundred at their ends, and second sides would halve what shows them."""
 LEAST_OF_OBJECT, LEAST_OF_ROOM = 0.1, 0.01
 """Sheets that are less of their object's surface, and of the room's, are left as they are: single leaves of a plant,
 whose two sides are alike, only cost elements, and views that its other elements would be judged by."""
@@ -78,7 +81,9 @@ def two_sided(mesh: Mesh, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     bordered = np.bincount(sheet, border, 2 * count) > 0
     one_surface = np.ones(2 * count, bool)
     one_surface[sheet[up == down]] = False  # such as Moebius' strip
-    seen = np.minimum(front, back) >= np.maximum(LEAST_SHARE * (front + back), LEAST_RAYS)
+    less, rays_on = np.minimum(front, back), front + back
+    seen = less >= np.maximum(LEAST_SHARE * rays_on, LEAST_RAYS)
+    seen |= less >= np.maximum(LESS_SHARE * rays_on, MORE_RAYS)
     both = (seen & bordered & one_surface)[sheet]
     return both, np.where(front >= back, 1, -1)[sheet] * ways.astype(np.float32)
 

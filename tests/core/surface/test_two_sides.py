@@ -61,7 +61,10 @@ def test_a_shade_is_a_sheet_though_each_triangle_shows_one_side():
     assert (facing > 0).all() or (facing < 0).all()
 
 
-@pytest.mark.parametrize("rays, told", [((100, 0), False), ((196, 4), False), ((96, 4), True), ((3, 3), False)])
+@pytest.mark.parametrize(
+    "rays, told",
+    [((100, 0), False), ((96, 4), False), ((94, 6), True), ((3, 3), False), ((580, 18), True), ((980, 18), False)],
+)
 def test_a_side_seen_by_chance_makes_no_sheet(rays, told):
     mesh = tube()
     seen = np.zeros((2, len(mesh.triangles)), int)
