@@ -1,9 +1,9 @@
 """Light that lamps throw by way of what nobody saw around them: the insides of their shades.
 
 A bulb that no frame sees is told by what it throws, and a good part of that comes by way of its shade, whose inside no
-frame sees either. Without that part two bulbs in a bedroom came out 1.3 to 1.45 times too bright, one in a study 1.3
-times. What counts is what the lamp makes much brighter than anything seen of that object: the rest is in the light that
-unseen elements are taken to send anyway.
+frame sees either. Without that part two bulbs in a bedroom came out at 1.30 and 1.43 of their luminance (1.06 and 1.24
+with it), two in a study at .98 and 1.39 (.93 and 1.08). What counts is what the lamp makes much brighter than anything
+seen of that object: the rest is in the light that unseen elements are taken to send anyway.
 """
 
 from __future__ import annotations
