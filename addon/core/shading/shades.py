@@ -89,9 +89,11 @@ def strongly_lit(atlas: Atlas, dark: np.ndarray, sent: np.ndarray, seen_as: np.n
     dark : (d,) int
         Elements that nobody saw.
     sent, seen_as : (d, 3) float32
-        Radiance that they are found to send, and what was seen of their object.
+        Radiance that they are found to send, and what was seen of their object; 0: nothing was, the room stands in.
     """
+    level = seen_as @ LUMINANCE
+    level = np.where(level > 0, level, np.median(level[level > 0]) if level.any() else np.inf)
     side = 2 * atlas.object_id.astype(np.int64) + (0 if atlas.back is None else atlas.back)
-    strong = sent @ LUMINANCE > STRONGLY * np.maximum(seen_as @ LUMINANCE, 1e-12)
+    strong = sent @ LUMINANCE > STRONGLY * level
     of_all, of_strong = (np.bincount(side[dark], weight, side.max() + 1) for weight in (None, strong))
     return [np.flatnonzero(side == one) for one in np.flatnonzero(of_strong > np.maximum(of_all / 2, LEAST))]

@@ -61,3 +61,12 @@ def test_sides_that_are_strongly_lit(shade):
     seen_as = np.full_like(sent, 0.1)
     (found,) = strongly_lit(shade.atlas, dark, sent, seen_as)
     assert (shade.atlas.object_id[found] == 1).all()
+
+
+def test_what_nobody_saw_is_judged_by_the_room(shade):
+    """Another room, dark or not, is no shade; a lamp's globe that no frame sees is."""
+    dark = np.flatnonzero(shade.atlas.object_id != FLOOR)
+    seen_as = shade.by_object({i: 0.1 for i in range(2, 7)})[dark]  # of object 1 nothing was seen
+    assert not strongly_lit(shade.atlas, dark, shade.by_object({1: 0.2})[dark], seen_as)
+    assert len(strongly_lit(shade.atlas, dark, shade.by_object({1: 0.5})[dark], seen_as)) == 1
+    assert not strongly_lit(shade.atlas, dark, shade.by_object({1: 0.5})[dark], np.zeros_like(seen_as))
