@@ -11,7 +11,8 @@ from __future__ import annotations
 LAMP_UNSURE, SKY_UNSURE, CLIPPED_UNSURE, ROUGH_LIGHT = 0.1, 0.3, 0.4, 0.25
 """Relative error of light that no frame looked at: lamps and sky that were solved for; clipped surfaces, known as a
 lower bound; and, besides the error of their albedo, surfaces: the light on them is gathered roughly. (An unseen ceiling
-lamp came out at 0.93 to 1.08 of its radiance in the rooms, at 0.99 in the living room; bulbs in shades at .93 to 1.24.)"""
+lamp came out at 0.93 to 1.08 of its radiance in the rooms, at 0.99 in the living room; four bulbs in shades at 0.93 to
+1.24.)"""
 SUN_UNSURE = 0.1
 """The same of a sun that was solved for."""
 LIGHT_FLOOR = 0.02
