@@ -13,7 +13,7 @@ SPINES = ((0.3, 0.03, 0.03), (0.03, 0.12, 0.06), (0.05, 0.07, 0.25), (0.5, 0.4, 
 
 
 def study(seed: int) -> FurnishedRoom:
-    """Two windows under an evening sky, a floor lamp, a desk lamp and two ceiling bulbs in open glass-less rings."""
+    """Two windows under an evening sky, a floor lamp, a desk lamp and two bulbs that hang on cords."""
     r = FurnishedRoom(
         "study",
         seed,

@@ -119,7 +119,7 @@ def _parts(atlas: Atlas, valid: np.ndarray) -> np.ndarray:
     """Numbers of what is filled in together: objects, a sheet's second side by itself if it was measured, (n,) int."""
     if atlas.back is None:
         return atlas.object_id
-    part = 2 * atlas.object_id.astype(np.int64) + atlas.back
+    part = atlas.side
     measured = np.bincount(part, valid, 2 * int(atlas.object_id.max()) + 2).reshape(-1, 2) > 0
     return np.where(measured.all(1)[atlas.object_id], part, part - atlas.back)
 

@@ -164,6 +164,8 @@ def shade(
         # Inside a shade light goes to and fro.
         for _ in range(BOUNCES - 1):
             shades = strongly_lit(atlas, dark, radiance[dark], seen_as)
+            if not shades:
+                break
             radiance = field.radiance.copy()
             for own in shades:
                 everywhere[own] = irradiance(field, own, **(rough | {"finest": finest}))[0]

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from ..surface.atlas import Atlas
 from .emitters import LUMINANCE
 from .environment import Environment
-from .few_elements import evened, irradiance_at, thrown_by_object
+from .few_elements import irradiance_at, thrown_by_object
 from .field import LightField
 from .lamps import Lamp
 
@@ -31,7 +31,7 @@ UNKNOWN, DARKEST, LIGHTEST = 0.5, 0.05, 0.85
 
 
 def by_way_of_shade(
-    field: LightField, lamp: Lamp, albedo: dict[int, float], element: np.ndarray, seed: int
+    field: LightField, lamp: Lamp, albedo: dict[int, float], even: np.ndarray, element: np.ndarray, seed: int
 ) -> np.ndarray:
     """E that a lamp at radiance 1 throws by way of unseen elements around it, (m,) float64.
 
@@ -41,6 +41,8 @@ def by_way_of_shade(
         What nobody saw is dark in it.
     albedo : dict of float
         Of objects, as far as it is known.
+    even : (n, 3) float32
+        L_d with each object's own median where nobody saw it (`few_elements.evened`).
     element : (m,) int
         Where E is wanted.
     """
@@ -54,31 +56,26 @@ def by_way_of_shade(
         return nothing
     rng = np.random.default_rng([seed, lamp.object_id])
     places = rng.choice(near, min(PLACES, len(near)), replace=False)
-    closest = cKDTree(_place(atlas, places)).query(_place(atlas, near), workers=-1)[1]
+    closest = cKDTree(atlas.place(places)).query(atlas.place(near), workers=-1)[1]
     rho = np.clip([albedo.get(int(i), UNKNOWN) for i in atlas.object_id[near]], DARKEST, LIGHTEST)
     from_lamp = thrown_by_object(field, places, lamp.object_id, seed)
     bright = float(lamp.radiance @ LUMINANCE)
-    enough = STRONGLY * (evened(field)[near] @ LUMINANCE) / max(bright, 1e-12)
+    enough = STRONGLY * (even[near] @ LUMINANCE) / max(bright, 1e-12)
     sent, unlit = rho * from_lamp[closest] / np.pi, field.with_sun(None)
     if (sent > enough).sum() < LEAST:
         return nothing
 
-    def lit_by(index: np.ndarray, radiance: np.ndarray) -> LightField:
+    def with_only(index: np.ndarray, radiance: np.ndarray) -> LightField:
         """The room with light from these elements only."""
         values = np.zeros_like(field.radiance)
         values[index] = radiance[:, None]
         return unlit.with_light(values, Environment.dark(), ())
 
     for bounce in range(BOUNCES - 1):
-        from_shade = irradiance_at(lit_by(near, sent), places, seed + bounce)[:, 0]
+        from_shade = irradiance_at(with_only(near, sent), places, seed + bounce)[:, 0]
         sent = rho * (from_lamp + from_shade)[closest] / np.pi
     strong = sent > enough
-    return irradiance_at(lit_by(near[strong], sent[strong]), element, seed)[:, 0]
-
-
-def _place(atlas: Atlas, index: np.ndarray) -> np.ndarray:
-    """Elements as points whose nearest neighbours face the same way."""
-    return np.concatenate([atlas.position[index], 0.2 * atlas.normal[index]], 1)
+    return irradiance_at(with_only(near[strong], sent[strong]), element, seed)[:, 0]
 
 
 def strongly_lit(atlas: Atlas, dark: np.ndarray, sent: np.ndarray, seen_as: np.ndarray) -> list[np.ndarray]:
@@ -93,7 +90,7 @@ def strongly_lit(atlas: Atlas, dark: np.ndarray, sent: np.ndarray, seen_as: np.n
     """
     level = seen_as @ LUMINANCE
     level = np.where(level > 0, level, np.median(level[level > 0]) if level.any() else np.inf)
-    side = 2 * atlas.object_id.astype(np.int64) + (0 if atlas.back is None else atlas.back)
+    side = atlas.side
     strong = sent @ LUMINANCE > STRONGLY * level
     of_all, of_strong = (np.bincount(side[dark], weight, side.max() + 1) for weight in (None, strong))
     return [np.flatnonzero(side == one) for one in np.flatnonzero(of_strong > np.maximum(of_all / 2, LEAST))]

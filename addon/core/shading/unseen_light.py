@@ -164,26 +164,31 @@ def find_light(
     # About half of the elements are on flat spots, of large objects as of small ones.
     most = SAMPLES / len(np.unique(atlas.object_id[element])) / 2 if clipped else np.inf
     sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit], most)
-    if old and np.array_equal(old.element, sample.element):
-        direct, thrown, least = None, old.lamps, old.least
+    known_thrown = old is not None and np.array_equal(old.element, sample.element)
+    if known_thrown:
+        thrown, least = old.lamps, old.least
     else:
-        direct = thrown = {i: thrown_by_object(field, sample.element, i, seed) for i in unseen_objects}
+        thrown = {i: thrown_by_object(field, sample.element, i, seed) for i in unseen_objects}
         # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
         lit_room = field.with_light(even, environment)
         least = {i: most_reflected(lit_room, i, seed) for i in unseen_objects}
 
     sky = Sky([G[lit] for G in thrown_sky], guess, bool(environment.clipped.any()), [zone.told for zone in zones])
-    lamps: list[Lamp] = []
     colours = shared_by_class(colours or {}, unseen_objects, instances)
-    for shaded in (False, True):
+
+    def solve(thrown: dict[int, np.ndarray], sky: Sky) -> tuple[list[Lamp], Sky, np.ndarray]:
+        """Lamps, the sky (changed in place, too) and log(L_d / E), (k, 3)."""
         for _ in range(SWEEPS if zones else 1):
             lamps = solve_lamps(sample, thrown, least, instances, seen, sky, received[lit], colours)
             solve_sky(sample, lamps, thrown, sky, received[lit])
         lamps, sky = needed(sample, lamps, thrown, sky, received[lit], colours)
-        log_albedo = np.log(np.maximum(sent, 1e-9) / np.maximum(all_light(received[lit], lamps, thrown, sky), 1e-12))
-        if shaded or not lamps or thrown is not direct:
-            break
-        thrown = direct | _by_shades(field, lamps, sample, log_albedo, direct, seed)
+        E = all_light(received[lit], lamps, thrown, sky)
+        return lamps, sky, np.log(np.maximum(sent, 1e-9) / np.maximum(E, 1e-12))
+
+    lamps, sky, log_albedo = solve(thrown, sky)
+    if lamps and not known_thrown:
+        thrown |= _by_shades(field, lamps, even, sample, log_albedo, thrown, seed)
+        lamps, sky, log_albedo = solve(thrown, sky)
     class_of = {i.object_id: i.class_name for i in instances}
     kind = kinds_of(sample.object_id, log_albedo, class_of)
     sample = replace(sample, kind=kind, cap=CLIPPED_CAP if clipped else CAP)
@@ -200,13 +205,19 @@ def find_light(
 
 
 def _by_shades(
-    field: LightField, lamps: list[Lamp], sample: Sample, log_albedo: np.ndarray, direct: dict, seed: int
+    field: LightField,
+    lamps: list[Lamp],
+    even: np.ndarray,
+    sample: Sample,
+    log_albedo: np.ndarray,
+    direct: dict[int, np.ndarray],
+    seed: int,
 ) -> dict[int, np.ndarray]:
     """E at the sample from each of some lamps at radiance 1, with what comes by way of its shade."""
     level = np.log(np.pi) + log_albedo.mean(1)
     albedo = {int(i): float(np.exp(np.median(level[sample.object_id == i]))) for i in np.unique(sample.object_id)}
     return {
-        lamp.object_id: direct[lamp.object_id] + by_way_of_shade(field, lamp, albedo, sample.element, seed)
+        lamp.object_id: direct[lamp.object_id] + by_way_of_shade(field, lamp, albedo, even, sample.element, seed)
         for lamp in lamps
     }
 

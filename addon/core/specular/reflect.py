@@ -218,8 +218,11 @@ def _by_looks(
 ) -> tuple[Choice, Problem | None]:
     """Ask whether an object looks like a metal or coated all over; choice and observations stay as they were if not."""
     if problem is not None and len(np.unique(problem.element)) >= MIN_ELEMENTS:
-        first, coat = compare(problem, irradiance), compare_coat(problem, irradiance)
-        if first is None or first.ratio > LOOKS_LIKE_NONE and (choice.model != LAMBERTIAN or coat.ratio > 1):
+        first = compare(problem, irradiance)
+        if first is None:
+            return choice, problem
+        like_metal = first.ratio <= LOOKS_LIKE_NONE
+        if not like_metal and (choice.model != LAMBERTIAN or compare_coat(problem, irradiance).ratio > 1):
             return choice, problem
     index = maker.pick(object_id, FIT_ELEMENTS, LOOKS_VIEWS, least=1, seed=1)
     whole = maker.problem(index, rays) if len(index) else None

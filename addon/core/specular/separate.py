@@ -64,11 +64,8 @@ def spread_over_object(atlas: Atlas, own: np.ndarray, element: np.ndarray, value
     (n, 3) float32
         Weighted mean of the nearest known ones, in place and orientation.
     """
-    def place(index: np.ndarray) -> np.ndarray:
-        return np.concatenate([atlas.position[index], 0.2 * atlas.normal[index]], 1)
-
     k = min(NEIGHBOURS, len(element))
-    distance, near = cKDTree(place(element)).query(place(own), k=k)
+    distance, near = cKDTree(atlas.place(element)).query(atlas.place(own), k=k)
     distance, near = distance.reshape(len(own), k), near.reshape(len(own), k)
     # Weights that level off within the neighbourhood: each known value is noisy by itself.
     weight = 1 / (distance + distance[:, -1:] / 2 + 1e-6)

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+TURNED = 0.2
+"""Metres: so far apart count two elements whose normals differ by a radian (`Atlas.place`)."""
+
 
 @dataclass(frozen=True)
 class Atlas:
@@ -54,6 +57,15 @@ class Atlas:
     def texel_edge(self) -> float:
         """Edge of a usual element, metres."""
         return float(np.sqrt(np.median(self.area)))
+
+    @property
+    def side(self) -> np.ndarray:
+        """Twice the object's number, plus 1 on the second side of a sheet, (n,) int64."""
+        return 2 * self.object_id.astype(np.int64) + (0 if self.back is None else self.back)
+
+    def place(self, index: np.ndarray) -> np.ndarray:
+        """Elements (m,) as points (m, 6) whose nearest neighbours lie close and face the same way."""
+        return np.concatenate([self.position[index], TURNED * self.normal[index]], 1)
 
     def image(self, values: np.ndarray, empty: float = 0.0) -> np.ndarray:
         """Spread values of the elements ((n,) or (n, c)) over the image, islands padded: (size, size[, c])."""

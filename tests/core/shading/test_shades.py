@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading.few_elements import thrown_by_object
+from addon.core.shading.few_elements import evened, thrown_by_object
 from addon.core.shading.lamps import Lamp
 from addon.core.shading.shades import by_way_of_shade, strongly_lit
 from tests.core.rooms import lit_box, make_room, radiosity
@@ -27,8 +27,8 @@ def floor(shade):
 
 def thrown(shade, floor, radiance, brightness=1.0, albedo=PAPER):
     lamp = Lamp(LAMP, np.full(3, brightness, np.float32), False)
-    known = {i: albedo for i in range(1, 6)}
-    return by_way_of_shade(shade.field(radiance), lamp, known, floor, seed=0)
+    known, field = {i: albedo for i in range(1, 6)}, shade.field(radiance)
+    return by_way_of_shade(field, lamp, known, evened(field), floor, seed=0)
 
 
 def test_what_comes_by_way_of_the_shade(shade, floor):
