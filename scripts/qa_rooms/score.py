@@ -21,6 +21,8 @@ from addon.core.settings import Settings
 from addon.core.shading.albedo import MEASURED
 from addon.core.store import Store
 
+from .held import held
+
 LEAST_PIXELS = 100
 UNTOLD = 0.5
 """Blender's Roughness where the result says none."""
@@ -38,6 +40,7 @@ def table(capture: Path, result: Path) -> str:
         f"  {found['roughness_by_pixel']:6.3f}     roughness, mean absolute error by pixel",
         f"  {found['roughness_by_object']:6.3f}     roughness, mean absolute error by object",
         f"  models right: {found['right']} of {found['of']}: {found['models']}",
+        f"  90 % intervals hold: {', '.join(f'{name} {value:.2f}' for name, value in found['held'].items())}",
     ]
     for lamp in found["lamps"]:
         lines.append(
@@ -78,7 +81,7 @@ def compare(capture: Path, result: Path) -> dict:
         base, rho, E = recovery.base_color(), recovery.albedo.rho, recovery.irradiance
         materials = {m.object_id: m for m in recovery.materials()}
         measured = recovery.albedo.origin == MEASURED
-        warnings = recovery.report()["warnings"]
+        warnings, shares = recovery.report()["warnings"], held(recovery, seen, truth)
     for view, frame in zip(seen, json.loads((capture / "truth" / "transforms.json").read_text())["frames"]):
         name = Path(frame["file_path"]).name
         view["id"] = np.rint(read_exr(capture / "truth" / "object_id" / name).rgb[..., 0]).astype(int).ravel()
@@ -151,6 +154,7 @@ def compare(capture: Path, result: Path) -> dict:
         "psnr": scores,
         "roughness_by_pixel": float(np.average(by_object, weights=by_pixel)),
         "roughness_by_object": float(by_object.mean()),
+        "held": shares,
         "models": models,
         "of": sum(models.values()),
         "right": sum(n for k, n in models.items() if len(set(k.split(" as "))) == 1),

@@ -18,7 +18,7 @@ from ..shading.field import LightField
 from ..shading.over_surface import irradiance
 from ..shading.shade import Shading
 from ..surface.atlas import Atlas
-from .calibration import CLIPPED_UNSURE, LAMP_UNSURE, ROUGH_LIGHT, SKY_UNSURE, SUN_UNSURE
+from .calibration import CLIPPED_UNSURE, LAMP_UNSURE, ROUGH_LIGHT, SKY_UNSURE, SUN_UNSURE, SURFACES
 
 SPOTS = 4000
 RAYS = {"rays": 128, "emitter_rays": 32, "portal_rays": 32}
@@ -97,7 +97,7 @@ def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, doubt: np
     solved = np.isin(field.atlas.object_id, [lamp.object_id for lamp in shading.lamps if not lamp.seen])
     clipped = lit.tier == SATURATED
     surface = (~lit.seen | clipped) & ~solved
-    off = np.where(clipped, CLIPPED_UNSURE, np.minimum(np.hypot(doubt, ROUGH_LIGHT), 1))
+    off = np.where(clipped, CLIPPED_UNSURE, SURFACES * np.minimum(np.hypot(doubt, ROUGH_LIGHT), 1))
     kinds = [luminance * (surface | solved), luminance * surface * off, luminance * solved * LAMP_UNSURE]
     sky = (shading.environment.radiance @ LUMINANCE) * (shading.environment.observations == 0)
     sky = np.stack([sky, np.zeros_like(sky), SKY_UNSURE * sky], -1).astype(np.float32)

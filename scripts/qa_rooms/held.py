@@ -1,0 +1,61 @@
+"""Shares of the truth that a result's 90 % intervals hold, in the room's held-out views."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from addon.benchmark.truth_views import projected_truth
+from addon.core.material import LAMBERTIAN, METAL, SPECULAR, Z90
+from addon.core.recover import Recovery
+from addon.core.shading.albedo import MEASURED
+
+LEAST_POINTS = 2
+"""In the views, that an element is known from."""
+LEAST_ELEMENTS = 20
+"""Known and measured ones, that an object's mean is judged by."""
+
+
+def held(recovery: Recovery, seen: list[dict], truth: dict[int, dict]) -> dict[str, float]:
+    """By area: of Base Color's elements, measured and filled in; of objects' means; of roughnesses.
+
+    Parameters
+    ----------
+    seen : list of dict
+        `truth_views.views` of the room.
+    truth : dict
+        Of `truth/materials.json`, by object_id.
+    """
+    atlas, albedo, evidence = recovery.surface().atlas, recovery.albedo, recovery.evidence
+    materials = {m.object_id: m for m in recovery.materials()}
+    base = recovery.base_color()
+    true = projected_truth(seen, len(atlas), np.full_like(base, np.nan))
+    points = sum(np.bincount(v["element"][:, v["counts"]].ravel(), minlength=len(atlas)) for v in seen)
+    plain = [i for i, m in materials.items() if m.model in (LAMBERTIAN, SPECULAR)]
+    known = np.isfinite(true).all(1) & (points >= LEAST_POINTS) & np.isin(atlas.object_id, plain)
+    # The errors are those of the diffuse albedo, Base Color is more by what the specular layer takes.
+    scale = np.maximum(base / np.maximum(albedo.rho, 1e-3), 1)
+    within = (np.abs(base - true) <= Z90 * scale * evidence.texels.albedo + 1e-6).mean(1)
+    measured = albedo.origin == MEASURED
+    means = []
+    for one in evidence.objects:
+        own = known & measured & (atlas.object_id == one.object_id)
+        if own.sum() >= LEAST_ELEMENTS and one.albedo_low is not None:
+            mean, more = (np.average(x[own], 0, atlas.area[own]) for x in (true, scale))
+            low, high = np.array(one.albedo_low) * more, np.array(one.albedo_high) * more
+            means.append(((low <= mean) & (mean <= high)).mean())
+    rough = [
+        m.roughness_low <= np.sqrt(truth[i]["alpha"]) <= m.roughness_high
+        for i, m in materials.items()
+        if m.model in (SPECULAR, METAL) and m.roughness_low is not None and truth[i]["alpha"] is not None
+    ]
+
+    def share(chosen: np.ndarray) -> float:
+        area = atlas.area[chosen]
+        return float((within[chosen] * area).sum() / area.sum()) if chosen.any() else float("nan")
+
+    return {
+        "measured": share(known & measured),
+        "filled in": share(known & ~measured),
+        "objects' means": float(np.mean(means)) if means else float("nan"),
+        f"roughness ({len(rough)})": float(np.mean(rough)) if rough else float("nan"),
+    }
