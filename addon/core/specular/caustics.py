@@ -26,6 +26,7 @@ from . import brdf
 PHOTONS = 1 << 18
 """Kitchen with seven small lamps: 26.37 dB of albedo with half as many, 26.43 with these and with four times these."""
 AT_ONCE = 1 << 15
+BOUNCES = 4
 FINER = (CELL / 2, CELL / 4)
 """Metres: cells where many photons come to lie. Light close to what throws it has edges that 12 cm lose: around spots
 the ceiling got up to half of its E taken away for what their rims no longer send (albedo 1.1 for .8)."""
@@ -99,10 +100,13 @@ def caustics(
         sent = _Light(origin, ways, np.concatenate([room.radiance[sender], -lobes.inside[sender]], 1) * share)
         element, place, at = _met(room, sent)
         _let_fall(fallen, element, sent.power[at, 3:])
-        light = _Light(place, sent.direction[at], sent.power[at, :3])
-        sent = _sent_on(room, lobes, element, light, rng)
-        element, _, at = _met(room, sent)
-        _let_fall(fallen, element, sent.power[at])
+        for _ in range(BOUNCES):
+            light = _Light(place, sent.direction[at], sent.power[at, :3])
+            sent = _sent_on(room, lobes, element, light, rng)
+            if not len(sent.origin):
+                break
+            element, place, at = _met(room, sent)
+            _let_fall(fallen, element, sent.power[at])
     return _over_cells(room.atlas, halves)
 
 
