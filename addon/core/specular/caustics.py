@@ -27,6 +27,8 @@ PHOTONS = 1 << 18
 """Kitchen with seven small lamps: 26.37 dB of albedo with half as many, 26.43 with these and with four times these."""
 AT_ONCE = 1 << 15
 BOUNCES = 4
+"""Glossy reflections in a row. Beside copper shades half of a kitchen wall's E came by no other way, and half of that by
+more than one; its albedo with 1, 4: 27.85, 28.51 dB, in coarser frames 27.71, 28.96; 10 add nothing."""
 FINER = (CELL / 2, CELL / 4)
 """Metres: cells where many photons come to lie. Light close to what throws it has edges that 12 cm lose: around spots
 the ceiling got up to half of its E taken away for what their rims no longer send (albedo 1.1 for .8)."""
@@ -70,7 +72,7 @@ class _Light:
 def caustics(
     room: LightField, bright: BrightTriangles, lobes: Lobes, seed: int = 0, photons: int = PHOTONS
 ) -> np.ndarray:
-    """E by way of one glossy reflection of what bright triangles send, less what was taken for it.
+    """E by way of glossy reflections of what bright triangles send, less what was taken for it.
 
     Parameters
     ----------
@@ -97,7 +99,9 @@ def caustics(
         share = (np.float32(np.pi) / (photons * pick.density))[:, None]
         sender = room.lookup(pick.triangle, pick.u, pick.v)
         origin = room.scene.off_surface(pick.point, normal)
-        sent = _Light(origin, ways, np.concatenate([room.radiance[sender], -lobes.inside[sender]], 1) * share)
+        # What of a bright thing's light is its lobe's comes by photons from elsewhere.
+        own = np.maximum(room.radiance[sender] - lobes.inside[sender], 0)
+        sent = _Light(origin, ways, np.concatenate([own, -lobes.inside[sender]], 1) * share)
         element, place, at = _met(room, sent)
         _let_fall(fallen, element, sent.power[at, 3:])
         for _ in range(BOUNCES):

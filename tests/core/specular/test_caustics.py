@@ -9,8 +9,8 @@ import pytest
 
 from addon.core.shading.emitters import bright_triangles
 from addon.core.specular.caustics import Lobes, _over_cells, caustics
-from tests.core.glossy_box import Box
-from tests.core.rooms import polygon_irradiance
+from tests.core.glossy_box import SIZE, Box
+from tests.core.rooms import Quad, polygon_irradiance
 from tests.core.specular.test_glossy_light import PSI, over_the_floor
 
 MANY = 1 << 20
@@ -76,6 +76,39 @@ def test_what_a_bright_metal_was_taken_to_send_goes(dark):
     truth = thrown.sum(1)[:, None] * dark.glow
     assert found[at].mean(0) == pytest.approx(-truth.mean(0), rel=0.03)
     assert np.corrcoef(found[at].mean(1), truth.mean(1))[0, 1] < -0.98
+
+
+def test_two_mirrors_in_a_corner(dark):
+    """The lamp comes back as three images: beneath the floor, behind the wall, and across the corner by way of both."""
+    atlas = dark.room.atlas
+    mirrors = np.isin(atlas.object_id, (0, 2))
+    f0 = np.where(mirrors[:, None], np.float32(1), np.float32(0)).repeat(3, 1)
+    lobes = Lobes(np.where(mirrors, np.float32(0.01), np.float32(0)), f0, np.zeros((len(atlas), 3), np.float32))
+    found = caustics(dark.field, dark.bright, lobes, photons=MANY)
+    (lamp,) = (quad for quad in dark.room.quads if quad.object_id == 6)
+    images = [
+        Quad(lamp.corner * turn, lamp.edge_u * turn, lamp.edge_v * turn, 6)
+        for turn in np.array([(1, 1, -1), (-1, 1, 1), (-1, 1, -1)])
+    ]
+    middle = ((atlas.position > 0.2) & (atlas.position < np.array(SIZE) - 0.2))[:, 1:].all(1)  # cells end at edges
+    at = np.flatnonzero((atlas.object_id == 3) & middle)
+    thrown = polygon_irradiance(atlas.position[at].astype(float), atlas.normal[at].astype(float), images)
+    assert thrown[:, 2].mean() > 0.2 * thrown.sum(1).mean()
+    truth = thrown.sum(1)[:, None] * dark.glow
+    assert found[at, :3].mean(0) == pytest.approx(truth.mean(0), rel=0.02)
+    off, noise = (found[at, :3] - truth).std(), np.sqrt(np.square(found[at, 3:]).mean())
+    assert off < 1.2 * noise
+
+
+def test_what_a_bright_metal_was_taken_to_send_is_not_reflected(dark):
+    """What it does send is followed from where that starts."""
+    lobes, lamp = on_the_floor(dark, 0.3, 1.0), dark.room.atlas.object_id == 6
+    taken = np.where(lamp[:, None], np.float32(dark.glow), np.float32(0))
+    metal = Lobes(np.where(lamp, np.float32(0.3), np.float32(0)), np.zeros_like(lobes.f0), taken)
+    alone = caustics(dark.field, dark.bright, metal)[:, :3]
+    with_floor = caustics(dark.field, dark.bright, Lobes(lobes.phi, lobes.f0, taken))[:, :3]
+    assert alone.any() and with_floor == pytest.approx(alone)
+    assert caustics(dark.field, dark.bright, lobes)[above(dark), :3].mean() > 0.1
 
 
 def test_nothing_glossy_or_nothing_bright(dark):
