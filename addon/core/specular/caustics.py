@@ -27,8 +27,9 @@ PHOTONS = 1 << 18
 """Kitchen with seven small lamps: 26.37 dB of albedo with half as many, 26.43 with these and with four times these."""
 AT_ONCE = 1 << 15
 BOUNCES = 4
-"""Glossy reflections in a row. Beside copper shades half of a kitchen wall's E came by no other way, and a third of that
-by more than one; its albedo with 1, 4: 27.85, 28.51 dB, in coarser frames 27.71, 28.96; 10 add nothing."""
+"""Glossy reflections in a row. Beside copper shades half of the light on a kitchen's wall came by no other way, and a
+third of that by more than one; its albedo with 1 and 4: 27.85, 28.51 dB, in coarser frames 27.71, 28.96; no more by 10.
+"""
 FINER = (CELL / 2, CELL / 4)
 """Metres: cells where many photons come to lie. Light close to what throws it has edges that 12 cm lose: around spots
 the ceiling got up to half of its E taken away for what their rims no longer send (albedo 1.1 for .8)."""
