@@ -47,7 +47,7 @@ from .surface.build import Surface, build_surface, from_uv
 from .surface.denoise import without_noise
 from .surface.two_sides import laid_apart, with_backs
 
-CODE = 54
+CODE = 55
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
@@ -338,11 +338,11 @@ class Recovery:
         apart = [m.object_id for m in found.materials if m.model == TRANSPARENT]
         if not found.specular.any() and not found.excess.any() and not apart:
             return shading.albedo
+        atlas = self.surface().atlas
         rho, valid = quotient(np.maximum(lit.radiance - found.specular, 0), self.irradiance)
         class_of = {i.object_id: i.class_name for i in self.capture.instances}
         emitters = {lamp.object_id for lamp in shading.lamps}
-        error = np.hypot(doubt(lit), shading.doubt)
-        atlas = self.surface().atlas
+        error = np.hypot(doubt(lit, atlas.object_id), shading.doubt)
         albedo = fill(atlas, rho, valid & lit.seen, class_of, emitters, error)
         # What shows its background has no albedo that was measured.
         origin = np.where(np.isin(atlas.object_id, apart), np.int8(NONE), albedo.origin)

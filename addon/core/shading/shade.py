@@ -191,7 +191,7 @@ def shade(
         # Near a crease the light of two sides is mixed.
         unsure = np.hypot(unsure, crease_doubt(mesh, atlas, atlas.texel_edge))
     rho, valid = quotient(lit_diffuse.radiance, E)
-    albedo = fill(atlas, rho, valid & seen, class_of, emitters, np.hypot(doubt(lit_diffuse), unsure))
+    albedo = fill(atlas, rho, valid & seen, class_of, emitters, np.hypot(doubt(lit_diffuse, atlas.object_id), unsure))
     return Shading(
         E, escaped, unsure, field.radiance, albedo, lamps, light.environment, notes, mirrors, points, sun
     )

@@ -190,29 +190,44 @@ def observed(median, spread, count, tier) -> LitDiffuse:
     return LitDiffuse(L, low, high, count, tier, np.zeros(len(count), np.float32))
 
 
+def of_one(lit: LitDiffuse) -> np.ndarray:
+    """The doubt of elements that all belong to one object."""
+    return doubt(lit, np.zeros(len(lit.count), np.int32))
+
+
 def test_doubt_falls_with_observations_and_rises_with_spread():
-    by_count = doubt(observed(5.0, 0.3, [3, 10, 100], CLEAN))
+    by_count = of_one(observed(5.0, 0.3, [3, 10, 100], CLEAN))
     assert (np.diff(by_count) < 0).all()
     assert by_count[1] == pytest.approx(np.hypot(1.25 * 0.3 / np.sqrt(10), LEAST_DOUBT), rel=1e-3)
-    by_spread = doubt(observed(5.0, [0.01, 0.3, 1.0], 10, CLEAN))
+    by_spread = of_one(observed(5.0, [0.01, 0.3, 1.0], 10, CLEAN))
     assert (np.diff(by_spread) > 0).all() and by_spread[0] < SURE
-    assert np.allclose(doubt(observed(5e-3, 0.3, 10, CLEAN)), doubt(observed(5e3, 0.3, 10, CLEAN)))
+    assert np.allclose(of_one(observed(5e-3, 0.3, 10, CLEAN)), of_one(observed(5e3, 0.3, 10, CLEAN)))
 
 
 def test_one_or_two_observations_are_no_certainty():
     """Their quartiles coincide, which is no sign of agreement."""
-    few = doubt(observed(1.0, 0.0, [1, 2, 3], CLEAN))
+    few = of_one(observed(1.0, 0.0, [1, 2, 3], CLEAN))
     assert few[0] == pytest.approx(np.hypot(1.25 * FEW, LEAST_DOUBT)) and SURE < few[1] < few[0]
     assert few[2] == pytest.approx(LEAST_DOUBT)
 
 
+@pytest.mark.parametrize("spread", [0.0, 0.08, 0.5])
+def test_a_single_observation_is_as_unsure_as_the_object_s_others(spread):
+    """Within bounds; what is known of one object says nothing of another."""
+    lit = observed(1.0, [spread] * 40 + [0.0, 0.0], [20] * 40 + [1, 1], CLEAN)
+    own, other = doubt(lit, np.int32([7] * 41 + [2]))[-2:]
+    expected = np.clip(neighbourhood.TIMES * spread, neighbourhood.LEAST_FEW, FEW)
+    assert own == pytest.approx(np.hypot(1.25 * expected, LEAST_DOUBT), rel=0.01)
+    assert other == pytest.approx(np.hypot(1.25 * FEW, LEAST_DOUBT))
+
+
 def test_edges_and_saturation_are_in_doubt():
-    clean, edge, saturated = doubt(observed(1.0, 0.1, 20, [CLEAN, EDGE, SATURATED]))
+    clean, edge, saturated = of_one(observed(1.0, 0.1, 20, [CLEAN, EDGE, SATURATED]))
     assert edge == pytest.approx(clean + EDGE_DOUBT) and saturated > edge > SURE > clean
 
 
 def test_what_nobody_saw_is_no_measurement():
-    assert np.isinf(doubt(observed(np.nan, 0.0, [0, 0], -1))).all()
+    assert np.isinf(of_one(observed(np.nan, 0.0, [0, 0], -1))).all()
 
 
 def test_fill_steadies_each_object_by_itself():
