@@ -14,10 +14,10 @@ LAMP_UNSURE, SKY_UNSURE, CLIPPED_UNSURE, ROUGH_LIGHT = 0.1, 0.2, 0.4, 0.25
 lower bound; and, besides the error of their albedo, surfaces: the light on them is gathered roughly. (An unseen ceiling
 lamp came out at 0.93 to 1.08 of its radiance in the rooms, at 0.99 in the living room; four bulbs in shades at 0.93 to
 1.24.)"""
-SURFACES = 0.5
-"""Of the error of unseen surfaces' light: each errs by itself, and E adds many of them up."""
 SUN_UNSURE = 0.1
 """The same of a sun that was solved for."""
+SURFACES = 0.5
+"""Of the error of unseen surfaces' light: each errs by itself, and E adds many of them up."""
 LIGHT_FLOOR = 0.015
 """Relative error of E that gathering it again does not show: texels stand for places, L_d is a median."""
 NOISE_LEFT = 0.4
