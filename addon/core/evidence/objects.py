@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..groups import by_label
 from ..lit_diffuse.accumulate import LitDiffuse
 from ..material import Z90
 from ..shading.albedo import MEASURED, Albedo
@@ -52,9 +53,7 @@ class ObjectEvidence:
 
 def object_evidence(atlas: Atlas, lit: LitDiffuse, albedo: Albedo, texels: TexelEvidence) -> list[ObjectEvidence]:
     """One for each object that has elements, by object_id."""
-    order = np.argsort(atlas.object_id, kind="stable")
-    groups = np.split(order, np.flatnonzero(np.diff(atlas.object_id[order])) + 1)
-    return [_one(own, atlas, lit, albedo, texels) for own in groups]
+    return [_one(own, atlas, lit, albedo, texels) for own in by_label(atlas.object_id)]
 
 
 def _one(own: np.ndarray, atlas: Atlas, lit: LitDiffuse, albedo: Albedo, texels: TexelEvidence) -> ObjectEvidence:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from ..groups import by_label
 from ..lit_diffuse.accumulate import LitDiffuse
 from ..lit_diffuse.visibility import EDGE
 from ..material import EMITTER, SPECULAR, ObjectMaterial
@@ -114,8 +115,7 @@ def by_object(atlas: Atlas, albedo: Albedo, value: np.ndarray) -> tuple[np.ndarr
     """
     spread, middle, share = np.zeros((3, len(atlas)), np.float32)
     level = np.log(np.maximum(albedo.rho.mean(1), 1e-3))
-    order = np.argsort(atlas.object_id, kind="stable")
-    for own in np.split(order, np.flatnonzero(np.diff(atlas.object_id[order])) + 1):
+    for own in by_label(atlas.object_id):
         known = own[albedo.origin[own] == MEASURED]
         if len(known):
             low, high = np.quantile(level[known], (0.16, 0.84))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..groups import by_label
 from ..surface.atlas import Atlas
 from .neighbourhood import steadied
 
@@ -94,9 +95,7 @@ def fill(
     left = error.copy()
     by_class: dict[str, list[np.ndarray]] = {}
     bare = []
-    part = _parts(atlas, valid)
-    order = np.argsort(part, kind="stable")
-    for own in np.split(order, np.flatnonzero(np.diff(part[order])) + 1):
+    for own in by_label(_parts(atlas, valid)):
         object_id = int(atlas.object_id[own[0]])
         if object_id in emitters:
             result[own], origin[own], left[own] = 0, NONE, 0

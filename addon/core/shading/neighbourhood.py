@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..groups import by_label
 from ..lit_diffuse.accumulate import LitDiffuse
 from ..lit_diffuse.visibility import CLEAN, SATURATED
 from ..parallel import blocks
@@ -71,8 +72,7 @@ def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray) -> np.
     """Relative error of a single observation of each element's object, (n,), from the elements seen `often`."""
     few = np.full(int(object_id.max()) + 1, FEW)
     ids, known = object_id[often], spread[often]
-    order = np.argsort(ids, kind="stable")
-    for own in np.split(order, np.flatnonzero(np.diff(ids[order])) + 1):
+    for own in by_label(ids):
         if len(own) >= ENOUGH_OTHERS:
             few[ids[own[0]]] = np.clip(TIMES * np.quantile(known[own], OF_OTHERS), LEAST_FEW, FEW)
     return few[object_id]

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from ..groups import by_label
 from .moran import SURE, moran, most_alike
 
 NEAR, REACH = 3.0, 4.5
@@ -338,8 +339,7 @@ def onto_sheets(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray,
     keep = pair.data >= SHARE * whole[pair.row]
     point, sheet = pair.row[keep], pair.col[keep]
     normal, gap = np.empty((len(point), 3)), np.empty(len(point))
-    order = np.argsort(sheet, kind="stable")
-    for part in np.split(order, np.flatnonzero(np.diff(sheet[order])) + 1):
+    for part in by_label(sheet):
         normal[part], gap[part] = sheets[sheet[part[0]]].tangent(smooth[point[part]])
     facing = np.empty((len(measured), 3))
     main = sheet == first[point]
