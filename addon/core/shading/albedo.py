@@ -103,7 +103,7 @@ def fill(
         if not valid[own].any():
             bare.append((object_id, own))
             continue
-        result[own], left[own] = steadied(atlas, own, result[own], error[own])
+        result[own], left[own] = steadied(atlas, own, result[own], error[own], most=MAX_ALBEDO)
         by_class.setdefault(class_of.get(object_id, ""), []).append(np.median(result[own][valid[own]], 0))
     known = [middle for alike in by_class.values() for middle in alike]
     for object_id, own in bare:

@@ -2,7 +2,7 @@
 
 Where the well-measured elements of an object agree among each other, a badly measured one between them (at a depth
 edge, seen once) is drawn towards them; where they differ, as in a texture, it is left as it is. Empirical Bayes on
-log albedo, with the spread of the neighbours as the prior's width.
+log albedo, with the spread of the neighbours as the prior's width; a second colour among them: `minority`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from ..lit_diffuse.accumulate import LitDiffuse
 from ..lit_diffuse.visibility import CLEAN, SATURATED
 from ..parallel import blocks
 from ..surface.atlas import Atlas
+from .minority import drawn_to_minority
 
 NEIGHBOURS = 64
 ALIKE = 0.7
@@ -78,8 +79,10 @@ def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray) -> np.
     return few[object_id]
 
 
-def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Median and width of the log albedo of the nearest references, (m, 3) and (m,)."""
+def _around(
+    position: np.ndarray, references: np.ndarray, log_rho: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Median and width of the log albedo of the nearest references, (m, 3) and (m,), and which these are, (m, k)."""
     # At most an eighth of the object: a small object's ends are not each other's surroundings.
     k = min(NEIGHBOURS, max(len(references) // 8, 3), len(references))
     near = cKDTree(references).query(position, k=k, workers=-1)[1].reshape(len(position), k)
@@ -90,28 +93,30 @@ def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -
         middle[part] = np.median(around, 1)
         off = np.abs(around - middle[part, None]).mean(2)
         width[part] = np.maximum(1.4826 * np.median(off, 1), np.quantile(off, OUTER, axis=1) / OUTER_OF_NORMAL)
-    return middle, np.maximum(width, np.float32(0.02))
+    return middle, np.maximum(width, np.float32(0.02)), near
 
 
-def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Median and width of log albedo around each place, from as far around as it stays the same: (m, 3) and (m,).
+def _prior(
+    position: np.ndarray, references: np.ndarray, log_rho: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """As `_around`, from as far around each place as it stays the same.
 
     `references` are in random order: half of them reach twice as far (in area) with as many neighbours.
     """
-    middle, width = _around(position, references, log_rho)
+    middle, width, near = _around(position, references, log_rho)
     first, allowed = middle.copy(), ALIKE * width
     todo, count = np.arange(len(position)), len(references) // 2
     while count >= 8 * NEIGHBOURS and len(todo):
         wider = _around(position[todo], references[:count], log_rho[:count])
         alike = np.abs(wider[0] - first[todo]).mean(1) <= allowed[todo]
         todo = todo[alike]
-        middle[todo], width[todo] = wider[0][alike], wider[1][alike]
+        middle[todo], width[todo], near[todo] = (part[alike] for part in wider)
         count //= 2
-    return middle, width
+    return middle, width, near
 
 
 def steadied(
-    atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, seed: int = 0
+    atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, seed: int = 0, most: float = np.inf
 ) -> tuple[np.ndarray, np.ndarray]:
     """Albedo of one object's elements, each drawn towards its neighbourhood as far as it is in doubt.
 
@@ -123,6 +128,8 @@ def steadied(
         Clamped quotient; anything where `error` is inf.
     error : (m,) float32
         Relative standard error; inf: not measured. At least one is finite.
+    most : float
+        Albedo that `rho` was clamped to.
 
     Returns
     -------
@@ -146,9 +153,10 @@ def steadied(
     )
     # The prior is asked for at the middle of a cell's elements: at one of them it would be shifted for the others.
     centre = np.stack([np.bincount(index, position[:, axis]) for axis in range(3)], 1) / count[:, None]
-    log_rho = np.log(np.maximum(rho, DARK))
-    middle, width = _prior(centre, position[sure], log_rho[sure])
-    middle, width = middle[index], width[index][:, None]
+    rho = np.maximum(rho, DARK)
+    log_rho = np.log(rho)
+    prior = _prior(centre, position[sure], log_rho[sure])
+    middle, width = prior[0][index], prior[1][index][:, None]
     error = np.minimum(error, 1e3)[:, None]
     # An element that lies further off than its own error allows is something else, as a line in a pattern is: the
     # prior gets the width that makes this element likeliest.
@@ -159,4 +167,8 @@ def steadied(
     trust = (wide / (wide + error**2)).astype(np.float32)
     trust[~measured] = 0
     left = np.where(measured, np.sqrt(trust[:, 0]) * error[:, 0], width[:, 0])
-    return np.exp(trust * log_rho + (1 - trust) * middle).astype(np.float32), left.astype(np.float32)
+    result = trust * log_rho + (1 - trust) * middle
+    result[known] = drawn_to_minority(
+        result[known], rho[known], error[known, 0], *prior[:2], index[known], prior[2], rho[sure], error[sure, 0], most
+    )
+    return np.exp(result).astype(np.float32), left.astype(np.float32)

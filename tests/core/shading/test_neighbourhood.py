@@ -25,6 +25,11 @@ def run(atlas, rho, error):
     return steadied(atlas, np.arange(len(atlas)), rho.astype(np.float32), error.astype(np.float32))[0]
 
 
+def alone(steady, *_):
+    """In the place of `drawn_to_minority`."""
+    return steady
+
+
 def grey(values):
     return np.asarray(values, np.float32)[:, None].repeat(3, 1)
 
@@ -113,6 +118,8 @@ def test_surroundings_that_differ_are_left_out(atlas, monkeypatch):
     noise = np.exp(np.random.default_rng(0).normal(0, 0.03, (len(atlas), 3)))
     rho, error = grey(np.where(inside, 0.2, 0.6)) * noise, np.where(poor, POOR, GOOD)
     assert np.allclose(run(atlas, rho, error)[poor], 0.2, rtol=0.1)
+    monkeypatch.setattr(neighbourhood, "drawn_to_minority", alone)
+    assert np.allclose(run(atlas, rho, error)[poor], 0.2, rtol=0.1)
     monkeypatch.setattr(neighbourhood, "ALIKE", np.inf)
     monkeypatch.setattr(neighbourhood, "OUTER", 0.5)
     assert np.median(run(atlas, rho, error)[poor]) > 0.4
@@ -125,6 +132,7 @@ def test_stripes_on_a_ground_that_covers_more_stay(atlas, monkeypatch):
     rho = grey(np.where(stripe, 0.25, 0.6)) * noise
     seen_once = atlas.position[:, 1] < 1.2
     error = np.where(seen_once, 0.35, GOOD)
+    monkeypatch.setattr(neighbourhood, "drawn_to_minority", alone)
     kept = np.median(run(atlas, rho, error)[stripe & seen_once])
     assert kept < 0.33
     monkeypatch.setattr(neighbourhood, "OUTER", 0.5)
