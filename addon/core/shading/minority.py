@@ -2,8 +2,8 @@
 
 A median and a width say nothing of a colour that covers a tenth of the surroundings: what bears it is drawn towards the
 others as far as it is in doubt. Where more neighbours lie far from the median than noise explains, each of those is a
-value that an element may have too. The prior is then a mixture of the normal distribution of the surroundings and of
-narrow ones at these neighbours (an empirical prior, Robbins 1956), and the albedo its mean once the element is measured.
+value that an element may have too. The prior is then a mixture of the surroundings' normal distribution and of narrow
+ones at these neighbours (an empirical prior, Robbins 1956); the albedo is its mean once the element is measured.
 """
 
 from __future__ import annotations
