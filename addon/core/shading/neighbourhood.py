@@ -17,7 +17,9 @@ from ..parallel import blocks
 from ..surface.atlas import Atlas
 from .minority import drawn_to_minority
 
-NEIGHBOURS = 64
+NEIGHBOURS = 128
+"""With 64, two kitchens have .8 and .4 dB less, bedroom .4, study, bathrooms and living room .2, hall and office .0.
+Under checks of .1 to .8 m laid over them the living room has .06 less in the mean, a bathroom .13 more."""
 ALIKE = 0.7
 """A wider neighbourhood speaks for a place if its median is within so many widths of the nearest neighbours' own."""
 OUTER = 0.7
