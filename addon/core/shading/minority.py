@@ -8,6 +8,8 @@ ones at these neighbours (an empirical prior, Robbins 1956); the albedo is its m
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..parallel import blocks
@@ -26,14 +28,20 @@ UNEXPLAINED = 1e-4
 """Density under which neither tells what an element is; `steadied` decides."""
 
 
+class Surroundings(NamedTuple):
+    """What is around m places: log albedo's median (m, 3) and width (m,), and the neighbours themselves, (m, k) int."""
+
+    middle: np.ndarray
+    width: np.ndarray
+    near: np.ndarray
+
+
 def drawn_to_minority(
     steady: np.ndarray,
     rho: np.ndarray,
     error: np.ndarray,
-    middle: np.ndarray,
-    width: np.ndarray,
+    around: Surroundings,
     cell: np.ndarray,
-    near: np.ndarray,
     reference: np.ndarray,
     reference_error: np.ndarray,
     most: float,
@@ -51,12 +59,10 @@ def drawn_to_minority(
         As measured; above 0.
     error : (m,)
         Its relative standard error.
-    middle, width : (cells, 3) and (cells,)
-        Of the surroundings' log albedo.
+    around : Surroundings
+        Of cells; neighbours are rows of `reference`.
     cell : (m,) int
-        Each element's row in them.
-    near : (cells, k) int
-        The surroundings themselves: rows of `reference`.
+        Each element's cell.
     reference, reference_error : (r, 3) and (r,)
         Albedo above 0, and relative standard error.
     most : float
@@ -66,7 +72,7 @@ def drawn_to_minority(
     -------
     (m, 3)
     """
-    ground, count = np.exp(middle), near.shape[1]
+    ground, width, near = np.exp(around.middle), around.width, around.near
     limit = (FAR * width[:, None]) ** 2 + (FAR_OF_ERROR * reference_error[near]) ** 2
     other = (_apart(reference[near], ground[:, None]) > limit) & (reference.max(1) < most)[near]
     share = other.mean(1)
@@ -76,14 +82,14 @@ def drawn_to_minority(
     for part in blocks(len(todo), 1 << 14):
         own = todo[part]
         at = cell[own]
-        around, value = near[at], rho[own]
+        beside, value = reference[near[at]], rho[own]
         local = (LOCAL * error[own]) ** 2
         of_ground = (1 - real[at] * share[at]) * _normal(_apart(value, ground[at]), local + width[at] ** 2)
-        away = _apart(value[:, None], reference[around])
-        of_other = (real[at] / count)[:, None] * other[at] * _normal(away, (local + APART**2)[:, None])
+        away = _apart(value[:, None], beside)
+        of_other = (real[at] / near.shape[1])[:, None] * other[at] * _normal(away, (local + APART**2)[:, None])
         of_ground += UNEXPLAINED
         total = of_ground + of_other.sum(1)
-        drawn = (of_other[:, :, None] * np.log(reference[around])).sum(1)
+        drawn = (of_other[:, :, None] * np.log(beside)).sum(1)
         trust = (APART**2 / (APART**2 + local))[:, None]
         as_other = trust * of_other.sum(1)[:, None] * np.log(value) + (1 - trust) * drawn
         result[own] = (of_ground[:, None] * steady[own] + as_other) / total[:, None]

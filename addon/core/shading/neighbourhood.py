@@ -15,7 +15,7 @@ from ..lit_diffuse.accumulate import LitDiffuse
 from ..lit_diffuse.visibility import CLEAN, SATURATED
 from ..parallel import blocks
 from ..surface.atlas import Atlas
-from .minority import drawn_to_minority
+from .minority import Surroundings, drawn_to_minority
 
 NEIGHBOURS = 128
 """With 64, two kitchens have .8 and .4 dB less, bedroom .4, study, bathrooms and living room .2, hall and office .0.
@@ -81,10 +81,8 @@ def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray) -> np.
     return few[object_id]
 
 
-def _around(
-    position: np.ndarray, references: np.ndarray, log_rho: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Median and width of the log albedo of the nearest references, (m, 3) and (m,), and which these are, (m, k)."""
+def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> Surroundings:
+    """The nearest references of m places."""
     # At most an eighth of the object: a small object's ends are not each other's surroundings.
     k = min(NEIGHBOURS, max(len(references) // 8, 3), len(references))
     near = cKDTree(references).query(position, k=k, workers=-1)[1].reshape(len(position), k)
@@ -95,26 +93,25 @@ def _around(
         middle[part] = np.median(around, 1)
         off = np.abs(around - middle[part, None]).mean(2)
         width[part] = np.maximum(1.4826 * np.median(off, 1), np.quantile(off, OUTER, axis=1) / OUTER_OF_NORMAL)
-    return middle, np.maximum(width, np.float32(0.02)), near
+    return Surroundings(middle, np.maximum(width, np.float32(0.02)), near)
 
 
-def _prior(
-    position: np.ndarray, references: np.ndarray, log_rho: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> Surroundings:
     """As `_around`, from as far around each place as it stays the same.
 
     `references` are in random order: half of them reach twice as far (in area) with as many neighbours.
     """
-    middle, width, near = _around(position, references, log_rho)
-    first, allowed = middle.copy(), ALIKE * width
+    found = _around(position, references, log_rho)
+    first, allowed = found.middle.copy(), ALIKE * found.width
     todo, count = np.arange(len(position)), len(references) // 2
     while count >= 8 * NEIGHBOURS and len(todo):
         wider = _around(position[todo], references[:count], log_rho[:count])
-        alike = np.abs(wider[0] - first[todo]).mean(1) <= allowed[todo]
+        alike = np.abs(wider.middle - first[todo]).mean(1) <= allowed[todo]
         todo = todo[alike]
-        middle[todo], width[todo], near[todo] = (part[alike] for part in wider)
+        for kept, new in zip(found, wider, strict=True):
+            kept[todo] = new[alike]
         count //= 2
-    return middle, width, near
+    return found
 
 
 def steadied(
@@ -157,8 +154,8 @@ def steadied(
     centre = np.stack([np.bincount(index, position[:, axis]) for axis in range(3)], 1) / count[:, None]
     rho = np.maximum(rho, DARK)
     log_rho = np.log(rho)
-    prior = _prior(centre, position[sure], log_rho[sure])
-    middle, width = prior[0][index], prior[1][index][:, None]
+    around = _prior(centre, position[sure], log_rho[sure])
+    middle, width = around.middle[index], around.width[index][:, None]
     error = np.minimum(error, 1e3)[:, None]
     # An element that lies further off than its own error allows is something else, as a line in a pattern is: the
     # prior gets the width that makes this element likeliest.
@@ -171,6 +168,6 @@ def steadied(
     left = np.where(measured, np.sqrt(trust[:, 0]) * error[:, 0], width[:, 0])
     result = trust * log_rho + (1 - trust) * middle
     result[known] = drawn_to_minority(
-        result[known], rho[known], error[known, 0], *prior[:2], index[known], prior[2], rho[sure], error[sure, 0], most
+        result[known], rho[known], error[known, 0], around, index[known], rho[sure], error[sure, 0], most
     )
     return np.exp(result).astype(np.float32), left.astype(np.float32)
