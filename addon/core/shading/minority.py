@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..parallel import blocks
+from ..parallel import for_blocks
 
 FAR = 2.0
 """Widths of its surroundings that a neighbour of another colour lies off; 2.5 tells fewer of a bathroom's joints."""
@@ -26,6 +26,7 @@ APART = 0.03
 """Relative difference between elements of one colour."""
 UNEXPLAINED = 1e-4
 """Density under which neither tells what an element is; `steadied` decides."""
+BLOCK = 1 << 11
 
 
 class Surroundings(NamedTuple):
@@ -73,13 +74,21 @@ def drawn_to_minority(
     (m, 3)
     """
     ground, width, near = np.exp(around.middle), around.width, around.near
-    limit = (FAR * width[:, None]) ** 2 + (FAR_OF_ERROR * reference_error[near]) ** 2
-    other = (_apart(reference[near], ground[:, None]) > limit) & (reference.max(1) < most)[near]
+    other = np.empty(near.shape, bool)
+    uncut, least = reference.max(1) < most, (FAR_OF_ERROR * reference_error) ** 2
+
+    def far(part: slice) -> None:
+        beside = near[part]
+        limit = (FAR * width[part, None]) ** 2 + least[beside]
+        other[part] = (_apart(reference[beside], ground[part, None]) > limit) & uncut[beside]
+
+    for_blocks(far, len(near), BLOCK, 0)
     share = other.mean(1)
     real = np.clip(1 - BY_CHANCE / np.maximum(share, 1e-9), 0, 1)
     result = steady.copy()
     todo = np.flatnonzero(real[cell] > 0)
-    for part in blocks(len(todo), 1 << 14):
+
+    def draw(part: slice) -> None:
         own = todo[part]
         at = cell[own]
         beside, value = reference[near[at]], rho[own]
@@ -93,6 +102,8 @@ def drawn_to_minority(
         trust = (APART**2 / (APART**2 + local))[:, None]
         as_other = trust * of_other.sum(1)[:, None] * np.log(value) + (1 - trust) * drawn
         result[own] = (of_ground[:, None] * steady[own] + as_other) / total[:, None]
+
+    for_blocks(draw, len(todo), BLOCK, 0)
     return result
 
 

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from ..groups import by_label
 from ..lit_diffuse.accumulate import LitDiffuse
 from ..lit_diffuse.visibility import CLEAN, SATURATED
-from ..parallel import blocks
+from ..parallel import for_blocks
 from ..surface.atlas import Atlas
 from .minority import Surroundings, drawn_to_minority
 
@@ -48,6 +48,7 @@ EDGE_DOUBT = 0.3
 SURPRISE = 3.0
 """Deviations of up to so many of an element's own errors are taken for error."""
 DARK = 1e-3
+BLOCK = 1 << 11
 
 
 def doubt(lit: LitDiffuse, object_id: np.ndarray) -> np.ndarray:
@@ -88,12 +89,23 @@ def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -
     near = cKDTree(references).query(position, k=k, workers=-1)[1].reshape(len(position), k)
     middle = np.empty((len(position), 3), np.float32)
     width = np.empty(len(position), np.float32)
-    for part in blocks(len(position), 1 << 14):
-        around = log_rho[near[part]]
-        middle[part] = np.median(around, 1)
-        off = np.abs(around - middle[part, None]).mean(2)
-        width[part] = np.maximum(1.4826 * np.median(off, 1), np.quantile(off, OUTER, axis=1) / OUTER_OF_NORMAL)
+    channels = np.ascontiguousarray(log_rho.T)
+
+    def gather(part: slice) -> None:
+        around = channels[:, near[part]]
+        middle[part] = _quantile(np.sort(around), 0.5).T
+        off = np.sort(np.abs(around - middle[part].T[..., None]).mean(0))
+        width[part] = np.maximum(1.4826 * _quantile(off, 0.5), _quantile(off, OUTER) / OUTER_OF_NORMAL)
+
+    for_blocks(gather, len(position), BLOCK, 0)
     return Surroundings(middle, np.maximum(width, np.float32(0.02)), near)
+
+
+def _quantile(ordered: np.ndarray, share: float) -> np.ndarray:
+    """As np.quantile along the last axis, of values in order: NumPy sorts 128 of them seven times as fast as it parts
+    them (AVX-512)."""
+    low, rest = divmod(share * (ordered.shape[-1] - 1), 1)
+    return (1 - rest) * ordered[..., int(low)] + rest * ordered[..., min(int(low) + 1, ordered.shape[-1] - 1)]
 
 
 def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> Surroundings:
