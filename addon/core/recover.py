@@ -28,14 +28,13 @@ from .passes import all_passes
 from .progress import Progress
 from .report import make_report
 from .settings import Settings
-from .shading.albedo import NONE, Albedo, fill, quotient
+from .shading.albedo import NONE, Albedo, albedo_of
 from .shading.clipped import shade_clipped
 from .shading.environment import Environment
 from .shading.field import LightField
 from .shading.fringes import Fringes
 from .shading.lamps import Lamp
 from .shading.mirrors import Mirror, in_their_planes, known_mirror
-from .shading.neighbourhood import doubt
 from .shading.shade import Shading, shade
 from .shading.sun import Sun, put_in
 from .specular.compensation import base_colors
@@ -244,7 +243,7 @@ class Recovery:
         return self._accumulated()[4]
 
     def shading(self) -> Shading:
-        """Lamps, irradiance and albedo."""
+        """Lamps and irradiance."""
         surface, lit, sky = self.surface(), self.lit_diffuse(), self.environment()
         s = self.settings
 
@@ -260,12 +259,10 @@ class Recovery:
 
             found = shade_clipped(shaded, lit, surface.atlas)
             arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "doubt", "radiance")}
-            arrays |= {"rho": found.albedo.rho, "origin": found.albedo.origin, "error": found.albedo.error}
             arrays |= {"sky": found.environment.radiance, "sky_seen": found.environment.observations}
             sun = found.sun and {k: np.asarray(v).tolist() for k, v in dataclasses.asdict(found.sun).items()}
             meta = {
                 "sun": sun,
-                "above_one": found.albedo.above_one,
                 "points": found.points,
                 "mirrors": [mirror.as_lists() for mirror in found.mirrors],
                 "notes": list(found.notes),
@@ -277,9 +274,8 @@ class Recovery:
             lamps = tuple(Lamp(**(d | {"radiance": np.float32(d["radiance"])})) for d in meta["lamps"])
             mirrors = tuple(Mirror.from_lists(d) for d in meta["mirrors"])
             return Shading(
-                a["irradiance"], a["escaped"], a["doubt"], a["radiance"],
-                Albedo(a["rho"], a["origin"], meta["above_one"], a["error"]),
-                lamps, Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
+                a["irradiance"], a["escaped"], a["doubt"], a["radiance"], lamps,
+                Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
                 meta["sun"] and Sun(**{k: np.float32(v) if isinstance(v, list) else v for k, v in meta["sun"].items()}),
             )  # fmt: skip
 
@@ -334,19 +330,20 @@ class Recovery:
     @cached_property
     def albedo(self) -> Albedo:
         """The final albedo: of L_d less its specular part, under all that glossy things throw."""
-        lit, shading, found = self.lit_diffuse(), self.shading(), self.specular()
+        found = self.specular()
         apart = [m.object_id for m in found.materials if m.model == TRANSPARENT]
-        if not found.specular.any() and not found.excess.any() and not apart:
-            return shading.albedo
-        atlas = self.surface().atlas
-        rho, valid = quotient(np.maximum(lit.radiance - found.specular, 0), self.irradiance)
+        albedo = self.albedo_under(self.irradiance, found.specular)
+        # What shows its background has no albedo that was measured.
+        origin = np.where(np.isin(self.surface().atlas.object_id, apart), np.int8(NONE), albedo.origin)
+        return dataclasses.replace(albedo, origin=origin)
+
+    def albedo_under(self, irradiance: np.ndarray, specular: np.ndarray | float = 0.0) -> Albedo:
+        """The albedo that L_d less a `specular` part has under an E, both (n, 3) float32."""
+        shading = self.shading()
         class_of = {i.object_id: i.class_name for i in self.capture.instances}
         emitters = {lamp.object_id for lamp in shading.lamps}
-        error = np.hypot(doubt(lit, atlas.object_id), shading.doubt)
-        albedo = fill(atlas, rho, valid & lit.seen, class_of, emitters, error)
-        # What shows its background has no albedo that was measured.
-        origin = np.where(np.isin(atlas.object_id, apart), np.int8(NONE), albedo.origin)
-        return dataclasses.replace(albedo, origin=origin)
+        surface, lit = self.surface(), self.lit_diffuse()
+        return albedo_of(surface.atlas, lit, irradiance, shading.doubt, class_of, emitters, specular)
 
     def base_color(self) -> np.ndarray:
         """Base Color of each element for Cycles' Principled, (n, 3) float32."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .lit_diffuse.visibility import SATURATED
-from .shading.albedo import MEASURED
+from .shading.albedo import MEASURED, above_one, quotient
 from .surface.elements import triangle_geometry
 
 if TYPE_CHECKING:
@@ -105,9 +105,14 @@ def _report_lit(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> 
 def _report_shading(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:
     shading, lit = run.shading(), run.lit_diffuse()
     escaped = float(shading.escaped[lit.seen].mean())
+    lamp = np.isin(run.surface().atlas.object_id, [lamp.object_id for lamp in shading.lamps])
+    # Before the specular part is known; a clipped element has no quotient.
+    rho, valid = quotient(lit.radiance, shading.irradiance)
+    told = lit.seen & ~lamp & (lit.tier != SATURATED)
+    above = above_one(rho, told & valid)
     figures |= {
         "escaped_share": escaped,
-        "albedo_above_one_share": shading.albedo.above_one,
+        "albedo_above_one_share": above,
         "shading_points": shading.points,
         "lamps": [lamp.object_id for lamp in shading.lamps],
         "mirrors": [mirror.object_id for mirror in shading.mirrors],
@@ -118,14 +123,12 @@ def _report_shading(run: Recovery, figures: dict[str, Any], warnings: list[str])
                           "irradiance": [float(x) for x in sun.irradiance]}  # fmt: skip
     warnings += [f"Lamp {lamp.object_id}: {lamp.note}" for lamp in shading.lamps if lamp.note]
     warnings += shading.notes
-    if shading.albedo.above_one > 0.05:
+    if above > 0.05:
         warnings.append(
-            f"{shading.albedo.above_one:.0%} of the seen surface would need an albedo above 1: light is missing "
+            f"{above:.0%} of the seen surface would need an albedo above 1: light is missing "
             "(an unseen lamp, a clipped one, or a hole that was no window)."
         )
-    unlit = lit.seen & (shading.albedo.origin != MEASURED) & (lit.tier != SATURATED)
-    unlit &= ~np.isin(run.surface().atlas.object_id, [lamp.object_id for lamp in shading.lamps])
-    figures["unlit_share"] = float(unlit.sum() / max(lit.seen.sum(), 1))
+    figures["unlit_share"] = float((told & ~valid).sum() / max(lit.seen.sum(), 1))
     if figures["unlit_share"] > 0.001:
         warnings.append(
             f"{figures['unlit_share']:.1%} of the seen surface gets too little light for an albedo; it was filled in."

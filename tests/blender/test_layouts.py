@@ -76,7 +76,7 @@ class Same:
 
         with Store(self.folder / f"result-{name}") as store:
             run = Recovery(capture, store, COARSE, Progress(), layout)
-            return run.shading().albedo.rho, run.surface().atlas
+            return run.albedo_under(run.shading().irradiance).rho, run.surface().atlas
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from addon.core.capture.model import Camera, Instance, Mesh, Pixels
+from addon.core.shading.albedo import albedo_of
 from addon.core.shading.environment import Environment
 from addon.core.shading.field import LightField
 from addon.core.surface.elements import make_atlas, triangle_geometry
@@ -232,3 +233,10 @@ def radiosity(room: Room, albedo: dict[int, object], emission: dict[int, object]
     height = middle @ atlas.normal.T - (atlas.position * atlas.normal).sum(1)
     above = np.abs(height.T) > 1e-4
     return room.by_object(albedo) * ((reaches * above) @ light) / np.pi + room.by_object(emission)
+
+
+def albedo_in(room, lit, found):
+    """The `Albedo` that L_d has under the E of a `Shading`."""
+    class_of = {i.object_id: i.class_name for i in room.instances}
+    emitters = {lamp.object_id for lamp in found.lamps}
+    return albedo_of(room.atlas, lit, found.irradiance, found.doubt, class_of, emitters)

@@ -55,6 +55,7 @@ def test_albedo_lamp_and_report(finished):
     assert figures["lamps"] == [6] and figures["frames"] == 24 and figures["elements"] == len(run.atlas)
     assert figures["models"] == {EMITTER: 1, LAMBERTIAN: 6}
     assert figures["unseen_share"] < 0.01 and figures["escaped_share"] == 0
+    assert figures["albedo_above_one_share"] < 0.005  # the lamp's quotient does not count
     assert figures["outside"] and run.report["warnings"] == []
     for name in ("albedo", "base_color", "shading", "lit_diffuse", "coverage", "environment"):
         assert (folder / f"{name}.exr").stat().st_size > 1000 or name == "environment"

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..groups import by_label
+from ..lit_diffuse.accumulate import LitDiffuse
 from ..surface.atlas import Atlas
-from .neighbourhood import steadied
+from .neighbourhood import doubt, steadied
 
 FLOOR = 1e-3
 """Below this share of the room's median irradiance a quotient says nothing."""
@@ -31,8 +32,6 @@ class Albedo:
         Linear Rec.709, 0...1.
     origin : (n,) int8
         MEASURED, FILLED or NONE.
-    above_one : float
-        Share of the measured elements, lamps left out, whose quotient was above 1: an alarm that light is missing.
     error : (n,) float32
         Relative standard error of `rho`, as far as it came of each element's own measurement and of its neighbourhood;
         what all of an object has in common, such as missing light, is added in `evidence.texel`. 0 on lamps.
@@ -40,7 +39,6 @@ class Albedo:
 
     rho: np.ndarray
     origin: np.ndarray
-    above_one: float
     error: np.ndarray
 
 
@@ -66,6 +64,40 @@ def quotient(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> tuple[np.ndarra
     return rho, valid
 
 
+def above_one(rho: np.ndarray, reflecting: np.ndarray) -> float:
+    """Share of the `reflecting` elements, (n,) bool, whose quotient is above 1: an alarm that light is missing."""
+    return float((rho[reflecting].max(1) > MAX_ALBEDO).mean()) if reflecting.any() else 0.0
+
+
+def albedo_of(
+    atlas: Atlas,
+    lit_diffuse: LitDiffuse,
+    irradiance: np.ndarray,
+    unsure: np.ndarray,
+    class_of: dict[int, str],
+    emitters: set[int],
+    specular: np.ndarray | float = 0.0,
+) -> Albedo:
+    """Albedo = L_d / S (Haefner et al. 2021, sec. 3.2), clamped, filled in and steadied (`fill`).
+
+    Parameters
+    ----------
+    irradiance : (n, 3) float32
+        E, radiance * steradian.
+    unsure : (n,) float32
+        Its relative error.
+    class_of : dict
+        Class by object.
+    emitters : set of int
+        Objects that have no albedo.
+    specular : (n, 3) float32
+        Part of L_d that is not diffuse.
+    """
+    rho, valid = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
+    error = np.hypot(doubt(lit_diffuse, atlas.object_id), unsure)
+    return fill(atlas, rho, valid & lit_diffuse.seen, class_of, emitters, error)
+
+
 def fill(
     atlas: Atlas,
     rho: np.ndarray,
@@ -89,7 +121,6 @@ def fill(
     result = np.clip(np.nan_to_num(rho), 0, MAX_ALBEDO)
     origin = np.where(valid, MEASURED, FILLED).astype(np.int8)
     reflecting = valid & ~np.isin(atlas.object_id, list(emitters))
-    above = float((rho[reflecting].max(1) > MAX_ALBEDO).mean()) if reflecting.any() else 0.0
     everywhere = np.median(result[reflecting], 0) if reflecting.any() else np.full(3, 0.5, np.float32)
     error = np.where(valid, 0.0 if error is None else error, np.inf).astype(np.float32)
     left = error.copy()
@@ -111,7 +142,7 @@ def fill(
         result[own] = np.median(alike, 0) if alike else everywhere
         origin[own] = NONE
         left[own] = _spread(alike if alike and len(alike) > 2 else known)
-    return Albedo(np.clip(result, 0, MAX_ALBEDO).astype(np.float32), origin, above, left)
+    return Albedo(np.clip(result, 0, MAX_ALBEDO).astype(np.float32), origin, left)
 
 
 def _parts(atlas: Atlas, valid: np.ndarray) -> np.ndarray:

@@ -138,7 +138,7 @@ def steadied(
     rho : (m, 3) float32
         Clamped quotient; anything where `error` is inf.
     error : (m,) float32
-        Relative standard error; inf: not measured. At least one is finite.
+        Relative standard error; 0: stays as it is; inf: not measured. At least one is finite.
     most : float
         Albedo that `rho` was clamped to.
 
@@ -149,8 +149,7 @@ def steadied(
         Its relative standard error: the posterior's; the prior's width where nothing was measured.
     """
     position = atlas.position[own]
-    measured = np.isfinite(error)
-    known = np.flatnonzero(measured)
+    known = np.flatnonzero(np.isfinite(error))
     # The better half at least: the few that are surer may be all of one kind, the frame of a painting.
     sure = known[error[known] <= max(SURE, float(np.median(error[known])))]
     if len(sure) < NEIGHBOURS:
@@ -164,9 +163,15 @@ def steadied(
     )
     # The prior is asked for at the middle of a cell's elements: at one of them it would be shifted for the others.
     centre = np.stack([np.bincount(index, position[:, axis]) for axis in range(3)], 1) / count[:, None]
+    todo = np.flatnonzero(error > 0)
+    asked, index = np.unique(index[todo], return_inverse=True)
     rho = np.maximum(rho, DARK)
+    reference, reference_error = rho[sure], error[sure]
+    around = _prior(centre[asked], position[sure], np.log(reference))
+    steady, left = rho.astype(np.float32), error.astype(np.float32)
+    rho, error = rho[todo], error[todo]
+    measured = np.isfinite(error)
     log_rho = np.log(rho)
-    around = _prior(centre, position[sure], log_rho[sure])
     middle, width = around.middle[index], around.width[index][:, None]
     error = np.minimum(error, 1e3)[:, None]
     # An element that lies further off than its own error allows is something else, as a line in a pattern is: the
@@ -177,9 +182,10 @@ def steadied(
     wide = np.maximum(width**2, surprise)
     trust = (wide / (wide + error**2)).astype(np.float32)
     trust[~measured] = 0
-    left = np.where(measured, np.sqrt(trust[:, 0]) * error[:, 0], width[:, 0])
+    left[todo] = np.where(measured, np.sqrt(trust[:, 0]) * error[:, 0], width[:, 0])
     result = trust * log_rho + (1 - trust) * middle
-    result[known] = drawn_to_minority(
-        result[known], rho[known], error[known, 0], around, index[known], rho[sure], error[sure, 0], most
+    result[measured] = drawn_to_minority(
+        result[measured], rho[measured], error[measured, 0], around, index[measured], reference, reference_error, most
     )
-    return np.exp(result).astype(np.float32), left.astype(np.float32)
+    steady[todo] = np.exp(result)
+    return steady, left

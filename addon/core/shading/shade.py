@@ -16,13 +16,12 @@ from ..surface.creases import crease_doubt
 from ..surface.mesh_noise import tilt
 from ..surface.rays import RayScene
 from ..surface.two_sides import fronts
-from .albedo import MAX_ALBEDO, Albedo, fill, quotient
+from .albedo import MAX_ALBEDO, fill, quotient
 from .environment import Environment
 from .few_elements import evened
 from .field import LightField
 from .lamps import Lamp
 from .mirrors import Mirror
-from .neighbourhood import doubt
 from .over_surface import finest_spacing, irradiance
 from .shades import BOUNCES, strongly_lit
 from .sun import Sun, taken_out
@@ -43,7 +42,6 @@ class Shading:
         Relative error of `irradiance` by interpolation and by the mesh's noise.
     radiance : (n, 3) float32
         L_d with everything filled in: what the light field shows at each element. Lamps have their own radiance.
-    albedo : Albedo
     lamps : tuple of Lamp
     environment : Environment
         With the unseen sky solved for where it could be, without the sun.
@@ -61,7 +59,6 @@ class Shading:
     escaped: np.ndarray
     doubt: np.ndarray
     radiance: np.ndarray
-    albedo: Albedo
     lamps: tuple[Lamp, ...]
     environment: Environment
     notes: tuple[str, ...]
@@ -95,7 +92,7 @@ def shade(
     noise: float = 0.0,
     colours: dict[int, np.ndarray] | None = None,
 ) -> Shading:
-    """Lamps, irradiance and albedo (Haefner et al. 2021, sec. 3.2, with aimed rays and interpolation by default).
+    """Lamps and irradiance (Haefner et al. 2021, sec. 3.2, with aimed rays and interpolation by default).
 
     Parameters
     ----------
@@ -190,8 +187,4 @@ def shade(
     if sampler != "uniform":  # the paper's way, whose rays alone leave more noise than creases do
         # Near a crease the light of two sides is mixed.
         unsure = np.hypot(unsure, crease_doubt(mesh, atlas, atlas.texel_edge))
-    rho, valid = quotient(lit_diffuse.radiance, E)
-    albedo = fill(atlas, rho, valid & seen, class_of, emitters, np.hypot(doubt(lit_diffuse, atlas.object_id), unsure))
-    return Shading(
-        E, escaped, unsure, field.radiance, albedo, lamps, light.environment, notes, mirrors, points, sun
-    )
+    return Shading(E, escaped, unsure, field.radiance, lamps, light.environment, notes, mirrors, points, sun)

@@ -37,7 +37,7 @@ def known(room, seen=None, tier=CLEAN) -> LitDiffuse:
 def grey(room, rho=0.5, error=0.05, filled=None) -> Albedo:
     n = len(room.atlas)
     origin = np.where(np.zeros(n, bool) if filled is None else filled, FILLED, MEASURED).astype(np.int8)
-    return Albedo(np.full((n, 3), rho, np.float32), origin, 0.0, np.full(n, error, np.float32))
+    return Albedo(np.full((n, 3), rho, np.float32), origin, np.full(n, error, np.float32))
 
 
 def sure_light(room, noise=0.0, unsure=0.0) -> LightEvidence:
@@ -78,7 +78,7 @@ def test_edges_and_texture_are_less_certain(box):
     edges = evidence(box, known(box, tier=EDGE), grey(box), sure_light(box)).albedo
     assert (edges > 2 * plain).all()
     rho = np.where((box.atlas.position[:, :1] * 5).astype(int) % 2, 0.7, 0.2).astype(np.float32).repeat(3, 1)
-    striped = Albedo(rho, grey(box).origin, 0.0, grey(box).error)
+    striped = Albedo(rho, grey(box).origin, grey(box).error)
     assert np.median(contrast(box.atlas, rho.mean(1))) > 0.3
     found = evidence(box, known(box), striped, sure_light(box)).albedo
     assert np.median(found / rho) > 2 * np.median(plain / 0.5)
