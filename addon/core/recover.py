@@ -24,6 +24,7 @@ from .lit_diffuse.from_texture import face_edge, lit_from_tiles
 from .lit_diffuse.poses import Poses
 from .material import TRANSPARENT, ObjectMaterial
 from .memory import peak_memory
+from .parallel import ordered_map
 from .passes import all_passes
 from .progress import Progress
 from .report import make_report
@@ -373,8 +374,11 @@ class Recovery:
             "coverage": coverage,
             **self.evidence.images(),
         }
-        for done, (name, values) in enumerate(images.items()):
-            self.store.write_exr(f"{name}.exr", atlas.image(values)[::-1])
+
+        def write(name: str) -> None:
+            self.store.write_exr(f"{name}.exr", atlas.image(images[name])[::-1])
+
+        for done, _ in enumerate(ordered_map(write, images, self.settings.threads)):
             self.progress.update(0.5 * done / len(images))
         self.store.write_exr("environment.exr", put_in(shading.environment, shading.sun)[::-1])
         known = {one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects}

@@ -121,7 +121,7 @@ def fit_specular(
         return choice, problem, target
 
     problems, choices, targets = {}, {}, {}
-    for object_id, found in zip(wanted, ordered_map(look, wanted, threads), strict=True):
+    for object_id, found in zip(wanted, ordered_map(look, wanted, threads, ahead=len(wanted)), strict=True):
         choices[object_id], problem, targets[object_id] = found
         if problem is not None:
             problems[object_id] = problem
