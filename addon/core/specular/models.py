@@ -8,7 +8,7 @@ import numpy as np
 
 from ..material import LAMBERTIAN, METAL, SPECULAR, TRANSPARENT
 from ..weighted import weighted_median
-from .fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs, huber
+from .fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs, huber, solve
 from .layout import Layout, Problem
 from .lobes import nearest
 from .one_colour import BROADEST_PHI, DIELECTRIC_PSI, Coated, OneColour
@@ -114,12 +114,20 @@ def _bare_metal(problem: Problem, layout: Layout, phi: float, fit: LobeFit, scal
     return replace(fit, phi=float(phi), psi=f0, kappa=0.0), (huber(size, scale) * layout.there).sum(0, dtype=np.float64)
 
 
-def _sets_apart(own: LobeFit, other: LobeFit, problem: Problem) -> bool:
-    """Whether an object's own lobe explains its frames better than another does, beyond doubt."""
+def _of_class(own: LobeFit, of_class: LobeFit, model: str, problem: Problem | None) -> LobeFit:
+    """An object's own lobe where it explains its frames better than that of its class does, beyond doubt; else that.
+
+    A metal's F0 is its own in either.
+    """
+    shared = replace(own, phi=of_class.phi, psi=own.psi if model == METAL else of_class.psi)
+    if problem is None:
+        return shared
     layout, scale = Layout(problem), max(1.4826 * own.residual, 1e-4)
-    (with_own, _), (with_other, _) = (element_costs(layout, fit, scale) for fit in (own, other))
-    gain, sigmas = _gain(with_own, with_other)
-    return gain > MIN_GAIN and sigmas > MIN_SIGMAS
+    if model == METAL:
+        shared = replace(shared, psi=solve(layout, layout.at(shared.phi), own.kappa, scale, **HOW[METAL]).psi[:, 0])
+    (with_own, _), (with_shared, _) = (element_costs(layout, fit, scale) for fit in (own, shared))
+    gain, sigmas = _gain(with_own, with_shared)
+    return own if gain > MIN_GAIN and sigmas > MIN_SIGMAS else shared
 
 
 def choose_model(problem: Problem) -> Choice:
@@ -212,7 +220,8 @@ def adopt_from_class(
         for i, choice in members.items():
             if model.model == METAL != choice.model and choice.metal is not None:
                 note = "Not beyond doubt by itself; others of its class are metal."
-                result[i] = replace(choice, model=METAL, fit=choice.metal, note=note)
+                fit = _of_class(choice.metal, model.fit, METAL, problems.get(i))
+                result[i] = replace(choice, model=METAL, fit=fit, note=note)
             elif model.model == METAL != choice.model and choice.bare and (views or choice.model == LAMBERTIAN):
                 note = f"Needs no diffuse part, like object {source} of its class, which is metal."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
@@ -220,11 +229,7 @@ def adopt_from_class(
                 note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
             elif choice.model == model.model and len(found) > 1 and i in problems:
-                shared = replace(choice.fit, phi=model.fit.phi)
-                if model.model == SPECULAR:
-                    shared = replace(shared, psi=model.fit.psi)
-                if not _sets_apart(choice.fit, shared, problems[i]):
-                    result[i] = replace(choice, fit=shared)
+                result[i] = replace(choice, fit=_of_class(choice.fit, model.fit, model.model, problems[i]))
     return result
 
 
@@ -246,7 +251,11 @@ def _together(members: dict[int, Choice]) -> dict[int, Choice]:
 
 
 def _pooled(found: list[Choice], best: Choice) -> Choice:
-    """`best` with the median phi and psi of several choices, weighted by their evidence."""
+    """`best` with the median phi and psi of several choices, weighted by their evidence.
+
+    Of those that views speak for, if any: by looks alone lobes come out too broad (spot rings' roughness .7 for .2).
+    """
+    found = [choice for choice in found if choice.looks is None] or found
     weight = np.square([choice.sigmas for choice in found])
     phi = weighted_median(np.array([choice.fit.phi for choice in found]), weight)
     psi = [weighted_median(values, weight) for values in np.array([choice.fit.psi for choice in found]).T]

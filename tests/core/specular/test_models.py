@@ -69,13 +69,22 @@ def test_a_metal_under_light_that_is_off(seen):
 
 
 def test_the_others_of_its_class_are_metal(seen):
-    """One that is not sure of being metal by itself keeps its own lobe; one whose frames say otherwise stays."""
+    """One that is not sure of being metal takes their roughness unless its frames are sure of another; one whose frames
+    say otherwise stays."""
     sure, matt = choose_model(seen["metal"]), choose_model(seen["matt"])
     own = replace(sure.fit, phi=0.2)
     likely = Choice(LAMBERTIAN, sure.fit, 0.1, 2.5, "Not sure.", metal=own)
-    result = adopt_from_class({0: sure, 1: likely, 2: matt}, {2: seen["matt"]}, dict.fromkeys(range(3), "steel"))
-    assert result[1].model == METAL and result[1].fit is own and "class" in result[1].note
+    classes = dict.fromkeys(range(4), "steel")
+    result = adopt_from_class({0: sure, 1: likely, 2: matt}, {2: seen["matt"]}, classes)
+    assert result[1].model == METAL and result[1].fit.phi == sure.fit.phi and "class" in result[1].note
     assert result[2] is matt
+    # Frames of a metal of phi .11: those of a class that is broader (by the better judged 3) do not fit.
+    broad = replace(sure, fit=replace(sure.fit, phi=0.5), sigmas=2 * sure.sigmas)
+    likely = replace(likely, metal=sure.fit)
+    for seen_enough in (True, False):
+        problems = {1: seen["metal"]} if seen_enough else {}
+        result = adopt_from_class({1: likely, 3: broad}, problems, classes)
+        assert result[1].model == METAL and result[1].fit.phi == (sure if seen_enough else broad).fit.phi
 
 
 def test_a_metal_on_a_bumpy_mesh(seen):
