@@ -47,7 +47,7 @@ from .surface.build import Surface, build_surface, from_uv
 from .surface.denoise import without_noise
 from .surface.two_sides import laid_apart, with_backs
 
-CODE = 58
+CODE = 59
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 

@@ -41,7 +41,8 @@ its perturbed scan nothing gains a tenth with less than 3). Not of a handful of 
 whose standard error is no better known than that."""
 SURELY_METAL = 2.0
 """Standard errors by which a metal must also beat a dielectric over a diffuse part, once it has beaten a matt surface:
-that alone it does not stand or fall with, as it has to do without a diffuse part besides (`BARE`)."""
+that alone it does not stand or fall with, as it has to do without a diffuse part besides (`BARE`). Below `MIN_SIGMAS`
+others of its class decide: of 31 true metals in nine rooms two had less, a black keyboard had 1.9 or 2.1."""
 MIN_ELEMENTS = 12
 EXCLUDED = 0.1
 """Rise of an object's cost from which on the lobe of its class is refused."""
@@ -72,6 +73,8 @@ class Choice:
     sigmas: float = 0.0
     note: str = ""
     scores: dict[str, float] = field(default_factory=dict)
+    dielectric: LobeFit | None = None
+    """A dielectric's sure lobe that serves nearly as well as the metal's that was taken."""
     metal: LobeFit | None = None
     """A metal's lobe that serves better than any other model, but not beyond doubt."""
     bare: bool = False
@@ -147,6 +150,11 @@ def choose_model(problem: Problem) -> Choice:
     scale = max(1.4826 * fit.residual, 1e-4)
     with_lobe, without = held_out(fit, SPECULAR)
     scores = {LAMBERTIAN: 1.0, SPECULAR: float(with_lobe.sum() / max(without.sum(), 1e-30))}
+    gain, sigmas = _gain(with_lobe, without)
+    large = gain > LARGE_GAIN and layout.there.shape[1] >= LARGE_ELEMENTS
+    sure = gain > MIN_GAIN and sigmas > (LARGE_SIGMAS if large else MIN_SIGMAS) and fit.phi <= BROADEST_PHI
+    # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
+    dielectric = replace(fit, psi=np.minimum(fit.psi, METAL_PSI))
     metal, likely = fit_lobe(layout, **HOW[METAL]), None
     found = [(metal, *held_out(metal, METAL))] if _metallic(metal) else []
     # Errors of the light draw psi down where each element has a diffuse part of its own; without one they don't.
@@ -157,23 +165,19 @@ def choose_model(problem: Problem) -> Choice:
     for fit_of_metal, with_metal, matt in found:
         scores[METAL] = min(float(with_metal.sum() / max(matt.sum(), 1e-30)), scores.get(METAL, np.inf))
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
-        (gain, sigmas), (more, surely) = _gain(with_metal, matt), _gain(with_metal, with_lobe)
-        most = BARE_AT_MOST if min(gain, more) > MUCH else BARE
+        (less, by), (more, surely) = _gain(with_metal, matt), _gain(with_metal, with_lobe)
+        most = BARE_AT_MOST if min(less, more) > MUCH else BARE
         if _bare_metal(problem, layout, fit_of_metal.phi, metal, scale)[1].sum() > most * matt.sum():
             continue
-        if min(gain, more) > MIN_GAIN and sigmas > MIN_SIGMAS and surely > SURELY_METAL:
-            return Choice(METAL, fit_of_metal, gain, sigmas, scores=scores)
-        if min(gain, more) > MIN_GAIN and likely is None:
+        if min(less, more) > MIN_GAIN and by > MIN_SIGMAS and surely > SURELY_METAL:
+            other = dielectric if sure and surely < MIN_SIGMAS else None
+            return Choice(METAL, fit_of_metal, less, by, scores=scores, dielectric=other)
+        if min(less, more) > MIN_GAIN and likely is None:
             likely = fit_of_metal
-    gain, sigmas = _gain(with_lobe, without)
-    large = gain > LARGE_GAIN and layout.there.shape[1] >= LARGE_ELEMENTS
-    sure = gain > MIN_GAIN and sigmas > (LARGE_SIGMAS if large else MIN_SIGMAS)
-    if sure and fit.phi <= BROADEST_PHI:
-        # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
-        held = replace(fit, psi=np.minimum(fit.psi, METAL_PSI))
-        return Choice(SPECULAR, held, gain, sigmas, scores=scores, metal=likely, bare=no_diffuse)
+    if sure:
+        return Choice(SPECULAR, dielectric, gain, sigmas, scores=scores, metal=likely, bare=no_diffuse)
     note = "Roughness and specular are not identifiable from these frames."
-    return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores, likely, no_diffuse)
+    return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores, metal=likely, bare=no_diffuse)
 
 
 def set_apart(choice: Choice, found: SeeThrough | None) -> Choice:
@@ -198,8 +202,10 @@ def adopt_from_class(
     model, weighted by evidence. Members keep their own lobe where their frames set it apart from that. Objects
     whose own frames decide nothing take over the class's, but not where it raises their cost by more than `EXCLUDED`.
     What is set apart neither gives nor takes. Among metals, one whose frames favour metal without being sure of it is
-    one; and one whose frames a metal's lobe explains alone, without any diffuse part, takes over that of the class: a
-    metal on a bumpy mesh shows the room where no ray finds it, and looks like anything, but not like diffuse light.
+    one, as rough as the others unless its frames are sure of something else; and one whose frames a metal's lobe
+    explains alone, without any diffuse part, takes over that of the class: a metal on a bumpy mesh shows the room where
+    no ray finds it, and looks like anything, but not like diffuse light. Among dielectrics, one that is a metal no more
+    surely than it is one of them is one of them.
     """
     result, choices = dict(choices), {i: choice for i, choice in choices.items() if choice.model != TRANSPARENT}
     for name in sorted(set(class_of[object_id] for object_id in choices)):
@@ -213,8 +219,10 @@ def adopt_from_class(
         # What a metal explains as well says nothing against metals of its class; looks alone judge none with a lobe.
         views = any(one.model == METAL and one.looks is None for one in found.values())
         judges = {i: one for i, one in found.items() if not isinstance(one.looks, Coated)} or found
-        unclear = {i for i, one in judges.items() if one.model != METAL and (one.metal or views and one.bare)}
-        clear = judges.keys() - unclear
+        clear = {
+            i for i, one in judges.items()
+            if not (one.dielectric if one.model == METAL else one.metal or views and one.bare)
+        }  # fmt: skip
         source = max(sorted(clear) or judges, key=lambda i: found[i].sigmas)
         model = _pooled([c for c in judges.values() if c.model == found[source].model], found[source])
         for i, choice in members.items():
@@ -225,6 +233,10 @@ def adopt_from_class(
             elif model.model == METAL != choice.model and choice.bare and (views or choice.model == LAMBERTIAN):
                 note = f"Needs no diffuse part, like object {source} of its class, which is metal."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
+            elif model.model == SPECULAR and choice.dielectric is not None:
+                note = "Like a metal, but not beyond doubt; others of its class are not."
+                fit = _of_class(choice.dielectric, model.fit, SPECULAR, problems.get(i))
+                result[i] = replace(choice, model=SPECULAR, fit=fit, note=note)
             elif choice.model == LAMBERTIAN and not _refused(model.fit, choice.fit, problems.get(i)):
                 note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)

@@ -87,6 +87,27 @@ def test_the_others_of_its_class_are_metal(seen):
         assert result[1].model == METAL and result[1].fit.phi == (sure if seen_enough else broad).fit.phi
 
 
+def test_the_others_of_its_class_are_no_metal(seen):
+    """One that is hardly surer of metal than of a dielectric is what the sure ones of its class are; alone it is metal."""
+    sure = choose_model(seen["glossy"])
+    hardly = replace(choose_model(seen["metal"]), sigmas=2 * sure.sigmas, dielectric=replace(sure.fit, phi=0.4))
+    beyond = replace(hardly, dielectric=None)
+    for members, model in (([hardly], METAL), ([hardly, sure], SPECULAR), ([beyond, sure], METAL)):
+        result = adopt_from_class(dict(enumerate(members)), {}, dict.fromkeys(range(2), "key"))
+        assert result[0].model == model
+    both = adopt_from_class({0: hardly, 1: sure}, {}, dict.fromkeys(range(2), "key"))
+    assert both[0].fit.phi == sure.fit.phi and "class" in both[0].note and both[1].fit.phi == sure.fit.phi
+
+
+def test_a_metal_hardly_better_than_a_dielectric_says_so(seen, monkeypatch):
+    assert choose_model(seen["metal"]).dielectric is None
+    # Of the dielectric over matt, the metal over matt, the metal over the dielectric: share and standard errors.
+    gains = iter([(0.5, 10.0), (0.5, 10.0), (0.1, 2.5)])
+    monkeypatch.setattr(models, "_gain", lambda with_lobe, without: next(gains))
+    choice = choose_model(seen["metal"])
+    assert choice.model == METAL and choice.dielectric is not None and choice.dielectric.psi.max() <= METAL_PSI
+
+
 def test_a_metal_on_a_bumpy_mesh(seen):
     """Where each view is thought to show what others do, no lobe explains it; but it needs no diffuse part either.
 
