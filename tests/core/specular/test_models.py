@@ -88,7 +88,7 @@ def test_the_others_of_its_class_are_metal(seen):
 
 
 def test_the_others_of_its_class_are_no_metal(seen):
-    """One that is hardly surer of metal than of a dielectric is what the sure ones of its class are; alone it is metal."""
+    """One hardly surer to be metal than dielectric is what the sure ones of its class are; alone it is metal."""
     sure = choose_model(seen["glossy"])
     hardly = replace(choose_model(seen["metal"]), sigmas=2 * sure.sigmas, dielectric=replace(sure.fit, phi=0.4))
     beyond = replace(hardly, dielectric=None)
