@@ -340,11 +340,9 @@ class Recovery:
 
     def albedo_under(self, irradiance: np.ndarray, specular: np.ndarray | float = 0.0) -> Albedo:
         """The albedo that L_d less a `specular` part has under an E, both (n, 3) float32."""
-        shading = self.shading()
-        class_of = {i.object_id: i.class_name for i in self.capture.instances}
-        emitters = {lamp.object_id for lamp in shading.lamps}
-        surface, lit = self.surface(), self.lit_diffuse()
-        return albedo_of(surface.atlas, lit, irradiance, shading.doubt, class_of, emitters, specular)
+        atlas, lit, shading = self.surface().atlas, self.lit_diffuse(), self.shading()
+        instances = self.capture.instances
+        return albedo_of(atlas, lit, irradiance, shading.doubt, instances, shading.emitters, specular)
 
     def base_color(self) -> np.ndarray:
         """Base Color of each element for Cycles' Principled, (n, 3) float32."""

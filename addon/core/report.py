@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .lit_diffuse.visibility import SATURATED
-from .shading.albedo import MEASURED, above_one, quotient
+from .shading.albedo import MEASURED, above_one, quotient, without_emitters
 from .surface.elements import triangle_geometry
 
 if TYPE_CHECKING:
@@ -105,10 +105,9 @@ def _report_lit(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> 
 def _report_shading(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:
     shading, lit = run.shading(), run.lit_diffuse()
     escaped = float(shading.escaped[lit.seen].mean())
-    lamp = np.isin(run.surface().atlas.object_id, [lamp.object_id for lamp in shading.lamps])
     # Before the specular part is known; a clipped element has no quotient.
     rho, valid = quotient(lit.radiance, shading.irradiance)
-    told = lit.seen & ~lamp & (lit.tier != SATURATED)
+    told = without_emitters(run.surface().atlas, lit.seen & (lit.tier != SATURATED), shading.emitters)
     above = above_one(rho, told & valid)
     figures |= {
         "escaped_share": escaped,

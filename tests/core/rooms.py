@@ -237,6 +237,4 @@ def radiosity(room: Room, albedo: dict[int, object], emission: dict[int, object]
 
 def albedo_in(room, lit, found):
     """The `Albedo` that L_d has under the E of a `Shading`."""
-    class_of = {i.object_id: i.class_name for i in room.instances}
-    emitters = {lamp.object_id for lamp in found.lamps}
-    return albedo_of(room.atlas, lit, found.irradiance, found.doubt, class_of, emitters)
+    return albedo_of(room.atlas, lit, found.irradiance, found.doubt, room.instances, found.emitters)

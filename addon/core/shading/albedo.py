@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..capture.model import Instance
 from ..groups import by_label
 from ..lit_diffuse.accumulate import LitDiffuse
 from ..surface.atlas import Atlas
@@ -64,6 +65,11 @@ def quotient(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> tuple[np.ndarra
     return rho, valid
 
 
+def without_emitters(atlas: Atlas, told: np.ndarray, emitters: set[int]) -> np.ndarray:
+    """Those of the elements `told`, (n,) bool, that are no emitter's."""
+    return told & ~np.isin(atlas.object_id, list(emitters))
+
+
 def above_one(rho: np.ndarray, reflecting: np.ndarray) -> float:
     """Share of the `reflecting` elements, (n,) bool, whose quotient is above 1: an alarm that light is missing."""
     return float((rho[reflecting].max(1) > MAX_ALBEDO).mean()) if reflecting.any() else 0.0
@@ -74,7 +80,7 @@ def albedo_of(
     lit_diffuse: LitDiffuse,
     irradiance: np.ndarray,
     unsure: np.ndarray,
-    class_of: dict[int, str],
+    instances: tuple[Instance, ...],
     emitters: set[int],
     specular: np.ndarray | float = 0.0,
 ) -> Albedo:
@@ -86,8 +92,6 @@ def albedo_of(
         E, radiance * steradian.
     unsure : (n,) float32
         Its relative error.
-    class_of : dict
-        Class by object.
     emitters : set of int
         Objects that have no albedo.
     specular : (n, 3) float32
@@ -95,6 +99,7 @@ def albedo_of(
     """
     rho, valid = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
     error = np.hypot(doubt(lit_diffuse, atlas.object_id), unsure)
+    class_of = {i.object_id: i.class_name for i in instances}
     return fill(atlas, rho, valid & lit_diffuse.seen, class_of, emitters, error)
 
 
@@ -120,7 +125,7 @@ def fill(
         valid = valid & np.isfinite(error)
     result = np.clip(np.nan_to_num(rho), 0, MAX_ALBEDO)
     origin = np.where(valid, MEASURED, FILLED).astype(np.int8)
-    reflecting = valid & ~np.isin(atlas.object_id, list(emitters))
+    reflecting = without_emitters(atlas, valid, emitters)
     everywhere = np.median(result[reflecting], 0) if reflecting.any() else np.full(3, 0.5, np.float32)
     error = np.where(valid, 0.0 if error is None else error, np.inf).astype(np.float32)
     left = error.copy()

@@ -66,6 +66,11 @@ class Shading:
     points: int
     sun: Sun | None = None
 
+    @property
+    def emitters(self) -> set[int]:
+        """The lamps' objects."""
+        return {lamp.object_id for lamp in self.lamps}
+
 
 def fill_unseen(radiance: np.ndarray, seen: np.ndarray) -> np.ndarray:
     """L_d with the unseen elements dark, as (n, 3) float32 without NaN."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading.albedo import FILLED, FLOOR, MEASURED, NONE, above_one, fill, quotient
+from addon.core.shading.albedo import FILLED, FLOOR, MEASURED, NONE, above_one, fill, quotient, without_emitters
 from tests.core.rooms import box_sides, make_room
 
 NAN = np.nan
@@ -87,6 +87,7 @@ def test_lamps_have_no_albedo(atlas):
     lamp = atlas.object_id == 5
     assert (result.rho[lamp] == 0).all() and (result.origin[lamp] == NONE).all()
     assert np.allclose(result.rho[atlas.object_id == 4], 0.25)  # median of 0.1 ... 0.4: the lamp has no say
+    assert above_one(rho, without_emitters(atlas, valid, {5})) == 0  # nor do they raise the alarm
 
 
 def test_nothing_is_above_one_and_the_alarm_is_raised(atlas):
