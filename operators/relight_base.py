@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..addon.bridge.mesh_objects import OBJECT_ID
+from ..addon.bridge.marks import OBJECT_ID
 from ..addon.console import unexpected
 from ..addon.core.errors import ScanRelightError
 from . import poll

@@ -5,7 +5,7 @@ import bpy
 from bpy_extras import view3d_utils
 
 from ..addon.bridge import virtual_object as virtual
-from ..addon.bridge.mesh_objects import OBJECT_ID
+from ..addon.bridge.marks import OBJECT_ID
 from ..addon.bridge.relight_room import cast
 from ..addon.core.errors import ScanRelightError
 from . import poll

@@ -3,7 +3,7 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.bridge.mesh_objects import OBJECT_ID
+from ..addon.bridge.marks import OBJECT_ID
 from . import poll
 
 

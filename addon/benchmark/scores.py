@@ -14,7 +14,7 @@ from ..bridge.demo import VIEW, new_lights, switch_off_the_lamps
 from ..bridge.demo_compare import describe, seen_albedo
 from ..bridge.demo_render import build, set_up_cycles
 from ..bridge.demo_room import room
-from ..bridge.mesh_objects import OBJECT_ID
+from ..bridge.marks import OBJECT_ID
 from ..core.capture.exr import read_exr
 from ..core.capture.read import read_capture
 from ..core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR

@@ -13,14 +13,10 @@ from ..core.errors import MissingStageError
 from ..core.material import EMITTER, ObjectMaterial, undescribed
 from . import result_images
 from .cameras import make_cameras
+from .marks import CAPTURE, OBJECT_ID, RESULT
 from .match_frame import show_picture
 from .materials import make_material
-from .mesh_objects import ATLAS_UV, OBJECT_ID, each_object
-
-CAPTURE = "scan_relight_capture"
-"""Custom property of the collection: the folder of the capture that it came from."""
-RESULT = "scan_relight_result"
-"""Custom property of an object: the result folder that its material came from."""
+from .mesh_objects import ATLAS_UV, each_object
 
 
 def whole(slices: Generator):

@@ -16,8 +16,9 @@ from ..core.shading.albedo import MEASURED
 from ..core.surface.rays import RayScene
 from .demo_room import room
 from .images import image_array
+from .marks import OBJECT_ID
 from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, METALLIC, MODEL, ROUGHNESS
-from .mesh_objects import ATLAS_UV, OBJECT_ID
+from .mesh_objects import ATLAS_UV
 
 MIN_COSINE = 0.2
 """More slanting views count as none, as in the method."""

@@ -17,8 +17,8 @@ import numpy as np
 
 from ..core.errors import BadInputError, StorageError
 from .export_material import plain_copy
+from .marks import OBJECT_ID
 from .materials import opacity
-from .mesh_objects import OBJECT_ID
 
 FORMATS = {".glb": "GLB", ".gltf": "GLTF_SEPARATE", ".usdc": "USD", ".usd": "USD", ".usda": "USD", ".usdz": "USD"}
 """By ending."""

@@ -15,10 +15,10 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import BadInputError
-from .apply import RESULT
 from .images import RADIANCE
+from .marks import OBJECT_ID, RESULT
 from .materials import mix_node
-from .mesh_objects import ATLAS_UV, OBJECT_ID
+from .mesh_objects import ATLAS_UV
 from .result_images import image
 
 MATERIAL, ALBEDO, SHADING, LIT_DIFFUSE, COVERAGE, CERTAINTY = (

@@ -8,13 +8,12 @@ import bpy
 import numpy as np
 
 from ..core.capture.model import Instance, Mesh
+from .marks import OBJECT_ID
 
 ATLAS_UV = "ScanRelight"
 """Name of the texture coordinates that the recovered images use."""
 CAPTURE_UV = "Capture"
 """Name of the capture's own texture coordinates, where it has any."""
-OBJECT_ID = "object_id"
-"""Custom property (int) of each object: which instance it is."""
 
 
 def make_objects(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray,

@@ -11,8 +11,8 @@ from mathutils import Vector
 
 from ..core.errors import BadInputError
 from .images import image_array
+from .marks import OBJECT_ID
 from .materials import opacity
-from .mesh_objects import OBJECT_ID
 
 ROOM_LIGHT = "scan_relight_room_light"
 """Custom property of the scene: median irradiance of the scanned room, in the frames' unit."""

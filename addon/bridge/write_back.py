@@ -18,9 +18,10 @@ from ..core.capture.model import Capture
 from ..core.errors import BadInputError, MissingStageError
 from ..core.material import ObjectMaterial, undescribed
 from . import result_images
-from .apply import RESULT, applying, whole
+from .apply import applying, whole
+from .marks import OBJECT_ID, RESULT
 from .materials import MODEL, make_material
-from .mesh_objects import ATLAS_UV, OBJECT_ID
+from .mesh_objects import ATLAS_UV
 from .relight_room import depsgraph_of
 from .scene_capture import Source, check_own, few, polygons_of, sharing, sources
 from .scene_mesh import Part, gather, same_topology, topology

@@ -3,8 +3,9 @@
 import bpy
 import numpy as np
 
+from addon.bridge.marks import OBJECT_ID
 from addon.bridge.materials import make_material
-from addon.bridge.mesh_objects import OBJECT_ID, mesh_data
+from addon.bridge.mesh_objects import mesh_data
 from addon.core.material import EMITTER, LAMBERTIAN, ObjectMaterial
 
 

@@ -11,8 +11,9 @@ bpy = pytest.importorskip("bpy")
 from addon.bridge import export as exporting  # noqa: E402
 from addon.bridge import relight_lamps  # noqa: E402
 from addon.bridge.images import image_array, load_image  # noqa: E402
+from addon.bridge.marks import OBJECT_ID  # noqa: E402
 from addon.bridge.materials import ior_of, make_material  # noqa: E402
-from addon.bridge.mesh_objects import ATLAS_UV, OBJECT_ID, mesh_data  # noqa: E402
+from addon.bridge.mesh_objects import ATLAS_UV, mesh_data  # noqa: E402
 from addon.core.capture.exr import write_exr  # noqa: E402
 from addon.core.errors import BadInputError, StorageError  # noqa: E402
 from addon.core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR, ObjectMaterial  # noqa: E402

@@ -1,0 +1,17 @@
+"""Names of the custom properties by which recovered data is known again: in this session, in a saved file, anywhere.
+
+They need no registered add-on, so that a file keeps its meaning where the extension is not installed.
+"""
+
+from __future__ import annotations
+
+OBJECT_ID = "object_id"
+"""Of an object (int): which instance of the capture it is."""
+CAPTURE = "scan_relight_capture"
+"""Of a room's collection: the folder of the capture that it came from."""
+RESULT = "scan_relight_result"
+"""Of a room's collection and of its objects: the result folder that their materials came from."""
+RUN = "scan_relight_run"
+"""Of a room's collection and of its objects: the key of the run (`materials.json`, "run") that made them."""
+OWN_SCENE = "scan_relight_own"
+"""Of a scene: True where it was made for a room and holds nothing else of the artist's."""
