@@ -11,9 +11,10 @@ import numpy as np
 from ..core.capture.model import Capture
 from ..core.errors import MissingStageError
 from ..core.material import EMITTER, ObjectMaterial, undescribed
+from ..core.room_file import run_of
 from . import result_images
 from .cameras import make_cameras
-from .marks import CAPTURE, OBJECT_ID, RESULT
+from .marks import CAPTURE, OBJECT_ID, mark
 from .match_frame import show_picture
 from .materials import make_material
 from .mesh_objects import ATLAS_UV, each_object
@@ -111,6 +112,8 @@ def applying(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, mat
     """`apply_recovery` in slices of an object each; yields the share done, so that a window can be drawn."""
     top = imported(scene, capture)
     folder = Path(result_folder).absolute()
+    run = run_of(folder)
+    mark(top, folder, run)
     base_color = result_images.bring(folder, where)
     things = {thing[OBJECT_ID]: thing for thing in top.all_objects if OBJECT_ID in thing}
     parts = {part.name.split(".")[0]: part for part in top.children}
@@ -134,7 +137,7 @@ def applying(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, mat
         description = descriptions.get(instance.object_id) or undescribed(instance.object_id, instance.class_name)
         thing.data.materials.clear()
         thing.data.materials.append(make_material(description, base_color))
-        thing[RESULT] = str(folder)
+        mark(thing, folder, run)
         if description.model == EMITTER and "Lamps" in parts and thing.name not in parts["Lamps"].objects:
             for part in parts.values():
                 if thing.name in part.objects:

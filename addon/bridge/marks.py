@@ -5,6 +5,8 @@ They need no registered add-on, so that a file keeps its meaning where the exten
 
 from __future__ import annotations
 
+from pathlib import Path
+
 OBJECT_ID = "object_id"
 """Of an object (int): which instance of the capture it is."""
 CAPTURE = "scan_relight_capture"
@@ -15,3 +17,21 @@ RUN = "scan_relight_run"
 """Of a room's collection and of its objects: the key of the run (`materials.json`, "run") that made them."""
 OWN_SCENE = "scan_relight_own"
 """Of a scene: True where it was made for a room and holds nothing else of the artist's."""
+
+
+def mark(owner, folder: Path | str, run: str, capture: Path | str | None = None) -> None:
+    """Say on an object or a room's collection which run made it.
+
+    Parameters
+    ----------
+    owner : bpy.types.Object or bpy.types.Collection
+    folder : Path or str
+        The result folder.
+    run : str
+        Its run's key, as `room_file.run_of` reads it; '' for a result that is older than such keys.
+    capture : Path or str, optional
+        Folder of the capture; for a collection.
+    """
+    owner[RESULT], owner[RUN] = str(Path(folder).absolute()), run
+    if capture is not None:
+        owner[CAPTURE] = str(Path(capture).absolute())

@@ -17,8 +17,10 @@ import numpy as np
 from ..core.capture.model import Capture
 from ..core.errors import StorageError
 from ..core.material import EMITTER, ObjectMaterial, undescribed
+from ..core.room_file import run_of
 from .cameras import differing, make_cameras, make_view, unlike, use_camera
 from .images import load_image, relative_to
+from .marks import mark
 from .materials import make_material
 from .mesh_objects import is_open, make_objects
 from .world import set_world
@@ -92,6 +94,10 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
         top.children.link(part)
     scene.collection.children.link(top)
     objects = make_objects(capture.mesh, capture.instances, atlas_uv, room)
+    run = run_of(folder)
+    mark(top, folder, run, capture.root)
+    for thing in objects.values():
+        mark(thing, folder, run)
     descriptions = {m.object_id: m for m in materials}
     for instance in capture.instances:
         if instance.object_id not in objects:

@@ -17,9 +17,10 @@ from mathutils import Matrix
 from ..core.capture.model import Capture
 from ..core.errors import BadInputError, MissingStageError
 from ..core.material import ObjectMaterial, undescribed
+from ..core.room_file import run_of
 from . import result_images
 from .apply import applying, whole
-from .marks import OBJECT_ID, RESULT
+from .marks import OBJECT_ID, RESULT, RUN, mark
 from .materials import MODEL, make_material
 from .mesh_objects import ATLAS_UV
 from .relight_room import depsgraph_of
@@ -145,6 +146,7 @@ class _Work:
 
     def __init__(self, scene, folder: Path, base_color):
         self.scene, self.folder, self.base_color, self.shown = scene, folder, base_color, sharing()
+        self.run = run_of(folder)
 
     def dress(self, thing: bpy.types.Object, source: Source, description: ObjectMaterial, uv: np.ndarray) -> None:
         """Put atlas coordinates ((c, 2) float32) and the material onto an object, keeping what it wore."""
@@ -168,7 +170,8 @@ class _Work:
             thing.data.materials.append(material)
         for slot in thing.material_slots:
             slot.material = material
-        thing[OBJECT_ID], thing[RESULT] = source.object_id, str(self.folder)
+        thing[OBJECT_ID] = source.object_id
+        mark(thing, self.folder, self.run)
         drop_ours(worn)
 
     def copy(self, made: list[tuple]) -> list[str]:
@@ -258,7 +261,7 @@ def restore(things: Iterable[bpy.types.Object]) -> tuple[int, tuple[str, ...]]:
             slots.append(thing.name)
         for slot, material in zip(thing.material_slots, old):
             slot.material = material
-        for key in (BEFORE, RESULT, OBJECT_ID):
+        for key in (BEFORE, RESULT, RUN, OBJECT_ID):
             if key in thing:
                 del thing[key]
         drop_ours(worn)

@@ -108,6 +108,11 @@ class Recovery:
         specular = key("specular", shading, s.specular, s.specular_rays, s.refine)
         return {"surface": surface, "lit_diffuse": lit, "shading": shading, "specular": specular}
 
+    @property
+    def run_key(self) -> str:
+        """16 hex digits that are the same where a capture and all that was asked of it are, and else differ."""
+        return key("run", self._keys["specular"])[:16]
+
     def _stage(
         self, name: str, load: Callable[[dict, dict], Any], compute: Callable[[], tuple[Any, dict, dict]]
     ) -> Any:
@@ -381,7 +386,8 @@ class Recovery:
         self.store.write_exr("environment.exr", put_in(shading.environment, shading.sun)[::-1])
         known = {one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects}
         objects = [dataclasses.asdict(m) | known.get(m.object_id, {}) for m in self.materials()]
-        self.store.write_json("materials.json", {"objects": objects})
+        told = {"run": self.run_key, "capture": self.capture.root.name, "objects": objects}
+        self.store.write_json("materials.json", told)
         self.progress.update(0.6)
         write_bytes(self.store.path("report.html"), make_page(self, self.report()).encode())
 

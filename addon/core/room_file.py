@@ -37,12 +37,27 @@ class Room:
     materials : tuple of ObjectMaterial
     folder : Path
         The result folder.
+    run : str
+        The run's key, see `run_of`.
     """
 
     capture: Capture
     atlas_uv: np.ndarray
     materials: tuple[ObjectMaterial, ...]
     folder: Path
+    run: str = ""
+
+
+def run_of(folder: Path | str) -> str:
+    """The key of the run that a result folder holds; '' where there is none, or it is older than such keys.
+
+    Objects that were made by this run carry the same (`marks.RUN`): nothing else in the folder is about any other.
+    """
+    try:
+        key = json.loads((Path(folder) / MATERIALS).read_text(encoding="utf-8")).get("run")
+    except (OSError, ValueError, AttributeError):
+        return ""
+    return key if isinstance(key, str) else ""
 
 
 def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = None) -> None:
@@ -89,8 +104,8 @@ def read_room(folder: Path | str) -> Room:
                                     "run the recovery to its end first.")
     capture, atlas_uv = read_capture_file(folder)
     try:
-        described = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))["objects"]
-        return Room(capture, atlas_uv, tuple(material(one) for one in described), folder)
+        told = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))
+        return Room(capture, atlas_uv, tuple(material(one) for one in told["objects"]), folder, told.get("run", ""))
     except DAMAGE as error:
         raise _damaged(folder, error) from error
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -42,7 +43,7 @@ def cheap(disk, tmp_path_factory):
     return folder, disk.run(folder)
 
 
-def test_albedo_lamp_and_report(finished):
+def test_albedo_lamp_and_report(disk, finished):
     folder, run = finished
     check(run)
     by_id = {m.object_id: m for m in run.materials}
@@ -59,7 +60,9 @@ def test_albedo_lamp_and_report(finished):
     assert figures["outside"] and run.report["warnings"] == []
     for name in ("albedo", "base_color", "shading", "lit_diffuse", "coverage", "environment"):
         assert (folder / f"{name}.exr").stat().st_size > 1000 or name == "environment"
-    objects = json.loads((folder / "materials.json").read_text())["objects"]
+    told = json.loads((folder / "materials.json").read_text())
+    objects = told["objects"]
+    assert told["capture"] == disk.root.name and re.fullmatch("[0-9a-f]{16}", told["run"])
     assert [o["model"] for o in objects] == [m.model for m in run.materials]
 
 
@@ -104,6 +107,8 @@ def test_only_later_stages_are_done_again(disk, cheap, tmp_path, change, kept):
         (copy / "stages" / path.name).write_bytes(path.read_bytes())
     again = disk.run(copy, replace(CHEAP, **change))
     assert again.stored == {name: name in kept for name in STAGES}
+    mine, theirs = (json.loads((one / "materials.json").read_text())["run"] for one in (folder, copy))
+    assert (mine == theirs) == (kept == STAGES)
 
 
 @pytest.mark.parametrize("after", [1, 2, 3])

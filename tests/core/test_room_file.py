@@ -14,7 +14,7 @@ from addon.core.capture.lenses_colmap import polynomial
 from addon.core.capture.model import Camera, Capture, Frame, Instance, Mesh
 from addon.core.errors import BadInputError, MissingStageError
 from addon.core.material import METAL, ObjectMaterial
-from addon.core.room_file import read_capture_file, read_room, write_room
+from addon.core.room_file import read_capture_file, read_room, run_of, write_room
 
 
 def a_capture(uv=None):
@@ -52,6 +52,16 @@ def test_materials_come_from_their_file(tmp_path):
     (tmp_path / "materials.json").write_text(json.dumps({"objects": [told]}))
     room = read_room(tmp_path)
     assert room.materials == (metal,) and room.folder == tmp_path and not room.atlas_uv.any()
+    assert room.run == "" == run_of(tmp_path)  # of an older version
+    (tmp_path / "materials.json").write_text(json.dumps({"run": "0123456789abcdef", "objects": [told]}))
+    assert read_room(tmp_path).run == run_of(tmp_path) == "0123456789abcdef"
+
+
+@pytest.mark.parametrize("text", [None, "", "[1]", '{"run": 3}'])
+def test_the_run_of_what_is_none(tmp_path, text):
+    if text is not None:
+        (tmp_path / "materials.json").write_text(text)
+    assert run_of(tmp_path) == ""
 
 
 def test_an_unfinished_result_is_told(tmp_path):

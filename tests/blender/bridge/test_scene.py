@@ -51,9 +51,10 @@ def counts():
 
 @pytest.mark.parametrize("fresh", [True, False])
 def test_it_renders_when_opened_elsewhere(scene, tmp_path, result, capture, fresh):
+    (result / "materials.json").write_text('{"run": "0123456789abcdef", "objects": []}')
     assert write_scene(result / "scene.blend", capture, ATLAS, MATERIALS, result, 0.36, fresh=fresh) == ()
     assert sorted(p.name for p in result.iterdir()) == [
-        "albedo.exr", "base_color.exr", "environment.exr", "scene.blend", "shading.exr"]
+        "albedo.exr", "base_color.exr", "environment.exr", "materials.json", "scene.blend", "shading.exr"]
     shutil.move(result, tmp_path / "moved")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "moved" / "scene.blend"))
     opened = bpy.context.scene
@@ -63,6 +64,10 @@ def test_it_renders_when_opened_elsewhere(scene, tmp_path, result, capture, fres
     room, lamps, eyes = (opened.collection.children["Scan Relight"].children[n] for n in ("Room", "Lamps", "Cameras"))
     assert [o["object_id"] for o in room.objects] == [4] and [o["object_id"] for o in lamps.objects] == [9]
     assert [o.name for o in eyes.objects] == ["frame 0", "frame 1"] and opened.camera == eyes.objects["frame 0"]
+    top = opened.collection.children["Scan Relight"]
+    for thing in (top, *room.objects, *lamps.objects):
+        assert (thing["scan_relight_result"], thing["scan_relight_run"]) == (str(result), "0123456789abcdef")
+    assert top["scan_relight_capture"] == str(capture.root)
     assert opened.render.engine == "CYCLES" and opened.view_settings.exposure == pytest.approx(-1)
     opened.cycles.samples, opened.cycles.use_denoising = 64, False
     opened.render.image_settings.file_format = "OPEN_EXR"
