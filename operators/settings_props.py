@@ -226,10 +226,12 @@ class SceneStageOperator(StageOperator):
 
     def begin(self, context):
         """Start the run; where the capture should be in the scene, its absence is told now and not afterwards."""
+        from ..addon.bridge import result_images
         from ..addon.bridge.apply import imported_from
         from ..addon.bridge.scene_capture import check_own
         from ..addon.bridge.write_back import is_own
 
+        result_images.check(self.images)
         capture = self.folder("capture_folder")
         if is_own(capture, self.target):
             check_own(capture)

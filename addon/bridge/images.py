@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import BadInputError
+from .marks import IMAGE
 
 RADIANCE = "Linear Rec.709"
 """Colour space of radiance, albedo and F0."""
@@ -18,7 +19,7 @@ DATA = "Non-Color"
 
 def load_image(path: Path | str, name: str | None = None, colour_space: str = RADIANCE, packed: bool = False,
                keep: bool = True) -> bpy.types.Image:
-    """Link an image file.
+    """Link an image file of a result folder; it is marked (`marks.IMAGE`) with where it came from.
 
     Parameters
     ----------
@@ -51,6 +52,7 @@ def load_image(path: Path | str, name: str | None = None, colour_space: str = RA
     image.colorspace_settings.name = colour_space
     image.alpha_mode = "NONE"
     image.use_fake_user = keep
+    image[IMAGE] = str(path)
     if packed:
         image.pack()
     return image

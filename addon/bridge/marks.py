@@ -15,6 +15,8 @@ RESULT = "scan_relight_result"
 """Of a room's collection and of its objects: the result folder that their materials came from."""
 RUN = "scan_relight_run"
 """Of a room's collection and of its objects: the key of the run (`materials.json`, "run") that made them."""
+IMAGE = "scan_relight_image"
+"""Of an image: the absolute path of the result folder's file that it came from."""
 OWN_SCENE = "scan_relight_own"
 """Of a scene: True where it was made for a room and holds nothing else of the artist's."""
 

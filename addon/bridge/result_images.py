@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterable
+from itertools import count
 from pathlib import Path
 
 import bpy
 
 from ..core.errors import BadInputError, StorageError
 from .images import DATA, RADIANCE, load_image, relative_to
+from .marks import IMAGE
 from .scene import ALBEDO, BASE_COLOR, SHADING
 
 RESULT, FOLDER, PACK = "RESULT", "FOLDER", "PACK"
 """Refer to the result folder; copy into a folder beside the saved .blend; pack into it."""
-MARK = "scan_relight_image"
-"""Custom property of an image: the file of the result folder that it came from."""
 COLOUR_SPACES = {BASE_COLOR: RADIANCE, ALBEDO: RADIANCE, SHADING: RADIANCE, "lit_diffuse.exr": RADIANCE,
                  "coverage.exr": DATA, "albedo_error.exr": DATA, "evidence.exr": DATA}
+UDIM = "<UDIM>"
 BAKED = (BASE_COLOR, ALBEDO, SHADING)
 
 
@@ -48,19 +49,16 @@ def image(folder: Path | str, name: str, where: str = RESULT, keep: bool = True,
     `keep` gives it a fake user; with `share` one that is there already is read again.
     """
     source = Path(folder).absolute() / name
-    earlier = next((one for one in bpy.data.images if one.get(MARK) == str(source) and not one.library), None)
+    earlier = next((one for one in bpy.data.images if one.get(IMAGE) == str(source) and not one.library), None)
     if share and earlier is not None:
         if not earlier.packed_file:
             earlier.reload()
         return earlier
     path = source if where != FOLDER else _beside(source)
     loaded = load_image(path, colour_space=COLOUR_SPACES[name], packed=where == PACK, keep=keep)
-    loaded[MARK] = str(source)
+    loaded[IMAGE] = str(source)
     if earlier is not None:
-        label = earlier.name
-        earlier.user_remap(loaded)
-        bpy.data.images.remove(earlier)
-        loaded.name = label
+        replace(earlier, loaded)
     if where != PACK and bpy.data.filepath:
         relative_to(loaded, Path(bpy.data.filepath).parent)
     return loaded
@@ -69,20 +67,87 @@ def image(folder: Path | str, name: str, where: str = RESULT, keep: bool = True,
 def drop_unused(folders: Iterable[str]) -> None:
     """Remove the images of result folders other than `folders` that nothing shows."""
     for one in list(bpy.data.images):
-        source = one.get(MARK)
+        source = one.get(IMAGE)
         if source and str(Path(source).parent) not in folders and one.users == int(one.use_fake_user):
             bpy.data.images.remove(one)
 
 
-def _beside(source: Path) -> Path:
-    """A copy of `source` in the folder of images beside the saved file."""
-    if not bpy.data.filepath:
+def check(where: str) -> None:
+    """Raise `BadInputError` where images can't go `where` in the open file: best asked before a run, not after it."""
+    if where == FOLDER and not bpy.data.filepath:
         raise BadInputError("Images can't go beside a file that was never saved; save it first, or pack them.")
+
+
+def settle(images: Iterable[bpy.types.Image], where: str = RESULT) -> None:
+    """Images that are in the file already go where the artist wants them.
+
+    Parameters
+    ----------
+    images : iterable of bpy.types.Image
+        Of result folders: those without a file of their own, and linked ones, are passed over. An earlier image of the
+        same file gives its place and its name to the new one, and goes.
+    where : str
+        `RESULT`: refer to the result folder, relative to the open file where it was saved; `FOLDER`: copy beside the
+        open file; `PACK`: into it.
+
+    Raises
+    ------
+    BadInputError
+        `FOLDER` is wished for and the file was never saved, or an image's file is gone.
+    StorageError
+        They can't be copied.
+    """
+    check(where)
+    gone = set()
+    for number, one in {one.session_uid: one for one in images}.items():
+        if number in gone or one.library or one.source not in ("FILE", "TILED"):
+            continue
+        source = Path(one.get(IMAGE) or bpy.path.abspath(one.filepath))
+        one[IMAGE] = str(source)
+        for earlier in [other for other in bpy.data.images
+                        if other != one and other.get(IMAGE) == str(source) and not other.library]:
+            gone.add(earlier.session_uid)
+            replace(earlier, one)
+        if one.packed_file:
+            continue
+        if not is_there(source):
+            raise BadInputError(f"'{source}' is missing; run the recovery again to its end.")
+        one.filepath = str(_beside(source) if where == FOLDER else source)
+        if where == PACK:
+            one.pack()
+        elif bpy.data.filepath:
+            relative_to(one, Path(bpy.data.filepath).parent)
+
+
+def replace(earlier: bpy.types.Image, one: bpy.types.Image) -> None:
+    """Let `one` stand wherever `earlier` did, under its name; `earlier` is removed."""
+    label, kept = earlier.name, earlier.use_fake_user
+    earlier.user_remap(one)
+    bpy.data.images.remove(earlier)
+    one.name, one.use_fake_user = label, one.use_fake_user or kept
+
+
+def is_there(path: Path) -> bool:
+    """Whether an image's file exists; of tiles (``<UDIM>``) any."""
+    return path.is_file() or bool(_tiles(path))
+
+
+def _tiles(path: Path) -> list[Path]:
+    return sorted(path.parent.glob(path.name.replace(UDIM, "[0-9]" * 4))) if UDIM in path.name else []
+
+
+def _beside(source: Path) -> Path:
+    """A copy of `source` in the folder of images beside the saved file; each result has a folder of its own."""
+    check(FOLDER)
     saved = Path(bpy.data.filepath)
-    target = saved.parent / f"{saved.stem} images" / source.name
+    theirs = {Path(bpy.path.abspath(one.filepath)).parent for one in bpy.data.images
+              if one.get(IMAGE) and Path(one[IMAGE]).parent != source.parent}
+    names = (f"{saved.stem} images{f' {number}' if number > 1 else ''}" for number in count(1))
+    target = next(one for one in (saved.parent / name for name in names) if one not in theirs) / source.name
     try:
         target.parent.mkdir(exist_ok=True)
-        shutil.copyfile(source, target)
+        for one in _tiles(source) or [source]:
+            shutil.copyfile(one, target.parent / one.name)
     except OSError as error:
         raise StorageError(f"'{target}' can't be written ({error.strerror or error}); free some space or save the file "
                            "elsewhere.") from error

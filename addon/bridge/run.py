@@ -92,6 +92,8 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     capture_folder, out_folder = Path(capture_folder), Path(out_folder)
     if out_folder.resolve() == capture_folder.resolve():
         raise BadInputError(f"Result folder '{out_folder}' is the capture itself; choose another.")
+    if scene is not None:
+        result_images.check(images)
     started = time.monotonic()
     progress.stage(READ)
     capture = read_capture(capture_folder, reading)
