@@ -9,6 +9,13 @@ def classes() -> tuple[type, ...]:
     from .capture_from_scene import SCAN_RELIGHT_OT_capture_from_scene
     from .check_capture import SCAN_RELIGHT_OT_check_capture
     from .clear_cache import SCAN_RELIGHT_OT_clear_cache
+    from .files import (
+        SCAN_RELIGHT_FH_json,
+        SCAN_RELIGHT_OT_drop,
+        SCAN_RELIGHT_OT_open_capture,
+        SCAN_RELIGHT_OT_open_result,
+        SCAN_RELIGHT_OT_use_folder,
+    )
     from .fit import SCAN_RELIGHT_OT_fit
     from .import_capture import SCAN_RELIGHT_OT_import_capture
     from .job_operator import SCAN_RELIGHT_OT_stop
@@ -35,6 +42,8 @@ def classes() -> tuple[type, ...]:
         SCAN_RELIGHT_OT_check_capture, SCAN_RELIGHT_OT_import_capture,
         SCAN_RELIGHT_OT_accumulate, SCAN_RELIGHT_OT_shade, SCAN_RELIGHT_OT_fit, SCAN_RELIGHT_OT_write,
         SCAN_RELIGHT_OT_recover, SCAN_RELIGHT_OT_run, SCAN_RELIGHT_OT_stop, SCAN_RELIGHT_OT_clear_cache,
+        SCAN_RELIGHT_OT_open_capture, SCAN_RELIGHT_OT_open_result, SCAN_RELIGHT_OT_use_folder, SCAN_RELIGHT_OT_drop,
+        SCAN_RELIGHT_FH_json,
         # The artist's side.
         SCAN_RELIGHT_OT_capture_from_scene, SCAN_RELIGHT_OT_restore_materials, SCAN_RELIGHT_OT_select_result_object,
         SCAN_RELIGHT_OT_look, SCAN_RELIGHT_OT_open_report, *relight_operators(),
@@ -61,6 +70,7 @@ def register():
     """Register every class and hang the property groups up."""
     import bpy
 
+    from . import menus
     from .job_operator import forget_job
     from .panel_results import active_row_property
 
@@ -70,6 +80,7 @@ def register():
         setattr(owner, name, bpy.props.PointerProperty(type=group))
     bpy.types.Scene.scan_relight_row = active_row_property()
     bpy.app.handlers.load_pre.append(forget_job)
+    menus.register()
 
 
 def unregister():
@@ -77,9 +88,10 @@ def unregister():
     import bpy
 
     from ..addon.bridge import job
-    from . import findings, results
+    from . import findings, menus, results
     from .job_operator import forget_job
 
+    menus.unregister()
     bpy.app.handlers.load_pre.remove(forget_job)
     findings.forget()
     results.forget()

@@ -3,19 +3,39 @@
 from __future__ import annotations
 
 import json
+import time
 
 import bpy
 
 from ..addon.bridge import job as jobs
+from ..addon.core.capture.folder import CAPTURE, Content, look_into
 from . import reading_props
 from .job_operator import redraw
 
 _found: dict[tuple, jobs.Job | dict | str] = {}
+FRESH = 2.0
+"""Seconds for which what a folder is stays known: panels are drawn often, disks are slow."""
+_contents: dict[str, tuple[float, Content]] = {}
 
 
 def key(choices) -> tuple:
     """What a finding is found by: the capture's folder and how it is read."""
     return bpy.path.abspath(choices.capture_folder), *reading_props.options(choices.reading)
+
+
+def wrong_folder(choices) -> Content | None:
+    """What the chosen folder is where it is no capture; None where it is one, was read, or its format was given."""
+    if not choices.capture_folder or choices.reading.reading_format != reading_props.FOUND:
+        return None
+    if isinstance(_found.get(key(choices)), dict):
+        return None
+    folder = bpy.path.abspath(choices.capture_folder)
+    read, content = _contents.get(folder, (0.0, None))
+    if content is None or time.monotonic() - read > FRESH:
+        content = look_into(folder)
+        _contents.clear()  # of one folder at a time
+        _contents[folder] = time.monotonic(), content
+    return None if content.kind == CAPTURE else content
 
 
 def look(choices) -> jobs.Job | dict | str | None:
@@ -70,3 +90,4 @@ def forget() -> None:
         if isinstance(one, jobs.Job):
             one.stop()
     _found.clear()
+    _contents.clear()

@@ -44,7 +44,8 @@ def progress_text(job: jobs.Job) -> str:
 
 
 def redraw(context) -> None:
-    """Have the sidebars of all 3D views drawn again, and nothing else."""
+    """Have the sidebars of all 3D views and the status bars drawn again, and nothing else."""
+    bpy.msgbus.publish_rna(key=(bpy.types.Window, "view_layer"))  # what status bars listen to
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
@@ -205,15 +206,11 @@ class JobOperator:
             return
         self._said, self._state, self._drawn = text, state, now
         redraw(context)
-        if context.workspace is not None:
-            context.workspace.status_text_set(f"Scan Relight: {text}   (ESC over a 3D view stops)")
 
     def _leave(self, context, verdict: set[str]) -> set[str]:
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None
-        for workspace in bpy.data.workspaces:
-            workspace.status_text_set(None)
         self.tidy(self.job)
         redraw(context)
         return verdict

@@ -32,6 +32,10 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
         if body is not None:
             body.use_property_split = True
             reading_props.draw(body, choices.reading)
+        wrong = findings.wrong_folder(choices)
+        if wrong is not None:
+            self.wrong(layout, context, wrong)
+            return
         found = findings.look(choices) if choices.capture_folder else None
         row = layout.row()
         row.enabled = not isinstance(found, jobs.Job)
@@ -43,6 +47,17 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
             self.say(layout, context, found, "CANCEL")
         elif found is not None:
             self.facts(layout, context, found)
+
+    def wrong(self, layout, context, content) -> None:
+        """Why the folder is no capture, and a button for each that is meant perhaps."""
+        column = layout.column()
+        self.say(column, context, content.sentence, "INFO" if content.captures or content.results else "CANCEL")
+        for folder in content.captures:
+            column.operator("scan_relight.use_folder", text=f"Use '{folder.name}'", icon="FILE_FOLDER",
+                            translate=False).folder = str(folder)
+        for folder in content.results:
+            text = "Open It" if folder == content.folder else f"Open Result '{folder.name}'"
+            column.operator("scan_relight.open_result", text=text, icon="IMPORT").folder = str(folder)
 
     def facts(self, layout, context, found: dict) -> None:
         """What `describe` tells of a capture; keys that are not known here are shown as they come."""

@@ -8,9 +8,10 @@ import bpy
 
 from ..addon.bridge import job as jobs
 from ..addon.console import duration
-from ..addon.core.stages import WRITE
+from ..addon.core.stages import LABELS, STAGES, WRITE
+from ..addon.core.unfinished import goes_on_with
 from ..addon.settings_info import setting_infos
-from . import preferences
+from . import findings, preferences
 from .job_operator import active, bar
 from .panel import SidebarPanel
 
@@ -46,7 +47,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         choices.enabled = job is None
         self.choices(choices, context)
         if job is None:
-            self.start()
+            self.start(context)
             self.outcome(context)
         else:
             self.progress(job)
@@ -74,11 +75,20 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
                     for name in names:
                         column.prop(choices.settings, name)
 
-    def start(self) -> None:
-        """The button."""
+    def start(self, context) -> None:
+        """The button; where a run was stopped, it goes on, and there is another to start anew."""
+        choices = context.scene.scan_relight
+        stage = goes_on_with(preferences.result_folder(choices.result_folder, choices.capture_folder)) \
+            if choices.capture_folder else ""
         row = self.layout.row()
         row.scale_y = 1.4
-        row.operator("scan_relight.run", text="Run", icon="PLAY").target = "recover"
+        row.enabled = findings.wrong_folder(choices) is None
+        row.operator("scan_relight.run", text="Resume" if stage else "Run", icon="PLAY").target = "recover"
+        if stage:
+            self.say(self.layout, context, f"Goes on with: {LABELS[stage]}. What is finished is kept, where its "
+                     "settings are the same.")
+            again = self.layout.operator("scan_relight.run", text="Start Anew", icon="FILE_REFRESH")
+            again.target, again.from_stage = "recover", STAGES[0]
 
     def progress(self, job: jobs.Job) -> None:
         """One bar, and Stop."""

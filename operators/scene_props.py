@@ -21,7 +21,7 @@ def preset_chosen(choices, context) -> None:
 
 def capture_chosen(choices, context) -> None:
     """Have a look at the folder at once, beside the window."""
-    if choices.capture_folder and not bpy.app.background:
+    if choices.capture_folder and not bpy.app.background and findings.wrong_folder(choices) is None:
         with suppress(OSError):  # then the button says why
             findings.begin(choices)
 
