@@ -5,7 +5,7 @@ import bpy
 
 from ..addon.bridge import look
 from ..addon.core.errors import ScanRelightError
-from . import poll, results
+from . import poll
 
 
 def look_items() -> list[tuple[str, str, str]]:
@@ -42,9 +42,7 @@ class SCAN_RELIGHT_OT_look(bpy.types.Operator):
     def execute(self, context):
         """Switch."""
         try:
-            chosen = results.folder_of(context.scene)
-            fits = chosen is not None and look.recovered(context.scene, chosen)
-            look.set_look(context.scene, self.look, chosen if fits else None)
+            look.set_look(context.scene, self.look)
         except ScanRelightError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

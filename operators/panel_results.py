@@ -3,7 +3,7 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.bridge.marks import OBJECT_ID
+from ..addon.bridge import result_file
 from ..addon.console import duration
 from ..addon.core.stages import LABELS, RUN_STAGES
 from . import results
@@ -28,13 +28,13 @@ class SCAN_RELIGHT_UL_results(bpy.types.UIList):
 
     bl_idname = "SCAN_RELIGHT_UL_results"
 
-    known: dict = {}  # what the last `filter_items` found, as it comes before the rows
+    known: dict = {}  # by name; what the last `filter_items` found, as it comes before the rows
     model: bpy.props.EnumProperty(name="Model", description="Which objects are listed", items=MODELS)
     order: bpy.props.EnumProperty(name="Order", description="How the list is sorted", items=ORDERS)
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
         """Name, roughness, specular, certainty."""
-        one = self.known.get(item.get(OBJECT_ID), {})
+        one = self.known.get(item.name, {})
         texts = columns(one)
         split = layout.split(factor=0.52 if any(texts) else 0.9)  # long names may use what stays empty
         split.label(text=item.name, icon=ICONS.get(one.get("model"), "BLANK1"), translate=False)
@@ -53,11 +53,10 @@ class SCAN_RELIGHT_UL_results(bpy.types.UIList):
     def filter_items(self, context, data, property):
         """Only recovered objects that pass the filters, in the chosen order."""
         things = getattr(data, property)
-        found = results.result_of(context.scene)
-        known = type(self).known = found.objects if found else {}
+        known = type(self).known = {thing.name: one for thing, one in result_file.rows(things).items()}
         shown, keys = [], []
         for thing in things:
-            one = known.get(thing.get(OBJECT_ID)) if thing.type == "MESH" else None
+            one = known.get(thing.name)
             passes = one is not None and self.model in ("ALL", one.get("model"))
             passes = passes and self.filter_name.lower() in thing.name.lower()
             shown.append(self.bitflag_filter_item if passes else 0)
@@ -111,12 +110,17 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         """The list, the chosen object, the page."""
         layout, scene = self.layout, context.scene
+        rows, refused = result_file.rows(scene.objects), results.refused(scene.objects)
+        for sentence in refused:
+            self.say(layout, context, sentence, "ERROR")
+        if refused:
+            layout.operator("scan_relight.run", text="Bring In", icon="IMPORT").target = "write"
         found = results.result_of(scene)
-        if found is None or not found.objects:
+        if not rows and not refused and (found is None or not found.objects):
             self.say(layout, context, "No result yet: run the recovery to its end, or choose the folder of one that "
                      "is finished.", "INFO")
             return
-        if any(thing.get(OBJECT_ID) in found.objects for thing in scene.objects if thing.type == "MESH"):
+        if rows:
             head = layout.split(factor=0.52)
             head.label(text="Object")
             row = head.row()
@@ -124,11 +128,11 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
             row.label(text="F0")
             row.label(text="", icon="BLANK1")
             layout.template_list("SCAN_RELIGHT_UL_results", "", scene, "objects", scene, "scan_relight_row", rows=6)
-        else:
+        elif not refused:
             self.say(layout, context, f"{len(found.objects)} objects in '{found.folder.name}'; none of them is in "
                      "this scene. Import the capture to see them.", "INFO")
-        thing = context.active_object
-        one = found.objects.get(thing.get(OBJECT_ID)) if thing is not None and thing.type == "MESH" else None
+        thing = results.active(scene)
+        one = rows.get(thing)
         if one is not None:
             self.details(layout.box(), context, thing.name, one)
         layout.operator("scan_relight.open_report", icon="URL")

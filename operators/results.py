@@ -2,47 +2,28 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import bpy
 
-from ..addon.bridge import look
+from ..addon.bridge import look, result_file
+from ..addon.bridge.result_file import EARLIER, FITS, MATERIALS, UNTOLD, Result, standing, standings
 from . import preferences
 
-MATERIALS, REPORT, PAGE = "materials.json", "report.json", "report.html"
+PAGE = "report.html"
 SURE, FAIR = 0.15, 0.4
 """Doubt (`doubt`) up to which an object counts as sure, and as fairly sure."""
 
 
-@dataclass(frozen=True)
-class Result:
-    """A result folder's content; empty where a file is absent or damaged.
-
-    Attributes
-    ----------
-    folder : Path
-    objects : dict of int to dict
-        Entries of materials.json by `object_id`.
-    stages : dict of str to dict
-        Of report.json.
-    figures : dict
-        Of report.json.
-    """
-
-    folder: Path
-    objects: dict[int, dict[str, Any]]
-    stages: dict[str, dict[str, Any]]
-    figures: dict[str, Any]
-
-
-_read: dict[Path, tuple[tuple, Result]] = {}
-
-
 def folder_of(scene: bpy.types.Scene) -> Path | None:
-    """The result folder that a scene's panel is about: the chosen one, or that of its recovered objects."""
+    """The result folder that a scene's panel is about.
+
+    That of the active object where its run lies there, else the chosen one, else that of the recovered objects.
+    """
+    state, result = standing(active(scene))
+    if state == FITS:
+        return result.folder
     choices = scene.scan_relight
     if choices.result_folder:
         return Path(bpy.path.abspath(choices.result_folder))
@@ -53,45 +34,35 @@ def folder_of(scene: bpy.types.Scene) -> Path | None:
     return look.result_of(scene)
 
 
+def active(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The active object of the window's view of a scene."""
+    return bpy.context.view_layer.objects.active if bpy.context.scene == scene and bpy.context.view_layer else None
+
+
 def result_of(scene: bpy.types.Scene) -> Result | None:
     """What is known of a scene's result; None where there is none."""
     folder = folder_of(scene)
-    if folder is None:
-        return None
-    stamp = tuple(_stamp(folder / name) for name in (MATERIALS, REPORT))
-    if not any(stamp):
-        return None
-    if folder not in _read or _read[folder][0] != stamp:
-        if len(_read) > 8:
-            _read.clear()
-        report = _json(folder / REPORT)
-        listed = _json(folder / MATERIALS).get("objects")
-        objects = {one["object_id"]: one for one in listed if isinstance(one, dict) and "object_id" in one} \
-            if isinstance(listed, list) else {}
-        _read[folder] = stamp, Result(folder, objects, *(
-            report[key] if isinstance(report.get(key), dict) else {} for key in ("stages", "figures")))
-    return _read[folder][1]
+    return None if folder is None else result_file.read(folder)
 
 
-def forget() -> None:
-    """Read everything again."""
-    _read.clear()
+def refused(things) -> list[str]:
+    """A sentence on recovered objects whose values can't be shown, as their folder holds another run or none can tell.
+
+    Those whose folder is gone are told by `panel_missing`.
+    """
+    states = [state for state, _ in standings(things).values()]
+    found = []
+    for state, why in ((EARLIER, "of an earlier run than the one that lies in the result folder now; bring in the new "
+                                 "one to see what was found."),
+                       (UNTOLD, "of an older version of Scan Relight, so that nobody can tell which run made them; run "
+                                "again and bring in the result.")):
+        count = states.count(state)
+        if count:
+            found.append(f"{count} object{'s' * (count > 1)} of this scene {'are' if count > 1 else 'is'} {why}")
+    return found
 
 
-def _stamp(path: Path) -> tuple[int, int] | None:
-    try:
-        stat = path.stat()
-    except OSError:
-        return None
-    return stat.st_mtime_ns, stat.st_size
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return value if isinstance(value, dict) else {}
+forget = result_file.forget
 
 
 def doubt(one: dict[str, Any]) -> float | None:

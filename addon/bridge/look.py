@@ -2,7 +2,7 @@
 
 A look is a Geometry Nodes modifier that sets another material, seen by the viewport alone: no material, slot or node
 tree of an object is touched, a render never evaluates the modifier (its switch for renders is off), and this stays so
-where a file is opened without the add-on. One material serves the whole room, as all objects share one atlas.
+where a file is opened without the add-on. One material serves a whole room, as all its objects share one atlas.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from .images import RADIANCE
 from .marks import OBJECT_ID, RESULT
 from .materials import mix_node
 from .mesh_objects import ATLAS_UV
+from .result_file import FITS, standings
 from .result_images import image
 
 MATERIAL, ALBEDO, SHADING, LIT_DIFFUSE, COVERAGE, CERTAINTY = (
@@ -77,40 +78,28 @@ def current(scene: bpy.types.Scene) -> str:
     return MATERIAL
 
 
-def recovered(scene: bpy.types.Scene, folder: Path | None = None) -> list[bpy.types.Object]:
-    """The objects that wear materials of a result folder (of any, where none is given)."""
+def recovered(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The objects that wear recovered materials."""
     return [thing for thing in scene.objects
-            if thing.type == "MESH" and OBJECT_ID in thing and ATLAS_UV in thing.data.uv_layers and not thing.library
-            and (folder is None or _told(thing) in (None, folder))]
-
-
-def _told(thing: bpy.types.Object) -> Path | None:
-    """The result folder that an object's material came from; None where it was moved away or never told."""
-    told = thing.get(RESULT)
-    return Path(told) if told and Path(told).is_dir() else None
+            if thing.type == "MESH" and OBJECT_ID in thing and ATLAS_UV in thing.data.uv_layers and not thing.library]
 
 
 def result_of(scene: bpy.types.Scene) -> Path | None:
-    """The result folder of a scene's recovered objects; that of an opened scene.blend is where the file lies."""
-    things = recovered(scene)
-    told = next(filter(None, map(_told, reversed(things))), None)
-    if told:
-        return told
-    if things and bpy.data.filepath:
-        return Path(bpy.data.filepath).parent
-    return None
+    """The result folder that the recovered objects of a scene came from, of several the last one's, if it is there."""
+    told = (thing.get(RESULT) for thing in reversed(recovered(scene)))
+    return next((Path(one) for one in told if one and Path(one).is_dir()), None)
 
 
-def set_look(scene: bpy.types.Scene, look: str, folder: Path | str | None = None) -> int:
-    """Let the viewport show a look on all recovered objects.
+def set_look(scene: bpy.types.Scene, look: str) -> int:
+    """Let the viewport show a look on all recovered objects, each from the result that it came from.
+
+    Objects of another run than lies in their folder now are left out: the images would not fit them.
 
     Parameters
     ----------
     scene : bpy.types.Scene
     look : str
         One of `LOOKS`.
-    folder : Path or str, optional
-        The result folder; `result_of` the scene where left out.
 
     Returns
     -------
@@ -120,33 +109,38 @@ def set_look(scene: bpy.types.Scene, look: str, folder: Path | str | None = None
     Raises
     ------
     BadInputError
-        Nothing is recovered in the scene, or the image is missing or damaged; the look stays as it was.
+        Nothing is recovered in the scene whose run lies in its folder, or an image is missing or damaged; the look
+        stays as it was.
     """
     if look == MATERIAL:
         return clear(scene)
-    folder = Path(folder).absolute() if folder is not None else result_of(scene)
-    things = [] if folder is None else recovered(scene, folder)
+    things = recovered(scene)
     if not things:
         raise BadInputError("No object of this scene wears recovered materials; run the recovery first.")
-    if not (folder / LOOKS[look].file).is_file():
-        raise BadInputError(f"'{folder / LOOKS[look].file}' is missing; run the recovery again to its end.")
+    folders = {thing: result.folder for thing, (state, result) in standings(things).items() if state == FITS}
+    if not folders:
+        raise BadInputError("The result folder holds no images of the run that this scene's objects came from; run "
+                            "again and bring in the result.")
+    for folder in dict.fromkeys(folders.values()):
+        if not (folder / LOOKS[look].file).is_file():
+            raise BadInputError(f"'{folder / LOOKS[look].file}' is missing; run the recovery again to its end.")
     try:
-        group = _group(_material(scene, look, folder), look)
+        groups = {folder: _group(_material(scene, look, folder), look) for folder in dict.fromkeys(folders.values())}
     except BadInputError:
         _sweep()
         raise
-    clear(scene, group)
-    for thing in things:
+    clear(scene, groups.values())
+    for thing, folder in folders.items():
         modifier = thing.modifiers.new(NAME, "NODES")
-        modifier.node_group = group
+        modifier.node_group = groups[folder]
         modifier.show_render = modifier.show_expanded = False
-    return len(things)
+    return len(folders)
 
 
-def clear(scene: bpy.types.Scene, but: bpy.types.NodeTree | None = None) -> int:
+def clear(scene: bpy.types.Scene, but: Iterable[bpy.types.NodeTree] = ()) -> int:
     """Let the viewport show the materials themselves; returns how many objects showed something else.
 
-    The node group `but` is kept for what comes next.
+    The node groups `but` are kept for what comes next.
     """
     count = _take_off(scene.objects)
     _sweep(but)
@@ -164,10 +158,10 @@ def _take_off(things: Iterable[bpy.types.Object]) -> int:
     return count
 
 
-def _sweep(but: bpy.types.NodeTree | None = None) -> None:
+def _sweep(but: Iterable[bpy.types.NodeTree] = ()) -> None:
     """Remove what earlier looks left: groups, materials and images that nothing uses."""
     for group in [one for one in bpy.data.node_groups if MARK in one and not one.users and not one.library]:
-        if group != but:
+        if group not in but:
             bpy.data.node_groups.remove(group)
     for material in [one for one in bpy.data.materials if MARK in one and not one.users and not one.library]:
         images = {node.image for node in material.node_tree.nodes if node.type == "TEX_IMAGE"}

@@ -1,11 +1,15 @@
 """What the viewport shows: on and off leaves everything as it was, and no render ever shows a look."""
 
+import json
+
 import numpy as np
 import pytest
 
+from addon.core.capture.exr import write_exr
+
 bpy = pytest.importorskip("bpy")
 
-from tests.blender.artist.artist_room import add_cameras, bridge, build_room, node_trees  # noqa: E402
+from tests.blender.artist.artist_room import add_cameras, box, bridge, build_room, mesh_object, node_trees  # noqa: E402
 
 QUICK = {"shading_rays": 16, "specular_rays": 4, "emitter_rays": 2, "refine": 0, "texel_size": 0.08, "atlas_size": 512}
 LOOKS = ("ALBEDO", "SHADING", "LIT_DIFFUSE", "COVERAGE", "CERTAINTY")
@@ -149,4 +153,34 @@ def test_a_missing_image_is_told_and_changes_nothing(scene, dressed):
 
 def test_nothing_recovered_is_told(ops):
     with pytest.raises(RuntimeError, match="No object of this scene wears recovered"):
+        ops.look(look="ALBEDO")
+
+
+def wearing(name, folder, run, value):
+    """An object of a result of its own, all of whose images are of one value."""
+    folder.mkdir()
+    (folder / "materials.json").write_text(json.dumps({"run": run, "objects": []}))
+    write_exr(folder / "albedo.exr", np.full((4, 4, 3), value, np.float32))
+    thing = mesh_object(name, *box((0, 0, 0), (1, 1, 1)), uv="ScanRelight")
+    thing["object_id"], thing["scan_relight_result"], thing["scan_relight_run"] = 0, str(folder), run
+    return thing
+
+
+def pictured(thing):
+    """First pixel of the image that the look shows on an object."""
+    group = thing.modifiers["Scan Relight look"].node_group
+    material = next(node for node in group.nodes if node.type == "SET_MATERIAL").inputs["Material"].default_value
+    return next(node.image.pixels[0] for node in material.node_tree.nodes if node.type == "TEX_IMAGE")
+
+
+def test_two_rooms_each_show_their_own_images_and_another_run_none(ops, tmp_path):
+    hall = wearing("hall", tmp_path / "hall", "a" * 16, 0.25)
+    attic = wearing("attic", tmp_path / "attic", "b" * 16, 0.5)
+    assert ops.look(look="ALBEDO") == {"FINISHED"}
+    assert (pictured(hall), pictured(attic)) == (0.25, 0.5)
+    hall["scan_relight_run"] = "c" * 16
+    ops.look(look="ALBEDO")
+    assert not hall.modifiers and pictured(attic) == 0.5
+    attic["scan_relight_run"] = "c" * 16
+    with pytest.raises(RuntimeError, match="no images of the run that this scene's objects came from"):
         ops.look(look="ALBEDO")

@@ -19,6 +19,7 @@ OBJECTS = [
     {"object_id": 2, "model": "metal", "phi": 0.04, "f0": [0.9, 0.6, 0.3], "roughness_low": 0.1, "roughness_high": 0.4},
     {"object_id": 3, "model": "emitter", "emission": [3.0, 2.0, 1.0]},
 ]
+RUN, LATER = "0123456789abcdef", "fedcba9876543210"
 
 
 @pytest.fixture
@@ -29,12 +30,22 @@ def results(ops):
     return module
 
 
+def write(folder, run=RUN, objects=OBJECTS):
+    folder.mkdir(exist_ok=True)
+    (folder / "materials.json").write_text(json.dumps({"run": run, "objects": objects}))
+
+
+def recovered(thing, number, folder, run=RUN):
+    thing["object_id"], thing["scan_relight_result"], thing["scan_relight_run"] = number, str(folder), run
+    return thing
+
+
 @pytest.fixture
 def scene(ops, results, tmp_path):
     for number, name in enumerate(("wall", "Apple", "tap", "lamp")):
-        mesh_object(name, *box((number, 0, 0), (number + 0.5, 1, 1)))["object_id"] = number
+        recovered(mesh_object(name, *box((number, 0, 0), (number + 0.5, 1, 1))), number, tmp_path)
     mesh_object("the user's own", *box((0, 2, 0), (1, 3, 1)))
-    (tmp_path / "materials.json").write_text(json.dumps({"objects": OBJECTS}))
+    write(tmp_path)
     bpy.context.scene.scan_relight.result_folder = str(tmp_path)
     return bpy.context.scene
 
@@ -67,9 +78,51 @@ def test_orders(scene, results, order, names):
 def test_read_again_when_the_file_changes_and_only_then(scene, results, tmp_path, monkeypatch):
     first = results.result_of(scene)
     assert results.result_of(scene) is first
-    (tmp_path / "materials.json").write_text(json.dumps({"objects": OBJECTS[:2]}))
+    write(tmp_path, objects=OBJECTS[:2])
     os.utime(tmp_path / "materials.json", (1, 1))
     assert len(results.result_of(scene).objects) == 2
+
+
+def listed(scene, results):
+    """What the list shows: phi by the object's name."""
+    result_file = results.result_file
+    return {thing.name: one.get("phi") for thing, one in result_file.rows(scene.objects).items()}
+
+
+def test_two_rooms_each_show_their_own_values(scene, results, tmp_path):
+    write(tmp_path / "attic", LATER, [{"object_id": 1, "model": "specular", "phi": 0.64}])
+    recovered(mesh_object("beam", *box((0, 3, 0), (1, 4, 1))), 1, tmp_path / "attic", LATER)
+    assert listed(scene, results) == {"wall": 0.09, "Apple": None, "tap": 0.04, "lamp": None, "beam": 0.64}
+    assert results.refused(scene.objects) == []
+    bpy.context.view_layer.objects.active = scene.objects["beam"]
+    assert results.folder_of(scene) == tmp_path / "attic"
+    bpy.context.view_layer.objects.active = scene.objects["the user's own"]
+    assert results.folder_of(scene) == tmp_path
+
+
+def test_another_run_s_values_are_never_shown(scene, results, tmp_path):
+    write(tmp_path, LATER)
+    assert listed(scene, results) == {}
+    [sentence] = results.refused(scene.objects)
+    assert sentence.startswith("4 objects of this scene are of an earlier run") and "bring in the new one" in sentence
+    recovered(scene.objects["tap"], 2, tmp_path, LATER)
+    assert listed(scene, results) == {"tap": 0.04}
+    assert results.refused(scene.objects)[0].startswith("3 objects")
+
+
+def test_objects_whose_run_nobody_can_tell_are_refused(scene, results, tmp_path):
+    del scene.objects["wall"]["scan_relight_run"]  # of an earlier version
+    for key in ("scan_relight_result", "scan_relight_run"):
+        del scene.objects["tap"][key]  # imported, with nothing put on: it is not spoken of
+        del scene.objects["lamp"][key]  # of an old scene.blend
+    worn = bpy.data.materials.new("old")
+    worn["scan_relight_model"] = "emitter"
+    scene.objects["lamp"].data.materials.append(worn)
+    assert listed(scene, results) == {"Apple": None}
+    [sentence] = results.refused(scene.objects)
+    assert sentence.startswith("2 objects of this scene are of an older version") and "run again" in sentence
+    write(tmp_path, run="")  # a folder of an earlier version
+    assert listed(scene, results) == {} and results.refused(scene.objects)[0].startswith("3 objects")
 
 
 @pytest.mark.parametrize("text", ["", "[1, 2]", "{\"objects\": 3}", "{\"objects\": [{\"model\": \"metal\"}]}"])
