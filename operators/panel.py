@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..addon.core.naming import numbered
 from . import text
 
 
@@ -21,6 +22,22 @@ class SidebarPanel:
     def say(layout, context, sentence: str, icon: str = "NONE") -> None:
         """Write `sentence` over as many lines as the panel's width asks for."""
         text.say(layout, context, sentence, icon)
+
+
+class NamedRows:
+    """A list whose rows are named after objects of the room."""
+
+    @staticmethod
+    def name(layout, name: str, icon: str = "NONE") -> None:
+        """Write a name; its number has a column of its own, so that a narrow panel cuts the class and never that."""
+        kind, number = numbered(name)
+        row = layout.row()
+        row.label(text=kind, icon=icon, translate=False)
+        if number:
+            last = row.row()
+            last.alignment = "RIGHT"
+            last.ui_units_x = 0.8 + 0.5 * len(number)
+            last.label(text=number, translate=False)
 
 
 def places(keys: list) -> list[int]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..addon.bridge import job as jobs
+from ..addon.core.naming import object_name
 from . import findings, reading_props
 from .panel import SidebarPanel
 
@@ -83,7 +84,7 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
             column = body.column(align=True)
             column.scale_y = 0.8
             for one in instances[:SHOWN]:
-                column.label(text=f"{one['class_name'] or 'Object'} {one['object_id']}: {one['triangles']:,} triangles")
+                column.label(text=f"{object_name(one['class_name'], one['object_id'])}: {one['triangles']:,} triangles")
             if len(instances) > SHOWN:
                 column.label(text=f"and {len(instances) - SHOWN} more")
 

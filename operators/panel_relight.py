@@ -6,14 +6,15 @@ import bpy
 
 from ..addon.bridge import match_frame, relight_lamps, relight_lights, relight_outside
 from ..addon.bridge.cameras import frame_cameras
-from .panel import SidebarPanel, places
+from ..addon.core.naming import in_order
+from .panel import NamedRows, SidebarPanel, places
 from .relight import PRESETS
 from .relight_base import has_room
 
 ICONS = {"WINDOW": "LIGHT_AREA", "SOFTBOX": "MESH_PLANE", "SPOT": "LIGHT_SPOT", "SUN": "LIGHT_SUN"}
 
 
-class SCAN_RELIGHT_UL_lamps(bpy.types.UIList):
+class SCAN_RELIGHT_UL_lamps(NamedRows, bpy.types.UIList):
     """The lamps of the scan, each by the first object that wears it.
 
     Not a list of materials: for each of those Blender renders a picture, and its shaders, before it draws the panel.
@@ -30,7 +31,7 @@ class SCAN_RELIGHT_UL_lamps(bpy.types.UIList):
             lamp = material.scan_relight_lamp
             row = column.row(align=True)
             row.prop(lamp, "on", text="", icon="OUTLINER_OB_LIGHT" if lamp.on else "LIGHT", emboss=False)
-            row.label(text=material.name, translate=False)
+            self.name(row, material.name)
             value = row.row(align=True)
             value.enabled = lamp.on
             colour = value.row(align=True)
@@ -47,7 +48,7 @@ class SCAN_RELIGHT_UL_lamps(bpy.types.UIList):
         lamps = type(self).lamps = relight_lamps.lamps_by_object(context.scene)
         names = [" ".join(lamp.name for lamp in lamps.get(thing.name, ())) for thing in getattr(data, name)]
         shown = [self.bitflag_filter_item if found and wanted in found.casefold() else 0 for found in names]
-        return shown, places(names)
+        return shown, places([in_order(found) for found in names])
 
 
 class RelightPanel(SidebarPanel):

@@ -5,9 +5,10 @@ import bpy
 
 from ..addon.bridge import result_file
 from ..addon.console import duration
+from ..addon.core.naming import in_order
 from ..addon.core.stages import LABELS, RUN_STAGES
 from . import results
-from .panel import SidebarPanel, places
+from .panel import NamedRows, SidebarPanel, places
 from .select_result_object import select
 
 ICONS = {"lambertian": "SHADING_SOLID", "specular": "SHADING_TEXTURE", "metal": "SHADING_RENDERED",
@@ -23,7 +24,7 @@ ORDERS = [("NAME", "Name", "By name"), ("MODEL", "Model", "By model, then by nam
           ("CERTAINTY", "Least sure first", "By how sure the material is, the least sure first")]
 
 
-class SCAN_RELIGHT_UL_results(bpy.types.UIList):
+class SCAN_RELIGHT_UL_results(NamedRows, bpy.types.UIList):
     """The recovered objects; the rows are the scene's own objects, so nothing of this is saved."""
 
     bl_idname = "SCAN_RELIGHT_UL_results"
@@ -37,7 +38,7 @@ class SCAN_RELIGHT_UL_results(bpy.types.UIList):
         one = self.known.get(item.name, {})
         texts = columns(one)
         split = layout.split(factor=0.52 if any(texts) else 0.9)  # long names may use what stays empty
-        split.label(text=item.name, icon=ICONS.get(one.get("model"), "BLANK1"), translate=False)
+        self.name(split, item.name, ICONS.get(one.get("model"), "BLANK1"))
         row = split.row()
         for text in texts if any(texts) else ():
             row.label(text=text)
@@ -67,11 +68,11 @@ class SCAN_RELIGHT_UL_results(bpy.types.UIList):
 def order_key(name: str, one: dict, order: str) -> tuple:
     """What a row is sorted by."""
     if order == "MODEL":
-        return one.get("model", ""), name.lower()
+        return one.get("model", ""), in_order(name)
     if order == "CERTAINTY":
         value = results.doubt(one)
-        return -(value if value is not None else -1.0), name.lower()
-    return (name.lower(),)
+        return -(value if value is not None else -1.0), in_order(name)
+    return in_order(name)
 
 
 def columns(one: dict) -> tuple[str, str]:

@@ -128,7 +128,7 @@ def applying(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, mat
         own = order[first:last]
         if thing is None or len(thing.data.polygons) != len(own):
             what = "was deleted" if thing is None else "was edited"
-            warnings.append(f"Object {instance.object_id} ({instance.class_name}) {what} and is left as it is.")
+            warnings.append(f"{instance.name} {what} and is left as it is.")
             continue
         layers = thing.data.uv_layers
         layer = layers.get(ATLAS_UV) or layers.new(name=ATLAS_UV)

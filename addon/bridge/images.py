@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import BadInputError
+from ..core.naming import LONGEST, cut
 from .marks import IMAGE
 
 RADIANCE = "Linear Rec.709"
@@ -56,6 +57,12 @@ def load_image(path: Path | str, name: str | None = None, colour_space: str = RA
     if packed:
         image.pack()
     return image
+
+
+def image_name(room: str, path: Path | str) -> str:
+    """What an image file of a room is called: 'kitchen base color', so that two rooms in one file are told apart."""
+    what = Path(path).stem.replace("_", " ")
+    return f"{cut(room, LONGEST - 8) or 'room'} {what}"
 
 
 def relative_to(image: bpy.types.Image, folder: Path | str) -> None:

@@ -50,7 +50,7 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
     bpy.types.Material
         Its custom properties ``scan_relight_model``, ``_phi``, ``_psi``, ``_transmission`` tell what was fitted.
     """
-    material = bpy.data.materials.new(f"{description.class_name or 'Object'} {description.object_id}")
+    material = bpy.data.materials.new(description.name)
     nodes, links, principled = _fresh_tree(material)
     value = {name: principled.inputs[name] for name in (
         BASE_COLOR, METALLIC, ROUGHNESS, IOR, SPECULAR_LEVEL, EMISSION_COLOR, EMISSION_STRENGTH, ALPHA)}

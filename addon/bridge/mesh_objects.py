@@ -49,16 +49,15 @@ def each_object(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray,
         if first == last:
             continue
         own = order[first:last]
-        name = instance.class_name or "Object"
         vertices, triangles = _compact(mesh.vertices, mesh.triangles[own])
         middle = (vertices.min(0) + vertices.max(0)) / 2
-        data = mesh_data(name, vertices - middle, triangles)
+        data = mesh_data(instance.name, vertices - middle, triangles)
         _add_uv(data, ATLAS_UV, atlas_uv[own])
         if mesh.uv is not None:
             _add_uv(data, CAPTURE_UV, mesh.uv[own])
         data.uv_layers.active = data.uv_layers[ATLAS_UV]
         data.uv_layers[ATLAS_UV].active_render = True
-        thing = bpy.data.objects.new(name, data)
+        thing = bpy.data.objects.new(instance.name, data)
         thing.location = middle
         thing[OBJECT_ID] = int(instance.object_id)
         collection.objects.link(thing)

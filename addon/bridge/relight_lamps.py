@@ -10,6 +10,7 @@ import bpy
 
 from ..core.errors import BadInputError
 from ..core.material import EMITTER
+from ..core.naming import in_order, numbered
 from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, MODEL
 
 _STRENGTH, _COLOUR, _BASE = (f"scan_relight_recovered_{name}" for name in ("strength", "colour", "base"))
@@ -29,7 +30,7 @@ def is_lamp(material: bpy.types.Material | None) -> bool:
 
 def find_lamps(scene: bpy.types.Scene) -> list[bpy.types.Material]:
     """The materials of all recovered lamps in a scene, each once, sorted by name."""
-    return sorted(sum(lamps_by_object(scene).values(), []), key=lambda material: material.name)
+    return sorted(sum(lamps_by_object(scene).values(), []), key=lambda material: in_order(material.name))
 
 
 def lamps_by_object(scene: bpy.types.Scene) -> dict[str, list[bpy.types.Material]]:
@@ -55,7 +56,7 @@ def lamp_named(scene: bpy.types.Scene, name: str) -> list[bpy.types.Material]:
     lamps = find_lamps(scene)
     wanted = name.strip().casefold()
     found = [m for m in lamps if m.name.casefold() == wanted] or \
-        [m for m in lamps if m.name.casefold().rpartition(" ")[0] == wanted]
+        [m for m in lamps if numbered(m.name.casefold())[0] == wanted]
     if not found:
         known = ", ".join(f"'{m.name}'" for m in lamps)
         raise BadInputError(f"There is no lamp '{name}'; " + (f"known are {known}." if known else
@@ -170,7 +171,7 @@ def _show(material):
     """Bring the node tree in line with the state."""
     inputs, on = _principled(material).inputs, is_on(material)
     inputs[EMISSION_STRENGTH].default_value = material[_STRENGTH] * factor(material) * on
-    grey = 0.02 if material.name.casefold().rpartition(" ")[0] in _DARK else UNLIT_GREY
+    grey = 0.02 if numbered(material.name.casefold())[0] in _DARK else UNLIT_GREY
     inputs[BASE_COLOR].default_value = material[_BASE] if on else (grey, grey, grey, 1)
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import BadInputError, StorageError
-from .images import DATA, RADIANCE, load_image, relative_to
+from ..core.room_file import capture_name
+from .images import DATA, RADIANCE, image_name, load_image, relative_to
 from .marks import IMAGE
 from .scene import ALBEDO, BASE_COLOR, SHADING
 
@@ -55,7 +56,7 @@ def image(folder: Path | str, name: str, where: str = RESULT, keep: bool = True,
             earlier.reload()
         return earlier
     path = source if where != FOLDER else _beside(source)
-    loaded = load_image(path, colour_space=COLOUR_SPACES[name], packed=where == PACK, keep=keep)
+    loaded = load_image(path, image_name(capture_name(source.parent), name), COLOUR_SPACES[name], where == PACK, keep)
     loaded[IMAGE] = str(source)
     if earlier is not None:
         replace(earlier, loaded)

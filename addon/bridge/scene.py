@@ -19,7 +19,7 @@ from ..core.errors import StorageError
 from ..core.material import EMITTER, ObjectMaterial, undescribed
 from ..core.room_file import run_of
 from .cameras import differing, make_cameras, make_view, unlike, use_camera
-from .images import load_image, relative_to
+from .images import image_name, load_image, relative_to
 from .marks import mark
 from .materials import make_material
 from .mesh_objects import is_open, make_objects
@@ -87,7 +87,8 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
         An image of the result folder can't be read.
     """
     folder = Path(result_folder).absolute()
-    images = {name: load_image(folder / name) for name in (BASE_COLOR, ALBEDO, SHADING) if (folder / name).exists()}
+    images = {name: load_image(folder / name, image_name(capture.root.name, name))
+              for name in (BASE_COLOR, ALBEDO, SHADING) if (folder / name).exists()}
     top = bpy.data.collections.new("Scan Relight")
     room, lamps, eyes = (bpy.data.collections.new(name) for name in ("Room", "Lamps", "Cameras"))
     for part in (room, lamps, eyes):
@@ -113,7 +114,10 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
     if own:
         environment = folder / ENVIRONMENT
         world = set_world(scene, environment if environment.exists() else None)
-        images.update((n.name, n.image) for n in world.node_tree.nodes if n.type == "TEX_ENVIRONMENT")
+        for node in world.node_tree.nodes:
+            if node.type == "TEX_ENVIRONMENT":
+                node.image.name = image_name(capture.root.name, ENVIRONMENT)
+                images[node.name] = node.image
         _prepare(scene, median_radiance)
         use_camera(scene, cameras[0] if cameras else _overview(capture, eyes))
     warnings = tuple(filter(None, (differing(capture.frames), unlike(capture.frames))))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from .naming import object_name
+
 LAMBERTIAN = "lambertian"
 SPECULAR = "specular"
 METAL = "metal"
@@ -80,6 +82,11 @@ class ObjectMaterial:
     specular_high: float | None = None
     scores: dict[str, float] = field(default_factory=dict)
     note: str = ""
+
+    @property
+    def name(self) -> str:
+        """What the object is called everywhere."""
+        return object_name(self.class_name, self.object_id)
 
     @property
     def opacity(self) -> float:

@@ -385,7 +385,7 @@ class Recovery:
             self.progress.update(0.5 * done / len(images))
         self.store.write_exr("environment.exr", put_in(shading.environment, shading.sun)[::-1])
         known = {one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects}
-        objects = [dataclasses.asdict(m) | known.get(m.object_id, {}) for m in self.materials()]
+        objects = [{"name": m.name} | dataclasses.asdict(m) | known.get(m.object_id, {}) for m in self.materials()]
         told = {"run": self.run_key, "capture": self.capture.root.name, "objects": objects}
         self.store.write_json("materials.json", told)
         self.progress.update(0.6)

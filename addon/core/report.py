@@ -91,7 +91,7 @@ def _report_lit(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> 
     seen = np.bincount(atlas.object_id, lit.seen, int(atlas.object_id.max()) + 1)
     unseen = [i for i in run.capture.instances if i.object_id >= len(seen) or seen[i.object_id] == 0]
     if unseen:
-        names = ", ".join(f"{i.class_name} ({i.object_id})" for i in unseen[:5])
+        names = ", ".join(i.name for i in unseen[:5])
         more = f" and {len(unseen) - 5} more" if len(unseen) > 5 else ""
         warnings.append(f"No frame sees {names}{more}; their materials are taken from their class or the room.")
     clipped = float(atlas.area[lit.tier == SATURATED].sum() / area)
@@ -120,7 +120,8 @@ def _report_shading(run: Recovery, figures: dict[str, Any], warnings: list[str])
         sun = shading.sun
         figures["sun"] = {"direction": [float(x) for x in sun.direction], "seen": sun.seen,
                           "irradiance": [float(x) for x in sun.irradiance]}  # fmt: skip
-    warnings += [f"Lamp {lamp.object_id}: {lamp.note}" for lamp in shading.lamps if lamp.note]
+    names = {one.object_id: one.name for one in run.capture.instances}
+    warnings += [f"Lamp '{names[lamp.object_id]}': {lamp.note}" for lamp in shading.lamps if lamp.note]
     warnings += shading.notes
     if above > 0.05:
         warnings.append(

@@ -126,6 +126,16 @@ def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
         raise _damaged(folder, error) from error
 
 
+def capture_name(folder: Path | str) -> str:
+    """Name of the room that a result is of: its capture's folder, or the result's own where that is not told."""
+    folder = Path(folder)
+    try:
+        told = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))["capture"]
+    except DAMAGE:
+        told = ""
+    return told if told and isinstance(told, str) else folder.name
+
+
 def _damaged(folder: Path, error: Exception) -> BadInputError:
     return BadInputError(f"The result in '{folder}' is damaged ({type(error).__name__}: {error}); "
                          "run the recovery again.")

@@ -63,6 +63,7 @@ def test_albedo_lamp_and_report(disk, finished):
     told = json.loads((folder / "materials.json").read_text())
     objects = told["objects"]
     assert told["capture"] == disk.root.name and re.fullmatch("[0-9a-f]{16}", told["run"])
+    assert {one["object_id"]: one["name"] for one in objects} == {i: f"thing {i} {i}" for i in range(7)}
     assert [o["model"] for o in objects] == [m.model for m in run.materials]
 
 

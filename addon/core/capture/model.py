@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..naming import object_name
 from .lens import Lens
 
 
@@ -217,6 +218,11 @@ class Instance:
 
     object_id: int
     class_name: str
+
+    @property
+    def name(self) -> str:
+        """What the object is called everywhere."""
+        return object_name(self.class_name, self.object_id)
 
 
 @dataclass(frozen=True)

@@ -75,7 +75,7 @@ def _warnings(warnings: list[str]) -> str:
 
 
 def _pictures(run: Recovery) -> str:
-    names = {i.object_id: i.class_name for i in run.capture.instances}
+    names = {i.object_id: i.name for i in run.capture.instances}
     if not run.capture.frames:
         return "<h2>Frames</h2><p>None; the light is the one stored on the capture's mesh.</p>"
     result = ["<h2>Frames</h2>"]
@@ -85,7 +85,7 @@ def _pictures(run: Recovery) -> str:
         except BadInputError:  # it was readable before; the page is not what to stop for
             continue
         pictures, worst = pictures_of(run, seen)
-        told = ", ".join(f"{escape(names.get(i, 'outside'))} ({i}) {size:.0%}" for i, size in worst)
+        told = ", ".join(f"{escape(names.get(i, 'outside'))} {size:.0%}" for i, size in worst)
         result.append(f"<h3>{escape(run.frames[index].name)} <small>worst residuals: {told or 'none'}</small></h3>")
         result.append('<div class="frames">' + "".join(map(_figure, pictures)) + "</div>")
     chips = "".join(f'<span><i style="background:rgb{colour}"></i>{model}</span>' for model, colour in MODEL.items())
@@ -126,7 +126,7 @@ def _row(m: ObjectMaterial, e: ObjectEvidence) -> str:
     specular = "coloured" if m.model == METAL else _interval(m.psi, *_range(m, "specular"))
     roughness = None if m.phi is None else float(np.sqrt(m.phi))
     return (
-        f"<tr><td>{_swatch(colour)}</td><td>{escape(m.class_name)} <small>{m.object_id}</small></td>"
+        f"<tr><td>{_swatch(colour)}</td><td>{escape(m.name)}</td>"
         f"<td>{m.model}</td><td>{albedo}</td><td>{_interval(roughness, *_range(m, 'roughness'))}</td>"
         f"<td>{specular}</td><td>{e.seen_share:.0%}</td><td>{escape(m.note)}</td></tr>"
     )
@@ -146,13 +146,13 @@ def _interval(value: float | None, low: float | None, high: float | None) -> str
 
 
 def _lamps(run: Recovery) -> str:
-    names = {i.object_id: i.class_name for i in run.capture.instances}
+    names = {i.object_id: i.name for i in run.capture.instances}
     lamps = run.shading().lamps
     if not lamps:
         return "<h2>Lamps</h2><p>None; all light comes from outside.</p>"
     rows = "".join(
         f"<tr><td>{_swatch(lamp.radiance / max(lamp.radiance.max(), 1e-9))}</td>"
-        f"<td>{escape(names.get(lamp.object_id, ''))} <small>{lamp.object_id}</small></td>"
+        f"<td>{escape(names.get(lamp.object_id, ''))}</td>"
         f"<td>{', '.join(f'{x:.3g}' for x in lamp.radiance)}</td><td>{'seen' if lamp.seen else 'solved for'}</td>"
         f"<td>{escape(lamp.note)}</td></tr>"
         for lamp in lamps

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..capture.model import Instance
+from ..naming import object_name
 from .emitters import LUMINANCE
 from .lamps import AGREES, Lamp, twin
 from .light_fit import Sample
@@ -154,8 +155,9 @@ def refined(sample: Sample, lamps: list[Lamp], thrown: dict[int, np.ndarray], le
     if any(twins.values()):
         for lamp in [lamp for lamp in free if twins[lamp.object_id]]:
             same = twins[lamp.object_id]
-            whose = f", near the seen lamp {same.object_id} of its class, whose radiance it takes."
-            fixed.append(replace(lamp, radiance=same.radiance, note=lamp.note.rstrip(".") + whose))
+            whose = object_name(class_of.get(same.object_id, ""), same.object_id)
+            note = f"{lamp.note.rstrip('.')}, near that of the seen '{whose}', which it takes."
+            fixed.append(replace(lamp, radiance=same.radiance, note=note))
         free = [lamp for lamp in free if not twins[lamp.object_id]]
         luminance = solve(LUMINANCE, now() @ LUMINANCE) if free or parts else luminance[:0]
     colour = now() * (luminance / (now() @ LUMINANCE))[:, None]

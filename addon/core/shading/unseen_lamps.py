@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..naming import object_name
 from .emitters import LUMINANCE
 from .lamps import AGREES, Lamp, twin
 from .light_fit import Sample
@@ -64,7 +65,8 @@ def _coloured(object_id, s, before, after, class_of, seen, received, by_channel,
     how = f"No frame sees it; solved from the light it throws (spread of log albedo {before:.3f} to {after:.3f})"
     same = twin(object_id, s, class_of, seen)
     if same is not None:
-        note = f"{how}: {s:.3g}, near the seen lamp {same.object_id} of its class, whose radiance it takes."
+        whose = object_name(class_of.get(same.object_id, ""), same.object_id)
+        note = f"{how}: {s:.3g}, near that of the seen '{whose}', which it takes."
         return Lamp(int(object_id), same.radiance, False, note)
     if known is not None:
         return Lamp(int(object_id), (s * known).astype(np.float32), False, how + "; its colour from its edges.")

@@ -61,6 +61,11 @@ def test_it_renders_when_opened_elsewhere(scene, tmp_path, result, capture, fres
     assert {i.name for i in bpy.data.images if i.size[0]} == {i.name for i in bpy.data.images}
     assert sorted(i.filepath for i in bpy.data.images) == [
         "//albedo.exr", "//base_color.exr", "//environment.exr", "//shading.exr"]
+    assert {i.name for i in bpy.data.images} == {
+        f"{tmp_path.name} {what}" for what in ("albedo", "base color", "environment", "shading")}
+    for thing in (one for one in opened.objects if one.type == "MESH"):
+        name = {4: "Floor 4", 9: "Lamp 9"}[thing["object_id"]]
+        assert (thing.name, thing.data.name, thing.active_material.name) == (name, name, name)
     room, lamps, eyes = (opened.collection.children["Scan Relight"].children[n] for n in ("Room", "Lamps", "Cameras"))
     assert [o["object_id"] for o in room.objects] == [4] and [o["object_id"] for o in lamps.objects] == [9]
     assert [o.name for o in eyes.objects] == ["frame 0", "frame 1"] and opened.camera == eyes.objects["frame 0"]
