@@ -187,7 +187,7 @@ def test_an_object_that_nobody_sees(tmp_path):
     disk = OnDisk(tmp_path / "capture", quads, light=light)
     run = disk.run(tmp_path / "result")
     check(run)
-    assert any("No frame sees thing 7 (7)" in warning for warning in run.report["warnings"])
+    assert any("No frame sees thing 7 7" in warning for warning in run.report["warnings"])
     unseen = {m.object_id: m for m in run.materials}[7]
     assert unseen.model == LAMBERTIAN and unseen.observations == 0 and unseen.note
     own = run.atlas.object_id == 7

@@ -176,7 +176,7 @@ def test_images_and_their_colour_spaces(ops, room, tmp_path, where):
     room = {name: bpy.context.scene.objects[name] for name in room}
     recover(ops, tmp_path, images=where)
     found = {image.name: image for image in bpy.data.images if "scan_relight_image" in image}
-    assert set(found) == {"base_color", "albedo", "shading"}
+    assert {name.split(" ", 1)[1] for name in found} == {"base color", "albedo", "shading"}
     for image in found.values():
         assert image.colorspace_settings.name == "Linear Rec.709"
         assert bool(image.packed_file) == (where == "PACK")

@@ -66,7 +66,7 @@ def test_strength_is_relative_to_the_rooms_own_light(room):
 
 def test_it_aims_at_the_cursor_or_an_object(room):
     room.cursor.location = (2.0, 1.5, 0.6)
-    sofa = next(thing for thing in room.objects if thing.name == "sofa")
+    sofa = next(thing for thing in room.objects if thing.name.startswith("sofa "))
     for aim, thing, target in (("CURSOR", None, (2.0, 1.5, 0.6)), ("OBJECT", sofa, sofa.location)):
         light = lights.add_light(room, "SPOT", aim=aim, thing=thing)
         shines = light.matrix_world.to_3x3() @ Vector((0, 0, -1))
