@@ -176,12 +176,14 @@ def test_images_and_their_colour_spaces(ops, room, tmp_path, where):
     room = {name: bpy.context.scene.objects[name] for name in room}
     recover(ops, tmp_path, images=where)
     found = {image.name: image for image in bpy.data.images if "scan_relight_image" in image}
-    assert {name.split(" ", 1)[1] for name in found} == {"base color", "albedo", "shading"}
+    files = {"scene_capture base color": "base_color.exr", "scene_capture albedo": "albedo.exr",
+             "scene_capture shading": "shading.exr"}
+    assert set(found) == set(files)
     for image in found.values():
         assert image.colorspace_settings.name == "Linear Rec.709"
         assert bool(image.packed_file) == (where == "PACK")
         folder = {"RESULT": "//result/", "FOLDER": "//file images/"}.get(where)
-        assert folder is None or image.filepath == f"{folder}{image.name}.exr"
+        assert folder is None or image.filepath == folder + files[image.name]
     again(ops, tmp_path, images=where)
     assert {image.name for image in bpy.data.images if "scan_relight_image" in image} == set(found)
     bpy.ops.wm.save_mainfile()
