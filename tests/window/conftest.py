@@ -76,8 +76,8 @@ def screen(blender):
 @pytest.fixture(scope="session")
 def open_window(blender, screen, user, tmp_path_factory):
     """Opens a window; at the end of whoever asks it has to be closed."""
-    def opened(*arguments) -> Window:
-        return Window(blender, screen, user, tmp_path_factory.mktemp("window") / "talk", *arguments)
+    def opened(*arguments, user: Path = user, tab: bool = True) -> Window:
+        return Window(blender, screen, user, tmp_path_factory.mktemp("window") / "talk", *arguments, tab=tab)
 
     return opened
 

@@ -11,6 +11,8 @@ from pathlib import Path
 
 from PIL import Image
 
+from tests.window import drag
+
 INSIDE = Path(__file__).with_name("inside.py")
 SIZE = 1360, 1000
 PATIENCE = 90.0
@@ -73,11 +75,19 @@ class Window:
         For questions and answers; new.
     *arguments : str
         Further words for Blender, such as a file to open.
+    tab : bool
+        Open the sidebar at our tab; False leaves the window as an artist finds it.
+
+    Attributes
+    ----------
+    actions : list of str
+        What a hand has done so far: each click, key and drag.
     """
 
-    def __init__(self, blender: str, screen: Screen, user: Path, folder: Path, *arguments: str):
+    def __init__(self, blender: str, screen: Screen, user: Path, folder: Path, *arguments: str, tab: bool = True):
         folder.mkdir(parents=True)
-        self.folder, self._blender, self._count = folder, blender, 0
+        self.folder, self._blender, self._count, self.actions = folder, blender, 0, []
+        self._screen = screen.name
         self._environment = dict(
             environment(user), DISPLAY=screen.name, LIBGL_ALWAYS_SOFTWARE="1", XDG_RUNTIME_DIR=str(folder))
         folder.chmod(0o700)
@@ -86,7 +96,7 @@ class Window:
             [blender, "--window-geometry", "0", "0", *map(str, SIZE), "-noaudio", *map(str, arguments),
              "--python", str(INSIDE), "--", str(folder)],
             env=self._environment, stdout=self._log, stderr=subprocess.STDOUT, cwd=folder)
-        self.ask("open_tab()")
+        self.ask("open_tab()" if tab else "None")
         self._x = self._xdotool("search", "--onlyvisible", "--name", "Blender").split()[0]
         self._xdotool("windowfocus", self._x)
 
@@ -140,6 +150,7 @@ class Window:
 
     def click_at(self, x: int, y: int) -> None:
         """Move the mouse there and press its button."""
+        self.actions.append(f"click at {x}, {y}")
         self._xdotool("mousemove", str(x), str(y), "sleep", "0.1", "mousemove_relative", "1", "0", "sleep", "0.2",
                       "mousedown", "1", "sleep", "0.1", "mouseup", "1", "sleep", "0.2")
         self.ask("None")  # it is back from whatever that was
@@ -150,8 +161,16 @@ class Window:
         self._xdotool("mousemove", str(left + width // 3), str(top + height // 2), "sleep", "0.1",
                       "mousemove_relative", "1", "0", "sleep", "0.2")
         pressed = time.time()
+        self.actions += [f"key {name}" for name in names]
         self._xdotool("key", *names)
         return pressed
+
+    def drop(self, *files: Path, region: str = "WINDOW") -> None:
+        """Drag files from outside into the middle of the 3D view."""
+        self.actions.append(f"drag {', '.join(one.name for one in files)}")
+        left, top, width, height = self.ask(f"rectangle({region!r})")
+        drag.drop(self._screen, int(self._x), files, left + width // 2, top + height // 2)
+        self.ask("None")
 
     def write(self, text: str) -> None:
         """Type."""
@@ -159,6 +178,7 @@ class Window:
 
     def press(self, *names: str) -> None:
         """Press keys where the mouse is."""
+        self.actions += [f"key {name}" for name in names]
         self._xdotool("key", *names)
 
     def picture(self, out: Path | None = None, sidebar: bool = False) -> Image.Image:
