@@ -26,14 +26,15 @@ class SCAN_RELIGHT_OT_capture_from_scene(bpy.types.Operator):
         name="Frames", description="Which cameras took the pictures",
         items=[("AUTO", "Automatic", "An animation where the only camera has a sequence or a clip behind it, else one "
                 "frame for each camera"),
-               ("OBJECTS", "Each camera", "One frame for each camera that has a picture behind it; only the selected "
+               ("OBJECTS", "Each Camera", "One frame for each camera that has a picture behind it; only the selected "
                 "cameras where some are selected"),
                ("ANIMATION", "Animation", "One frame for each frame of the active camera's animation")])
     whole_range: bpy.props.BoolProperty(
-        name="Whole range", description="Take the scene's frame range", default=True)
+        name="Whole Range", description="Take the scene's frame range", default=True)
     frame_start: bpy.props.IntProperty(name="Start", description="First frame of the animation", default=1)
     frame_end: bpy.props.IntProperty(name="End", description="Last frame of the animation", default=250)
-    frame_step: bpy.props.IntProperty(name="Step", description="Take every so-manieth frame", default=1, min=1)
+    frame_step: bpy.props.IntProperty(name="Step", description="Frames from one that is taken to the next",
+                                       default=1, min=1)
 
     @classmethod
     def poll(cls, context):
@@ -51,7 +52,7 @@ class SCAN_RELIGHT_OT_capture_from_scene(bpy.types.Operator):
     def draw(self, context):
         """The dialog."""
         layout = self.layout
-        layout.use_property_split = True
+        layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(self, "cameras")
         if self.cameras != "OBJECTS":
             layout.prop(self, "whole_range")

@@ -45,7 +45,7 @@ class FileOperator:
     """Takes a path to a scan or to a result; errors become one sentence."""
 
     filepath: bpy.props.StringProperty(
-        name="File or folder", description="Folder of a scan or of a result, or a file in one", subtype="FILE_PATH",
+        name="File or Folder", description="Folder of a scan or of a result, or a file in one", subtype="FILE_PATH",
         options={"SKIP_SAVE"})
     directory: bpy.props.StringProperty(
         name="Folder", description="Folder that the files lie in", subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})

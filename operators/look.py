@@ -23,7 +23,7 @@ class SCAN_RELIGHT_OT_look(bpy.types.Operator):
 
     look: bpy.props.EnumProperty(name="Look", description="What the viewport shows", items=look_items())
     switch_view: bpy.props.BoolProperty(
-        name="Switch the view", description="Turn viewports that show no materials (Solid, Wireframe) to Material "
+        name="Switch the View", description="Turn viewports that show no materials (Solid, Wireframe) to Material "
         "Preview, where the look can be seen", default=True)
 
     @classmethod

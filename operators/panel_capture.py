@@ -31,7 +31,7 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
         header, body = layout.panel("scan_relight_reading", default_closed=True)
         header.label(text="How it is read")
         if body is not None:
-            body.use_property_split = True
+            body.use_property_split, body.use_property_decorate = True, False
             reading_props.draw(body, choices.reading)
         wrong = findings.wrong_folder(choices)
         if wrong is not None:

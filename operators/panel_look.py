@@ -52,8 +52,7 @@ class SCAN_RELIGHT_PT_own_scene(SidebarPanel, bpy.types.Panel):
         self.say(layout, context, "Select the room's objects; the EXR pictures behind the cameras are the frames.")
         layout.operator("scan_relight.capture_from_scene", icon="SCENE_DATA")
         column = layout.column()
-        column.use_property_split = True
-        column.use_property_decorate = False
+        column.use_property_split, column.use_property_decorate = True, False
         column.prop(choices, "images")
         column.prop(choices, "copies")
         layout.operator("scan_relight.restore_materials", icon="LOOP_BACK")

@@ -20,7 +20,7 @@ GROUPS = (
     ("Texture", ("texel_size", "detail", "atlas_size", "median", "sharpen", "frame_order")),
     ("Light", ("shading", "shading_rays", "emitter_rays", "portal_rays", "interpolate", "mirrors")),
     ("Highlights", ("specular", "specular_rays", "refine")),
-    ("Run", ("threads", "seed")),
+    ("Computer", ("threads", "seed")),
 )
 OTHER = "More"
 
@@ -55,12 +55,11 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
     def choices(self, layout, context) -> None:
         """Preset, folder, settings."""
         choices = context.scene.scan_relight
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(choices, "preset")
         changed = choices.settings.changed(choices.preset)
         layout.prop(choices.settings, "detail")
-        layout.prop(choices.settings, "shading_rays", text="Rays")
+        layout.prop(choices.settings, "shading_rays")
         layout.prop(choices, "result_folder")
         if not choices.result_folder and choices.capture_folder:
             folder = preferences.result_folder("", choices.capture_folder)
@@ -70,7 +69,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         if body is not None:
             for heading, names in groups():
                 if names:
-                    column = body.column(heading=heading)
+                    column = body.column()
                     column.label(text=heading)
                     for name in names:
                         column.prop(choices.settings, name)
@@ -94,7 +93,8 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         """One bar, and Stop."""
         factor, text = bar(job)
         column = self.layout.column(align=True)
-        column.label(text=job.facts.get("title", ""))
+        if job.facts.get("title") not in (None, "", "Recover"):  # no heading twice
+            column.label(text=job.facts["title"])
         column.progress(factor=factor, text=text)
         column.operator("scan_relight.stop", icon="CANCEL")
 

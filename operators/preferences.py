@@ -18,18 +18,18 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
     bl_idname = PACKAGE
 
     cache_folder: bpy.props.StringProperty(
-        name="Cache folder", description="Where runs go whose result folder is not chosen; empty takes a folder of "
+        name="Cache Folder", description="Where runs go whose result folder is not chosen; empty takes a folder of "
         "Blender's own", subtype="DIR_PATH")
     threads: bpy.props.IntProperty(
         name="Threads", description="Processor threads that a run may take; 0 takes all", min=0, soft_max=64)
     memory_limit: bpy.props.FloatProperty(
-        name="Memory limit", description="Gigabytes that a run may take before it is stopped; 0 sets no limit. A run "
+        name="Memory Limit (GB)", description="Memory that a run may take before it is stopped; 0 sets no limit. A run "
         "is a process of its own: Blender's own memory does not count", min=0.0, soft_max=256.0, precision=1)
 
     def draw(self, context):
         """The choices."""
         layout = self.layout
-        layout.use_property_split = True
+        layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(self, "cache_folder")
         row = layout.row()
         row.label(text=cache_text(), icon="FILE_CACHE")

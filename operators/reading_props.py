@@ -10,7 +10,7 @@ from ..addon.core.capture.formats import FORMATS
 from ..addon.core.capture.layout import Reading
 
 FOUND = "FOUND"
-CURVES = (("FOUND", "Not given", "Pictures of 8 and 16 bits are refused, as their curve is unknown"),
+CURVES = (("FOUND", "Not Given", "Pictures of 8 and 16 bits are refused, as their curve is unknown"),
           ("srgb", "sRGB", "The curve of screens and of most pictures of 8 bits"),
           ("linear", "Linear", "Stored numbers are proportional to light"))
 NAMES = ("reading_format", "reading_mesh", "reading_outside", "reading_transfer", "reading_exposures",
@@ -19,7 +19,7 @@ NAMES = ("reading_format", "reading_mesh", "reading_outside", "reading_transfer"
 
 def format_items() -> list[tuple[str, str, str]]:
     """Items of an enumeration of the formats."""
-    return [(FOUND, "From the folder", "Find the format from what the folder holds"),
+    return [(FOUND, "From the Folder", "Find the format from what the folder holds"),
             *((name, name, f"Known by {wants}") for name, wants in FORMATS.items())]
 
 
@@ -31,9 +31,9 @@ def with_reading(cls):
                                default=FOUND),
         string(name="Mesh", description="The mesh, where it is not the one that the format names",
                subtype="FILE_PATH"),
-        bpy.props.BoolProperty(name="Files outside", description="Let the capture's files name others outside of its "
+        bpy.props.BoolProperty(name="Files Outside", description="Let the capture's files name others outside of its "
                                "folder"),
-        bpy.props.EnumProperty(name="Picture curve", description="Curve of pictures of 8 and 16 bits", items=CURVES),
+        bpy.props.EnumProperty(name="Picture Curve", description="Curve of pictures of 8 and 16 bits", items=CURVES),
         string(name="Exposures", description="CSV file with the exposure of each frame: lines of name, exposure",
                subtype="FILE_PATH"),
         string(name="Poses", description="Name of a correction of all poses, as the check of the capture proposes it"),

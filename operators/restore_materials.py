@@ -16,7 +16,7 @@ class SCAN_RELIGHT_OT_restore_materials(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     selected_only: bpy.props.BoolProperty(
-        name="Selected only", description="Leave the objects that are not selected as they are", default=False)
+        name="Selected Only", description="Leave the objects that are not selected as they are", default=False)
 
     @classmethod
     def poll(cls, context):

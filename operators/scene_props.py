@@ -59,13 +59,15 @@ class ScanRelightScene(bpy.types.PropertyGroup):
     capture_folder: bpy.props.StringProperty(
         name="Capture", description="Folder of the scan: its mesh, its frames and their cameras", subtype="DIR_PATH",
         update=capture_chosen)
-    reading: bpy.props.PointerProperty(type=ScanRelightReading)
+    reading: bpy.props.PointerProperty(
+        name="How It Is Read", description="How the capture is to be read", type=ScanRelightReading)
     result_folder: bpy.props.StringProperty(
         name="Result", description="Folder for the recovered scene and the finished stages; empty takes one in the "
         "cache folder of the preferences", subtype="DIR_PATH")
     preset: bpy.props.EnumProperty(
         name="Preset", description="What all settings start from", items=preset_items(), default="normal",
         update=preset_chosen)
-    settings: bpy.props.PointerProperty(type=ScanRelightSettings)
+    settings: bpy.props.PointerProperty(
+        name="Settings", description="All settings of a recovery", type=ScanRelightSettings)
     images: IMAGES
     copies: COPIES

@@ -12,12 +12,13 @@ import bpy
 from ..addon.console import unexpected
 from ..addon.core.errors import BadInputError, ScanRelightError
 from ..addon.core.settings import PRESETS, Settings
-from ..addon.core.stages import RUN_STAGES, WRITE
+from ..addon.core.stages import LABELS, RUN_STAGES, WRITE
 from ..addon.leash import MemoryGuard
 from ..addon.settings_info import SettingInfo, setting_infos
 from . import poll, preferences, reading_props
 from .job_operator import JobOperator
 from .reading_props import with_reading
+from .settings_words import words
 
 PRESET_TEXTS = {
     "draft": "A first look: coarse texels, few rays",
@@ -25,36 +26,36 @@ PRESET_TEXTS = {
     "fine": "Finer texels and three times the rays; takes several times as long",
     "paper": "The published method, for comparison; very slow",
 }
-TARGETS = [("AUTO", "What was captured", "Imported objects of a scan; your own objects where they were captured"),
-           ("IMPORTED", "Imported objects", "The objects that Import Capture made"),
-           ("SELECTED", "Your own objects", "The objects that were selected when the scene was captured; what they "
+TARGETS = [("AUTO", "What Was Captured", "Imported objects of a scan; your own objects where they were captured"),
+           ("IMPORTED", "Imported Objects", "The objects that Import Capture made"),
+           ("SELECTED", "Your Own Objects", "The objects that were selected when the scene was captured; what they "
             "wear now is kept and can be restored")]
 IMAGES = bpy.props.EnumProperty(
     name="Images", description="Where the recovered images are kept", items=[
-        ("RESULT", "In the result folder", "Refer to the images where they are"),
-        ("FOLDER", "Beside the file", "Copy the images into a folder beside the saved .blend"),
+        ("RESULT", "In the Result Folder", "Refer to the images where they are"),
+        ("FOLDER", "Beside the File", "Copy the images into a folder beside the saved .blend"),
         ("PACK", "Packed", "Keep the images within the .blend")])
 COPIES = bpy.props.BoolProperty(
-    name="Make copies", description="Where modifiers or instances make an object's faces, put the material onto a "
+    name="Make Copies", description="Where modifiers or instances make an object's faces, put the material onto a "
     "copy of it and hide the object; without this such objects are left as they are", default=False)
 FROM_STAGE = bpy.props.EnumProperty(
-    name="Again from", description="Do this stage and all later ones anew, though they are stored",
+    name="Again From", description="Do this stage and all later ones anew, though they are stored",
     items=[("NONE", "Nothing", "Go on from what is stored"),
-           *((name, name.replace("_", " ").capitalize(), "") for name in RUN_STAGES)])
+           *((name, LABELS[name], f"From '{LABELS[name]}' on") for name in RUN_STAGES)])
 PACKAGES = ("scipy", "embreex", "OpenEXR")
 
 
 def property_for(info: SettingInfo):
     """The Blender property that holds one setting."""
-    name = info.name.replace("_", " ").capitalize()
+    name, text, choices = words(info)
     if info.choices:
-        items = [(choice, choice.capitalize(), "") for choice in info.choices]
-        return bpy.props.EnumProperty(name=name, description=info.help, items=items, default=info.default)
+        items = [(choice, *choices[choice]) for choice in info.choices]
+        return bpy.props.EnumProperty(name=name, description=text, items=items, default=info.default)
     make = {bool: bpy.props.BoolProperty, int: bpy.props.IntProperty, float: bpy.props.FloatProperty}[info.kind]
     extra = {} if info.kind is bool else {"min": 0}
     if info.kind is float:
         extra["precision"] = 3
-    return make(name=name, description=info.help, default=info.default, **extra)
+    return make(name=name, description=text, default=info.default, **extra)
 
 
 def with_settings(operator):
@@ -151,7 +152,7 @@ class StageOperator(CaptureOperator):
         default="normal")
     from_stage: FROM_STAGE
     paper: bpy.props.BoolProperty(
-        name="As in the paper", description="The published method; the other settings are not looked at", default=False)
+        name="As in the Paper", description="The published method; the other settings are not looked at", default=False)
 
     def work(self, context) -> list[str]:
         """Run the stages up to the operator's own; returns warnings."""
@@ -160,7 +161,7 @@ class StageOperator(CaptureOperator):
     def draw(self, context):
         """The dialog: what is to be decided; all else comes from the preset or from who calls."""
         layout = self.layout
-        layout.use_property_split = True
+        layout.use_property_split, layout.use_property_decorate = True, False
         for name in ("capture_folder", "result_folder", "preset", "from_stage"):
             layout.prop(self, name)
 
