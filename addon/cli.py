@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
+from .cli_refit import add_override
 from .cli_relight import add_relight, relight_command
 from .console import ConsoleProgress, StopWish, duration, own_console, unexpected
 from .core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_OK, BadInputError, ScanRelightError
@@ -101,6 +102,7 @@ def make_parser() -> argparse.ArgumentParser:
                          help=f"last stage to do: {', '.join(RUN_STAGES)} (default write, which is all)")
     recover.add_argument("--from-stage", metavar="STAGE", choices=RUN_STAGES,
                          help="do this stage and all later ones anew, though they are stored")
+    add_override(recover)
     add_settings(recover)
     add_leash(recover)
     add_common(recover, recover_command)
@@ -233,7 +235,8 @@ def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     run = need("run")
     with console_run(arguments, stream) as console:
         report = run.run(arguments.capture, arguments.out, settings, run.progress_for(settings, **console),
-                         until=arguments.until, reading=reading_from(arguments), from_stage=arguments.from_stage)
+                         until=arguments.until, reading=reading_from(arguments), from_stage=arguments.from_stage,
+                         override=arguments.override, heed_kept=not arguments.no_overrides)
     if isinstance(console["listener"], JsonProgress):
         for warning in report.get("warnings", ()):
             console["listener"].tell("warning", text=warning)

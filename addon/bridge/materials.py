@@ -64,6 +64,10 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
     if description.model == SPECULAR:
         value[SPECULAR_LEVEL].default_value = 0.5
         value[IOR].default_value = ior_of(description.psi or 0.0)
+    if description.coat:
+        value[SPECULAR_LEVEL].default_value = 0.5
+        value[IOR].default_value = ior_of(description.coat["f0"])
+        value[ROUGHNESS].default_value = description.coat["roughness"]
     if description.model == METAL:
         value[METALLIC].default_value = 1.0
         value[SPECULAR_LEVEL].default_value = 0.5

@@ -21,6 +21,7 @@ from ..core.capture.model import Capture
 from ..core.capture.read import read_capture
 from ..core.errors import BadInputError, StorageError
 from ..core.memory import peak_memory
+from ..core.overrides import OVERRIDES, heeded
 from ..core.progress import Progress, ProgressEvent
 from ..core.recover import Recovery
 from ..core.room_file import ROOM, write_room
@@ -40,6 +41,7 @@ PICTURES = "stages/pictures"
 """Where in the result folder copies of frames lie that the core can't read itself."""
 WEIGHTS = {READ: 1, "surface": 5, "lit_diffuse": 8, "shading": 17, "specular": 16, WRITE: 5}
 """Rough cost of the stages, for the estimate of the time left."""
+LEFT_OUT = f"The corrections that the result folder keeps in {OVERRIDES} were left out of this run, as was asked."
 
 
 def progress_for(settings: Settings, listener: Callable[[ProgressEvent], None] | None = None,
@@ -51,7 +53,8 @@ def progress_for(settings: Settings, listener: Callable[[ProgressEvent], None] |
 def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, progress: Progress,
         until: str = WRITE, scene: bpy.types.Scene | None = None, import_first: bool = True,
         reading: Reading = AS_FOUND, from_stage: str | None = None, target: str = AUTO,
-        images: str = result_images.RESULT, copies: bool = False) -> dict:
+        images: str = result_images.RESULT, copies: bool = False, override: Path | None = None,
+        heed_kept: bool = True) -> dict:
     """Recover a capture up to a stage; stages that the result folder holds already are not done again.
 
     Parameters
@@ -76,6 +79,11 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         With `scene`: what the materials go onto, and where their images go; see `write_back.putting_on`. Nothing is
         imported where they go onto the artist's own objects.
 
+    override : Path, optional
+        File of what the artist gives (`core.overrides`), merged into what the result folder keeps.
+    heed_kept : bool
+        False leaves out, for this run, what the result folder keeps.
+
     Returns
     -------
     dict
@@ -97,6 +105,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     started = time.monotonic()
     progress.stage(READ)
     capture = read_capture(capture_folder, reading)
+    given = heeded(out_folder, (one.object_id for one in capture.instances), override, heed_kept)
     own = is_own(capture.root, target)
     if scene is not None and own:
         check_own(capture.root)  # what is absent is told now, not after the work
@@ -106,10 +115,12 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     with Store(out_folder) as store, _told(out_folder):
         if from_stage in STAGES:
             store.drop(STAGES[STAGES.index(from_stage):])
+        if override is not None and heed_kept:
+            store.write_json(OVERRIDES, given.as_dict())
         faces = polygons_of(capture.root, capture.mesh)
         readable = converted(capture, store.path(PICTURES), load_picture, progress)
         progress.done()
-        recovery = Recovery(readable, store, settings, progress, partial(unwrap, polygons=faces))
+        recovery = Recovery(readable, store, settings, progress, partial(unwrap, polygons=faces), given)
         for stage in STAGES:
             getattr(recovery, stage)()
             if stage == until:
@@ -141,7 +152,8 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         if until == WRITE:
             report["stages"][WRITE] = {"seconds": round(time.monotonic() - writing, 2), "stored": False,
                                        "peak_memory_bytes": peak_memory()}
-        report["warnings"] += (*told, *warnings)
+        left = [] if heed_kept or not (store.folder / OVERRIDES).is_file() else [LEFT_OUT]
+        report["warnings"] += (*left, *told, *warnings)
         report["versions"] = versions()
         report["peak_memory_bytes"] = peak_memory()
         report["seconds"] = round(time.monotonic() - started, 2)

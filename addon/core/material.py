@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from .naming import object_name
 
@@ -61,6 +62,10 @@ class ObjectMaterial:
         below 1 is better.
     note : str
         Why a richer model was not taken, or what is doubtful; '' if nothing is.
+    given : dict
+        What the artist gave of it, as `overrides.Given.as_dict` has it.
+    coat : dict of str to float
+        Lambertian only, for lack of evidence: `f0` and `roughness` (Blender's) of a dielectric's coat that is assumed.
     """
 
     object_id: int
@@ -82,6 +87,8 @@ class ObjectMaterial:
     specular_high: float | None = None
     scores: dict[str, float] = field(default_factory=dict)
     note: str = ""
+    given: dict[str, Any] = field(default_factory=dict)
+    coat: dict[str, float] = field(default_factory=dict)
 
     @property
     def name(self) -> str:

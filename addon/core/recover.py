@@ -16,31 +16,33 @@ from .capture.model import Capture, Frame, Mesh, Pixels
 from .capture.pixels import read_pixels
 from .capture.read import MAX_BAD_SHARE
 from .capture.recentre import near_origin
+from .corrected import Corrected
 from .errors import BadInputError
 from .evidence.collect import Evidence, collect
 from .evidence.page import make_page
 from .lit_diffuse.accumulate import LitDiffuse
 from .lit_diffuse.from_texture import face_edge, lit_from_tiles
 from .lit_diffuse.poses import Poses
-from .material import TRANSPARENT, ObjectMaterial
+from .material import ObjectMaterial
 from .memory import peak_memory
+from .overrides import NONE as NO_OVERRIDES
+from .overrides import Overrides
 from .parallel import ordered_map
 from .passes import all_passes
 from .progress import Progress
 from .report import make_report
 from .settings import Settings
-from .shading.albedo import NONE, Albedo, albedo_of
+from .shading.albedo import Albedo, albedo_of
 from .shading.clipped import shade_clipped
 from .shading.environment import Environment
 from .shading.field import LightField
 from .shading.fringes import Fringes
-from .shading.lamps import Lamp
 from .shading.mirrors import Mirror, in_their_planes, known_mirror
 from .shading.shade import Shading, shade
-from .shading.sun import Sun, put_in
+from .shading.stored import from_store, to_store
 from .specular.compensation import base_colors
 from .specular.flat_mirrors import find_mirrors
-from .specular.reflect import Specular, fit_specular
+from .specular.reflect import Held, Specular, fit_specular
 from .specular.samples import Samples
 from .store import Store, key
 from .surface.build import Surface, build_surface, from_uv
@@ -51,7 +53,7 @@ CODE = 59
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
 
 
-class Recovery:
+class Recovery(Corrected):
     """One run over one capture. Each stage is computed when it is first asked for, or taken from the store.
 
     Parameters
@@ -62,6 +64,8 @@ class Recovery:
     progress : Progress
     unwrap : callable(Mesh, int) -> (t, 3, 2) float32
         Lays the mesh out in an atlas of so many texels; Blender's, in the extension.
+    overrides : Overrides
+        What the artist gives.
 
     Attributes
     ----------
@@ -80,8 +84,10 @@ class Recovery:
         settings: Settings,
         progress: Progress,
         unwrap: Callable[[Mesh, int], np.ndarray],
+        overrides: Overrides = NO_OVERRIDES,
     ):
         self.capture, self.store, self.settings, self.progress = capture, store, settings, progress
+        self.overrides = overrides
         self._near = near_origin(capture)
         self._unwrap = unwrap
         self.done: dict[str, Any] = {}
@@ -97,21 +103,27 @@ class Recovery:
     # Each stage's key: the stage before, and the settings that it heeds.
 
     @cached_property
-    def _keys(self) -> dict[str, str]:
+    def _surface_key(self) -> str:
         s = self.settings
-        surface = key("surface", CODE, fingerprint(self.capture), s.texel_size, s.detail, s.atlas_size, s.denoise_mesh)
+        return key("surface", CODE, fingerprint(self.capture), s.texel_size, s.detail, s.atlas_size, s.denoise_mesh)
+
+    @cached_property
+    def _keys(self) -> dict[str, str]:
+        s, surface = self.settings, self._surface_key
         lit = key("lit_diffuse", surface, s.refine_poses, s.median, s.sharpen, s.frame_order, s.seed)
         shading = key(
             "shading", lit, s.shading, s.shading_rays, s.emitter_rays, s.portal_rays, s.interpolate,
             s.mirrors, s.seed,
         )
-        specular = key("specular", shading, s.specular, s.specular_rays, s.refine)
+        specular = key("specular", shading, s.specular, s.specular_rays, s.refine, *self.overrides.lobes_key())
         return {"surface": surface, "lit_diffuse": lit, "shading": shading, "specular": specular}
 
     @property
     def run_key(self) -> str:
         """16 hex digits that are the same where a capture and all that was asked of it are, and else differ."""
-        return key("run", self._keys["specular"])[:16]
+        told = (self.overrides.as_dict(),) if self.overrides.any else ()
+        told += () if self.settings.coat else ("no coat",)
+        return key("run", self._keys["specular"], *told)[:16]
 
     def _stage(
         self, name: str, load: Callable[[dict, dict], Any], compute: Callable[[], tuple[Any, dict, dict]]
@@ -264,30 +276,11 @@ class Recovery:
                 )  # fmt: skip
 
             found = shade_clipped(shaded, lit, surface.atlas)
-            arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "doubt", "radiance")}
-            arrays |= {"sky": found.environment.radiance, "sky_seen": found.environment.observations}
-            sun = found.sun and {k: np.asarray(v).tolist() for k, v in dataclasses.asdict(found.sun).items()}
-            meta = {
-                "sun": sun,
-                "points": found.points,
-                "mirrors": [mirror.as_lists() for mirror in found.mirrors],
-                "notes": list(found.notes),
-                "lamps": [dataclasses.asdict(lamp) | {"radiance": lamp.radiance.tolist()} for lamp in found.lamps],
-            }
-            return found, arrays, meta
+            return found, *to_store(found)
 
-        def load(a, meta):
-            lamps = tuple(Lamp(**(d | {"radiance": np.float32(d["radiance"])})) for d in meta["lamps"])
-            mirrors = tuple(Mirror.from_lists(d) for d in meta["mirrors"])
-            return Shading(
-                a["irradiance"], a["escaped"], a["doubt"], a["radiance"], lamps,
-                Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
-                meta["sun"] and Sun(**{k: np.float32(v) if isinstance(v, list) else v for k, v in meta["sun"].items()}),
-            )  # fmt: skip
+        return self._stage("shading", from_store, compute)
 
-        return self._stage("shading", load, compute)
-
-    def _find_mirrors(self, field: LightField, lamps: tuple[Lamp, ...] | None) -> tuple[Mirror, ...]:
+    def _find_mirrors(self, field: LightField, lamps: tuple | None) -> tuple[Mirror, ...]:
         noisy = lamps is not None and self.surface().noise > 0
         found = find_mirrors(field, lamps or (), self.samples(), self.capture.instances, self.settings.seed, noisy)
         told = [known_mirror(mirror, field) for mirror in self._near.mirrors]
@@ -303,18 +296,7 @@ class Recovery:
 
     def specular(self) -> Specular:
         """phi, psi and the model of every object."""
-        lit, shading = self.lit_diffuse(), self.shading()
-        s = self.settings
-
-        def compute():
-            found = fit_specular(
-                self.capture.instances, self.field, lit, shading.irradiance, shading.lamps, self.samples(),
-                [frame.name for frame in self.capture.frames],
-                way=s.specular, rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
-                noise=self.surface().noise, progress=self.progress,
-            )  # fmt: skip
-            arrays = {"specular": found.specular, "excess": found.excess}
-            return found, arrays, {"materials": [dataclasses.asdict(m) for m in found.materials]}
+        self.shading()
 
         def load(arrays, meta):
             def one(d):
@@ -322,32 +304,30 @@ class Recovery:
 
             return Specular(tuple(one(d) for d in meta["materials"]), arrays["specular"], arrays["excess"])
 
-        return self._stage("specular", load, compute)
+        return self._stage("specular", load, self.fitted)
 
-    def materials(self) -> list[ObjectMaterial]:
-        """One description for each instance."""
-        return list(self.specular().materials)
+    def fitted(self, held: Held | None = None) -> tuple[Specular, dict[str, np.ndarray], dict[str, Any]]:
+        """The specular stage as it is computed, of all objects or with some `held`, and what is stored of it."""
+        s, lit, shading = self.settings, self.lit_diffuse(), self.shading()
+        found = fit_specular(
+            self.capture.instances, self.field, lit, shading.irradiance, shading.lamps, self.samples(),
+            [frame.name for frame in self.capture.frames],
+            way=s.specular, rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
+            noise=self.surface().noise, given=self.overrides.lobes(), held=held, progress=self.progress,
+        )  # fmt: skip
+        meta = {"materials": [dataclasses.asdict(m) for m in found.materials], "overrides": self.overrides.as_dict()}
+        return found, {"specular": found.specular, "excess": found.excess}, meta
 
-    @cached_property
-    def irradiance(self) -> np.ndarray:
-        """The final E, (n, 3) float32."""
-        return self.shading().irradiance + self.specular().excess
+    def albedo_under(
+        self, irradiance: np.ndarray, specular: np.ndarray | float = 0.0, without: set[int] | None = None
+    ) -> Albedo:
+        """The albedo that L_d less a `specular` part has under an E, both (n, 3) float32.
 
-    @cached_property
-    def albedo(self) -> Albedo:
-        """The final albedo: of L_d less its specular part, under all that glossy things throw."""
-        found = self.specular()
-        apart = [m.object_id for m in found.materials if m.model == TRANSPARENT]
-        albedo = self.albedo_under(self.irradiance, found.specular)
-        # What shows its background has no albedo that was measured.
-        origin = np.where(np.isin(self.surface().atlas.object_id, apart), np.int8(NONE), albedo.origin)
-        return dataclasses.replace(albedo, origin=origin)
-
-    def albedo_under(self, irradiance: np.ndarray, specular: np.ndarray | float = 0.0) -> Albedo:
-        """The albedo that L_d less a `specular` part has under an E, both (n, 3) float32."""
+        The objects `without` get none; by default the lamps that were found.
+        """
         atlas, lit, shading = self.surface().atlas, self.lit_diffuse(), self.shading()
-        instances = self.capture.instances
-        return albedo_of(atlas, lit, irradiance, shading.doubt, instances, shading.emitters, specular)
+        without = shading.emitters if without is None else without
+        return albedo_of(atlas, lit, irradiance, shading.doubt, self.capture.instances, without, specular)
 
     def base_color(self) -> np.ndarray:
         """Base Color of each element for Cycles' Principled, (n, 3) float32."""
@@ -365,7 +345,7 @@ class Recovery:
 
     def write_images(self) -> None:
         """The result folder's images and materials.json."""
-        atlas, lit, shading = self.surface().atlas, self.lit_diffuse(), self.shading()
+        atlas, lit = self.surface().atlas, self.lit_diffuse()
         dark = max(1e-6 * self.median_radiance(), 1e-30)
         spread = (lit.upper - lit.lower).mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
         coverage = np.stack([lit.count, np.nan_to_num(spread), self.albedo.origin], -1).astype(np.float32)
@@ -383,7 +363,7 @@ class Recovery:
 
         for done, _ in enumerate(ordered_map(write, images, self.settings.threads)):
             self.progress.update(0.5 * done / len(images))
-        self.store.write_exr("environment.exr", put_in(shading.environment, shading.sun)[::-1])
+        self.store.write_exr("environment.exr", self.sky()[::-1])
         known = {one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects}
         objects = [{"name": m.name} | dataclasses.asdict(m) | known.get(m.object_id, {}) for m in self.materials()]
         told = {"run": self.run_key, "capture": self.capture.root.name, "objects": objects}

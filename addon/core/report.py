@@ -36,7 +36,12 @@ def make_report(run: Recovery) -> dict[str, Any]:
     if "specular" in run.done:
         models = [m.model for m in run.materials()]
         figures["models"] = {model: models.count(model) for model in sorted(set(models))}
+        figures["coats"] = sum(bool(m.coat) for m in run.materials())
         figures["evidence"] = _evidence_figures(run)
+        if run.white is not None:
+            figures["white_scale"] = [float(x) for x in run.white.of_irradiance]
+            figures["white_light"] = [float(x) for x in run.white.of_light]
+            result["warnings"] += [run.white.warning] if run.white.warning else []
     result["figures"] = figures
     return result
 
@@ -45,7 +50,7 @@ def _evidence_figures(run: Recovery) -> dict[str, float]:
     """How sure the room is as a whole; medians and means over the elements, lamps left out."""
     evidence, albedo = run.evidence, run.albedo
     relative = evidence.texels.albedo.mean(1) / np.maximum(albedo.rho.mean(1), 1e-3)
-    reflecting = ~np.isin(run.surface().atlas.object_id, [lamp.object_id for lamp in run.shading().lamps])
+    reflecting = ~np.isin(run.surface().atlas.object_id, list(run.emitters))
     measured, filled = reflecting & (albedo.origin == MEASURED), reflecting & (albedo.origin != MEASURED)
     kinds = {"": measured, "filled_": filled}
     figures = {f"albedo_error_{name}median": float(np.median(relative[k])) for name, k in kinds.items() if k.any()}

@@ -52,6 +52,8 @@ class Settings:
     refine : int
         Rounds after the fit: 1 takes the fitted specular out of the lit diffuse texture; 2 also lights the room with
         what glossy things really reflect; 0 leaves both (the paper).
+    coat : bool
+        Give objects of which too little was seen to look for a highlight a plausible dielectric's coat in the scene.
     threads : int
         0 takes all cores.
     seed : int
@@ -75,6 +77,7 @@ class Settings:
     specular: str = "frames"
     specular_rays: int = 256
     refine: int = 2
+    coat: bool = True
     threads: int = 0
     seed: int = 0
 
@@ -101,7 +104,7 @@ class Settings:
 
 PAPER = Settings(denoise_mesh=False, refine_poses=False, median="p2", sharpen=False, frame_order="capture",
                  shading="uniform", shading_rays=10000, emitter_rays=0, portal_rays=0, interpolate=False, mirrors=False,
-                 specular="target", refine=0)
+                 specular="target", refine=0, coat=False)
 """Haefner et al. 2021: P-square in video order, uniform rays, one target frame."""
 DRAFT = Settings(detail=0.5, sharpen=False, shading_rays=48, emitter_rays=16, portal_rays=16, specular_rays=96)
 """A first look: texels of two pixels' edge, few rays."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from addon.core.capture.exr import write_exr
 from addon.core.capture.read import read_capture
+from addon.core.overrides import NONE
 from addon.core.progress import Progress
 from addon.core.recover import Recovery
 from addon.core.settings import Settings
@@ -62,11 +63,12 @@ class OnDisk:
         assert len(mesh.triangles) == len(self.room.mesh.triangles)
         return self.room.uv
 
-    def run(self, result: Path, settings: Settings = CHEAP, progress: Progress | None = None, capture=None):
+    def run(self, result: Path, settings: Settings = CHEAP, progress: Progress | None = None, capture=None,
+            overrides=NONE):
         """A finished run: its albedo, materials, report and the stages' arrays."""
         with Store(result) as store:
             capture = capture or read_capture(self.root)
-            return Finished(Recovery(capture, store, settings, progress or Progress(), self.unwrap))
+            return Finished(Recovery(capture, store, settings, progress or Progress(), self.unwrap, overrides))
 
 
 class Finished:

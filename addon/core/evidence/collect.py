@@ -44,4 +44,6 @@ def collect(run: Recovery) -> Evidence:
     texels = texel_evidence(
         atlas, lit, run.albedo, own, light, list(specular.materials), specular.specular, run.irradiance
     )
+    given = [i for i, one in run.overrides.objects.items() if one.base_color is not None]
+    texels.albedo[np.isin(atlas.object_id, given)] = 0
     return Evidence(light, texels, object_evidence(atlas, lit, run.albedo, texels))

@@ -46,7 +46,7 @@ def pictures_of(run: Recovery, view: View) -> tuple[list[Picture], list[tuple[in
     shown = np.maximum(element, 0)
     albedo, errors, shading = run.albedo.rho, run.evidence.texels, run.irradiance
     middle = float(np.median(view.radiance[view.valid])) if view.valid.any() else 1.0
-    emitters = np.isin(view.object_id, [lamp.object_id for lamp in run.shading().lamps])
+    emitters = np.isin(view.object_id, list(run.emitters))
 
     relative = errors.albedo[shown].mean(-1) / np.maximum(albedo[shown].mean(-1), 0.02)
     residual = view.residual

@@ -91,6 +91,10 @@ def base_colors(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[O
         elif m.model == SPECULAR:
             # Above 1 the object would reflect more than all light, and a room of it would never grow dark.
             color[own] = np.minimum(base_color(color[own], m.psi, m.phi), 1)
+        elif m.coat:
+            # The frames' albedo is all that it reflects, so what the coat does is no longer the diffuse part's.
+            coat = float(layer_reflectance(m.coat["f0"], m.coat["roughness"] ** 2))
+            color[own] = np.maximum(color[own] - coat, 0) / (1 - coat)
         elif m.model == TRANSPARENT and m.opacity < 1:
             # Each surface reflects as much less as it lets pass.
             color[own] = np.minimum(color[own] / max(1 - m.transmission, 0.01), 1)

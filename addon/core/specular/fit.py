@@ -174,7 +174,7 @@ def robust_scale(size: np.ndarray) -> float:
 
 def fit_lobe(
     problem: Problem | Layout, way: str = "frames", coloured: bool = False, least_psi: float = 0.0,
-    prior: Prior | None = None,
+    prior: Prior | None = None, psi: np.ndarray | None = None,
 ) -> LobeFit:
     """Best phi, with its psi.
 
@@ -187,9 +187,11 @@ def fit_lobe(
         psi for each channel (a metal's F0); otherwise one for all.
     least_psi : float
         Lower bound of psi.
+    psi : (3,) float, optional
+        Given: phi alone is sought.
     """
     layout = problem if isinstance(problem, Layout) else Layout(problem, way == "frames")
-    how = {"coloured": coloured, "least_psi": least_psi, "prior": prior}
+    how = {"coloured": coloured, "least_psi": least_psi, "prior": prior, "psi": psi}
     kappas = KAPPAS if layout.free else (0.0,)
     flat = solve(layout, None, kappas, 1.0).size
     scale = robust_scale(layout.seen(flat[0]))
@@ -207,13 +209,13 @@ def fit_lobe(
     found = solve(layout, near, kappa, scale, **how)
     costs = found.total
     middle = best - near.start
-    root, psi = between(np.sqrt(layout.grid[near]), costs, found.psi, middle)
+    root, best_psi = between(np.sqrt(layout.grid[near]), costs, found.psi, middle)
     flat_costs = huber(flat, scale) * layout.there
     flattest = int(np.argmin(flat_costs.sum((1, 2))))
     unit = scale**2 / layout.count
     return LobeFit(
         phi=float(min(max(root**2, layout.grid[0]), layout.grid[-1])),
-        psi=psi,
+        psi=best_psi,
         kappa=kappa,
         kappa_lambertian=kappas[flattest],
         cost=float(found.cost[middle].sum()) * unit,

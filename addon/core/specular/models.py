@@ -117,6 +117,16 @@ def _bare_metal(problem: Problem, layout: Layout, phi: float, fit: LobeFit, scal
     return replace(fit, phi=float(phi), psi=f0, kappa=0.0), (huber(size, scale) * layout.there).sum(0, dtype=np.float64)
 
 
+def metal_fit(problem: Problem, layout: Layout) -> LobeFit:
+    """The lobe of what is known to be a metal: the one over a diffuse part if it is a metal's, else the lobe alone."""
+    metal = fit_lobe(layout, **HOW[METAL])
+    if _metallic(metal):
+        return metal
+    widths = layout.grid[layout.grid <= BROADEST_PHI] if len(layout.grid) > 1 else layout.grid
+    scale = max(1.4826 * metal.residual, 1e-4)
+    return min((_bare_metal(problem, layout, phi, metal, scale) for phi in widths), key=lambda one: one[1].sum())[0]
+
+
 def _of_class(own: LobeFit, of_class: LobeFit, model: str, problem: Problem | None) -> LobeFit:
     """An object's own lobe where it explains its frames better than that of its class does, beyond doubt; else that.
 

@@ -90,12 +90,16 @@ class Problems:
         noisy = np.flatnonzero(_noise(found, self._samples.radiance[index]) > NOISY)
         return found.replaced(noisy, light(index[noisy], AGAIN * rays)) if len(noisy) else found
 
-    def problem(self, index: np.ndarray, rays: int, rough: bool = False) -> Problem:
+    def element(self, index: np.ndarray) -> np.ndarray:
+        """The elements of observations."""
+        return self._samples.element[index]
+
+    def problem(self, index: np.ndarray, rays: int, rough: bool = False, phi: float | None = None) -> Problem:
         """The fit's problem over observations (see `light`)."""
         element = self._samples.element[index]
         cosine = np.einsum("ij,ij->i", self._field.atlas.normal[element], self._samples.direction[index])
         radiance = self._samples.radiance[index]
-        return Problem(element, radiance, self._lit.radiance[element], self.light(index, rays, rough=rough), cosine)
+        return Problem(element, radiance, self._lit.radiance[element], self.light(index, rays, phi, rough), cosine)
 
 
 def _noise(light: LobeLight, radiance: np.ndarray) -> np.ndarray:

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..capture.model import Instance
 from ..lit_diffuse.accumulate import LitDiffuse
-from ..material import EMITTER, LAMBERTIAN, LAMP_ALBEDO, METAL, SPECULAR, TRANSPARENT, ObjectMaterial
+from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, ObjectMaterial
+from ..overrides import NOTHING, Given
 from ..parallel import ordered_map
 from ..progress import Progress
 from ..shading.field import LightField
 from ..shading.lamps import Lamp
-from ..shading.mirrors import Mirror
 from .by_looks import coated_by_looks, metal_by_looks
+from .describe import as_given, described, flat_mirror, lamp_material
 from .fit import fit_lobe
+from .given import fit_given, given_note, same_material
 from .glossy_light import Excess, glossy_light
-from .intervals import GlossInterval, gloss_interval
+from .intervals import gloss_interval
 from .layout import Problem
-from .models import MIN_ELEMENTS, Choice, adopt_from_class, choose_model, metal_f0, set_apart
+from .lobes import GRID
+from .models import MIN_ELEMENTS, Choice, adopt_from_class, choose_model, set_apart
 from .one_colour import compare, compare_coat
 from .problems import Problems
 from .samples import Samples
@@ -39,8 +43,6 @@ LOOKS_VIEWS = 4
 """Views of each element for the question whether an object looks like a metal or coated all over (`by_looks`)."""
 LOOKS_LIKE_NONE = 1.5
 """A metal whose spread is so many times the other's in the first look needs no second."""
-UNRESOLVED = 0.17
-"""Roughness up to which the frames show a mirror: a lobe of phi 0.03 is as wide as a few pixels."""
 SEPARATE_ELEMENTS = 2500
 SEPARATE_VIEWS = 9
 SEPARATE_RAYS = 8
@@ -68,6 +70,14 @@ class Specular:
     excess: np.ndarray
 
 
+@dataclass(frozen=True)
+class Held:
+    """What a fit of a few objects leaves as it is: all that was found, but of these objects."""
+
+    found: Specular
+    only: Collection[int]
+
+
 def fit_specular(
     instances: tuple[Instance, ...],
     field: LightField,
@@ -83,6 +93,8 @@ def fit_specular(
     threads: int = 0,
     seed: int = 0,
     noise: float = 0.0,
+    given: Mapping[int, Given] | None = None,
+    held: Held | None = None,
     progress: Progress | None = None,
 ) -> Specular:
     """Fit every object (Haefner et al. 2021, sec. 3.3 and 3.4) and find the specular part of L_d.
@@ -97,18 +109,33 @@ def fit_specular(
         0 leaves L_d as the median gave it; 1 takes the lobes out of it; 2 also corrects E for what they really throw.
     noise : float
         What was taken out of the mesh, in metres.
+    given : dict of int to Given
+        What the artist gives of objects, by object_id.
+    held : Held, optional
+        Fit a few objects only.
 
     Raises
     ------
     InterruptedRun
         From `progress`.
     """
+    given = given or {}
     glowing, mirrors = {lamp.object_id: lamp for lamp in lamps}, {mirror.object_id: mirror for mirror in field.mirrors}
     # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
     maker = Problems(field, lit_diffuse, samples, threads=1, seed=seed)
-    wanted = [i.object_id for i in instances if i.object_id not in glowing and i.object_id not in mirrors]
+    # What is given goes before what the shading stage found.
+    taken = {i for i, one in given.items() if one.same_as is not None}
+    settled = {i for i in (*glowing, *mirrors) if i not in given} | taken
+    wanted = [i.object_id for i in instances if i.object_id not in settled]
+    if held is not None:
+        # Where nothing is given of an object, others of its class have their say.
+        alike = {i.class_name for i in instances if i.object_id in held.only and i.object_id not in given}
+        class_of = {i.object_id: i.class_name for i in instances}
+        wanted = [i for i in wanted if i in held.only or i not in given and class_of[i] in alike]
 
     def look(object_id: int) -> tuple[Choice, Problem | None, int]:
+        if object_id in given:
+            return *fit_given(given[object_id], maker, object_id, irradiance, rays), -1
         choice, problem, target, index = _look(maker, object_id, samples, len(frame_names), way, rays)
         if way == "frames" and choice.fit is not None:
             element, direction = samples.element[index], samples.direction[index]
@@ -128,32 +155,49 @@ def fit_specular(
         if progress is not None:
             progress.update(0.7 * len(choices) / len(wanted))
     if way == "frames":
-        choices = adopt_from_class(choices, problems, {i.object_id: i.class_name for i in instances})
+        reflecting = {i: choice for i, choice in choices.items() if choice.model != EMITTER}
+        adopted = adopt_from_class(reflecting, problems, {i.object_id: i.class_name for i in instances})
+        choices |= {i: choice for i, choice in adopted.items() if i not in given}
 
     # Where the target frame alone was fitted, elements have one view: the jackknife has nothing to work on.
     told = problems if way == "frames" else {}
     intervals = ordered_map(lambda i: gloss_interval(choices[i], told.get(i)), wanted, threads)
     sure = dict(zip(wanted, intervals, strict=True))
 
-    materials = []
-    for i in instances:
-        if i.object_id in glowing:
-            lamp = glowing[i.object_id]
-            own = field.atlas.object_id == i.object_id
-            radiance = given_off(lamp.radiance, np.median(irradiance[own], 0) if own.any() else np.zeros(3))
-            materials.append(ObjectMaterial(i.object_id, i.class_name, EMITTER, emission=radiance, note=lamp.note))
-            continue
-        if i.object_id in mirrors:
+    def describe(i: Instance) -> ObjectMaterial:
+        own, choice = field.atlas.object_id == i.object_id, choices.get(i.object_id)
+        if choice is not None and choice.model == EMITTER:
+            seen = np.median(field.radiance[own], 0) if own.any() else np.zeros(3)
+            return lamp_material(i, seen, irradiance[own], given_note(given[i.object_id]))
+        if choice is not None:
+            target, problem = targets[i.object_id], problems.get(i.object_id)
+            name = frame_names[target] if target >= 0 else None
+            found = described(i, choice, problem, name, sure[i.object_id])
+            return as_given(found, given[i.object_id], choice) if i.object_id in given else found
+        if i.object_id in glowing and i.object_id not in given:
+            known = glowing[i.object_id]
+            return lamp_material(i, known.radiance, irradiance[own], known.note)
+        if i.object_id in mirrors and i.object_id not in given:
             seen = int((field.atlas.object_id[samples.element] == i.object_id).sum())
-            materials.append(_flat_mirror(i, mirrors[i.object_id], seen))
-            continue
-        target = targets[i.object_id]
-        name = frame_names[target] if target >= 0 else None
-        materials.append(_material(i, choices[i.object_id], problems.get(i.object_id), name, sure[i.object_id]))
+            return flat_mirror(i, mirrors[i.object_id], seen)
+        return ObjectMaterial(i.object_id, i.class_name, LAMBERTIAN)  # the same as another, which is described first
+
+    kept = {} if held is None else {m.object_id: m for m in held.found.materials if m.object_id not in held.only}
+    by_id = {i.object_id: kept.get(i.object_id) or describe(i) for i in instances}
+    for i in by_id:
+        if i not in kept and given.get(i, NOTHING).same_as is not None:
+            source = given[i].same_as
+            while given.get(source, NOTHING).same_as is not None:
+                source = given[source].same_as
+            by_id[i] = same_material(by_id[source], by_id[i])
+    materials = list(by_id.values())
 
     specular = np.zeros((len(field.atlas), 3), np.float32)
+    if held is not None:
+        specular = np.where(np.isin(field.atlas.object_id, list(held.only))[:, None], specular, held.found.specular)
     glass = [m for m in materials if m.model == TRANSPARENT and m.surfaces is not None]
     glossy = [m for m in materials if m.model == SPECULAR] + glass if refine else []
+    glossy = [m for m in glossy if m.object_id not in kept]
 
     def separate(material: ObjectMaterial) -> tuple[np.ndarray, np.ndarray]:
         if material.model == TRANSPARENT:
@@ -165,20 +209,14 @@ def fit_specular(
         if progress is not None:
             progress.update(0.7 + 0.15 * (done + 1) / len(glossy))
 
-    excess = np.zeros_like(specular)
-    if refine > 1:
+    excess = np.zeros_like(specular) if held is None else held.found.excess
+    if refine > 1 and held is None:
         seen = np.flatnonzero(lit_diffuse.seen)
         sent = Excess(field, tuple(materials), specular, seed)
         excess[seen] = glossy_light(
             sent, seen, irradiance[seen], threads=threads, seed=seed, progress=progress, share=(0.85, 1.0)
         )
     return Specular(tuple(materials), specular, excess)
-
-
-def given_off(radiance: np.ndarray, irradiance: np.ndarray) -> tuple[float, float, float]:
-    """What a lamp gives of itself of the `radiance` ((3,)) that it was seen with, under E ((3,)); never all of it."""
-    reflected = np.minimum(LAMP_ALBEDO * irradiance / np.pi, LAMP_ALBEDO * radiance)
-    return tuple(float(x) for x in radiance - reflected)
 
 
 def _look(
@@ -244,48 +282,6 @@ def _by_target(maker: Problems, object_id: int, frame: np.ndarray, target: int, 
     return Choice(SPECULAR, fit_lobe(problem, "target")), problem
 
 
-def _flat_mirror(instance: Instance, mirror: Mirror, observations: int) -> ObjectMaterial:
-    """The description of a mirror that was found before the shading, or that the capture tells of."""
-    note = "A flat mirror: the frames show the room in it." if observations else "A flat mirror, as the capture tells."
-    return ObjectMaterial(
-        instance.object_id, instance.class_name, METAL, phi=0.0, f0=tuple(float(x) for x in mirror.f0),
-        observations=observations, roughness_low=0.0, roughness_high=UNRESOLVED if observations else 0.0, note=note,
-    )  # fmt: skip
-
-
-def _material(
-    instance: Instance, choice: Choice, problem: Problem | None, target: str | None, sure: GlossInterval
-) -> ObjectMaterial:
-    """The description of what was chosen."""
-    fit = choice.fit
-    common = {
-        "object_id": instance.object_id,
-        "class_name": instance.class_name,
-        "model": choice.model,
-        "target_frame": target,
-        "observations": 0 if problem is None else len(problem.element),
-        "residual": None if fit is None else fit.residual,
-        "residual_lambertian": None if fit is None else fit.residual_lambertian,
-        "roughness_low": sure.roughness[0],
-        "roughness_high": sure.roughness[1],
-        "specular_low": sure.specular[0],
-        "specular_high": sure.specular[1],
-        "scores": choice.scores,
-        "note": choice.note,
-    }
-    if choice.model == TRANSPARENT:
-        found = choice.see_through
-        return ObjectMaterial(
-            **common, transmission=found.transmission, surfaces=None if found.cut_out else found.surfaces
-        )
-    if choice.model == LAMBERTIAN:
-        return ObjectMaterial(**(common | {"residual": common["residual_lambertian"]}))
-    if choice.model == METAL:
-        f0 = fit.psi if problem is None else metal_f0(problem, fit.phi)
-        return ObjectMaterial(**common, phi=fit.phi, f0=tuple(float(x) for x in f0))
-    return ObjectMaterial(**common, phi=fit.phi, psi=float(fit.psi.mean()))
-
-
 def _separate(
     material: ObjectMaterial, field: LightField, maker: Problems, samples: Samples, rays: int
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -294,7 +290,7 @@ def _separate(
     index = maker.pick(material.object_id, SEPARATE_ELEMENTS, SEPARATE_VIEWS, least=1, seed=2)
     if not len(index):
         return own, np.zeros((len(own), 3), np.float32)
-    light = maker.light(index, rays, material.phi)
+    light = maker.light(index, rays, max(material.phi, float(GRID[0])))
     element, part = specular_in_median(samples, index, material.psi * light.A[:, 0] + light.B[:, 0])
     return own, spread_over_object(field.atlas, own, element, part)
 

@@ -1,0 +1,346 @@
+"""What the artist gives instead of what the frames say: model, roughness, F0, colour of objects, and a known white.
+
+As JSON, with every key optional; what is not given is fitted under what is given:
+
+    {"objects": {"12": {"model": "metal", "roughness": 0.3}, "13": {"same_as": 12}},
+     "white": {"object": 26, "albedo": 0.8}}
+
+`null` takes back what was given before. The result folder keeps all of it in `OVERRIDES`, and later runs heed it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from .capture.jsonfile import is_number
+from .errors import BadInputError
+from .material import EMITTER, LAMBERTIAN, METAL, SPECULAR
+from .store import key
+
+OVERRIDES = "overrides.json"
+MODELS = (LAMBERTIAN, SPECULAR, METAL, EMITTER)
+"""Those that can be given."""
+LOBE = ("model", "roughness", "f0")
+"""What describes a highlight, and `same_as` takes from another object."""
+HAS_NO = {LAMBERTIAN: ("roughness", "f0"), EMITTER: ("roughness", "f0", "base_color")}
+"""What some models do not have."""
+Colour = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Given:
+    """What is given of one object; None where it is to be found.
+
+    Attributes
+    ----------
+    model : str or None
+        One of `MODELS`.
+    roughness : float or None
+        Blender's, 0...1: the square root of phi.
+    f0 : float or (3,) tuple of float or None
+        Reflectance at normal incidence, linear Rec.709.
+    base_color : (3,) tuple of float or None
+        Linear Rec.709: mean albedo over what was measured; of a metal its F0.
+    same_as : int or None
+        Object whose model and highlight this one takes over.
+    """
+
+    model: str | None = None
+    roughness: float | None = None
+    f0: float | Colour | None = None
+    base_color: Colour | None = None
+    same_as: int | None = None
+
+    @property
+    def any(self) -> bool:
+        """Whether anything is given."""
+        return bool(self.as_dict())
+
+    @property
+    def lobe(self) -> Given:
+        """What of it bears on the fit of the highlight; a metal's colour is its F0."""
+        f0 = self.base_color if self.f0 is None and self.model == METAL else self.f0
+        return replace(self, f0=f0, base_color=None)
+
+    def as_dict(self) -> dict[str, Any]:
+        """What is given, as the file has it."""
+        told = {one.name: getattr(self, one.name) for one in fields(self)}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in told.items()
+                if value is not None}
+
+
+@dataclass(frozen=True)
+class White:
+    """An object whose mean albedo, (3,) over what was measured of it, is known."""
+
+    object_id: int
+    albedo: Colour
+
+
+@dataclass(frozen=True)
+class Overrides:
+    """All that is given of a room.
+
+    Attributes
+    ----------
+    objects : dict of int to Given
+        By object_id.
+    white : White or None
+    back : frozenset of (int or str, str)
+        What was null: (object_id, key), (object_id, '') for all of an object, ('white', '').
+    """
+
+    objects: Mapping[int, Given] = field(default_factory=dict)
+    white: White | None = None
+    back: frozenset[tuple[int | str, str]] = frozenset()
+
+    @property
+    def any(self) -> bool:
+        """Whether anything is given."""
+        return bool(self.objects) or self.white is not None
+
+    def of(self, object_id: int) -> Given:
+        """What is given of one object."""
+        return self.objects.get(object_id, NOTHING)
+
+    def lobes(self) -> dict[int, Given]:
+        """What bears on the fit of highlights, of the objects that have any."""
+        return {i: one.lobe for i, one in sorted(self.objects.items()) if one.lobe.any}
+
+    def lobes_key(self) -> tuple[str, ...]:
+        """A digest of that as a tuple of one; empty where nothing is given."""
+        told = {str(i): one.as_dict() for i, one in self.lobes().items()}
+        return (key("overrides", told),) if told else ()
+
+    def source(self, object_id: int) -> int:
+        """The object at the end of the chain of `same_as` that begins with this one."""
+        while (after := self.of(object_id).same_as) is not None:
+            object_id = after
+        return object_id
+
+    def as_dict(self) -> dict[str, Any]:
+        """As the file has it."""
+        objects = {str(i): one.as_dict() for i, one in sorted(self.objects.items())}
+        told: dict[str, Any] = {"objects": objects}
+        if self.white is not None:
+            told["white"] = {"object": self.white.object_id, "albedo": list(self.white.albedo)}
+        return told
+
+
+NOTHING = Given()
+NONE = Overrides()
+
+
+def merge(older: Overrides, newer: Overrides) -> Overrides:
+    """Both together: key by key what is newer wins, and what it took back is gone.
+
+    A newly given `same_as` replaces an older description of the highlight, and the other way round; a matt surface or
+    a lamp has no older roughness or F0.
+
+    Raises
+    ------
+    BadInputError
+        Objects are to be the same as each other in a circle.
+    """
+    objects = {i: one for i, one in older.objects.items() if (i, "") not in newer.back}
+    for object_id, name in newer.back:
+        if name and object_id in objects:
+            objects[object_id] = replace(objects[object_id], **{name: None})
+    for object_id, one in newer.objects.items():
+        given = one.as_dict()
+        outdated = LOBE if "same_as" in given else ("same_as",) if given.keys() & set(LOBE) else ()
+        if "model" in given:
+            outdated += HAS_NO.get(given["model"], ())
+        elif given.keys() & set(HAS_NO.get(objects.get(object_id, NOTHING).model, ())):
+            outdated += ("model",)  # a highlight is given now, so it is matt no longer
+        was = replace(objects.get(object_id, NOTHING), **dict.fromkeys(outdated))
+        objects[object_id] = replace(was, **{name: getattr(one, name) for name in given})
+    white = newer.white or (None if ("white", "") in newer.back else older.white)
+    merged = Overrides({i: one for i, one in sorted(objects.items()) if one.any}, white)
+    if circle := _circle(merged):
+        raise BadInputError(f"What is kept and what is given together make objects the same as each other in a circle "
+                            f"({circle}); give one of them values of its own.")
+    return merged
+
+
+def read_overrides(path: Path, known: Iterable[int]) -> Overrides:
+    """The overrides in a file.
+
+    Parameters
+    ----------
+    path : Path
+    known : iterable of int
+        The capture's objects.
+
+    Raises
+    ------
+    BadInputError
+        One sentence that names file, object and key, and what is allowed.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise BadInputError(f"'{path}' is no file; give the JSON file with what is to be overridden.")
+    try:
+        told = json.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise BadInputError(f"'{path}' can't be read ({error.strerror or error}); give one that can.") from error
+    except (ValueError, RecursionError) as error:
+        raise BadInputError(f"'{path}' is not valid JSON ({error}); mend it there.") from error
+    return parse(told, f"'{path}'", known)
+
+
+def kept_overrides(folder: Path, known: Iterable[int]) -> Overrides:
+    """What a result folder keeps; nothing where it keeps none. Raises `BadInputError`."""
+    path = Path(folder) / OVERRIDES
+    return read_overrides(path, known) if path.is_file() else NONE
+
+
+def heeded(folder: Path, known: Iterable[int], file: Path | None = None, keep: bool = True) -> Overrides:
+    """What a run heeds: what its result folder keeps, and over that what is in a `file`.
+
+    Parameters
+    ----------
+    folder : Path
+        The result folder.
+    known : iterable of int
+        The capture's objects.
+    file : Path, optional
+    keep : bool
+        False leaves out what the folder keeps.
+
+    Raises
+    ------
+    BadInputError
+        As `read_overrides` and `merge`.
+    """
+    known = set(known)
+    older = kept_overrides(folder, known) if keep else NONE
+    return merge(older, read_overrides(file, known)) if file is not None else older
+
+
+def parse(told: Any, name: str, known: Iterable[int]) -> Overrides:
+    """Overrides from what JSON holds; `name` is what errors call it. Parameters and errors as of `read_overrides`."""
+    known = set(known)
+    _keys(told, ("objects", "white"), name)
+    objects, back = {}, set()
+    entries = told.get("objects") or {}
+    if not isinstance(entries, dict):
+        raise BadInputError(f"{name}: 'objects' has to be an object of JSON by object_id, such as "
+                            '{"12": {"model": "metal"}}.')
+    for number, entry in entries.items():
+        object_id = _object(number, known, name)
+        if entry is None:
+            back.add((object_id, ""))
+            continue
+        one, gone = _given(object_id, entry, known, name)
+        back |= {(object_id, key) for key in gone}
+        if one.any:
+            objects[object_id] = one
+    white = None
+    if "white" in told:
+        white = _white(told["white"], known, name)
+        back |= {("white", "")} if white is None else set()
+    found = Overrides(objects, white, frozenset(back))
+    if circle := _circle(found):
+        raise BadInputError(f"{name}: objects are the same as each other in a circle ({circle}); give one of them "
+                            "values of its own.")
+    return found
+
+
+def _given(object_id: int, entry: Any, known: set[int], name: str) -> tuple[Given, list[str]]:
+    where = f"{name}, object {object_id}"
+    _keys(entry, tuple(one.name for one in fields(Given)), where)
+    gone = [key for key, value in entry.items() if value is None]
+    said = {key: value for key, value in entry.items() if value is not None}
+    found: dict[str, Any] = {}
+    if (model := said.get("model")) is not None:
+        if model not in MODELS:
+            raise BadInputError(f"{where}: 'model' is {model!r}; give one of {', '.join(MODELS)}.")
+        found["model"] = model
+    if "roughness" in said:
+        found["roughness"] = _share(said["roughness"], f"{where}: 'roughness'")
+    if "f0" in said:
+        found["f0"] = _colour(said["f0"], f"{where}: 'f0'", keep_number=True)
+    if "base_color" in said:
+        found["base_color"] = _colour(said["base_color"], f"{where}: 'base_color'", number=False)
+    if "same_as" in said:
+        found["same_as"] = _object(said["same_as"], known, f"{where}, 'same_as'")
+    also = [key for key in LOBE if key in said]
+    if "same_as" in said and also:
+        raise BadInputError(f"{where}: 'same_as' brings the other object's {also[0]}; leave one of the two out.")
+    for name_of in HAS_NO.get(model, ()):
+        if name_of in said:
+            raise BadInputError(f"{where}: model '{model}' has no '{name_of}'; leave one of the two out.")
+    return Given(**found), gone
+
+
+def _white(entry: Any, known: set[int], name: str) -> White | None:
+    if entry is None:
+        return None
+    where = f"{name}, 'white'"
+    _keys(entry, ("object", "albedo"), where)
+    for part in ("object", "albedo"):
+        if entry.get(part) is None:
+            raise BadInputError(f"{where}: '{part}' is missing; give " + '{"object": 26, "albedo": 0.8}.')
+    albedo = _colour(entry["albedo"], f"{where}: 'albedo'")
+    if min(albedo) <= 0:
+        raise BadInputError(f"{where}: 'albedo' is {entry['albedo']}; a known white is more than 0 in every channel.")
+    return White(_object(entry["object"], known, where), albedo)
+
+
+def _keys(entry: Any, allowed: tuple[str, ...], where: str) -> None:
+    if not isinstance(entry, dict):
+        raise BadInputError(f"{where} has to be an object of JSON with the keys {', '.join(allowed)}.")
+    for name in entry:
+        if name not in allowed:
+            raise BadInputError(f"{where}: there is no key '{name}'; choose from {', '.join(allowed)}.")
+
+
+def _object(number: Any, known: set[int], where: str) -> int:
+    """An object_id, which JSON may have as text."""
+    text = str(number)
+    if isinstance(number, (bool, float)) or not text.isascii() or not text.removeprefix("-").isdigit():
+        raise BadInputError(f"{where}: {number!r} is no object_id; give a whole number.")
+    if int(text) not in known:
+        raise BadInputError(f"{where}: the capture has no object {text}; it has {_listed(known)}.")
+    return int(text)
+
+
+def _listed(known: set[int]) -> str:
+    some = sorted(known)
+    if some and some == list(range(some[0], some[-1] + 1)):
+        return f"{some[0]} to {some[-1]}"
+    return ", ".join(map(str, some[:20])) + (", ..." if len(some) > 20 else "") if some else "none"
+
+
+def _share(value: Any, where: str) -> float:
+    if not is_number(value) or not 0 <= value <= 1:
+        raise BadInputError(f"{where} is {value!r}; give a number from 0 to 1.")
+    return float(value)
+
+
+def _colour(value: Any, where: str, number: bool = True, keep_number: bool = False) -> Any:
+    """(3,) tuple of float, or where it may be the number that was given."""
+    if number and not isinstance(value, (list, tuple)):
+        share = _share(value, where)
+        return share if keep_number else (share,) * 3
+    if not isinstance(value, (list, tuple)) or len(value) != 3:
+        raise BadInputError(f"{where} is {value!r}; give {'a number or ' if number else ''}three numbers from 0 to 1 "
+                            "(red, green, blue).")
+    return tuple(_share(one, where) for one in value)
+
+
+def _circle(overrides: Overrides) -> str:
+    """The first circle of `same_as`, as text; '' if there is none."""
+    for start in overrides.objects:
+        chain, here = [start], overrides.of(start).same_as
+        while here is not None and here not in chain:
+            chain.append(here)
+            here = overrides.of(here).same_as
+        if here is not None:
+            return " -> ".join(map(str, (*chain[chain.index(here):], here)))
+    return ""
