@@ -7,6 +7,7 @@ import bpy
 
 from ..addon.bridge import export
 from ..addon.core.errors import BadInputError
+from ..addon.core.room_file import capture_name
 from . import poll
 from .relight_base import RelightOperator, default_folder
 
@@ -48,7 +49,7 @@ class SCAN_RELIGHT_OT_export(RelightOperator, bpy.types.Operator):
         """Choose the file."""
         if not self.filepath:
             folder = default_folder(context.scene)
-            self.filepath = str(Path(folder, f"room{self.format}")) if folder else f"room{self.format}"
+            self.filepath = str(Path(folder, capture_name(folder) + self.format)) if folder else f"room{self.format}"
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 

@@ -16,13 +16,17 @@ import bpy
 import numpy as np
 
 from ..core.errors import BadInputError, StorageError
+from .export_files import put, textures_of
 from .export_material import plain_copy
+from .export_names import Names, own_name, unique
 from .marks import OBJECT_ID
 from .materials import opacity
 
 FORMATS = {".glb": "GLB", ".gltf": "GLTF_SEPARATE", ".usdc": "USD", ".usd": "USD", ".usda": "USD", ".usdz": "USD"}
 """By ending."""
 ROOM, SELECTED, ALL = "ROOM", "SELECTED", "ALL"
+_BESIDE = (".usdc", ".usd", ".usda")
+"""Files whose textures we lay beside them ourselves."""
 _COLLECTION = "Scan Relight export"
 
 
@@ -75,15 +79,21 @@ def export(scene: bpy.types.Scene, path: Path | str, scope: str = ROOM, lights: 
         lights and thing.type == "LIGHT" or cameras and thing == scene.camera)]
     folder = Path(tempfile.mkdtemp(prefix="scan_relight_"))
     try:
-        with copies(scene, things, extra, folder / "textures", FORMATS[ending] != "USD") as collection:
-            made = folder / "made"
-            made.mkdir()
+        made = folder / "made"
+        made.mkdir()
+        # Blender's USD exporter can be told no folder for its textures, but it can leave them where they are.
+        textures = made / textures_of(path) if ending in _BESIDE else folder / "textures"
+        with copies(scene, things, extra, textures, FORMATS[ending] != "USD") as collection:
             try:
                 _write(made / path.name, ending, collection)
             except RuntimeError as error:
                 reason = " ".join(str(error).split()).removeprefix("Error: ").rstrip(".")
                 raise StorageError(f"'{path}' can't be exported ({reason[:300]}).") from error
-            _move(made, path)
+        try:
+            put(made, path)
+        except OSError as error:
+            raise StorageError(f"'{path}' can't be written ({error.strerror or error}); free some space or choose "
+                               "another folder.") from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     return remarks(ending, things, extra, scene)
@@ -126,7 +136,8 @@ def copies(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], extra: It
 
     `textures` gets the 8-bit sRGB pictures that the materials show; for `level` see `plain_copy`.
     """
-    kinds = ("objects", "materials", "images", "collections", "meshes")
+    kinds = ("objects", "materials", "images", "collections", "meshes", "worlds")
+    world, names = scene.world, Names()
     before = {kind: set(getattr(bpy.data, kind)) for kind in kinds}
     try:
         textures.mkdir(parents=True)
@@ -134,11 +145,15 @@ def copies(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], extra: It
         scene.collection.children.link(collection)
         pictures: dict = {}
         plain: dict = {}
-        for thing in things:
+        things, extra = list(things), list(extra)
+        for thing, name in zip(things + extra, unique(own_name(thing) for thing in things + extra)):
             copy = thing.copy()
+            names.give("objects", copy, name)
             collection.objects.link(copy)
             copy.parent = None
             copy.matrix_world = thing.matrix_world
+            if thing not in things:
+                continue
             copy.hide_viewport = False
             for own, slot in zip(thing.material_slots, copy.material_slots):
                 if own.material is None:
@@ -147,17 +162,43 @@ def copies(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], extra: It
                     plain[own.material] = plain_copy(own.material, textures, pictures, level)
                 slot.link = "OBJECT"
                 slot.material = plain[own.material]
-        for thing in extra:
-            copy = thing.copy()
-            collection.objects.link(copy)
-            copy.parent = None
-            copy.matrix_world = thing.matrix_world
+        for own, name in zip(plain, unique(map(own_name, plain))):
+            names.give("materials", plain[own], name)
+        # By their first objects: one mesh may be worn by several.
+        meshes = {copy.data: copy for copy in reversed(collection.objects) if copy.type == "MESH"}
+        wanted = [copy.name if OBJECT_ID in copy else mesh.name for mesh, copy in meshes.items()]
+        for mesh, name in zip(meshes, unique(wanted)):
+            names.give("meshes", mesh, name)
+        if not level and world is not None and world.node_tree:
+            scene.world = _with_own_pictures(world, textures)
         yield collection
     finally:
+        scene.world = world
         for kind in ("collections", "objects", "materials", "images", "meshes"):
             new = [item for item in getattr(bpy.data, kind) if item not in before[kind]]
             if new:
                 bpy.data.batch_remove(new)
+        names.put_back()
+
+
+def _with_own_pictures(world: bpy.types.World, textures: Path) -> bpy.types.World:
+    """A copy of a world whose pictures lie in `textures`."""
+    copy = world.copy()
+    for node in copy.node_tree.nodes:
+        image = node.image if node.type == "TEX_ENVIRONMENT" else None
+        if image is None or not (image.packed_file or image.source == "FILE"):
+            continue
+        source = Path(bpy.path.abspath(image.filepath))
+        path = textures / f"{bpy.path.clean_name(image.name)}{source.suffix}"
+        if image.packed_file:
+            path.write_bytes(image.packed_file.data)
+        elif source.is_file():
+            shutil.copyfile(source, path)
+        else:
+            continue
+        node.image = bpy.data.images.load(str(path))
+        node.image.colorspace_settings.name = image.colorspace_settings.name
+    return copy
 
 
 def _write(path: Path, ending: str, collection: bpy.types.Collection) -> None:
@@ -165,31 +206,14 @@ def _write(path: Path, ending: str, collection: bpy.types.Collection) -> None:
     if FORMATS[ending] == "USD":
         bpy.ops.wm.usd_export(filepath=str(path), collection=collection.name, export_materials=True,
                               generate_preview_surface=True, rename_uvmaps=True, relative_paths=True,
-                              export_textures_mode="NEW", overwrite_textures=True, evaluation_mode="RENDER",
-                              convert_world_material=True)
+                              export_textures_mode="KEEP" if ending in _BESIDE else "NEW", overwrite_textures=True,
+                              evaluation_mode="RENDER", convert_world_material=True)
         return
     bpy.ops.export_scene.gltf(filepath=str(path), export_format=FORMATS[ending], collection=collection.name,
                               export_apply=True, export_lights=True, export_cameras=True, export_yup=True,
-                              export_image_format="AUTO", export_extras=False, export_animations=False,
+                              export_image_format="AUTO",
+                              export_texture_dir=textures_of(path), export_extras=False, export_animations=False,
                               use_active_scene=True)
-
-
-def _move(made: Path, path: Path) -> None:
-    """Bring what was written to its place, the file itself last."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if not (made / path.name).is_file() or not (made / path.name).stat().st_size:
-            raise OSError(0, "Blender's exporter wrote nothing")
-        for one in sorted(made.rglob("*"), key=lambda p: p.name == path.name):
-            if one.is_file():
-                target = path.parent / one.relative_to(made)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                partial = target.with_name(f".partial-{target.name}")
-                shutil.copyfile(one, partial)
-                partial.replace(target)
-    except OSError as error:
-        raise StorageError(f"'{path}' can't be written ({error.strerror or error}); free some space or choose another "
-                           "folder.") from error
 
 
 def srgb(linear: np.ndarray) -> np.ndarray:

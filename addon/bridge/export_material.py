@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import bpy
@@ -87,6 +88,17 @@ def _image(socket) -> bpy.types.Image | None:
     return None
 
 
+def _file_name(image: bpy.types.Image, textures: Path) -> str:
+    """A name that the folder does not hold yet, whatever the case."""
+    taken = {path.stem.casefold() for path in textures.iterdir()}
+    plain = name = bpy.path.clean_name(re.sub(r"\.\d{3,}$", "", image.name))
+    number = 1
+    while name.casefold() in taken:
+        number += 1
+        name = f"{plain}_{number}"
+    return name
+
+
 def _picture(image: bpy.types.Image, textures: Path, pictures: dict) -> bpy.types.Image:
     """An image as PNG of 8 bits in sRGB, which glTF and USD's preview surface take."""
     if image in pictures:
@@ -98,7 +110,7 @@ def _picture(image: bpy.types.Image, textures: Path, pictures: dict) -> bpy.type
     pixels = image_array(image)[::-1, :, :3]
     if image.colorspace_settings.name != "sRGB" or image.is_float:
         pixels = srgb(pixels)
-    path = textures / f"{bpy.path.clean_name(image.name.split('.')[0])}_{len(pictures)}.png"
+    path = textures / f"{_file_name(image, textures)}.png"
     write_png(path, np.ascontiguousarray((pixels * 255 + 0.5).astype(np.uint8)))
     made = bpy.data.images.load(str(path))
     made.colorspace_settings.name = "sRGB"
