@@ -9,6 +9,7 @@ def classes() -> tuple[type, ...]:
     from .capture_from_scene import SCAN_RELIGHT_OT_capture_from_scene
     from .check_capture import SCAN_RELIGHT_OT_check_capture
     from .clear_cache import SCAN_RELIGHT_OT_clear_cache
+    from .correct_register import correct_groups, correct_operators, correct_panels
     from .files import (
         SCAN_RELIGHT_FH_json,
         SCAN_RELIGHT_OT_drop,
@@ -38,6 +39,7 @@ def classes() -> tuple[type, ...]:
     return (
         # Property groups: those that others point to come first.
         ScanRelightSettings, ScanRelightReading, ScanRelightScene, ScanRelightPreferences, *relight_groups(),
+        *correct_groups(),
         # Operators, in the order of the method.
         SCAN_RELIGHT_OT_check_capture, SCAN_RELIGHT_OT_import_capture,
         SCAN_RELIGHT_OT_accumulate, SCAN_RELIGHT_OT_shade, SCAN_RELIGHT_OT_fit, SCAN_RELIGHT_OT_write,
@@ -46,11 +48,12 @@ def classes() -> tuple[type, ...]:
         SCAN_RELIGHT_FH_json,
         # The artist's side.
         SCAN_RELIGHT_OT_capture_from_scene, SCAN_RELIGHT_OT_restore_materials, SCAN_RELIGHT_OT_select_result_object,
-        SCAN_RELIGHT_OT_look, SCAN_RELIGHT_OT_open_report, *relight_operators(),
+        SCAN_RELIGHT_OT_look, SCAN_RELIGHT_OT_open_report, *relight_operators(), *correct_operators(),
         # Panels, in the order of the work; a panel's parts come after it.
         SCAN_RELIGHT_PT_capture, SCAN_RELIGHT_PT_own_scene,
         SCAN_RELIGHT_PT_recover,
-        SCAN_RELIGHT_UL_results, SCAN_RELIGHT_PT_results, SCAN_RELIGHT_PT_stages,
+        SCAN_RELIGHT_UL_results, SCAN_RELIGHT_PT_results, *correct_panels(),
+        SCAN_RELIGHT_PT_stages,
         SCAN_RELIGHT_PT_look,
         *relight_panels(),
     )  # fmt: skip
@@ -60,10 +63,11 @@ def pointers() -> tuple[tuple[type, str, type], ...]:
     """Blender type, name and property group of everything that hangs on Blender's own data."""
     import bpy
 
+    from .correct_register import correct_pointers
     from .relight_register import relight_pointers
     from .scene_props import ScanRelightScene
 
-    return ((bpy.types.Scene, "scan_relight", ScanRelightScene), *relight_pointers())
+    return ((bpy.types.Scene, "scan_relight", ScanRelightScene), *relight_pointers(), *correct_pointers())
 
 
 def register():
@@ -71,6 +75,7 @@ def register():
     import bpy
 
     from . import menus
+    from .correct_register import register_handlers
     from .job_operator import forget_job
     from .panel_results import active_row_property
 
@@ -80,6 +85,7 @@ def register():
         setattr(owner, name, bpy.props.PointerProperty(type=group))
     bpy.types.Scene.scan_relight_row = active_row_property()
     bpy.app.handlers.load_pre.append(forget_job)
+    register_handlers()
     menus.register()
 
 
@@ -87,11 +93,14 @@ def unregister():
     """Take back what `register` did."""
     import bpy
 
-    from ..addon.bridge import job
+    from ..addon.bridge import corrections, job
     from . import findings, menus, results
+    from .correct_register import unregister_handlers
     from .job_operator import forget_job
 
     menus.unregister()
+    unregister_handlers()
+    corrections.forget()
     bpy.app.handlers.load_pre.remove(forget_job)
     findings.forget()
     results.forget()

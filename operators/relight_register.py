@@ -7,7 +7,7 @@ import bpy
 from . import before_after, export, panel_export, panel_relight, relight, relight_props, relight_view, relight_virtual
 
 
-def _own(*modules) -> tuple[type, ...]:
+def own(*modules) -> tuple[type, ...]:
     """The classes of modules whose names are Blender's, in the order of their writing."""
     return tuple(one for module in modules for name, one in vars(module).items()
                  if name.startswith("SCAN_RELIGHT_") and one.__module__ == module.__name__)
@@ -20,12 +20,12 @@ def relight_groups() -> tuple[type, ...]:
 
 def relight_operators() -> tuple[type, ...]:
     """Operators."""
-    return _own(relight, relight_view, relight_virtual, before_after, export)
+    return own(relight, relight_view, relight_virtual, before_after, export)
 
 
 def relight_panels() -> tuple[type, ...]:
     """Lists and panels; a panel comes before those within it."""
-    return _own(panel_relight, panel_export)
+    return own(panel_relight, panel_export)
 
 
 def relight_pointers() -> tuple[tuple[type, str, type], ...]:

@@ -14,6 +14,9 @@ from . import preferences
 PAGE = "report.html"
 SURE, FAIR = 0.15, 0.4
 """Doubt (`doubt`) up to which an object counts as sure, and as fairly sure."""
+MODELS = {"lambertian": "Lambertian (matt)", "specular": "Specular", "metal": "Metal", "emitter": "Lamp",
+          "transparent": "Transparent"}
+GIVEN = {"model": "model", "roughness": "roughness", "f0": "F0", "base_color": "colour", "same_as": "same as object"}
 
 
 def folder_of(scene: bpy.types.Scene) -> Path | None:
@@ -105,8 +108,7 @@ def _mean(value) -> float | None:
 def facts(one: dict[str, Any]) -> list[tuple[str, str]]:
     """Label and text of everything that the panel tells of an object."""
     model, evidence = one.get("model", ""), one.get("evidence") or {}
-    found = [("Model", {"lambertian": "Lambertian (matt)", "specular": "Specular", "metal": "Metal",
-                        "emitter": "Lamp", "transparent": "Transparent"}.get(model, model))]
+    found = [("Model", MODELS.get(model, model))]
     phi = one.get("phi")
     if phi is not None:
         found.append(("Roughness", _between(max(phi, 0) ** 0.5, one.get("roughness_low"), one.get("roughness_high"))))
@@ -122,7 +124,20 @@ def facts(one: dict[str, Any]) -> list[tuple[str, str]]:
         found.append(("Seen", f"{evidence['seen_share']:.0%} of {evidence.get('area', 0):.3g} m\u00b2"))
     if evidence.get("observations") is not None:
         found.append(("Views", f"{evidence['observations']:.0f}"))
+    coat = one.get("coat")
+    if coat:
+        found.append(("Assumed coat", f"roughness {coat.get('roughness', 0):.2f}, F0 {coat.get('f0', 0):.2f}"))
+    said = one.get("given")
+    if said:
+        found.append(("Given", ", ".join(f"{GIVEN.get(key, key)} {_told(value)}" for key, value in said.items())))
     return [*found, ("Certainty", certainty(one).capitalize())]
+
+
+def _told(value) -> str:
+    """A given value in words."""
+    if isinstance(value, (list, tuple)):
+        return " ".join(map(_told, value))
+    return f"{value:.2f}" if isinstance(value, float) else MODELS.get(value, str(value))
 
 
 def _between(value: float, low: float | None, high: float | None) -> str:

@@ -19,6 +19,16 @@ IMAGE = "scan_relight_image"
 """Of an image: the absolute path of the result folder's file that it came from."""
 OWN_SCENE = "scan_relight_own"
 """Of a scene: True where it was made for a room and holds nothing else of the artist's."""
+GIVEN = "scan_relight_given"
+"""Of an object: JSON of what the artist says of its material, as an override holds it; absent where nothing is said."""
+WHITE = "scan_relight_white"
+"""Of an object: the albedo, three numbers, that the artist says it has; it fixes the whole room's scale."""
+FOUND = "scan_relight_found"
+"""Of an object: JSON of what was found where something else is given now."""
+PAINTED = "scan_relight_painted"
+"""Of an object: the artist's own Base Color image, which later runs leave alone. Of that image: where it came from."""
+SMOOTH = "scan_relight_smooth"
+"""Of an object: the angle in radians from which on its edges stay sharp."""
 
 
 def mark(owner, folder: Path | str, run: str, capture: Path | str | None = None) -> None:

@@ -50,7 +50,12 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
     bpy.types.Material
         Its custom properties ``scan_relight_model``, ``_phi``, ``_psi``, ``_transmission`` tell what was fitted.
     """
-    material = bpy.data.materials.new(description.name)
+    return dress(bpy.data.materials.new(description.name), description, base_color, emission, one_sided)
+
+
+def dress(material: bpy.types.Material, description: ObjectMaterial, base_color: bpy.types.Image | None = None,
+          emission: bpy.types.Image | None = None, one_sided: bool = False) -> bpy.types.Material:
+    """`make_material` with a material that is there: its nodes go, its name and whoever wears it stay."""
     nodes, links, principled = _fresh_tree(material)
     value = {name: principled.inputs[name] for name in (
         BASE_COLOR, METALLIC, ROUGHNESS, IOR, SPECULAR_LEVEL, EMISSION_COLOR, EMISSION_STRENGTH, ALPHA)}
@@ -88,13 +93,20 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
         number = getattr(description, name)
         if number is not None:
             material[f"scan_relight_{name}"] = float(number)
+        elif f"scan_relight_{name}" in material:
+            del material[f"scan_relight_{name}"]
     return material
+
+
+def principled(material: bpy.types.Material | None) -> bpy.types.ShaderNode | None:
+    """A material's Principled node; None where it has none."""
+    nodes = material.node_tree.nodes if material and material.node_tree else ()
+    return next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
 
 
 def opacity(material: bpy.types.Material) -> float:
     """Alpha of a material's Principled node; 1 where it has none."""
-    nodes = material.node_tree.nodes if material.node_tree else ()
-    shader = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
+    shader = principled(material)
     return 1.0 if shader is None else shader.inputs[ALPHA].default_value
 
 

@@ -32,7 +32,7 @@ class Layout:
         assert idname.startswith("scan_relight")
         return self._part(), self._part() if self._open else None
 
-    def label(self, text="", icon="NONE"):
+    def label(self, text="", icon="NONE", **_):
         self.words.append(text)
 
     def separator(self, **_):
@@ -86,7 +86,9 @@ def draw(ops):
                 else:
                     setattr(panel, name, value.__get__(panel))
         context = SimpleNamespace(scene=bpy.context.scene, preferences=bpy.context.preferences, mode=bpy.context.mode,
-                                  region=SimpleNamespace(width=width), window_manager=bpy.context.window_manager)
+                                  region=SimpleNamespace(width=width), window_manager=bpy.context.window_manager,
+                                  view_layer=bpy.context.view_layer, active_object=bpy.context.active_object,
+                                  selected_objects=bpy.context.selected_objects)
         assert cls.poll(context)
         cls.draw(panel, context)
         return layout

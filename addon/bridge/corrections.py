@@ -1,0 +1,276 @@
+"""What the artist says of recovered objects: kept with them, shown at once, written beside the result for a refit.
+
+An object's property `marks.GIVEN` holds it, so that it is saved and undone with the scene. The result folder's
+`overrides.json`, which runs heed, is brought in line with the scene whenever a run or refit begins (`keep`).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ..core.atomic import write_bytes
+from ..core.errors import BadInputError
+from ..core.material import LAMBERTIAN, METAL, SPECULAR
+from ..core.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
+from ..core.room_file import MATERIALS
+from . import correct_material, look, smoothing, unseen
+from .marks import FOUND, GIVEN, OBJECT_ID, RESULT, RUN, WHITE
+
+F0_COATED, F0_METAL, ROUGHNESS = 0.04, 0.6, 0.3
+"""What is shown until a refit, where nothing better is known."""
+
+_entries: dict[Path, tuple[tuple, dict]] = {}
+_written: dict[Path, set[int | str]] = {}
+"""Objects, by result folder, whose entries in its overrides.json come from this session's scenes: undo reaches them."""
+
+
+def correctable(thing: bpy.types.Object | None) -> bool:
+    """Whether an object wears a recovered material that can be changed."""
+    return thing is not None and thing.type == "MESH" and OBJECT_ID in thing and not thing.library \
+        and correct_material.worn_material(thing) is not None
+
+
+def result_folder(thing: bpy.types.Object) -> Path | None:
+    """The result folder that an object came from; None where it is gone. An opened scene.blend lies in it."""
+    if thing.get(RESULT) and (Path(thing[RESULT]) / MATERIALS).is_file():
+        return Path(thing[RESULT])
+    beside = Path(bpy.data.filepath).parent if bpy.data.filepath else None
+    return beside if beside and (beside / MATERIALS).is_file() else None
+
+
+def told(folder: Path) -> dict[str, Any]:
+    """A result's materials.json, its `objects` by number; {} where it is absent or damaged. Read when it changes."""
+    try:
+        stat = (folder / MATERIALS).stat()
+        stamp = stat.st_mtime_ns, stat.st_size
+        if _entries.get(folder, (None,))[0] != stamp:
+            read = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))
+            read["objects"] = {one["object_id"]: one for one in read["objects"]}
+            _entries[folder] = stamp, read
+        return _entries[folder][1]
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+
+
+def entry(thing: bpy.types.Object) -> dict[str, Any]:
+    """What an object's own run says of it; {} where that is gone or another run took its place."""
+    folder = result_folder(thing)
+    found = told(folder) if folder else {}
+    if thing.get(RUN, "") != found.get("run", ""):
+        return {}
+    return found.get("objects", {}).get(thing.get(OBJECT_ID), {})
+
+
+def given(thing: bpy.types.Object) -> dict[str, Any]:
+    """What is given of an object: by the artist here, else by the overrides that its run was made with."""
+    if GIVEN not in thing:
+        return dict(entry(thing).get("given") or {})
+    try:
+        value = json.loads(thing[GIVEN])
+    except (TypeError, ValueError):
+        return {}
+    return value if isinstance(value, dict) else {}
+
+
+def give(thing: bpy.types.Object, **values) -> None:
+    """Say something of an object's material and show it.
+
+    Parameters
+    ----------
+    thing : bpy.types.Object
+        `correctable`.
+    **values
+        As in an override: `model`, `roughness`, `f0`, `base_color`, `same_as`; None takes one back. What contradicts
+        them and was given before goes (`core.overrides.merge`).
+
+    Raises
+    ------
+    BadInputError
+        A value can't be, or objects would be the same as each other in a circle.
+    """
+    number = thing[OBJECT_ID]
+    room = {one[OBJECT_ID]: one for one in _room_of(thing)}
+    newer = parse({"objects": {str(number): {key: _plain(value) for key, value in values.items()}}},
+                  f"Object '{thing.name}'", room)
+    older = {i: Given(**_tuples(given(one))) for i, one in room.items() if i == number or GIVEN in one}
+    said = merge(Overrides(older), newer).of(number).as_dict()
+    correct_material.note(thing, entry(thing))
+    thing[GIVEN] = json.dumps(said)
+    show(thing)
+    for other in _followers(thing):
+        show(other)
+
+
+def take_back(thing: bpy.types.Object, *keys: str) -> None:
+    """Go back to what was found, for `keys` or in everything."""
+    give(thing, **dict.fromkeys(keys or tuple(given(thing)), None))
+
+
+def _plain(value):
+    """Numbers as JSON has them, within 0...1; all else as it is."""
+    if isinstance(value, (str, int)) or value is None:
+        return value
+    return [_plain(one) for one in value] if hasattr(value, "__len__") else round(min(max(float(value), 0.0), 1.0), 6)
+
+
+def _tuples(said: dict[str, Any]) -> dict[str, Any]:
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in said.items()}
+
+
+def by_id(thing: bpy.types.Object, number: int) -> bpy.types.Object | None:
+    """Another object of the same room."""
+    folder = thing.get(RESULT)
+    return next((one for scene in thing.users_scene for one in scene.objects
+                 if one.get(OBJECT_ID) == number and one.get(RESULT) == folder and correctable(one)), None)
+
+
+def _followers(thing: bpy.types.Object) -> list[bpy.types.Object]:
+    """Objects that are said to be the same as this one."""
+    return [one for scene in thing.users_scene for one in scene.objects if GIVEN in one and one != thing
+            and given(one).get("same_as") == thing.get(OBJECT_ID) and one.get(RESULT) == thing.get(RESULT)
+            and correctable(one)]
+
+
+def found(thing: bpy.types.Object) -> dict[str, Any]:
+    """`model`, `roughness`, `f0` and `base_color` as they were found; None where there is no such thing."""
+    return correct_material.found(thing, entry(thing))
+
+
+def effective(thing: bpy.types.Object, seen: frozenset = frozenset()) -> dict[str, Any]:
+    """The same with what is given laid over it."""
+    values, said = found(thing), given(thing)
+    before = values["model"]
+    other = by_id(thing, said["same_as"]) if said.get("same_as") is not None else None
+    if other is not None and other.name not in seen:
+        theirs = effective(other, seen | {thing.name})
+        values |= {key: theirs[key] for key in LOBE}
+    values |= {key: said[key] for key in (*LOBE, "base_color") if key in said}
+    if "model" not in said and {"f0", "roughness"} & said.keys() and values["model"] == LAMBERTIAN:
+        values["model"] = SPECULAR
+    if values["model"] == METAL and "base_color" in said and "f0" not in said:
+        values["f0"] = said["base_color"]
+    if values["model"] in (SPECULAR, METAL):
+        if values["roughness"] is None:
+            values["roughness"] = ROUGHNESS
+        coloured = isinstance(values["f0"], (list, tuple))
+        new_model = values["model"] != before and other is None and not {"f0", "base_color"} & said.keys()
+        if values["f0"] is None or new_model:
+            values["f0"] = F0_COATED if values["model"] == SPECULAR else values["base_color"] or [F0_METAL] * 3
+        elif values["model"] == METAL and not coloured:
+            values["f0"] = [values["f0"]] * 3
+        elif values["model"] == SPECULAR and coloured:
+            values["f0"] = sum(values["f0"]) / 3
+    return values
+
+
+def show(thing: bpy.types.Object) -> None:
+    """Bring an object's material in line with what is given."""
+    if correctable(thing):
+        correct_material.show(thing, effective(thing), entry(thing))
+        if not given(thing) and found(thing) == correct_material.worn(thing, entry(thing)):
+            thing.pop(FOUND, None)
+
+
+def reapply(thing: bpy.types.Object) -> list[str]:
+    """Bring back what the artist did to an object whose mesh or material a run has just made anew.
+
+    Its corrected values, its painted image, its smooth shading. For whoever updates a room, at the end of each object.
+
+    Returns
+    -------
+    list of str
+        Sentences on what no longer fits.
+    """
+    smoothing.reapply(thing)
+    if not correctable(thing):
+        return []
+    correct_material.renew(thing, given(thing))
+    said = unseen.reapply(thing)
+    show(thing)
+    return said
+
+
+def say_white(thing: bpy.types.Object, albedo) -> None:
+    """Say what albedo an object has (number or three, 0...1), in place of any other of its room."""
+    value = _plain(albedo if hasattr(albedo, "__len__") else [float(albedo)] * 3)
+    for other in _room_of(thing):
+        if WHITE in other:
+            del other[WHITE]
+    thing[WHITE] = value
+
+
+def white_of(thing: bpy.types.Object) -> tuple[bpy.types.Object, list[float]] | None:
+    """The object of a room whose albedo is given, and that albedo; None where none is."""
+    return next(((one, list(one[WHITE])) for one in _room_of(thing) if WHITE in one), None)
+
+
+def take_white_back(thing: bpy.types.Object) -> None:
+    """Let the frames alone say the room's scale again."""
+    for other in _room_of(thing):
+        if WHITE in other:
+            del other[WHITE]
+
+
+def _room_of(thing: bpy.types.Object) -> list[bpy.types.Object]:
+    return list({one: None for scene in thing.users_scene for one in scene.objects
+                 if OBJECT_ID in one and one.get(RESULT) == thing.get(RESULT)})
+
+
+def folder_for(things: Iterable[bpy.types.Object]) -> Path:
+    """The one result folder of `things`; raises `BadInputError` where there are several, or none any more."""
+    folders = {result_folder(thing) for thing in things}
+    if len(folders) != 1:
+        raise BadInputError("The selected objects come from several results; select those of one room.")
+    folder = folders.pop()
+    if folder is None:
+        raise BadInputError("The result folder of the selected objects is gone; choose where it lies now, or run the "
+                            "recovery again.")
+    return folder
+
+
+def keep(scene: bpy.types.Scene, folder: Path) -> set[int]:
+    """Bring a result's `overrides.json` in line with what is given in a scene.
+
+    Entries of objects of which the scene says nothing are left alone, unless it was this session that wrote them: then
+    the artist has taken them back by undo.
+
+    Returns
+    -------
+    set of int
+        Objects whose entry is not what the result's materials were made with: a refit has to do them.
+
+    Raises
+    ------
+    BadInputError
+        The file is damaged.
+    StorageError
+        It can't be written.
+    """
+    things = [thing for thing in look.recovered(scene) if result_folder(thing) == folder]
+    said = {thing[OBJECT_ID]: Given(**_tuples(given(thing))) for thing in things if GIVEN in thing}
+    result = told(folder).get("objects", {})
+    before = kept_overrides(folder, {*result, *said})
+    ours = _written.setdefault(folder, set())
+    objects = {i: one for i, one in before.objects.items() if i not in ours} | said
+    white = before.white if "white" not in ours else None
+    stated = next((thing for thing in things if WHITE in thing), None)
+    if stated is not None:
+        white = White(stated[OBJECT_ID], tuple(stated[WHITE]))
+    now = Overrides({i: one for i, one in objects.items() if one.any}, white)
+    if now.as_dict() != before.as_dict():
+        write_bytes(folder / OVERRIDES, json.dumps(now.as_dict(), indent=1).encode())
+    ours |= said.keys() | ({"white"} if stated is not None else set())
+    return {i for i, one in result.items() if now.of(i).as_dict() != (one.get("given") or {})}
+
+
+def forget() -> None:
+    """Read every result again."""
+    _entries.clear()
+    _written.clear()
+
+

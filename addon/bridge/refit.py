@@ -1,0 +1,130 @@
+"""Some objects of a room fitted again under what the artist gives, and brought into the scene where they are."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Generator, Iterable
+from pathlib import Path
+
+import bpy
+
+from ..core.errors import MissingStageError
+from ..core.material import EMITTER
+from ..core.room_file import DAMAGE, MATERIALS, material
+from . import corrections, relight_lamps, result_images
+from .correct_material import worn_material
+from .marks import IMAGE, OBJECT_ID, RESULT, mark
+from .materials import MODEL, dress
+from .mesh_objects import is_open
+from .scene import BASE_COLOR
+
+_WORN = ("model", "phi", "psi", "f0", "emission", "transmission", "surfaces", "coat", "given")
+"""Of an entry of materials.json, what its object's material is made of."""
+
+
+def words(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> tuple[Path, list[str], dict[int, dict]]:
+    """What has to be run: writes down what is given and finds all that it bears on.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    things : iterable of bpy.types.Object
+        At least these are fitted again; they are of one room.
+
+    Returns
+    -------
+    folder : Path
+        The result folder.
+    words : list of str
+        Of the command line.
+    before : dict of int to dict
+        The entries of materials.json as they are now.
+
+    Raises
+    ------
+    BadInputError
+        The result is gone, or they are of several.
+    StorageError
+        Its `overrides.json` can't be written.
+    """
+    things = list(things)
+    folder = corrections.folder_for(things)
+    numbers = corrections.keep(scene, folder) | {thing[OBJECT_ID] for thing in things}
+    objects = [word for number in sorted(numbers) for word in ("--object", str(number))]
+    before = corrections.told(folder).get("objects", {})
+    return folder, ["refit", str(folder), *objects, "--progress", "json", "--stop-with-stdin"], dict(before)
+
+
+def fitted(folder: Path) -> dict:
+    """What the refit left in materials.json, objects by number; raises `MissingStageError` where it left nothing."""
+    try:
+        read = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))
+        return read | {"objects": {one["object_id"]: one for one in read["objects"]}}
+    except DAMAGE as error:
+        raise MissingStageError(f"'{folder / MATERIALS}' is missing or damaged; run the recovery again.") from error
+
+
+def bringing(scene: bpy.types.Scene, folder: Path, before: dict[int, dict],
+             after: dict) -> Generator[float, None, tuple[str, ...]]:
+    """Put onto a scene's objects what a refit changed; yields the share done, returns warnings.
+
+    Only materials that the refit changed are made anew, so that what an artist did to others by hand stays.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    folder : Path
+        The result folder.
+    before, after : dict
+        What `words` and `fitted` gave.
+    """
+    things = [thing for thing in scene.objects if corrections.correctable(thing)
+              and corrections.result_folder(thing) == folder]
+    image = _renew_images(folder)
+    run, warnings = after.get("run", ""), []
+    for done, thing in enumerate(things):
+        yield done / max(len(things), 1)
+        number = thing[OBJECT_ID]
+        now = after["objects"].get(number)
+        mark(thing, folder, run)
+        if now is not None and any(now.get(key) != before.get(number, {}).get(key) for key in _WORN):
+            _dress(thing, now, image)
+            warnings += corrections.reapply(thing)
+    for collection in scene.collection.children_recursive:
+        if collection.get(RESULT) and Path(collection[RESULT]) == folder:
+            mark(collection, folder, run)
+    return tuple(warnings)
+
+
+def _dress(thing: bpy.types.Object, entry: dict, image: bpy.types.Image | None) -> None:
+    """Make an object's material anew in place; a lamp stays as bright as it was set."""
+    worn = worn_material(thing)
+    description = material(entry)
+    state = relight_lamps.snapshot(worn) if relight_lamps.is_lamp(worn) else None
+    if state is not None:
+        relight_lamps.restore(worn)
+    dress(worn, description, image, one_sided=description.model == EMITTER and is_open(thing.data))
+    if state is not None and worn[MODEL] == EMITTER:
+        relight_lamps.put_back(worn, state)
+
+
+def _renew_images(folder: Path) -> bpy.types.Image | None:
+    """Read the result's images again, wherever in this file they lie; the one of Base Color."""
+    found = None
+    for one in list(bpy.data.images):
+        if one.library or one.source != "FILE":
+            continue
+        source = Path(one.get(IMAGE) or bpy.path.abspath(one.filepath))
+        if source.parent != folder or source.name not in result_images.COLOUR_SPACES or not source.is_file():
+            continue
+        one[IMAGE] = str(source)
+        if one.packed_file:
+            one = result_images.image(folder, source.name, result_images.PACK, one.use_fake_user)
+        elif Path(bpy.path.abspath(one.filepath)) != source:
+            one = result_images.image(folder, source.name, result_images.FOLDER, one.use_fake_user)
+        else:
+            one.reload()
+        found = one if source.name == BASE_COLOR else found
+    if found is None and (folder / BASE_COLOR).is_file():
+        found = result_images.image(folder, BASE_COLOR)
+    return found
