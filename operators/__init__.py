@@ -17,10 +17,12 @@ def classes() -> tuple[type, ...]:
         SCAN_RELIGHT_OT_open_result,
         SCAN_RELIGHT_OT_use_folder,
     )
+    from .find_result import SCAN_RELIGHT_OT_find_result, SCAN_RELIGHT_PT_missing
     from .fit import SCAN_RELIGHT_OT_fit
     from .import_capture import SCAN_RELIGHT_OT_import_capture
     from .job_operator import SCAN_RELIGHT_OT_stop
     from .look import SCAN_RELIGHT_OT_look
+    from .move_results import SCAN_RELIGHT_OT_move_results
     from .open_report import SCAN_RELIGHT_OT_open_report
     from .panel_capture import SCAN_RELIGHT_PT_capture
     from .panel_look import SCAN_RELIGHT_PT_look, SCAN_RELIGHT_PT_own_scene
@@ -44,13 +46,14 @@ def classes() -> tuple[type, ...]:
         SCAN_RELIGHT_OT_check_capture, SCAN_RELIGHT_OT_import_capture,
         SCAN_RELIGHT_OT_accumulate, SCAN_RELIGHT_OT_shade, SCAN_RELIGHT_OT_fit, SCAN_RELIGHT_OT_write,
         SCAN_RELIGHT_OT_recover, SCAN_RELIGHT_OT_run, SCAN_RELIGHT_OT_stop, SCAN_RELIGHT_OT_clear_cache,
+        SCAN_RELIGHT_OT_move_results, SCAN_RELIGHT_OT_find_result,
         SCAN_RELIGHT_OT_open_capture, SCAN_RELIGHT_OT_open_result, SCAN_RELIGHT_OT_use_folder, SCAN_RELIGHT_OT_drop,
         SCAN_RELIGHT_FH_json,
         # The artist's side.
         SCAN_RELIGHT_OT_capture_from_scene, SCAN_RELIGHT_OT_restore_materials, SCAN_RELIGHT_OT_select_result_object,
         SCAN_RELIGHT_OT_look, SCAN_RELIGHT_OT_open_report, *relight_operators(), *correct_operators(),
         # Panels, in the order of the work; a panel's parts come after it.
-        SCAN_RELIGHT_PT_capture, SCAN_RELIGHT_PT_own_scene,
+        SCAN_RELIGHT_PT_missing, SCAN_RELIGHT_PT_capture, SCAN_RELIGHT_PT_own_scene,
         SCAN_RELIGHT_PT_recover,
         SCAN_RELIGHT_UL_results, SCAN_RELIGHT_PT_results, *correct_panels(),
         SCAN_RELIGHT_PT_stages,
@@ -74,7 +77,7 @@ def register():
     """Register every class and hang the property groups up."""
     import bpy
 
-    from . import menus
+    from . import find_result, menus
     from .correct_register import register_handlers
     from .job_operator import forget_job
     from .panel_results import active_row_property
@@ -85,6 +88,8 @@ def register():
         setattr(owner, name, bpy.props.PointerProperty(type=group))
     bpy.types.Scene.scan_relight_row = active_row_property()
     bpy.app.handlers.load_pre.append(forget_job)
+    bpy.app.handlers.load_post.append(find_result.look_for_results)
+    bpy.app.handlers.save_post.append(find_result.found_is_kept)
     register_handlers()
     menus.register()
 
@@ -94,7 +99,7 @@ def unregister():
     import bpy
 
     from ..addon.bridge import corrections, job
-    from . import findings, menus, results
+    from . import find_result, findings, menus, results
     from .correct_register import unregister_handlers
     from .job_operator import forget_job
 
@@ -102,6 +107,8 @@ def unregister():
     unregister_handlers()
     corrections.forget()
     bpy.app.handlers.load_pre.remove(forget_job)
+    bpy.app.handlers.load_post.remove(find_result.look_for_results)
+    bpy.app.handlers.save_post.remove(find_result.found_is_kept)
     findings.forget()
     results.forget()
     del bpy.types.Scene.scan_relight_row

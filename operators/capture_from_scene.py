@@ -1,8 +1,11 @@
 """`bpy.ops.scan_relight.capture_from_scene`: the selected objects and the cameras' backgrounds become a capture."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+from pathlib import Path
+
 import bpy
 
+from ..addon.bridge import result_home
 from ..addon.core.errors import ScanRelightError
 from . import poll, preferences
 from .settings_props import can_start
@@ -20,8 +23,8 @@ class SCAN_RELIGHT_OT_capture_from_scene(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     result_folder: bpy.props.StringProperty(
-        name="Result", description="The capture goes into a folder within this one; empty takes the panel's, or one in "
-        "the cache folder", subtype="DIR_PATH")
+        name="Result", description="The capture goes into a folder within this one; empty takes the panel's, or a "
+        "folder of its own among the results", subtype="DIR_PATH")
     cameras: bpy.props.EnumProperty(
         name="Frames", description="Which cameras took the pictures",
         items=[("AUTO", "Automatic", "An animation where the only camera has a sequence or a clip behind it, else one "
@@ -66,10 +69,12 @@ class SCAN_RELIGHT_OT_capture_from_scene(bpy.types.Operator):
         from ..addon.bridge.scene_capture import capture_scene
 
         choices = context.scene.scan_relight
-        folder = preferences.result_folder(self.result_folder or choices.result_folder,
-                                           bpy.data.filepath or "unsaved") / FOLDER
+        chosen = self.result_folder or choices.result_folder
+        folder = Path(bpy.path.abspath(chosen)) / FOLDER if chosen else result_home.capture_folder(
+            preferences.results_folder(), choices.capture_folder)
         first, last = (None, None) if self.whole_range else (self.frame_start, self.frame_end)
         try:
+            result_home.check(str(folder))
             for sentence in capture_scene(context, folder, context.selected_objects, self.cameras, first, last,
                                           self.frame_step):
                 self.report({"WARNING"}, sentence)

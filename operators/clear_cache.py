@@ -1,22 +1,30 @@
-"""`bpy.ops.scan_relight.clear_cache`: free what runs have left in the cache folder of the preferences."""
+"""`bpy.ops.scan_relight.clear_cache`: free the stages of results, which can be made again. Results stay."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+from pathlib import Path
+
 import bpy
 
-from . import poll, preferences
+from ..addon.bridge import result_home
+from . import poll, preferences, results
+
+
+def folders(scene: bpy.types.Scene | None) -> list[Path]:
+    """The results whose stages can be cleared: in the results folder, beside the .blend, and the scene's own."""
+    from ..addon.core.result_cache import results as below
+
+    beside = result_home.beside()
+    own = results.folder_of(scene) if scene is not None else None
+    return [*below(preferences.results_folder()), *(below(beside) if beside else ()), *([own] if own else ())]
 
 
 class SCAN_RELIGHT_OT_clear_cache(bpy.types.Operator):
-    """Clear the cache folder."""
+    """Clear the finished stages of results."""
 
     bl_idname = "scan_relight.clear_cache"
-    bl_label = "Clear Cache"
-    bl_description = "Delete what runs have left in the cache folder; nothing else in it is touched"
-
-    what: bpy.props.EnumProperty(name="Delete", description="What is deleted", default="STAGES", items=[
-        ("STAGES", "Finished stages", "Results stay as they are; a further run begins anew"),
-        ("ALL", "Whole results", "Also images: scenes that show them lose their textures. A result whose scene.blend "
-         "you have saved again is kept")])
+    bl_label = "Clear Stages"
+    bl_description = ("Delete the finished stages that further runs would go on from: of the results in the results "
+                      "folder, beside this file, and of this scene's. The results themselves stay as they are")
 
     @classmethod
     def poll(cls, context):
@@ -25,21 +33,18 @@ class SCAN_RELIGHT_OT_clear_cache(bpy.types.Operator):
 
     def invoke(self, context, event):
         """Ask first."""
-        return context.window_manager.invoke_props_dialog(self, confirm_text="Delete")
-
-    def draw(self, context):
-        """What, and where."""
-        layout = self.layout
-        layout.label(text=str(preferences.cache_folder()), icon="FILE_CACHE")
-        layout.prop(self, "what", expand=True)
+        return context.window_manager.invoke_confirm(
+            self, event, title="Clear the finished stages?",
+            message="Results stay as they are; a further run begins anew.", confirm_text="Clear", icon="QUESTION")
 
     def execute(self, context):
         """Delete, and say how much is free again."""
         from ..addon.core.result_cache import clear
 
-        done = clear(preferences.cache_folder(), whole=self.what == "ALL")
+        done = clear(folders(context.scene))
         preferences.forget_size()
         for sentence in done.left:
             self.report({"WARNING"}, sentence)
-        self.report({"INFO"}, f"{preferences.amount(done.freed)} of {done.results} results deleted.")
+        self.report({"INFO"}, f"{preferences.amount(done.freed)} of stages deleted; {done.results} "
+                    f"result{'s' * (done.results != 1)} kept.")
         return {"FINISHED"}

@@ -47,12 +47,11 @@ class SCAN_RELIGHT_PT_own_scene(SidebarPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """Capture, where the images go, restore."""
+        """Capture, copies, restore."""
         layout, choices = self.layout, context.scene.scan_relight
         self.say(layout, context, "Select the room's objects; the EXR pictures behind the cameras are the frames.")
         layout.operator("scan_relight.capture_from_scene", icon="SCENE_DATA")
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False
-        column.prop(choices, "images")
         column.prop(choices, "copies")
         layout.operator("scan_relight.restore_materials", icon="LOOP_BACK")

@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 
 from ..addon.bridge import job as jobs
+from ..addon.bridge import result_home, result_images
 from ..addon.console import duration
 from ..addon.core.stages import LABELS, STAGES, WRITE
 from ..addon.core.unfinished import goes_on_with
@@ -62,8 +63,11 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         layout.prop(choices.settings, "shading_rays")
         layout.prop(choices, "result_folder")
         if not choices.result_folder and choices.capture_folder:
-            folder = preferences.result_folder("", choices.capture_folder)
-            self.say(layout, context, f"In the cache: {folder.name}", "FILE_CACHE")
+            folder = preferences.result_folder("", choices.capture_folder, context.scene)
+            self.say(layout, context, f"Goes into '{result_home.shown(folder)}'.", "FILE_FOLDER")
+        layout.prop(choices, "images")
+        if choices.images == result_images.FOLDER and not bpy.data.filepath:
+            self.say(layout, context, result_images.NEVER_SAVED, "ERROR")
         header, body = layout.panel("scan_relight_settings", default_closed=True)
         header.label(text="Settings" + (f" ({len(changed)} changed)" if changed else ""))
         if body is not None:
@@ -77,7 +81,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
     def start(self, context) -> None:
         """The button; where a run was stopped, it goes on, and there is another to start anew."""
         choices = context.scene.scan_relight
-        stage = goes_on_with(preferences.result_folder(choices.result_folder, choices.capture_folder)) \
+        stage = goes_on_with(preferences.result_folder(choices.result_folder, choices.capture_folder, context.scene)) \
             if choices.capture_folder else ""
         row = self.layout.row()
         row.scale_y = 1.4

@@ -1,15 +1,15 @@
-"""The add-on's preferences: where runs are kept, and what of the machine they may take."""
+"""The add-on's preferences: where results are kept, and what of the machine a run may take."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
-import hashlib
 import threading
 import time
 from pathlib import Path
 
 import bpy
 
-PACKAGE = __package__.rpartition(".")[0]
-"""The root package, under whatever name Blender installed it."""
+from ..addon.bridge import result_home
+
+PACKAGE = result_home.PACKAGE
 
 
 class ScanRelightPreferences(bpy.types.AddonPreferences):
@@ -17,9 +17,13 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
 
     bl_idname = PACKAGE
 
+    results_folder: bpy.props.StringProperty(
+        name="Results Folder", description="Where results go whose folder is not chosen and whose .blend was never "
+        "saved; empty takes 'Scan Relight' among your documents. A saved .blend has its results beside it",
+        subtype="DIR_PATH")
     cache_folder: bpy.props.StringProperty(
-        name="Cache Folder", description="Where runs go whose result folder is not chosen; empty takes a folder of "
-        "Blender's own", subtype="DIR_PATH")
+        name="Cache Folder", description="The results folder as earlier versions called it; heeded where none is set",
+        subtype="DIR_PATH", options={"HIDDEN"})
     threads: bpy.props.IntProperty(
         name="Threads", description="Processor threads that a run may take; 0 takes all", min=0, soft_max=64)
     memory_limit: bpy.props.FloatProperty(
@@ -30,10 +34,16 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
         """The choices."""
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop(self, "cache_folder")
+        layout.prop(self, "results_folder")
         row = layout.row()
-        row.label(text=cache_text(), icon="FILE_CACHE")
+        row.label(text=size_text(), icon="FILE_FOLDER")
         row.operator("scan_relight.clear_cache", icon="TRASH")
+        count = len(result_home.earlier_results())
+        if count:
+            row = layout.row()
+            row.label(text=f"{count} result{'s' * (count != 1)} of an earlier version in the extension's own folder: "
+                      "removing the extension would delete them.", icon="ERROR")
+            row.operator("scan_relight.move_results", icon="EXPORT")
         layout.prop(self, "threads")
         layout.prop(self, "memory_limit")
 
@@ -44,34 +54,30 @@ def preferences() -> ScanRelightPreferences | None:
     return found.preferences if found else None
 
 
-def cache_folder() -> Path:
-    """Where runs go whose result folder was not chosen; not made here."""
+def results_folder() -> Path:
+    """The folder of results whose own was not chosen and whose .blend was never saved; not made here."""
     ours = preferences()
-    if ours is not None and ours.cache_folder:
-        return Path(bpy.path.abspath(ours.cache_folder))
-    try:
-        return Path(bpy.utils.extension_path_user(PACKAGE, path="cache"))
-    except ValueError:  # not installed as an extension
-        return Path(bpy.utils.user_resource("DATAFILES", path="scan_relight")) / "cache"
+    return result_home.results_folder((ours.results_folder or ours.cache_folder) if ours is not None else "")
 
 
-def result_folder(chosen: str, capture_folder: str) -> Path:
-    """The result folder that `chosen` means for a capture: itself, or one in the cache where it is empty."""
+def result_folder(chosen: str, capture_folder: str, scene: bpy.types.Scene | None = None) -> Path:
+    """The result folder that `chosen` means for a capture: itself, or where it is empty the capture's own.
+
+    That is where `scene` has its room from, else beside the saved .blend, else in `results_folder`.
+    """
     if chosen:
         return Path(bpy.path.abspath(chosen))
-    capture = Path(bpy.path.abspath(capture_folder)).absolute()
-    mark = hashlib.sha256(str(capture).encode("utf-8", "surrogatepass")).hexdigest()[:8]
-    return cache_folder() / f"{capture.name}-{mark}"
+    return result_home.result_folder(Path(bpy.path.abspath(capture_folder)).absolute(), results_folder(), scene)
 
 
 SIZE_SECONDS = 30.0
-"""How old the cache's size may be that the preferences show."""
+"""How old the size may be that the preferences show."""
 _size: dict = {"folder": None, "time": 0.0, "text": "", "thread": None}
 
 
-def cache_text() -> str:
-    """What the cache takes, as far as is known; it is added up in a thread, as there may be many files."""
-    folder = cache_folder()
+def size_text() -> str:
+    """What the results take, as far as is known; it is added up in a thread, as there may be many files."""
+    folder = results_folder()
     thread = _size["thread"]
     if thread is not None and thread.is_alive():
         return "Adding up"
@@ -85,7 +91,7 @@ def cache_text() -> str:
 
 
 def forget_size() -> None:
-    """Have the cache's size added up again."""
+    """Have the size added up again."""
     _size["folder"] = None
 
 
@@ -96,9 +102,12 @@ def amount(size: int) -> str:
 
 def _add_up(folder: Path) -> None:
     from ..addon.core.result_cache import results, size
+    from ..addon.core.store import STAGES
 
     found = results(folder)
-    text = f"{len(found)} result{'s' * (len(found) != 1)}, {amount(sum(size(one) for one in found))}, in {folder}"
+    whole, stages = (sum(size(one / part) for one in found) for part in ("", STAGES))
+    text = f"{len(found)} result{'s' * (len(found) != 1)}, {amount(whole)}, of it {amount(stages)} that can be made " \
+           f"again, in {folder}"
     _size.update(folder=folder, time=time.monotonic(), text=text)
 
 

@@ -31,7 +31,7 @@ def folder_of(scene: bpy.types.Scene) -> Path | None:
     if choices.result_folder:
         return Path(bpy.path.abspath(choices.result_folder))
     if choices.capture_folder:
-        folder = preferences.result_folder("", choices.capture_folder)
+        folder = preferences.result_folder("", choices.capture_folder, scene)
         if (folder / MATERIALS).is_file():
             return folder
     return look.result_of(scene)

@@ -62,8 +62,8 @@ class ScanRelightScene(bpy.types.PropertyGroup):
     reading: bpy.props.PointerProperty(
         name="How It Is Read", description="How the capture is to be read", type=ScanRelightReading)
     result_folder: bpy.props.StringProperty(
-        name="Result", description="Folder for the recovered scene and the finished stages; empty takes one in the "
-        "cache folder of the preferences", subtype="DIR_PATH")
+        name="Result", description="Folder for the recovered scene and the finished stages; empty takes one beside "
+        "the saved .blend, or in the preferences' results folder", subtype="DIR_PATH")
     preset: bpy.props.EnumProperty(
         name="Preset", description="What all settings start from", items=preset_items(), default="normal",
         update=preset_chosen)

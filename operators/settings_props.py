@@ -9,6 +9,7 @@ from functools import cache
 
 import bpy
 
+from ..addon.bridge import result_home
 from ..addon.console import unexpected
 from ..addon.core.errors import BadInputError, ScanRelightError
 from ..addon.core.settings import PRESETS, Settings
@@ -139,7 +140,10 @@ class CaptureOperator(JobOperator):
         value = getattr(self, name)
         if not value:
             raise BadInputError(f"Choose the {name.replace('_', ' ')} first.")
-        return bpy.path.abspath(value)
+        folder = bpy.path.abspath(value)
+        if name == "result_folder":
+            result_home.check(folder)
+        return folder
 
 
 class StageOperator(CaptureOperator):

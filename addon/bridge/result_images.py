@@ -20,6 +20,7 @@ RESULT, FOLDER, PACK = "RESULT", "FOLDER", "PACK"
 COLOUR_SPACES = {BASE_COLOR: RADIANCE, ALBEDO: RADIANCE, SHADING: RADIANCE, "lit_diffuse.exr": RADIANCE,
                  "coverage.exr": DATA, "albedo_error.exr": DATA, "evidence.exr": DATA}
 UDIM = "<UDIM>"
+NEVER_SAVED = "Images can't go beside a file that was never saved; save it first, or pack them."
 BAKED = (BASE_COLOR, ALBEDO, SHADING)
 
 
@@ -76,7 +77,7 @@ def drop_unused(folders: Iterable[str]) -> None:
 def check(where: str) -> None:
     """Raise `BadInputError` where images can't go `where` in the open file: best asked before a run, not after it."""
     if where == FOLDER and not bpy.data.filepath:
-        raise BadInputError("Images can't go beside a file that was never saved; save it first, or pack them.")
+        raise BadInputError(NEVER_SAVED)
 
 
 def settle(images: Iterable[bpy.types.Image], where: str = RESULT) -> None:

@@ -24,6 +24,7 @@ from ..core.memory import peak_memory
 from ..core.overrides import OVERRIDES, heeded
 from ..core.progress import Progress, ProgressEvent
 from ..core.recover import Recovery
+from ..core.result_place import write_capture
 from ..core.room_file import ROOM, write_room
 from ..core.settings import Settings
 from ..core.stages import READ, RUN_STAGES, STAGES, WRITE
@@ -113,6 +114,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         imported(scene, capture)
     told = _look(capture, reading) if capture.frames else []
     with Store(out_folder) as store, _told(out_folder):
+        write_capture(store.folder, capture.root)
         if from_stage in STAGES:
             store.drop(STAGES[STAGES.index(from_stage):])
         if override is not None and heed_kept:

@@ -1,18 +1,15 @@
-"""A folder of result folders: how much they take, and clearing them away. Touches nothing that `Store` did not make."""
+"""Result folders: how much they take, and clearing what can be made again: the finished stages, and nothing else."""
 
 from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from .errors import ScanRelightError
 from .store import LOCK, STAGES, Store
-
-SCENE, REPORT = "scene.blend", "report.json"
-SAVED_AGAIN = 2.0
-"""Seconds after the report from which on a scene.blend was saved by its user: a run writes the report last."""
 
 
 @dataclass(frozen=True)
@@ -24,13 +21,16 @@ class Cleared:
     left: tuple[str, ...]
 
 
-def results(cache: Path | str) -> list[Path]:
-    """The result folders right below `cache`: those with a store's lock file and its folder of stages; no links."""
-    cache = Path(cache)
-    if not cache.is_dir():
-        return []
-    return sorted(one for one in cache.iterdir() if one.is_dir() and not one.is_symlink()
-                  and (one / LOCK).is_file() and (one / STAGES).is_dir() and not (one / STAGES).is_symlink())
+def is_result(folder: Path) -> bool:
+    """Whether a run wrote a folder: it has a store's lock file and its folder of stages; no links."""
+    return (folder.is_dir() and not folder.is_symlink() and (folder / LOCK).is_file() and (folder / STAGES).is_dir()
+            and not (folder / STAGES).is_symlink())
+
+
+def results(parent: Path | str) -> list[Path]:
+    """The result folders right below `parent`."""
+    parent = Path(parent)
+    return sorted(filter(is_result, parent.iterdir())) if parent.is_dir() else []
 
 
 def size(folder: Path | str) -> int:
@@ -45,47 +45,22 @@ def size(folder: Path | str) -> int:
     return total
 
 
-def clear(cache: Path | str, whole: bool = False) -> Cleared:
-    """Clear the stages of all result folders in `cache`, or these folders as a whole.
+def clear(folders: Iterable[Path]) -> Cleared:
+    """Clear the stages of result folders; what is no result is passed over.
 
     Without its stages a result shows as before; only a further run begins anew. A folder that a run is writing is left
-    as it is, and so is, where `whole`, one whose scene.blend was saved again since.
+    as it is.
     """
     freed, touched, left = 0, 0, []
-    for folder in results(cache):
+    for folder in filter(is_result, dict.fromkeys(folders)):
         try:
             with Store(folder):
-                if whole and _saved_again(folder):
-                    left.append(f"'{folder.name}' is kept, as its {SCENE} was changed since the run.")
-                    continue
-                before = size(folder)
-                _remove(folder / STAGES)
-                if whole:
-                    for one in folder.iterdir():
-                        if one.name != LOCK:  # Windows removes no open file
-                            _remove(one)
-            if whole:
-                (folder / LOCK).unlink(missing_ok=True)
-                folder.rmdir()
-            else:
-                (folder / STAGES).mkdir(exist_ok=True)  # by which the folder is known
-            freed += before - size(folder)
+                before = size(folder / STAGES)
+                shutil.rmtree(folder / STAGES)
+                (folder / STAGES).mkdir()  # by which the folder is known
+            freed += before
             touched += 1
         except (ScanRelightError, OSError) as error:
             left.append(str(error) if isinstance(error, ScanRelightError)
                         else f"'{folder.name}' can't be cleared ({error.strerror or error}).")
     return Cleared(freed, touched, tuple(left))
-
-
-def _saved_again(folder: Path) -> bool:
-    scene, report = folder / SCENE, folder / REPORT
-    if not scene.exists():
-        return False
-    return not report.exists() or scene.stat().st_mtime > report.stat().st_mtime + SAVED_AGAIN
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)

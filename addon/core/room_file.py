@@ -136,6 +136,15 @@ def capture_name(folder: Path | str) -> str:
     return told if told and isinstance(told, str) else folder.name
 
 
+def root_of(folder: Path | str) -> Path | None:
+    """Folder of the capture that `ROOM` tells of, and nothing else of it; None where the file is absent or damaged."""
+    try:
+        with open(Path(folder) / ROOM, "rb") as file, np.load(file, allow_pickle=False) as archive:
+            return Path(json.loads(archive["told"].tobytes())["root"])
+    except DAMAGE:
+        return None
+
+
 def _damaged(folder: Path, error: Exception) -> BadInputError:
     return BadInputError(f"The result in '{folder}' is damaged ({type(error).__name__}: {error}); "
                          "run the recovery again.")

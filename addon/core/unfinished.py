@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .result_cache import REPORT
+from .capture.folder import REPORT
 from .stages import STAGES, WRITE
 from .store import STAGES as FOLDER
 

@@ -27,8 +27,9 @@ from addon.core.capture.ply import read_ply
 QUICK = ("--shading-rays", "8", "--specular-rays", "2", "--emitter-rays", "2", "--refine", "0", "--texel-size", "0.2",
          "--atlas-size", "256")
 FRAMES = 10
-RESULTS = {"albedo.exr", "albedo_error.exr", "base_color.exr", "coverage.exr", "environment.exr", "evidence.exr",
-           "lit_diffuse.exr", "materials.json", "report.html", "report.json", "room.npz", "scene.blend", "shading.exr"}
+RESULTS = {"albedo.exr", "albedo_error.exr", "base_color.exr", "capture.json", "coverage.exr", "environment.exr",
+           "evidence.exr", "lit_diffuse.exr", "materials.json", "report.html", "report.json", "room.npz", "scene.blend",
+           "shading.exr"}
 STAGES = ("surface", "lit_diffuse", "shading", "specular")
 
 

@@ -161,6 +161,7 @@ def test_what_is_chosen_arrives(ops, name, until, paper, package, tmp_path, monk
         return {"warnings": ["This was odd."]}
 
     monkeypatch.setattr(module, "run", remember)
+    monkeypatch.chdir(tmp_path)
     done = getattr(ops, name)(capture_folder="a", result_folder="b", paper=paper, seed=5, median="mean")
     assert done == {"FINISHED"}
     [(capture, result, chosen, stage, where)] = asked

@@ -1,8 +1,6 @@
-"""The cache: what counts as ours, what is cleared, what is left alone."""
+"""Clearing stages: what counts as ours, what is cleared, what is left alone."""
 
 from __future__ import annotations
-
-import os
 
 import numpy as np
 import pytest
@@ -46,38 +44,21 @@ def test_size_counts_files_and_follows_no_link(cache, tmp_path):
     assert size(cache / "photos") == 4 and 16000 < size(cache) < 10**6 < size(tmp_path / "elsewhere")
 
 
-def test_stages_go_and_results_stay(cache):
+def test_stages_go_and_results_stay(cache, tmp_path):
     before = size(cache / "room")
-    done = clear(cache)
+    done = clear([*results(cache), cache / "photos", cache / "link", cache / "not-there"])
     assert done.results == 2 and done.freed > 16000 and not done.left
     assert not any(list((one / "stages").iterdir()) for one in results(cache))
     assert (cache / "room" / "albedo.exr").read_text() == "picture"
+    assert (cache / "photos" / "mine.png").exists() and (cache / "notes.txt").exists()
+    assert (tmp_path / "elsewhere" / "kept" / "stages" / "surface.npz").exists()
     assert size(cache / "room") < before and len(results(cache)) == 2
     with Store(cache / "room") as store:
         assert store.finished() == []
 
 
-def test_whole_results_go_and_nothing_else(cache, tmp_path):
-    done = clear(cache, whole=True)
-    assert done.results == 2 and not done.left
-    assert sorted(one.name for one in cache.iterdir()) == ["link", "notes.txt", "photos", "stages"]
-    assert (cache / "photos" / "mine.png").exists()
-    assert (tmp_path / "elsewhere" / "kept" / "stages" / "surface.npz").exists()
-
-
 def test_a_folder_that_is_being_written_is_left(cache):
     with Store(cache / "room"):
-        done = clear(cache, whole=True)
+        done = clear(results(cache))
     assert done.results == 1 and "another run" in done.left[0]
     assert (cache / "room" / "stages" / "surface.npz").exists()
-
-
-def test_a_scene_that_was_saved_again_is_kept(cache):
-    scene = cache / "room" / "scene.blend"
-    scene.write_text("work")
-    later = (cache / "room" / "report.json").stat().st_mtime + 60
-    os.utime(scene, (later, later))
-    done = clear(cache, whole=True)
-    assert done.results == 1 and "'room' is kept" in done.left[0] and scene.exists()
-    assert (cache / "room" / "stages" / "surface.npz").exists()
-    assert clear(cache).results == 1 and scene.exists()

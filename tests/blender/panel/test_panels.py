@@ -177,6 +177,8 @@ def test_run_hands_over_what_was_chosen(choices, module, monkeypatch, tmp_path):
     asked = []
     monkeypatch.setattr(module("addon.bridge.run"), "run", lambda capture, result, settings, progress, until, **where:
                         asked.append((capture, result, settings, until, where)) or {"warnings": []})
+    monkeypatch.setenv("HOME", str(tmp_path / "me"))
+    monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     choices.capture_folder, choices.preset = str(tmp_path / "room"), "draft"
     choices.settings.texel_size = 0.12
     assert bpy.ops.scan_relight.run(from_stage="shading") == {"FINISHED"}
@@ -187,7 +189,7 @@ def test_run_hands_over_what_was_chosen(choices, module, monkeypatch, tmp_path):
 
     assert asdict(settings) == asdict(replace(DRAFT, texel_size=0.12))
     assert capture == str(tmp_path / "room") and until == "write" and where["from_stage"] == "shading"
-    assert "cache" in result and "room-" in result
+    assert result == str(tmp_path / "me" / "Scan Relight" / "room")
     choices.result_folder = str(tmp_path / "mine")
     bpy.ops.scan_relight.run()
     assert asked[-1][1] == str(tmp_path / "mine")
