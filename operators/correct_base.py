@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..addon.bridge import corrections, refit
+from ..addon.bridge import corrections, refitted
 from ..addon.bridge import job as jobs
 from ..addon.console import unexpected
 from ..addon.core.errors import ScanRelightError
@@ -80,7 +80,7 @@ class RefitOperator(JobOperator):
         """Fit `things` again; what `execute` returns."""
         from ..addon.bridge.job_command import command
 
-        folder, words, before = refit.words(context.scene, things)
+        folder, words, before = refitted.words(context.scene, things)
         facts = {"title": self.bl_label, "result_folder": str(folder), "before": before}
         if not bpy.app.background:
             return self.start(context, command(words), **facts)
@@ -104,11 +104,11 @@ class RefitOperator(JobOperator):
         from pathlib import Path
 
         folder = Path(job.facts["result_folder"])
-        return folder, job.facts["before"], refit.fitted(folder)
+        return folder, job.facts["before"], refitted.fitted(folder)
 
     def change(self, scene, loaded):
         """Put it onto the objects."""
-        warnings = yield from refit.bringing(scene, *loaded)
+        warnings = yield from refitted.bringing(scene, *loaded)
         results.forget()
         return warnings
 

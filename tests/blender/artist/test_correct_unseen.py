@@ -128,9 +128,9 @@ def test_a_painted_image_survives_an_update(room, ops, tmp_path):
     from addon.core.capture.exr import write_exr
 
     write_exr(folder / "base_color.exr", np.full((SIZE, SIZE, 3), 0.25, np.float32))
-    refit = bridge("refit")
+    refitted = bridge("refitted")
     before = {one["object_id"]: one | ({"model": "metal"} if one["object_id"] == BOARD else {}) for one in ENTRIES}
-    bridge("apply").whole(refit.bringing(bpy.context.scene, folder, before, refit.fitted(folder)))
+    bridge("apply").whole(refitted.bringing(bpy.context.scene, folder, before, refitted.fitted(folder)))
     assert shown(room[BOARD])[0] == image and np.array_equal(shown(room[BOARD])[1], filled)
     assert np.allclose(shown(room[TABLE])[1], 0.25)
     ops.restore_painted()
