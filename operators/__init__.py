@@ -6,6 +6,7 @@ from __future__ import annotations
 def classes() -> tuple[type, ...]:
     """Everything that Blender has to know: property groups, preferences, operators, panels. Each part adds its own."""
     from .accumulate import SCAN_RELIGHT_OT_accumulate
+    from .assets import SCAN_RELIGHT_OT_mark_assets
     from .capture_from_scene import SCAN_RELIGHT_OT_capture_from_scene
     from .check_capture import SCAN_RELIGHT_OT_check_capture
     from .clear_cache import SCAN_RELIGHT_OT_clear_cache
@@ -22,6 +23,8 @@ def classes() -> tuple[type, ...]:
     from .import_capture import SCAN_RELIGHT_OT_import_capture
     from .job_operator import SCAN_RELIGHT_OT_stop
     from .look import SCAN_RELIGHT_OT_look
+    from .manual import SCAN_RELIGHT_OT_manual
+    from .menus import SCAN_RELIGHT_MT_all
     from .move_results import SCAN_RELIGHT_OT_move_results
     from .open_report import SCAN_RELIGHT_OT_open_report
     from .panel_capture import SCAN_RELIGHT_PT_capture
@@ -52,6 +55,7 @@ def classes() -> tuple[type, ...]:
         # The artist's side.
         SCAN_RELIGHT_OT_capture_from_scene, SCAN_RELIGHT_OT_restore_materials, SCAN_RELIGHT_OT_select_result_object,
         SCAN_RELIGHT_OT_look, SCAN_RELIGHT_OT_open_report, *relight_operators(), *correct_operators(),
+        SCAN_RELIGHT_OT_mark_assets, SCAN_RELIGHT_OT_manual, SCAN_RELIGHT_MT_all,
         # Panels, in the order of the work; a panel's parts come after it.
         SCAN_RELIGHT_PT_missing, SCAN_RELIGHT_PT_capture, SCAN_RELIGHT_PT_own_scene,
         SCAN_RELIGHT_PT_recover,
@@ -77,7 +81,7 @@ def register():
     """Register every class and hang the property groups up."""
     import bpy
 
-    from . import find_result, menus
+    from . import find_result, keymaps, manual, menus
     from .correct_register import register_handlers
     from .job_operator import forget_job
     from .panel_results import active_row_property
@@ -92,6 +96,8 @@ def register():
     bpy.app.handlers.save_post.append(find_result.found_is_kept)
     register_handlers()
     menus.register()
+    keymaps.register()
+    bpy.utils.register_manual_map(manual.manual_map)
 
 
 def unregister():
@@ -99,10 +105,12 @@ def unregister():
     import bpy
 
     from ..addon.bridge import corrections, job
-    from . import find_result, findings, menus, results
+    from . import find_result, findings, keymaps, manual, menus, results
     from .correct_register import unregister_handlers
     from .job_operator import forget_job
 
+    bpy.utils.unregister_manual_map(manual.manual_map)
+    keymaps.unregister()
     menus.unregister()
     unregister_handlers()
     corrections.forget()

@@ -12,7 +12,7 @@ class SCAN_RELIGHT_OT_check_capture(bpy.types.Operator):
     """Check the capture that is chosen in the panel."""
 
     bl_idname = "scan_relight.check_capture"
-    bl_label = "Check"
+    bl_label = "Check Capture"
     bl_description = "Read the capture and show what it holds and what is wrong with it; nothing is changed"
 
     @classmethod

@@ -24,7 +24,7 @@ class SCAN_RELIGHT_OT_export(RelightOperator, bpy.types.Operator):
     """Take the room elsewhere."""
 
     bl_idname = "scan_relight.export"
-    bl_label = "Export"
+    bl_label = "Export Room"
     bl_description = "Write the room with plain materials that other programs understand; the scene stays as it is"
     bl_options = {"REGISTER"}
     needs_room = False

@@ -12,7 +12,7 @@ class SCAN_RELIGHT_OT_fit(StageOperator, bpy.types.Operator):
     """Fit roughness and specular of each object."""
 
     bl_idname = "scan_relight.fit"
-    bl_label = "Fit"
+    bl_label = "Recover Highlights"
     bl_description = "Fit roughness and specular of each object"
     bl_options = set()  # the scene stays as it is: no undo step
     until = "specular"

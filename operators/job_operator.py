@@ -238,7 +238,7 @@ class SCAN_RELIGHT_OT_stop(bpy.types.Operator):
     """Stop the run."""
 
     bl_idname = "scan_relight.stop"
-    bl_label = "Stop"
+    bl_label = "Stop Recovery"
     bl_description = "Stop the run within a second; finished stages are kept and the next run goes on from them"
 
     @classmethod

@@ -17,7 +17,7 @@ class SCAN_RELIGHT_OT_look(bpy.types.Operator):
     """Show another look of the recovered objects."""
 
     bl_idname = "scan_relight.look"
-    bl_label = "Look"
+    bl_label = "Show Look"
     bl_description = "What the viewport shows on the recovered objects; renders and materials stay as they are"
     bl_options = {"REGISTER", "UNDO"}
 

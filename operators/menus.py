@@ -6,8 +6,39 @@ import bpy
 
 from .job_operator import active, bar
 
+NEED_MORE = ("restore_lamp", "select_result_object")
+"""Operators that say nothing without what a list has chosen; all others are in the menu, where F3 finds them."""
 WIDTH = 14
 """Of the bar, in units of the interface."""
+
+
+class SCAN_RELIGHT_MT_all(bpy.types.Menu):
+    """Object > Scan Relight: every operator that makes sense without a list; the search (F3) looks into menus."""
+
+    bl_idname = "SCAN_RELIGHT_MT_all"
+    bl_label = "Scan Relight"
+
+    def draw(self, context):
+        """One line each, in the order of registration; they ask for what they need."""
+        layout = self.layout
+        layout.operator_context = "INVOKE_DEFAULT"
+        for name in names():
+            layout.operator(f"scan_relight.{name}")
+
+
+def names() -> list[str]:
+    """The operators in the menu."""
+    from . import classes
+
+    found = (cls for cls in classes()
+             if issubclass(cls, bpy.types.Operator) and "INTERNAL" not in getattr(cls, "bl_options", ()))
+    return [name for name in (cls.bl_idname.partition(".")[2] for cls in found) if name not in NEED_MORE]
+
+
+def object_entry(menu, context) -> None:
+    """Object > Scan Relight."""
+    menu.layout.separator()
+    menu.layout.menu(SCAN_RELIGHT_MT_all.bl_idname)
 
 
 def import_entry(menu, context) -> None:
@@ -33,6 +64,7 @@ def register() -> None:
     from bl_ui.space_statusbar import STATUSBAR_HT_header
 
     bpy.types.TOPBAR_MT_file_import.append(import_entry)
+    bpy.types.VIEW3D_MT_object.append(object_entry)
     bpy.types.STATUSBAR_HT_header.append(run_entry)
     # `WorkSpace.status_text_set` puts back the bar's drawing as it first found it: have it look again, or ours is lost.
     if "_draw_orig" in vars(STATUSBAR_HT_header):
@@ -42,4 +74,5 @@ def register() -> None:
 def unregister() -> None:
     """Take them back."""
     bpy.types.STATUSBAR_HT_header.remove(run_entry)
+    bpy.types.VIEW3D_MT_object.remove(object_entry)
     bpy.types.TOPBAR_MT_file_import.remove(import_entry)

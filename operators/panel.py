@@ -12,11 +12,18 @@ class SidebarPanel:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Scan Relight"
+    manual = ""
+    """Page of the documentation that "?" in the header opens; '' has none."""
 
     @classmethod
     def poll(cls, context):
         """Only where there is a scene to work in."""
         return context.scene is not None
+
+    def draw_header_preset(self, context):
+        """The way to the documentation."""
+        if self.manual:
+            self.layout.operator("scan_relight.manual", text="", icon="HELP", emboss=False).page = self.manual
 
     @staticmethod
     def say(layout, context, sentence: str, icon: str = "NONE") -> None:

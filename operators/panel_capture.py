@@ -20,6 +20,7 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
 
     bl_idname = "SCAN_RELIGHT_PT_capture"
     bl_label = "Capture"
+    manual = "panel#capture"
     bl_order = 0
 
     def draw(self, context):

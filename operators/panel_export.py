@@ -14,6 +14,7 @@ class SCAN_RELIGHT_PT_export(SidebarPanel, bpy.types.Panel):
 
     bl_idname = "SCAN_RELIGHT_PT_export"
     bl_label = "Export"
+    manual = "relighting#export"
     bl_order = 5
     bl_options = {"DEFAULT_CLOSED"}
 

@@ -13,6 +13,7 @@ class SCAN_RELIGHT_PT_look(SidebarPanel, bpy.types.Panel):
 
     bl_idname = "SCAN_RELIGHT_PT_look"
     bl_label = "Look"
+    manual = "panel#look"
     bl_order = 3
 
     def draw(self, context):

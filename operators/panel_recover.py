@@ -39,6 +39,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
 
     bl_idname = "SCAN_RELIGHT_PT_recover"
     bl_label = "Recover"
+    manual = "panel#recover"
     bl_order = 1
 
     def draw(self, context):
@@ -97,10 +98,10 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         """One bar, and Stop."""
         factor, text = bar(job)
         column = self.layout.column(align=True)
-        if job.facts.get("title") not in (None, "", "Recover"):  # no heading twice
+        if job.facts.get("title") not in (None, "", "Recover Capture"):  # no heading twice
             column.label(text=job.facts["title"])
         column.progress(factor=factor, text=text)
-        column.operator("scan_relight.stop", icon="CANCEL")
+        column.operator("scan_relight.stop", text="Stop", icon="CANCEL")
 
     def outcome(self, context) -> None:
         """How the last run of this session ended."""

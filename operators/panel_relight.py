@@ -65,6 +65,7 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
 
     bl_idname = "SCAN_RELIGHT_PT_relight"
     bl_label = "Relight"
+    manual = "relighting"
     bl_order = 4
 
     def draw(self, context):

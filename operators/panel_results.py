@@ -106,6 +106,7 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
 
     bl_idname = "SCAN_RELIGHT_PT_results"
     bl_label = "Results"
+    manual = "panel#results"
     bl_order = 2
 
     def draw(self, context):

@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 
 from ..addon.bridge import result_home
+from . import keymaps
 
 PACKAGE = result_home.PACKAGE
 
@@ -46,6 +47,8 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
             row.operator("scan_relight.move_results", icon="EXPORT")
         layout.prop(self, "threads")
         layout.prop(self, "memory_limit")
+        keymaps.draw(layout, context)
+        layout.operator("scan_relight.manual", icon="HELP")
 
 
 def preferences() -> ScanRelightPreferences | None:

@@ -12,5 +12,5 @@ class SCAN_RELIGHT_OT_recover(SceneStageOperator, bpy.types.Operator):
     """Recover a capture from the first stage to the last."""
 
     bl_idname = "scan_relight.recover"
-    bl_label = "Recover"
+    bl_label = "Recover Capture"
     bl_description = "Import the capture, run every stage and put the materials onto the objects"

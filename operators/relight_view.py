@@ -15,7 +15,7 @@ class SCAN_RELIGHT_OT_match_frame(RelightOperator, bpy.types.Operator):
     """Look through a frame of the capture."""
 
     bl_idname = "scan_relight.match_frame"
-    bl_label = "Match Frame"
+    bl_label = "Look Through Frame"
     bl_description = "Look and render through the camera of a frame: its lens, size and pixel shape"
     needs_room = False
 

@@ -17,7 +17,7 @@ class SCAN_RELIGHT_OT_run(bpy.types.Operator):
     """Run what the panel has chosen."""
 
     bl_idname = "scan_relight.run"
-    bl_label = "Run"
+    bl_label = "Run Recovery"
     bl_description = "Run what the panel has chosen"
 
     target: bpy.props.EnumProperty(

@@ -12,7 +12,7 @@ class SCAN_RELIGHT_OT_shade(StageOperator, bpy.types.Operator):
     """Gather the light that falls on each element and divide it out."""
 
     bl_idname = "scan_relight.shade"
-    bl_label = "Shade"
+    bl_label = "Recover Light and Albedo"
     bl_description = "Gather the light that falls on each element and divide it out"
     bl_options = set()  # the scene stays as it is: no undo step
     until = "shading"

@@ -20,6 +20,8 @@ import tempfile
 import tomllib
 from pathlib import Path
 
+from manual_pages import write_pages
+
 ROOT = Path(__file__).resolve().parent.parent
 LOCK = ROOT / "requirements" / "blender-5.2.txt"
 WHEELS = ROOT / "wheels"
@@ -126,6 +128,7 @@ def stage(folder: Path, platforms: list[str], wheels: set[str]) -> None:
             shutil.copytree(source, folder / name, ignore=leave)
         else:
             shutil.copy2(source, folder / name)
+    write_pages(ROOT / "docs", folder / "docs")
     (folder / "wheels").mkdir()
     for name in sorted(wheels):
         try:

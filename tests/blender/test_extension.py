@@ -77,11 +77,12 @@ def test_content(archive, root):
     code = [name for name in names if not name.endswith(".whl")]
     assert {"__init__.py", "LICENSE", "addon/cli.py", "operators/recover.py"} <= set(code)
     assert {name.split("/")[0] for name in code} == {
-        "__init__.py", "LICENSE", "README.md", "CHANGELOG.md", "blender_manifest.toml", "addon", "operators"}
+        "__init__.py", "LICENSE", "README.md", "CHANGELOG.md", "blender_manifest.toml", "addon", "operators", "docs"}
     wheels = {name for name in names if name.endswith(".whl")}
     assert wheels == {wheel.removeprefix("./") for wheel in manifest["build"]["generated"]["wheels"]}
     assert not any("numpy" in name for name in wheels)
     assert not any("__pycache__" in name for name in names)
+    assert {"docs/panel.html", "docs/guide.html", "docs/images/guide/empty.png"} <= set(names)
     tracked = {path.relative_to(root).as_posix() for part in ("addon", "operators")
                for path in (root / part).rglob("*.py")}
     assert tracked <= set(code)

@@ -1,0 +1,69 @@
+"""The documentation that comes with the extension: "?" in the panels, and Blender's own Online Manual (right click)."""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+from pathlib import Path
+
+import bpy
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+"""Installed: pages for a browser. In a checkout: the Markdown that they are made of."""
+MAP = (
+    ("bpy.ops.scan_relight.export*", "relighting#export"),
+    ("bpy.ops.scan_relight.*light*", "relighting"),
+    ("bpy.ops.scan_relight.*lamp*", "relighting"),
+    ("bpy.ops.scan_relight.*virtual*", "relighting"),
+    ("bpy.ops.scan_relight.*place*", "relighting"),
+    ("bpy.ops.scan_relight.match_frame*", "relighting"),
+    ("bpy.ops.scan_relight.before_after*", "relighting"),
+    ("bpy.ops.scan_relight.capture_from_scene*", "own_scene"),
+    ("bpy.ops.scan_relight.restore_materials*", "own_scene"),
+    ("bpy.ops.scan_relight.open_report*", "evidence"),
+    ("bpy.ops.scan_relight.*capture*", "panel#capture"),
+    ("bpy.ops.scan_relight.*", "panel#recover"),
+    ("bpy.types.scanrelightreading.*", "captures"),
+    ("bpy.types.scanrelightlamp.*", "relighting"),
+    ("bpy.types.scanrelightoutside.*", "relighting"),
+    ("bpy.types.scanrelightstudio.*", "relighting"),
+    ("bpy.types.scanrelightpreferences.*", "panel#preferences"),
+    ("bpy.types.scanrelight*", "panel#recover"),
+)
+"""Blender's names of operators and properties, lower case, and the page of each; the first that fits counts."""
+
+
+def file_name(page: str) -> str:
+    """The file of a page such as 'panel#recover', with the part that is meant."""
+    name, mark, part = page.partition("#")
+    ending = "html" if (DOCS / f"{name}.html").is_file() else "md"
+    return f"{name}.{ending}{mark}{part}"
+
+
+def address(page: str) -> str:
+    """A page's address, for a browser."""
+    return f"{DOCS.as_uri()}/{file_name(page)}"
+
+
+def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
+    """What `bpy.utils.register_manual_map` asks for."""
+    return f"{DOCS.as_uri()}/", tuple((pattern, file_name(page)) for pattern, page in MAP)
+
+
+class SCAN_RELIGHT_OT_manual(bpy.types.Operator):
+    """Open a page of the documentation."""
+
+    bl_idname = "scan_relight.manual"
+    bl_label = "Scan Relight Manual"
+    bl_description = "Open the documentation in the browser; it came with the extension and needs no network"
+
+    page: bpy.props.StringProperty(
+        name="Page", description="Which page, and which part of it", default="guide", options={"SKIP_SAVE"})
+
+    def execute(self, context):
+        """Open it; in the background only say where it lies."""
+        found = address(self.page)
+        if not (DOCS / file_name(self.page).partition("#")[0]).is_file():
+            self.report({"ERROR"}, f"The documentation has no page '{self.page}'; install the extension again.")
+            return {"CANCELLED"}
+        if bpy.app.background:
+            self.report({"INFO"}, found)
+            return {"FINISHED"}
+        return bpy.ops.wm.url_open(url=found)
