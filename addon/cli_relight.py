@@ -36,6 +36,9 @@ def add_relight(commands, epilog: str) -> argparse.ArgumentParser:
     picture.add_argument("--size", metavar="PERCENT", type=int, default=100, help="of the frame (default 100)")
     picture.add_argument("--engine", choices=("cycles", "eevee"), default="cycles",
                          help="eevee needs a graphics card (default cycles)")
+    picture.add_argument("--device", metavar="cpu|gpu|KIND", help="what Cycles renders on; KIND is optix, cuda, hip, "
+                         "metal or oneapi (default the processor)")
+    picture.add_argument("--scene", metavar="NAME", help="where the file holds several (default its active one)")
     return parser
 
 
@@ -63,7 +66,8 @@ def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         stages = ("before", "after") if arguments.before_after else ("after",)
         progress = Progress(weights=dict.fromkeys(stages, 1.0), **console)
         remarks = command.relight(arguments.result, light, arguments.out, arguments.camera, arguments.samples,
-                                  arguments.engine.upper(), arguments.before_after, arguments.size, progress)
+                                  arguments.engine.upper(), arguments.before_after, arguments.size, progress,
+                                  arguments.device, arguments.scene)
     if isinstance(console["listener"], JsonProgress):
         for remark in remarks:
             console["listener"].tell("warning", text=remark)

@@ -9,10 +9,11 @@ from pathlib import Path
 import bpy
 
 from ..addon.bridge import before_after, pictures
-from ..addon.core.errors import BadInputError
+from ..addon.bridge.render_device import told_device
+from ..addon.core.errors import ScanRelightError
 from . import poll
 from .job_operator import JobOperator
-from .relight_base import RelightOperator, default_folder
+from .relight_base import RelightOperator
 from .relight_props import ENGINE
 
 FILE = "before_after.png"
@@ -27,7 +28,7 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
     bl_options = {"UNDO"}
 
     filepath: bpy.props.StringProperty(
-        name="File", description="Picture to write; by default before_after.png in the result folder",
+        name="File", description="Picture to write; by default before_after.png in the room's result folder",
         subtype="FILE_PATH", options={"SKIP_SAVE"})
     engine: ENGINE
     samples: bpy.props.IntProperty(name="Samples", description="For each pixel; 0 takes the scene's", min=0, default=64)
@@ -45,10 +46,10 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         """The file to write."""
         if self.filepath:
             return Path(bpy.path.abspath(self.filepath)).absolute()
-        folder = default_folder(scene)
-        if not folder:
-            raise BadInputError("Choose a result folder or save the file first, so that the picture has a place.")
-        return Path(folder) / FILE
+        folder, stays = before_after.picture_folder(scene, scene.scan_relight.result_folder)
+        if not stays:
+            self.report({"INFO"}, "The picture goes with this session: there is no result folder to keep it in.")
+        return folder / FILE
 
     def work(self, context):
         """In the background: here and now."""
@@ -69,11 +70,12 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
             pictures.check_format(out)
             self._folder = Path(tempfile.mkdtemp(prefix="scan_relight_"))
             before_after.save_copy(self._folder)
-        except BadInputError as error:
+        except ScanRelightError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         words = ["relight", str(self._folder), "--out", str(self._folder / out.name), "--before-after",
                  "--engine", self.engine.lower(), "--samples", str(self.samples), "--size", str(self.percentage),
+                 "--device", told_device(context.scene), "--scene", context.scene.name,
                  "--progress", "json", "--stop-with-stdin"]
         return self.start(context, command(words), title="Before and After", out=str(out), result_folder="")
 

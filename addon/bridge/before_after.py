@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+import time
 from pathlib import Path
 
 import bpy
@@ -16,7 +17,9 @@ import bpy
 from ..core.atomic import TEMPORARY
 from ..core.errors import BadInputError, StorageError
 from ..core.progress import Progress
-from .pictures import beside, check_format, shoot
+from ..core.room_file import MATERIALS
+from .marks import RESULT
+from .pictures import beside, check_format, seconds_expected, shoot, ticking
 from .relight_state import captured_light
 
 NAME = "Before and After"
@@ -38,17 +41,44 @@ def render_pair(scene: bpy.types.Scene, out: Path, progress: Progress | None = N
         raise StorageError(f"'{out}' can't be written ({error.strerror or error}); choose another folder.") from error
     try:
         before, after = folder / f"before{ending}", folder / f"after{ending}"
-        # No finer than that: Blender's handler of render statistics waits for Python, which waits for the render.
         progress.stage("before")
         with captured_light(scene):
-            shoot(scene, before)
+            expected = seconds_expected(scene)
+            began = time.monotonic()
+            with ticking(progress, expected):
+                shoot(scene, before)
+            taken = time.monotonic() - began
         progress.done()
         progress.stage("after")
-        shoot(scene, after)
+        with ticking(progress, taken):
+            shoot(scene, after)
         progress.done()
         beside(before, after, out)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def picture_folder(scene: bpy.types.Scene, chosen: str = "") -> tuple[Path, bool]:
+    """Where a picture of a scene goes unless told.
+
+    The result folder that the open file lies in, else the one that the room came from, else the `chosen` one, else
+    beside the file; a folder that is gone or can't be written to is passed over. Where none is left it is Blender's own
+    for things of passing use.
+
+    Returns
+    -------
+    (Path, bool)
+        The folder; whether it stays when Blender ends.
+    """
+    beside_file = bpy.path.abspath("//") if bpy.data.filepath else ""
+    places = [thing[RESULT] for thing in (*scene.collection.children_recursive, *scene.objects) if RESULT in thing]
+    places += [bpy.path.abspath(chosen), beside_file]
+    if beside_file and (Path(beside_file) / MATERIALS).is_file():
+        places.insert(0, beside_file)
+    for place in dict.fromkeys(places):
+        if place and Path(place).is_absolute() and Path(place).is_dir() and os.access(place, os.W_OK):
+            return Path(place), True
+    return Path(bpy.app.tempdir), False
 
 
 def save_copy(folder: Path) -> None:

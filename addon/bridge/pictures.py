@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import errno
 import os
+import threading
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import bpy
 import numpy as np
 
 from ..core.atomic import replacing
-from ..core.errors import BadInputError, StorageError
+from ..core.errors import BadInputError, InterruptedRun, StorageError
+from ..core.progress import Progress
 from .images import image_array
 
 FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32"), ".jpg": ("JPEG", "8"), ".jpeg": ("JPEG", "8")}
@@ -111,6 +114,49 @@ def shoot(scene: bpy.types.Scene, path: Path | str) -> None:
         if "EEVEE" in scene.render.engine and _is_black(temporary):
             raise BadInputError("EEVEE gave a black picture: it needs a graphics card, which Blender has none of here; "
                                 "take Cycles.")
+
+
+def seconds_expected(scene: bpy.types.Scene) -> float:
+    """About how long a picture will take, from two of few samples; 0 where that is not worth asking.
+
+    Blender tells Python nothing while it renders: its handler of render statistics waits for Python, which waits for
+    the render, and what Cycles writes of its samples is next to nothing without a window.
+    """
+    if scene.render.engine != CYCLES or scene.cycles.samples < 32:
+        return 0.0
+    samples, denoising = scene.cycles.samples, scene.cycles.use_denoising
+    few, taken = max(samples // 16, 4), []
+    try:
+        scene.cycles.use_denoising = False
+        for count in (few, 1):  # the first one loads what the device needs
+            scene.cycles.samples = count
+            began = time.monotonic()
+            bpy.ops.render.render(write_still=False, scene=scene.name)
+            taken.append(time.monotonic() - began)
+    finally:
+        scene.cycles.samples, scene.cycles.use_denoising = samples, denoising
+    return taken[1] + (samples - 1) * max(taken[0] - taken[1], 0.0) / (few - 1)
+
+
+@contextmanager
+def ticking(progress: Progress, expected: float) -> Iterator[None]:
+    """While a picture is rendered within, tell its share by the clock; `expected` seconds, 0: nothing is told."""
+    end, began = threading.Event(), time.monotonic()
+
+    def tell() -> None:
+        with suppress(InterruptedRun):  # the wish to stop is heard by who rendered, at its end
+            while not end.wait(0.25):
+                progress.update(min((time.monotonic() - began) / expected, 0.97))
+
+    thread = threading.Thread(target=tell, name="scan relight picture", daemon=True)
+    if expected > 0:
+        thread.start()
+    try:
+        yield
+    finally:
+        end.set()
+        if expected > 0:
+            thread.join()
 
 
 def _is_black(path: Path) -> bool:

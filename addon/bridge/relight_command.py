@@ -14,8 +14,9 @@ from . import relight_lamps, relight_outside
 from .before_after import COPY as SCENE
 from .before_after import render_pair
 from .cameras import frame_cameras, use_camera
-from .pictures import CYCLES, check_format, prepare, settings_kept, shoot
+from .pictures import CYCLES, check_format, prepare, seconds_expected, settings_kept, shoot, ticking
 from .relight_lights import SOFTBOX, SPOT, SUN, WINDOW, add_light
+from .render_device import use_device
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Light:
 
 def relight(result: Path, light: Light, out: Path, camera: str | None = None, samples: int = 0,
             engine: str = CYCLES, before_after: bool = False, percentage: int = 100,
-            progress: Progress | None = None) -> list[str]:
+            progress: Progress | None = None, device: str | None = None, of: str | None = None) -> list[str]:
     """Open a result's scene, change its light, render.
 
     Parameters
@@ -65,6 +66,10 @@ def relight(result: Path, light: Light, out: Path, camera: str | None = None, sa
     percentage : int
         Of the frame's size.
     progress : Progress, optional
+    device : str, optional
+        See `render_device.use_device`; by default the file's, on which Cycles may have no say without preferences.
+    of : str, optional
+        Name of the scene, where the file holds several; by default the one that it was saved with.
 
     Returns
     -------
@@ -86,21 +91,35 @@ def relight(result: Path, light: Light, out: Path, camera: str | None = None, sa
     except RuntimeError as error:
         raise BadInputError(f"'{path}' can't be opened by Blender {bpy.app.version_string}; recover the capture "
                             "again.") from error
-    scene = bpy.context.scene
+    scene = scene_named(of)
     if camera is not None:
         use_camera(scene, camera_named(scene, camera))
     if scene.camera is None:
         raise BadInputError(f"'{path}' has no camera to render through.")
     remarks = apply_light(scene, light)
     with settings_kept(scene):
+        if device is not None and engine == CYCLES:
+            remarks += filter(None, [use_device(scene, device)])
         prepare(scene, engine, samples, percentage)
         if before_after:
             render_pair(scene, out, progress)
         else:
             progress.stage("after")
-            shoot(scene, out)
+            with ticking(progress, seconds_expected(scene)):
+                shoot(scene, out)
             progress.done()
     return remarks
+
+
+def scene_named(name: str | None) -> bpy.types.Scene:
+    """A scene of the open file, made the one that is worked in; raises `BadInputError` where there is none."""
+    scene = bpy.context.scene if name is None else bpy.data.scenes.get(name)
+    if scene is None:
+        known = ", ".join(f"'{one.name}'" for one in bpy.data.scenes)
+        raise BadInputError(f"There is no scene '{name}' in the file; it holds {known}.")
+    if bpy.context.window is not None:
+        bpy.context.window.scene = scene
+    return scene
 
 
 def apply_light(scene: bpy.types.Scene, light: Light) -> list[str]:

@@ -1,0 +1,86 @@
+"""The processor or graphics card that Cycles renders on: told in this Blender, taken up in another one.
+
+A process of its own starts with factory settings, so what the artist's preferences say has to be handed over in words.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from ..core.errors import BadInputError
+
+CPU, GPU = "CPU", "GPU"
+TYPES = ("OPTIX", "CUDA", "HIP", "METAL", "ONEAPI")
+"""Cycles' kinds of graphics card, the quicker one first where a card is of two kinds."""
+
+
+def told_device(scene: bpy.types.Scene) -> str:
+    """The device that this scene renders on here, for `use_device`: 'CPU', or a kind and the cards' ids."""
+    preferences = _preferences()
+    if preferences is None or scene.cycles.device != "GPU" or preferences.compute_device_type == "NONE":
+        return CPU
+    kind = preferences.compute_device_type
+    used = [device.id for device in preferences.devices if device.use and device.type in (kind, "CPU")]
+    return f"{kind}={'|'.join(used)}" if used else CPU
+
+
+def use_device(scene: bpy.types.Scene, told: str) -> str:
+    """Have a scene rendered on a device, on the processor where it is not to be had.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    told : str
+        'CPU'; 'GPU', which is all graphics cards of the first kind of `TYPES` that there is; one of `TYPES`; or what
+        `told_device` gave. Whatever the case, but for ids.
+
+    Returns
+    -------
+    str
+        '' or a remark: why it is the processor.
+
+    Raises
+    ------
+    BadInputError
+        There is no such kind of device.
+    """
+    kind, _, ids = told.partition("=")
+    kind, wanted = kind.strip().upper(), {one for one in ids.split("|") if one}
+    if kind not in (CPU, GPU, *TYPES):
+        raise BadInputError(f"There is no device '{told}'; take cpu, gpu or one of {', '.join(TYPES).lower()}.")
+    if kind == CPU:
+        scene.cycles.device = "CPU"
+        return ""
+    for one in TYPES if kind == GPU else (kind,):
+        if _enable(one, wanted):
+            scene.cycles.device = "GPU"
+            return ""
+    scene.cycles.device = "CPU"
+    return ("Blender finds no such graphics card here, so the processor renders."
+            if kind == GPU else f"Blender finds no {kind} device here, so the processor renders.")
+
+
+def _enable(kind: str, wanted: set[str]) -> bool:
+    """Switch on the devices of a kind, those of `wanted` alone if there are any; whether there is one."""
+    preferences = _preferences()
+    if preferences is None:
+        return False
+    before = preferences.compute_device_type
+    try:
+        preferences.compute_device_type = kind
+    except TypeError:  # this Blender was built without it
+        return False
+    preferences.refresh_devices()
+    cards = [device for device in preferences.devices if device.type == kind]
+    chosen = [device for device in cards if device.id in wanted] or cards
+    for device in preferences.devices:
+        device.use = device in chosen or device.id in wanted
+    if not chosen:
+        preferences.compute_device_type = before
+    return bool(chosen)
+
+
+def _preferences():
+    """Cycles' preferences; None where Cycles is switched off."""
+    addon = bpy.context.preferences.addons.get("cycles")
+    return addon.preferences if addon else None
