@@ -17,14 +17,12 @@ from ..core.atomic import write_bytes
 from ..core.errors import BadInputError
 from ..core.material import LAMBERTIAN, METAL, SPECULAR
 from ..core.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
-from ..core.room_file import MATERIALS
-from . import correct_material, look, smoothing, unseen
-from .marks import FOUND, GIVEN, OBJECT_ID, RESULT, RUN, WHITE
+from . import correct_material, look, result_file, smoothing, unseen
+from .marks import FOUND, GIVEN, OBJECT_ID, RESULT, WHITE
 
 F0_COATED, F0_METAL, ROUGHNESS = 0.04, 0.6, 0.3
 """What is shown until a refit, where nothing better is known."""
 
-_entries: dict[Path, tuple[tuple, dict]] = {}
 _written: dict[Path, set[int | str]] = {}
 """Objects, by result folder, whose entries in its overrides.json come from this session's scenes: undo reaches them."""
 
@@ -36,34 +34,21 @@ def correctable(thing: bpy.types.Object | None) -> bool:
 
 
 def result_folder(thing: bpy.types.Object) -> Path | None:
-    """The result folder that an object came from; None where it is gone. An opened scene.blend lies in it."""
-    if thing.get(RESULT) and (Path(thing[RESULT]) / MATERIALS).is_file():
-        return Path(thing[RESULT])
-    beside = Path(bpy.data.filepath).parent if bpy.data.filepath else None
-    return beside if beside and (beside / MATERIALS).is_file() else None
-
-
-def told(folder: Path) -> dict[str, Any]:
-    """A result's materials.json, its `objects` by number; {} where it is absent or damaged. Read when it changes."""
-    try:
-        stat = (folder / MATERIALS).stat()
-        stamp = stat.st_mtime_ns, stat.st_size
-        if _entries.get(folder, (None,))[0] != stamp:
-            read = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))
-            read["objects"] = {one["object_id"]: one for one in read["objects"]}
-            _entries[folder] = stamp, read
-        return _entries[folder][1]
-    except (OSError, ValueError, KeyError, TypeError):
-        return {}
+    """The result folder that an object came from; None where it is gone."""
+    folder = Path(thing[RESULT]) if thing.get(RESULT) else None
+    result = result_file.read(folder) if folder else None
+    return folder if result is not None and result.objects else None
 
 
 def entry(thing: bpy.types.Object) -> dict[str, Any]:
     """What an object's own run says of it; {} where that is gone or another run took its place."""
-    folder = result_folder(thing)
-    found = told(folder) if folder else {}
-    if thing.get(RUN, "") != found.get("run", ""):
-        return {}
-    return found.get("objects", {}).get(thing.get(OBJECT_ID), {})
+    return result_file.rows([thing]).get(thing, {})
+
+
+def made_by(folder: Path) -> dict[int, dict[str, Any]]:
+    """The objects of the run that lies in a result folder, as materials.json tells them, by number; {} for none."""
+    result = result_file.read(folder)
+    return dict(result.objects) if result else {}
 
 
 def given(thing: bpy.types.Object) -> dict[str, Any]:
@@ -253,7 +238,7 @@ def keep(scene: bpy.types.Scene, folder: Path) -> set[int]:
     """
     things = [thing for thing in look.recovered(scene) if result_folder(thing) == folder]
     said = {thing[OBJECT_ID]: Given(**_tuples(given(thing))) for thing in things if GIVEN in thing}
-    result = told(folder).get("objects", {})
+    result = made_by(folder)
     before = kept_overrides(folder, {*result, *said})
     ours = _written.setdefault(folder, set())
     objects = {i: one for i, one in before.objects.items() if i not in ours} | said
@@ -269,8 +254,7 @@ def keep(scene: bpy.types.Scene, folder: Path) -> set[int]:
 
 
 def forget() -> None:
-    """Read every result again."""
-    _entries.clear()
+    """Know nothing of what was written in this session."""
     _written.clear()
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Generator, Iterable
 from pathlib import Path
 
@@ -10,8 +9,8 @@ import bpy
 
 from ..core.errors import MissingStageError
 from ..core.material import EMITTER
-from ..core.room_file import DAMAGE, MATERIALS, material
-from . import corrections, relight_lamps, result_images
+from ..core.room_file import material
+from . import corrections, relight_lamps, result_file, result_images
 from .correct_material import worn_material
 from .marks import IMAGE, OBJECT_ID, RESULT, mark
 from .materials import MODEL, dress
@@ -51,21 +50,19 @@ def words(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> tuple[P
     folder = corrections.folder_for(things)
     numbers = corrections.keep(scene, folder) | {thing[OBJECT_ID] for thing in things}
     objects = [word for number in sorted(numbers) for word in ("--object", str(number))]
-    before = corrections.told(folder).get("objects", {})
-    return folder, ["refit", str(folder), *objects, "--progress", "json", "--stop-with-stdin"], dict(before)
+    return folder, ["refit", str(folder), *objects, "--progress", "json", "--stop-with-stdin"], corrections.made_by(folder)
 
 
-def fitted(folder: Path) -> dict:
-    """What the refit left in materials.json, objects by number; raises `MissingStageError` where it left nothing."""
-    try:
-        read = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))
-        return read | {"objects": {one["object_id"]: one for one in read["objects"]}}
-    except DAMAGE as error:
-        raise MissingStageError(f"'{folder / MATERIALS}' is missing or damaged; run the recovery again.") from error
+def fitted(folder: Path) -> result_file.Result:
+    """What the refit left; raises `MissingStageError` where it left nothing."""
+    result = result_file.read(folder)
+    if result is None or not result.objects:
+        raise MissingStageError(f"'{folder / result_file.MATERIALS}' is missing or damaged; run the recovery again.")
+    return result
 
 
 def bringing(scene: bpy.types.Scene, folder: Path, before: dict[int, dict],
-             after: dict) -> Generator[float, None, tuple[str, ...]]:
+             after: result_file.Result) -> Generator[float, None, tuple[str, ...]]:
     """Put onto a scene's objects what a refit changed; yields the share done, returns warnings.
 
     Only materials that the refit changed are made anew, so that what an artist did to others by hand stays.
@@ -75,17 +72,18 @@ def bringing(scene: bpy.types.Scene, folder: Path, before: dict[int, dict],
     scene : bpy.types.Scene
     folder : Path
         The result folder.
-    before, after : dict
+    before : dict of int to dict
+    after : result_file.Result
         What `words` and `fitted` gave.
     """
     things = [thing for thing in scene.objects if corrections.correctable(thing)
               and corrections.result_folder(thing) == folder]
     image = _renew_images(folder)
-    run, warnings = after.get("run", ""), []
+    run, warnings = after.run, []
     for done, thing in enumerate(things):
         yield done / max(len(things), 1)
         number = thing[OBJECT_ID]
-        now = after["objects"].get(number)
+        now = after.objects.get(number)
         mark(thing, folder, run)
         if now is not None and any(now.get(key) != before.get(number, {}).get(key) for key in _WORN):
             _dress(thing, now, image)

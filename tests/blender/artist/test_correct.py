@@ -223,3 +223,17 @@ def test_polls_say_what_is_missing(room, ops):
     bpy.context.view_layer.objects.active = None
     for name in ("refit", "this_is", "this_is_white", "take_back", "paint_unseen", "fill_unseen"):
         assert not getattr(ops, name).poll(), name
+
+
+def test_undo_takes_a_statement_back(room, ops):
+    name = room[TABLE].name
+    before = sockets(room[TABLE])
+    select(room[TABLE])
+    bpy.ops.ed.undo_push(message="before")
+    ops.this_is(model="metal")
+    bpy.ops.ed.undo_push(message="after")
+    bpy.ops.ed.undo()
+    table = bpy.data.objects[name]
+    assert sockets(table) == before and "scan_relight_given" not in table
+    bpy.ops.ed.redo()
+    assert sockets(bpy.data.objects[name])["Metallic"] == 1
