@@ -31,6 +31,7 @@ class SCAN_RELIGHT_OT_this_is(RefitOperator, bpy.types.Operator):
     bl_description = "Say what the selected objects are made of, and fit them again under that"
 
     model: bpy.props.EnumProperty(name="Model", description="What they are", items=STATEMENTS)
+    asks_for = "model"
 
     @classmethod
     def description(cls, context, properties):

@@ -51,11 +51,19 @@ class RefitOperator(JobOperator):
 
     bl_options = {"REGISTER", "UNDO"}
     always = False
+    asks_for = ""
+    """Property that is asked for where nobody gave it: from a menu or the search."""
 
     @classmethod
     def poll(cls, context):
         """Only with a recovered object, and no other run."""
         return CorrectOperator.poll.__func__(cls, context) and poll.no_run(cls)
+
+    def invoke(self, context, event):
+        """Ask for what is missing."""
+        if self.asks_for and not self.properties.is_property_set(self.asks_for):
+            return context.window_manager.invoke_props_dialog(self)
+        return self.execute(context)
 
     def state(self, context, things) -> list[bpy.types.Object]:
         """Say it; returns the objects that are to be fitted again."""

@@ -22,6 +22,7 @@ class SCAN_RELIGHT_OT_this_is_white(RefitOperator, bpy.types.Operator):
                       "channel, and with it the colour of the light")
 
     albedo: ALBEDO
+    asks_for = "albedo"
 
     def state(self, context, things):
         """Give it."""

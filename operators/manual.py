@@ -8,6 +8,14 @@ import bpy
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 """Installed: pages for a browser. In a checkout: the Markdown that they are made of."""
 MAP = (
+    ("bpy.ops.scan_relight.refit*", "corrections"),
+    ("bpy.ops.scan_relight.this_is*", "corrections"),
+    ("bpy.ops.scan_relight.same_as*", "corrections"),
+    ("bpy.ops.scan_relight.take_back*", "corrections"),
+    ("bpy.ops.scan_relight.*white*", "corrections#a-known-white"),
+    ("bpy.ops.scan_relight.*unseen*", "corrections#unseen-spots"),
+    ("bpy.ops.scan_relight.*painted*", "corrections#unseen-spots"),
+    ("bpy.ops.scan_relight.smooth*", "corrections#smooth-shading"),
     ("bpy.ops.scan_relight.export*", "relighting#export"),
     ("bpy.ops.scan_relight.*light*", "relighting"),
     ("bpy.ops.scan_relight.*lamp*", "relighting"),
@@ -20,6 +28,7 @@ MAP = (
     ("bpy.ops.scan_relight.open_report*", "evidence"),
     ("bpy.ops.scan_relight.*capture*", "panel#capture"),
     ("bpy.ops.scan_relight.*", "panel#recover"),
+    ("bpy.types.scanrelightcorrect*", "corrections"),
     ("bpy.types.scanrelightreading.*", "captures"),
     ("bpy.types.scanrelightlamp.*", "relighting"),
     ("bpy.types.scanrelightoutside.*", "relighting"),

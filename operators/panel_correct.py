@@ -26,6 +26,7 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
 
     bl_idname = "SCAN_RELIGHT_PT_correct"
     bl_parent_id = "SCAN_RELIGHT_PT_results"
+    manual = "corrections"
     bl_label = "Correct"
 
     @classmethod

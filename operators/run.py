@@ -1,8 +1,12 @@
 """`bpy.ops.scan_relight.run`: the panel's buttons. Starts another operator with what the scene has chosen."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+from pathlib import Path
+
 import bpy
 
+from ..addon.bridge.corrections import keep_for_run
+from ..addon.core.errors import ScanRelightError
 from . import poll, preferences, reading_props
 from .settings_props import FROM_STAGE, can_start, setting_infos, setting_value
 
@@ -42,11 +46,19 @@ class SCAN_RELIGHT_OT_run(bpy.types.Operator):
         operator = getattr(bpy.ops.scan_relight, self.target)
         how = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
         try:
-            verdict = operator(how, ask=False, **self.chosen(context.scene.scan_relight))
-        except RuntimeError as error:  # reported already, and again by Blender as an exception
+            chosen = self.chosen(context.scene.scan_relight)
+            if self.target != "import_capture":
+                self.keep_corrections(context.scene, chosen)
+            verdict = operator(how, ask=False, **chosen)
+        except (RuntimeError, ScanRelightError) as error:  # reported already, and again by Blender as an exception
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
             return {"CANCELLED"}
         return {"FINISHED"} if verdict & {"FINISHED", "RUNNING_MODAL"} else {"CANCELLED"}
+
+    @staticmethod
+    def keep_corrections(scene, chosen) -> None:
+        """What the artist gave of a room that is run again goes to where the run heeds it."""
+        keep_for_run(scene, Path(chosen["result_folder"]), Path(bpy.path.abspath(chosen["capture_folder"])).absolute())
 
     def chosen(self, choices) -> dict:
         """The target's properties."""

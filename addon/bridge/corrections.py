@@ -17,8 +17,9 @@ from ..core.atomic import write_bytes
 from ..core.errors import BadInputError
 from ..core.material import LAMBERTIAN, METAL, SPECULAR
 from ..core.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
+from ..core.result_place import write_capture
 from . import correct_material, look, result_file, smoothing, unseen
-from .marks import FOUND, GIVEN, OBJECT_ID, RESULT, WHITE
+from .marks import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, WHITE
 
 F0_COATED, F0_METAL, ROUGHNESS = 0.04, 0.6, 0.3
 """What is shown until a refit, where nothing better is known."""
@@ -218,11 +219,26 @@ def folder_for(things: Iterable[bpy.types.Object]) -> Path:
     return folder
 
 
-def keep(scene: bpy.types.Scene, folder: Path) -> set[int]:
+def keep_for_run(scene: bpy.types.Scene, folder: Path, capture: Path) -> None:
+    """`keep` before a capture is run into `folder`, which may be another one than the scene's room came from."""
+    things = [thing for thing in look.recovered(scene)
+              if result_folder(thing) == folder or str(capture) in [thing.get(CAPTURE), *_captures(thing)]]
+    if any(GIVEN in thing or WHITE in thing for thing in things) or _written.get(folder):
+        if not folder.exists():
+            folder.mkdir(parents=True)
+            write_capture(folder, capture)  # from the first file on it is that capture's
+        keep(scene, folder, things)
+
+
+def _captures(thing: bpy.types.Object) -> list[str]:
+    return [part[CAPTURE] for part in bpy.data.collections if CAPTURE in part and thing.name in part.all_objects]
+
+
+def keep(scene: bpy.types.Scene, folder: Path, things: Iterable[bpy.types.Object] | None = None) -> set[int]:
     """Bring a result's `overrides.json` in line with what is given in a scene.
 
     Entries of objects of which the scene says nothing are left alone, unless it was this session that wrote them: then
-    the artist has taken them back by undo.
+    the artist has taken them back by undo. `things` are the room's objects, by default those of that result.
 
     Returns
     -------
@@ -236,10 +252,11 @@ def keep(scene: bpy.types.Scene, folder: Path) -> set[int]:
     StorageError
         It can't be written.
     """
-    things = [thing for thing in look.recovered(scene) if result_folder(thing) == folder]
+    if things is None:
+        things = [thing for thing in look.recovered(scene) if result_folder(thing) == folder]
     said = {thing[OBJECT_ID]: Given(**_tuples(given(thing))) for thing in things if GIVEN in thing}
     result = made_by(folder)
-    before = kept_overrides(folder, {*result, *said})
+    before = kept_overrides(folder, {*result, *(thing[OBJECT_ID] for thing in things)})
     ours = _written.setdefault(folder, set())
     objects = {i: one for i, one in before.objects.items() if i not in ours} | said
     white = before.white if "white" not in ours else None

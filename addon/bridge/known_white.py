@@ -9,7 +9,6 @@ import numpy as np
 from mathutils import Vector
 from mathutils.interpolate import poly_3d_calc
 
-from ..core.capture.exr import read_exr
 from ..core.errors import BadInputError
 from . import corrections, unseen
 from .mesh_objects import ATLAS_UV
@@ -66,6 +65,8 @@ def _around(thing, uv) -> list[float]:
     path = base.with_name(base.name.replace("base_color", Path(ALBEDO).stem))
     if not path.is_file():
         raise BadInputError(f"'{path}' is missing; run the recovery again to its end.")
+    from ..core.capture.exr import read_exr  # not earlier: Blender's start should not wait for it
+
     image = np.array(read_exr(path).rgb)[::-1]
     height, width = image.shape[:2]
     column, row = (min(max(int(at * size), 0), size - 1) for at, size in zip(uv, (width, height), strict=True))

@@ -12,13 +12,10 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ..core.capture.exr import read_exr
 from ..core.capture.model import Mesh
 from ..core.errors import BadInputError, StorageError
 from ..core.surface.atlas import Atlas
-from ..core.surface.elements import make_atlas
 from . import result_images
 from .correct_material import worn_material
 from .images import array_image, image_array, load_image
@@ -160,6 +157,8 @@ def coverage(thing: bpy.types.Object) -> np.ndarray:
     path = base.with_name(base.name.replace("base_color", "coverage"))
     if path == base or not path.is_file():
         raise BadInputError(f"'{path}' is missing, so nobody knows what no frame saw; run the recovery again.")
+    from ..core.capture.exr import read_exr  # not earlier, as all such: Blender's start should not wait for it
+
     found = np.array(read_exr(path).rgb)[::-1]
     if found.shape[:2] != (image.size[1], image.size[0]):
         raise BadInputError(f"'{path}' has another size than image '{image.name}'; restore the object first.")
@@ -214,6 +213,8 @@ def fill(things: Iterable[bpy.types.Object], where: str = result_images.PACK) ->
 
 def _fill(things, seen, where, remarks) -> int:
     """`fill` for objects that show the same image, whose coverage is `seen`."""
+    from scipy.spatial import cKDTree
+
     owners = _sharing(things[0])
     atlas = _elements(owners, seen.shape[0])
     observed, quality = (seen[..., k].ravel()[atlas.texel] for k in (0, 2))
@@ -259,6 +260,8 @@ def _sharing(thing: bpy.types.Object) -> list[bpy.types.Object]:
 
 def _elements(things: list[bpy.types.Object], size: int) -> Atlas:
     """The texels of objects with their place; `object_id` counts `things`."""
+    from ..core.surface.elements import make_atlas
+
     vertices, triangles, uv, number, first = [], [], [], [], 0
     for k, thing in enumerate(things):
         data = thing.data

@@ -237,3 +237,16 @@ def test_undo_takes_a_statement_back(room, ops):
     assert sockets(table) == before and "scan_relight_given" not in table
     bpy.ops.ed.redo()
     assert sockets(bpy.data.objects[name])["Metallic"] == 1
+
+
+def test_a_run_from_the_panel_heeds_what_is_given(room, tmp_path):
+    """Also where it goes to another folder than the one that the room came from."""
+    corrections = bridge("corrections")
+    for thing in room.values():
+        thing["scan_relight_capture"] = str(tmp_path / "capture")
+    corrections.give(room[TABLE], roughness=0.6)
+    corrections.keep_for_run(bpy.context.scene, tmp_path / "new", tmp_path / "capture")
+    assert json.loads((tmp_path / "new" / "overrides.json").read_text())["objects"] == {str(TABLE): {"roughness": 0.6}}
+    assert (tmp_path / "new" / "capture.json").is_file(), "so that nobody else takes the folder"
+    corrections.keep_for_run(bpy.context.scene, tmp_path / "another", tmp_path / "another capture")
+    assert not (tmp_path / "another").exists()
