@@ -114,8 +114,7 @@ def white_scale(run: Recovery) -> WhiteScale | None:
     if white is None:
         return None
     atlas, ones = run.surface().atlas, np.ones(3, np.float32)
-    name = next(i.class_name for i in run.capture.instances if i.object_id == white.object_id)
-    name = f"{name or 'Object'} {white.object_id}"
+    name = next(i.name for i in run.capture.instances if i.object_id == white.object_id)
     before, scale = run.irradiance_found, ones
     others = {i.object_id for i in run.capture.instances} - {white.object_id}
     for _ in range(ROUNDS):
@@ -193,9 +192,10 @@ def corrected(materials: tuple[ObjectMaterial, ...], overrides: Overrides, light
 def coated(materials: list[ObjectMaterial], albedo: Albedo, atlas: Atlas) -> list[ObjectMaterial]:
     """Descriptions with a plausible coat on what was seen too little to look for any highlight.
 
-    Not on what was looked at and showed none, nor on what is too dark to reflect as much as the coat does. The
-    roughness is the median of the dielectrics that were identified in the object's class, else in the room.
+    Not on what was looked at and showed none, or is of a class that did, nor on what is too dark to reflect as much as
+    the coat does. The roughness is the median of the dielectrics that were identified in the class, else in the room.
     """
+    matt = {m.class_name for m in materials if m.model == LAMBERTIAN and m.scores}
     rough: dict[str, list[float]] = {}
     for m in materials:
         if m.model == SPECULAR and m.phi is not None:
@@ -203,7 +203,7 @@ def coated(materials: list[ObjectMaterial], albedo: Albedo, atlas: Atlas) -> lis
     everywhere = [one for alike in rough.values() for one in alike]
     result = []
     for m in materials:
-        if m.model == LAMBERTIAN and not m.scores and m.given.keys() <= {"base_color"}:
+        if m.model == LAMBERTIAN and not m.scores and m.class_name not in matt and m.given.keys() <= {"base_color"}:
             own = atlas.object_id == m.object_id
             roughness = float(np.median(rough.get(m.class_name) or everywhere or [COAT_ROUGHNESS]))
             if own.any() and np.median(albedo.rho[own], 0).min() > layer_reflectance(COAT_F0, roughness**2):

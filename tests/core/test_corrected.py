@@ -12,7 +12,7 @@ from addon.core.material import EMITTER, LAMBERTIAN, SPECULAR, ObjectMaterial
 from addon.core.overrides import parse
 from addon.core.shading.albedo import MEASURED, NONE, Albedo
 from tests.core.on_disk import ALBEDO, CHEAP, LAMP
-from tests.core.rooms import box_sides, make_room, radiosity
+from tests.core.rooms import lit_box, make_room, radiosity
 
 pytestmark = pytest.mark.usefixtures("few_samples")
 
@@ -117,7 +117,7 @@ def test_keys_stay_where_nothing_is_given(recovered, folder):
 
 
 def test_a_coat_is_for_what_nothing_is_known_of():
-    room = make_room(box_sides(), 0.5)
+    room = make_room(lit_box(), 0.5)
     bright = {3: 0.02}
     rho = room.by_object(bright, 0.5)
     albedo = Albedo(rho, np.full(len(rho), MEASURED, np.int8), np.zeros(len(rho), np.float32))
@@ -129,7 +129,8 @@ def test_a_coat_is_for_what_nothing_is_known_of():
         ObjectMaterial(3, "wood", LAMBERTIAN),
         ObjectMaterial(4, "cloth", LAMBERTIAN, given={"model": "lambertian"}),
         ObjectMaterial(5, "door", LAMBERTIAN),
+        ObjectMaterial(6, "wall", LAMBERTIAN),
     ], albedo, room.atlas)
     assert found[1].coat == {"f0": 0.04, "roughness": pytest.approx(0.3)} and found[1].model == LAMBERTIAN
     assert found[5].coat["roughness"] == pytest.approx(0.3)  # no door has one: the room's
-    assert not any(found[i].coat for i in (0, 2, 3, 4))  # glossy; looked at; too dark to carry it; given
+    assert not any(found[i].coat for i in (0, 2, 3, 4, 6))  # glossy; looked at; too dark; given; as wall 2
