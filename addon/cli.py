@@ -18,7 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
-from .cli_refit import add_override
+from .cli_refit import add_override, add_refit, refit_command
 from .cli_relight import add_relight, relight_command
 from .console import ConsoleProgress, StopWish, duration, own_console, unexpected
 from .core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_OK, BadInputError, ScanRelightError
@@ -119,9 +119,10 @@ def make_parser() -> argparse.ArgumentParser:
     add_reading(info)
     add_common(info, info_command)
 
-    relight = add_relight(commands, EXIT_CODES)
-    add_leash(relight)
-    add_common(relight, relight_command)
+    for add, function in ((add_refit, refit_command), (add_relight, relight_command)):
+        command = add(commands, EXIT_CODES)
+        add_leash(command)
+        add_common(command, function)
 
     demo = commands.add_parser(
         "demo", help="render a small room, recover it, compare, relight", epilog=EXIT_CODES,

@@ -79,7 +79,6 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     target, images, copies
         With `scene`: what the materials go onto, and where their images go; see `write_back.putting_on`. Nothing is
         imported where they go onto the artist's own objects.
-
     override : Path, optional
         File of what the artist gives (`core.overrides`), merged into what the result folder keeps.
     heed_kept : bool
@@ -113,7 +112,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     elif scene is not None and not import_first:
         imported(scene, capture)
     told = _look(capture, reading) if capture.frames else []
-    with Store(out_folder) as store, _told(out_folder):
+    with Store(out_folder) as store, told_in_a_sentence(out_folder):
         write_capture(store.folder, capture.root)
         if from_stage in STAGES:
             store.drop(STAGES[STAGES.index(from_stage):])
@@ -179,7 +178,7 @@ def _look(capture: Capture, reading: Reading) -> list[str]:
 
 
 @contextmanager
-def _told(folder: Path) -> Iterator[None]:
+def told_in_a_sentence(folder: Path) -> Iterator[None]:
     """Turn what the system refuses while `folder` is written into one sentence."""
     try:
         yield

@@ -95,9 +95,13 @@ class Corrected:
     @cached_property
     def albedo(self) -> Albedo:
         """The final albedo: of L_d less its specular part, under all that glossy things throw, and as it was given."""
+        return self.albedo_of_all_but(self.emitters)
+
+    def albedo_of_all_but(self, without: set[int]) -> Albedo:
+        """The same, but with none for some objects."""
         found = self.specular()
         apart = [m.object_id for m in found.materials if m.model == TRANSPARENT]
-        albedo = self.albedo_under(self.irradiance, found.specular, self.emitters)
+        albedo = self.albedo_under(self.irradiance, found.specular, without)
         # What shows its background has no albedo that was measured.
         origin = np.where(np.isin(self.surface().atlas.object_id, apart), np.int8(NO_ALBEDO), albedo.origin)
         return with_base_colors(replace(albedo, origin=origin), self.surface().atlas, self.overrides)

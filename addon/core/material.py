@@ -106,3 +106,10 @@ class ObjectMaterial:
 def undescribed(object_id: int, class_name: str) -> ObjectMaterial:
     """What an object is taken for of which nothing was recovered."""
     return ObjectMaterial(object_id, class_name, LAMBERTIAN, note="no description")
+
+
+def from_json(told: dict[str, Any]) -> ObjectMaterial:
+    """A description as materials.json or a stored stage has it; further keys are left out."""
+    known = {name: tuple(value) if isinstance(value, list) else value for name, value in told.items()
+             if name in ObjectMaterial.__dataclass_fields__}
+    return ObjectMaterial(**known)

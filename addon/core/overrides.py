@@ -116,11 +116,12 @@ class Overrides:
         told = {str(i): one.as_dict() for i, one in self.lobes().items()}
         return (key("overrides", told),) if told else ()
 
-    def source(self, object_id: int) -> int:
-        """The object at the end of the chain of `same_as` that begins with this one."""
-        while (after := self.of(object_id).same_as) is not None:
-            object_id = after
-        return object_id
+    def chain(self, object_id: int) -> tuple[int, ...]:
+        """The objects that this one is the same as, one after the other; the last is described by itself."""
+        found = []
+        while (object_id := self.of(object_id).same_as) is not None:
+            found.append(object_id)
+        return tuple(found)
 
     def as_dict(self) -> dict[str, Any]:
         """As the file has it."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from functools import cached_property
 from typing import Any
 
@@ -23,7 +23,6 @@ from .evidence.page import make_page
 from .lit_diffuse.accumulate import LitDiffuse
 from .lit_diffuse.from_texture import face_edge, lit_from_tiles
 from .lit_diffuse.poses import Poses
-from .material import ObjectMaterial
 from .memory import peak_memory
 from .overrides import NONE as NO_OVERRIDES
 from .overrides import Overrides
@@ -298,13 +297,7 @@ class Recovery(Corrected):
         """phi, psi and the model of every object."""
         self.shading()
 
-        def load(arrays, meta):
-            def one(d):
-                return ObjectMaterial(**{k: tuple(v) if isinstance(v, list) else v for k, v in d.items()})
-
-            return Specular(tuple(one(d) for d in meta["materials"]), arrays["specular"], arrays["excess"])
-
-        return self._stage("specular", load, self.fitted)
+        return self._stage("specular", Specular.from_store, self.fitted)
 
     def fitted(self, held: Held | None = None) -> tuple[Specular, dict[str, np.ndarray], dict[str, Any]]:
         """The specular stage as it is computed, of all objects or with some `held`, and what is stored of it."""
@@ -343,8 +336,8 @@ class Recovery(Corrected):
         lit = self.lit_diffuse()
         return float(np.median(lit.radiance[lit.seen]))
 
-    def write_images(self) -> None:
-        """The result folder's images and materials.json."""
+    def write_images(self, wanted: Container[str] | None = None) -> None:
+        """The result folder's images, all or the `wanted` ones by name, materials.json and report.html."""
         atlas, lit = self.surface().atlas, self.lit_diffuse()
         dark = max(1e-6 * self.median_radiance(), 1e-30)
         spread = (lit.upper - lit.lower).mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
@@ -357,20 +350,23 @@ class Recovery(Corrected):
             "coverage": coverage,
             **self.evidence.images(),
         }
+        images = {name: image for name, image in images.items() if wanted is None or name in wanted}
 
         def write(name: str) -> None:
             self.store.write_exr(f"{name}.exr", atlas.image(images[name])[::-1])
 
         for done, _ in enumerate(ordered_map(write, images, self.settings.threads)):
             self.progress.update(0.5 * done / len(images))
-        self.store.write_exr("environment.exr", self.sky()[::-1])
+        if wanted is None or "environment" in wanted:
+            self.store.write_exr("environment.exr", self.sky()[::-1])
         known = {one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects}
         objects = [{"name": m.name} | dataclasses.asdict(m) | known.get(m.object_id, {}) for m in self.materials()]
         told = {"run": self.run_key, "capture": self.capture.root.name, "objects": objects}
+        told |= {name: value for name, value in self.overrides.as_dict().items() if name == "white"}
         self.store.write_json("materials.json", told)
         self.progress.update(0.6)
         write_bytes(self.store.path("report.html"), make_page(self, self.report()).encode())
 
     def report(self) -> dict[str, Any]:
         """What report.json holds so far: stages, settings, figures and warnings."""
-        return make_report(self)
+        return make_report(self) | {"code": CODE}

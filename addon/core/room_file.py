@@ -6,17 +6,19 @@ Reading it asks for neither the capture's pictures nor the stages, and takes a b
 from __future__ import annotations
 
 import json
+import math
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from .atomic import replacing
 from .capture.lenses_told import lens_of, told_lens
-from .capture.model import Camera, Capture, Frame, Instance, Mesh
+from .capture.model import Camera, Capture, Frame, Instance, Mesh, Shot
 from .errors import BadInputError, MissingStageError
-from .material import ObjectMaterial
+from .material import ObjectMaterial, from_json
 
 ROOM = "room.npz"
 MATERIALS = "materials.json"
@@ -72,6 +74,7 @@ def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = Non
         "frames": [[frame.name, str(frame.path.absolute()), [getattr(frame.camera, name) for name in CAMERA],
                     told_lens(frame.camera.lens)]
                    for frame in capture.frames],
+        "pictures": [_told_picture(frame) for frame in capture.frames],
     }
     arrays = {
         "told": np.frombuffer(json.dumps(told).encode(), np.uint8),
@@ -105,7 +108,7 @@ def read_room(folder: Path | str) -> Room:
     capture, atlas_uv = read_capture_file(folder)
     try:
         told = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))
-        return Room(capture, atlas_uv, tuple(material(one) for one in told["objects"]), folder, told.get("run", ""))
+        return Room(capture, atlas_uv, tuple(from_json(one) for one in told["objects"]), folder, told.get("run", ""))
     except DAMAGE as error:
         raise _damaged(folder, error) from error
 
@@ -119,11 +122,40 @@ def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
         told = json.loads(arrays["told"].tobytes())
         frames = tuple(Frame(name, Path(path), Camera(*camera, pose, lens_of(lens)))
                        for (name, path, camera, lens), pose in zip(told["frames"], arrays["poses"], strict=True))
+        pictures = told.get("pictures") or [{}] * len(frames)
+        frames = tuple(replace(frame, **_picture(one)) for frame, one in zip(frames, pictures, strict=True))
         mesh = Mesh(*(arrays[name] for name in ("vertices", "triangles", "object_id")), arrays.get("uv"))
         instances = tuple(Instance(int(number), name) for number, name in told["instances"])
         return Capture(Path(told["root"]), mesh, instances, frames, format=told["format"]), arrays["atlas_uv"]
     except DAMAGE as error:
         raise _damaged(folder, error) from error
+
+
+def _told_picture(frame: Frame) -> dict[str, Any]:
+    """How a frame's pictures are to be read, as JSON; JSON has no inf, so null stands for it."""
+    def told(path: Path | None) -> str | None:
+        return path and str(path.absolute())
+
+    def finite(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    return {"mask_path": told(frame.mask_path), "id_path": told(frame.id_path), "exposure": frame.exposure,
+            "saturation": finite(frame.saturation), "transfer": frame.transfer,
+            "brackets": [[told(shot.path), shot.exposure, finite(shot.saturation)] for shot in frame.brackets]}
+
+
+def _picture(told: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a `Frame` that `_told_picture` tells; none where it is of an older result."""
+    if not told:
+        return {}
+
+    def level(value: float | None) -> float:
+        return math.inf if value is None else value
+
+    paths = {name: told[name] and Path(told[name]) for name in ("mask_path", "id_path")}
+    brackets = tuple(Shot(Path(path), exposure, level(value)) for path, exposure, value in told["brackets"])
+    return paths | {"exposure": told["exposure"], "saturation": level(told["saturation"]),
+                    "transfer": told["transfer"], "brackets": brackets}
 
 
 def capture_name(folder: Path | str) -> str:
@@ -148,10 +180,3 @@ def root_of(folder: Path | str) -> Path | None:
 def _damaged(folder: Path, error: Exception) -> BadInputError:
     return BadInputError(f"The result in '{folder}' is damaged ({type(error).__name__}: {error}); "
                          "run the recovery again.")
-
-
-def material(told: dict) -> ObjectMaterial:
-    """One object of materials.json as its description; further keys are left out."""
-    known = {name: tuple(value) if isinstance(value, list) else value for name, value in told.items()
-             if name in ObjectMaterial.__dataclass_fields__}
-    return ObjectMaterial(**known)

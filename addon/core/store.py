@@ -122,6 +122,10 @@ class Store:
         meta = _read_meta(self._stage(name))
         return None if meta is None or meta.get("key") != key else meta.get("meta", {})
 
+    def stored_key(self, name: str) -> str | None:
+        """The key under which the stage `name` is stored; None where it is absent or damaged."""
+        return (_read_meta(self._stage(name)) or {}).get("key")
+
     def save(self, name: str, key: str, arrays: dict[str, np.ndarray], meta: dict[str, Any] | None = None) -> None:
         """Store the finished stage `name`, in whole or not at all.
 

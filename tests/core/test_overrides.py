@@ -129,7 +129,8 @@ def test_a_circle_made_by_both_is_told():
 
 
 def test_the_chain_of_same_as_is_followed():
-    assert read({"objects": {"1": {"same_as": 2}, "2": {"same_as": 3}}}).source(1) == 3
+    given = read({"objects": {"1": {"same_as": 2}, "2": {"same_as": 3}}})
+    assert given.chain(1) == (2, 3) and given.chain(3) == ()
 
 
 def test_only_what_bears_on_highlights_makes_them_anew():

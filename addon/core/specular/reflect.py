@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..capture.model import Instance
 from ..lit_diffuse.accumulate import LitDiffuse
-from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, ObjectMaterial
+from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, ObjectMaterial, from_json
 from ..overrides import NOTHING, Given
 from ..parallel import ordered_map
 from ..progress import Progress
@@ -68,6 +69,11 @@ class Specular:
     materials: tuple[ObjectMaterial, ...]
     specular: np.ndarray
     excess: np.ndarray
+
+    @staticmethod
+    def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Specular:
+        """From the stage's arrays, and the descriptions as JSON has them."""
+        return Specular(tuple(from_json(one) for one in meta["materials"]), arrays["specular"], arrays["excess"])
 
 
 @dataclass(frozen=True)
@@ -187,8 +193,8 @@ def fit_specular(
     for i in by_id:
         if i not in kept and given.get(i, NOTHING).same_as is not None:
             source = given[i].same_as
-            while given.get(source, NOTHING).same_as is not None:
-                source = given[source].same_as
+            while (further := given.get(source, NOTHING).same_as) is not None:
+                source = further
             by_id[i] = same_material(by_id[source], by_id[i])
     materials = list(by_id.values())
 

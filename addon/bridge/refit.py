@@ -1,0 +1,93 @@
+"""A few objects of a finished result fitted again, and the result folder written anew."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Collection
+from dataclasses import replace
+from pathlib import Path
+
+from ..core.capture.copies import converted
+from ..core.overrides import OVERRIDES
+from ..core.progress import Progress
+from ..core.refit import REPORT, Refit, Result, open_result
+from ..core.stages import READ, WRITE
+from ..core.store import Store
+from .load_picture import load_picture
+from .run import PICTURES, told_in_a_sentence, versions
+from .scene import write_scene
+
+SCENE = "scene.blend"
+WEIGHTS = {READ: 1, "surface": 2, "lit_diffuse": 0.1, "shading": 0.1, "specular": 3, WRITE: 5}
+"""Rough cost of its parts, for the estimate of the time left."""
+OUTDATED = f"{SCENE} shows the room as it was before objects were fitted again."
+
+
+def refit(
+    folder: Path | str, objects: Collection[int], progress: Progress, override: Path | None = None,
+    heed_kept: bool = True, scene: bool = True,
+) -> dict:
+    """Fit objects of a result again with all else held.
+
+    Parameters
+    ----------
+    folder : path
+        The result folder.
+    objects : collection of int
+        Those to fit; those of which something new is given are fitted besides.
+    progress : Progress
+    override : Path, optional
+        File of what the artist gives, merged into what the folder keeps.
+    heed_kept : bool
+        False leaves out what the folder keeps.
+    scene : bool
+        Also write scene.blend, from an empty file: what is open in this process is lost.
+
+    Returns
+    -------
+    dict
+        What report.json holds.
+
+    Raises
+    ------
+    ScanRelightError
+        One sentence for the user.
+    """
+    started = time.monotonic()
+    progress.stage(READ)
+    result = open_result(folder, objects, override, heed_kept)
+    with Store(folder) as store, told_in_a_sentence(store.folder):
+        result = _readable(result, store, progress)
+        run = Refit(result, store, progress)
+        progress.done()
+        run.refit()
+        if override is not None and heed_kept:
+            store.write_json(OVERRIDES, run.overrides.as_dict())
+        progress.stage(WRITE)
+        for name in (REPORT, SCENE) if scene else (REPORT,):
+            store.path(name).unlink(missing_ok=True)  # a stopped run must not leave the last one's among new images
+        run.write()
+        progress.update(0.6)
+        report = run.report()
+        report["warnings"] = [one for one in report["warnings"] if one != OUTDATED]
+        if scene:
+            capture = result.room.capture
+            posed = replace(capture, frames=run.room_poses().of(capture.frames), mesh=run.written_mesh())
+            write_scene(store.path(SCENE), posed, run.surface().atlas.uv, run.materials(), store.folder,
+                        run.median_radiance(), fresh=True, facing=True)
+        else:
+            report["warnings"].append(OUTDATED)
+        report["versions"] = versions()
+        report["refit"] = {"objects": sorted(run.touched), "seconds": round(time.monotonic() - started, 2)}
+        store.write_json(REPORT, report)
+        progress.done()
+    return report
+
+
+def _readable(result: Result, store: Store, progress: Progress) -> Result:
+    """The result with copies that the core can read of its pictures, for the report's; without what is gone."""
+    capture = result.room.capture
+    if not all(path.is_file() for frame in capture.frames for path in frame.files):
+        return result
+    capture = converted(capture, store.path(PICTURES), load_picture, progress)
+    return replace(result, room=replace(result.room, capture=capture))

@@ -1,0 +1,196 @@
+"""A few objects fitted again in a finished result: what a whole run gives for them, and nothing else changed."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from addon.core.capture.exr import read_exr
+from addon.core.capture.read import read_capture
+from addon.core.errors import BadInputError, MissingStageError
+from addon.core.material import METAL, SPECULAR
+from addon.core.overrides import parse
+from addon.core.progress import Progress
+from addon.core.recover import Recovery
+from addon.core.refit import Refit, open_result
+from addon.core.room_file import write_room
+from addon.core.store import Store
+from tests.core.on_disk import QUICK
+
+pytestmark = pytest.mark.usefixtures("few_samples")
+IMAGES = ("albedo", "base_color", "albedo_error", "coverage", "shading", "lit_diffuse", "evidence", "environment")
+
+
+def recover(disk, folder, told=None, settings=QUICK):
+    """A whole run with all that the bridge writes, but the scene."""
+    with Store(folder) as store:
+        capture = read_capture(disk.root)
+        run = Recovery(capture, store, settings, Progress(), disk.unwrap, parse(told or {}, "given", range(7)))
+        run.write_images()
+        write_room(folder, capture, run.surface().first_uv)
+        store.write_json("report.json", run.report())
+    return run
+
+
+@pytest.fixture(scope="module")
+def finished(disk, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("finished") / "result"
+    recover(disk, folder)
+    return folder
+
+
+@pytest.fixture
+def result(finished, tmp_path):
+    return shutil.copytree(finished, tmp_path / "result")
+
+
+def refit(folder, objects=(), told=None):
+    override = None
+    if told is not None:
+        override = folder / "given.json"
+        override.write_text(json.dumps(told))
+    with Store(folder) as store:
+        run = Refit(open_result(folder, objects, override), store, Progress())
+        run.refit()
+        store.write_json("overrides.json", run.overrides.as_dict())
+        run.write()
+        store.write_json("report.json", run.report())
+    return run
+
+
+def materials(folder):
+    return {one["object_id"]: one for one in json.loads((folder / "materials.json").read_text())["objects"]}
+
+
+def pictures(folder):
+    return {name: read_exr(folder / f"{name}.exr").rgb for name in IMAGES}
+
+
+GIVEN = {"objects": {"3": {"model": "specular", "roughness": 0.4}, "5": {"base_color": [0.2, 0.4, 0.1]}}}
+
+
+def test_as_a_whole_run_with_the_same_corrections(disk, finished, result, tmp_path):
+    run = refit(result, told=GIVEN)
+    assert run.touched == {3, 5} and run.fitted_again == {3}
+    whole = recover(disk, tmp_path / "whole", GIVEN)
+    assert not whole.log["specular"]["stored"]
+    ours, theirs, before = materials(result), materials(tmp_path / "whole"), materials(finished)
+    assert ours[3]["model"] == SPECULAR and ours[3]["given"] == GIVEN["objects"]["3"]
+    for i in (3, 5):
+        for name in ("model", "phi", "psi", "roughness_low", "roughness_high", "specular_low", "specular_high", "given",
+                     "note", "observations", "coat"):
+            assert ours[i][name] == theirs[i][name], name
+        for name in ("albedo", "albedo_low", "albedo_high"):
+            assert np.allclose(ours[i]["evidence"][name], theirs[i]["evidence"][name], atol=0.02), (i, name)
+    assert ours[5]["evidence"]["albedo"] == ours[5]["evidence"]["albedo_low"] == [0.2, 0.4, 0.1]
+    assert {i: one for i, one in ours.items() if i not in (3, 5)} == {
+        i: one for i, one in before.items() if i not in (3, 5)}
+    images, wholes = pictures(result), pictures(tmp_path / "whole")
+    atlas = run.surface().atlas
+    for i in (3, 5):
+        own = np.zeros(len(atlas), bool)
+        own[(atlas.object_id == i) & run.lit_diffuse().seen] = True
+        mine = atlas.image(own)[::-1] > 0
+        for name in ("albedo", "base_color"):
+            assert np.abs(images[name][mine] - wholes[name][mine]).mean() < 0.01, (name, i)
+        assert np.median(np.abs(images["albedo_error"][mine] - wholes["albedo_error"][mine])) < 0.01
+
+
+def test_all_else_is_held(finished, result):
+    run = refit(result, told=GIVEN)
+    atlas, before, after = run.surface().atlas, pictures(finished), pictures(result)
+    other = atlas.image(~np.isin(atlas.object_id, (3, 5)))[::-1]
+    assert np.array_equal(before.pop("environment"), after.pop("environment"))
+    for name in before:
+        assert np.array_equal(before[name][other], after[name][other]), name
+    assert (before["albedo"][~other] != after["albedo"][~other]).any()
+    assert json.loads((result / "materials.json").read_text())["run"] != (
+        json.loads((finished / "materials.json").read_text())["run"])
+
+
+def test_a_later_run_keeps_it(disk, result):
+    refit(result, told={"objects": {"4": {"model": "metal", "roughness": 0.2, "f0": [0.9, 0.6, 0.3]}}})
+    kept = json.loads((result / "overrides.json").read_text())
+    again = recover(disk, result, kept)
+    assert all(one["stored"] for one in again.log.values())
+    found = materials(result)[4]
+    assert found["model"] == METAL and found["f0"] == [0.9, 0.6, 0.3] and found["phi"] == pytest.approx(0.04)
+    color = again.base_color()[again.surface().atlas.object_id == 4]
+    assert np.allclose(color, (0.9, 0.6, 0.3))
+
+
+def test_taken_back_it_is_as_before(finished, result):
+    refit(result, told={"objects": {"3": {"model": "specular", "roughness": 0.4}}})
+    run = refit(result, told={"objects": {"3": None}})
+    assert run.touched == {3} and run.overrides.as_dict() == {"objects": {}}
+    before, after = materials(finished)[3], materials(result)[3]
+    for name in ("evidence",):
+        assert np.allclose(before[name]["albedo"], after[name]["albedo"], atol=1e-3)
+        before.pop(name), after.pop(name)
+    assert before == after
+    assert np.abs(pictures(finished)["albedo"] - pictures(result)["albedo"]).max() < 0.01
+
+
+def test_what_is_the_same_follows(result):
+    told = {"objects": {"2": {"same_as": 3}, "3": {"model": "metal", "roughness": 0.5}}}
+    refit(result, told=told)
+    run = refit(result, told={"objects": {"3": {"roughness": 0.1}}})
+    assert run.touched == {2, 3}
+    found = materials(result)
+    assert found[2]["phi"] == found[3]["phi"] == pytest.approx(0.01) and found[2]["model"] == METAL
+
+
+def test_a_lamp_given_and_taken_back(finished, result):
+    refit(result, told={"objects": {"2": {"model": "emitter"}}})
+    assert materials(result)[2]["emission"] and not materials(result)[2]["model"] == materials(finished)[2]["model"]
+    refit(result, told={"objects": {"2": None}})
+    assert np.abs(pictures(finished)["albedo"] - pictures(result)["albedo"]).max() < 0.01
+
+
+def test_a_white_makes_all_of_it_anew(finished, result):
+    mean = materials(finished)[4]["evidence"]["albedo"]
+    refit(result, told={"white": {"object": 4, "albedo": [x / 1.2 for x in mean]}})
+    report = json.loads((result / "report.json").read_text())
+    assert np.allclose(report["figures"]["white_scale"], 1.2, rtol=0.01)
+    before, after = materials(finished), materials(result)
+    for i in (0, 1, 3):
+        assert np.allclose(np.array(before[i]["evidence"]["albedo"]) / after[i]["evidence"]["albedo"], 1.2, rtol=0.02)
+    refit(result, told={"white": None})
+    assert "white_scale" not in json.loads((result / "report.json").read_text())["figures"]
+    assert np.allclose(pictures(finished)["albedo"], pictures(result)["albedo"], atol=1e-5)
+
+
+def test_the_capture_may_be_gone(disk, result):
+    hidden = disk.root.with_name("hidden")
+    disk.root.rename(hidden)
+    try:
+        refit(result, [3])
+    finally:
+        hidden.rename(disk.root)
+    assert (result / "report.html").is_file()
+
+
+def test_what_can_not_be_done_is_one_sentence(disk, result, tmp_path):
+    with pytest.raises(BadInputError, match="no object 99"):
+        open_result(result, [99])
+    with pytest.raises(BadInputError, match="Nothing is to be fitted"):
+        open_result(result, [])
+    with pytest.raises(MissingStageError, match="no finished result"):
+        open_result(tmp_path, [1])
+    shutil.rmtree(result / "stages")
+    with Store(result) as store, pytest.raises(MissingStageError, match="run recover again"):
+        Refit(open_result(result, [3]), store, Progress())
+    (result / "report.json").unlink()
+    with pytest.raises(MissingStageError, match="run recover again"):
+        open_result(result, [3])
+
+
+def test_stages_of_another_run_are_refused(disk, result):
+    with Store(result) as store:  # the shading stage anew with other settings, and stopped there
+        Recovery(read_capture(disk.root), store, replace(QUICK, shading_rays=32), Progress(), disk.unwrap).shading()
+        with pytest.raises(MissingStageError, match="another run's"):
+            Refit(open_result(result, [3]), store, Progress())
