@@ -18,7 +18,8 @@ from .atomic import replacing
 from .capture.lenses_told import lens_of, told_lens
 from .capture.model import Camera, Capture, Frame, Instance, Mesh, Shot
 from .errors import BadInputError, MissingStageError
-from .material import ObjectMaterial, from_json
+from .material import ObjectMaterial
+from .material import from_json as material
 
 ROOM = "room.npz"
 MATERIALS = "materials.json"
@@ -108,7 +109,7 @@ def read_room(folder: Path | str) -> Room:
     capture, atlas_uv = read_capture_file(folder)
     try:
         told = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))
-        return Room(capture, atlas_uv, tuple(from_json(one) for one in told["objects"]), folder, told.get("run", ""))
+        return Room(capture, atlas_uv, tuple(material(one) for one in told["objects"]), folder, told.get("run", ""))
     except DAMAGE as error:
         raise _damaged(folder, error) from error
 
