@@ -100,21 +100,28 @@ def settle(images: Iterable[bpy.types.Image], where: str = RESULT) -> None:
         They can't be copied.
     """
     check(where)
-    gone = set()
-    for number, one in {one.session_uid: one for one in images}.items():
-        if number in gone or one.library or one.source not in ("FILE", "TILED"):
+    places = {}
+    for one in {one.session_uid: one for one in images}.values():
+        if one.library or one.source not in ("FILE", "TILED"):
             continue
         source = Path(one.get(IMAGE) or bpy.path.abspath(one.filepath))
         one[IMAGE] = str(source)
+        if not one.packed_file and not is_there(source):
+            raise BadInputError(f"'{source}' is missing; run the recovery again to its end.")
+        places[one.session_uid] = one, source
+    for one, source in places.values():
+        if not one.packed_file:
+            one.filepath = str(_beside(source) if where == FOLDER else source)
+    gone = set()  # what can fail is done: from here on images give way to others
+    for number, (one, source) in places.items():
+        if number in gone:
+            continue
         for earlier in [other for other in bpy.data.images
                         if other != one and other.get(IMAGE) == str(source) and not other.library]:
             gone.add(earlier.session_uid)
             replace(earlier, one)
         if one.packed_file:
             continue
-        if not is_there(source):
-            raise BadInputError(f"'{source}' is missing; run the recovery again to its end.")
-        one.filepath = str(_beside(source) if where == FOLDER else source)
         if where == PACK:
             one.pack()
         elif bpy.data.filepath:
