@@ -1,13 +1,15 @@
 """The tab's third part: what was found of each object, how sure it is, and the stages that led there."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+from pathlib import Path
+
 import bpy
 
 from ..addon.bridge import result_file
 from ..addon.console import duration
 from ..addon.core.naming import in_order
 from ..addon.core.stages import LABELS, RUN_STAGES
-from . import results
+from . import preferences, results
 from .panel import NamedRows, SidebarPanel, places
 from .select_result_object import select
 
@@ -113,10 +115,9 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
         """The list, the chosen object, the page."""
         layout, scene = self.layout, context.scene
         rows, refused = result_file.rows(scene.objects), results.refused(scene.objects)
-        for sentence in refused:
+        for sentence, folder in refused:
             self.say(layout, context, sentence, "ERROR")
-        if refused:
-            layout.operator("scan_relight.run", text="Bring In", icon="IMPORT").target = "write"
+            self.bring_in(layout, scene, folder)
         found = results.result_of(scene)
         if not rows and not refused and (found is None or not found.objects):
             self.say(layout, context, "No result yet: run the recovery to its end, or choose the folder of one that "
@@ -138,6 +139,16 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
         if one is not None:
             self.details(layout.box(), context, thing.name, one)
         layout.operator("scan_relight.open_report", icon="URL")
+
+    def bring_in(self, layout, scene, folder: Path | None) -> None:
+        """The button that renews objects of an earlier run from a folder: the panel's own capture's, or by itself."""
+        choices = scene.scan_relight
+        chosen = preferences.result_folder(choices.result_folder, choices.capture_folder, scene) \
+            if choices.capture_folder else None
+        if chosen is not None and folder in (None, chosen):
+            layout.operator("scan_relight.run", text="Bring In", icon="IMPORT").target = "write"
+        elif folder is not None:
+            layout.operator("scan_relight.open_result", text="Bring In", icon="IMPORT").folder = str(folder)
 
     def details(self, layout, context, name: str, one: dict) -> None:
         """Everything of one object."""

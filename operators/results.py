@@ -48,21 +48,26 @@ def result_of(scene: bpy.types.Scene) -> Result | None:
     return None if folder is None else result_file.read(folder)
 
 
-def refused(things) -> list[str]:
-    """A sentence on recovered objects whose values can't be shown, as their folder holds another run or none can tell.
+def refused(things) -> list[tuple[str, Path | None]]:
+    """What is said of objects whose values can't be shown, as their folder holds another run or nobody can tell.
 
-    Those whose folder is gone are told by `panel_missing`.
+    Those whose folder is gone are told by the panel's top (`find_result`).
+
+    Returns
+    -------
+    list of (str, Path or None)
+        A sentence, and the folder whose run has to be brought in; None where nobody can tell.
     """
-    states = [state for state, _ in standings(things).values()]
-    found = []
-    for state, why in ((EARLIER, "of an earlier run than the one that lies in the result folder now; bring in the new "
-                                 "one to see what was found."),
-                       (UNTOLD, "of an older version of Scan Relight, so that nobody can tell which run made them; run "
-                                "again and bring in the result.")):
-        count = states.count(state)
-        if count:
-            found.append(f"{count} object{'s' * (count > 1)} of this scene {'are' if count > 1 else 'is'} {why}")
-    return found
+    counts: dict[Path | None, int] = {}
+    for state, result in standings(things).values():
+        if state in (EARLIER, UNTOLD):
+            folder = result.folder if state == EARLIER else None
+            counts[folder] = counts.get(folder, 0) + 1
+    return [(f"{count} object{'s' * (count > 1)} of this scene {'are' if count > 1 else 'is'} "
+             + (f"of an earlier run than the one that lies in '{folder.name}' now; bring in the new one to see what "
+                "was found." if folder else
+                "of an older version of Scan Relight, so that nobody can tell which run made them; run again and bring "
+                "in the result."), folder) for folder, count in counts.items()]
 
 
 forget = result_file.forget

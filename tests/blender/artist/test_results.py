@@ -107,11 +107,12 @@ def test_two_rooms_each_show_their_own_values(scene, results, tmp_path):
 def test_another_run_s_values_are_never_shown(scene, results, tmp_path):
     write(tmp_path, LATER)
     assert listed(scene, results) == {}
-    [sentence] = results.refused(scene.objects)
-    assert sentence.startswith("4 objects of this scene are of an earlier run") and "bring in the new one" in sentence
+    [(sentence, folder)] = results.refused(scene.objects)
+    assert folder == tmp_path and "bring in the new one" in sentence
+    assert sentence.startswith("4 objects of this scene are of an earlier run")
     recovered(scene.objects["tap"], 2, tmp_path, LATER)
     assert listed(scene, results) == {"tap": 0.04}
-    assert results.refused(scene.objects)[0].startswith("3 objects")
+    assert results.refused(scene.objects)[0][0].startswith("3 objects")
 
 
 def test_objects_whose_run_nobody_can_tell_are_refused(scene, results, tmp_path):
@@ -123,10 +124,11 @@ def test_objects_whose_run_nobody_can_tell_are_refused(scene, results, tmp_path)
     worn["scan_relight_model"] = "emitter"
     scene.objects["lamp"].data.materials.append(worn)
     assert listed(scene, results) == {"Apple": None}
-    [sentence] = results.refused(scene.objects)
-    assert sentence.startswith("2 objects of this scene are of an older version") and "run again" in sentence
+    [(sentence, folder)] = results.refused(scene.objects)
+    assert folder is None and "run again" in sentence
+    assert sentence.startswith("2 objects of this scene are of an older version")
     write(tmp_path, run="")  # a folder of an earlier version
-    assert listed(scene, results) == {} and results.refused(scene.objects)[0].startswith("3 objects")
+    assert listed(scene, results) == {} and results.refused(scene.objects)[0][0].startswith("3 objects")
 
 
 @pytest.mark.parametrize("text", ["", "[1, 2]", "{\"objects\": 3}", "{\"objects\": [{\"model\": \"metal\"}]}"])
@@ -170,3 +172,40 @@ def test_every_property_has_its_text(ops, name):
     kind = getattr(ops, name).get_rna_type()
     assert kind.description
     assert all(one.description for one in kind.properties if one.identifier != "rna_type" and not one.is_hidden)
+
+
+def test_the_button_brings_in_what_lies_in_the_objects_own_folder(scene, ops, tmp_path):
+    """The panel may be about another capture."""
+    from types import SimpleNamespace
+
+    from tests.blender.panel.conftest import Layout
+
+    class Shown(Layout):
+        def __init__(self, *args):
+            super().__init__(*args)
+            self.made = []
+
+        def operator(self, name, **more):
+            properties = super().operator(name, **more)
+            self.made.append((name, properties))
+            return properties
+
+        def template_list(self, *_, **__):
+            """Nothing to remember."""
+
+    panels = importlib.import_module("scan_relight.operators.panel_results")
+
+    def drawn():
+        layout, cls = Shown(), panels.SCAN_RELIGHT_PT_results
+        panel = SimpleNamespace(layout=layout, say=cls.say)
+        panel.bring_in = cls.bring_in.__get__(panel)
+        cls.draw(panel, SimpleNamespace(scene=scene, preferences=bpy.context.preferences, region=None))
+        return layout.text, layout.made[0]
+
+    write(tmp_path, LATER)
+    text, (button, properties) = drawn()
+    assert "4 objects of this scene are of an earlier run" in text
+    assert (button, properties.folder) == ("scan_relight.open_result", str(tmp_path))
+    scene.scan_relight.capture_folder = str(tmp_path / "capture")
+    _, (button, properties) = drawn()
+    assert (button, properties.target) == ("scan_relight.run", "write")
