@@ -81,7 +81,7 @@ def register():
     """Register every class and hang the property groups up."""
     import bpy
 
-    from . import find_result, keymaps, manual, menus
+    from . import find_result, keymaps, manual, menus, translations
     from .correct_register import register_handlers
     from .job_operator import forget_job
     from .panel_results import active_row_property
@@ -95,6 +95,7 @@ def register():
     bpy.app.handlers.load_post.append(find_result.look_for_results)
     bpy.app.handlers.save_post.append(find_result.found_is_kept)
     register_handlers()
+    translations.register()
     menus.register()
     keymaps.register()
     bpy.utils.register_manual_map(manual.manual_map)
@@ -105,13 +106,14 @@ def unregister():
     import bpy
 
     from ..addon.bridge import corrections, job
-    from . import find_result, findings, keymaps, manual, menus, results
+    from . import find_result, findings, keymaps, manual, menus, results, translations
     from .correct_register import unregister_handlers
     from .job_operator import forget_job
 
     bpy.utils.unregister_manual_map(manual.manual_map)
     keymaps.unregister()
     menus.unregister()
+    translations.unregister()
     unregister_handlers()
     corrections.forget()
     bpy.app.handlers.load_pre.remove(forget_job)

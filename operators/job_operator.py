@@ -16,6 +16,7 @@ from ..addon.bridge import job as jobs
 from ..addon.console import duration, unexpected
 from ..addon.core.errors import ScanRelightError
 from ..addon.core.stages import LABELS
+from .translations import told
 
 PERIOD = 0.1
 """Seconds between two looks at the job."""
@@ -28,10 +29,10 @@ SLICE = 0.04
 def stage_text(job: jobs.Job) -> str:
     """What a job does now, in words."""
     if job.stopping:
-        return "Stopping"
+        return told("Stopping")
     if not job.stage:
-        return "Starting"
-    return LABELS.get(job.stage, job.stage.replace("_", " ").capitalize())
+        return told("Starting")
+    return told(LABELS.get(job.stage, job.stage.replace("_", " ").capitalize()))
 
 
 def progress_text(job: jobs.Job) -> str:
@@ -40,7 +41,7 @@ def progress_text(job: jobs.Job) -> str:
     if job.stage and not job.stopping:
         text += f" {job.share:.0%}"
     left = job.seconds_left
-    return text if left is None or job.stopping else f"{text}, {duration(left)} left"
+    return text if left is None or job.stopping else f"{text}, {told(f'{duration(left)} left')}"
 
 
 def redraw(context) -> None:
@@ -220,11 +221,11 @@ def bar(job: jobs.Job) -> tuple[float, str]:
     """Share and text of the one progress bar."""
     phase = job.facts.get("phase")
     if phase == "change":
-        return job.facts["changed"], "Into the scene"
+        return job.facts["changed"], told("Into the scene")
     if phase == "load":
-        return 1.0, "Loading the result"
+        return 1.0, told("Loading the result")
     if phase == "wait":
-        return 1.0, "Done; leave the editing mode to bring it in"
+        return 1.0, told("Done; leave the editing mode to bring it in")
     return job.overall, progress_text(job)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+from . import translations
+
 MARGIN = 68
 """Pixels at an interface scale of 1 that the tabs, the panel's edges and paddings take."""
 ICON = 20
@@ -11,6 +13,7 @@ ICON = 20
 
 def say(layout, context, sentence: str, icon: str = "NONE") -> None:
     """Write `sentence` over as many lines as the region's width asks for; the icon stands before the first."""
+    sentence = translations.told(sentence)
     scale = context.preferences.system.ui_scale or 1.0  # 0 where there was never a window
     region = context.region
     room = (region.width if region else 300) - (MARGIN + (ICON if icon != "NONE" else 0)) * scale
