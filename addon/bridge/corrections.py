@@ -129,12 +129,15 @@ def found(thing: bpy.types.Object) -> dict[str, Any]:
 
 def effective(thing: bpy.types.Object, seen: frozenset = frozenset()) -> dict[str, Any]:
     """The same with what is given laid over it."""
-    values, said = found(thing), given(thing)
-    before = values["model"]
+    said = given(thing)
     other = by_id(thing, said["same_as"]) if said.get("same_as") is not None else None
+    theirs = {}
     if other is not None and other.name not in seen:
         theirs = effective(other, seen | {thing.name})
-        values |= {key: theirs[key] for key in LOBE}
+        theirs = {key: theirs[key] for key in LOBE}
+    values = _under(thing, said, (said | theirs).get("model"))
+    before = values["model"]
+    values |= theirs
     values |= {key: said[key] for key in (*LOBE, "base_color") if key in said}
     if "model" not in said and {"f0", "roughness"} & said.keys() and values["model"] == LAMBERTIAN:
         values["model"] = SPECULAR
@@ -152,6 +155,16 @@ def effective(thing: bpy.types.Object, seen: frozenset = frozenset()) -> dict[st
         elif values["model"] == SPECULAR and coloured:
             values["f0"] = sum(values["f0"]) / 3
     return values
+
+
+def _under(thing: bpy.types.Object, said: dict, model: str | None) -> dict[str, Any]:
+    """What to lay given values over: what the run fitted to that model, else what was found before it was given one."""
+    told, was = entry(thing), found(thing)
+    made = correct_material.worn(thing, told)
+    if made["model"] != (model or was["model"]):
+        return was
+    back = (told.get("given") or {}).keys() - said.keys()  # given to the run, and not any more
+    return made | {key: was[key] for key in made if key in back or ("same_as" in back and key in LOBE)}
 
 
 def show(thing: bpy.types.Object) -> None:
