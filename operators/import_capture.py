@@ -1,14 +1,13 @@
 """`bpy.ops.scan_relight.import_capture`: a capture's objects, cameras and frames into the scene."""
 
-from __future__ import annotations
-
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import shutil
 import tempfile
 
 import bpy
 
-from . import findings, reading_props
-from .settings_props import CaptureOperator
+from . import findings, reading_props, room_window
+from .settings_props import INTO, CaptureOperator
 
 
 class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
@@ -16,16 +15,17 @@ class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
 
     bl_idname = "scan_relight.import_capture"
     bl_label = "Import Capture"
-    bl_description = "Bring a capture's objects, cameras and frames into the scene"
+    bl_description = "Bring a capture's objects, cameras and frames into a scene of their own, as they were scanned"
+
+    into: INTO
 
     def work(self, context):
         """Read, then build."""
-        from ..addon.bridge.apply import import_capture
+        from ..addon.bridge.slices import whole
         from ..addon.core.capture.read import read_capture
 
         capture = read_capture(self.folder("capture_folder"), reading_props.reading(self))
-        import_capture(context.scene, capture)
-        return capture.warnings
+        return (*capture.warnings, *whole(self.change(context.scene, capture)))
 
     def begin(self, context):
         """Read it beside the window; large captures take a while."""
@@ -48,7 +48,9 @@ class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
 
     def change(self, scene, loaded):
         """Build the objects."""
-        from ..addon.bridge.apply import importing
+        from ..addon.bridge.room_import import importing
 
-        yield from importing(scene, loaded)
-        return ()
+        brought = yield from importing(loaded, scene if self.into == "SCENE" else None)
+        if self.into == "OWN":
+            room_window.show(scene, brought.scene)
+        return brought.warnings

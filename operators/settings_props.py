@@ -16,7 +16,7 @@ from ..addon.core.settings import PRESETS, Settings
 from ..addon.core.stages import LABELS, RUN_STAGES, WRITE
 from ..addon.leash import MemoryGuard
 from ..addon.settings_info import SettingInfo, setting_infos
-from . import poll, preferences, reading_props
+from . import poll, preferences, reading_props, room_window
 from .job_operator import JobOperator
 from .reading_props import with_reading
 from .settings_words import words
@@ -36,6 +36,10 @@ IMAGES = bpy.props.EnumProperty(
         ("RESULT", "In the Result Folder", "Refer to the images where they are"),
         ("FOLDER", "Beside the File", "Copy the images into a folder beside the saved .blend"),
         ("PACK", "Packed", "Keep the images within the .blend")])
+INTO = bpy.props.EnumProperty(
+    name="Into", description="Where the room goes", items=[
+        ("OWN", "A Scene of Its Own", "With its light, exposure and cameras; your scenes stay as they are"),
+        ("SCENE", "This Scene", "Only link the room into this scene; its world, exposure, engine and camera stay")])
 COPIES = bpy.props.BoolProperty(
     name="Make Copies", description="Where modifiers or instances make an object's faces, put the material onto a "
     "copy of it and hide the object; without this such objects are left as they are", default=False)
@@ -223,16 +227,21 @@ class SceneStageOperator(StageOperator):
         name="Onto", description="Which objects the materials go onto", items=TARGETS)
     images: IMAGES
     copies: COPIES
+    into: INTO
 
     def work(self, context):
-        """Run, then change the scene, so that a failed run leaves it alone."""
-        return self.run(context, self.until, scene=context.scene, import_first=self.import_first, target=self.target,
-                        images=self.images, copies=self.copies)
+        """Run, then bring the room, so that a failed run leaves the file alone."""
+        scene = context.scene
+        warnings = self.run(context, self.until, scene=scene, import_first=self.import_first, target=self.target,
+                            images=self.images, copies=self.copies, into=self.into)
+        if self.into == "OWN":
+            room_window.show_own(scene, self.folder("capture_folder"))
+        return warnings
 
     def begin(self, context):
-        """Start the run; where the capture should be in the scene, its absence is told now and not afterwards."""
+        """Start the run; where the capture should be in the file, its absence is told now and not afterwards."""
         from ..addon.bridge import result_images
-        from ..addon.bridge.apply import imported_from
+        from ..addon.bridge.room_parts import imported
         from ..addon.bridge.scene_capture import check_own
         from ..addon.bridge.write_back import is_own
 
@@ -241,7 +250,7 @@ class SceneStageOperator(StageOperator):
         if is_own(capture, self.target):
             check_own(capture)
         elif not self.import_first:
-            imported_from(context.scene, capture)
+            imported(capture)
         return super().begin(context)
 
     def load(self, job):
@@ -251,18 +260,16 @@ class SceneStageOperator(StageOperator):
         return read_room(job.facts["result_folder"])
 
     def change(self, scene, loaded):
-        """Import the capture, then put on what was recovered."""
-        from ..addon.bridge.apply import importing
-        from ..addon.bridge.write_back import is_own, putting_on
+        """Bring the room, or put the materials onto the artist's own objects."""
+        from ..addon.bridge.room import bringing
+        from ..addon.bridge.write_back import is_own, writing_back
 
-        half = 0.0 if is_own(loaded.capture.root, self.target) or not self.import_first else 0.5
-        if half:
-            for share in importing(scene, loaded.capture):
-                yield share * half
-        slices = putting_on(scene, loaded.capture, loaded.atlas_uv, loaded.materials, loaded.folder, self.target,
-                            self.images, self.copies)
-        while True:
-            try:
-                yield half + (1 - half) * next(slices)
-            except StopIteration as end:
-                return end.value
+        if is_own(loaded.capture.root, self.target):
+            return (yield from writing_back(scene, loaded.capture, loaded.atlas_uv, loaded.materials, loaded.folder,
+                                            self.images, self.copies))
+        brought = yield from bringing(loaded.folder, scene if self.into == "SCENE" else None, self.images,
+                                      known=not self.import_first)
+        if self.into == "OWN":
+            room_window.show(scene, brought.scene)
+        self.job.facts["room"] = brought.scene.name
+        return brought.warnings

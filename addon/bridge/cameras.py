@@ -19,9 +19,12 @@ from ..core.capture.lenses import Cropped, Equirectangular
 from ..core.capture.lenses_told import lens_of, told_lens
 from ..core.capture.model import Camera, Frame
 from ..core.capture.pixel_rays import widest_angle
+from .marks import CAPTURE
 
 LENS = "lens_model"
 """Custom property of cameras with a lens: the lens, fx, fy, cx and cy as JSON, which Blender has no settings for."""
+FRAME_INDEX = "frame_index"
+"""Custom property of a frame's camera: its place in the capture's order, from 0."""
 _SENSOR = 36.0
 _WIDE = np.radians(80)
 """A lens that sees further than this from its axis is no perspective."""
@@ -30,13 +33,15 @@ _TOLD = 0.5
 _GRID = 33
 
 
-def make_cameras(frames: Iterable[Frame], collection: bpy.types.Collection) -> list[bpy.types.Object]:
+def make_cameras(frames: Iterable[Frame], collection: bpy.types.Collection, first: int = 0) -> list[bpy.types.Object]:
     """Make a camera object for each frame and link it to a collection.
 
     Parameters
     ----------
     frames : iterable of Frame
     collection : bpy.types.Collection
+    first : int
+        Place of the first of `frames` in the capture's order.
 
     Returns
     -------
@@ -46,27 +51,44 @@ def make_cameras(frames: Iterable[Frame], collection: bpy.types.Collection) -> l
         frame's picture and what its radiance was multiplied by; `LENS` is the lens, where there is one.
     """
     made = []
-    for frame in frames:
+    for index, frame in enumerate(frames, first):
         thing = make_view(frame.name, frame.camera, collection)
+        thing[FRAME_INDEX] = index
         thing["frame_path"], thing["frame_exposure"] = str(Path(frame.path).absolute()), float(frame.exposure)
         made.append(thing)
     return made
 
 
-def use_camera(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
-    """Render through one of `make_cameras`: active camera, size of the picture and shape of its pixels."""
-    aspect = float(thing["pixel_aspect"])
-    render = scene.render
-    render.resolution_x, render.resolution_y = int(thing["width"]), int(thing["height"])
-    render.resolution_percentage = 100
-    # Blender takes numbers from 1 on.
-    render.pixel_aspect_x, render.pixel_aspect_y = max(1.0, 1 / aspect), max(1.0, aspect)
+def use_camera(scene: bpy.types.Scene, thing: bpy.types.Object, size: bool = True) -> None:
+    """Render through one of `make_cameras`: active camera and, with `size`, the picture's size and shape of pixels."""
+    if size:
+        render = scene.render
+        render.resolution_x, render.resolution_y = int(thing["width"]), int(thing["height"])
+        render.resolution_percentage = 100
+        render.pixel_aspect_x, render.pixel_aspect_y = _pixel(thing)
     scene.camera = thing
 
 
+def shows_as_framed(scene: bpy.types.Scene, thing: bpy.types.Object) -> bool:
+    """Whether a scene's picture has the sides and pixel shape that a frame's camera was made for, at any size."""
+    render = scene.render
+    wide, high = _pixel(thing)
+    wanted = thing["width"] * wide / (thing["height"] * high)
+    shown = render.resolution_x * render.pixel_aspect_x / (render.resolution_y * render.pixel_aspect_y)
+    return abs(shown / wanted - 1) < 1e-3
+
+
+def _pixel(thing: bpy.types.Object) -> tuple[float, float]:
+    """Width and height of a pixel as Blender takes them: from 1 on."""
+    aspect = float(thing["pixel_aspect"])
+    return max(1.0, 1 / aspect), max(1.0, aspect)
+
+
 def frame_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The cameras of a scene that `make_cameras` made, in the capture's order."""
-    return [thing for thing in scene.objects if thing.type == "CAMERA" and "pixel_aspect" in thing]
+    """The cameras of a scene that `make_cameras` made, one room after the other, in the capture's order."""
+    found = [thing for thing in scene.objects if thing.type == "CAMERA" and "pixel_aspect" in thing
+             and thing.get(FRAME_INDEX, 0) >= 0]
+    return sorted(found, key=lambda thing: (thing.get(CAPTURE, ""), thing.get(FRAME_INDEX, 0)))
 
 
 def differing(frames: Iterable[Frame]) -> str:

@@ -156,6 +156,22 @@ def put_back(material: bpy.types.Material, state: dict) -> None:
     set_on(material, state["on"])
 
 
+def carry(old: bpy.types.Material, new: bpy.types.Material) -> None:
+    """Give a lamp that was recovered anew the state of the lamp that it replaces."""
+    state = snapshot(old)
+    if state["colour"] is not None and tuple(old.get(_COLOUR, state["colour"])) == state["colour"]:
+        state["colour"] = None  # as found: the new one's own
+    put_back(new, state)
+
+
+def state_sockets(material: bpy.types.Material) -> list[bpy.types.NodeSocket]:
+    """The inputs that show a lamp's state; none while it is as recovered."""
+    if _STRENGTH not in material or not is_lamp(material):
+        return []
+    inputs = _principled(material).inputs
+    return [one for one in (inputs[EMISSION_STRENGTH], inputs[BASE_COLOR], _colour_socket(material)) if one is not None]
+
+
 def _keep(material):
     """Note what was recovered, before the first change."""
     if _STRENGTH in material:

@@ -224,6 +224,13 @@ def put_back(world: bpy.types.World | None, state: dict) -> None:
         set_on(world, state["on"])
 
 
+def state_sockets(world: bpy.types.World) -> list[bpy.types.NodeSocket]:
+    """The inputs that show the state of the light from outside."""
+    texture = _texture(world)
+    turned = [texture.inputs["Vector"]] if texture is not None and rotation(world) else []
+    return turned + ([_background(world).inputs["Strength"]] if _KEPT in world else [])
+
+
 def _keep(world):
     node = _background(world)
     if node is not None and _KEPT not in world:

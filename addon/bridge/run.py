@@ -31,15 +31,19 @@ from ..core.stages import READ, RUN_STAGES, STAGES, WRITE
 from ..core.store import Store
 from ..version import VERSION
 from . import result_images
-from .apply import import_capture, imported, whole
 from .load_picture import load_picture
+from .room import bringing
+from .room_parts import imported
 from .scene import write_scene
 from .scene_capture import check_own, polygons_of
+from .slices import whole
 from .unwrap import unwrap
-from .write_back import AUTO, is_own, putting_on
+from .write_back import AUTO, is_own, writing_back
 
 PICTURES = "stages/pictures"
 """Where in the result folder copies of frames lie that the core can't read itself."""
+OWN, SCENE = "OWN", "SCENE"
+"""Where a room goes: into a scene of its own, or into the one that is open."""
 WEIGHTS = {READ: 1, "surface": 5, "lit_diffuse": 8, "shading": 17, "specular": 16, WRITE: 5}
 """Rough cost of the stages, for the estimate of the time left."""
 LEFT_OUT = f"The corrections that the result folder keeps in {OVERRIDES} were left out of this run, as was asked."
@@ -55,7 +59,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         until: str = WRITE, scene: bpy.types.Scene | None = None, import_first: bool = True,
         reading: Reading = AS_FOUND, from_stage: str | None = None, target: str = AUTO,
         images: str = result_images.RESULT, copies: bool = False, override: Path | None = None,
-        heed_kept: bool = True) -> dict:
+        heed_kept: bool = True, into: str = OWN) -> dict:
     """Recover a capture up to a stage; stages that the result folder holds already are not done again.
 
     Parameters
@@ -68,21 +72,23 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     until : str
         One of `stages.RUN_STAGES`; `WRITE` for all of them, the images and scene.blend.
     scene : bpy.types.Scene, optional
-        With `WRITE`: also put the materials onto the capture's objects in this scene, and leave all else that is open
-        as it is. Without one, scene.blend is made from an empty file.
+        With `WRITE`: also bring the room into the file that this scene is of, and leave all else that is open as it
+        is. Without one, scene.blend is made from an empty file.
     import_first : bool
-        Bring the capture into `scene` before; False takes the objects that are there.
+        Bring the room where it is not there; False updates one that is.
     reading : Reading
         How the capture is to be read.
     from_stage : str, optional
         Do this stage and all later ones anew, though the result folder holds them.
     target, images, copies
-        With `scene`: what the materials go onto, and where their images go; see `write_back.putting_on`. Nothing is
-        imported where they go onto the artist's own objects.
+        With `scene`: what the materials go onto, see `write_back.is_own`, and where their images go, see
+        `result_images`. No room comes where they go onto the artist's own objects.
     override : Path, optional
         File of what the artist gives (`core.overrides`), merged into what the result folder keeps.
     heed_kept : bool
         False leaves out, for this run, what the result folder keeps.
+    into : str
+        `OWN`: the room has a scene of its own; `SCENE`: it comes into `scene`.
 
     Returns
     -------
@@ -110,7 +116,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     if scene is not None and own:
         check_own(capture.root)  # what is absent is told now, not after the work
     elif scene is not None and not import_first:
-        imported(scene, capture)
+        imported(capture.root)
     told = _look(capture, reading) if capture.frames else []
     with Store(out_folder) as store, told_in_a_sentence(out_folder):
         write_capture(store.folder, capture.root)
@@ -143,11 +149,12 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
             write_room(store.folder, posed, surface.first_uv)
             warnings = write_scene(store.path("scene.blend"), facing, surface.atlas.uv, materials, store.folder,
                                    recovery.median_radiance(), fresh=scene is None, facing=True)
-            if scene is not None:
-                if import_first and not own:
-                    import_capture(scene, capture)
-                warnings += whole(putting_on(scene, capture, surface.first_uv, materials, store.folder, target,
-                                             images, copies))
+            if scene is not None and own:
+                warnings += whole(writing_back(scene, capture, surface.first_uv, materials, store.folder, images,
+                                               copies))
+            elif scene is not None:
+                warnings += whole(bringing(store.folder, scene if into == SCENE else None, images,
+                                           known=not import_first)).warnings
             progress.done()
         report = recovery.report()
         if until == WRITE:

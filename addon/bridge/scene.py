@@ -18,11 +18,16 @@ from ..core.capture.model import Capture
 from ..core.errors import StorageError
 from ..core.material import EMITTER, ObjectMaterial, undescribed
 from ..core.room_file import run_of
+from .as_made import stamp, stamp_tree
+from .camera_track import make_track
 from .cameras import differing, make_cameras, make_view, unlike, use_camera
 from .images import image_name, load_image, relative_to
-from .marks import mark
+from .marks import OWN_SCENE, mark
 from .materials import make_material
 from .mesh_objects import is_open, make_objects
+from .room_parts import CAMERAS, LAMPS, ROOM, new_room, part_of, scene_name
+from .room_scene import EXPOSURE
+from .scene_data import Made
 from .world import set_world
 
 BASE_COLOR, ALBEDO, SHADING, ENVIRONMENT = "base_color.exr", "albedo.exr", "shading.exr", "environment.exr"
@@ -89,16 +94,13 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
     folder = Path(result_folder).absolute()
     images = {name: load_image(folder / name, image_name(capture.root.name, name))
               for name in (BASE_COLOR, ALBEDO, SHADING) if (folder / name).exists()}
-    top = bpy.data.collections.new("Scan Relight")
-    room, lamps, eyes = (bpy.data.collections.new(name) for name in ("Room", "Lamps", "Cameras"))
-    for part in (room, lamps, eyes):
-        top.children.link(part)
+    top = new_room(capture.root)
+    room, lamps, eyes = (part_of(top, name) for name in (ROOM, LAMPS, CAMERAS))
     scene.collection.children.link(top)
     objects = make_objects(capture.mesh, capture.instances, atlas_uv, room)
     run = run_of(folder)
-    mark(top, folder, run, capture.root)
-    for thing in objects.values():
-        mark(thing, folder, run)
+    for owner in (top, *objects.values()):
+        mark(owner, folder, run, capture.root)
     descriptions = {m.object_id: m for m in materials}
     for instance in capture.instances:
         if instance.object_id not in objects:
@@ -110,7 +112,9 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
         if description.model == EMITTER:
             room.objects.unlink(thing)
             lamps.objects.link(thing)
+        stamp(thing, instance.name)
     cameras = make_cameras(capture.frames, eyes)
+    track = make_track(cameras, top)
     if own:
         environment = folder / ENVIRONMENT
         world = set_world(scene, environment if environment.exists() else None)
@@ -119,7 +123,14 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
                 node.image.name = image_name(capture.root.name, ENVIRONMENT)
                 images[node.name] = node.image
         _prepare(scene, median_radiance)
+        stamp_tree(world)
         use_camera(scene, cameras[0] if cameras else _overview(capture, eyes))
+        scene.frame_start, scene.frame_end = 1, max(len(cameras), 1)
+        scene.name, scene[OWN_SCENE] = scene_name(capture.root), True
+        scene[EXPOSURE] = scene.view_settings.exposure
+    for thing in (*cameras, *filter(None, (track,))):
+        mark(thing, folder, run, capture.root)
+        stamp(thing)
     warnings = tuple(filter(None, (differing(capture.frames), unlike(capture.frames))))
     return BuiltScene(top, objects, cameras, list(images.values()), warnings)
 
@@ -168,7 +179,7 @@ def write_scene(path: Path | str, capture: Capture, atlas_uv: np.ndarray, materi
         scene = bpy.context.scene
         scene.name = "Scan Relight"
     else:
-        before = {kind: set(getattr(bpy.data, kind)) for kind in _KINDS}
+        made = Made()
         scene = bpy.data.scenes.new("Scan Relight")
     try:
         built = build_scene(scene, capture, atlas_uv, materials, result_folder, median_radiance, own=True,
@@ -178,11 +189,8 @@ def write_scene(path: Path | str, capture: Capture, atlas_uv: np.ndarray, materi
         _save_whole(path, lambda name: _save(name, scene, built, fresh))
     finally:
         if not fresh:
-            _remove_new(before)
+            made.remove()
     return built.warnings
-
-
-_KINDS = ("scenes", "collections", "objects", "meshes", "cameras", "materials", "worlds", "images")
 
 
 def _save(name, scene, built, fresh):
@@ -234,14 +242,6 @@ def is_whole(path: Path) -> bool:
 
 
 _FOOTER, _FRAME, _SEEKABLE = struct.Struct("<IBI"), struct.Struct("<II"), 0x8F92EAB1
-
-
-def _remove_new(before):
-    """Take away all data that a build made, the owners before what they own."""
-    for kind in _KINDS:
-        new = [item for item in getattr(bpy.data, kind) if item not in before[kind]]
-        if new:
-            bpy.data.batch_remove(new)
 
 
 def _prepare(scene, median_radiance):

@@ -19,7 +19,6 @@ from ..core.errors import BadInputError, MissingStageError
 from ..core.material import ObjectMaterial, undescribed
 from ..core.room_file import run_of
 from . import result_images
-from .apply import applying, whole
 from .marks import OBJECT_ID, RESULT, RUN, mark
 from .materials import MODEL, make_material
 from .mesh_objects import ATLAS_UV
@@ -27,6 +26,7 @@ from .relight_room import depsgraph_of
 from .scene_capture import Source, check_own, few, polygons_of, sharing, sources
 from .scene_mesh import Part, gather, same_topology, topology
 from .scene_mesh import topology_hash as hash_of
+from .slices import whole
 
 BEFORE = "scan_relight_before"
 """Custom property of an object: what it wore before."""
@@ -70,15 +70,6 @@ def write_back(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, m
         An image can't be read, or the images' folder can't be told.
     """
     return whole(writing_back(scene, capture, atlas_uv, materials, result_folder, where, copies))
-
-
-def putting_on(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
-               result_folder: Path | str, target: str = AUTO, where: str = result_images.RESULT,
-               copies: bool = False) -> Generator[float, None, tuple[str, ...]]:
-    """`writing_back` or `apply.applying`, as `target` says; `AUTO` takes what the capture came from."""
-    if is_own(capture.root, target):
-        return writing_back(scene, capture, atlas_uv, materials, result_folder, where, copies)
-    return applying(scene, capture, atlas_uv, materials, result_folder, where)
 
 
 def is_own(capture_folder: Path | str, target: str = AUTO) -> bool:

@@ -1,0 +1,37 @@
+"""Data that a piece of work adds to the open file, so that all of it, or what is left over, can be taken away again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import bpy
+
+KINDS = ("scenes", "collections", "objects", "meshes", "cameras", "materials", "worlds", "images", "actions")
+"""Owners come before what they own."""
+
+
+class Made:
+    """What has been added to the open file since this was made."""
+
+    def __init__(self):
+        self._before = {one.session_uid for kind in KINDS for one in getattr(bpy.data, kind)}
+
+    def new(self, kind: str) -> list:
+        """What is new among one of `KINDS`."""
+        return [one for one in getattr(bpy.data, kind) if one.session_uid not in self._before]
+
+    def remove(self) -> None:
+        """Take all of it away, but for pictures that what was there shows already."""
+        for kind in KINDS:
+            found = [one for one in self.new(kind) if kind != "images" or not one.users]
+            if found:
+                bpy.data.batch_remove(found)
+
+    def remove_unused(self, also: Iterable[int] = ()) -> None:
+        """Take away what nothing uses: of what is new, and of the data whose `session_uid` is in `also`."""
+        also = set(also)
+        for kind in KINDS[1:]:
+            while found := [one for one in getattr(bpy.data, kind)
+                            if (one.session_uid not in self._before or one.session_uid in also)
+                            and not one.users and not one.library]:
+                bpy.data.batch_remove(found)

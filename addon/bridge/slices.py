@@ -1,0 +1,14 @@
+"""Work in slices: a generator that yields the share done, so that a window can be drawn in between."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+
+def whole(slices: Generator):
+    """Do all slices of a piece of work at once; what it returns."""
+    while True:
+        try:
+            next(slices)
+        except StopIteration as end:
+            return end.value
