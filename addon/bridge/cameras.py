@@ -67,6 +67,18 @@ def use_camera(scene: bpy.types.Scene, thing: bpy.types.Object, size: bool = Tru
         render.resolution_percentage = 100
         render.pixel_aspect_x, render.pixel_aspect_y = _pixel(thing)
     scene.camera = thing
+    show_camera(scene, thing)
+
+
+def show_camera(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
+    """Show one camera of a room whose others are hidden: Blender draws no picture behind a hidden one."""
+    top = next((one for one in scene.collection.children_recursive
+                if CAPTURE in one and thing in set(one.all_objects)), None)
+    if top is None or thing.name in top.objects:
+        return
+    for other in [one for one in top.objects if one.get(FRAME_INDEX, -1) >= 0 and len(one.users_collection) > 1]:
+        top.objects.unlink(other)
+    top.objects.link(thing)
 
 
 def shows_as_framed(scene: bpy.types.Scene, thing: bpy.types.Object) -> bool:

@@ -16,8 +16,9 @@ from ..core.errors import BadInputError, MissingStageError
 from ..core.room_file import ROOM, root_of, run_of
 from . import result_images, room_changes
 from .as_made import stamp, stamp_tree
+from .cameras import show_camera
 from .marks import IMAGE, OWN_SCENE, RESULT, mark
-from .room_parts import find_room, imported, own_scene, rooms, scene_name
+from .room_parts import find_room, hide_cameras, imported, own_scene, rooms, scene_name
 from .room_scene import dress, take_settings
 from .room_update import commit, note_known, plan
 from .scene_data import Made
@@ -135,6 +136,8 @@ def bringing(folder: Path | str, scene: bpy.types.Scene | None = None, where: st
         one.name = label
     brought = Brought(place, top, steps is not None, (*warnings, *kept), differences)
     yield 0.98
+    if brought.scene.camera is not None:
+        show_camera(brought.scene, brought.scene.camera)
     # Without this no matrix_world is right before the scene is looked at.
     brought.scene.view_layers[0].update()
     return brought
@@ -185,9 +188,11 @@ def _place(top, shell, scene, root: str, new: bool) -> tuple[bpy.types.Scene, li
         kept = take_settings(own, shell)
     if scene is not None and top not in scene.collection.children_recursive:
         scene.collection.children.link(top)
+        hide_cameras(scene, top)
     if scene is None and own is None:
         if not new:
             shell.collection.children.link(top)
+            hide_cameras(shell, top)
         shell.name, shell[OWN_SCENE] = scene_name(root), True
         dress(shell)
         return shell, kept
@@ -217,5 +222,6 @@ def link_room(top: bpy.types.Collection, scene: bpy.types.Scene, outside: bool =
                                 "again.")
     if top not in scene.collection.children_recursive:
         scene.collection.children.link(top)
+        hide_cameras(scene, top)
     if outside:
         scene.world, scene.view_settings.exposure = source.world, source.view_settings.exposure

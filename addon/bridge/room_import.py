@@ -10,12 +10,12 @@ import numpy as np
 from ..core.capture.model import Capture
 from .as_made import stamp
 from .camera_track import make_track
-from .cameras import make_cameras, use_camera
+from .cameras import make_cameras, show_camera, use_camera
 from .marks import CAPTURE, OWN_SCENE
 from .match_frame import show_picture
 from .mesh_objects import each_object
 from .room import Brought
-from .room_parts import CAMERAS, ROOM, find_room, new_room, part_of, scene_name, scenes_with
+from .room_parts import CAMERAS, ROOM, find_room, hide_cameras, new_room, part_of, scene_name, scenes_with
 from .room_update import note_known
 from .scene_data import Made
 
@@ -75,5 +75,8 @@ def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generat
         if cameras:
             use_camera(scene, cameras[0])
     scene.collection.children.link(top)
+    hide_cameras(scene, top)
+    if scene.camera is not None:
+        show_camera(scene, scene.camera)
     scene.view_layers[0].update()
     return Brought(scene, top)

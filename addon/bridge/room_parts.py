@@ -15,18 +15,28 @@ PART = "scan_relight_part"
 
 
 def new_room(capture_folder: Path | str) -> bpy.types.Collection:
-    """A collection "Scan Relight" with its parts, linked to no scene.
-
-    The cameras' part is not shown in the viewport: as many cameras as frames would hide the room.
-    """
+    """A collection "Scan Relight" with its parts, linked to no scene."""
     top = bpy.data.collections.new("Scan Relight")
     top[CAPTURE] = str(Path(capture_folder).absolute())
     for name in (ROOM, LAMPS, CAMERAS):
         part = bpy.data.collections.new(name)
         part[PART] = name
         top.children.link(part)
-    part_of(top, CAMERAS).hide_viewport = True
     return top
+
+
+def hide_cameras(scene: bpy.types.Scene, top: bpy.types.Collection) -> None:
+    """Close the eye of the cameras' part in a scene: as many cameras as frames would hide the room.
+
+    The eye and not "disabled in viewports", under which Blender would not even tell where a camera stands.
+    """
+    part = part_of(top, CAMERAS)
+    for layer in scene.view_layers:
+        found = [layer.layer_collection]
+        for one in found:
+            found.extend(one.children)
+            if one.collection == part != top:
+                one.hide_viewport = True
 
 
 def scene_name(capture_folder: Path | str) -> str:

@@ -25,7 +25,7 @@ from .images import image_name, load_image, relative_to
 from .marks import OWN_SCENE, mark
 from .materials import make_material
 from .mesh_objects import is_open, make_objects
-from .room_parts import CAMERAS, LAMPS, ROOM, new_room, part_of, scene_name
+from .room_parts import CAMERAS, LAMPS, ROOM, hide_cameras, new_room, part_of, scene_name
 from .room_scene import EXPOSURE
 from .scene_data import Made
 from .world import set_world
@@ -131,6 +131,7 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
     for thing in (*cameras, *filter(None, (track,))):
         mark(thing, folder, run, capture.root)
         stamp(thing)
+    hide_cameras(scene, top)
     warnings = tuple(filter(None, (differing(capture.frames), unlike(capture.frames))))
     return BuiltScene(top, objects, cameras, list(images.values()), warnings)
 

@@ -23,7 +23,7 @@ class Made:
     def remove(self) -> None:
         """Take all of it away, but for pictures that what was there shows already."""
         for kind in KINDS:
-            found = [one for one in self.new(kind) if kind != "images" or not one.users]
+            found = [one for one in self.new(kind) if kind != "images" or one.users == one.use_fake_user]
             if found:
                 bpy.data.batch_remove(found)
 

@@ -48,7 +48,7 @@ def test_triangles_and_coordinates_come_back(scene, mesh):
 
 def test_names(scene, mesh):
     objects = make_objects(mesh, INSTANCES, mesh.uv, scene.collection)
-    assert [o.name for o in objects.values()] == ["Sofa", "Sofa.001", "Wall"]
+    assert [o.name for o in objects.values()] == ["Sofa 2", "Sofa 5", "Wall 7"]
 
 
 def test_without_own_coordinates(scene, mesh):

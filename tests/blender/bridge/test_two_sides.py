@@ -82,7 +82,7 @@ def test_round_trip_of_a_sheet_between_two_rooms(scene, shoot, tmp_path):
     opened.cycles.use_denoising = opened.cycles.use_adaptive_sampling = False
     opened.cycles.samples, opened.render.image_settings.file_format = 128, "OPEN_EXR"
     opened.render.film_transparent = False
-    frames = {c.name: c for c in opened.objects if c.type == "CAMERA"}
+    frames = {c.name: c for c in opened.objects if "frame_path" in c}
     # `all_round` looks along +x, -x, ...: of the first eye along +x, of the first in the dim room along -x.
     for index in (0, 5 * 6 + 1):
         camera = case.views[index]
@@ -99,20 +99,20 @@ def test_round_trip_of_a_sheet_between_two_rooms(scene, shoot, tmp_path):
         assert np.abs(ratio - 1).max() < 0.1, f"frame {index}: {ratio}"
 
 
-def test_a_scene_of_ones_own_keeps_its_faces_and_a_stored_run_is_the_same(scene, tmp_path):
-    """Materials go onto the imported objects, whose sheet has one layer; a second run takes the stored stages."""
+def test_the_room_in_an_open_scene_has_both_sides_and_a_stored_run_is_the_same(scene, tmp_path):
+    """The sheet has the two layers that it has in scene.blend; a second run takes the stored stages."""
     case = sheet_between_rooms()
     taken = Captured(tmp_path / "capture", case.room, case.shown, views=case.views[::2])
     result = tmp_path / "result"
-    first = run(taken.root, result, QUICK, Progress(), scene=scene)
+    first = run(taken.root, result, QUICK, Progress(), scene=scene, into="SCENE")
     images = {name: (result / f"{name}.exr").read_bytes() for name in ("base_color", "shading")}
     [sheet] = [thing for thing in scene.objects if thing.get("object_id") == 8]
-    assert len(sheet.data.polygons) == 2 and len(sheet.data.materials) == 1
-    uv = np.empty(12, np.float32)
+    assert len(sheet.data.polygons) == 4 and len(sheet.data.materials) == 1
+    uv = np.empty(24, np.float32)
     sheet.data.uv_layers["ScanRelight"].uv.foreach_get("vector", uv)
     assert np.ptp(uv.reshape(-1, 2), axis=0).min() > 0.05
     assert not any("Object 8" in warning for warning in first["warnings"])
-    again = run(taken.root, result, QUICK, Progress(), scene=scene, import_first=False)
+    again = run(taken.root, result, QUICK, Progress(), scene=scene, import_first=False, into="SCENE")
     assert again["stages"]["surface"]["stored"] and again["figures"] == first["figures"]
     assert images == {name: (result / f"{name}.exr").read_bytes() for name in images}
 

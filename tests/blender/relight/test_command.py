@@ -54,7 +54,7 @@ def test_before_and_after_beside_each_other(result, tmp_path, camera):
 
 def bpy_camera_name(result, index):
     bpy.ops.wm.open_mainfile(filepath=str(result / "scene.blend"), load_ui=False)
-    return [thing.name for thing in bpy.context.scene.objects if thing.type == "CAMERA"][index]
+    return sorted(thing.name for thing in bpy.context.scene.objects if "frame_path" in thing)[index]
 
 
 def test_a_number_and_a_name_are_the_same_camera(result, tmp_path):
