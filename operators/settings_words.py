@@ -23,6 +23,10 @@ WORDS = {
     "detail": Words("Detail", "Texels along one pixel of the frames, where the texel size is 0; more is finer and "
                     "slower"),
     "atlas_size": Words("Largest Texture (px)", "The longest edge that a texture may have, in pixels"),
+    "atlas": Words("Textures", "How many images the colours of the room are in", {
+        "room": ("One for the Room", "One image for all objects"),
+        "object": ("One an Object", "One image for each object, as fine as the frames show it: for close work"),
+        "udim": ("UDIM Tiles", "Numbered tiles of the largest texture size, as fine as the frames show each object")}),
     "denoise_mesh": Words("Smooth the Mesh", "Take the noise out of a scanned mesh and keep its edges; a mesh without "
                           "noise and your own objects stay as they are"),
     "refine_poses": Words("Correct Cameras", "Move frames that lie beside what all of them show together; good ones, "

@@ -9,11 +9,14 @@ import bpy
 import numpy as np
 
 from ..core.errors import BadInputError
+from ..core.material import ObjectMaterial
 from ..core.naming import LONGEST, cut
-from .marks import IMAGE
+from .marks import IMAGE, UV_MAP
+from .mesh_objects import PARTS_UV
 
 RADIANCE = "Linear Rec.709"
 """Colour space of radiance, albedo and F0."""
+UDIM = "<UDIM>"
 DATA = "Non-Color"
 """Colour space of numbers that are no colours."""
 
@@ -25,6 +28,7 @@ def load_image(path: Path | str, name: str | None = None, colour_space: str = RA
     Parameters
     ----------
     path : Path or str
+        One with ``<UDIM>`` in its name stands for all its tiles.
     name : str, optional
         Name of the image in Blender; the file's stem if left out.
     colour_space : str
@@ -45,8 +49,13 @@ def load_image(path: Path | str, name: str | None = None, colour_space: str = RA
         The file is missing or is no image.
     """
     path = Path(path).absolute()
+    tiles = tiles_of(path)
     try:
-        image = bpy.data.images.load(str(path), check_existing=False)
+        image = bpy.data.images.load(str(tiles[0] if tiles else path), check_existing=False)
+        if tiles:
+            image.source, image.filepath = "TILED", str(path)
+            for tile in tiles[1:]:
+                image.tiles.new(int(tile.name[len(path.name.split(UDIM)[0]):][:4]))
     except RuntimeError as error:
         raise BadInputError(f"{path} can't be opened as an image; run the stage that writes it again.") from error
     image.name = name or path.stem
@@ -57,6 +66,23 @@ def load_image(path: Path | str, name: str | None = None, colour_space: str = RA
     if packed:
         image.pack()
     return image
+
+
+def tiles_of(path: Path) -> list[Path]:
+    """The files that a path with ``<UDIM>`` in its name stands for; none for any other."""
+    return sorted(path.parent.glob(path.name.replace(UDIM, "[0-9]" * 4))) if UDIM in path.name else []
+
+
+def load_parts(folder: Path, files: dict[int, str], room: str,
+               descriptions: dict[int, ObjectMaterial]) -> dict[int, bpy.types.Image]:
+    """The images of a result folder's `Parts`, by object; objects of one file share its image."""
+    found: dict[str, bpy.types.Image] = {}
+    for number, file in files.items():
+        if file not in found:
+            owner = room if UDIM in file else descriptions[number].name
+            found[file] = load_image(folder / file, image_name(owner, "base_color tiles" if UDIM in file else "base_color"), keep=False)
+            found[file][UV_MAP] = PARTS_UV
+    return {number: found[file] for number, file in files.items()}
 
 
 def image_name(room: str, path: Path | str) -> str:

@@ -30,6 +30,9 @@ PAINTED = "scan_relight_painted"
 SMOOTH = "scan_relight_smooth"
 """Of an object: the angle in radians from which on its edges stay sharp."""
 
+UV_MAP = "scan_relight_uv_map"
+"""Of an image: name of the texture coordinates that it is laid out for; absent where those are the room atlas's."""
+
 
 def mark(owner, folder: Path | str, run: str, capture: Path | str | None = None) -> None:
     """Say on an object or a room's collection which run made it.

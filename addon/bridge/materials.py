@@ -7,6 +7,7 @@ import math
 import bpy
 
 from ..core.material import EMITTER, LAMP_ALBEDO, METAL, SPECULAR, ObjectMaterial
+from .marks import UV_MAP
 from .mesh_objects import ATLAS_UV
 
 MODEL = "scan_relight_model"
@@ -169,9 +170,9 @@ def mix_node(nodes):
 
 
 def _texture(nodes, links, image, place):
-    """Colour output of an image over the atlas."""
+    """Colour output of an image over the atlas, or its part of it."""
     coordinates = nodes.new("ShaderNodeUVMap")
-    coordinates.uv_map = ATLAS_UV
+    coordinates.uv_map = image.get(UV_MAP, ATLAS_UV)
     coordinates.location = (place[0] - 250, place[1])
     texture = nodes.new("ShaderNodeTexImage")
     texture.image = image

@@ -12,12 +12,14 @@ from .marks import OBJECT_ID
 
 ATLAS_UV = "ScanRelight"
 """Name of the texture coordinates that the recovered images use."""
+PARTS_UV = "ScanRelightParts"
+"""Of those for images of single objects, or UDIM tiles; absent where one image serves the room."""
 CAPTURE_UV = "Capture"
 """Name of the capture's own texture coordinates, where it has any."""
 
 
-def make_objects(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray,
-                 collection: bpy.types.Collection) -> dict[int, bpy.types.Object]:
+def make_objects(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray, collection: bpy.types.Collection,
+                 parts_uv: np.ndarray | None = None) -> dict[int, bpy.types.Object]:
     """Make one mesh object for each instance and link it to a collection.
 
     Parameters
@@ -29,6 +31,8 @@ def make_objects(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray
     atlas_uv : (t, 3, 2) float32
         Atlas coordinates of each triangle's corners, in [0, 1].
     collection : bpy.types.Collection
+    parts_uv : (t, 3, 2) float32, optional
+        See `PARTS_UV`; then these are the active ones.
 
     Returns
     -------
@@ -36,11 +40,11 @@ def make_objects(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray
         By `object_id`. The origin lies in the middle of the object's box; shading is flat, because the scan's
         geometric normals are what the light was divided by.
     """
-    return dict(each_object(mesh, instances, atlas_uv, collection))
+    return dict(each_object(mesh, instances, atlas_uv, collection, parts_uv))
 
 
-def each_object(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray,
-                collection: bpy.types.Collection) -> Iterator[tuple[int, bpy.types.Object]]:
+def each_object(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray, collection: bpy.types.Collection,
+                parts_uv: np.ndarray | None = None) -> Iterator[tuple[int, bpy.types.Object]]:
     """`make_objects` one by one, so that a window can be drawn in between."""
     order = np.argsort(mesh.object_id, kind="stable")
     sorted_id = mesh.object_id[order]
@@ -55,8 +59,10 @@ def each_object(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray,
         _add_uv(data, ATLAS_UV, atlas_uv[own])
         if mesh.uv is not None:
             _add_uv(data, CAPTURE_UV, mesh.uv[own])
-        data.uv_layers.active = data.uv_layers[ATLAS_UV]
-        data.uv_layers[ATLAS_UV].active_render = True
+        if parts_uv is not None:
+            _add_uv(data, PARTS_UV, parts_uv[own])
+        shown = data.uv_layers[ATLAS_UV if parts_uv is None else PARTS_UV]
+        data.uv_layers.active, shown.active_render = shown, True
         thing = bpy.data.objects.new(instance.name, data)
         thing.location = middle
         thing[OBJECT_ID] = int(instance.object_id)

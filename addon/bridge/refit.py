@@ -74,7 +74,7 @@ def refit(
             capture = result.room.capture
             posed = replace(capture, frames=run.room_poses().of(capture.frames), mesh=run.written_mesh())
             write_scene(store.path(SCENE), posed, run.surface().atlas.uv, run.materials(), store.folder,
-                        run.median_radiance(), fresh=True, facing=True)
+                        run.median_radiance(), fresh=True, facing=True, parts=run.parts)
         else:
             report["warnings"].append(OUTDATED)
         report["versions"] = versions()

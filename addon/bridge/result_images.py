@@ -11,7 +11,7 @@ import bpy
 
 from ..core.errors import BadInputError, StorageError
 from ..core.room_file import capture_name
-from .images import DATA, RADIANCE, image_name, load_image, relative_to
+from .images import DATA, RADIANCE, image_name, load_image, relative_to, tiles_of
 from .marks import IMAGE
 from .scene import ALBEDO, BASE_COLOR, SHADING
 
@@ -19,7 +19,6 @@ RESULT, FOLDER, PACK = "RESULT", "FOLDER", "PACK"
 """Refer to the result folder; copy into a folder beside the saved .blend; pack into it."""
 COLOUR_SPACES = {BASE_COLOR: RADIANCE, ALBEDO: RADIANCE, SHADING: RADIANCE, "lit_diffuse.exr": RADIANCE,
                  "coverage.exr": DATA, "albedo_error.exr": DATA, "evidence.exr": DATA}
-UDIM = "<UDIM>"
 NEVER_SAVED = "Images can't go beside a file that was never saved; save it first, or pack them."
 BAKED = (BASE_COLOR, ALBEDO, SHADING)
 
@@ -138,11 +137,7 @@ def replace(earlier: bpy.types.Image, one: bpy.types.Image) -> None:
 
 def is_there(path: Path) -> bool:
     """Whether an image's file exists; of tiles (``<UDIM>``) any."""
-    return path.is_file() or bool(_tiles(path))
-
-
-def _tiles(path: Path) -> list[Path]:
-    return sorted(path.parent.glob(path.name.replace(UDIM, "[0-9]" * 4))) if UDIM in path.name else []
+    return path.is_file() or bool(tiles_of(path))
 
 
 def _beside(source: Path) -> Path:
@@ -155,7 +150,7 @@ def _beside(source: Path) -> Path:
     target = next(one for one in (saved.parent / name for name in names) if one not in theirs) / source.name
     try:
         target.parent.mkdir(exist_ok=True)
-        for one in _tiles(source) or [source]:
+        for one in tiles_of(source) or [source]:
             shutil.copyfile(one, target.parent / one.name)
     except OSError as error:
         raise StorageError(f"'{target}' can't be written ({error.strerror or error}); free some space or save the file "

@@ -148,7 +148,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
             facing = replace(posed, mesh=recovery.written_mesh())
             write_room(store.folder, posed, surface.first_uv)
             warnings = write_scene(store.path("scene.blend"), facing, surface.atlas.uv, materials, store.folder,
-                                   recovery.median_radiance(), fresh=scene is None, facing=True)
+                                   recovery.median_radiance(), fresh=scene is None, facing=True, parts=recovery.parts)
             if scene is not None and own:
                 warnings += whole(writing_back(scene, capture, surface.first_uv, materials, store.folder, images,
                                                copies))

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -21,7 +22,7 @@ from ..core.room_file import run_of
 from .as_made import stamp, stamp_tree
 from .camera_track import make_track
 from .cameras import differing, make_cameras, make_view, unlike, use_camera
-from .images import image_name, load_image, relative_to
+from .images import image_name, load_image, load_parts, relative_to
 from .marks import OWN_SCENE, mark
 from .materials import make_material
 from .mesh_objects import is_open, make_objects
@@ -29,6 +30,9 @@ from .room_parts import CAMERAS, LAMPS, ROOM, hide_cameras, new_room, part_of, s
 from .room_scene import EXPOSURE
 from .scene_data import Made
 from .world import set_world
+
+if TYPE_CHECKING:
+    from ..core.parts import Parts
 
 BASE_COLOR, ALBEDO, SHADING, ENVIRONMENT = "base_color.exr", "albedo.exr", "shading.exr", "environment.exr"
 """Files of the result folder that the scene shows; a missing one is left out."""
@@ -62,7 +66,7 @@ class BuiltScene:
 
 def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
                 result_folder: Path | str, median_radiance: float = 0.0, own: bool = False,
-                facing: bool = False) -> BuiltScene:
+                facing: bool = False, parts: Parts | None = None) -> BuiltScene:
     """Add the recovered room to a scene as a new collection; nothing that is there is changed.
 
     Parameters
@@ -81,6 +85,8 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
         The scene is ours: also set its world, active camera, render engine and exposure.
     facing : bool
         The mesh's normals face the frames: a lamp that is an open sheet then shines on that side only, as it was seen.
+    parts : Parts, optional
+        Images that the materials show instead of the room's one; that is there all the same.
 
     Returns
     -------
@@ -97,18 +103,20 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
     top = new_room(capture.root)
     room, lamps, eyes = (part_of(top, name) for name in (ROOM, LAMPS, CAMERAS))
     scene.collection.children.link(top)
-    objects = make_objects(capture.mesh, capture.instances, atlas_uv, room)
+    objects = make_objects(capture.mesh, capture.instances, atlas_uv, room, parts and parts.uv)
     run = run_of(folder)
     for owner in (top, *objects.values()):
         mark(owner, folder, run, capture.root)
     descriptions = {m.object_id: m for m in materials}
+    own_images = load_parts(folder, parts.images, capture.root.name, descriptions) if parts else {}
     for instance in capture.instances:
         if instance.object_id not in objects:
             continue
         thing = objects[instance.object_id]
         description = descriptions.get(instance.object_id) or undescribed(instance.object_id, instance.class_name)
         one_sided = facing and description.model == EMITTER and is_open(thing.data)
-        thing.data.materials.append(make_material(description, images.get(BASE_COLOR), one_sided=one_sided))
+        base_color = own_images.get(instance.object_id, images.get(BASE_COLOR))
+        thing.data.materials.append(make_material(description, base_color, one_sided=one_sided))
         if description.model == EMITTER:
             room.objects.unlink(thing)
             lamps.objects.link(thing)
@@ -133,7 +141,8 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
         stamp(thing)
     hide_cameras(scene, top)
     warnings = tuple(filter(None, (differing(capture.frames), unlike(capture.frames))))
-    return BuiltScene(top, objects, cameras, list(images.values()), warnings)
+    shown = [*images.values(), *dict.fromkeys(own_images.values())]
+    return BuiltScene(top, objects, cameras, shown, warnings)
 
 
 def _overview(capture: Capture, collection: bpy.types.Collection) -> bpy.types.Object:
@@ -145,7 +154,7 @@ def _overview(capture: Capture, collection: bpy.types.Collection) -> bpy.types.O
 
 def write_scene(path: Path | str, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
                 result_folder: Path | str, median_radiance: float = 0.0,
-                fresh: bool | None = None, facing: bool = False) -> tuple[str, ...]:
+                fresh: bool | None = None, facing: bool = False, parts: Parts | None = None) -> tuple[str, ...]:
     """Save the recovered room as a .blend of its own that renders when opened.
 
     The file appears whole or not at all, and refers to the images by paths relative to itself.
@@ -154,7 +163,7 @@ def write_scene(path: Path | str, capture: Capture, atlas_uv: np.ndarray, materi
     ----------
     path : Path or str
         Best within `result_folder`, so that both are moved together.
-    capture, atlas_uv, materials, result_folder, median_radiance, facing
+    capture, atlas_uv, materials, result_folder, median_radiance, facing, parts
         See `build_scene`.
     fresh : bool, optional
         True: start from an empty file; what is open in this process is lost. False: build next to what is open, save
@@ -184,7 +193,7 @@ def write_scene(path: Path | str, capture: Capture, atlas_uv: np.ndarray, materi
         scene = bpy.data.scenes.new("Scan Relight")
     try:
         built = build_scene(scene, capture, atlas_uv, materials, result_folder, median_radiance, own=True,
-                            facing=facing)
+                            facing=facing, parts=parts)
         for image in built.images:
             relative_to(image, path.parent)
         _save_whole(path, lambda name: _save(name, scene, built, fresh))

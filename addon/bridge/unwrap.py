@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ..core.capture.model import Mesh
-from .uv_islands import areas, connected, corner_ids, cut_sparse
+from ..core.surface.uv_islands import areas, connected, corner_ids, cut_sparse
 from .uv_overlap import layers, overlapping_pairs
 
 OVERLAP_TEXELS = 0.02

@@ -27,10 +27,11 @@ from .memory import peak_memory
 from .overrides import NONE as NO_OVERRIDES
 from .overrides import Overrides
 from .parallel import ordered_map
+from .parts import Parts, remove_parts, write_parts
 from .passes import all_passes
 from .progress import Progress
 from .report import make_report
-from .settings import Settings
+from .settings import ROOM, Settings
 from .shading.albedo import Albedo, albedo_of
 from .shading.clipped import shade_clipped
 from .shading.environment import Environment
@@ -74,6 +75,8 @@ class Recovery(Corrected):
         Time, memory and whether it was stored, of each.
     bad_frames, blind_frames : list of str
         Sentences on frames that turned out damaged; names of those without a valid pixel.
+    parts : Parts or None
+        What `write_images` wrote besides the room's images, as `Settings.atlas` asks for.
     """
 
     def __init__(
@@ -93,6 +96,7 @@ class Recovery(Corrected):
         self.log: dict[str, dict[str, Any]] = {}
         self.bad_frames: list[str] = []
         self.blind_frames: list[str] = []
+        self.parts: Parts | None = None
 
     @property
     def frames(self) -> tuple[Frame, ...]:
@@ -122,6 +126,7 @@ class Recovery(Corrected):
         """16 hex digits that are the same where a capture and all that was asked of it are, and else differ."""
         told = (self.overrides.as_dict(),) if self.overrides.any else ()
         told += () if self.settings.coat else ("no coat",)
+        told += () if self.settings.atlas == ROOM else (self.settings.atlas,)
         return key("run", self._keys["specular"], *told)[:16]
 
     def _stage(
@@ -198,7 +203,7 @@ class Recovery(Corrected):
             pose[:3, 3] += was.camera.centre - near.camera.centre
         return dataclasses.replace(self.poses(), camera_to_world=poses)
 
-    def _read(self, frame: Frame) -> Pixels:
+    def read(self, frame: Frame) -> Pixels:
         """A frame's pixels; one that turns out damaged counts as blind, unless too many are."""
         try:
             pixels = read_pixels(frame)
@@ -221,7 +226,7 @@ class Recovery(Corrected):
 
         def compute():
             value = (
-                all_passes(surface, frames, self._read, self.settings, self.store.folder, self.progress)
+                all_passes(surface, frames, self.read, self.settings, self.store.folder, self.progress)
                 if frames else from_mesh()
             )  # fmt: skip
             arrays = {f"{i}.{f.name}": getattr(v, f.name) for i, v in enumerate(value) for f in dataclasses.fields(v)}
@@ -359,7 +364,13 @@ class Recovery(Corrected):
             self.progress.update(0.5 * done / len(images))
         if wanted is None or "environment" in wanted:
             self.store.write_exr("environment.exr", self.sky()[::-1])
+        if self.settings.atlas == ROOM:
+            remove_parts(self)
+        elif "base_color" in images:
+            self.parts = write_parts(self, atlas.image(images["base_color"]))
         known = {one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects}
+        for number, name in (self.parts.images if self.parts else {}).items():
+            known.setdefault(number, {})["image"] = name
         objects = [{"name": m.name} | dataclasses.asdict(m) | known.get(m.object_id, {}) for m in self.materials()]
         told = {"run": self.run_key, "capture": self.capture.root.name, "objects": objects}
         told |= {name: value for name, value in self.overrides.as_dict().items() if name == "white"}

@@ -6,6 +6,8 @@ from dataclasses import dataclass, fields
 
 from .errors import BadInputError
 
+ROOM = "room"
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -19,6 +21,9 @@ class Settings:
         Texels along one pixel of the frames' footprint, where texel_size is 0.
     atlas_size : int
         Upper bound on the atlas's edge in pixels.
+    atlas : str
+        'room' (one image for the room), or for close work 'object' (one for each object, as fine as the frames resolve
+        it) or 'udim' (the same as tiles of at most atlas_size); the room's images are written all the same.
     denoise_mesh : bool
         Take a scanned mesh's noise out of it, edges kept, for all that is computed and for the scene that is written. A
         mesh without noise, and objects in your own scene, stay as they are.
@@ -63,6 +68,7 @@ class Settings:
     texel_size: float = 0.0
     detail: float = 1.0
     atlas_size: int = 4096
+    atlas: str = ROOM
     denoise_mesh: bool = True
     refine_poses: bool = True
     median: str = "adaptive"
@@ -82,6 +88,7 @@ class Settings:
     seed: int = 0
 
     CHOICES = {
+        "atlas": (ROOM, "object", "udim"),
         "median": ("adaptive", "batched", "exact", "p2", "mean"),
         "frame_order": ("shuffled", "capture"),
         "shading": ("aimed", "uniform"),

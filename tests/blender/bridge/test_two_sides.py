@@ -20,9 +20,9 @@ from addon.bridge.materials import make_material  # noqa: E402
 from addon.bridge.mesh_objects import make_objects  # noqa: E402
 from addon.bridge.run import run  # noqa: E402
 from addon.bridge.unwrap import Polygons, unwrap  # noqa: E402
-from addon.bridge.uv_islands import areas  # noqa: E402
 from addon.bridge.uv_overlap import overlapping_pairs  # noqa: E402
 from addon.core.progress import Progress  # noqa: E402
+from addon.core.surface.uv_islands import areas  # noqa: E402
 
 
 @pytest.mark.parametrize("in_faces", [False, True])

@@ -1,0 +1,242 @@
+"""The atlas in parts: an image for each object, or UDIM tiles, made of the room atlas's own islands.
+
+Islands are moved by whole texels, so an image in parts shows the very texels of the room's; those of an object that
+the frames resolve finer are enlarged. All parts lie side by side in one square, the sheet, on which finer detail is
+computed as on any atlas.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .uv_islands import boxes, connected, corner_ids
+
+OBJECT, UDIM = "object", "udim"
+MARGIN = 1
+"""Texels of the room's atlas around each island that show it too, for what lies between texels."""
+SHAPES = (1.0, 1.1, 1.25, 1.5)
+STEP = 64
+
+
+@dataclass(frozen=True)
+class Page:
+    """One image: `number` is an object's id, or a tile's (1001...); a rectangle of the sheet, in texels."""
+
+    number: int
+    x: int
+    y: int
+    width: int
+    height: int
+
+
+@dataclass(frozen=True)
+class Pages:
+    """How a room's atlas is parted.
+
+    Attributes
+    ----------
+    pages : tuple of Page
+    uv : (t, 3, 2) float32
+        Coordinates for the images: in [0, 1] of the object's own, or tile by tile as UDIM has it.
+    sheet_uv : (t, 3, 2) float32
+        The same corners on the sheet, in [0, 1].
+    size : int
+        Edge of the sheet in texels.
+    scale : dict of int to float
+        By object: texels of the sheet along one of the room's.
+    island : (i, 6) float64
+        Of each island: lower left of its box on the room's atlas, on the sheet, and width and height there, in texels.
+    island_object : (i,) int64
+    """
+
+    pages: tuple[Page, ...]
+    uv: np.ndarray
+    sheet_uv: np.ndarray
+    size: int
+    scale: dict[int, float]
+    island: np.ndarray
+    island_object: np.ndarray
+
+    def image(self, room: np.ndarray) -> np.ndarray:
+        """The sheet, (size, size, c) float32, of what an image over the room's atlas, (s, s, c), shows; rows upwards.
+
+        Between its islands a page shows its mean: smaller copies of it then have no dark seams.
+        """
+        sheet = np.zeros((self.size, self.size, room.shape[2]), np.float32)
+        empty = np.ones(sheet.shape[:2], bool)
+        for (x0, y0, x, y, width, height), number in zip(self.island, self.island_object, strict=True):
+            x, y, width, height = int(x), int(y), int(width), int(height)
+            scale = self.scale[int(number)]
+            columns, rows = (_weights(start, count, scale, len(room)) for start, count in ((x0, width), (y0, height)))
+            if scale == 1:
+                part = room[rows[0][:, None], columns[0]]
+            else:
+                part = _between(room, rows, columns)
+            sheet[y:y + height, x:x + width] = part
+            empty[y:y + height, x:x + width] = False
+        for page in self.pages:
+            part, gaps = self.of(sheet, page), self.of(empty, page)
+            part[gaps] = part[~gaps].mean(0)
+        return sheet
+
+    def of(self, sheet: np.ndarray, page: Page) -> np.ndarray:
+        """A page's part of an image of the sheet."""
+        return sheet[page.y:page.y + page.height, page.x:page.x + page.width]
+
+
+def _weights(start: float, count: int, scale: float, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """For `count` texels from `start` on: the room's texels to both sides, and how near each lies to the second."""
+    at = start + (np.arange(count) + 0.5) / scale - 0.5
+    low = np.floor(at + 1e-6).astype(np.int64)
+    share = np.clip(at - low, 0, 1).astype(np.float32)
+    return np.clip(low, 0, size - 1), np.clip(low + 1, 0, size - 1), share
+
+
+def _between(room, rows, columns):
+    (y0, y1, b), (x0, x1, a) = rows, columns
+    a, b = a[None, :, None], b[:, None, None]
+    low = room[y0[:, None], x0] * (1 - a) + room[y0[:, None], x1] * a
+    high = room[y1[:, None], x0] * (1 - a) + room[y1[:, None], x1] * a
+    return low * (1 - b) + high * b
+
+
+def lay_out(kind: str, triangles: np.ndarray, uv: np.ndarray, object_id: np.ndarray, size: int,
+            scale: dict[int, float], largest: int) -> Pages:
+    """Part a room's atlas.
+
+    Parameters
+    ----------
+    kind : str
+        `OBJECT` or `UDIM`.
+    triangles : (t, 3) int
+    uv : (t, 3, 2) float32
+        On the room's atlas.
+    object_id : (t,) int
+    size : int
+        Edge of that atlas in texels.
+    scale : dict of int to float
+        By object: how much larger its islands become; 1 where left out. Lowered where its image would not fit.
+    largest : int
+        Upper bound of an image's edge in texels.
+    """
+    island = connected(corner_ids(triangles, uv), object_id)
+    first = np.unique(island, return_index=True)[1]
+    owner = object_id[first].astype(np.int64)
+    low, high = (edge.astype(np.float64) * size for edge in boxes(uv, island))
+    corner = np.floor(low) - MARGIN
+    extent = np.ceil(high) + MARGIN - corner
+    numbers = np.unique(owner).tolist()
+    scale = {number: float(scale.get(number, 1.0)) for number in numbers}
+    blocks, place, box = {}, np.zeros((len(first), 2)), np.zeros((len(first), 2))
+    for number in numbers:
+        own = np.flatnonzero(owner == number)
+        while True:
+            box[own] = np.ceil(extent[own] * scale[number])
+            place[own], width, height = _block(box[own], largest)
+            if width <= largest and (height <= largest or kind == UDIM and box[own].max() <= largest):
+                break
+            scale[number] *= 0.95
+        blocks[number] = own, width, height
+    if kind == OBJECT:
+        page, tile, offset = _in_blocks(blocks, place)
+    else:
+        page, tile, offset = _in_few_tiles(blocks, place, box, largest)
+    edge = max(one.x + one.width for one in page), max(one.y + one.height for one in page)
+    sheet = -(-max(edge) // STEP) * STEP
+    place += np.array([(page[k].x, page[k].y) for k in tile]) + offset
+    factor = np.array([scale[int(number)] for number in owner])
+    on_sheet = (uv * size - corner[island][:, None]) * factor[island][:, None, None] + place[island][:, None]
+    origin, extents = (np.array([[getattr(one, a), getattr(one, b)] for one in page], np.float64)
+                       for a, b in (("x", "y"), ("width", "height")))
+    of_page = np.asarray(tile)[island]
+    own_uv = (on_sheet - origin[of_page][:, None]) / extents[of_page][:, None]
+    if kind == UDIM:
+        number = np.array([one.number - 1001 for one in page])[of_page]
+        own_uv += np.stack([number % 10, number // 10], -1)[:, None]
+    return Pages(tuple(page), own_uv.astype(np.float32), (on_sheet / sheet).astype(np.float32), int(sheet), scale,
+                 np.concatenate([corner, place, box], 1), owner)
+
+
+def _shelves(box: np.ndarray, width: int) -> tuple[np.ndarray, int, int]:
+    """Rectangles ((n, 2) width and height) in rows of at most `width`: lower left corners, and what they take."""
+    place = np.zeros_like(box)
+    x = y = height = widest = 0
+    for k in np.lexsort((-box[:, 0], -box[:, 1])).tolist():
+        w, h = int(box[k, 0]), int(box[k, 1])
+        if x and x + w > width:
+            x, y, height = 0, y + height, 0
+        place[k] = x, y
+        x, height = x + w, max(height, h)
+        widest = max(widest, x)
+    return place, widest, y + height
+
+
+def _block(box: np.ndarray, largest: int) -> tuple[np.ndarray, int, int]:
+    """The rectangles in a block that is nearly square and small: lower left corners, width and height."""
+    side = np.sqrt(box.prod(1).sum())
+    widths = {int(np.clip(np.ceil(side * shape), box[:, 0].max(), max(largest, box[:, 0].max()))) for shape in SHAPES}
+    found = [_shelves(box, width) for width in sorted(widths)]
+    return min(found, key=lambda one: (max(one[1:]) > largest, one[1] * one[2]))
+
+
+def _in_blocks(blocks, place):
+    """A page for each object, side by side."""
+    extents = np.array([(width, height) for _, width, height in blocks.values()], np.float64)
+    corner, _, _ = _shelves(extents, int(max(np.sqrt(extents.prod(1).sum()) * 1.1, extents[:, 0].max())))
+    pages, tile = [], np.zeros(len(place), np.int64)
+    for k, (number, (own, width, height)) in enumerate(blocks.items()):
+        pages.append(Page(int(number), int(corner[k, 0]), int(corner[k, 1]), int(width), int(height)))
+        tile[own] = k
+    return pages, tile, np.zeros_like(place)
+
+
+def _in_few_tiles(blocks, place, box, largest):
+    """One tile that is no larger than it has to be, else several of the largest."""
+    needed = max(max(width, height) for _, width, height in blocks.values())
+    total = sum(width * height for _, width, height in blocks.values())
+    edge = -(-int(max(needed, np.sqrt(total))) // STEP) * STEP
+    while edge < largest:
+        found = _in_tiles(blocks, place.copy(), box, edge)
+        if len(found[0]) == 1:
+            return found
+        edge += STEP
+    return _in_tiles(blocks, place, box, largest)
+
+
+def _in_tiles(blocks, place, box, largest):
+    """Tiles of one edge, no object on two of them but one that is larger than a tile."""
+    parts = []
+    for own, width, height in sorted(blocks.values(), key=lambda one: -one[2]):
+        if height <= largest:
+            parts.append((own, width, height))
+            continue
+        # Row by row: what begins in a tile's height ends in the next.
+        left = own[np.argsort(place[own, 1], kind="stable")]
+        while len(left):
+            base = place[left, 1].min()
+            fits = place[left, 1] + box[left, 1] <= base + largest
+            rows = np.unique(place[left[~fits], 1])
+            now = left[fits & ~np.isin(place[left, 1], rows)] if len(rows) else left
+            place[now, 1] -= base
+            parts.append((now, width, int((place[now, 1] + box[now, 1]).max())))
+            left = np.setdiff1d(left, now)
+    shelves: list[list[int]] = []  # tile, x that is free, y, height
+    full: list[int] = []  # height of each tile that is taken
+    offset, tile = np.zeros_like(place), np.zeros(len(place), np.int64)
+    for own, width, height in sorted(parts, key=lambda one: -one[2]):
+        shelf = next((one for one in shelves if one[1] + width <= largest and height <= one[3]), None)
+        if shelf is None:
+            where = next((k for k, taken in enumerate(full) if taken + height <= largest), None)
+            if where is None:
+                where = len(full)
+                full.append(0)
+            shelf = [where, 0, full[where], height]
+            shelves.append(shelf)
+            full[where] += height
+        tile[own], offset[own] = shelf[0], (shelf[1], shelf[2])
+        shelf[1] += width
+    across = int(np.ceil(np.sqrt(len(full))))
+    pages = [Page(1001 + k, k % across * largest, k // across * largest, largest, largest) for k in range(len(full))]
+    return pages, tile, offset
