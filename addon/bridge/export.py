@@ -21,6 +21,7 @@ from .export_material import plain_copy
 from .export_names import Names, own_name, unique
 from .marks import OBJECT_ID
 from .materials import opacity
+from .mesh_objects import PARTS_UV
 
 FORMATS = {".glb": "GLB", ".gltf": "GLTF_SEPARATE", ".usdc": "USD", ".usd": "USD", ".usda": "USD", ".usdz": "USD"}
 """By ending."""
@@ -159,7 +160,7 @@ def copies(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], extra: It
                 if own.material is None:
                     continue
                 if own.material not in plain:
-                    plain[own.material] = plain_copy(own.material, textures, pictures, level)
+                    plain[own.material] = plain_copy(own.material, textures, pictures, level, _tiles(thing))
                 slot.link = "OBJECT"
                 slot.material = plain[own.material]
         for own, name in zip(plain, unique(map(own_name, plain))):
@@ -179,6 +180,21 @@ def copies(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], extra: It
             if new:
                 bpy.data.batch_remove(new)
         names.put_back()
+
+
+def _tiles(thing: bpy.types.Object) -> frozenset[int]:
+    """The UDIM tiles that an object's faces lie on; none where it has no coordinates for tiles."""
+    layer = thing.data.uv_layers.get(PARTS_UV)
+    if layer is None or not len(layer.uv):
+        return frozenset()
+    uv = np.empty(2 * len(layer.uv), np.float32)
+    layer.uv.foreach_get("vector", uv)
+    # By the middles of faces: a corner may lie on an edge.
+    start = np.empty(len(thing.data.polygons), np.int32)
+    thing.data.polygons.foreach_get("loop_start", start)
+    middle = np.add.reduceat(uv.reshape(-1, 2), start) / np.diff(np.r_[start, len(layer.uv)])[:, None]
+    column, row = np.floor(middle).astype(int).T
+    return frozenset((1001 + column + 10 * row).tolist())
 
 
 def _with_own_pictures(world: bpy.types.World, textures: Path) -> bpy.types.World:

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..core.capture.png import write_png
 from . import relight_lamps
-from .images import image_array
+from .images import UDIM, image_array, load_image
+from .marks import IMAGE, UV_MAP
 from .materials import (
     ALPHA,
     BASE_COLOR,
@@ -18,14 +19,20 @@ from .materials import (
     EMISSION_STRENGTH,
     IOR,
     METALLIC,
+    REPEATS,
     ROUGHNESS,
     SPECULAR_LEVEL,
     ior_of,
     plain_material,
 )
 
+WHOLE = "base_color.exr"
+"""The room's one image, beside its tiles."""
+FIRST_TILE = 1001
 
-def plain_copy(material: bpy.types.Material, textures: Path, pictures: dict, level: bool = True) -> bpy.types.Material:
+
+def plain_copy(material: bpy.types.Material, textures: Path, pictures: dict, level: bool = True,
+               tiles: frozenset[int] = frozenset()) -> bpy.types.Material:
     """A material that exporters understand.
 
     Parameters
@@ -35,9 +42,12 @@ def plain_copy(material: bpy.types.Material, textures: Path, pictures: dict, lev
     textures : Path
         Folder for the 8-bit pictures.
     pictures : dict
-        Those that were made already, by the image they show; filled here.
+        Those that were made already, by the image they show (and its tile); filled here.
     level : bool
         The format holds Specular IOR Level; else F0, which that level scales, goes into the index of refraction.
+    tiles : frozenset of int
+        UDIM tiles that the material's object lies on. One becomes a picture that repeats; for an object on several, the
+        room's one image is taken.
 
     Returns
     -------
@@ -59,7 +69,7 @@ def plain_copy(material: bpy.types.Material, textures: Path, pictures: dict, lev
     made = plain_material(
         material.name, tuple(value[BASE_COLOR].default_value[:3]), value[ROUGHNESS].default_value,
         specular, value[METALLIC].default_value, ior, emission(material),
-        None if image is None else _picture(image, textures, pictures), value[ALPHA].default_value)
+        None if image is None else _picture(*_one_tile(image, tiles), textures, pictures), value[ALPHA].default_value)
     made.use_backface_culling = bool(value[EMISSION_COLOR].links) and relight_lamps.is_lamp(material)
     return made
 
@@ -88,6 +98,36 @@ def _image(socket) -> bpy.types.Image | None:
     return None
 
 
+def _one_tile(image: bpy.types.Image, tiles: frozenset[int]) -> tuple[bpy.types.Image, int]:
+    """What formats get that know of no tiles: a tiled image and one tile's number, or the room's image and 0."""
+    if image.source != "TILED":
+        return image, 0
+    if len(tiles) == 1:
+        return image, next(iter(tiles))
+    folder = Path(bpy.path.abspath(image.filepath)).parent
+    whole = next((one for one in bpy.data.images if one.source == "FILE" and UV_MAP not in one and (
+        one.get(IMAGE) == str(folder / WHOLE) or Path(bpy.path.abspath(one.filepath)) == folder / WHOLE)), None)
+    return (whole, 0) if whole else (image, min(tiles, default=FIRST_TILE))
+
+
+def _pixels(image: bpy.types.Image, tile: int, textures: Path) -> np.ndarray:
+    """The pixels of an image or of one of its tiles, (h, w, c) float32."""
+    if not tile:
+        return image_array(image)
+    path = Path(bpy.path.abspath(image.filepath.replace(UDIM, str(tile))))
+    packed = next((one for one in image.packed_files if str(tile) in Path(one.filepath).name), None)
+    if packed is not None:
+        path = textures.with_name(f"tile{path.suffix}")
+        path.write_bytes(packed.data)
+    one = load_image(path, colour_space=image.colorspace_settings.name, keep=False)
+    try:
+        return image_array(one)
+    finally:
+        bpy.data.images.remove(one)
+        if packed is not None:
+            path.unlink()
+
+
 def _file_name(image: bpy.types.Image, textures: Path) -> str:
     """A name that the folder does not hold yet, whatever the case."""
     taken = {path.stem.casefold() for path in textures.iterdir()}
@@ -99,20 +139,23 @@ def _file_name(image: bpy.types.Image, textures: Path) -> str:
     return name
 
 
-def _picture(image: bpy.types.Image, textures: Path, pictures: dict) -> bpy.types.Image:
+def _picture(image: bpy.types.Image, tile: int, textures: Path, pictures: dict) -> bpy.types.Image:
     """An image as PNG of 8 bits in sRGB, which glTF and USD's preview surface take."""
-    if image in pictures:
-        return pictures[image]
+    if (image, tile) in pictures:
+        return pictures[image, tile]
     if not all(image.size):
         return image
     from .export import srgb
 
-    pixels = image_array(image)[::-1, :, :3]
+    pixels = _pixels(image, tile, textures)[::-1, :, :3]
     if image.colorspace_settings.name != "sRGB" or image.is_float:
         pixels = srgb(pixels)
-    path = textures / f"{_file_name(image, textures)}.png"
+    path = textures / f"{_file_name(image, textures)}{f'_{tile}' if tile else ''}.png"
     write_png(path, np.ascontiguousarray((pixels * 255 + 0.5).astype(np.uint8)))
     made = bpy.data.images.load(str(path))
     made.colorspace_settings.name = "sRGB"
-    pictures[image] = made
+    if UV_MAP in image:
+        made[UV_MAP] = image[UV_MAP]
+    made[REPEATS] = bool(tile)
+    pictures[image, tile] = made
     return made

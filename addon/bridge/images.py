@@ -79,8 +79,8 @@ def load_parts(folder: Path, files: dict[int, str], room: str,
     found: dict[str, bpy.types.Image] = {}
     for number, file in files.items():
         if file not in found:
-            owner = room if UDIM in file else descriptions[number].name
-            found[file] = load_image(folder / file, image_name(owner, "base_color tiles" if UDIM in file else "base_color"), keep=False)
+            name = image_name(room, "base_color tiles") if UDIM in file else f"{descriptions[number].name} base color"
+            found[file] = load_image(folder / file, name, keep=False)
             found[file][UV_MAP] = PARTS_UV
     return {number: found[file] for number, file in files.items()}
 

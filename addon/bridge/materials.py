@@ -12,6 +12,8 @@ from .mesh_objects import ATLAS_UV
 
 MODEL = "scan_relight_model"
 """Custom property of each recovered material: its description's model."""
+REPEATS = "scan_relight_repeats"
+"""Custom property of a picture: it goes on beyond its edges, as one tile does for coordinates on that tile."""
 MAX_F0 = 0.9
 """The index of refraction grows without bound as F0 nears 1; this is an index of 38."""
 
@@ -176,7 +178,7 @@ def _texture(nodes, links, image, place):
     coordinates.location = (place[0] - 250, place[1])
     texture = nodes.new("ShaderNodeTexImage")
     texture.image = image
-    texture.extension = "EXTEND"
+    texture.extension = "REPEAT" if image.get(REPEATS) else "EXTEND"
     texture.location = place
     links.new(coordinates.outputs[0], texture.inputs[0])
     return texture.outputs["Color"]
