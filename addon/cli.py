@@ -333,13 +333,9 @@ def compare(capture, arguments: argparse.Namespace) -> dict:
         from .core.agreement.overlay import overlay
         from .core.atomic import write_bytes
         from .core.capture.conventions import Convention
-        from .core.capture.copies import reading_through
-        from .core.evidence.png import png
+        from .core.capture.pixels import read_pixels
+        from .core.png import png
 
-        def load(path: Path):
-            return need("load_picture").load_picture(path)  # only now: most captures need no Blender to be read
-
-        read_pixels = reading_through(load)
         found = look(capture, read_pixels, search=not arguments.convention)
         if arguments.overlay is not None:
             columns = [Convention()] + ([found.best.convention] if found.best else [])

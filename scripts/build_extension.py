@@ -23,7 +23,7 @@ from pathlib import Path
 from manual_pages import write_pages
 
 ROOT = Path(__file__).resolve().parent.parent
-LOCK = ROOT / "requirements" / "blender-5.2.txt"
+LOCKS = tuple(ROOT / "requirements" / name for name in ("blender-5.2.txt", "extension.txt"))
 WHEELS = ROOT / "wheels"
 CONTENT = ("__init__.py", "LICENSE", "README.md", "CHANGELOG.md", "addon", "operators")
 """What goes into the zip, besides the manifest and the wheels."""
@@ -82,13 +82,14 @@ def blender_ext() -> Path:
 def locked_hashes(packages: set[str]) -> dict[str, tuple[str, set[str]]]:
     """Each package's pinned requirement and its allowed hashes."""
     found = {}
-    for block in re.split(r"^(?=\S)", LOCK.read_text(encoding="utf-8"), flags=re.MULTILINE):
+    locks = "".join(path.read_text(encoding="utf-8") for path in LOCKS)
+    for block in re.split(r"^(?=\S)", locks, flags=re.MULTILINE):
         requirement = block.split(" ")[0]
         name = requirement.split("==")[0]
         if name in packages:
             found[name] = requirement, set(re.findall(r"--hash=sha256:([0-9a-f]{64})", block))
     if missing := packages - set(found):
-        sys.exit(f"{LOCK.name} does not pin {', '.join(sorted(missing))}.")
+        sys.exit(f"{' and '.join(path.name for path in LOCKS)} do not pin {', '.join(sorted(missing))}.")
     return found
 
 

@@ -14,6 +14,7 @@ FOLDER = Path(__file__).resolve().parent.parent / "requirements"
 LOCKS = {
     "blender-4.5": ["--python-version", "3.11"],
     "blender-5.2": ["--python-version", "3.13"],
+    "extension": ["--python-version", "3.14", "--no-emit-package", "numpy"],
     "tools": ["--python-version", "3.11", "--universal", "--no-emit-package", "numpy"],
 }
 

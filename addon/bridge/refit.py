@@ -7,14 +7,12 @@ from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
-from ..core.capture.copies import converted
 from ..core.overrides import OVERRIDES
 from ..core.progress import Progress
-from ..core.refit import REPORT, Refit, Result, open_result
+from ..core.refit import REPORT, Refit, open_result
 from ..core.stages import READ, WRITE
 from ..core.store import Store
-from .load_picture import load_picture
-from .run import PICTURES, told_in_a_sentence, versions
+from .run import told_in_a_sentence, versions
 from .scene import write_scene
 
 SCENE = "scene.blend"
@@ -57,7 +55,6 @@ def refit(
     progress.stage(READ)
     result = open_result(folder, objects, override, heed_kept)
     with Store(folder) as store, told_in_a_sentence(store.folder):
-        result = _readable(result, store, progress)
         run = Refit(result, store, progress)
         progress.done()
         run.refit()
@@ -82,12 +79,3 @@ def refit(
         store.write_json(REPORT, report)
         progress.done()
     return report
-
-
-def _readable(result: Result, store: Store, progress: Progress) -> Result:
-    """The result with copies that the core can read of its pictures, for the report's; without what is gone."""
-    capture = result.room.capture
-    if not all(path.is_file() for frame in capture.frames for path in frame.files):
-        return result
-    capture = converted(capture, store.path(PICTURES), load_picture, progress)
-    return replace(result, room=replace(result.room, capture=capture))

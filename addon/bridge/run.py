@@ -15,9 +15,9 @@ import bpy
 
 from ..core.agreement.look import look
 from ..core.capture.conventions import AS_READ
-from ..core.capture.copies import converted, reading_through
 from ..core.capture.layout import AS_FOUND, Reading
 from ..core.capture.model import Capture
+from ..core.capture.pixels import read_pixels
 from ..core.capture.read import read_capture
 from ..core.errors import BadInputError, StorageError
 from ..core.memory import peak_memory
@@ -31,7 +31,6 @@ from ..core.stages import READ, RUN_STAGES, STAGES, WRITE
 from ..core.store import Store
 from ..version import VERSION
 from . import result_images
-from .load_picture import load_picture
 from .room import bringing
 from .room_parts import imported
 from .scene import write_scene
@@ -40,8 +39,6 @@ from .slices import whole
 from .unwrap import unwrap
 from .write_back import AUTO, is_own, writing_back
 
-PICTURES = "stages/pictures"
-"""Where in the result folder copies of frames lie that the core can't read itself."""
 OWN, SCENE = "OWN", "SCENE"
 """Where a room goes: into a scene of its own, or into the one that is open."""
 WEIGHTS = {READ: 1, "surface": 5, "lit_diffuse": 8, "shading": 17, "specular": 16, WRITE: 5}
@@ -125,9 +122,8 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         if override is not None and heed_kept:
             store.write_json(OVERRIDES, given.as_dict())
         faces = polygons_of(capture.root, capture.mesh)
-        readable = converted(capture, store.path(PICTURES), load_picture, progress)
         progress.done()
-        recovery = Recovery(readable, store, settings, progress, partial(unwrap, polygons=faces), given)
+        recovery = Recovery(capture, store, settings, progress, partial(unwrap, polygons=faces), given)
         for stage in STAGES:
             getattr(recovery, stage)()
             if stage == until:
@@ -177,7 +173,7 @@ def _look(capture: Capture, reading: Reading) -> list[str]:
     BadInputError
         The poses are surely read wrongly, and how they would be right is known.
     """
-    found = look(capture, reading_through(load_picture), search=not reading.convention)
+    found = look(capture, read_pixels, search=not reading.convention)
     if found.best is not None:
         raise BadInputError(f"Capture '{capture.root}': {found.sentence()} Give that, or --convention {AS_READ} to go "
                             "on all the same.")

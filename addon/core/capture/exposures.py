@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import BadInputError
-from . import tiff_tags
-from .foreign import exif_exposure
+from . import exif
 from .model import Frame
-from .pictures import JPEG, TIFF, picture_kind
+from .oiio import JPEG, TIFF
+from .pictures import picture_kind
 
 EXPOSURE, NAME = "exposure", ("name", "file", "file_path", "filename", "frame", "image")
 TIME = ("exposure_time", "exposuretime", "shutter", "shutter_speed", "shutter_time", "exposure_duration",
@@ -137,14 +137,13 @@ def from_exif(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
         try:
             if picture_kind(frame.path) not in (JPEG, TIFF):
                 return list(frames), []
-            tags = exif_exposure(frame.path)
+            tags = exif.exif_exposure(frame.path)
         except BadInputError:
             settings.append(None)  # told when its header is looked at
             continue
-        if tiff_tags.EXPOSURE_TIME not in tags:
+        if exif.EXPOSURE_TIME not in tags:
             return list(frames), []
-        settings.append(Settings(*(tags.get(tag) for tag in (tiff_tags.EXPOSURE_TIME, tiff_tags.F_NUMBER,
-                                                             tiff_tags.ISO))))
+        settings.append(Settings(*(tags.get(tag) for tag in (exif.EXPOSURE_TIME, exif.F_NUMBER, exif.ISO))))
     known = [value for value in relative(settings) if value is not None]
     if not known or max(known) <= EQUAL * min(known):
         return list(frames), []

@@ -9,8 +9,8 @@ import numpy as np
 from ..errors import BadInputError
 from .exr import read_numbers
 from .model import Frame
-from .pictures import EXR, PNG, picture_kind
-from .png import read_png
+from .oiio import PNG, read_coded
+from .pictures import EXR, picture_kind
 
 OFF = 0.02
 """An id in a float channel is this near to a whole number; further off, pictures were blended or are no ids."""
@@ -34,10 +34,10 @@ def read_ids(frame: Frame) -> np.ndarray:
         return _whole(read_numbers(path), path)
     if picture_kind(path) != PNG:
         raise BadInputError(f"Picture '{path}' is no OpenEXR or PNG file; ids need one that loses nothing.")
-    pixels = read_png(path)
+    pixels = read_coded(path).colour
     step = np.iinfo(pixels.dtype).max + 1
     pixels = pixels.astype(np.int64)
-    if pixels.shape[2] < 3 or (pixels[..., :3] == pixels[..., :1]).all():
+    if (pixels == pixels[..., :1]).all():
         return pixels[..., 0]
     return pixels[..., 0] + step * pixels[..., 1] + step**2 * pixels[..., 2]
 

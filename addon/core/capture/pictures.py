@@ -9,20 +9,19 @@ import numpy as np
 from ..errors import BadInputError
 from . import exr_header, radiance_hdr
 from .exr import exr_note, read_exr, read_header
-from .foreign import JPEG_MAGIC, foreign_info, is_foreign
+from .oiio import CODED, coded_header, read_coded
 from .paths import absence
 from .picture import Picture
-from .png import MAGIC, png_bits, png_size, read_png
 from .radiance_hdr import hdr_size, read_hdr
 from .transfer import decode
 
-EXR, HDR, PNG, JPEG, TIFF = "OpenEXR", "Radiance HDR", "PNG", "JPEG", "TIFF"
+EXR, HDR = "OpenEXR", "Radiance HDR"
 ENDINGS = (".exr", ".hdr", ".pic", ".png", ".jpg", ".jpeg", ".tif", ".tiff")
 """Of files that can be pictures, in the order in which a missing ending is tried."""
 
 
 def picture_kind(path: Path | str) -> str:
-    """One of the kinds above.
+    """One of the kinds above or of `oiio`.
 
     Raises
     ------
@@ -40,9 +39,7 @@ def picture_kind(path: Path | str) -> str:
         raise BadInputError(f"Picture '{path}' can't be read ({reason}); check the file and its rights.") from error
     if not head:
         raise BadInputError(f"Picture '{path}' is empty; write or copy it again.")
-    if is_foreign(head):
-        return JPEG if head.startswith(JPEG_MAGIC) else TIFF
-    for kind, magic in ((EXR, exr_header.MAGIC), (HDR, radiance_hdr.MAGIC), (PNG, MAGIC)):
+    for kind, magic in {EXR: exr_header.MAGIC, HDR: radiance_hdr.MAGIC, **CODED}.items():
         if head.startswith(magic):
             return kind
     raise BadInputError(f"Picture '{path}' is not an OpenEXR, Radiance HDR, PNG, JPEG or TIFF file, or is damaged; "
@@ -58,9 +55,9 @@ def picture_size(path: Path) -> tuple[int, int]:
         The file is absent, damaged, or of a kind that isn't supported.
     """
     kind = picture_kind(path)
-    if kind in (JPEG, TIFF):
-        return foreign_info(path)[:2]
-    return {EXR: read_header, HDR: hdr_size, PNG: png_size}[kind](path)
+    if kind in CODED:
+        return coded_header(path)[:2]
+    return {EXR: read_header, HDR: hdr_size}[kind](path)
 
 
 def picture_bits(path: Path) -> int:
@@ -71,10 +68,7 @@ def picture_bits(path: Path) -> int:
     BadInputError
         As `picture_size`.
     """
-    kind = picture_kind(path)
-    if kind in (JPEG, TIFF):
-        return foreign_info(path)[2]
-    return png_bits(path) if kind == PNG else 0
+    return coded_header(path).bits if picture_kind(path) in CODED else 0
 
 
 def picture_note(path: Path) -> str:
@@ -100,16 +94,15 @@ def read_picture(path: Path, transfer: str = "") -> Picture:
         return read_exr(path)
     if kind == HDR:
         return read_hdr(path)
-    if not transfer:
+    if not transfer and coded_header(path).bits:
         raise BadInputError(unstated(path))
-    if kind in (JPEG, TIFF):
-        raise BadInputError(f"Picture '{path}' is a {kind} file, which Blender has to decode; run `recover` where bpy "
-                            "is installed, or convert it to PNG.")
-    codes = read_png(path)
-    scale = np.float32(np.iinfo(codes.dtype).max)
-    count = codes.shape[2]
-    alpha = codes[..., -1] / scale if count in (2, 4) else None
-    return Picture(decode(np.repeat(codes[..., :1], 3, -1) if count < 3 else codes[..., :3], transfer), alpha)
+    colour, alpha = read_coded(path)
+    if colour.shape[2] == 1:
+        colour = np.repeat(colour, 3, -1)
+    if colour.dtype.kind == "f":
+        return Picture(np.ascontiguousarray(colour, np.float32), alpha)
+    scale = np.float32(np.iinfo(colour.dtype).max)
+    return Picture(decode(colour, transfer), None if alpha is None else alpha / scale)
 
 
 def unstated(path: Path | str) -> str:
@@ -126,7 +119,5 @@ def read_mask(path: Path) -> np.ndarray:
     BadInputError
         As `read_picture`.
     """
-    if picture_kind(path) != PNG:
-        return (read_picture(path, "linear").rgb > 0).any(-1)
-    pixels = read_png(path)
-    return (pixels[..., : 1 if pixels.shape[2] < 3 else 3] > 0).any(-1)
+    colour = read_coded(path).colour if picture_kind(path) in CODED else read_picture(path).rgb
+    return (colour > 0).any(-1)

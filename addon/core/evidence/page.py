@@ -9,10 +9,10 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..material import EMITTER, METAL, SPECULAR, Z90, ObjectMaterial
+from ..png import data_address
 from .colours import MODEL, encoded, heat_css
 from .objects import ObjectEvidence
 from .pictures import Picture, pictures_of
-from .png import data_address
 from .style import STYLE
 from .views import choose_frames, view
 

@@ -9,7 +9,7 @@ bpy = pytest.importorskip("bpy")
 
 from addon import cli  # noqa: E402
 from addon.core.capture.exr import read_exr  # noqa: E402
-from addon.core.capture.png import png_size  # noqa: E402
+from addon.core.capture.pictures import picture_size  # noqa: E402
 
 QUICK = ("--samples", "4", "--quiet")
 
@@ -44,7 +44,7 @@ def test_before_and_after_beside_each_other(result, tmp_path, camera):
     name = camera and bpy_camera_name(result, 3)
     assert relight(result, tmp_path / "a.png", "--before-after", "--lamps", "off", "--softbox",
                    *(("--camera", name) if name else ()), "--size", "50") == 0
-    width, height = png_size(tmp_path / "a.png")
+    width, height = picture_size(tmp_path / "a.png")
     assert height == 24 and width == 2 * 32 + 1
     image = bpy.data.images.load(str(tmp_path / "a.png"))
     pixels = np.array(image.pixels[:]).reshape(24, 65, 4)[..., :3]

@@ -12,8 +12,11 @@ from addon.core.capture.exr import write_exr
 
 SHARED = Path(__file__).resolve().parents[4] / "shared"
 WIDTH, HEIGHT = 8, 6
-JPEG = bytes.fromhex("ffd8 ffe0 0010 4a46494600010100000100010000 ffc0 000b 08 0006 0008 01 011100")
-"""Of that size, gray, baseline, as far as the header goes."""
+JPEG = bytes.fromhex(
+    "ffd8ffe000104a46494600010100000100010000ffdb0043000302020302020303030304030304050805050404050a070706080c0a0c0c0b0a"
+    "0b0b0d0e12100d0e110e0b0b1016101113141515150c0f171816141812141514ffc0000b080006000801011100ffc400140001000000000000"
+    "00000000000000000009ffc400191000010500000000000000000000000000040006213291ffda0008010100003f003d86630f15c5ffd9")
+"""Of that size, gray, baseline: the numbers 0 to 47 in the order of reading, about."""
 
 
 def ply_text(vertices, faces, object_ids=None, uv=None) -> str:

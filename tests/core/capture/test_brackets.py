@@ -8,9 +8,9 @@ import pytest
 from addon.core.capture.brackets import Exposed, merge
 from addon.core.capture.layout import Reading
 from addon.core.capture.pixels import read_pixels
-from addon.core.capture.png import write_png
 from addon.core.capture.read import read_capture
 from addon.core.errors import BadInputError
+from addon.core.png import write_png
 from tests.core.capture.conftest import HEIGHT, WIDTH
 
 TIMES = (1 / 64, 1 / 8, 1.0, 8.0)

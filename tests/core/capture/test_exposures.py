@@ -6,11 +6,10 @@ import struct
 
 import pytest
 
+from addon.core.capture.exif import EXPOSURE_TIME, F_NUMBER, ISO, exif_exposure, exposure_tags
 from addon.core.capture.exposures import Settings, parse_number, relative
-from addon.core.capture.foreign import exif_exposure
 from addon.core.capture.layout import Reading
 from addon.core.capture.read import describe, read_capture
-from addon.core.capture.tiff_tags import EXPOSURE_TIME, F_NUMBER, ISO, exposure_tags
 from addon.core.errors import BadInputError
 
 

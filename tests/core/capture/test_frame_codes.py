@@ -10,10 +10,10 @@ import pytest
 from addon.core.capture.layout import Reading
 from addon.core.capture.pictures import picture_bits, read_picture
 from addon.core.capture.pixels import read_pixels
-from addon.core.capture.png import write_png
 from addon.core.capture.read import describe, read_capture
 from addon.core.capture.transfer import decode, to_linear
 from addon.core.errors import BadInputError
+from addon.core.png import write_png
 from tests.core.capture.conftest import HEIGHT, WIDTH
 
 CODES = (np.arange(HEIGHT * WIDTH * 3) % 256).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)

@@ -14,10 +14,10 @@ from addon.core.capture.exr import write_exr
 from addon.core.capture.id_pictures import read_ids
 from addon.core.capture.model import Frame
 from addon.core.capture.parts import MOST, connected_parts
-from addon.core.capture.png import write_png
 from addon.core.capture.read import read_capture
 from addon.core.capture.vote import vote
 from addon.core.errors import BadInputError
+from addon.core.png import write_png
 from addon.core.surface.rays import RayScene
 from tests.core.rooms import all_round, lit_box, make_room
 

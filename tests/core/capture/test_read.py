@@ -10,9 +10,9 @@ import pytest
 from addon.core.capture.exr import write_exr
 from addon.core.capture.fingerprint import fingerprint
 from addon.core.capture.pixels import read_pixels
-from addon.core.capture.png import write_png
 from addon.core.capture.read import describe, read_capture
 from addon.core.errors import BadInputError
+from addon.core.png import write_png
 from tests.core.capture.conftest import CORNERS, HEIGHT, SIDES, WIDTH, ply_text
 
 

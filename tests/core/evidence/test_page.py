@@ -8,10 +8,10 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from addon.core.capture.png import read_png
+from addon.core.capture.oiio import read_coded
 from addon.core.evidence.colours import HEAT, encoded, heat, photo
 from addon.core.evidence.pictures import BLOCK, worst_blocks
-from addon.core.evidence.png import png
+from addon.core.png import png
 from addon.core.specular.intervals import UNKNOWN, gloss_interval
 from addon.core.specular.models import Choice, choose_model
 from tests.core.glossy_box import Box
@@ -22,7 +22,7 @@ from tests.core.rooms import pixels_of
 def test_a_png_holds_the_picture(size, tmp_path):
     image = np.random.default_rng(0).integers(0, 256, (*size, 3), np.uint8)
     (tmp_path / "a.png").write_bytes(png(image))
-    assert np.array_equal(np.asarray(read_png(tmp_path / "a.png"))[..., :3], image)
+    assert np.array_equal(read_coded(tmp_path / "a.png").colour, image)
 
 
 def test_colours():

@@ -15,7 +15,7 @@ import numpy as np
 
 from addon.core.capture.exr import write_exr
 from addon.core.capture.layout import Reading
-from addon.core.capture.png import write_png
+from addon.core.png import write_png
 from tests.core.capture.colmap_files import images_of, write_binary, write_text
 from tests.core.capture.conftest import CORNERS, HEIGHT, JPEG, SIDES, WIDTH, CaptureOnDisk
 from tests.core.replica_on_disk import ReplicaOnDisk
@@ -177,9 +177,15 @@ def replica(root: Path) -> None:
     (root / "glass.sur").write_text(json.dumps([pane]))
 
 
-TIFF = (b"II*\0" + struct.pack("<IH", 8, 4) + struct.pack("<HHIHH", 256, 3, 1, WIDTH, 0)
-        + struct.pack("<HHIHH", 257, 3, 1, HEIGHT, 0) + struct.pack("<HHIHH", 258, 3, 1, 8, 0)
-        + struct.pack("<HHII", 0x8769, 4, 1, 8) + struct.pack("<I", 0))
+def tiff_content() -> bytes:
+    """8 bits, no compression, an EXIF pointer that leads back to the first directory."""
+    tags = ((256, 3, WIDTH), (257, 3, HEIGHT), (258, 3, 8), (259, 3, 1), (262, 3, 2), (273, 4, 8), (277, 3, 3),
+            (278, 3, HEIGHT), (279, 4, CODES.size), (0x8769, 4, 8 + CODES.size))
+    directory = b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in tags)
+    return (b"II*\0" + struct.pack("<I", 8 + CODES.size) + CODES.tobytes() + struct.pack("<H", len(tags)) + directory
+            + struct.pack("<I", 0))
+
+
 CODED = Reading(transfer="srgb")
 ON_PLY = Reading(mesh=Path("mesh.ply"))
 """The format's own mesh is an OBJ file, which needs Blender."""
@@ -194,7 +200,7 @@ CASES = (
     Case("hdr", with_pictures(".hdr", hdr_content()), "images/000.hdr"),
     Case("png", with_pictures(".png", png_content()), "images/000.png", CODED),
     Case("jpeg", with_pictures(".jpg", JPEG), "images/000.jpg", CODED),
-    Case("tiff", with_pictures(".tif", TIFF), "images/000.tif", CODED),
+    Case("tiff", with_pictures(".tif", tiff_content()), "images/000.tif", CODED),
     Case("colmap_cameras", colmap(write_text), "sparse/0/cameras.txt"),
     Case("colmap_images", colmap(write_text), "sparse/0/images.txt"),
     Case("colmap_binary_cameras", colmap(write_binary), "sparse/0/cameras.bin"),

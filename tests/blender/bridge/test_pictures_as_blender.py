@@ -1,4 +1,4 @@
-"""JPEG and TIFF through Blender, and EXR and HDR beside Blender's own reader."""
+"""Pictures that Blender wrote, and EXR beside Blender's own reader."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.bridge.load_picture import load_picture
 from addon.core.capture.exr import read_exr
-from addon.core.capture.foreign import foreign_info
+from addon.core.capture.oiio import coded_header, read_coded
 from addon.core.errors import BadInputError
 
 SHARED = Path(__file__).resolve().parents[4] / "shared"
@@ -36,9 +35,8 @@ def saved(path: Path, kind: str, depth: str = "8", values=CODES / 255.0) -> Path
 
 def test_jpeg(tmp_path):
     path = saved(tmp_path / "a.jpg", "JPEG")
-    before = len(bpy.data.images)
-    got = load_picture(path)
-    assert got.dtype == np.uint8 and got.shape == CODES.shape and len(bpy.data.images) == before
+    got = read_coded(path).colour
+    assert got.dtype == np.uint8 and got.shape == CODES.shape
     error = abs(got.astype(int) - CODES)
     assert np.median(error) <= 2 and error.mean() < 10  # the chroma of a JPEG is halved
 
@@ -46,17 +44,18 @@ def test_jpeg(tmp_path):
 @pytest.mark.parametrize("depth, dtype", [("8", np.uint8), ("16", np.uint16)])
 def test_tiff(tmp_path, depth, dtype):
     path = saved(tmp_path / "a.tif", "TIFF", depth)
-    got = load_picture(path)
-    assert foreign_info(path) == (32, 24, int(depth)) and got.dtype == dtype
+    got = read_coded(path).colour
+    assert coded_header(path) == (32, 24, int(depth)) and got.dtype == dtype
     np.testing.assert_allclose(got / np.iinfo(dtype).max, CODES / 255, atol=0.003)
 
 
-def test_a_damaged_jpeg(tmp_path):
+@pytest.mark.parametrize("kept", [200, -500, -2])
+def test_a_damaged_jpeg(tmp_path, kept):
     path = saved(tmp_path / "a.jpg", "JPEG")
     content = path.read_bytes()
-    path.write_bytes(content[:200])
+    path.write_bytes(content[:kept])
     with pytest.raises(BadInputError, match="a.jpg"):
-        load_picture(path)
+        read_coded(path)
 
 
 def blenders(path: Path) -> np.ndarray:

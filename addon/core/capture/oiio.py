@@ -1,0 +1,167 @@
+"""PNG, JPEG and TIFF, through OpenImageIO: any number of threads may read at once.
+
+Blender's own builds bring the library. Radiance HDR and EXIF are read by our own code: docs/development.md says why.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import BadInputError
+from .picture import MAX_PIXELS
+
+PNG, JPEG, TIFF = "PNG", "JPEG", "TIFF"
+CODED = {PNG: b"\x89PNG\r\n\x1a\n", JPEG: b"\xff\xd8\xff", TIFF: (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")}
+"""How files of each kind begin; TIFF's last two are those of more than 4 GiB."""
+READERS = {"png", "jpeg", "tiff"}
+"""The library's names of them: it goes by a file's name first, and so might take it for something else."""
+DEPTHS = {"uint8": 8, "uint16": 16, "half": 0, "float": 0}
+"""Bits of a channel that is stored as codes; 0 for floats."""
+WHOLE_BYTES = (8, 16, 32)
+PALETTE = 3
+"""PNG's kind of colour."""
+MAX_RATIO = 1100
+"""No PNG packs more bytes of pixels than this into one of the file: deflate's limit is 1032."""
+LITTLE = 1 << 16
+"""A claim of fewer bytes is not doubted."""
+
+
+class Header(NamedTuple):
+    """What a picture's header says.
+
+    Attributes
+    ----------
+    width, height : int
+        Pixels.
+    bits : int
+        Of a channel, 8 or 16; 0 for floats.
+    """
+
+    width: int
+    height: int
+    bits: int
+
+
+class Stored(NamedTuple):
+    """What a picture stores, no curve undone, row 0 at the top.
+
+    Attributes
+    ----------
+    colour : (h, w, 1) or (h, w, 3)
+        uint8 or uint16 codes, or float32. A palette is looked up; 1, 2 and 4 bits are scaled to 0...255.
+    alpha : (h, w) of the same type, or None
+        PNG's one transparent colour (tRNS) counts as alpha 0.
+    """
+
+    colour: np.ndarray
+    alpha: np.ndarray | None
+
+
+def coded_header(path: Path | str) -> Header:
+    """What the header of the PNG, JPEG or TIFF `path` says, its pixels left alone.
+
+    Raises
+    ------
+    BadInputError
+        Absent, damaged, larger than any picture, or of a depth that isn't supported; or there is no OpenImageIO.
+    """
+    return _checked(_open(path), Path(path))
+
+
+def read_coded(path: Path | str) -> Stored:
+    """Read the pixels of the PNG, JPEG or TIFF `path`.
+
+    What a file says of colour spaces and of how a camera was held is not heeded: poses and curve are the capture's.
+
+    Raises
+    ------
+    BadInputError
+        As `coded_header`, and where the pixels are damaged or cut off.
+    """
+    path = Path(path)
+    file = _open(path)
+    spec = file.spec()
+    width, height, _ = _checked(file, path)
+    count = min(spec.nchannels, 4)
+    try:
+        pixels = file.read_image(0, count, spec.format)
+    except MemoryError:
+        pixels = None
+    # A JPEG that was cut off comes with an error and with pixels, grey where it ends.
+    if file.geterror() or pixels is None or pixels.shape != (height, width, count):
+        raise BadInputError(f"Picture '{path}' is damaged or cut off; write or copy it again.")
+    colour = pixels[..., : 3 if count >= 3 else 1]
+    if file.format_name() == "png" and _png_kind(path)[1] == PALETTE:
+        _check_palette(colour, path)
+    alpha = spec.alpha_channel
+    return Stored(colour, pixels[..., alpha] if 0 <= alpha < count else None)
+
+
+def _library(path: Path) -> Any:
+    """The module OpenImageIO; pip's bpy has it in a folder that only Blender as a program puts on the path."""
+    if importlib.util.find_spec("OpenImageIO") is None:
+        found = (folder.parent for entry in sys.path for python in ("python*/", "")
+                 for folder in Path(entry).glob(f"bpy/*/python/lib/{python}site-packages/OpenImageIO"))
+        sys.path += [str(folder) for folder in found][:1]
+    try:
+        import OpenImageIO
+    except ImportError as error:
+        raise BadInputError(f"Picture '{path}' needs OpenImageIO, which this Python has not; install it (pip: "
+                            "OpenImageIO, Debian: python3-openimageio), or write the picture as OpenEXR.") from error
+    return OpenImageIO
+
+
+def _open(path: Path | str) -> Any:
+    """The file as an ImageInput."""
+    library = _library(Path(path))
+    wishes = library.ImageSpec()
+    wishes.attribute("oiio:UnassociatedAlpha", 1)  # else colours are multiplied by alpha
+    try:
+        file = library.ImageInput.open(os.fsencode(path), wishes)  # bytes: a name need not be UTF-8
+    except MemoryError:
+        file = None
+    if file is None or file.format_name() not in READERS:
+        library.geterror()  # cleared, as it is kept for the thread's next picture
+        raise BadInputError(f"Picture '{path}' is damaged or cut off; write or copy it again.")
+    return file
+
+
+def _checked(file: Any, path: Path) -> Header:
+    """The header, before room for any pixel is made."""
+    spec = file.spec()
+    width, height, depth = spec.width, spec.height, str(spec.format)
+    if not 0 < width * height <= MAX_PIXELS or width * height * spec.nchannels > 4 * MAX_PIXELS:
+        raise BadInputError(f"Picture '{path}' claims {width} x {height} pixels; write it again.")
+    bits = spec.get_int_attribute("oiio:BitsPerSample", 8)
+    if depth not in DEPTHS or (file.format_name() == "tiff" and bits not in WHOLE_BYTES):
+        raise BadInputError(f"Picture '{path}' has channels of {bits} bits ({depth}), which isn't supported; write PNG "
+                            "or EXR.")
+    if file.format_name() == "png":
+        bits, colour = _png_kind(path)
+        larger = 4 if colour == PALETTE else 1  # what a pixel of the file becomes when a palette is looked up
+        if spec.image_bytes() * min(bits, 8) // 8 > max(LITTLE, larger * MAX_RATIO * path.stat().st_size):
+            raise BadInputError(f"Picture '{path}' claims {width} x {height} pixels, more than it can hold; it is "
+                                "damaged or cut off, so write or copy it again.")
+    return Header(width, height, DEPTHS[depth])
+
+
+def _png_kind(path: Path) -> tuple[int, int]:
+    """Bits and kind of colour of a PNG as it is stored; the library tells what it makes of them."""
+    with open(path, "rb") as file:
+        return tuple(file.read(26)[24:])
+
+
+def _check_palette(colour: np.ndarray, path: Path) -> None:
+    """Raise `BadInputError` where a PNG's pixels are beyond its palette: the library gives black for them."""
+    content = path.read_bytes()
+    at = content.find(b"PLTE")
+    palette = np.frombuffer(content, np.uint8, int.from_bytes(content[at - 4 : at], "big") // 3 * 3, at + 4)
+    known = palette.reshape(-1, 3).tolist()
+    if [0, 0, 0] not in known and not colour.any(-1).all():
+        raise BadInputError(f"Picture '{path}' is damaged (its palette is too short); write it again.")
