@@ -159,9 +159,10 @@ def _png_kind(path: Path) -> tuple[int, int]:
 
 def _check_palette(colour: np.ndarray, path: Path) -> None:
     """Raise `BadInputError` where a PNG's pixels are beyond its palette: the library gives black for them."""
-    content = path.read_bytes()
-    at = content.find(b"PLTE")
-    palette = np.frombuffer(content, np.uint8, int.from_bytes(content[at - 4 : at], "big") // 3 * 3, at + 4)
-    known = palette.reshape(-1, 3).tolist()
-    if [0, 0, 0] not in known and not colour.any(-1).all():
+    content, at = path.read_bytes(), 8
+    while at < len(content) and content[at + 4 : at + 8] != b"PLTE":
+        at += 12 + int.from_bytes(content[at : at + 4], "big")
+    entries = content[at + 8 : at + 8 + int.from_bytes(content[at : at + 4], "big")]
+    has_black = any(entries[i : i + 3] == bytes(3) for i in range(0, len(entries), 3))
+    if not has_black and not colour.any(-1).all():
         raise BadInputError(f"Picture '{path}' is damaged (its palette is too short); write it again.")

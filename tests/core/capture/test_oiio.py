@@ -125,6 +125,13 @@ def test_a_transparent_colour_is_alpha(tmp_path):
     np.testing.assert_array_equal(alpha == 0, (array == array[2, 3]).all(-1))
 
 
+def test_a_palette_is_found_behind_whatever_else(tmp_path):
+    palette = bytes(range(1, 7))
+    decoy = chunk(b"tEXt", b"Comment\0\xff\xff\xff\xffPLTE")
+    (tmp_path / "a.png").write_bytes(png(b"\0\x50", 2, 1, 1, 3, decoy + chunk(b"PLTE", palette)))
+    assert read_coded(tmp_path / "a.png").colour.ravel().tolist() == [1, 2, 3, 4, 5, 6]
+
+
 def test_a_blank_mask_is_not_doubted(tmp_path):
     for bits, colour, extra in ((1, 0, b""), (1, 3, chunk(b"PLTE", b"\0\0\0\xff\xff\xff"))):
         (tmp_path / "a.png").write_bytes(png((b"\0" + b"\xff" * 500) * 4000, 4000, 4000, bits, colour, extra))
