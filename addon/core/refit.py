@@ -170,12 +170,12 @@ class Refit(Recovery):
             raise _again(self.store.folder, "its stages were cleared or are another run's")
         return Specular.from_store(arrays, meta), was.lobes()
 
-    @property
+    @cached_property
     def touched(self) -> set[int]:
         """Objects whose material is made anew."""
         return self.result.changed
 
-    @property
+    @cached_property
     def fitted_again(self) -> set[int]:
         """Those of them that are fitted: something else is given of their highlight, or nothing new at all."""
         before, now, given = self._specular_before[1], self.overrides.lobes(), self.result.given
