@@ -59,8 +59,8 @@ WORDS = {
     "specular_rays": Words("Rays", "Rays for each view in the fit of the highlights; more is calmer and slower"),
     "refine": Words("Rounds After", "0 stops after the first fit; 1 takes the highlights out of the texture; 2 lights "
                     "the room with what glossy things reflect, too"),
-    "coat": Words("Assume a Coat", "Give objects that were seen too little to look for a highlight a plausible coat, as "
-                  "paint or plastic has, instead of none"),
+    "coat": Words("Assume a Coat", "Give objects that were seen too little to look for a highlight a plausible coat, "
+                  "as paint or plastic has, instead of none"),
     "threads": Words("Threads", "Processor threads that the run takes; 0 takes all"),
     "seed": Words("Seed", "Another number gives other noise; the same one gives the same result again"),
 }
