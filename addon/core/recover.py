@@ -51,6 +51,8 @@ from .surface.two_sides import laid_apart, with_backs
 
 CODE = 59
 """Counted up whenever a stage computes something else than before: stored stages of older code are done again."""
+ELEMENTS = ("texel", "triangle", "position")
+"""What is stored of the elements, as finding it takes seconds; older stages lack it."""
 
 
 class Recovery(Corrected):
@@ -169,6 +171,7 @@ class Recovery(Corrected):
             sign = np.where((first == mesh.triangles).all(1), 1, -1).astype(np.int8)
             arrays = {"uv": found.uv, "sign": sign, "backs": found.backs}
             arrays |= {"vertices": mesh.vertices} if noise else {}
+            arrays |= {name: getattr(found.atlas, name) for name in ELEMENTS}
             return dataclasses.replace(found, noise=noise), arrays, {"size": found.atlas.size, "noise": noise}
 
         def load(arrays, meta):
@@ -176,7 +179,8 @@ class Recovery(Corrected):
             if "vertices" in arrays:
                 mesh = dataclasses.replace(mesh, vertices=arrays["vertices"])
             mesh = with_backs(mesh, arrays["backs"])
-            return from_uv(mesh, arrays["sign"], arrays["uv"], int(meta["size"]), float(meta["noise"]))
+            known = tuple(arrays[name] for name in ELEMENTS) if "texel" in arrays else None
+            return from_uv(mesh, arrays["sign"], arrays["uv"], int(meta["size"]), float(meta["noise"]), known)
 
         return self._stage("surface", load, compute)
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..capture.model import Camera, Mesh
 from ..errors import BadInputError
 from .atlas import Atlas
-from .elements import make_atlas, triangle_geometry, uv_scale
+from .elements import Covered, make_atlas, triangle_geometry, uv_scale
 from .orientation import Sides, seen_sides
 from .rays import RayScene
 from .two_sides import with_backs
@@ -133,10 +133,15 @@ def build_surface(
     return from_uv(mesh, sides.sign, uv, size)
 
 
-def from_uv(mesh: Mesh, sign: np.ndarray, uv: np.ndarray, size: int, noise: float = 0.0) -> Surface:
-    """The surface for a known layout of a mesh `with_backs`, and the sign of each of its first sides."""
+def from_uv(
+    mesh: Mesh, sign: np.ndarray, uv: np.ndarray, size: int, noise: float = 0.0, known: Covered | None = None
+) -> Surface:
+    """The surface for a known layout of a mesh `with_backs`, and the sign of each of its first sides.
+
+    `known`, if given, is what was found of the elements before.
+    """
     towards = facing(mesh, sign)
-    atlas = make_atlas(towards, turned(uv, _every(mesh, sign)), size)
+    atlas = make_atlas(towards, turned(uv, _every(mesh, sign)), size, known)
     scale = uv_scale(mesh, uv)
     scene = RayScene(towards.vertices, towards.triangles, towards.backs)
     return Surface(towards, atlas, scene, uv, 1 / max(scale * size, 1e-12), noise)

@@ -85,7 +85,19 @@ def _padding(texel: np.ndarray, size: int) -> np.ndarray:
     return element.reshape(size, size)[nearest[0], nearest[1]].ravel()
 
 
-def make_atlas(mesh: Mesh, uv: np.ndarray, size: int) -> Atlas:
+Covered = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Texel, triangle and position of each element: what takes time to find."""
+
+
+def _covered(mesh: Mesh, uv: np.ndarray, size: int) -> Covered:
+    triangle, u, v = _cover(uv, size)
+    texel = np.flatnonzero(triangle >= 0)
+    triangle, u, v = triangle[texel], u[texel, None].astype(np.float64), v[texel, None].astype(np.float64)
+    a, b, c = (mesh.vertices[mesh.triangles[triangle, i]] for i in range(3))
+    return texel, triangle, (a + u * (b - a) + v * (c - a)).astype(np.float32)
+
+
+def make_atlas(mesh: Mesh, uv: np.ndarray, size: int, known: Covered | None = None) -> Atlas:
     """Surface elements at the texels that `uv` covers.
 
     Parameters
@@ -95,12 +107,10 @@ def make_atlas(mesh: Mesh, uv: np.ndarray, size: int) -> Atlas:
         Atlas coordinates in [0, 1], without overlap.
     size : int
         Edge of the atlas in texels.
+    known : Covered, optional
+        Of the same atlas, made before.
     """
-    triangle, u, v = _cover(uv, size)
-    texel = np.flatnonzero(triangle >= 0)
-    triangle, u, v = triangle[texel], u[texel, None].astype(np.float64), v[texel, None].astype(np.float64)
-    a, b, c = (mesh.vertices[mesh.triangles[triangle, i]] for i in range(3))
-    position = (a + u * (b - a) + v * (c - a)).astype(np.float32)
+    texel, triangle, position = known or _covered(mesh, uv, size)
     normal, area = triangle_geometry(mesh)
     # Each triangle's surface is shared out between its elements; what no element covers is left out.
     count = np.bincount(triangle, minlength=len(mesh.triangles))
