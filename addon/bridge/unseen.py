@@ -22,12 +22,13 @@ from .images import array_image, image_array, load_image
 from .marks import IMAGE, OBJECT_ID, PAINTED, RESULT, RUN
 from .materials import BASE_COLOR, principled
 from .mesh_objects import ATLAS_UV
+from .scene_capture import few
 
 _UV = "scan_relight_painted_uv"
 """Of an object: digest of the texture coordinates that its painted image was made for."""
 _SOURCE = "scan_relight_painted_over"
 """Of a painted image: the result's image that it is a copy of."""
-NEIGHBOURS = 24
+NEIGHBOURS = 12
 """Measured spots that a filled one is the mean of, nearer ones counting more."""
 MASK = "unseen"
 
@@ -198,20 +199,20 @@ def fill(things: Iterable[bpy.types.Object], where: str = result_images.PACK) ->
     BadInputError, StorageError
         As of `own_image` and `unseen_mask`; nothing is changed then.
     """
-    remarks, ready = [], {}
+    groups: dict[str, list] = {}
+    passed: dict[str, list[str]] = {}
     for thing in things:
-        if texture_node(thing) is None:
-            remarks.append(f"Object '{thing.name}' has one colour: there is nothing to fill.")
+        node = texture_node(thing)
+        if node is None:
+            passed.setdefault("one colour, so there is nothing to fill", []).append(thing.name)
         else:
-            ready[thing] = coverage(thing)
-    count = 0
-    for group in {path_of(texture_node(thing).image): None for thing in ready}:
-        chosen = [thing for thing in ready if path_of(texture_node(thing).image) == group]
-        count += _fill(chosen, ready[chosen[0]], where, remarks)
-    return count, remarks
+            groups.setdefault(path_of(node.image), []).append(thing)
+    seen = {path: coverage(some[0]) for path, some in groups.items()}
+    count = sum(_fill(some, seen[path], where, passed) for path, some in groups.items())
+    return count, [f"{few(names)}: {why}." for why, names in passed.items()]
 
 
-def _fill(things, seen, where, remarks) -> int:
+def _fill(things, seen, where, passed) -> int:
     """`fill` for objects that show the same image, whose coverage is `seen`."""
     from scipy.spatial import cKDTree
 
@@ -219,36 +220,34 @@ def _fill(things, seen, where, remarks) -> int:
     atlas = _elements(owners, seen.shape[0])
     observed, quality = (seen[..., k].ravel()[atlas.texel] for k in (0, 2))
     number = {thing: k for k, thing in enumerate(owners)}
-    count, images = 0, {}
+    filled, value, image = np.zeros(len(atlas), bool), np.empty((len(atlas), 3), np.float32), None
     for thing in things:
         own = np.flatnonzero(atlas.object_id == number[thing])
         wanted, measured = own[observed[own] < 0.5], own[(observed[own] >= 0.5) & (quality[own] > 1.5)]
         if not len(wanted) or not len(measured):
-            remarks.append(f"Object '{thing.name}': " + ("frames saw all of it." if not len(wanted) else
-                                                         "no spot of it was measured to fill from."))
+            why = "frames saw all of it" if not len(wanted) else "no spot of it was measured to fill from"
+            passed.setdefault(why, []).append(thing.name)
             continue
-        image = own_image(thing, where)
-        if image not in images:
-            images[image] = image_array(image)
-        flat = images[image].reshape(-1, images[image].shape[2])
-        distance, near = cKDTree(atlas.place(measured)).query(atlas.place(wanted), min(NEIGHBOURS, len(measured)))
-        distance, near = distance.reshape(len(wanted), -1), near.reshape(len(wanted), -1)
+        if image is None:
+            image = own_image(thing, where)
+            flat = image_array(image).reshape(seen.shape[0] * seen.shape[1], -1)
+        own_image(thing, where)
+        tree, nearest = cKDTree(atlas.place(measured)), min(NEIGHBOURS, len(measured))
+        distance, near = (found.reshape(len(wanted), -1)
+                          for found in tree.query(atlas.place(wanted), nearest, workers=-1))
         weight = 1 / (distance**2 + atlas.texel_edge**2)
-        values = flat[atlas.texel[measured], :3]
-        new = (weight[..., None] * values[near]).sum(1) / weight.sum(1)[:, None]
-        element = np.full(len(atlas), -1, np.int64)
-        element[wanted] = np.arange(len(wanted))
-        texels = np.flatnonzero(element[atlas.padding] >= 0)  # the gutter beside them too
-        flat[texels, :3] = new[element[atlas.padding[texels]]]
-        count += len(wanted)
-    for image, pixels in images.items():
-        image.pixels.foreach_set(pixels.ravel())
+        value[wanted] = (weight[..., None] * flat[atlas.texel[measured], :3][near]).sum(1) / weight.sum(1)[:, None]
+        filled[wanted] = True
+    if image is not None:
+        texels = np.flatnonzero(filled[atlas.padding])  # the gutter beside them too
+        flat[texels, :3] = value[atlas.padding[texels]]
+        image.pixels.foreach_set(flat.ravel())
         image.update()
         if image.packed_file:
             image.pack()
         else:
             image.save()
-    return count
+    return int(filled.sum())
 
 
 def _sharing(thing: bpy.types.Object) -> list[bpy.types.Object]:

@@ -62,7 +62,7 @@ def test_both_objects_on_one_image(room, ops):
 
 def test_nothing_to_fill_is_told(room, ops):
     select(room[TAP])
-    with pytest.raises(RuntimeError, match="has one colour"):
+    with pytest.raises(RuntimeError, match="one colour, so there is nothing to fill"):
         ops.fill_unseen()
     assert "scan_relight_painted" not in room[TAP]
 
