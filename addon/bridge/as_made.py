@@ -8,6 +8,8 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
@@ -93,6 +95,19 @@ def is_corrected(owner: bpy.types.Material | bpy.types.World) -> bool:
         made.pop(key, None)
     # A socket that is gone from a node that is there went with a version of Blender.
     return any(key.partition("\n")[0] not in nodes or key in now and now[key] != value for key, value in made.items())
+
+
+@contextmanager
+def our_own(owner: bpy.types.Material | bpy.types.World) -> Iterator[None]:
+    """What is changed within is shown on the artist's behalf and can be shown again: no edit of nodes by hand.
+
+    `is_corrected` says afterwards what it said before.
+    """
+    noted = WRITTEN in owner and not is_corrected(owner)
+    yield
+    if noted:
+        del owner[WRITTEN]
+        stamp_tree(owner)
 
 
 def is_ours(material: bpy.types.Material | None) -> bool:

@@ -19,6 +19,7 @@ from ..core.material import LAMBERTIAN, METAL, SPECULAR
 from ..core.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
 from ..core.result_place import write_capture
 from . import correct_material, look, result_file, smoothing, unseen
+from .as_made import is_corrected, our_own
 from .marks import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, WHITE
 
 F0_COATED, F0_METAL, ROUGHNESS = 0.04, 0.6, 0.3
@@ -170,7 +171,8 @@ def _under(thing: bpy.types.Object, said: dict, model: str | None) -> dict[str, 
 def show(thing: bpy.types.Object) -> None:
     """Bring an object's material in line with what is given."""
     if correctable(thing):
-        correct_material.show(thing, effective(thing), entry(thing))
+        with our_own(correct_material.worn_material(thing)):
+            correct_material.show(thing, effective(thing), entry(thing))
         if not given(thing) and found(thing) == correct_material.worn(thing, entry(thing)):
             thing.pop(FOUND, None)
 
@@ -186,7 +188,7 @@ def reapply(thing: bpy.types.Object) -> list[str]:
         Sentences on what no longer fits.
     """
     smoothing.reapply(thing)
-    if not correctable(thing):
+    if not correctable(thing) or is_corrected(correct_material.worn_material(thing)):
         return []
     correct_material.renew(thing, given(thing))
     said = unseen.reapply(thing)

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from collections.abc import Generator, Iterable
 from pathlib import Path
 
 import bpy
 
-from ..core.errors import MissingStageError
+from ..core.errors import MissingStageError, StorageError
 from ..core.material import EMITTER
 from ..core.room_file import material
-from . import corrections, relight_lamps, result_file, result_images
+from . import corrections, relight_lamps, result_file, result_images, room_changes, unseen
+from .as_made import WRITTEN, is_corrected, stamp_tree
 from .correct_material import worn_material
 from .marks import IMAGE, OBJECT_ID, RESULT, mark
 from .materials import MODEL, dress
 from .mesh_objects import is_open
 from .scene import BASE_COLOR
+from .scene_capture import few
 
 _WORN = ("model", "phi", "psi", "f0", "emission", "transmission", "surfaces", "coat", "given")
 """Of an entry of materials.json, what its object's material is made of."""
@@ -80,50 +84,72 @@ def bringing(scene: bpy.types.Scene, folder: Path, before: dict[int, dict],
     things = [thing for thing in scene.objects if corrections.correctable(thing)
               and corrections.result_folder(thing) == folder]
     image = _renew_images(folder)
-    run, warnings = after.run, []
+    run, warnings, by_hand = after.run, [], []
     for done, thing in enumerate(things):
         yield done / max(len(things), 1)
         number = thing[OBJECT_ID]
         now = after.objects.get(number)
         mark(thing, folder, run)
         if now is not None and any(now.get(key) != before.get(number, {}).get(key) for key in _WORN):
+            if is_corrected(worn_material(thing)):
+                by_hand.append(thing.name)
+                continue
             _dress(thing, now, image)
             warnings += corrections.reapply(thing)
     for collection in scene.collection.children_recursive:
         if collection.get(RESULT) and Path(collection[RESULT]) == folder:
             mark(collection, folder, run)
+            room_changes.keep(collection, room_changes.found(folder))
+    if by_hand:
+        warnings.append(f"{few(by_hand)}: the material was edited by hand and stays.")
     return tuple(warnings)
 
 
 def _dress(thing: bpy.types.Object, entry: dict, image: bpy.types.Image | None) -> None:
     """Make an object's material anew in place; a lamp stays as bright as it was set."""
     worn = worn_material(thing)
-    description = material(entry)
+    description, node = material(entry), unseen.texture_node(thing)
+    if node is not None:
+        image = unseen.source_of(node.image)
     state = relight_lamps.snapshot(worn) if relight_lamps.is_lamp(worn) else None
     if state is not None:
         relight_lamps.restore(worn)
+    worn.pop(WRITTEN, None)
     dress(worn, description, image, one_sided=description.model == EMITTER and is_open(thing.data))
     if state is not None and worn[MODEL] == EMITTER:
         relight_lamps.put_back(worn, state)
+    stamp_tree(worn)
 
 
 def _renew_images(folder: Path) -> bpy.types.Image | None:
-    """Read the result's images again, wherever in this file they lie; the one of Base Color."""
+    """Read the result's images again, whether they are referred to, packed or copies; the one of the room's colours."""
     found = None
-    for one in list(bpy.data.images):
-        if one.library or one.source != "FILE":
+    for one in bpy.data.images:
+        if one.library or one.source not in ("FILE", "TILED"):
             continue
-        source = Path(one.get(IMAGE) or bpy.path.abspath(one.filepath))
-        if source.parent != folder or source.name not in result_images.COLOUR_SPACES or not source.is_file():
+        shown = Path(os.path.normpath(bpy.path.abspath(one.filepath)))
+        source = Path(one.get(IMAGE) or shown)
+        if not source.is_relative_to(folder) or not result_images.is_there(source):
             continue
-        one[IMAGE] = str(source)
         if one.packed_file:
-            one = result_images.image(folder, source.name, result_images.PACK, one.use_fake_user)
-        elif Path(bpy.path.abspath(one.filepath)) != source:
-            one = result_images.image(folder, source.name, result_images.FOLDER, one.use_fake_user)
-        else:
+            one.unpack(method="REMOVE")
+            one.filepath = str(source)
             one.reload()
+            one.pack()
+        else:
+            if shown != source and source.is_file():
+                _copy(source, shown)
+            one.reload()
+        one[IMAGE] = str(source)
         found = one if source.name == BASE_COLOR else found
     if found is None and (folder / BASE_COLOR).is_file():
         found = result_images.image(folder, BASE_COLOR)
     return found
+
+
+def _copy(source: Path, target: Path) -> None:
+    try:
+        shutil.copyfile(source, target)
+    except OSError as error:
+        raise StorageError(f"'{target}' can't be written ({error.strerror or error}); free some space and refit "
+                           "again.") from error

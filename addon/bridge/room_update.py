@@ -12,7 +12,7 @@ from pathlib import Path
 
 import bpy
 
-from . import relight_lamps
+from . import corrections, relight_lamps
 from .as_made import NAME, PLACE, SHAPE, is_corrected, is_edited, is_ours, is_renamed, made_at
 from .atlas_transfer import atlas_onto, layer_values, set_layer
 from .camera_track import NO_FRAME
@@ -145,7 +145,8 @@ def commit(steps: Steps, top: bpy.types.Collection, fresh: bpy.types.Collection,
     if steps.removed:
         bpy.data.batch_remove(steps.removed)
     note_known(top, fresh.all_objects)
-    return _told(steps)
+    again = [sentence for pair in steps.pairs for sentence in corrections.reapply(pair.old)]
+    return _told(steps) + again
 
 
 def note_known(top: bpy.types.Collection, things: Iterable[bpy.types.Object]) -> None:

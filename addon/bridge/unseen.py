@@ -17,6 +17,7 @@ from ..core.capture.model import Mesh
 from ..core.errors import BadInputError, StorageError
 from ..core.surface.atlas import Atlas
 from . import result_images
+from .as_made import our_own
 from .correct_material import worn_material
 from .images import array_image, image_array, load_image
 from .marks import IMAGE, OBJECT_ID, PAINTED, RESULT, RUN
@@ -89,9 +90,14 @@ def own_image(thing: bpy.types.Object, where: str = result_images.PACK) -> bpy.t
     elif image.get(RUN, "") != thing.get(RUN, ""):
         _renew(image, source, thing)  # what another run found of this object, which nobody painted
     image[_SOURCE] = source
-    node.image = image
+    _show(thing, node, image)
     thing[PAINTED], thing[_UV] = image, _digest(thing.data)
     return image
+
+
+def source_of(image: bpy.types.Image) -> bpy.types.Image:
+    """The result's image that an artist's is a copy of; any other itself."""
+    return image.get(_SOURCE) or image
 
 
 def restore(things: Iterable[bpy.types.Object], discard: bool = False) -> int:
@@ -107,7 +113,7 @@ def restore(things: Iterable[bpy.types.Object], discard: bool = False) -> int:
         if discard and image.get(_SOURCE):
             _renew(image, image[_SOURCE], thing)
         if node is not None and node.image == image:
-            node.image = image.get(_SOURCE) or load_image(image[PAINTED])
+            _show(thing, node, image.get(_SOURCE) or load_image(image[PAINTED]))
         for key in (PAINTED, _UV):
             del thing[key]
         count += 1
@@ -123,8 +129,13 @@ def reapply(thing: bpy.types.Object) -> list[str]:
         return [f"What was painted on '{thing.name}' lies on other texture coordinates than this run's; it is kept as "
                 f"image '{image.name}' and not shown."]
     image[_SOURCE] = node.image
-    node.image = image
+    _show(thing, node, image)
     return []
+
+
+def _show(thing, node, image) -> None:
+    with our_own(worn_material(thing)):
+        node.image = image
 
 
 def keep_painted() -> None:
@@ -154,7 +165,7 @@ def coverage(thing: bpy.types.Object) -> np.ndarray:
     if node is None:
         raise BadInputError(f"Object '{thing.name}' has one colour and no texture.")
     image = node.image
-    base = Path(image.get(PAINTED) or path_of(image))
+    base = Path(path_of(image))
     path = base.with_name(base.name.replace("base_color", "coverage"))
     if path == base or not path.is_file():
         raise BadInputError(f"'{path}' is missing, so nobody knows what no frame saw; run the recovery again.")
@@ -220,7 +231,7 @@ def _fill(things, seen, where, passed) -> int:
     atlas = _elements(owners, seen.shape[0])
     observed, quality = (seen[..., k].ravel()[atlas.texel] for k in (0, 2))
     number = {thing: k for k, thing in enumerate(owners)}
-    filled, value, image = np.zeros(len(atlas), bool), np.empty((len(atlas), 3), np.float32), None
+    filled, value, spots = np.zeros(len(atlas), bool), np.empty((len(atlas), 3), np.float32), {}
     for thing in things:
         own = np.flatnonzero(atlas.object_id == number[thing])
         wanted, measured = own[observed[own] < 0.5], own[(observed[own] >= 0.5) & (quality[own] > 1.5)]
@@ -228,17 +239,17 @@ def _fill(things, seen, where, passed) -> int:
             why = "frames saw all of it" if not len(wanted) else "no spot of it was measured to fill from"
             passed.setdefault(why, []).append(thing.name)
             continue
-        if image is None:
-            image = own_image(thing, where)
-            flat = image_array(image).reshape(seen.shape[0] * seen.shape[1], -1)
-        own_image(thing, where)
+        image = own_image(thing, where)  # of all of them before it is read, as each may renew its part
+        spots[thing] = wanted, measured
+    flat = image_array(image).reshape(seen.shape[0] * seen.shape[1], -1) if spots else None
+    for wanted, measured in spots.values():
         tree, nearest = cKDTree(atlas.place(measured)), min(NEIGHBOURS, len(measured))
         distance, near = (found.reshape(len(wanted), -1)
                           for found in tree.query(atlas.place(wanted), nearest, workers=-1))
         weight = 1 / (distance**2 + atlas.texel_edge**2)
         value[wanted] = (weight[..., None] * flat[atlas.texel[measured], :3][near]).sum(1) / weight.sum(1)[:, None]
         filled[wanted] = True
-    if image is not None:
+    if spots:
         texels = np.flatnonzero(filled[atlas.padding])  # the gutter beside them too
         flat[texels, :3] = value[atlas.padding[texels]]
         image.pixels.foreach_set(flat.ravel())
@@ -309,6 +320,7 @@ def _save_beside(image) -> None:
 
 def path_of(image: bpy.types.Image) -> str:
     """Where an image of the result, or what an artist's is a copy of, came from."""
+    image = source_of(image)  # as the result may have been moved since
     return str(image.get(PAINTED) or image.get(IMAGE) or bpy.path.abspath(image.filepath))
 
 

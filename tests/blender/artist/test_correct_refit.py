@@ -95,3 +95,49 @@ def test_a_failed_refit_is_a_sentence_and_what_was_said_stays(room, ops):
     with pytest.raises(RuntimeError, match="run recover again"):
         ops.this_is(model="metal")
     assert sockets(things["sofa"])["Metallic"] == 1
+
+
+def test_a_later_run_brings_the_room_and_what_the_artist_did_stays(ops, result, tmp_path):  # noqa: F811
+    """The material is the new run's, under what is given; painted image and smooth shading come back."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bridge("corrections").forget()
+    folder = shutil.copytree(result, tmp_path / "result")
+    bringing, whole = bridge("room").bringing, bridge("slices").whole
+    scene = whole(bringing(folder)).scene
+    bpy.context.window.scene = scene
+    scene.scan_relight_correct.refit_automatically = False
+    things = {thing.name.rpartition(" ")[0]: thing for thing in scene.objects if "object_id" in thing}
+    sofa, wall = things["sofa"], things["papered wall"]
+    select(sofa)
+    ops.this_is(model="metal")
+    sofa.scan_relight_correct.roughness = 0.33
+    ops.smooth_by_angle(angle=0.5)
+    image = bridge("unseen").own_image(wall)
+    materials = json.loads((folder / "materials.json").read_text())
+    materials["run"] = "f" * 16
+    (folder / "materials.json").write_text(json.dumps(materials))
+    again = whole(bringing(folder))
+    assert again.updated and not [said for said in again.warnings if "corrected" in said]
+    assert sockets(sofa)["Metallic"] == 1 and sockets(sofa)["Roughness"] == pytest.approx(0.33)
+    assert bridge("unseen").texture_node(wall).image == image
+    assert any(polygon.use_smooth for polygon in sofa.data.polygons)
+    assert sofa["scan_relight_run"] == "f" * 16
+    select(sofa, wall)
+    ops.take_back()
+    ops.restore_painted()
+    assert sockets(sofa)["Metallic"] == 0 and bridge("unseen").texture_node(wall).image != image
+
+
+def test_nodes_that_were_edited_by_hand_stay(ops, result, tmp_path):  # noqa: F811
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    folder = shutil.copytree(result, tmp_path / "result")
+    scene = bridge("slices").whole(bridge("room").bringing(folder)).scene
+    bpy.context.window.scene = scene
+    sofa = next(thing for thing in scene.objects if thing.name.startswith("sofa"))
+    node = bridge("materials").principled(sofa.material_slots[0].material)
+    node.inputs["Sheen Weight"].default_value = 0.7
+    select(sofa)
+    ops.this_is(model="metal")
+    assert node.inputs["Sheen Weight"].default_value == pytest.approx(0.7)
+    assert node.inputs["Metallic"].default_value == 1
+    assert entries(folder)[sofa["object_id"]]["model"] == "metal"

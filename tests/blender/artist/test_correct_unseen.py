@@ -130,7 +130,7 @@ def test_a_painted_image_survives_an_update(room, ops, tmp_path):
     write_exr(folder / "base_color.exr", np.full((SIZE, SIZE, 3), 0.25, np.float32))
     refitted = bridge("refitted")
     before = {one["object_id"]: one | ({"model": "metal"} if one["object_id"] == BOARD else {}) for one in ENTRIES}
-    bridge("apply").whole(refitted.bringing(bpy.context.scene, folder, before, refitted.fitted(folder)))
+    bridge("slices").whole(refitted.bringing(bpy.context.scene, folder, before, refitted.fitted(folder)))
     assert shown(room[BOARD])[0] == image and np.array_equal(shown(room[BOARD])[1], filled)
     assert np.allclose(shown(room[TABLE])[1], 0.25)
     ops.restore_painted()
@@ -155,3 +155,11 @@ def test_a_result_that_is_gone_is_told(room, ops, tmp_path):
         with pytest.raises(RuntimeError, match="coverage.exr' is missing"):
             getattr(ops, name)()
     assert "scan_relight_painted" not in room[BOARD] and bpy.context.mode == "OBJECT"
+
+
+def test_a_moved_result_is_followed(room, ops, tmp_path):
+    select(room[BOARD])
+    ops.fill_unseen()
+    (tmp_path / "result").rename(tmp_path / "elsewhere")
+    bridge("find_result").repoint(tmp_path / "result", tmp_path / "elsewhere")
+    assert bridge("unseen").coverage(room[BOARD]).shape == (SIZE, SIZE, 3)
