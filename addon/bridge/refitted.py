@@ -15,7 +15,7 @@ from ..core.room_file import material
 from . import corrections, relight_lamps, result_file, result_images, room_changes, unseen
 from .as_made import WRITTEN, is_corrected, stamp_tree
 from .correct_material import worn_material
-from .marks import IMAGE, OBJECT_ID, RESULT, mark
+from .marks import IMAGE, OBJECT_ID, RESULT, UV_MAP, mark
 from .materials import MODEL, dress
 from .mesh_objects import is_open
 from .scene import BASE_COLOR
@@ -94,7 +94,7 @@ def bringing(scene: bpy.types.Scene, folder: Path, before: dict[int, dict],
             if is_corrected(worn_material(thing)):
                 by_hand.append(thing.name)
                 continue
-            _dress(thing, now, image)
+            _dress(thing, now, _own_image(thing) or image)
             warnings += corrections.reapply(thing)
     for collection in scene.collection.children_recursive:
         if collection.get(RESULT) and Path(collection[RESULT]) == folder:
@@ -103,6 +103,14 @@ def bringing(scene: bpy.types.Scene, folder: Path, before: dict[int, dict],
     if by_hand:
         warnings.append(f"{few(by_hand)}: the material was edited by hand and stays.")
     return tuple(warnings)
+
+
+def _own_image(thing: bpy.types.Object) -> bpy.types.Image | None:
+    """The image of an object's own part of the atlas that its material shows; None where that is the room's."""
+    worn = worn_material(thing)
+    nodes = worn.node_tree.nodes if worn is not None and worn.node_tree else ()
+    images = (node.image for node in nodes if node.type == "TEX_IMAGE" and node.image)
+    return next((image for image in images if UV_MAP in image), None)
 
 
 def _dress(thing: bpy.types.Object, entry: dict, image: bpy.types.Image | None) -> None:

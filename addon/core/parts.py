@@ -32,9 +32,11 @@ FINEST = 4.0
 """Times that an object's texels may be finer than the room's."""
 WORTH = 1.2
 """Finer by less than this is not worth another look at the frames."""
-SHEET = 1.5
-"""All parts together take so many times the texels of the largest atlas: memory ends there."""
+MOST_TEXELS = 25_000_000
+"""Of all parts together: one and a half times an atlas of 4096. Memory, a few gigabytes for this, ends there."""
 PIXEL_STEP = 8
+HALF = 0.5
+"""Of what lies around a spot on the room's atlas, this share has to be measured for detail to be told there."""
 FOLDER = "objects"
 TILE = "base_color.<UDIM>.exr"
 
@@ -85,8 +87,7 @@ def scales(run: Recovery) -> dict[int, float]:
     finer = {number: float(np.clip(surface.texel_size / texel, 1, FINEST)) for number, texel in wanted.items()}
     finer = {number: scale for number, scale in finer.items() if scale > WORTH}
     taken = np.bincount(surface.atlas.object_id) / max(len(surface.atlas), 1) * surface.atlas.size**2
-    most = max(SHEET * s.atlas_size**2, surface.atlas.size**2)
-    while finer and taken.sum() + sum((scale**2 - 1) * taken[number] for number, scale in finer.items()) > most:
+    while finer and taken.sum() + sum((scale**2 - 1) * taken[i] for i, scale in finer.items()) > MOST_TEXELS:
         finer = {number: max(0.95 * scale, 1.0) for number, scale in finer.items()}
     return {number: scale for number, scale in finer.items() if scale > WORTH}
 
@@ -168,11 +169,12 @@ def finer_detail(run: Recovery, pages: Pages) -> np.ndarray | None:
         stored = {"radiance": np.where(told[:, None], found.radiance, np.nan)[only].astype(np.float32)}
         run.store.save("detail", own, stored)
     good = (lit.tier == CLEAN) & (lit.count >= ENOUGH) & (run.albedo.origin == MEASURED)
-    known = np.concatenate([np.nan_to_num(lit.radiance), good[:, None]], 1).astype(np.float32)
+    known = np.concatenate([np.where(good[:, None], lit.radiance, 0), good[:, None]], 1).astype(np.float32)
     room = pages.image(surface.atlas.image(known)).reshape(-1, 4)[atlas.texel[only]]
     floor = np.float32(max(FLOOR * run.median_radiance(), 1e-30))
-    ratio = np.clip((stored["radiance"] + floor) / (room[:, :3] + floor), 1 / MOST, MOST)
-    ratio[(room[:, 3] < 0.99) | ~np.isfinite(ratio).all(1)] = 1
+    level = room[:, :3] / np.maximum(room[:, 3:], 1e-6)
+    ratio = np.clip((stored["radiance"] + floor) / (level + floor), 1 / MOST, MOST)
+    ratio[(room[:, 3] < HALF) | ~np.isfinite(ratio).all(1)] = 1
     every = np.ones((len(atlas), 3), np.float32)
     every[only] = ratio
     return atlas.image(every, 1.0)
