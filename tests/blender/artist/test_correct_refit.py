@@ -141,3 +141,19 @@ def test_nodes_that_were_edited_by_hand_stay(ops, result, tmp_path):  # noqa: F8
     assert node.inputs["Sheen Weight"].default_value == pytest.approx(0.7)
     assert node.inputs["Metallic"].default_value == 1
     assert entries(folder)[sofa["object_id"]]["model"] == "metal"
+
+
+def test_a_known_white_scales_the_room_in_the_scene(room, ops):
+    """Albedo of all objects by the given over the found; lamps the other way."""
+    folder, things = room
+    wall = things["wall"]
+    found = entries(folder)[wall["object_id"]]["evidence"]["albedo"]
+    before = {name: plain(thing) for name, thing in things.items()}
+    select(wall)
+    ops.this_is_white(albedo=[0.9 * part for part in found])
+    after = entries(folder)
+    assert after[wall["object_id"]]["evidence"]["albedo"] == pytest.approx([0.9 * part for part in found], rel=0.05)
+    assert json.loads((folder / "overrides.json").read_text())["white"]["object"] == wall["object_id"]
+    lamps = [name for name, thing in things.items() if after[thing["object_id"]]["model"] == "emitter"]
+    assert lamps and all(plain(things[name]) != before[name] for name in lamps)
+    assert bridge("corrections").entry(wall)
