@@ -11,6 +11,7 @@ from ..addon.core.errors import BadInputError, ScanRelightError
 from . import poll
 from .panel import SidebarPanel
 from .settings_props import preset_items
+from .translations import OWN
 
 NEXT = (("CHOOSE", "Choose Only", "Choose it in the sidebar; the panel shows what is in it"),
         ("IMPORT", "Import", "Bring objects, cameras and frames into the scene as they were scanned"),
@@ -55,7 +56,7 @@ class FileOperator:
     then: bpy.props.EnumProperty(name="Then", description="What is done with a scan", items=NEXT)
     preset: bpy.props.EnumProperty(
         name="Preset", description="What all settings of a recovery start from", items=preset_items(),
-        default="normal")
+        translation_context=OWN, default="normal")
 
     @classmethod
     def poll(cls, context):

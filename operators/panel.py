@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..addon.core.naming import numbered
-from . import text
+from . import text, translations
 
 
 class SidebarPanel:
@@ -12,6 +12,7 @@ class SidebarPanel:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = "Scan Relight"
+    bl_translation_context = translations.OWN
     manual = ""
     """Page of the documentation that "?" in the header opens; '' has none."""
 

@@ -8,6 +8,7 @@ import bpy
 
 from ..addon.core.capture.formats import FORMATS
 from ..addon.core.capture.layout import Reading
+from .translations import OWN
 
 FOUND = "FOUND"
 CURVES = (("FOUND", "Not Given", "Pictures of 8 and 16 bits are refused, as their curve is unknown"),
@@ -30,7 +31,7 @@ def with_reading(cls):
         bpy.props.EnumProperty(name="Format", description="Layout of the capture's folder", items=format_items(),
                                default=FOUND),
         string(name="Mesh", description="The mesh, where it is not the one that the format names",
-               subtype="FILE_PATH"),
+               subtype="FILE_PATH", translation_context=OWN),
         bpy.props.BoolProperty(name="Files Outside", description="Let the capture's files name others outside of its "
                                "folder"),
         bpy.props.EnumProperty(name="Picture Curve", description="Curve of pictures of 8 and 16 bits", items=CURVES),

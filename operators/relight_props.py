@@ -8,6 +8,7 @@ import bpy
 
 from ..addon.bridge import match_frame, relight_lamps, relight_outside
 from ..addon.bridge.cameras import frame_cameras
+from .translations import OWN
 
 AIMS = (("VIEW", "View", "What the middle of the camera's picture shows"),
         ("CURSOR", "3D Cursor", "Where the 3D cursor is"),
@@ -21,7 +22,8 @@ LOOKS = (("MATTE", "Matte", "Grey, like chalk"), ("GLOSSY", "Glossy", "Red lacqu
 SHAPE = bpy.props.EnumProperty(
     name="Shape", description="What is set into the room", items=(
         ("SPHERE", "Sphere", "A ball"), ("CUBE", "Cube", "A cube"), ("MONKEY", "Suzanne", "Blender's monkey")))
-LOOK = bpy.props.EnumProperty(name="Material", description="Of the new object", items=LOOKS, default="MIRROR")
+LOOK = bpy.props.EnumProperty(name="Material", description="Of the new object", items=LOOKS, default="MIRROR",
+                             translation_context=OWN)
 SIZE = bpy.props.FloatProperty(
     name="Size", description="Its largest extent", subtype="DISTANCE", min=0.001, soft_max=2.0, default=0.3)
 ENGINE = bpy.props.EnumProperty(name="Engine", description="Renders the two pictures", items=(

@@ -12,6 +12,7 @@ from . import poll
 from .relight_base import RelightOperator
 from .relight_props import LOOK, LOOKS, PLACES, SHAPE, SIZE
 from .select_result_object import make_active
+from .translations import OWN
 
 
 def surface(scene, place: str, ignored=None):
@@ -71,7 +72,7 @@ class SCAN_RELIGHT_OT_virtual_look(OwnObject, bpy.types.Operator):
     bl_label = "Give It This Material"
     bl_description = "Give the active object a simple material in place of its own"
 
-    look: bpy.props.EnumProperty(name="Material", description="Which one", items=LOOKS)
+    look: bpy.props.EnumProperty(name="Material", description="Which one", items=LOOKS, translation_context=OWN)
 
     def work(self, context):
         """Replace its materials."""

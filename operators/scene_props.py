@@ -11,6 +11,7 @@ from ..addon.settings_info import setting_infos
 from . import findings
 from .reading_props import with_reading
 from .settings_props import COPIES, IMAGES, preset_items, setting_value, with_settings
+from .translations import OWN
 
 
 def preset_chosen(choices, context) -> None:
@@ -66,7 +67,7 @@ class ScanRelightScene(bpy.types.PropertyGroup):
         "the saved .blend, or in the preferences' results folder", subtype="DIR_PATH")
     preset: bpy.props.EnumProperty(
         name="Preset", description="What all settings start from", items=preset_items(), default="normal",
-        update=preset_chosen)
+        translation_context=OWN, update=preset_chosen)
     settings: bpy.props.PointerProperty(
         name="Settings", description="All settings of a recovery", type=ScanRelightSettings)
     images: IMAGES

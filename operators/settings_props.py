@@ -20,6 +20,7 @@ from . import poll, preferences, reading_props, room_window
 from .job_operator import JobOperator
 from .reading_props import with_reading
 from .settings_words import words
+from .translations import OWN
 
 PRESET_TEXTS = {
     "draft": "A first look: coarse texels, few rays",
@@ -157,7 +158,7 @@ class StageOperator(CaptureOperator):
         name="Result", description="Folder for the recovered scene and the finished stages", subtype="DIR_PATH")
     preset: bpy.props.EnumProperty(
         name="Preset", description="What the settings that are not given start from", items=preset_items(),
-        default="normal")
+        translation_context=OWN, default="normal")
     from_stage: FROM_STAGE
     paper: bpy.props.BoolProperty(
         name="As in the Paper", description="The published method; the other settings are not looked at", default=False)

@@ -13,7 +13,9 @@ from pathlib import Path
 import bpy
 
 LANGUAGES = {"de_DE": "de.po"}
-CONTEXTS = ("*", "Operator")
+OWN = "Scan Relight"
+"""Translation context of words that Blender has too and means otherwise: its 'Normal' is a surface's."""
+CONTEXTS = ("*", "Operator", OWN)
 """Blender asks for a button's text under the second, for everything else under the first."""
 
 
