@@ -144,3 +144,25 @@ def test_a_stopped_run_is_resumed_or_begun_anew(draw, recover, choices, scan, tm
     assert "Resume" in shown.words and "Goes on with: Light and albedo." in shown.text and "Start Anew" in shown.words
     (tmp_path / "result" / "report.json").write_text("{}")
     assert "Run" in draw(recover).words and "Resume" not in draw(recover).words
+
+
+@pytest.fixture(scope="module")
+def finished(grey_capture, tmp_path_factory):
+    """A whole result, made as quickly as can be."""
+    from addon.bridge.run import run
+    from addon.core.progress import Progress
+    from addon.core.settings import Settings
+
+    out = tmp_path_factory.mktemp("finished") / "result"
+    quick = Settings(shading_rays=16, specular_rays=4, emitter_rays=2, portal_rays=0, refine=0, texel_size=0.12,
+                     atlas_size=512, mirrors=False, threads=1)
+    run(grey_capture, out, quick, Progress(), "write")
+    return out
+
+
+def test_a_dropped_result_comes_in_as_a_scene_of_its_own(choices, finished):
+    before = set(bpy.data.scenes)
+    assert drop(finished / "materials.json") == {"FINISHED"}
+    [scene] = set(bpy.data.scenes) - before
+    assert sum("object_id" in thing for thing in scene.objects) == 15
+    assert scene.scan_relight.result_folder == str(finished), "its panel is about this result"
