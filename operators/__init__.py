@@ -22,6 +22,7 @@ def classes() -> tuple[type, ...]:
     from .fit import SCAN_RELIGHT_OT_fit
     from .import_capture import SCAN_RELIGHT_OT_import_capture
     from .job_operator import SCAN_RELIGHT_OT_stop
+    from .link_room import SCAN_RELIGHT_OT_link_room
     from .look import SCAN_RELIGHT_OT_look
     from .manual import SCAN_RELIGHT_OT_manual
     from .menus import SCAN_RELIGHT_MT_all
@@ -49,6 +50,7 @@ def classes() -> tuple[type, ...]:
         SCAN_RELIGHT_OT_check_capture, SCAN_RELIGHT_OT_import_capture,
         SCAN_RELIGHT_OT_accumulate, SCAN_RELIGHT_OT_shade, SCAN_RELIGHT_OT_fit, SCAN_RELIGHT_OT_write,
         SCAN_RELIGHT_OT_recover, SCAN_RELIGHT_OT_run, SCAN_RELIGHT_OT_stop, SCAN_RELIGHT_OT_clear_cache,
+        SCAN_RELIGHT_OT_link_room,
         SCAN_RELIGHT_OT_move_results, SCAN_RELIGHT_OT_find_result,
         SCAN_RELIGHT_OT_open_capture, SCAN_RELIGHT_OT_open_result, SCAN_RELIGHT_OT_use_folder, SCAN_RELIGHT_OT_drop,
         SCAN_RELIGHT_FH_json,

@@ -8,7 +8,7 @@ import bpy
 from ..addon.console import unexpected
 from ..addon.core.capture import folder as folders
 from ..addon.core.errors import BadInputError, ScanRelightError
-from . import poll
+from . import poll, room_window
 from .panel import SidebarPanel
 from .settings_props import preset_items
 from .translations import OWN
@@ -239,8 +239,7 @@ class SCAN_RELIGHT_OT_open_result(bpy.types.Operator):
                 brought = end.value
                 break
         scene = getattr(brought, "scene", None) or context.scene
-        if context.window is not None:
-            context.window.scene = scene
+        room_window.show(context.scene, scene)
         scene.scan_relight.result_folder = str(folder)
         for sentence in getattr(brought, "warnings", ()):
             self.report({"WARNING"}, sentence)

@@ -165,7 +165,7 @@ class JobOperator:
         if stop:
             self._slices.close()
             self.job.facts["phase"] = "end"
-            self.report({"WARNING"}, "Stopped while the result came into the scene; undo takes back what is there.")
+            self.report({"WARNING"}, "Stopped while the result came in; undo takes back what has come.")
             return self._leave(context, {"FINISHED"})
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}

@@ -7,7 +7,8 @@ from pathlib import Path
 import bpy
 
 from ..addon.bridge import job as jobs
-from ..addon.bridge import result_home, result_images
+from ..addon.bridge import result_home, result_images, room_changes
+from ..addon.bridge.marks import OWN_SCENE
 from ..addon.console import duration
 from ..addon.core.stages import LABELS, STAGES, WRITE
 from ..addon.core.unfinished import goes_on_with
@@ -24,6 +25,8 @@ GROUPS = (
     ("Computer", ("threads", "seed")),
 )
 OTHER = "More"
+CHANGES = 8
+"""Objects that are listed as different since the run before."""
 
 
 def groups() -> list[tuple[str, list[str]]]:
@@ -51,6 +54,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         if job is None:
             self.start(context)
             self.outcome(context)
+            self.room(context)
         else:
             self.progress(job)
 
@@ -102,6 +106,21 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
             column.label(text=job.facts["title"])
         column.progress(factor=factor, text=text)
         column.operator("scan_relight.stop", text="Stop", icon="CANCEL")
+
+    def room(self, context) -> None:
+        """What differs since the run before, and the way into the artist's own scene."""
+        scene, layout = context.scene, self.layout
+        if not scene.get(OWN_SCENE):
+            return
+        changes = room_changes.shown(scene)
+        if changes:
+            header, body = layout.panel("scan_relight_changes", default_closed=True)
+            header.label(text=f"{len(changes)} objects differ from the run before")
+            if body is not None:
+                for one in changes[:CHANGES]:
+                    self.say(body, context, one["text"], "DOT")
+        if len(bpy.data.scenes) > 1:
+            layout.operator_menu_enum("scan_relight.link_room", "scene", icon="LINKED")
 
     def outcome(self, context) -> None:
         """How the last run of this session ended."""

@@ -72,10 +72,11 @@ class ScanRelightOutside(bpy.types.PropertyGroup):
         set=lambda self, value: relight_outside.set_rotation(self.id_data, value))
 
 
-def look_through(studio, index: int) -> str:
+def look_through(studio, index: int, size: bool = False) -> str:
     """Make the scene's camera that of a frame, its picture shown as chosen; returns what `match_frame` says."""
     return match_frame.match_frame(studio.id_data, index, studio.show_frame, studio.frame_alpha, studio.frame_front,
-                                   bpy.path.abspath(studio.id_data.scan_relight.capture_folder))
+                                   bpy.path.abspath(studio.id_data.scan_relight.capture_folder),
+                                   size or studio.match_size)
 
 
 def _set_frame(studio, index):
@@ -93,9 +94,12 @@ class ScanRelightStudio(bpy.types.PropertyGroup):
 
     lamp: bpy.props.IntProperty(name="Lamp", description="The lamp that is shown in full", default=0)
     frame: bpy.props.IntProperty(
-        name="Frame", description="Look through the camera of this frame of the capture: its lens, its size",
+        name="Frame", description="Look through the camera of this frame of the capture",
         get=lambda self: max(match_frame.current(self.id_data), 0),
         set=_set_frame)
+    match_size: bpy.props.BoolProperty(
+        name="Match Render Size", description="Going to a frame also sets the render size and the shape of the pixels "
+        "to the frame's", update=_frame_changed)
     show_frame: bpy.props.BoolProperty(
         name="Show Its Picture", description="Lay the frame's picture behind the scene, under the scene's exposure",
         default=True, update=_frame_changed)

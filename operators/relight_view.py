@@ -16,10 +16,12 @@ class SCAN_RELIGHT_OT_match_frame(RelightOperator, bpy.types.Operator):
 
     bl_idname = "scan_relight.match_frame"
     bl_label = "Look Through Frame"
-    bl_description = "Look and render through the camera of a frame: its lens, size and pixel shape"
+    bl_description = "Look and render through the camera of a frame of the capture"
     needs_room = False
 
     index: bpy.props.IntProperty(name="Frame", description="In the capture's order, from 0", min=0)
+    size: bpy.props.BoolProperty(
+        name="Match Render Size", description="Render at the frame's size and with its shape of pixels, too")
     step: bpy.props.IntProperty(name="Step", description="So many frames on from the present one; 0 takes the frame")
 
     @classmethod
@@ -35,7 +37,7 @@ class SCAN_RELIGHT_OT_match_frame(RelightOperator, bpy.types.Operator):
         index = (match_frame.current(scene) + self.step) % count if self.step else self.index
         if index >= count:
             raise BadInputError(f"There is no frame {index}; the capture's last one is {count - 1}.")
-        told = look_through(scene.scan_relight_studio, index)
+        told = look_through(scene.scan_relight_studio, index, self.size)
         space = context.space_data
         if space is not None and space.type == "VIEW_3D" and space.region_3d is not None:
             space.region_3d.view_perspective = "CAMERA"

@@ -46,9 +46,9 @@ def stamp(thing: bpy.types.Object, name: str | None = None) -> None:
                 stamp_tree(slot.material)
 
 
-def stamp_tree(owner: bpy.types.Material | bpy.types.World) -> None:
-    """Note what a recovered material or world is."""
-    if WRITTEN not in owner:
+def stamp_tree(owner: bpy.types.Material | bpy.types.World, anew: bool = False) -> None:
+    """Note what a recovered material or world is; `anew` where it was made again in place."""
+    if anew or WRITTEN not in owner:
         owner[WRITTEN] = json.dumps(_values(owner))
 
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import bpy
 
-from .cameras import frame_cameras, use_camera
+from .cameras import frame_cameras, shows_as_framed, use_camera
 from .images import RADIANCE
 
 
 def match_frame(scene: bpy.types.Scene, index: int, background: bool = True, alpha: float = 1.0,
-                front: bool = False, capture_folder: str = "") -> str:
-    """Render and look through a frame's camera: lens, size of the picture, shape of its pixels.
+                front: bool = False, capture_folder: str = "", size: bool = False) -> str:
+    """Render and look through a frame's camera.
 
     Parameters
     ----------
@@ -27,6 +27,8 @@ def match_frame(scene: bpy.types.Scene, index: int, background: bool = True, alp
         Lay it before the scene instead.
     capture_folder : str
         Where to look for a picture that is no longer where it was.
+    size : bool
+        Render at the frame's size and with its shape of pixels, too.
 
     Returns
     -------
@@ -37,9 +39,14 @@ def match_frame(scene: bpy.types.Scene, index: int, background: bool = True, alp
     if not cameras:
         return "The scene has no camera of a capture; import a capture or open a result's scene.blend first."
     thing = cameras[min(max(index, 0), len(cameras) - 1)]
-    use_camera(scene, thing)
+    use_camera(scene, thing, size)
     thing.data.show_background_images = background
-    return show_picture(thing, alpha, front, capture_folder) if background else ""
+    told = show_picture(thing, alpha, front, capture_folder) if background else ""
+    if not shows_as_framed(scene, thing):
+        other = (f"Frame '{thing.name}' ({thing['width']} x {thing['height']} pixels) has another shape than the "
+                 "picture that is rendered; turn Match Render Size on to render it whole.")
+        told = " ".join(filter(None, (told, other)))
+    return told
 
 
 def current(scene: bpy.types.Scene) -> int:

@@ -13,7 +13,7 @@ from ..core.errors import MissingStageError, StorageError
 from ..core.material import EMITTER
 from ..core.room_file import material
 from . import corrections, relight_lamps, result_file, result_images, room_changes, unseen
-from .as_made import WRITTEN, is_corrected, stamp_tree
+from .as_made import is_corrected, stamp_tree
 from .correct_material import worn_material
 from .marks import IMAGE, OBJECT_ID, RESULT, UV_MAP, mark
 from .materials import MODEL, dress
@@ -122,11 +122,10 @@ def _dress(thing: bpy.types.Object, entry: dict, image: bpy.types.Image | None) 
     state = relight_lamps.snapshot(worn) if relight_lamps.is_lamp(worn) else None
     if state is not None:
         relight_lamps.restore(worn)
-    worn.pop(WRITTEN, None)
     dress(worn, description, image, one_sided=description.model == EMITTER and is_open(thing.data))
+    stamp_tree(worn, anew=True)
     if state is not None and worn[MODEL] == EMITTER:
         relight_lamps.put_back(worn, state)
-    stamp_tree(worn)
 
 
 def _renew_images(folder: Path) -> bpy.types.Image | None:

@@ -112,14 +112,14 @@ def bringing(folder: Path | str, scene: bpy.types.Scene | None = None, where: st
             steps = yield from plan(top, fresh)
         yield 0.95
         result_images.settle(_images(made, folder), where)
+        for name in (result_images.ALBEDO, result_images.SHADING):  # shown by nothing yet, but asked for by name
+            if (folder / name).exists():
+                result_images.image(folder, name, where)
     except BaseException:
         made.remove()
         raise
     if top is not None:
         _replace_images(made, top)
-    for name in (result_images.ALBEDO, result_images.SHADING):  # shown by nothing yet, but asked for by name
-        if (folder / name).exists():
-            result_images.image(folder, name, where)
     warnings: list[str] = []
     if steps is None:
         top, differences = fresh, ()
@@ -200,7 +200,7 @@ def _place(top, shell, scene, root: str, new: bool) -> tuple[bpy.types.Scene, li
     return scene or own, kept
 
 
-def link_room(top: bpy.types.Collection, scene: bpy.types.Scene, outside: bool = False) -> None:
+def link_room(top: bpy.types.Collection, scene: bpy.types.Scene, outside: bpy.types.Scene | None = None) -> None:
     """Show a room in another scene as well.
 
     Parameters
@@ -208,20 +208,11 @@ def link_room(top: bpy.types.Collection, scene: bpy.types.Scene, outside: bool =
     top : bpy.types.Collection
         The room's.
     scene : bpy.types.Scene
-    outside : bool
-        Give the scene the world and the exposure of the room's own scene too.
-
-    Raises
-    ------
-    MissingStageError
-        `outside` is wished for and the room has no scene of its own.
+    outside : bpy.types.Scene, optional
+        Give `scene` the world and the exposure of this one, too.
     """
-    source = own_scene(top)
-    if outside and source is None:
-        raise MissingStageError("The room has no scene of its own any more to take the outside from; run the recovery "
-                                "again.")
     if top not in scene.collection.children_recursive:
         scene.collection.children.link(top)
         hide_cameras(scene, top)
-    if outside:
-        scene.world, scene.view_settings.exposure = source.world, source.view_settings.exposure
+    if outside is not None:
+        scene.world, scene.view_settings.exposure = outside.world, outside.view_settings.exposure

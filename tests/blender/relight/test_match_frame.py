@@ -33,7 +33,7 @@ def frames(tmp_path):
 @pytest.mark.parametrize("index", [0, 1])
 def test_it_reprojects_to_a_thousandth_of_a_pixel(scene, frames, index):
     make_cameras(frames, scene.collection)
-    match_frame(scene, index)
+    match_frame(scene, index, size=True)
     camera = frames[index].camera
     assert (scene.render.resolution_x, scene.render.resolution_y) == (camera.width, camera.height)
     local = np.random.default_rng(5).uniform((-1, -1, -5), (1, 1, -2), (50, 3))
@@ -47,7 +47,7 @@ def test_it_reprojects_to_a_thousandth_of_a_pixel(scene, frames, index):
 
 def test_the_frame_stands_behind_as_bright_as_the_scene(scene, frames):
     make_cameras(frames, scene.collection)
-    assert match_frame(scene, 0, alpha=0.6, front=True) == "" and current(scene) == 0
+    assert match_frame(scene, 0, alpha=0.6, front=True, size=True) == "" and current(scene) == 0
     shown, = scene.camera.data.background_images
     assert scene.camera.data.show_background_images and shown.image.size[:] == (64, 48)
     assert shown.image.colorspace_settings.name == "Linear Rec.709" and shown.image.use_view_as_render
@@ -63,7 +63,7 @@ def test_a_picture_that_moved_is_found_in_the_captures_folder(scene, frames, tmp
     assert "not where the capture had it" in match_frame(scene, 0)
     (tmp_path / "moved").mkdir()
     (tmp_path / "elsewhere").rename(tmp_path / "moved" / "images")
-    assert match_frame(scene, 0, capture_folder=str(tmp_path / "moved")) == ""
+    assert match_frame(scene, 0, capture_folder=str(tmp_path / "moved"), size=True) == ""
     assert len(scene.camera.data.background_images) == 1
 
 
