@@ -19,7 +19,6 @@ from .marks import IMAGE, OBJECT_ID, RESULT, UV_MAP, mark
 from .materials import MODEL, dress
 from .mesh_objects import is_open
 from .scene import BASE_COLOR
-from .scene_capture import few
 
 _WORN = ("model", "phi", "psi", "f0", "emission", "transmission", "surfaces", "coat", "given")
 """Of an entry of materials.json, what its object's material is made of."""
@@ -101,6 +100,8 @@ def bringing(scene: bpy.types.Scene, folder: Path, before: dict[int, dict],
             mark(collection, folder, run)
             room_changes.keep(collection, room_changes.found(folder))
     if by_hand:
+        from .scene_capture import few  # not earlier: Blender's start should not wait for what it imports
+
         warnings.append(f"{few(by_hand)}: the material was edited by hand and stays.")
     return tuple(warnings)
 

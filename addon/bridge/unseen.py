@@ -23,7 +23,6 @@ from .images import array_image, image_array, load_image
 from .marks import IMAGE, OBJECT_ID, PAINTED, RESULT, RUN
 from .materials import BASE_COLOR, principled
 from .mesh_objects import ATLAS_UV
-from .scene_capture import few
 
 _UV = "scan_relight_painted_uv"
 """Of an object: digest of the texture coordinates that its painted image was made for."""
@@ -210,6 +209,8 @@ def fill(things: Iterable[bpy.types.Object], where: str = result_images.PACK) ->
     BadInputError, StorageError
         As of `own_image` and `unseen_mask`; nothing is changed then.
     """
+    from .scene_capture import few
+
     groups: dict[str, list] = {}
     passed: dict[str, list[str]] = {}
     for thing in things:
