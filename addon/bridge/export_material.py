@@ -118,7 +118,7 @@ def _pixels(image: bpy.types.Image, tile: int, textures: Path) -> np.ndarray:
     packed = next((one for one in image.packed_files if str(tile) in Path(one.filepath).name), None)
     if packed is not None:
         path = textures.with_name(f"tile{path.suffix}")
-        path.write_bytes(packed.data)
+        path.write_bytes(packed.packed_file.data)
     one = load_image(path, colour_space=image.colorspace_settings.name, keep=False)
     try:
         return image_array(one)

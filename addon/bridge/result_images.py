@@ -140,12 +140,17 @@ def is_there(path: Path) -> bool:
     return path.is_file() or bool(tiles_of(path))
 
 
+def _of_one_result(one: Path, other: Path) -> bool:
+    """Whether two folders are one, or one lies in the other, as objects' own images do."""
+    return one.is_relative_to(other) or other.is_relative_to(one)
+
+
 def _beside(source: Path) -> Path:
     """A copy of `source` in the folder of images beside the saved file; each result has a folder of its own."""
     check(FOLDER)
     saved = Path(bpy.data.filepath)
     theirs = {Path(bpy.path.abspath(one.filepath)).parent for one in bpy.data.images
-              if one.get(IMAGE) and Path(one[IMAGE]).parent != source.parent}
+              if one.get(IMAGE) and not _of_one_result(Path(one[IMAGE]).parent, source.parent)}
     names = (f"{saved.stem} images{f' {number}' if number > 1 else ''}" for number in count(1))
     target = next(one for one in (saved.parent / name for name in names) if one not in theirs) / source.name
     try:

@@ -17,7 +17,7 @@ from ..core.room_file import ROOM, root_of, run_of
 from . import result_images, room_changes
 from .as_made import stamp, stamp_tree
 from .cameras import show_camera
-from .marks import IMAGE, OWN_SCENE, RESULT, mark
+from .marks import IMAGE, OWN_SCENE, RESULT, UV_MAP, mark
 from .room_parts import find_room, hide_cameras, imported, own_scene, rooms, scene_name
 from .room_scene import dress, take_settings
 from .room_update import commit, note_known, plan
@@ -162,7 +162,9 @@ def _images(made: Made, folder: Path) -> list[bpy.types.Image]:
     """The images that came, marked with their files of the result folder."""
     found = [image for image in made.new("images") if image.source in ("FILE", "TILED") and image.filepath]
     for image in found:
-        image[IMAGE] = str(folder / bpy.path.basename(image.filepath))
+        path = Path(image.filepath.replace("\\", "/"))
+        own = UV_MAP in image and image.source == "FILE"  # an object's, in a folder below the result's
+        image[IMAGE] = str(folder / path.parent.name / path.name if own else folder / path.name)
     return found
 
 
@@ -171,7 +173,7 @@ def _replace_images(made: Made, top: bpy.types.Collection) -> None:
     came = {Path(image[IMAGE]).name: image for image in made.new("images") if IMAGE in image}
     for image in [one for one in bpy.data.images if one.get(IMAGE) and not one.library]:
         path = Path(image[IMAGE])
-        if path.name in came and came[path.name] != image and str(path.parent) == top.get(RESULT):
+        if path.name in came and came[path.name] != image and path.is_relative_to(top.get(RESULT, "")):
             result_images.replace(image, came[path.name])
 
 

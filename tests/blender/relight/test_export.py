@@ -14,9 +14,9 @@ bpy = pytest.importorskip("bpy")
 from addon.bridge import export as exporting  # noqa: E402
 from addon.bridge import relight_lamps  # noqa: E402
 from addon.bridge.images import image_array, load_image  # noqa: E402
-from addon.bridge.marks import OBJECT_ID  # noqa: E402
+from addon.bridge.marks import OBJECT_ID, UV_MAP  # noqa: E402
 from addon.bridge.materials import ior_of, make_material  # noqa: E402
-from addon.bridge.mesh_objects import ATLAS_UV, mesh_data  # noqa: E402
+from addon.bridge.mesh_objects import ATLAS_UV, PARTS_UV, mesh_data  # noqa: E402
 from addon.bridge.world import set_world  # noqa: E402
 from addon.core.capture.exr import write_exr  # noqa: E402
 from addon.core.errors import BadInputError, StorageError  # noqa: E402
@@ -307,3 +307,28 @@ def test_without_usd_it_is_told(monkeypatch):
 
 def test_the_transfer_curve():
     assert exporting.srgb(np.array([0.0, 0.5, 1.0, 2.0, math.nan])) == pytest.approx([0, 0.735357, 1, 1, 0], abs=1e-5)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_an_object_takes_its_tile_along(things, tmp_path, packed):
+    colours = {1001: (0.1, 0.2, 0.3), 1012: (0.6, 0.5, 0.4)}
+    for number, colour in colours.items():
+        write_exr(tmp_path / f"tiles.{number}.exr", np.broadcast_to(np.float32(colour), (8, 8, 3)))
+    tiled = load_image(tmp_path / "tiles.<UDIM>.exr", "kitchen tiles", packed=packed)
+    tiled[UV_MAP] = PARTS_UV
+    for name, number in (("wall 1", 1001), ("table 2", 1012)):
+        data = things.objects[name].data
+        tile = (number - 1001) % 10, (number - 1001) // 10
+        layer = data.uv_layers.new(name=PARTS_UV)
+        layer.data.foreach_set("uv", (UV + np.float32(tile)).ravel())
+        layer.active_render = True
+        data.materials[0] = make_material(KNOWN[int(name[-1]) - 1], tiled)
+    if packed:
+        for number in colours:
+            (tmp_path / f"tiles.{number}.exr").unlink()
+    exporting.export(things, tmp_path / "out" / "room.glb")
+    found = read_back(tmp_path / "out" / "room.glb")
+    for name, colour in (("wall 1", colours[1001]), ("table 2", colours[1012])):
+        assert np.allclose(base_colour(found[name][1]["Base Color"]), colour, atol=0.005)
+        node = found[name][1]["Base Color"].links[0].from_node
+        assert node.extension == "REPEAT"
