@@ -9,10 +9,13 @@ from addon.core.capture.exr import write_exr
 from addon.core.capture.model import Camera, Capture, Frame, Instance, Mesh
 from addon.core.errors import StorageError
 from addon.core.material import EMITTER, LAMBERTIAN, LAMP_ALBEDO, ObjectMaterial
+from addon.core.parts import Parts
+from addon.core.room_file import write_room
 
 bpy = pytest.importorskip("bpy")
 
 from addon.bridge import scene as bridge_scene  # noqa: E402
+from addon.bridge.room import bringing  # noqa: E402
 from addon.bridge.scene import build_scene, write_scene  # noqa: E402
 
 KINDS = ("scenes", "collections", "objects", "meshes", "cameras", "materials", "worlds", "images")
@@ -143,3 +146,32 @@ def test_a_file_that_blender_cannot_write_is_told(scene, tmp_path, result, captu
     with pytest.raises(StorageError, match="can't be saved"):
         write_scene(tmp_path / "file.blend", capture, ATLAS, MATERIALS, result, fresh=fresh)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file.blend", "result"]
+
+
+@pytest.mark.parametrize("where", ["RESULT", "FOLDER", "PACK"])
+@pytest.mark.parametrize("kind", ["object", "udim"])
+def test_an_objects_own_image_comes_along(scene, tmp_path, result, capture, kind, where):
+    written, told = {"object": ("objects/Floor 4 base_color.exr",) * 2,
+                     "udim": ("base_color.1002.exr", "base_color.<UDIM>.exr")}[kind]
+    (result / "objects").mkdir()
+    write_exr(result / written, np.broadcast_to(np.float32([0.9, 0.1, 0.3]), (4, 4, 3)))
+    if kind == "udim":
+        write_exr(result / "base_color.1001.exr", np.zeros((4, 4, 3), np.float32))
+    shift = (0, 0) if kind == "object" else (1, 0)
+    parts = Parts(ATLAS * np.float32(0.5) + np.float32(shift), {4: told}, () if kind == "object" else (1001, 1002))
+    write_scene(result / "scene.blend", capture, ATLAS, MATERIALS, result, fresh=False, parts=parts)
+    write_room(result, capture, ATLAS)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "file.blend"))
+    for _ in bringing(result, scene, where):
+        pass
+    thing = next(thing for thing in scene.objects if thing.get("object_id") == 4)
+    assert [layer.name for layer in thing.data.uv_layers] == ["ScanRelight", "ScanRelightParts"]
+    nodes = thing.active_material.node_tree.nodes
+    image = next(node for node in nodes if node.type == "TEX_IMAGE").image
+    assert next(node for node in nodes if node.type == "UVMAP").uv_map == "ScanRelightParts"
+    assert image["scan_relight_image"] == str(result / told) and bool(image.packed_file) == (where == "PACK")
+    if where == "FOLDER":
+        assert (tmp_path / "file images" / written.split("/")[-1]).is_file()
+    elif where == "RESULT":
+        assert image.filepath == f"//result/{told}"
+    assert len(image.tiles) == (1 if kind == "object" else 2)
