@@ -108,7 +108,7 @@ def unregister():
     import bpy
 
     from ..addon.bridge import corrections, job
-    from . import find_result, findings, keymaps, manual, menus, results, translations
+    from . import find_result, findings, keymaps, light_pictures, manual, menus, results, translations
     from .correct_register import unregister_handlers
     from .job_operator import forget_job
 
@@ -123,6 +123,7 @@ def unregister():
     bpy.app.handlers.save_post.remove(find_result.found_is_kept)
     findings.forget()
     results.forget()
+    light_pictures.forget()
     del bpy.types.Scene.scan_relight_row
     job.forget()
     job.end_all()

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from ..addon.bridge import match_frame, relight_lamps, relight_lights, relight_outside
+from ..addon.bridge import match_frame, relight_exposure, relight_lamps, relight_lights, relight_outside
 from ..addon.bridge.cameras import frame_cameras
 from ..addon.core.naming import in_order
 from .panel import NamedRows, SidebarPanel, places
-from .relight import PRESETS
 from .relight_base import has_room
 
 ICONS = {"WINDOW": "LIGHT_AREA", "SOFTBOX": "MESH_PLANE", "SPOT": "LIGHT_SPOT", "SUN": "LIGHT_SUN"}
@@ -76,11 +75,16 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
             return
         studio, lamps = scene.scan_relight_studio, relight_lamps.lamps_by_object(scene)
         if lamps:
+            head = layout.split(factor=0.56)
+            head.label(text="Lamp")
+            row = head.row()
+            row.label(text="Colour")
+            row.label(text="Strength x")
             layout.template_list("SCAN_RELIGHT_UL_lamps", "", scene, "objects", studio, "lamp", rows=3)
             row = layout.row(align=True)
             row.operator("scan_relight.switch_lamps", text="All On", icon="OUTLINER_OB_LIGHT").on = True
             row.operator("scan_relight.switch_lamps", text="All Off", icon="LIGHT").on = False
-            chosen = scene.objects[studio.lamp].name if studio.lamp < len(scene.objects) else ""
+            chosen = scene.objects[studio.lamp].name if 0 <= studio.lamp < len(scene.objects) else ""
             for lamp in lamps.get(chosen, ()):
                 self.numbers(layout, context, lamp)
         else:
@@ -89,6 +93,13 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
 
     def numbers(self, layout, context, lamp) -> None:
         """What a lamp emits, now and as found."""
+        column = layout.column()
+        column.use_property_split, column.use_property_decorate = True, False
+        column.prop(lamp.scan_relight_lamp, "factor")
+        colour = column.column()
+        colour.enabled = relight_lamps.colour(lamp) is not None
+        colour.prop(lamp.scan_relight_lamp, "kelvin")
+        colour.prop(lamp.scan_relight_lamp, "colour")
         now, found = (" ".join(f"{c:.3g}" for c in values) for values in
                       (relight_lamps.radiance(lamp), relight_lamps.recovered_radiance(lamp)))
         self.say(layout, context, f"{lamp.name}: radiance {now} (R G B, in the frames' unit)")
@@ -138,19 +149,50 @@ class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(studio, "aim")
         layout.prop(studio, "strength")
-        grid = layout.grid_flow(columns=2, even_columns=True, align=True)
-        for name, text, _ in PRESETS:
-            button = grid.operator("scan_relight.add_light", text=text, icon=ICONS[name])
-            button.preset, button.aim, button.strength = name, studio.aim, studio.strength
+        layout.template_icon_view(studio, "preset", show_labels=True, scale=5.0, scale_popup=5.0)
+        text = layout.enum_item_name(studio, "preset", studio.preset)
+        button = layout.operator("scan_relight.add_light", text=f"Add {text}", icon=ICONS[studio.preset])
+        button.preset, button.aim, button.strength = studio.preset, studio.aim, studio.strength
         for light in relight_lights.added_lights(context.scene):
             row = layout.row(align=True)
             row.prop(light, "hide_render", text="", icon_only=True, emboss=False)
             row.label(text=light.name)
             colour = row.row(align=True)
-            colour.scale_x = 0.5
-            colour.prop(light.data, "color", text="")
+            colour.scale_x = 0.8
+            colour.prop(light.data, "temperature" if light.data.use_temperature else "color", text="")
             row.prop(light.data, "energy", text="")
+        if relight_lights.added_lights(context.scene):
+            self.say(layout, context, "Colour in kelvin; strength in watts, a sun's in watts per square metre.")
         layout.operator("scan_relight.remove_lights", icon="TRASH")
+        row = layout.row(align=True)
+        row.menu("SCAN_RELIGHT_MT_light_presets", text="My Lights")
+        row.operator("scan_relight.light_preset_add", text="", icon="ADD")
+        row.operator("scan_relight.light_preset_add", text="", icon="REMOVE").remove_active = True
+
+
+class SCAN_RELIGHT_PT_exposure(RelightPanel, bpy.types.Panel):
+    """How bright it is shown, and by EEVEE."""
+
+    bl_idname = "SCAN_RELIGHT_PT_exposure"
+    bl_label = "Exposure and Preview"
+    bl_parent_id = "SCAN_RELIGHT_PT_relight"
+
+    def draw(self, context):
+        """The exposure, what there is to say of it, the preview's light."""
+        layout, scene = self.layout, context.scene
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop(scene.view_settings, "exposure", text="Exposure (stops)")
+        row = layout.row(align=True)
+        row.operator("scan_relight.expose", icon="LIGHT_SUN")
+        row.prop(scene.scan_relight_studio, "follow", toggle=True)
+        said = relight_exposure.darkness(scene)
+        if said:
+            self.say(layout, context, said, "INFO")
+        if relight_exposure.CAPTURED in scene:
+            layout.operator("scan_relight.restore_exposure", icon="LOOP_BACK")
+        row = layout.row(align=True)
+        row.operator("scan_relight.bake_preview", icon="LIGHTPROBE_VOLUME")
+        row.operator("scan_relight.remove_preview", text="", icon="TRASH")
 
 
 class SCAN_RELIGHT_PT_view(SidebarPanel, bpy.types.Panel):

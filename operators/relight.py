@@ -6,14 +6,11 @@ import bpy
 from ..addon.bridge import relight_lamps, relight_lights, relight_outside, relight_state
 from ..addon.core.errors import BadInputError
 from . import poll
+from .light_pictures import PRESETS
 from .relight_base import RelightOperator
+from .relight_exposure import follow
 from .relight_props import AIMS
 from .select_result_object import make_active
-
-PRESETS = (("WINDOW", "Window", "A window's soft, cool light from the side"),
-           ("SOFTBOX", "Softbox", "A studio light beside the camera"),
-           ("SPOT", "Spot", "A spot from above, a little on the camera's side"),
-           ("SUN", "Evening Sun", "A low, warm sun: through an opening of the scan, else as a window would let it in"))
 
 
 class SCAN_RELIGHT_OT_switch_lamps(RelightOperator, bpy.types.Operator):
@@ -29,6 +26,7 @@ class SCAN_RELIGHT_OT_switch_lamps(RelightOperator, bpy.types.Operator):
         """All of them."""
         for lamp in relight_lamps.find_lamps(context.scene):
             relight_lamps.set_on(lamp, self.on)
+        follow(context.scene)
 
 
 class SCAN_RELIGHT_OT_restore_lamp(RelightOperator, bpy.types.Operator):
@@ -62,6 +60,7 @@ class SCAN_RELIGHT_OT_restore_light(RelightOperator, bpy.types.Operator):
     def work(self, context):
         """All of it."""
         relight_state.restore_captured(context.scene)
+        follow(context.scene)
 
 
 class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
@@ -73,6 +72,9 @@ class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
     preset: bpy.props.EnumProperty(name="Light", description="What kind of light", items=PRESETS)
     strength: bpy.props.FloatProperty(
         name="Strength", description="1 keeps the scene's exposure readable", min=0.0, soft_max=4.0, default=1.0)
+    kelvin: bpy.props.FloatProperty(
+        name="Temperature", description="Of its colour; 0 takes the preset's own", subtype="TEMPERATURE", min=0.0,
+        max=20000.0, default=0.0)
     aim: bpy.props.EnumProperty(name="Aim At", description="What the light is aimed at", items=AIMS)
 
     @classmethod
@@ -83,8 +85,10 @@ class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
 
     def work(self, context):
         """Add it and make it the active object."""
-        light = relight_lights.add_light(context.scene, self.preset, self.strength, self.aim, context.object)
+        light = relight_lights.add_light(context.scene, self.preset, self.strength, self.aim, context.object,
+                                         self.kelvin or None)
         make_active(context, light)
+        follow(context.scene)
 
 
 class SCAN_RELIGHT_OT_remove_lights(RelightOperator, bpy.types.Operator):
@@ -103,6 +107,7 @@ class SCAN_RELIGHT_OT_remove_lights(RelightOperator, bpy.types.Operator):
     def work(self, context):
         """All of them."""
         relight_lights.remove_lights(context.scene)
+        follow(context.scene)
 
 
 def put_around(scene, picture: str) -> list[str]:

@@ -6,8 +6,11 @@ The properties of lamps and outside hold nothing: they read and write what the b
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.bridge import match_frame, relight_lamps, relight_outside
+from ..addon.bridge import match_frame, relight_lamps, relight_outside, relight_setup
 from ..addon.bridge.cameras import frame_cameras
+from ..addon.bridge.relight_kelvin import HIGHEST, LOWEST
+from .light_pictures import light_items
+from .panel_results import active_row, choose_row
 from .translations import OWN
 
 AIMS = (("VIEW", "View", "What the middle of the camera's picture shows"),
@@ -43,14 +46,21 @@ class ScanRelightLamp(bpy.types.PropertyGroup):
         get=lambda self: bool(_lamp(self)) and relight_lamps.is_on(self.id_data),
         set=lambda self, value: _lamp(self) and relight_lamps.set_on(self.id_data, value))
     factor: bpy.props.FloatProperty(
-        name="Strength", description="Times the radiance that the scan found; 1 is the lamp as captured",
+        name="Strength x", description="Times the radiance that the scan found; 1 is the lamp as captured",
         min=0.0, max=relight_lamps.MAX_FACTOR, soft_max=4.0, step=5, precision=2,
         get=lambda self: relight_lamps.factor(self.id_data),
         set=lambda self, value: _lamp(self) and relight_lamps.set_factor(self.id_data, value))
     colour: bpy.props.FloatVectorProperty(
-        name="Colour", description="Colour of its light", subtype="COLOR", size=3, min=0.0, max=1.0,
+        name="Colour", description="Colour of its light", subtype="COLOR", size=3, min=0.0, soft_max=1.0,
         get=lambda self: (_lamp(self) and relight_lamps.colour(self.id_data)) or (1.0, 1.0, 1.0),
         set=lambda self, value: _lamp(self) and relight_lamps.set_colour(self.id_data, value))
+
+
+    kelvin: bpy.props.FloatProperty(
+        name="Temperature", description="Colour of its light as a temperature, at the same luminance: 2700 a warm "
+        "bulb, 6500 daylight", subtype="TEMPERATURE", min=LOWEST, max=HIGHEST, step=10000, precision=0,
+        get=lambda self: relight_lamps.kelvin(self.id_data) if _lamp(self) else 6500.0,
+        set=lambda self, value: _lamp(self) and relight_lamps.set_kelvin(self.id_data, value))
 
 
 class ScanRelightOutside(bpy.types.PropertyGroup):
@@ -92,7 +102,9 @@ def _frame_changed(studio, context):
 class ScanRelightStudio(bpy.types.PropertyGroup):
     """`Scene.scan_relight_studio`."""
 
-    lamp: bpy.props.IntProperty(name="Lamp", description="The lamp that is shown in full", default=0)
+    lamp: bpy.props.IntProperty(
+        name="Lamp", description="Click to select the lamp in the scene",
+        get=lambda self: active_row(self.id_data), set=lambda self, row: choose_row(self.id_data, row))
     frame: bpy.props.IntProperty(
         name="Frame", description="Look through the camera of this frame of the capture",
         get=lambda self: max(match_frame.current(self.id_data), 0),
@@ -108,6 +120,14 @@ class ScanRelightStudio(bpy.types.PropertyGroup):
     frame_alpha: bpy.props.FloatProperty(
         name="Opacity", description="Of the frame's picture", min=0.0, max=1.0, default=1.0, subtype="FACTOR",
         update=_frame_changed)
+    preset: bpy.props.EnumProperty(name="Light", description="What kind of light is added", items=light_items)
+    follow: bpy.props.BoolProperty(
+        name="Follow", description="Measure anew and expose after each light that is switched, added or removed here; "
+        "takes some seconds each time", default=False)
+    setup: bpy.props.StringProperty(
+        name="Set-Up", description="The present light as a preset keeps it", options={"SKIP_SAVE"},
+        get=lambda self: relight_setup.setup_of(self.id_data),
+        set=lambda self, text: relight_setup.apply_setup(self.id_data, text))
     aim: bpy.props.EnumProperty(name="Aim At", description="What a new light is aimed at", items=AIMS)
     strength: bpy.props.FloatProperty(
         name="Strength", description="Of a new light; 1 keeps the scene's exposure readable", min=0.0, soft_max=4.0,

@@ -4,7 +4,19 @@ from __future__ import annotations
 
 import bpy
 
-from . import before_after, export, panel_export, panel_relight, relight, relight_props, relight_view, relight_virtual
+from . import (
+    before_after,
+    export,
+    panel_export,
+    panel_relight,
+    relight,
+    relight_exposure,
+    relight_probe,
+    relight_props,
+    relight_setup,
+    relight_view,
+    relight_virtual,
+)
 
 
 def own(*modules) -> tuple[type, ...]:
@@ -20,7 +32,8 @@ def relight_groups() -> tuple[type, ...]:
 
 def relight_operators() -> tuple[type, ...]:
     """Operators."""
-    return own(relight, relight_view, relight_virtual, before_after, export)
+    return own(relight, relight_exposure, relight_setup, relight_probe, relight_view, relight_virtual, before_after,
+               export)
 
 
 def relight_panels() -> tuple[type, ...]:

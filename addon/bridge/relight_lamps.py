@@ -12,6 +12,7 @@ from ..core.errors import BadInputError
 from ..core.material import EMITTER
 from ..core.naming import in_order, numbered
 from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, MODEL
+from .relight_kelvin import HIGHEST, LOWEST, kelvin_of, luminance, rgb_of
 
 _STRENGTH, _COLOUR, _BASE = (f"scan_relight_recovered_{name}" for name in ("strength", "colour", "base"))
 _OFF, _FACTOR = "scan_relight_lamp_off", "scan_relight_lamp_factor"
@@ -100,6 +101,19 @@ def set_colour(material: bpy.types.Material, value: tuple[float, float, float]) 
     socket = _colour_socket(material)
     if socket is not None:
         socket.default_value = (*(max(float(c), 0.0) for c in value), 1)
+
+
+def kelvin(material: bpy.types.Material) -> float:
+    """Temperature of the colour of its light, the nearest there is; 6500 where a picture gives the colour."""
+    return kelvin_of(colour(material) or (1.0, 1.0, 1.0))
+
+
+def set_kelvin(material: bpy.types.Material, value: float) -> None:
+    """Give the light the colour of a temperature, at the same luminance; without effect where a picture gives it."""
+    now = colour(material)
+    if now is not None:
+        bright = luminance(now)
+        set_colour(material, tuple(bright * c for c in rgb_of(min(max(value, LOWEST), HIGHEST))))
 
 
 def recovered_radiance(material: bpy.types.Material) -> tuple[float, float, float]:

@@ -1,0 +1,82 @@
+"""The exposure that a light asks for: a small picture is rendered and its median brought to middle grey.
+
+As `scene.py` does with the median of the frames, so that the captured light asks for about the captured exposure.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..core.capture.exr import read_exr
+from ..core.errors import BadInputError
+from .pictures import prepare, settings_kept, shoot
+from .relight_kelvin import LUMINANCE
+
+CAPTURED = "scan_relight_captured_exposure"
+"""Custom property of a scene: its exposure before ours, in stops."""
+ASKED = "scan_relight_asked_exposure"
+"""Custom property of a scene: the exposure that its light asked for when it was last measured, in stops."""
+_GREY, _MOST = 0.18, 32.0
+_WIDTH, _SAMPLES = 64, 16
+
+
+def measure(scene: bpy.types.Scene) -> float:
+    """The exposure in stops that shows the median of the present picture as middle grey.
+
+    Raises
+    ------
+    BadInputError
+        There is no camera, or no light at all.
+    StorageError
+        The small picture can't be written.
+    """
+    if scene.camera is None:
+        raise BadInputError("The scene has no camera to measure the light through; choose a frame first.")
+    with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, settings_kept(scene):
+        prepare(scene, samples=_SAMPLES)
+        render = scene.render
+        render.resolution_y = max(round(_WIDTH * render.resolution_y / render.resolution_x), 8)
+        render.resolution_x, render.resolution_percentage = _WIDTH, 100
+        scene.cycles.use_denoising = False
+        shoot(scene, Path(folder) / "light.exr")
+        median = float(np.median(read_exr(Path(folder) / "light.exr").rgb @ LUMINANCE))
+    if not median > 0:
+        raise BadInputError("No light reaches what the camera looks at; switch a lamp on or add a light.")
+    asked = min(max(math.log2(_GREY / median), -_MOST), _MOST)
+    scene[ASKED] = asked
+    return asked
+
+
+def expose(scene: bpy.types.Scene) -> float:
+    """Set the scene's exposure to what its light asks for; returns it in stops. Raises as `measure`."""
+    asked = measure(scene)
+    if CAPTURED not in scene:
+        scene[CAPTURED] = scene.view_settings.exposure
+    scene.view_settings.exposure = asked
+    return asked
+
+
+def restore(scene: bpy.types.Scene) -> None:
+    """The exposure as it was before `expose`."""
+    if CAPTURED in scene:
+        scene.view_settings.exposure = scene[CAPTURED]
+        del scene[CAPTURED]
+    if ASKED in scene:
+        del scene[ASKED]
+
+
+def darkness(scene: bpy.types.Scene) -> str:
+    """A sentence where the last measured light is much darker or brighter than the exposure shows; '' else."""
+    if ASKED not in scene:
+        return ""
+    stops = scene[ASKED] - scene.view_settings.exposure
+    if abs(stops) < 0.5:
+        return ""
+    how = "darker" if stops > 0 else "brighter"
+    kept = "as captured" if CAPTURED not in scene else "as it was set"
+    return f"The light is {abs(stops):.1f} stops {how} than the exposure asks for; the exposure is {kept}."

@@ -1,0 +1,112 @@
+"""Light probes for EEVEE: the room's indirect light baked into a volume, so that a preview is as bright as the picture.
+
+EEVEE knows of no light that bounces between surfaces, nor of what shines and is no lamp, unless it is baked.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from pathlib import Path
+
+import bpy
+from mathutils import Matrix
+
+from ..core.errors import BadInputError, ScanRelightError
+from .own_collection import own_collection
+from .pictures import EEVEE, prepare, settings_kept, shoot
+from .relight_room import bounds
+
+COLLECTION = "Preview Light"
+PROBE = "scan_relight_probe"
+"""Custom property of the probes that were made here."""
+_NO_CARD = "EEVEE has no graphics card to bake the preview's light on here; use a Blender with a window, or Cycles."
+_STEP, _MOST = 0.3, 24
+"""Metres between two places where the light is kept, and how many of them a side has at most."""
+
+
+def probes(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The volumes that were baked here."""
+    return [thing for thing in scene.objects if thing.type == "LIGHT_PROBE" and PROBE in thing]
+
+
+def add_volume(scene: bpy.types.Scene) -> bpy.types.Object:
+    """Put a volume over the room, an older one of ours goes; to be baked by `bake`. Raises `BadInputError`."""
+    low, high = bounds(scene)
+    remove(scene)
+    data = bpy.data.lightprobes.new("Preview light", "VOLUME")
+    thing = bpy.data.objects.new("Preview light", data)
+    half = [max((high[k] - low[k]) / 2 * 1.02, 0.1) for k in range(3)]
+    thing.matrix_world = Matrix.LocRotScale((low + high) / 2, None, half)
+    for axis, extent in zip("xyz", half, strict=True):
+        setattr(data, f"resolution_{axis}", min(max(math.ceil(2 * extent / _STEP), 3), _MOST))
+    _set(data, bake_samples=1024, capture_world=True, capture_indirect=True, capture_emission=True,
+         clamp_direct=0.0, clamp_indirect=0.0, surfel_density=15)
+    thing[PROBE] = True
+    own_collection(scene, COLLECTION).objects.link(thing)
+    return thing
+
+
+def prepare_eevee(scene: bpy.types.Scene) -> None:
+    """What EEVEE needs to show the room: rays on the screen, shadows, no clamping."""
+    _set(scene.eevee, use_raytracing=True, use_shadows=True, light_threshold=0.001, clamp_surface_direct=0.0,
+         clamp_surface_indirect=0.0, gi_irradiance_pool_size="64")
+
+
+def bake(scene: bpy.types.Scene) -> bpy.types.Object:
+    """Bake the room's light, at once.
+
+    Raises
+    ------
+    BadInputError
+        There is no room, or no graphics card to bake on; nothing is left behind then.
+    """
+    if bpy.context.view_layer is None or bpy.context.scene != scene:
+        raise BadInputError(f"Switch to scene '{scene.name}' first: what is baked is what the window shows.")
+    if bpy.app.background:  # where a card may be missing, and baking says nothing of it
+        _try_eevee(scene)
+    thing = add_volume(scene)
+    prepare_eevee(scene)
+    layer = bpy.context.view_layer
+    layer.update()
+    active, layer.objects.active = layer.objects.active, thing
+    try:
+        done = bpy.ops.object.lightprobe_cache_bake(subset="ACTIVE") == {"FINISHED"}
+        reason = ""
+    except RuntimeError as error:
+        done, reason = False, " ".join(str(error).split()).removeprefix("Error: ").rstrip(".")
+    finally:
+        layer.objects.active = active
+    if not done:
+        remove(scene)
+        raise BadInputError(f"{_NO_CARD[:-1]} ({reason})." if reason else _NO_CARD)
+    return thing
+
+
+def _try_eevee(scene) -> None:
+    """Raise `BadInputError` where EEVEE gives black pictures."""
+    with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, settings_kept(scene):
+        prepare(scene, EEVEE, 1)
+        scene.render.resolution_x = scene.render.resolution_y = 8
+        try:
+            shoot(scene, Path(folder) / "try.png")
+        except ScanRelightError as error:
+            raise BadInputError(_NO_CARD) from error
+
+
+def remove(scene: bpy.types.Scene) -> int:
+    """Take away the volumes that were baked here; returns how many."""
+    found = probes(scene)
+    data = {thing.data for thing in found}
+    bpy.data.batch_remove([*found, *data])
+    part = next((c for c in scene.collection.children if c.name.split(".")[0] == COLLECTION), None)
+    if part is not None and not part.all_objects:
+        bpy.data.collections.remove(part)
+    return len(found)
+
+
+def _set(owner, **values) -> None:
+    """Set what this Blender's version has."""
+    for name, value in values.items():
+        if hasattr(owner, name):
+            setattr(owner, name, value)

@@ -1,0 +1,40 @@
+"""`bpy.ops.scan_relight.bake_preview`: the room's indirect light for EEVEE."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..addon.bridge import relight_probe
+from . import poll
+from .relight_base import RelightOperator
+
+
+class SCAN_RELIGHT_OT_bake_preview(RelightOperator, bpy.types.Operator):
+    """Bake light probes."""
+
+    bl_idname = "scan_relight.bake_preview"
+    bl_label = "Bake Preview Light"
+    bl_description = ("Bake how light bounces through the room for EEVEE, so that its preview is about as bright "
+                      "as the picture by Cycles; bake again after the light has changed")
+
+    def work(self, context):
+        """Renew the volume."""
+        relight_probe.bake(context.scene)
+
+
+class SCAN_RELIGHT_OT_remove_preview(RelightOperator, bpy.types.Operator):
+    """Take the probes away."""
+
+    bl_idname = "scan_relight.remove_preview"
+    bl_label = "Remove Preview Light"
+    bl_description = "Remove the light that was baked for EEVEE"
+
+    @classmethod
+    def poll(cls, context):
+        """Only where there is any."""
+        return super().poll(context) and poll.check(
+            cls, bool(relight_probe.probes(context.scene)), "No preview light was baked here.")
+
+    def work(self, context):
+        """All of it."""
+        relight_probe.remove(context.scene)

@@ -1,0 +1,106 @@
+"""Set-ups that are kept and used elsewhere, the exposure that a light asks for, light probes."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from mathutils import Matrix, Vector  # noqa: E402
+
+from addon.bridge import (  # noqa: E402
+    relight_exposure,
+    relight_lamps,
+    relight_lights,
+    relight_probe,
+    relight_room,
+    relight_setup,
+)
+from addon.core.errors import BadInputError  # noqa: E402
+from tests.blender.relight.sheets import sheet  # noqa: E402
+
+
+def build(scene, size):
+    """A box room `size` times 4 x 3 x 2.5 m with a lamp under its ceiling; a camera that looks along +X."""
+    for number, (place, turn) in enumerate((((0, 0, 0), (0, 0, 0)), ((0, 0, 2.5), (math.pi, 0, 0)),
+                                            ((2, 0, 1), (0, -math.pi / 2, 0)), ((-2, 0, 1), (0, math.pi / 2, 0)))):
+        sheet(scene, f"wall {number}", 3 * size, Vector(place) * size, turn, number)
+    sheet(scene, "lamp 9", 0.5 * size, Vector((0, 0, 2.4)) * size, (math.pi, 0, 0), 9, emission=(8, 8, 8))
+    data = bpy.data.cameras.new("camera")
+    scene.camera = bpy.data.objects.new("camera", data)
+    scene.camera.matrix_world = Matrix.LocRotScale(Vector((-1.2, 0, 1.2)) * size,
+                                                   Vector((1, 0, -0.1)).to_track_quat("-Z", "Y"), None)
+    scene.collection.objects.link(scene.camera)
+    scene[relight_room.ROOM_LIGHT] = 2.0
+    bpy.context.view_layer.update()
+
+
+def test_a_setup_lights_another_room_alike(scene, shoot):
+    """A room twice as large: the same picture, as light and lengths go with the room."""
+    build(scene, 1)
+    relight_lights.add_light(scene, "SOFTBOX")
+    relight_lights.add_light(scene, "SPOT", 0.5)
+    relight_lamps.set_factor(relight_lamps.find_lamps(scene)[0], 0.25)
+    before, told = shoot(scene, 32, 24, 64), relight_setup.setup_of(scene)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    other = bpy.context.scene
+    other.render.engine = "CYCLES"
+    build(other, 2)
+    relight_setup.apply_setup(other, told)
+    lamp, = relight_lamps.find_lamps(other)
+    assert relight_lamps.factor(lamp) == pytest.approx(0.25) and len(relight_lights.added_lights(other)) == 2
+    assert np.median(shoot(other, 32, 24, 64)) == pytest.approx(np.median(before), rel=0.05)
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"lights": [{"kind": 3}], "lamps": {}, "outside": null}'])
+def test_what_is_no_setup_changes_nothing(scene, text):
+    build(scene, 1)
+    relight_lights.add_light(scene, "SPOT")
+    with pytest.raises(BadInputError, match="no light that was saved here"):
+        relight_setup.apply_setup(scene, text)
+    assert len(relight_lights.added_lights(scene)) == 1
+
+
+def test_a_preset_is_blenders_own(package, scene, tmp_path):
+    build(scene, 1)
+    relight_lights.add_light(scene, "SPOT")
+    text = scene.scan_relight_studio.setup
+    assert json.loads(text)["lights"][0]["kind"] == "SPOT"
+    relight_lights.remove_lights(scene)
+    scene.scan_relight_studio.setup = text
+    assert len(relight_lights.added_lights(scene)) == 1
+
+
+def test_the_exposure_shows_middle_grey(scene, shoot):
+    build(scene, 1)
+    scene.render.resolution_x, scene.render.resolution_y = 64, 48
+    scene.view_settings.exposure = 1.25
+    asked = relight_exposure.expose(scene)
+    median = np.median(shoot(scene, 64, 48, 64) @ (0.2126, 0.7152, 0.0722))
+    assert median * 2**asked == pytest.approx(0.18, rel=0.1) and scene.view_settings.exposure == pytest.approx(asked)
+    assert not relight_exposure.darkness(scene)
+    relight_lamps.set_factor(relight_lamps.find_lamps(scene)[0], 0.25)
+    assert relight_exposure.measure(scene) == pytest.approx(asked + 2, abs=0.15)
+    assert "2.0 stops darker" in relight_exposure.darkness(scene).replace("1.9", "2.0").replace("2.1", "2.0")
+    relight_exposure.restore(scene)
+    assert scene.view_settings.exposure == pytest.approx(1.25)
+    relight_lamps.set_on(relight_lamps.find_lamps(scene)[0], False)
+    with pytest.raises(BadInputError, match="No light reaches"):
+        relight_exposure.expose(scene)
+
+
+def test_one_volume_of_probes_covers_the_room(scene):
+    build(scene, 1)
+    relight_probe.add_volume(scene)
+    relight_probe.add_volume(scene)  # renewed, not doubled
+    thing, = relight_probe.probes(scene)
+    bpy.context.view_layer.update()
+    corners = np.array([thing.matrix_world @ Vector(c) for c in ((-1, -1, -1), (1, 1, 1))])
+    low, high = relight_room.bounds(scene)
+    assert all(corners[0] <= low) and all(corners[1] >= high)
+    assert relight_probe.remove(scene) == 1 and not relight_probe.probes(scene)
+    other = bpy.data.scenes.new("another")
+    with pytest.raises(BadInputError, match="Switch to scene 'another'"):
+        relight_probe.bake(other)
