@@ -26,7 +26,7 @@ class SCAN_RELIGHT_OT_export(RelightOperator, bpy.types.Operator):
     bl_idname = "scan_relight.export"
     bl_label = "Export Room"
     bl_description = "Write the room with plain materials that other programs understand; the scene stays as it is"
-    bl_options = {"REGISTER"}
+    bl_options = {"REGISTER", "PRESET"}
     needs_room = False
 
     filepath: bpy.props.StringProperty(

@@ -79,7 +79,11 @@ class FileOperator:
         if self.properties.is_property_set("preset"):
             context.scene.scan_relight.preset = self.preset
         target = "import_capture" if self.then == "IMPORT" else "recover"
-        return bpy.ops.scan_relight.run(target=target)
+        try:
+            return bpy.ops.scan_relight.run(target=target)
+        except RuntimeError as error:  # reported already, and again by Blender as an exception
+            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+            return {"CANCELLED"}
 
 
 def choose(context, content: folders.Content) -> None:

@@ -102,9 +102,10 @@ class CaptureOperator(JobOperator):
     With a window the work is a job of its own that `modal` follows; in the background `execute` does it itself.
     """
 
-    bl_options = {"UNDO"}
+    bl_options = {"UNDO", "PRESET"}
     capture_folder: bpy.props.StringProperty(
-        name="Capture", description="Folder with transforms.json, mesh.ply and the frames", subtype="DIR_PATH")
+        name="Capture", description="Folder with transforms.json, mesh.ply and the frames", subtype="DIR_PATH",
+        options={"SKIP_PRESET"})
     ask: bpy.props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"}, description="Ask for the folders first")
 
     @classmethod
@@ -155,7 +156,8 @@ class StageOperator(CaptureOperator):
     """An operator that runs stages of the method: also a result folder and the settings."""
 
     result_folder: bpy.props.StringProperty(
-        name="Result", description="Folder for the recovered scene and the finished stages", subtype="DIR_PATH")
+        name="Result", description="Folder for the recovered scene and the finished stages", subtype="DIR_PATH",
+        options={"SKIP_PRESET"})
     preset: bpy.props.EnumProperty(
         name="Preset", description="What the settings that are not given start from", items=preset_items(),
         translation_context=OWN, default="normal")

@@ -32,6 +32,8 @@ def hide_cameras(scene: bpy.types.Scene, top: bpy.types.Collection) -> None:
     """
     part = part_of(top, CAMERAS)
     for layer in scene.view_layers:
+        if layer.layer_collection is None:  # Blender 5: a new scene's layers know nothing before their first update
+            layer.update()
         found = [layer.layer_collection]
         for one in found:
             found.extend(one.children)

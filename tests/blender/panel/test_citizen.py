@@ -90,3 +90,12 @@ def test_the_keys_are_of_operators_and_properties_that_there_are(package, ops, m
     for name, properties in keymaps.ENTRIES:
         known = getattr(ops, name.partition(".")[2]).get_rna_type().properties
         assert set(properties) <= set(known.keys())
+
+
+@pytest.mark.parametrize("name", ["recover", "import_capture", "open_capture", "export"])
+def test_operators_with_settings_have_presets_that_keep_no_folder(package, ops, name):
+    assert "PRESET" in getattr(bpy.types, f"SCAN_RELIGHT_OT_{name}").bl_options
+    properties = getattr(ops, name).get_rna_type().properties
+    paths = [prop for prop in properties if prop.type == "STRING" and prop.identifier in (
+        "capture_folder", "result_folder", "filepath", "directory")]
+    assert paths and all(prop.is_skip_preset or prop.is_skip_save for prop in paths)
