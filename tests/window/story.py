@@ -1,0 +1,97 @@
+"""The way from the zip to a relit room, one method a step, by a hand's own clicks, keys and drags.
+
+The tests play it on a small capture; `scripts/guide_pictures.py` plays it on a real one and takes the guide's pictures.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from tests.window.driver import Window
+
+JOB = "module('addon.bridge.job').current()"
+ACTIVE = "module('operators.job_operator').active()"
+LAMPS = "module('addon.bridge.relight_lamps')"
+OWN_SCENES = "[one.name for one in bpy.data.scenes if one.get('scan_relight_own')]"
+ADDON = "[name for name in bpy.context.preferences.addons.keys() if name.endswith('.scan_relight')]"
+
+
+class Story:
+    """What an artist does, in a window that shows Blender's startup file.
+
+    Parameters
+    ----------
+    window : Window
+        Opened with `tab=False`.
+    patience : float
+        Seconds that a run may take.
+    """
+
+    def __init__(self, window: Window, patience: float = 400.0):
+        self.window, self.patience = window, patience
+
+    def install(self, archive: Path) -> None:
+        """Drag the zip in and agree."""
+        self.window.drop(archive)
+        self.popup()
+        self.window.press("Return")
+        self.window.wait_for(ADDON)
+
+    def drag_in(self, capture: Path) -> None:
+        """Drag a scan's transforms.json into the 3D view; Blender asks whether to recover it."""
+        self.window.drop(capture / "transforms.json")
+        self.window.wait_for("bool(bpy.context.scene.scan_relight.capture_folder)")
+        self.popup()
+
+    def run(self) -> None:
+        """Press the dialog's Run."""
+        self.window.press("Return")
+        self.window.wait_for(f"{ACTIVE} is not None")
+
+    def finished(self) -> None:
+        """Wait until the room is there."""
+        self.window.wait_for(f"{ACTIVE} is None", patience=self.patience)
+        assert self.window.ask(f"{JOB}.state") == "done", self.window.ask(f"{JOB}.sentence")
+        self.window.wait_for(OWN_SCENES)
+        self.window.ask("open_tab()")
+
+    def lamp_off(self) -> str:
+        """Switch the first lamp of the list off; its name."""
+        names = self.window.ask(f"[one.name for one in {LAMPS}.find_lamps(bpy.context.scene)]")
+        self.window.click("scan_relight_lamp.on", top=False, across=(0.06, 0.1))
+        [off] = self.window.wait_for(f"[name for name in {names!r} if not {LAMPS}.is_on(bpy.data.materials[name])]")
+        return off
+
+    def softbox(self) -> None:
+        """Add a softbox."""
+        self.window.click("scan_relight.add_light(", "'SOFTBOX'", top=False, across=(0.25, 0.75, 0.5))
+        self.window.wait_for("any(one.type == 'LIGHT' for one in bpy.context.scene.objects)")
+
+    def render_both(self) -> None:
+        """Before and after, rendered beside the window."""
+        self.window.click("scan_relight.before_after(", top=False, across=(0.5,))
+        self.window.wait_for(f"{ACTIVE} is not None")
+        self.window.wait_for(f"{ACTIVE} is None", patience=self.patience)
+        assert self.window.ask(f"{JOB}.state") == "done", self.window.ask(f"{JOB}.sentence")
+
+    def choose(self, row: int = 1) -> str:
+        """Click on a row of the results; the chosen object's name."""
+        x, y = self.window.ask("find(('scan_relight_row',), across=(0.3,))")
+        self.window.click_at(x, y + 23 * row)
+        return self.window.wait_for("getattr(bpy.context.view_layer.objects.active, 'name', '')")
+
+    def this_is_metal(self) -> None:
+        """Say that the active object is metal; it is fitted again at once."""
+        self.window.click("scan_relight.this_is(", "'metal'", across=(0.25, 0.75))
+        self.window.wait_for(f"{ACTIVE} is not None")
+        self.window.wait_for(f"{ACTIVE} is None", patience=self.patience)
+        assert self.window.ask(f"{JOB}.state") == "done", self.window.ask(f"{JOB}.sentence")
+
+    def save_as(self, path: Path) -> None:
+        """Save the file."""
+        self.window.ask(f"bpy.ops.wm.save_as_mainfile(filepath={str(path)!r})")
+
+    def popup(self, seconds: float = 2.0) -> None:
+        """Give Blender the time to show a dialog: from outside it can't be asked whether it does."""
+        time.sleep(seconds)
