@@ -17,7 +17,8 @@ import bpy, sys
 scene = bpy.data.scenes[{scene!r}]
 scene.render.engine, scene.cycles.device, scene.cycles.samples, scene.cycles.seed = "CYCLES", "CPU", 64, 0
 scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
-scene.camera = next(one for one in scene.objects if one.type == "CAMERA" and one.get("frame_path", "").endswith({frame!r}))
+scene.camera = next(one for one in scene.objects
+                    if one.type == "CAMERA" and one.get("frame_path", "").endswith({frame!r}))
 scene.render.use_compositing = scene.render.use_sequencer = False
 settings = scene.render.image_settings
 settings.media_type = "IMAGE"
@@ -106,8 +107,8 @@ answer = [bpy.context.scene.name, sorted(one.name for one in hers.objects), hers
 def test_it_is_the_room_of_scene_blend(story, shot, tmp_path, tiny_capture, figures, pictures):
     [own] = story.window.ask(OWN_SCENES)
     story.window.ask(f"bpy.ops.wm.save_as_mainfile(filepath={str(tmp_path / 'copy.blend')!r}, copy=True)")
-    result = story.window.ask("bpy.context.scene.scan_relight.result_folder or next(one['scan_relight_result'] for one in "
-                              "bpy.context.scene.objects if 'scan_relight_result' in one)")
+    result = story.window.ask("next(one['scan_relight_result'] for one in bpy.context.scene.objects"
+                              " if 'scan_relight_result' in one)")
     [theirs] = story.window.ask(f"""
 with bpy.data.libraries.load({result + '/scene.blend'!r}) as (there, wanted):
     answer = list(there.scenes)
