@@ -24,7 +24,6 @@ from typing import Any
 import numpy as np
 
 from .atomic import TEMPORARY, replacing, write_bytes
-from .capture.exr import write_exr
 from .errors import BadInputError, StorageError
 
 STAGES = "stages"
@@ -164,6 +163,8 @@ class Store:
 
     def write_exr(self, name: str, array: np.ndarray, half: bool = False) -> Path:
         """Write the picture `name` (row 0 = top); see `capture.exr.write_exr`. Raises `StorageError`."""
+        from .capture.exr import write_exr  # not earlier: Blender's start, which knows the store, waits for no library
+
         path = self._parent(name)
         write_exr(path, array, half)
         return path
