@@ -12,7 +12,6 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.capture.exr import read_exr
 from ..core.errors import BadInputError
 from .pictures import prepare, settings_kept, shoot
 from .relight_kelvin import LUMINANCE
@@ -35,6 +34,8 @@ def measure(scene: bpy.types.Scene) -> float:
     StorageError
         The small picture can't be written.
     """
+    from ..core.capture.exr import read_exr  # not earlier: Blender's start should not wait for OpenEXR
+
     if scene.camera is None:
         raise BadInputError("The scene has no camera to measure the light through; choose a frame first.")
     with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, settings_kept(scene):

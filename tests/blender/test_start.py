@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 REGISTER = """
-import importlib.util, sys
+import importlib.util, os, sys
 import bpy
 known = set(sys.modules)
 spec = importlib.util.spec_from_file_location("scan_relight", {root!r} + "/__init__.py",
@@ -14,7 +14,8 @@ spec = importlib.util.spec_from_file_location("scan_relight", {root!r} + "/__ini
 sys.modules["scan_relight"] = package = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(package)
 package.register()
-print("LOADED", *sorted({{name.split(".")[0] for name in set(sys.modules) - known}}))
+print("LOADED", *sorted({{name.split(".")[0] for name in set(sys.modules) - known}}), flush=True)
+os._exit(0)  # Blender 5.2 as a module may hang at its end
 """
 
 

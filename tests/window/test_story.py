@@ -13,7 +13,7 @@ from tests.window.driver import environment
 from tests.window.story import ADDON, LAMPS, OWN_SCENES, Story
 
 RENDER = """
-import bpy, sys
+import bpy, os
 scene = bpy.data.scenes[{scene!r}]
 scene.render.engine, scene.cycles.device, scene.cycles.samples, scene.cycles.seed = "CYCLES", "CPU", 64, 0
 scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
@@ -25,7 +25,8 @@ settings.media_type = "IMAGE"
 settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGB", "32"
 scene.render.filepath = {out!r}
 bpy.ops.render.render(write_still=True, scene=scene.name)
-lost = [one.filepath for one in bpy.data.images if one.source == "FILE" and not one.packed_file and not one.has_data]
+lost = [one.filepath for one in bpy.data.images
+        if one.source == "FILE" and not one.packed_file and not os.path.isfile(bpy.path.abspath(one.filepath))]
 print("LOST", lost)
 """
 
