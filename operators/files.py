@@ -1,6 +1,7 @@
 """`bpy.ops.scan_relight.*` for what lies on disk: File > Import, files that are dropped, finished results."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -25,11 +26,26 @@ def show_tab(context) -> None:
         if area.type != "VIEW_3D":
             continue
         area.spaces.active.show_region_ui = True
-        region = next((one for one in area.regions if one.type == "UI"), None)
-        try:
-            region.active_panel_category = SidebarPanel.bl_category
-        except (AttributeError, TypeError):
-            pass  # the sidebar was never drawn: it has no tabs before that
+        if not _to_front(area) and not bpy.app.background:
+            bpy.app.timers.register(partial(_later, context.window, area.as_pointer()), first_interval=0.1)
+
+
+def _to_front(area) -> bool:
+    """Show our tab in an area's sidebar; one that was never drawn has no tabs yet."""
+    region = next((one for one in area.regions if one.type == "UI"), None)
+    try:
+        region.active_panel_category = SidebarPanel.bl_category
+    except (AttributeError, TypeError):
+        return False
+    return True
+
+
+def _later(window, pointer: int) -> None:
+    """Once more after the sidebar was drawn; windows and areas may be gone by then."""
+    if window in bpy.context.window_manager.windows[:]:
+        for area in window.screen.areas:
+            if area.as_pointer() == pointer:
+                _to_front(area)
 
 
 def given_path(operator) -> Path:

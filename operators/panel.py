@@ -44,7 +44,7 @@ class NamedRows:
         if number:
             last = row.row()
             last.alignment = "RIGHT"
-            last.ui_units_x = 0.8 + 0.5 * len(number)
+            last.ui_units_x = 0.5 + 0.45 * len(number)
             last.label(text=number, translate=False)
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import bpy
 
 from ..addon.bridge import job as jobs
 from ..addon.bridge import result_home, result_images, room_changes
 from ..addon.bridge.marks import OWN_SCENE
 from ..addon.console import duration
-from ..addon.core.stages import LABELS, STAGES, WRITE
+from ..addon.core.stages import LABELS, STAGES
 from ..addon.core.unfinished import goes_on_with
 from ..addon.settings_info import setting_infos
 from . import findings, preferences
@@ -135,10 +133,6 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
             self.say(layout, context, jobs.STOPPED_TEXT, "INFO")
         else:
             self.say(layout, context, f"{job.facts.get('title', 'Run')}: done in {duration(job.seconds)}.", "CHECKMARK")
-        result = job.facts.get("result_folder")
-        report = Path(result) / "report.html" if result else None
-        if report is not None and job.state == jobs.DONE and job.facts.get("until") == WRITE:
-            layout.operator("wm.path_open", text="Open Report", icon="URL").filepath = str(report)
         if job.warnings:
             header, body = layout.panel("scan_relight_warnings", default_closed=True)
             header.label(text=f"{len(job.warnings)} warning{'s' * (len(job.warnings) > 1)}")

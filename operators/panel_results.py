@@ -39,7 +39,7 @@ class SCAN_RELIGHT_UL_results(NamedRows, bpy.types.UIList):
         """Name, roughness, specular, certainty."""
         one = self.known.get(item.name, {})
         texts = columns(one)
-        split = layout.split(factor=0.52 if any(texts) else 0.9)  # long names may use what stays empty
+        split = layout.split(factor=0.58 if any(texts) else 0.9)  # long names may use what stays empty
         self.name(split, item.name, ICONS.get(one.get("model"), "BLANK1"))
         row = split.row()
         for text in texts if any(texts) else ():
@@ -124,7 +124,7 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
                      "is finished.", "INFO")
             return
         if rows:
-            head = layout.split(factor=0.52)
+            head = layout.split(factor=0.58)
             head.label(text="Object")
             row = head.row()
             row.label(text="Rough")

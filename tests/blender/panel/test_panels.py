@@ -170,7 +170,6 @@ def test_the_outcome_is_shown(draw, recover, begin, choices, code, said):
     job.wait(30)
     shown = draw(recover)
     assert said in shown.text and "scan_relight.run" in shown.buttons and not shown.bars
-    assert ("wm.path_open" in shown.buttons) == (job.state == "done")
 
 
 def test_run_hands_over_what_was_chosen(choices, module, monkeypatch, tmp_path):
