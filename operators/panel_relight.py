@@ -7,6 +7,7 @@ import bpy
 from ..addon.bridge import match_frame, relight_exposure, relight_lamps, relight_lights, relight_outside
 from ..addon.bridge.cameras import frame_cameras
 from ..addon.core.naming import in_order
+from . import light_pictures
 from .panel import NamedRows, SidebarPanel, places
 from .relight_base import has_room
 
@@ -149,10 +150,12 @@ class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(studio, "aim")
         layout.prop(studio, "strength")
-        layout.template_icon_view(studio, "preset", show_labels=True, scale=5.0, scale_popup=5.0)
-        text = layout.enum_item_name(studio, "preset", studio.preset)
-        button = layout.operator("scan_relight.add_light", text=f"Add {text}", icon=ICONS[studio.preset])
-        button.preset, button.aim, button.strength = studio.preset, studio.aim, studio.strength
+        grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
+        for name, text, _ in light_pictures.PRESETS:
+            cell = grid.column(align=True)
+            cell.template_icon(icon_value=light_pictures.picture(name), scale=4.0)
+            button = cell.operator("scan_relight.add_light", text=text, icon=ICONS[name])
+            button.preset, button.aim, button.strength = name, studio.aim, studio.strength
         for light in relight_lights.added_lights(context.scene):
             row = layout.row(align=True)
             row.prop(light, "hide_render", text="", icon_only=True, emboss=False)

@@ -9,7 +9,6 @@ import bpy
 from ..addon.bridge import match_frame, relight_lamps, relight_outside, relight_setup
 from ..addon.bridge.cameras import frame_cameras
 from ..addon.bridge.relight_kelvin import HIGHEST, LOWEST
-from .light_pictures import light_items
 from .panel_results import active_row, choose_row
 from .translations import OWN
 
@@ -120,7 +119,6 @@ class ScanRelightStudio(bpy.types.PropertyGroup):
     frame_alpha: bpy.props.FloatProperty(
         name="Opacity", description="Of the frame's picture", min=0.0, max=1.0, default=1.0, subtype="FACTOR",
         update=_frame_changed)
-    preset: bpy.props.EnumProperty(name="Light", description="What kind of light is added", items=light_items)
     follow: bpy.props.BoolProperty(
         name="Follow", description="Measure anew and expose after each light that is switched, added or removed here; "
         "takes some seconds each time", default=False)

@@ -103,17 +103,22 @@ def find(words, across=(0.5, 0.25, 0.75, 0.12, 0.9), top=True):
         region = place("UI")["region"]
         for share in across:
             x = region.x + round((region.width - 40) * share) + 8
+            last = None
             for y in range(region.y + region.height - 16, region.y + 6, -15):
                 window.cursor_warp(x, y)
-                yield
                 yield
                 text = under_mouse()
                 seen[text] = (x, window.height - y)
                 if text and all(word in text for word in words):
-                    yield
-                    if under_mouse() == text:  # still there after what the mouse had Blender draw
-                        state["known"].update(seen)
-                        return list(seen[text])
+                    for place_ in filter(None, ((x, y), last)):  # what is told may still be of the place before
+                        window.cursor_warp(*place_)
+                        for _ in range(3):
+                            yield
+                        if under_mouse() == text:
+                            seen[text] = (place_[0], window.height - place_[1])
+                            state["known"].update(seen)
+                            return list(seen[text])
+                last = x, y
         before = region.view2d.region_to_view(0, 0)
         scroll(region.height * 0.6)
         yield

@@ -236,9 +236,3 @@ def test_reading_options_match_the_command_line(choices, module):
     here = reading_props.reading(owner)
     assert (given.format, given.mesh, given.outside, given.transfer, given.exposures, given.convention) == (
         here.format, here.mesh, here.outside, here.transfer, here.exposures, here.convention)
-
-
-def test_the_report_opens_from_the_panel(draw, recover, begin, choices):
-    choices.capture_folder = "/somewhere"
-    begin("", phase="end", result_folder="/there", until="lit_diffuse").wait(30)
-    assert "wm.path_open" not in draw(recover).buttons, "a run that wrote nothing has no report"
