@@ -30,7 +30,7 @@ def test_from_run_to_reopened(ops, tiny_capture, tmp_path, monkeypatch):
     result = tmp_path / "me" / "Documents" / "Scan Relight" / tiny_capture.name
     assert json.loads((result / "capture.json").read_text())["folder"] == str(tiny_capture)
     run = json.loads((result / "materials.json").read_text())["run"]
-    wearing = [thing for thing in bpy.data.objects if thing.get("scan_relight_run") == run]
+    wearing = [thing for thing in bpy.data.objects if thing.get("scan_relight_run") == run and thing.type == "MESH"]
     assert wearing and {thing["scan_relight_result"] for thing in wearing} == {str(result)}
     rows = importlib.import_module("scan_relight.addon.bridge.result_file").rows
     assert set(rows(wearing)) == set(wearing)
@@ -47,7 +47,7 @@ def test_from_run_to_reopened(ops, tiny_capture, tmp_path, monkeypatch):
     shutil.move(result, tmp_path / "project" / "scan relight" / result.name)
     bpy.ops.wm.open_mainfile(filepath=str(file))
     assert "base_color.exr" in shown() and set(shown().values()) == {True}
-    wearing = [thing for thing in bpy.data.objects if thing.get("scan_relight_run") == run]
+    wearing = [thing for thing in bpy.data.objects if thing.get("scan_relight_run") == run and thing.type == "MESH"]
     assert set(rows(wearing)) == set(wearing) and wearing
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.read_homefile(use_empty=True)

@@ -218,7 +218,7 @@ def test_the_artists_edits_stay(first, second, artist, tmp_path):
     assert relight_outside.factor(scene.world) == 0.5
     assert relight_outside.rotation(scene.world) == pytest.approx(0.7)
     assert scene.view_settings.exposure == exposure
-    assert [thing.name for thing in scene.objects if thing.type == "LIGHT"] == ["Softbox"]
+    assert [thing["scan_relight_light"] for thing in scene.objects if thing.type == "LIGHT"] == ["SOFTBOX"]
     told = " ".join(brought.warnings)
     assert "'crystal ball': the material was corrected and stays" in told and "exposure stays" in told
 
