@@ -221,6 +221,7 @@ class SCAN_RELIGHT_PT_view(SidebarPanel, bpy.types.Panel):
         index = match_frame.current(scene)
         name = cameras[index].name if index >= 0 else "The camera is none of the capture's."
         self.say(layout, context, f"{name} ({index + 1} of {len(cameras)})" if index >= 0 else name)
+        layout.operator("scan_relight.follow_track", icon="ANIM")
         layout.prop(studio, "match_size")
         layout.prop(studio, "show_frame")
         column = layout.column()

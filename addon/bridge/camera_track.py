@@ -41,3 +41,8 @@ def make_track(cameras: Sequence[bpy.types.Object], collection: bpy.types.Collec
     thing.matrix_basis = cameras[0].matrix_basis
     collection.objects.link(thing)
     return thing
+
+
+def track_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The cameras of a scene that go along the track of a capture."""
+    return [thing for thing in scene.objects if thing.type == "CAMERA" and thing.get(FRAME_INDEX, 0) == NO_FRAME]

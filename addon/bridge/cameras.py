@@ -76,7 +76,7 @@ def show_camera(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
                 if CAPTURE in one and thing in set(one.all_objects)), None)
     if top is None or thing.name in top.objects:
         return
-    for other in [one for one in top.objects if one.get(FRAME_INDEX, -1) >= 0 and len(one.users_collection) > 1]:
+    for other in [one for one in top.objects if FRAME_INDEX in one and len(one.users_collection) > 1]:
         top.objects.unlink(other)
     top.objects.link(thing)
 

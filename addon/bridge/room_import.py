@@ -60,7 +60,7 @@ def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generat
             show_picture(cameras[-1])
             cameras[-1].data.show_background_images = True
             yield (len(things) + len(cameras)) / total
-        track = make_track(cameras, top)
+        track = make_track(cameras, part_of(top, CAMERAS))
         for thing in (*things, *cameras, *filter(None, (track,))):
             thing[CAPTURE] = top[CAPTURE]
             stamp(thing)

@@ -122,7 +122,7 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
             lamps.objects.link(thing)
         stamp(thing, instance.name)
     cameras = make_cameras(capture.frames, eyes)
-    track = make_track(cameras, top)
+    track = make_track(cameras, eyes)
     if own:
         environment = folder / ENVIRONMENT
         world = set_world(scene, environment if environment.exists() else None)

@@ -99,7 +99,7 @@ def find(words, across=(0.5, 0.25, 0.75, 0.12, 0.9), top=True):
     if top:
         scroll(-100000)
         yield
-    for _ in range(6):
+    for _ in range(9):
         region = place("UI")["region"]
         for share in across:
             x = region.x + round((region.width - 40) * share) + 8
@@ -121,10 +121,13 @@ def find(words, across=(0.5, 0.25, 0.75, 0.12, 0.9), top=True):
                 last = x, y
         before = region.view2d.region_to_view(0, 0)
         scroll(region.height * 0.6)
-        yield
-        yield
-        if place("UI")["region"].view2d.region_to_view(0, 0) == before:
+        for _ in range(25):  # a busy window takes its time
+            yield
+            if place("UI")["region"].view2d.region_to_view(0, 0) != before:
+                break
+        else:
             break
+        yield
     return {"seen": sorted(text for text in seen if text)}
 
 

@@ -343,6 +343,21 @@ def test_one_camera_goes_along_the_track(first, artist, tiny_capture):
         np.testing.assert_allclose(np.array(track.matrix_world), wanted, atol=1e-4)
 
 
+def test_the_camera_along_the_track_is_looked_through_by_a_button(ops, first, artist, tiny_capture):
+    """Hidden till then, like those of the frames; its render goes where the capture's went."""
+    scene = bring(first).scene
+    bpy.context.window.scene = scene
+    track = scene.objects["Scan Relight track"]
+    assert not track.visible_get()
+    assert ops.follow_track() == {"FINISHED"}
+    assert scene.camera == track and track.visible_get()
+    assert sum(thing.type == "CAMERA" and thing.visible_get() for thing in scene.objects) == 1
+    scene.frame_set(3)
+    wanted = read_capture(tiny_capture).frames[2].camera.camera_to_world
+    np.testing.assert_allclose(np.array(track.matrix_world), wanted, atol=1e-4)
+    assert ops.match_frame(index=1) == {"FINISHED"} and not track.visible_get()
+
+
 def test_frames_cameras_are_hidden_but_for_the_one_looked_through(first, artist):
     """In the viewport; all of them know where they stand."""
     scene = bring(first).scene

@@ -68,7 +68,7 @@ def test_every_operator_has_a_label_and_a_tooltip(package, ops):
 def test_labels_are_title_case(package, ops):
     """As Blender's are; small words stay small."""
     small = {"a", "an", "and", "as", "at", "by", "for", "from", "in", "it", "not", "of", "on", "or", "the", "to", "px",
-             "m", "with", "is", "its"}
+             "m", "with", "is", "its", "x"}
     wrong = [f"{owner}.{prop.identifier}: {prop.name}" for owner, prop in described(package)
              if any(word[0].islower() and word not in small for word in re.findall(r"[A-Za-z][\w']*", prop.name))]
     assert not wrong, "\n".join(wrong)
