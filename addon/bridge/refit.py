@@ -61,10 +61,11 @@ def refit(
         if override is not None and heed_kept:
             store.write_json(OVERRIDES, run.overrides.as_dict())
         progress.stage(WRITE)
+        run.look_closer()
         for name in (REPORT, SCENE) if scene else (REPORT,):
             store.path(name).unlink(missing_ok=True)  # a stopped run must not leave the last one's among new images
         run.write()
-        progress.update(0.6)
+        progress.update(0.7)
         report = run.report()
         report["warnings"] = [one for one in report["warnings"] if one != OUTDATED]
         if scene:

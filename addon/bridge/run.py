@@ -132,11 +132,12 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
         if until == WRITE:
             progress.stage(WRITE)
             writing = time.monotonic()
+            recovery.look_closer()
             # A stopped run must not leave the last one's among new images.
             for name in ("report.json", "scene.blend", ROOM):
                 store.path(name).unlink(missing_ok=True)
             recovery.write_images()
-            progress.update(0.5)
+            progress.update(0.7)
             surface, materials = recovery.surface(), recovery.materials()
             # The file gets the mesh whose normals face the frames: its lamps shine on that side. And the one that the
             # materials were measured on: their colours fit its normals.

@@ -8,21 +8,23 @@ base colour is multiplied by what this differs from the room's own lit diffuse t
 from __future__ import annotations
 
 import re
-import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .capture.model import Camera
+from .capture.model import Camera, Mesh
 from .lit_diffuse.accumulate import ENOUGH, LitDiffuse, accumulate
 from .lit_diffuse.sharpen import FLOOR, MOST, sharpened
 from .lit_diffuse.visibility import CLEAN
 from .material import EMITTER, METAL
+from .parallel import ordered_map
+from .progress import Rounds
 from .shading.albedo import MEASURED
 from .store import key
+from .surface.atlas import Atlas
 from .surface.build import Surface
-from .surface.elements import make_atlas
+from .surface.elements import ElementLookup, make_atlas
 from .surface.pages import OBJECT, Pages, lay_out
 
 if TYPE_CHECKING:
@@ -37,6 +39,10 @@ MOST_TEXELS = 25_000_000
 PIXEL_STEP = 8
 HALF = 0.5
 """Of what lies around a spot on the room's atlas, this share has to be measured for detail to be told there."""
+STAGE = "detail"
+LOOKED = 0.3
+"""Share of the writing that the look at the frames takes."""
+NO_LIMIT = 1 << 30
 FOLDER = "objects"
 TILE = "base_color.<UDIM>.exr"
 
@@ -58,6 +64,27 @@ class Parts:
     uv: np.ndarray
     images: dict[int, str]
     tiles: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Parting:
+    """How an atlas is parted, and what the frames show of the objects whose texels are finer.
+
+    Attributes
+    ----------
+    pages : Pages
+    sheet : Pages or None
+        Of the finer objects alone; None, like what follows, where no object is finer.
+    atlas : Atlas or None
+        Over that sheet.
+    radiance : (n, 3) float32 or None
+        L_d of its elements; NaN where too little tells.
+    """
+
+    pages: Pages
+    sheet: Pages | None = None
+    atlas: Atlas | None = None
+    radiance: np.ndarray | None = None
 
 
 def footprints(surface: Surface, cameras: list[Camera]) -> dict[int, float]:
@@ -92,26 +119,84 @@ def scales(run: Recovery) -> dict[int, float]:
     return {number: scale for number, scale in finer.items() if scale > WORTH}
 
 
-def pages_of(run: Recovery) -> Pages:
-    """How the run's atlas is parted."""
-    surface = run.surface()
-    return lay_out(run.settings.atlas, surface.mesh.triangles, surface.atlas.uv, surface.mesh.object_id,
-                   surface.atlas.size, scales(run), run.settings.atlas_size)
+def look_closer(run: Recovery) -> Parting:
+    """Part a run's atlas and look at the frames once more for what they show of objects with finer texels.
+
+    What it finds is stored, so that it is done once for a capture: a refit asks for no frame, tiles use what was found
+    for objects. Nothing that was written is touched.
+
+    Raises
+    ------
+    BadInputError
+        Too many frames can't be read any more.
+    InterruptedRun
+        From the run's progress.
+    """
+    surface, own = run.surface(), stored_key(run)
+    stored, meta = run.store.load(STAGE, own), run.store.load_meta(STAGE, own)
+    wanted = scales(run) if stored is None else dict(meta["wanted"])
+    mesh, uv, size = surface.mesh, surface.atlas.uv, surface.atlas.size
+    pages = lay_out(run.settings.atlas, mesh.triangles, uv, mesh.object_id, size, wanted, run.settings.atlas_size)
+    finer = {number: scale for number, scale in pages.scale.items() if scale > 1}
+    if not finer:
+        if stored is None:
+            run.store.save(STAGE, own, {}, {"wanted": [], "finer": []})
+        return Parting(pages)
+    # Their islands alone, on a sheet of their own: the time that this takes is theirs, not the room's.
+    chosen = np.flatnonzero(np.isin(mesh.object_id, list(finer)))
+    part = Mesh(mesh.vertices, mesh.triangles[chosen], mesh.object_id[chosen])
+    sheet = lay_out(OBJECT, part.triangles, uv[chosen], part.object_id, size, finer, NO_LIMIT)
+    atlas = make_atlas(part, sheet.sheet_uv, sheet.size)
+    if stored is None or dict(meta["finer"]) != finer:
+        found = _looked(run, part, atlas, chosen)
+        told = (found.tier == CLEAN) & (found.count >= ENOUGH)
+        stored = {"radiance": np.where(told[:, None], found.radiance, np.nan).astype(np.float32)}
+        run.store.save(STAGE, own, stored, {"wanted": [*wanted.items()], "finer": [*finer.items()]})
+    return Parting(pages, sheet, atlas, stored["radiance"])
 
 
-def write_parts(run: Recovery, base_color: np.ndarray) -> Parts:
+def stored_key(run: Recovery) -> str:
+    """The key of what `look_closer` stores, of a run whose passes over the frames are done."""
+    return key(STAGE, run.store.stored_key("lit_diffuse"))
+
+
+def _looked(run: Recovery, part: Mesh, atlas: Atlas, chosen: np.ndarray) -> LitDiffuse:
+    """L_d of the elements of an atlas over a `part` of the room's mesh: its triangles `chosen`."""
+    s, surface = run.settings, run.surface()
+    place = np.full(len(surface.mesh.triangles), -1)
+    place[chosen] = np.arange(len(chosen))
+    find = ElementLookup(part, atlas)
+
+    def lookup(triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        own = place[triangle]
+        element = np.full(len(own), -1, np.int32)
+        there = own >= 0
+        element[there] = find(own[there], u[there], v[there])
+        return element
+
+    rounds = Rounds(run.progress, 0, LOOKED)
+    how = {"median": s.median, "order": s.frame_order, "seed": s.seed, "threads": s.threads, "folder": run.store.folder,
+           "progress": rounds}
+    finer = replace(surface, atlas=atlas)
+    found = accumulate(surface.mesh, atlas, surface.scene, run.frames, run.read, **how)
+    rounds.next()
+    return sharpened(found, finer, run.frames, run.read, lookup, **how) if s.sharpen and found.seen.any() else found
+
+
+def write_parts(run: Recovery, parting: Parting, base_color: np.ndarray) -> Parts:
     """Write the images into the result folder; those of an earlier run that are not written again are removed.
 
     Parameters
     ----------
+    parting : Parting
+        What `look_closer` gave.
     base_color : (s, s, 3) float32
         Over the room's atlas, row 0 at the bottom.
     """
-    pages = pages_of(run)
+    pages = parting.pages
     sheet = pages.image(base_color)
-    finer = finer_detail(run, pages)
-    if finer is not None:
-        sheet *= finer
+    if parting.atlas is not None:
+        pages.multiply(sheet, parting.sheet, finer_detail(run, parting))
     materials = {m.object_id: m for m in run.materials()}
     shown = {number: m for number, m in materials.items() if m.model not in (EMITTER, METAL)}
     if run.settings.atlas == OBJECT:
@@ -124,10 +209,26 @@ def write_parts(run: Recovery, base_color: np.ndarray) -> Parts:
         files = {TILE.replace("<UDIM>", str(page.number)): page for page in pages.pages}
         tiles = tuple(page.number for page in pages.pages)
     remove_parts(run, set(files))
-    for done, (name, page) in enumerate(files.items()):
-        run.store.write_exr(name, pages.of(sheet, page)[::-1], half=True)
-        run.progress.update(0.55 + 0.05 * done / len(files))
+
+    def write(name: str) -> None:
+        run.store.write_exr(name, pages.of(sheet, files[name])[::-1], half=True)
+
+    for done, _ in enumerate(ordered_map(write, files, run.settings.threads)):
+        run.progress.update(0.5 + 0.1 * (done + 1) / len(files))
     return Parts(pages.uv, images, tiles)
+
+
+def finer_detail(run: Recovery, parting: Parting) -> np.ndarray:
+    """What base colour is multiplied by on the finer objects' sheet, (size, size, 3) float32."""
+    surface, lit, atlas = run.surface(), run.lit_diffuse(), parting.atlas
+    good = (lit.tier == CLEAN) & (lit.count >= ENOUGH) & (run.albedo.origin == MEASURED)
+    known = np.concatenate([np.where(good[:, None], lit.radiance, 0), good[:, None]], 1).astype(np.float32)
+    room = parting.sheet.image(surface.atlas.image(known)).reshape(-1, 4)[atlas.texel]
+    floor = np.float32(max(FLOOR * run.median_radiance(), 1e-30))
+    level = room[:, :3] / np.maximum(room[:, 3:], 1e-6)
+    ratio = np.clip((parting.radiance + floor) / (level + floor), 1 / MOST, MOST)
+    ratio[(room[:, 3] < HALF) | ~np.isfinite(ratio).all(1)] = 1
+    return atlas.image(ratio, 1.0)
 
 
 def remove_parts(run: Recovery, kept: set[str] = frozenset()) -> None:
@@ -141,48 +242,3 @@ def remove_parts(run: Recovery, kept: set[str] = frozenset()) -> None:
 def file_name(name: str) -> str:
     """An object's name as a file may have it anywhere."""
     return re.sub(r"[^\w\- ]", "_", name)
-
-
-def finer_detail(run: Recovery, pages: Pages) -> np.ndarray | None:
-    """What base colour is multiplied by on the sheet, (size, size, 3) float32; None where nothing is finer.
-
-    Raises
-    ------
-    BadInputError
-        Too many frames can't be read any more.
-    InterruptedRun
-        From the run's progress.
-    """
-    finer = [number for number, scale in pages.scale.items() if scale > 1]
-    if not finer or not run.frames:
-        return None
-    surface, lit = run.surface(), run.lit_diffuse()
-    atlas = make_atlas(surface.mesh, pages.sheet_uv, pages.size)
-    only = np.isin(atlas.object_id, finer)
-    # By what it was made of: a refit knows the capture no more.
-    known = (zlib.crc32(np.ascontiguousarray(part).tobytes()) for part in (lit.radiance, lit.count, surface.atlas.uv))
-    own = key("detail", *known, run.settings.atlas, run.settings.sharpen, sorted(pages.scale.items()), pages.size)
-    stored = run.store.load("detail", own)
-    if stored is None:
-        found = _looked(run, Surface(surface.mesh, atlas, surface.scene, pages.sheet_uv, surface.texel_size), only)
-        told = (found.tier == CLEAN) & (found.count >= ENOUGH)
-        stored = {"radiance": np.where(told[:, None], found.radiance, np.nan)[only].astype(np.float32)}
-        run.store.save("detail", own, stored)
-    good = (lit.tier == CLEAN) & (lit.count >= ENOUGH) & (run.albedo.origin == MEASURED)
-    known = np.concatenate([np.where(good[:, None], lit.radiance, 0), good[:, None]], 1).astype(np.float32)
-    room = pages.image(surface.atlas.image(known)).reshape(-1, 4)[atlas.texel[only]]
-    floor = np.float32(max(FLOOR * run.median_radiance(), 1e-30))
-    level = room[:, :3] / np.maximum(room[:, 3:], 1e-6)
-    ratio = np.clip((stored["radiance"] + floor) / (level + floor), 1 / MOST, MOST)
-    ratio[(room[:, 3] < HALF) | ~np.isfinite(ratio).all(1)] = 1
-    every = np.ones((len(atlas), 3), np.float32)
-    every[only] = ratio
-    return atlas.image(every, 1.0)
-
-
-def _looked(run: Recovery, surface: Surface, only: np.ndarray) -> LitDiffuse:
-    """L_d of some elements of a finer surface."""
-    s = run.settings
-    how = {"median": s.median, "order": s.frame_order, "seed": s.seed, "threads": s.threads, "folder": run.store.folder}
-    found = accumulate(surface.mesh, surface.atlas, surface.scene, run.frames, run.read, only=only, **how)
-    return sharpened(found, surface, run.frames, run.read, **how) if s.sharpen and found.seen.any() else found

@@ -27,7 +27,7 @@ from .memory import peak_memory
 from .overrides import NONE as NO_OVERRIDES
 from .overrides import Overrides
 from .parallel import ordered_map
-from .parts import Parts, remove_parts, write_parts
+from .parts import LOOKED, Parting, Parts, look_closer, remove_parts, write_parts
 from .passes import all_passes
 from .progress import Progress
 from .report import make_report
@@ -99,6 +99,7 @@ class Recovery(Corrected):
         self.bad_frames: list[str] = []
         self.blind_frames: list[str] = []
         self.parts: Parts | None = None
+        self._parting: Parting | None = None
 
     @property
     def frames(self) -> tuple[Frame, ...]:
@@ -345,8 +346,14 @@ class Recovery(Corrected):
         lit = self.lit_diffuse()
         return float(np.median(lit.radiance[lit.seen]))
 
+    def look_closer(self) -> None:
+        """All that writing asks of the frames. It may fail and be stopped: done before what was written is touched."""
+        if self.settings.atlas != ROOM and self._parting is None:
+            self._parting = look_closer(self)
+
     def write_images(self, wanted: Container[str] | None = None) -> None:
         """The result folder's images, all or the `wanted` ones by name, materials.json and report.html."""
+        self.look_closer()
         atlas, lit = self.surface().atlas, self.lit_diffuse()
         dark = max(1e-6 * self.median_radiance(), 1e-30)
         spread = (lit.upper - lit.lower).mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
@@ -364,14 +371,15 @@ class Recovery(Corrected):
         def write(name: str) -> None:
             self.store.write_exr(f"{name}.exr", atlas.image(images[name])[::-1])
 
+        begun = LOOKED if self._parting else 0.0
         for done, _ in enumerate(ordered_map(write, images, self.settings.threads)):
-            self.progress.update(0.5 * done / len(images))
+            self.progress.update(begun + (0.5 - begun) * done / len(images))
         if wanted is None or "environment" in wanted:
             self.store.write_exr("environment.exr", self.sky()[::-1])
         if self.settings.atlas == ROOM:
             remove_parts(self)
         elif "base_color" in images:
-            self.parts = write_parts(self, atlas.image(images["base_color"]))
+            self.parts = write_parts(self, self._parting, atlas.image(images["base_color"]))
         known = {one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects}
         for number, name in (self.parts.images if self.parts else {}).items():
             known.setdefault(number, {})["image"] = name

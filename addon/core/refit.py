@@ -25,10 +25,12 @@ from .evidence.objects import object_evidence
 from .evidence.texel import TexelEvidence, gloss_error
 from .material import EMITTER, ObjectMaterial
 from .overrides import Given, Overrides, heeded, parse
+from .parts import STAGE as DETAIL
+from .parts import stored_key as detail_key
 from .progress import Progress
 from .recover import CODE, Corrected, Recovery
 from .room_file import MATERIALS, Room, read_room
-from .settings import Settings
+from .settings import ROOM, Settings
 from .shading.albedo import MEASURED, Albedo
 from .specular.reflect import Held, Specular
 from .store import Store, key
@@ -148,6 +150,8 @@ class Refit(Recovery):
         for name in ("surface", "lit_diffuse", "shading"):
             if store.stored_key(name) is None or store.stored_key(name) != self._keys[name]:
                 raise _again(store.folder, "its stages were cleared or are another run's")
+        if self.settings.atlas != ROOM and store.stored_key(DETAIL) != detail_key(self):
+            raise _again(store.folder, "what its frames show of finer texels was cleared")
         self._specular_before = self._load_specular()
 
     def _has_images(self) -> bool:

@@ -40,6 +40,7 @@ def sharpened(
     surface: Surface,
     frames: Sequence[Frame],
     read: Callable[[Frame], Pixels],
+    lookup: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray] | None = None,
     **how: Any,
 ) -> LitDiffuse:
     """L_d with the detail that its own blur took from it, where `ENOUGH` clean observations tell.
@@ -50,6 +51,8 @@ def sharpened(
         In the poses that `lit` was accumulated with.
     read : callable
         Gives a frame's pixels.
+    lookup : callable, optional
+        As `ElementLookup` finds elements, but -1 where the atlas has none; that one over all of it where left out.
     **how
         As `accumulate` takes it: median, order, seed, threads, folder, progress.
 
@@ -61,7 +64,7 @@ def sharpened(
         From a progress.
     """
     atlas = surface.atlas
-    lookup = ElementLookup(surface.mesh, atlas)
+    lookup = lookup or ElementLookup(surface.mesh, atlas)
     floor = np.float32(max(FLOOR * float(np.median(lit.radiance[lit.seen])), 1e-30))
     good = (lit.tier == CLEAN) & (lit.count >= ENOUGH) & _detailed(lit, atlas)
 
@@ -89,21 +92,28 @@ def _detailed(lit: LitDiffuse, atlas: Atlas) -> np.ndarray:
     return np.abs(own - total / np.maximum(count, 1e-6)) > DETAIL * own
 
 
-def _shown(camera: Camera, surface: Surface, lookup: ElementLookup, lit: LitDiffuse) -> np.ndarray:
+def _shown(camera: Camera, surface: Surface, lookup: Callable, lit: LitDiffuse) -> np.ndarray:
     """L_d as a camera shows it, (height, width, 3) float32; NaN where a pixel shows what has none."""
     width, height = camera.width, camera.height
-    corner = np.stack(np.meshgrid(np.arange(width + 1.0), np.arange(height + 1.0)), -1).reshape(-1, 2)
 
-    def traced(places: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    def traced(places: np.ndarray) -> np.ndarray:
         directions, led = camera.rays(places)
         origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
         hits = surface.scene.intersect(origins, directions)
         met = np.flatnonzero((hits.triangle >= 0) & led)
+        element = lookup(hits.triangle[met], hits.u[met], hits.v[met])
         found = np.full((len(places), 3), np.nan, np.float32)
-        found[met] = lit.radiance.take(lookup(hits.triangle[met], hits.u[met], hits.v[met]), 0)
-        return found.reshape(*shape, 3)
+        found[met[element >= 0]] = lit.radiance.take(element[element >= 0], 0)
+        return found
 
-    around = traced(corner, (height + 1, width + 1))
-    around = around[1:, 1:] + around[1:, :-1] + around[:-1, 1:] + around[:-1, :-1]
-    middle = traced(camera.pixel_centres(), (height, width))
+    middle = traced(camera.pixel_centres()).reshape(height, width, 3)
+    # Corners of those pixels alone that show an element: often few, where few objects are asked for.
+    known = np.isfinite(middle).all(-1)
+    wanted = np.zeros((height + 1, width + 1), bool)
+    for down in (slice(None, -1), slice(1, None)):
+        for right in (slice(None, -1), slice(1, None)):
+            wanted[down, right] |= known
+    corner = np.full((height + 1, width + 1, 3), np.nan, np.float32)
+    corner[wanted] = traced(np.argwhere(wanted)[:, ::-1].astype(float))
+    around = corner[1:, 1:] + corner[1:, :-1] + corner[:-1, 1:] + corner[:-1, :-1]
     return np.float32(MIDDLE) * middle + np.float32(CORNER) * around

@@ -81,6 +81,18 @@ class Pages:
             part[gaps] = part[~gaps].mean(0)
         return sheet
 
+    def multiply(self, sheet: np.ndarray, other: Pages, factor: np.ndarray) -> None:
+        """Multiply a sheet's islands of the objects that another layout of the same atlas has by what its sheet holds.
+
+        The other has them at the same scale, so texel meets texel.
+        """
+        own = self.island[np.isin(self.island_object, other.island_object)].astype(np.int64)
+        there = other.island.astype(np.int64)
+        if len(own) != len(there) or (own[:, [0, 1, 4, 5]] != there[:, [0, 1, 4, 5]]).any():
+            raise ValueError("the other layout is not of the same atlas at the same scale")
+        for (x, y, width, height), (x0, y0) in zip(own[:, 2:].tolist(), there[:, 2:4].tolist(), strict=True):
+            sheet[y:y + height, x:x + width] *= factor[y0:y0 + height, x0:x0 + width]
+
     def of(self, sheet: np.ndarray, page: Page) -> np.ndarray:
         """A page's part of an image of the sheet."""
         return sheet[page.y:page.y + page.height, page.x:page.x + page.width]
