@@ -194,7 +194,7 @@ def write_parts(run: Recovery, parting: Parting, base_color: np.ndarray) -> Part
         Over the room's atlas, row 0 at the bottom.
     """
     pages = parting.pages
-    sheet = pages.image(base_color)
+    sheet = pages.image(base_color, _owner(run))
     if parting.atlas is not None:
         pages.multiply(sheet, parting.sheet, finer_detail(run, parting))
     materials = {m.object_id: m for m in run.materials()}
@@ -223,12 +223,18 @@ def finer_detail(run: Recovery, parting: Parting) -> np.ndarray:
     surface, lit, atlas = run.surface(), run.lit_diffuse(), parting.atlas
     good = (lit.tier == CLEAN) & (lit.count >= ENOUGH) & (run.albedo.origin == MEASURED)
     known = np.concatenate([np.where(good[:, None], lit.radiance, 0), good[:, None]], 1).astype(np.float32)
-    room = parting.sheet.image(surface.atlas.image(known)).reshape(-1, 4)[atlas.texel]
+    room = parting.sheet.image(surface.atlas.image(known), _owner(run)).reshape(-1, 4)[atlas.texel]
     floor = np.float32(max(FLOOR * run.median_radiance(), 1e-30))
     level = room[:, :3] / np.maximum(room[:, 3:], 1e-6)
     ratio = np.clip((parting.radiance + floor) / (level + floor), 1 / MOST, MOST)
     ratio[(room[:, 3] < HALF) | ~np.isfinite(ratio).all(1)] = 1
     return atlas.image(ratio, 1.0)
+
+
+def _owner(run: Recovery) -> np.ndarray:
+    """The object that each texel of the room's images shows, (s, s) int32."""
+    atlas = run.surface().atlas
+    return atlas.image(atlas.object_id, -1)
 
 
 def remove_parts(run: Recovery, kept: set[str] = frozenset()) -> None:

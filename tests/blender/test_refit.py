@@ -96,3 +96,39 @@ def test_later_runs_heed_what_is_kept(tiny_capture, tmp_path, capsys):
     assert "left out" in capsys.readouterr().out
     assert (result / "overrides.json").exists()
     assert main(["recover", str(tiny_capture), "--out", str(result), "--override", str(tmp_path / "none")]) == 2
+
+
+COARSE = [*FAST[:FAST.index("--texel-size")], "--atlas-size", "128"]
+"""The room's atlas is too small for what the frames show: parts of it are finer."""
+
+
+@pytest.mark.parametrize("kind", ["object", "udim"])
+def test_parts_of_an_atlas_are_renewed_without_the_capture(tiny_capture, tmp_path, capsys, kind):
+    capture, result = shutil.copytree(tiny_capture, tmp_path / "capture"), tmp_path / "result"
+    assert main(["recover", str(capture), "--out", str(result), *COARSE, "--atlas", kind, "--quiet"]) == 0
+    shutil.rmtree(capture)
+
+    def parts():
+        return {path.relative_to(result).as_posix(): path.read_bytes() for path in sorted(result.rglob("*base_color.*"))
+                if path.name != "base_color.exr"}
+
+    before = parts()
+    assert len(before) > 1
+    file = given(tmp_path, {"0": {"base_color": [0.1, 0.2, 0.3]}})
+    assert main(["refit", str(result), "--object", "0", "--override", file]) == 0
+    after = parts()
+    changed = {name for name in before if before[name] != after[name]}
+    objects = json.loads((result / "materials.json").read_text())["objects"]
+    told = {one["object_id"]: one.get("image") for one in objects}
+    assert after.keys() == before.keys()
+    assert changed == {told[0]} if kind == "object" else changed
+    bpy.ops.wm.open_mainfile(filepath=str(result / "scene.blend"))
+    assert any("ScanRelightParts" in (layer.name for layer in thing.data.uv_layers)
+               for thing in bpy.data.objects if thing.type == "MESH")
+    (result / "stages/detail.npz").unlink()
+    written = {path: path.read_bytes() for path in result.rglob("[!.]*.*") if path.is_file()}
+    capsys.readouterr()
+    assert main(["refit", str(result), "--object", "0"]) == 2
+    told = capsys.readouterr().err
+    assert "run recover again" in told and len(told.strip().splitlines()) == 1
+    assert written == {path: path.read_bytes() for path in result.rglob("[!.]*.*") if path.is_file()}

@@ -10,6 +10,7 @@ import pytest
 
 from addon.core.capture.exr import read_exr
 from addon.core.capture.read import read_capture
+from addon.core.errors import InterruptedRun
 from addon.core.progress import Progress
 from addon.core.recover import Recovery
 from addon.core.store import Store
@@ -103,3 +104,34 @@ def test_each_way_takes_the_others_images_away(disk, tmp_path):
     assert not any(name.startswith("objects/") for name in parts())
     run(disk, tmp_path)
     assert parts() == {"base_color.exr"}
+
+
+def test_the_look_at_the_frames_is_told_and_stopped_and_done_once(striped, tmp_path):
+    def files():
+        return {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.[ehj]*")}
+
+    run(striped, tmp_path)
+    before, shares = files(), []
+
+    def follow(stop_at):
+        shares.clear()
+        return Progress(lambda event: event.stage == "write" and shares.append(event.share),
+                        lambda: any(stop_at < share < 0.5 for share in shares))
+
+    def write(kind, stop_at=1.0):
+        progress = follow(stop_at)
+        with Store(tmp_path) as store:
+            settings = replace(COARSE, atlas=kind)
+            recovery = Recovery(read_capture(striped.root), store, settings, progress, striped.unwrap)
+            recovery.specular()
+            progress.stage("write")
+            recovery.write_images()
+
+    with pytest.raises(InterruptedRun):
+        write("object", stop_at=0.05)
+    assert files() == before and len(shares) > 1
+    write("object")
+    frames = len(read_capture(striped.root).frames)
+    assert shares == sorted(shares) and sum(0 < share < 0.3 for share in shares) >= frames
+    write("object")
+    assert not any(0 < share < 0.3 for share in shares)

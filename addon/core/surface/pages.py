@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from .uv_islands import boxes, connected, corner_ids
 
@@ -59,10 +60,12 @@ class Pages:
     island: np.ndarray
     island_object: np.ndarray
 
-    def image(self, room: np.ndarray) -> np.ndarray:
+    def image(self, room: np.ndarray, owner: np.ndarray | None = None) -> np.ndarray:
         """The sheet, (size, size, c) float32, of what an image over the room's atlas, (s, s, c), shows; rows upwards.
 
-        Between its islands a page shows its mean: smaller copies of it then have no dark seams.
+        Between its islands a page shows its mean: smaller copies of it then have no dark seams. `owner`, if given, is
+        the object that each texel of the room's shows, (s, s) int: on the room's atlas islands of two objects may lie
+        within one box, and a part shows nothing of another's.
         """
         sheet = np.zeros((self.size, self.size, room.shape[2]), np.float32)
         empty = np.ones(sheet.shape[:2], bool)
@@ -70,10 +73,15 @@ class Pages:
             x, y, width, height = int(x), int(y), int(width), int(height)
             scale = self.scale[int(number)]
             columns, rows = (_weights(start, count, scale, len(room)) for start, count in ((x0, width), (y0, height)))
-            if scale == 1:
-                part = room[rows[0][:, None], columns[0]]
-            else:
-                part = _between(room, rows, columns)
+            bottom, left = rows[0][0], columns[0][0]
+            box = slice(bottom, rows[1][-1] + 1), slice(left, columns[1][-1] + 1)
+            shown = room[box]
+            foreign = None if owner is None else owner[box] != number
+            if foreign is not None and foreign.any() and not foreign.all():
+                shown = shown[tuple(distance_transform_edt(foreign, return_distances=False, return_indices=True))]
+            rows, columns = ((low - start, high - start, share)
+                             for (low, high, share), start in ((rows, bottom), (columns, left)))
+            part = shown[rows[0][:, None], columns[0]] if scale == 1 else _between(shown, rows, columns)
             sheet[y:y + height, x:x + width] = part
             empty[y:y + height, x:x + width] = False
         for page in self.pages:

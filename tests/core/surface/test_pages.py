@@ -100,3 +100,15 @@ def test_an_object_larger_than_a_tile_goes_on_several():
     assert len(found.pages) > 1 and found.scale == {0: 1.0}
     local = found.uv - np.floor(found.uv.mean(1))[:, None]
     assert local.min() >= 0 and local.max() <= 1
+
+
+def test_a_part_shows_nothing_of_another_object():
+    """An island of 3 is L-shaped; in the corner that it leaves lies one of 5."""
+    corners = [[(1, 1), (20, 1), (1, 20)], [(14, 14), (20, 14), (20, 20)]]
+    uv, owner = np.float32(corners) / SIZE, np.array([3, 5])
+    y, x = np.mgrid[0:SIZE, 0:SIZE]
+    texel = np.where(x + y < 23, 3, 5)
+    for scale in ({}, {3: 2.0}):
+        found = lay_out(OBJECT, np.arange(6).reshape(2, 3), uv, owner, SIZE, scale, 256)
+        sheet = found.image(texel[..., None].astype(np.float32), texel)
+        assert all((found.of(sheet, page) == page.number).all() for page in found.pages)
