@@ -38,12 +38,12 @@ class SCAN_RELIGHT_UL_results(NamedRows, bpy.types.UIList):
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
         """Name, roughness, specular, certainty."""
         one = self.known.get(item.name, {})
-        texts = columns(one)
-        split = layout.split(factor=0.58 if any(texts) else 0.9)  # long names may use what stays empty
+        text = "  ".join(filter(None, columns(one)))
+        split = layout.split(factor=0.52 if text else 0.9)  # long names may use what stays empty
         self.name(split, item.name, ICONS.get(one.get("model"), "BLANK1"))
         row = split.row()
-        for text in texts if any(texts) else ():
-            row.label(text=text)
+        if text:
+            row.label(text=text, translate=False)  # one label: the margins of two would leave no room for figures
         row.label(text="", icon=SIGNS[results.certainty(one)])
 
     def draw_filter(self, context, layout):
@@ -124,12 +124,11 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
                      "is finished.", "INFO")
             return
         if rows:
-            head = layout.split(factor=0.58)
+            head = layout.split(factor=0.52)
             head.label(text="Object")
             row = head.row()
             row.label(text="Rough")
             row.label(text="F0")
-            row.label(text="", icon="BLANK1")
             layout.template_list("SCAN_RELIGHT_UL_results", "", scene, "objects", scene, "scan_relight_row", rows=6)
         elif not refused:
             self.say(layout, context, f"{len(found.objects)} objects in '{found.folder.name}'; none of them is in "

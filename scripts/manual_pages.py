@@ -34,7 +34,7 @@ def write_pages(docs: Path, out: Path) -> None:
         (out / f"{path.stem}.html").write_text(
             f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Scan Relight: {path.stem}</title>'
             f"<style>{STYLE}</style><nav>{links}</nav>{body}</html>\n", encoding="utf-8")
-    for path in docs.rglob("*.png"):
+    for path in (*docs.rglob("*.png"), *docs.rglob("*.jpg")):
         place = path.relative_to(docs)
         if place.parts[0] not in LEFT_OUT:
             (out / place).parent.mkdir(parents=True, exist_ok=True)

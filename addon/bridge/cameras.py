@@ -17,7 +17,7 @@ from mathutils import Matrix
 from ..core.capture.lens import Lens
 from ..core.capture.lenses import Cropped, Equirectangular
 from ..core.capture.lenses_told import lens_of, told_lens
-from ..core.capture.model import Camera, Frame
+from ..core.capture.model import Camera, Frame, Mesh
 from ..core.capture.pixel_rays import widest_angle
 from .marks import CAPTURE
 
@@ -68,6 +68,24 @@ def use_camera(scene: bpy.types.Scene, thing: bpy.types.Object, size: bool = Tru
         render.pixel_aspect_x, render.pixel_aspect_y = _pixel(thing)
     scene.camera = thing
     show_camera(scene, thing)
+
+
+def best_view(frames: Iterable[Frame], mesh: Mesh) -> int:
+    """Index of the frame that a room is first seen through: the first one with the most objects' middles in it.
+
+    What stands in whose way is not asked: a frame from the room's edge that looks into it has most, one of a wall or
+    ceiling few.
+    """
+    _, owner = np.unique(mesh.object_id, return_inverse=True)
+    centres = mesh.vertices[mesh.triangles].mean(1)
+    middles = np.stack([np.bincount(owner, centres[:, axis]) for axis in range(3)], -1) / np.bincount(owner)[:, None]
+
+    def shown(camera: Camera) -> int:
+        pixels, depth = camera.project(middles)
+        inside = (pixels >= 0) & (pixels < (camera.width, camera.height))
+        return int(((depth > 0) & inside.all(1)).sum())
+
+    return int(np.argmax([shown(frame.camera) for frame in frames]))
 
 
 def show_camera(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
@@ -236,6 +254,7 @@ def make_view(name: str, camera: Camera, collection: bpy.types.Collection) -> bp
         _set_panorama(data, camera)
     data.clip_start, data.clip_end = 0.01, 1000.0
     data.display_size = 0.15
+    data.passepartout_alpha = 1.0  # what lies outside the picture Cycles' viewport then needn't compute
     thing = bpy.data.objects.new(name, data)
     thing.matrix_world = Matrix(np.asarray(camera.camera_to_world, np.float64).tolist())
     thing["width"], thing["height"], thing["pixel_aspect"] = camera.width, camera.height, aspect

@@ -21,7 +21,7 @@ from ..core.material import EMITTER, ObjectMaterial, undescribed
 from ..core.room_file import run_of
 from .as_made import stamp, stamp_tree
 from .camera_track import make_track
-from .cameras import differing, make_cameras, make_view, unlike, use_camera
+from .cameras import best_view, differing, make_cameras, make_view, unlike, use_camera
 from .images import image_name, load_image, load_parts, relative_to
 from .marks import OWN_SCENE, mark
 from .materials import make_material
@@ -132,7 +132,7 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
                 images[node.name] = node.image
         _prepare(scene, median_radiance)
         stamp_tree(world)
-        use_camera(scene, cameras[0] if cameras else _overview(capture, eyes))
+        use_camera(scene, cameras[best_view(capture.frames, capture.mesh)] if cameras else _overview(capture, eyes))
         scene.frame_start, scene.frame_end = 1, max(len(cameras), 1)
         scene.name, scene[OWN_SCENE] = scene_name(capture.root), True
         scene[EXPOSURE] = scene.view_settings.exposure

@@ -16,6 +16,25 @@ LAMPS = "module('addon.bridge.relight_lamps')"
 OWN_SCENES = "[one.name for one in bpy.data.scenes if one.get('scan_relight_own')]"
 ADDON = "[name for name in bpy.context.preferences.addons.keys() if name.endswith('.scan_relight')]"
 
+EXPOSURE = "bpy.context.scene.view_settings.exposure"
+SEEN = """
+from bpy_extras.view3d_utils import location_3d_to_region_2d as shown
+where, wanted = place(), bpy.data.objects[{name!r}]
+region, view, graph = where["region"], where["area"].spaces.active.region_3d, bpy.context.evaluated_depsgraph_get()
+eye, free, found = view.view_matrix.inverted().translation, place("UI")["region"], []
+for polygon in wanted.data.polygons[::max(1, len(wanted.data.polygons) // 500)]:
+    point = wanted.matrix_world @ polygon.center
+    at = shown(region, view, point)
+    hit = bpy.context.scene.ray_cast(graph, eye, point - eye)
+    if at is not None and hit[0] and hit[4] == wanted and 80 < at.x < free.x - region.x - 20:
+        found.append(at)
+if found:
+    middle = sum((at.xy for at in found[1:]), found[0].copy()) / len(found)
+    at = min(found, key=lambda at: (at - middle).length)
+    height = bpy.context.window_manager.windows[0].height
+    answer = [round(region.x + at.x), round(height - region.y - at.y)]
+"""
+
 
 class Story:
     """What an artist does, in a window that shows Blender's startup file.
@@ -33,8 +52,16 @@ class Story:
 
     def install(self, archive: Path) -> None:
         """Drag the zip in and agree."""
+        self.drag_zip_in(archive)
+        self.agree()
+
+    def drag_zip_in(self, archive: Path) -> None:
+        """Drag the zip into the window; Blender asks."""
         self.window.drop(archive)
         self.popup()
+
+    def agree(self) -> None:
+        """OK: it is installed."""
         self.window.press("Return")
         self.window.wait_for(ADDON)
 
@@ -68,6 +95,12 @@ class Story:
         self.window.click("scan_relight.add_light(", "'SOFTBOX'", top=False, across=(0.25, 0.75, 0.5))
         self.window.wait_for("any(one.type == 'LIGHT' for one in bpy.context.scene.objects)")
 
+    def expose(self) -> None:
+        """Have the exposure follow the light that there is now."""
+        before = self.window.ask(EXPOSURE)
+        self.window.click("scan_relight.expose(", top=False, across=(0.25,))
+        self.window.wait_for(f"{EXPOSURE} != {before!r}")
+
     def render_both(self) -> None:
         """Before and after, rendered beside the window."""
         self.window.click("scan_relight.before_after(", top=False, across=(0.5,))
@@ -80,6 +113,13 @@ class Story:
         x, y = self.window.ask("find(('scan_relight_row',), across=(0.3,))")
         self.window.click_at(x, y + 23 * row)
         return self.window.wait_for("getattr(bpy.context.view_layer.objects.active, 'name', '')")
+
+    def choose_in_view(self, name: str) -> None:
+        """Click on an object in the 3D view, where it is nearest to the middle of what is seen of it."""
+        found = self.window.ask(SEEN.format(name=name))
+        assert found, f"'{name}' is not in view"
+        self.window.click_at(*found)
+        self.window.wait_for(f"getattr(bpy.context.view_layer.objects.active, 'name', '') == {name!r}")
 
     def this_is_metal(self) -> None:
         """Say that the active object is metal; it is fitted again at once."""

@@ -5,14 +5,14 @@ import pytest
 
 from addon.core.capture.lenses import Cropped, EnhancedUnified, Equirectangular
 from addon.core.capture.lenses_colmap import polynomial
-from addon.core.capture.model import Camera, Frame
+from addon.core.capture.model import Camera, Frame, Mesh
 
 bpy = pytest.importorskip("bpy")
 
 from bpy_extras.object_utils import world_to_camera_view  # noqa: E402
 from mathutils import Vector  # noqa: E402
 
-from addon.bridge.cameras import differing, make_cameras, off_by, unlike, use_camera  # noqa: E402
+from addon.bridge.cameras import best_view, differing, make_cameras, off_by, unlike, use_camera  # noqa: E402
 
 POSE = np.array([[0.36, 0.48, -0.8, 1.5], [-0.8, 0.6, 0.0, -0.7], [0.48, 0.64, 0.6, 2.0], [0, 0, 0, 1.0]])
 CAMERAS = {
@@ -147,3 +147,21 @@ def test_a_crop_is_black_in_blender(scene, shoot, tmp_path):
     y, x = np.mgrid[0.5 : camera.height, 0.5 : camera.width]
     radius = np.hypot((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy)
     assert (grey[radius < 1.55] > 0).all() and (grey[radius > 1.65] == 0).all()
+
+
+def test_a_room_is_first_seen_through_the_frame_that_shows_most_objects(tmp_path):
+    def looking(along) -> Camera:
+        """From the origin along a horizontal direction."""
+        back, up = -np.float64(along), np.array([0, 0, 1.0])
+        pose = np.eye(4)
+        pose[:3, :3] = np.stack([np.cross(up, back), up, back], -1)
+        return Camera(64, 48, 50, 50, 32, 24, pose)
+
+    middles = np.array([[0, 5, 0], [1, 5, 0.5], [5, 0, 0], [0, -5, 0], [-1, -5, 0.2], [0.5, -4, 0]])
+    corners = np.array([[0.1, 0, 0], [-0.1, 0.1, 0], [0, -0.1, 0]])
+    mesh = Mesh((middles[:, None] + corners).reshape(-1, 3), np.arange(18, dtype=np.int32).reshape(6, 3),
+                np.int32([3, 5, 7, 20, 21, 40]))
+    ways = {"one": (1, 0, 0), "two": (0, 1, 0), "three": (0, -1, 0), "three again": (0, -1, 0), "none": (-1, 0, 0)}
+    frames = [Frame(name, tmp_path, looking(way)) for name, way in ways.items()]
+    assert frames[best_view(frames, mesh)].name == "three"
+    assert frames[best_view(frames[:2], mesh)].name == "two"
