@@ -71,7 +71,8 @@ def test_it_renders_when_opened_elsewhere(scene, tmp_path, result, capture, fres
         assert (thing.name, thing.data.name, thing.active_material.name) == (name, name, name)
     room, lamps, eyes = (opened.collection.children["Scan Relight"].children[n] for n in ("Room", "Lamps", "Cameras"))
     assert [o["object_id"] for o in room.objects] == [4] and [o["object_id"] for o in lamps.objects] == [9]
-    assert [o.name for o in eyes.objects] == ["frame 0", "frame 1"] and opened.camera == eyes.objects["frame 0"]
+    assert [o.name for o in eyes.objects] == ["frame 0", "frame 1", "Scan Relight track"]
+    assert opened.camera == eyes.objects["frame 0"]
     top = opened.collection.children["Scan Relight"]
     for thing in (top, *room.objects, *lamps.objects):
         assert (thing["scan_relight_result"], thing["scan_relight_run"]) == (str(result), "0123456789abcdef")
