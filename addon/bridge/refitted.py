@@ -15,6 +15,7 @@ from ..core.room_file import material
 from . import corrections, relight_lamps, result_file, result_images, room_changes, unseen
 from .as_made import is_corrected, stamp_tree
 from .correct_material import worn_material
+from .images import tiles_of
 from .marks import IMAGE, OBJECT_ID, RESULT, UV_MAP, mark
 from .materials import MODEL, dress
 from .mesh_objects import is_open
@@ -145,8 +146,9 @@ def _renew_images(folder: Path) -> bpy.types.Image | None:
             one.reload()
             one.pack()
         else:
-            if shown != source and source.is_file():
-                _copy(source, shown)
+            for part in tiles_of(source) or [source]:
+                if shown != source:
+                    _copy(part, shown.parent / part.name if part != source else shown)
             one.reload()
         one[IMAGE] = str(source)
         found = one if source.name == BASE_COLOR else found

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
+from addon.core.capture.exr import read_exr, write_exr
 from addon.core.errors import BadInputError
 
 bpy = pytest.importorskip("bpy")
 
+from addon.bridge import refitted  # noqa: E402
 from addon.bridge.images import load_image  # noqa: E402
+from addon.bridge.marks import IMAGE  # noqa: E402
 from addon.bridge.result_images import settle  # noqa: E402
 
 VALUES = {"hall": 0.25, "attic": 0.5}
@@ -70,3 +72,15 @@ def test_what_is_gone_is_told(two, tmp_path):
     (tmp_path / "hall" / "base_color.exr").unlink()
     with pytest.raises(BadInputError, match="base_color.exr' is missing"):
         settle(two, "PACK")
+
+
+def test_tiles_copied_beside_the_file_are_renewed(tmp_path):
+    result, copies = tmp_path / "result", tmp_path / "copies"
+    for folder, grey in ((result, 0.25), (copies, 0.75)):
+        folder.mkdir()
+        for number in (1001, 1002):
+            write_exr(folder / f"base_color.{number}.exr", np.full((8, 8, 3), grey, np.float32))
+    image = load_image(copies / "base_color.<UDIM>.exr", "tiles")
+    image[IMAGE] = str(result / "base_color.<UDIM>.exr")
+    refitted._renew_images(result)
+    assert [float(read_exr(copies / f"base_color.{number}.exr").rgb.max()) for number in (1001, 1002)] == [0.25, 0.25]
