@@ -87,48 +87,60 @@ def find(words, across=(0.5, 0.25, 0.75, 0.12, 0.9), top=True):
     """Look for a button by moving the mouse over the sidebar, page by page.
 
     Returns x and y, from the window's upper left corner, where its text holds all `words`; else all that was found.
+    Without `top` the search begins where the sidebar is scrolled to, and goes on from its top.
     """
     window, seen = bpy.context.window_manager.windows[0], {}
     for text, (x, y) in list(state["known"].items()):  # where it was seen before
         if all(word in text for word in words):
             window.cursor_warp(x, window.height - y)
-            yield
-            yield
+            for _ in range(3):
+                yield
             if under_mouse() == text:
                 return [x, y]
-    if top:
-        scroll(-100000)
-        yield
-    for _ in range(9):
-        region = place("UI")["region"]
-        for share in across:
-            x = region.x + round((region.width - 40) * share) + 8
-            last = None
-            for y in range(region.y + region.height - 16, region.y + 6, -15):
-                window.cursor_warp(x, y)
-                yield
-                text = under_mouse()
-                seen[text] = (x, window.height - y)
-                if text and all(word in text for word in words):
-                    for place_ in filter(None, ((x, y), last)):  # what is told may still be of the place before
-                        window.cursor_warp(*place_)
-                        for _ in range(3):
-                            yield
-                        if under_mouse() == text:
-                            seen[text] = (place_[0], window.height - place_[1])
-                            state["known"].update(seen)
-                            return list(seen[text])
-                last = x, y
-        before = region.view2d.region_to_view(0, 0)
-        scroll(region.height * 0.6)
-        for _ in range(25):  # a busy window takes its time
+    for whole in (False, True) if not top else (True,):
+        if whole:
+            scroll(-100000)
             yield
-            if place("UI")["region"].view2d.region_to_view(0, 0) != before:
+        for _ in range(12):
+            place_ = yield from look_over(words, across, seen)
+            if place_:
+                state["known"].update(seen)
+                return place_
+            if not (yield from next_page()):
                 break
-        else:
-            break
-        yield
     return {"seen": sorted(text for text in seen if text)}
+
+
+def look_over(words, across, seen):
+    """`find` on what the sidebar shows at the moment."""
+    window, region = bpy.context.window_manager.windows[0], place("UI")["region"]
+    for share in across:
+        x = region.x + round((region.width - 40) * share) + 8
+        for y in range(region.y + region.height - 16, region.y + 6, -15):
+            window.cursor_warp(x, y)
+            yield
+            yield
+            text = under_mouse()
+            seen[text] = (x, window.height - y)
+            if text and all(word in text for word in words):
+                for _ in range(2):
+                    yield
+                if under_mouse() == text:  # still there after what the mouse had Blender draw
+                    return list(seen[text])
+    return None
+
+
+def next_page():
+    """Scroll the sidebar on; whether there was anything to scroll to. A busy window takes its time."""
+    region = place("UI")["region"]
+    before = region.view2d.region_to_view(0, 0)
+    for _ in range(3):
+        scroll(region.height * 0.6)
+        for _ in range(8):
+            yield
+        if place("UI")["region"].view2d.region_to_view(0, 0) != before:
+            return True
+    return False
 
 
 def phase():

@@ -108,6 +108,14 @@ class Story:
         self.window.wait_for(f"{ACTIVE} is None", patience=self.patience)
         assert self.window.ask(f"{JOB}.state") == "done", self.window.ask(f"{JOB}.sentence")
 
+    def close_picture(self) -> None:
+        """Close the window that shows the two pictures."""
+        self.window.ask("""
+for extra in bpy.context.window_manager.windows[1:]:
+    with bpy.context.temp_override(window=extra):
+        bpy.ops.wm.window_close()
+""")
+
     def choose(self, row: int = 1) -> str:
         """Click on a row of the results; the chosen object's name."""
         x, y = self.window.ask("find(('scan_relight_row',), across=(0.3,))")

@@ -129,16 +129,19 @@ def test_a_lamp_goes_off_and_a_softbox_on(story, pictures, figures):
     figures["actions_to_a_relit_render"] = list(story.window.actions)
     assert len(story.window.actions) <= 6
     story.window.picture(pictures / "24-before-and-after.png")
+    story.close_picture()
 
 
 def test_this_is_metal_and_fitted_again(story, pictures):
     name = story.choose()
+    light = story.window.ask("[sum(one.type == 'LIGHT' for one in bpy.context.scene.objects), "
+                             f"all({LAMPS}.is_on(one) for one in {LAMPS}.find_lamps(bpy.context.scene))]")
     story.this_is_metal()
     thing = f"bpy.data.objects[{name!r}]"
     assert story.window.ask(f"{thing}.material_slots[0].material['scan_relight_model']") == "metal"
     assert story.window.ask("sum('object_id' in one for one in bpy.data.objects)") == 15
-    assert story.window.ask("sum(one.type == 'LIGHT' for one in bpy.context.scene.objects)") == 1
-    assert not story.window.ask(f"all({LAMPS}.is_on(one) for one in {LAMPS}.find_lamps(bpy.context.scene))")
+    assert story.window.ask("[sum(one.type == 'LIGHT' for one in bpy.context.scene.objects), "
+                            f"all({LAMPS}.is_on(one) for one in {LAMPS}.find_lamps(bpy.context.scene))]") == light
     story.window.picture(pictures / "25-metal.png")
 
 
