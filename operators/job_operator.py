@@ -92,6 +92,8 @@ class JobOperator:
 
     def modal(self, context, event):
         """One look at the job."""
+        if self._timer is None:  # it has ended, and a window that it opened has Blender ask once more
+            return {"FINISHED"}
         job = self.job
         if job is not jobs.current():  # another file was loaded
             return self._leave(context, {"CANCELLED"})

@@ -78,8 +78,7 @@ class Story:
 
     def finished(self) -> None:
         """Wait until the room is there."""
-        self.window.wait_for(f"{ACTIVE} is None", patience=self.patience)
-        assert self.window.ask(f"{JOB}.state") == "done", self.window.ask(f"{JOB}.sentence")
+        self.ended()
         self.window.wait_for(OWN_SCENES)
         self.window.ask("open_tab()")
 
@@ -105,8 +104,14 @@ class Story:
         """Before and after, rendered beside the window."""
         self.window.click("scan_relight.before_after(", top=False, across=(0.5,))
         self.window.wait_for(f"{ACTIVE} is not None")
+        self.ended()
+
+    def ended(self) -> None:
+        """Wait until a job's work is in the scene, and see that all went well."""
         self.window.wait_for(f"{ACTIVE} is None", patience=self.patience)
-        assert self.window.ask(f"{JOB}.state") == "done", self.window.ask(f"{JOB}.sentence")
+        time.sleep(0.5)
+        told = self.window.ask(f"[{JOB}.state, {JOB}.sentence, {JOB}.facts.get('failed')]")
+        assert told == ["done", "", None], told
 
     def close_picture(self) -> None:
         """Close the window that shows the two pictures."""
@@ -133,8 +138,7 @@ for extra in bpy.context.window_manager.windows[1:]:
         """Say that the active object is metal; it is fitted again at once."""
         self.window.click("scan_relight.this_is(", "'metal'", across=(0.25, 0.75))
         self.window.wait_for(f"{ACTIVE} is not None")
-        self.window.wait_for(f"{ACTIVE} is None", patience=self.patience)
-        assert self.window.ask(f"{JOB}.state") == "done", self.window.ask(f"{JOB}.sentence")
+        self.ended()
 
     def save_as(self, path: Path) -> None:
         """Save the file."""
