@@ -9,6 +9,7 @@ from ..addon.bridge import job as jobs
 from ..addon.console import unexpected
 from ..addon.core.errors import ScanRelightError
 from . import poll, results
+from .at_once import AtOnce
 from .job_operator import JobOperator
 
 
@@ -21,10 +22,11 @@ def chosen(context) -> list[bpy.types.Object]:
     return found
 
 
-class CorrectOperator:
+class CorrectOperator(AtOnce):
     """Changes recovered objects at once, in one undo step; `work` returns remarks."""
 
     bl_options = {"REGISTER", "UNDO"}
+    remarks = "INFO"
 
     @classmethod
     def poll(cls, context):
@@ -32,18 +34,9 @@ class CorrectOperator:
         return poll.has_scene(cls, context) and poll.object_mode(cls, context) and poll.check(
             cls, bool(chosen(context)), "Select a recovered object first.")
 
-    def execute(self, context):
-        """Do the work; every error that is foreseen becomes one sentence."""
-        try:
-            for sentence in self.work(context, chosen(context)) or ():
-                self.report({"INFO"}, sentence)
-        except ScanRelightError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        except Exception as error:  # the last line of defence: a sentence, never a bare traceback
-            self.report({"ERROR"}, unexpected(error, bpy.app.tempdir))
-            return {"CANCELLED"}
-        return {"FINISHED"}
+    def act(self, context):
+        """On what is selected."""
+        return self.work(context, chosen(context))
 
 
 class RefitOperator(JobOperator):

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import bpy
 
-from ..addon.console import unexpected
 from ..addon.core.capture import folder as folders
 from ..addon.core.errors import BadInputError, ScanRelightError
 from . import poll, room_window
+from .at_once import AtOnce
 from .panel import SidebarPanel
 from .settings_props import preset_items
 from .translations import OWN
@@ -200,7 +200,7 @@ class SCAN_RELIGHT_OT_use_folder(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class SCAN_RELIGHT_OT_open_result(bpy.types.Operator):
+class SCAN_RELIGHT_OT_open_result(AtOnce, bpy.types.Operator):
     """Bring a finished result in."""
 
     bl_idname = "scan_relight.open_result"
@@ -228,39 +228,24 @@ class SCAN_RELIGHT_OT_open_result(bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, context):
+    def work(self, context):
         """Bring it in, and show it in the panel."""
         folder = Path(bpy.path.abspath(self.folder or self.directory))
-        try:
-            if not (self.folder or self.directory):
-                raise BadInputError("Choose the folder of a finished result first.")
-            content = folders.of_path(folder)
-            if content.kind != folders.RESULT:
-                raise BadInputError(f"Folder '{folder.name}' holds no finished result; run the recovery to its end "
-                                    "first, or choose another.")
-            self.bring(context, content.folder)
-        except ScanRelightError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        except Exception as error:  # the last line of defence: a sentence, never a bare traceback
-            self.report({"ERROR"}, unexpected(error, bpy.app.tempdir))
-            return {"CANCELLED"}
-        return {"FINISHED"}
+        if not (self.folder or self.directory):
+            raise BadInputError("Choose the folder of a finished result first.")
+        content = folders.of_path(folder)
+        if content.kind != folders.RESULT:
+            raise BadInputError(f"Folder '{folder.name}' holds no finished result; run the recovery to its end "
+                                "first, or choose another.")
+        return self.bring(context, content.folder)
 
-    def bring(self, context, folder: Path) -> None:
-        """The room into this file; the panel of its scene is about this result."""
+    def bring(self, context, folder: Path) -> tuple[str, ...]:
+        """The room into this file; the panel of its scene is about this result. What is to be told of it."""
         from ..addon.bridge.room import bringing
+        from ..addon.bridge.slices import whole
 
-        slices = bringing(folder)
-        while True:
-            try:
-                next(slices)
-            except StopIteration as end:
-                brought = end.value
-                break
-        scene = getattr(brought, "scene", None) or context.scene
-        room_window.show(context.scene, scene)
-        scene.scan_relight.result_folder = str(folder)
-        for sentence in getattr(brought, "warnings", ()):
-            self.report({"WARNING"}, sentence)
+        brought = whole(bringing(folder))
+        room_window.show(context.scene, brought.scene)
+        brought.scene.scan_relight.result_folder = str(folder)
         show_tab(context)
+        return brought.warnings

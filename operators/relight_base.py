@@ -5,12 +5,11 @@ from __future__ import annotations
 import bpy
 
 from ..addon.bridge.marks import OBJECT_ID
-from ..addon.console import unexpected
-from ..addon.core.errors import ScanRelightError
 from . import poll
+from .at_once import AtOnce
 
 
-class RelightOperator:
+class RelightOperator(AtOnce):
     """Works in the scene at once, in one undo step; `work` returns warnings."""
 
     bl_options = {"REGISTER", "UNDO"}
@@ -22,19 +21,6 @@ class RelightOperator:
         return poll.has_scene(cls, context) and poll.object_mode(cls, context) and poll.check(
             cls, not cls.needs_room or has_room(context.scene),
             "The scene holds no scanned room yet; recover a capture or open a result's scene.blend.")
-
-    def execute(self, context):
-        """Do the work; every error that is foreseen becomes one sentence."""
-        try:
-            for sentence in self.work(context) or ():
-                self.report({"WARNING"}, sentence)
-        except ScanRelightError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        except Exception as error:  # the last line of defence: a sentence, never a bare traceback
-            self.report({"ERROR"}, unexpected(error, bpy.app.tempdir))
-            return {"CANCELLED"}
-        return {"FINISHED"}
 
 
 def has_room(scene: bpy.types.Scene) -> bool:
