@@ -14,7 +14,8 @@ def add_relight(commands, epilog: str) -> argparse.ArgumentParser:
     parser = commands.add_parser(
         "relight", help="render a result's scene under another light", epilog=epilog,
         description="Render RESULT/scene.blend with its lamps changed and new lights added. The scene is not changed. "
-                    "New lights take a strength, 1 if none is given, relative to the room's own light.")
+                    "New lights take a strength: a factor on the room's own light, 1 if none is given, or radiant "
+                    "watts or lumens, as in 20W or 800lm.")
     parser.add_argument("result", metavar="RESULT", type=Path, help="folder that 'recover' wrote")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="picture to write: .png, .jpg or .exr")
     light = parser.add_argument_group("light")
@@ -27,7 +28,10 @@ def add_relight(commands, epilog: str) -> argparse.ArgumentParser:
     light.add_argument("--hdri", metavar="FILE", type=Path, help="equirectangular picture to put around the room")
     for name, text in (("window", "a window's soft light from the side"), ("softbox", "a studio light by the camera"),
                        ("spot", "a spot from above"), ("sun", "a low, warm sun from the side")):
-        light.add_argument(f"--{name}", metavar="STRENGTH", type=positive, nargs="?", const=1.0, help=f"add {text}")
+        light.add_argument(f"--{name}", metavar="STRENGTH", type=strength, nargs="?", const=(1.0, "ROOM"),
+                           help=f"add {text}")
+    light.add_argument("--kelvin", metavar="KELVIN", type=positive,
+                       help="temperature of the new lights, 1700 to 20000 (default what suits each)")
     picture = parser.add_argument_group("picture")
     picture.add_argument("--camera", metavar="NUMBER|NAME", help="frame to look through, from 0 (default the first)")
     picture.add_argument("--before-after", action="store_true", help="the captured light beside the new one")
@@ -50,6 +54,17 @@ def positive(text: str) -> float:
     return value
 
 
+def strength(text: str) -> tuple[float, str]:
+    """A new light's strength and its unit: `0.5`, `20W` or `800lm`."""
+    for ending, unit in (("lm", "LUMEN"), ("w", "WATT"), ("", "ROOM")):
+        if text.lower().endswith(ending):
+            try:
+                return positive(text[:len(text) - len(ending)]), unit
+            except ValueError:
+                break
+    raise argparse.ArgumentTypeError(f"'{text}' is not a strength, such as 0.5, 20W or 800lm")
+
+
 def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`relight RESULT --out FILE`."""
     from .cli import console_run, need  # which imports this module
@@ -61,7 +76,8 @@ def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     command = need("relight_command")
     added = {kind: getattr(arguments, name) for name, kind in command.OPTIONS.items()
              if getattr(arguments, name) is not None}
-    light = command.Light(arguments.lamps, arguments.world, arguments.world_strength, arguments.hdri, added)
+    light = command.Light(arguments.lamps, arguments.world, arguments.world_strength, arguments.hdri, added,
+                          arguments.kelvin)
     with console_run(arguments, stream) as console:
         stages = ("before", "after") if arguments.before_after else ("after",)
         progress = Progress(weights=dict.fromkeys(stages, 1.0), **console)

@@ -10,6 +10,7 @@ from ..addon.core.naming import in_order
 from . import light_pictures
 from .panel import NamedRows, SidebarPanel, places
 from .relight_base import has_room
+from .relight_exposure import look_soon
 
 ICONS = {"WINDOW": "LIGHT_AREA", "SOFTBOX": "MESH_PLANE", "SPOT": "LIGHT_SPOT", "SUN": "LIGHT_SUN"}
 
@@ -149,13 +150,17 @@ class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):
         layout, studio = self.layout, context.scene.scan_relight_studio
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(studio, "aim")
-        layout.prop(studio, "strength")
+        layout.prop(studio, "unit")
+        field = {"ROOM": "strength", "WATT": "watts", "LUMEN": "lumens"}[studio.unit]
+        layout.prop(studio, field)
+        layout.prop(studio, "kelvin")
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
         for name, text, _ in light_pictures.PRESETS:
             cell = grid.column(align=True)
             cell.template_icon(icon_value=light_pictures.picture(name), scale=4.0)
             button = cell.operator("scan_relight.add_light", text=text, icon=ICONS[name])
-            button.preset, button.aim, button.strength = name, studio.aim, studio.strength
+            button.preset, button.aim, button.strength = name, studio.aim, getattr(studio, field)
+            button.unit, button.kelvin = studio.unit, studio.kelvin
         for light in relight_lights.added_lights(context.scene):
             row = layout.row(align=True)
             row.prop(light, "hide_render", text="", icon_only=True, emboss=False)
@@ -163,9 +168,10 @@ class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):
             colour = row.row(align=True)
             colour.scale_x = 0.8
             colour.prop(light.data, "temperature" if light.data.use_temperature else "color", text="")
-            row.prop(light.data, "energy", text="")
-        if relight_lights.added_lights(context.scene):
-            self.say(layout, context, "Colour in kelvin; strength in watts, a sun's in watts per square metre.")
+            if studio.unit == "LUMEN":
+                row.prop(light.data.scan_relight_light, "lumens", text="lx" if light.data.type == "SUN" else "lm")
+            else:
+                row.prop(light.data, "energy", text="W/m²" if light.data.type == "SUN" else "W")
         layout.operator("scan_relight.remove_lights", icon="TRASH")
         row = layout.row(align=True)
         row.menu("SCAN_RELIGHT_MT_light_presets", text="My Lights")
@@ -188,6 +194,7 @@ class SCAN_RELIGHT_PT_exposure(RelightPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("scan_relight.expose", icon="LIGHT_SUN")
         row.prop(scene.scan_relight_studio, "follow", toggle=True)
+        look_soon(scene)
         said = relight_exposure.darkness(scene)
         if said:
             self.say(layout, context, said, "INFO")

@@ -9,7 +9,7 @@ from . import poll
 from .light_pictures import PRESETS
 from .relight_base import RelightOperator
 from .relight_exposure import follow
-from .relight_props import AIMS
+from .relight_props import AIMS, UNITS
 from .select_result_object import make_active
 
 
@@ -42,6 +42,7 @@ class SCAN_RELIGHT_OT_restore_lamp(RelightOperator, bpy.types.Operator):
         """By its name."""
         for lamp in relight_lamps.lamp_named(context.scene, self.name):
             relight_lamps.restore(lamp)
+        follow(context.scene)
 
 
 class SCAN_RELIGHT_OT_restore_light(RelightOperator, bpy.types.Operator):
@@ -71,7 +72,9 @@ class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
 
     preset: bpy.props.EnumProperty(name="Light", description="What kind of light", items=PRESETS)
     strength: bpy.props.FloatProperty(
-        name="Strength", description="1 keeps the scene's exposure readable", min=0.0, soft_max=4.0, default=1.0)
+        name="Strength", description="In the unit below; of the room's light 1 keeps the scene's exposure readable",
+        min=0.0, soft_max=4.0, default=1.0)
+    unit: bpy.props.EnumProperty(name="Strength In", description="What the strength is given in", items=UNITS)
     kelvin: bpy.props.FloatProperty(
         name="Temperature", description="Of its colour; 0 takes the preset's own", subtype="TEMPERATURE", min=0.0,
         max=20000.0, default=0.0)
@@ -86,7 +89,7 @@ class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
     def work(self, context):
         """Add it and make it the active object."""
         light = relight_lights.add_light(context.scene, self.preset, self.strength, self.aim, context.object,
-                                         self.kelvin or None)
+                                         self.kelvin or None, self.unit)
         make_active(context, light)
         follow(context.scene)
 

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import time
+
 import bpy
 
-from ..addon.bridge import relight_exposure
+from ..addon.bridge import relight_estimate, relight_exposure
+from ..addon.core.errors import ScanRelightError
 from .relight_base import RelightOperator
+
+_REST, _SLICE = 0.2, 0.02
+"""Seconds that a slider stays still to count as let go; that looking takes of the window's time at once."""
+_looked: dict = {"run": None}
 
 
 class SCAN_RELIGHT_OT_expose(RelightOperator, bpy.types.Operator):
@@ -34,6 +41,46 @@ class SCAN_RELIGHT_OT_restore_exposure(RelightOperator, bpy.types.Operator):
 
 
 def follow(scene: bpy.types.Scene) -> None:
-    """After a change of the light: expose for it where that was asked for."""
+    """After a change of the light: expose for it, by an estimate, where that was asked for."""
     if scene.scan_relight_studio.follow and scene.camera is not None:
-        relight_exposure.expose(scene)
+        relight_exposure.follow(scene)
+
+
+def follow_soon() -> None:
+    """As `follow`, once the slider that is dragged has rested; at once without a window."""
+    if bpy.app.background:
+        follow(bpy.context.scene)
+        return
+    if bpy.app.timers.is_registered(_rested):
+        bpy.app.timers.unregister(_rested)
+    bpy.app.timers.register(_rested, first_interval=_REST)
+
+
+def _rested() -> None:
+    scene = bpy.context.scene
+    if hasattr(scene, "scan_relight_studio"):  # else the add-on is gone
+        follow(scene)
+
+
+def look_soon(scene: bpy.types.Scene) -> None:
+    """Have a panel know before long how bright the light is; it can be asked for by what draws."""
+    if _looked["run"] is None and not bpy.app.background and not relight_estimate.is_known(scene):
+        _looked["run"] = relight_estimate.looking(scene)
+        bpy.app.timers.register(_look, first_interval=_SLICE)
+
+
+def _look() -> float | None:
+    """A slice of looking; at its end the panels are drawn anew."""
+    until = time.perf_counter() + _SLICE
+    try:
+        for _ in _looked["run"]:
+            if time.perf_counter() > until:
+                return _SLICE
+    except (ReferenceError, KeyError, ScanRelightError):  # the room went meanwhile; the next drawing asks anew
+        pass
+    _looked["run"] = None
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+    return None

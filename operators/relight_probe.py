@@ -15,11 +15,19 @@ class SCAN_RELIGHT_OT_bake_preview(RelightOperator, bpy.types.Operator):
     bl_idname = "scan_relight.bake_preview"
     bl_label = "Bake Preview Light"
     bl_description = ("Bake how light bounces through the room for EEVEE, so that its preview is about as bright "
-                      "as the picture by Cycles; bake again after the light has changed")
+                      "as the picture by Cycles; bake again after the light has changed. The status bar shows how far "
+                      "it is, ESC ends it")
+
+    _wait = True
+
+    def invoke(self, context, event):
+        """From a button: the window stays alive meanwhile."""
+        self._wait = False
+        return self.execute(context)
 
     def work(self, context):
         """Renew the volume."""
-        relight_probe.bake(context.scene)
+        relight_probe.bake(context.scene, self._wait)
 
 
 class SCAN_RELIGHT_OT_remove_preview(RelightOperator, bpy.types.Operator):

@@ -6,12 +6,16 @@ The properties of lamps and outside hold nothing: they read and write what the b
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.bridge import match_frame, relight_lamps, relight_outside, relight_setup
+from ..addon.bridge import match_frame, relight_lamps, relight_outside, relight_setup, relight_units
 from ..addon.bridge.cameras import frame_cameras
 from ..addon.bridge.relight_kelvin import HIGHEST, LOWEST
 from .panel_results import active_row, choose_row
+from .relight_exposure import follow, follow_soon
 from .translations import OWN
 
+UNITS = (("ROOM", "Room's Light", "Relative to the light that the room was scanned in, so that the exposure can stay"),
+         ("WATT", "Watts", "Radiant power, as Blender's own lamps have it; a sun: for each square metre"),
+         ("LUMEN", "Lumens", "683 lm for each radiant watt of white light; a sun: lux"))
 AIMS = (("VIEW", "View", "What the middle of the camera's picture shows"),
         ("CURSOR", "3D Cursor", "Where the 3D cursor is"),
         ("OBJECT", "Object", "The active object"))
@@ -37,29 +41,46 @@ def _lamp(group):
     return group.id_data if relight_lamps.is_lamp(group.id_data) else None
 
 
+def _change(change, group, value) -> None:
+    """Change a lamp or the outside, and have the exposure follow; nothing where `change` is None."""
+    if change:
+        change(group.id_data, value)
+        follow_soon()
+
+
 class ScanRelightLamp(bpy.types.PropertyGroup):
     """`Material.scan_relight_lamp`."""
 
     on: bpy.props.BoolProperty(
         name="On", description="Whether this lamp shines",
         get=lambda self: bool(_lamp(self)) and relight_lamps.is_on(self.id_data),
-        set=lambda self, value: _lamp(self) and relight_lamps.set_on(self.id_data, value))
+        set=lambda self, value: _change(_lamp(self) and relight_lamps.set_on, self, value))
     factor: bpy.props.FloatProperty(
         name="Strength x", description="Times the radiance that the scan found; 1 is the lamp as captured",
         min=0.0, max=relight_lamps.MAX_FACTOR, soft_max=4.0, step=5, precision=2,
         get=lambda self: relight_lamps.factor(self.id_data),
-        set=lambda self, value: _lamp(self) and relight_lamps.set_factor(self.id_data, value))
+        set=lambda self, value: _change(_lamp(self) and relight_lamps.set_factor, self, value))
     colour: bpy.props.FloatVectorProperty(
         name="Colour", description="Colour of its light", subtype="COLOR", size=3, min=0.0, soft_max=1.0,
         get=lambda self: (_lamp(self) and relight_lamps.colour(self.id_data)) or (1.0, 1.0, 1.0),
-        set=lambda self, value: _lamp(self) and relight_lamps.set_colour(self.id_data, value))
+        set=lambda self, value: _change(_lamp(self) and relight_lamps.set_colour, self, value))
 
 
     kelvin: bpy.props.FloatProperty(
         name="Temperature", description="Colour of its light as a temperature, at the same luminance: 2700 a warm "
         "bulb, 6500 daylight", subtype="TEMPERATURE", min=LOWEST, max=HIGHEST, step=10000, precision=0,
         get=lambda self: relight_lamps.kelvin(self.id_data) if _lamp(self) else 6500.0,
-        set=lambda self, value: _lamp(self) and relight_lamps.set_kelvin(self.id_data, value))
+        set=lambda self, value: _change(_lamp(self) and relight_lamps.set_kelvin, self, value))
+
+
+class ScanRelightLight(bpy.types.PropertyGroup):
+    """`Light.scan_relight_light`: a lamp of Blender's in lumens."""
+
+    lumens: bpy.props.FloatProperty(
+        name="lm", description="Luminous flux in lumens, a sun's in lux: 683 for each radiant watt of white light",
+        min=0.0, soft_max=100000.0, step=1000, precision=0,
+        get=lambda self: relight_units.lumens(self.id_data),
+        set=lambda self, value: _change(relight_units.set_lumens, self, value))
 
 
 class ScanRelightOutside(bpy.types.PropertyGroup):
@@ -68,17 +89,17 @@ class ScanRelightOutside(bpy.types.PropertyGroup):
     on: bpy.props.BoolProperty(
         name="Light from Outside", description="Whether light comes in from outside the scanned room",
         get=lambda self: relight_outside.is_on(self.id_data),
-        set=lambda self, value: relight_outside.set_on(self.id_data, value))
+        set=lambda self, value: _change(relight_outside.set_on, self, value))
     factor: bpy.props.FloatProperty(
         name="Strength", description="Times the light from outside that was recovered, or the picture's",
         min=0.0, max=relight_outside.MAX_FACTOR, soft_max=4.0, step=5, precision=2,
         get=lambda self: relight_outside.factor(self.id_data),
-        set=lambda self, value: relight_outside.set_factor(self.id_data, value))
+        set=lambda self, value: _change(relight_outside.set_factor, self, value))
     rotation: bpy.props.FloatProperty(
         name="Rotation", description="Turns the outside about the vertical, anticlockwise from above", subtype="ANGLE",
         soft_min=-3.141593, soft_max=3.141593, step=100,
         get=lambda self: relight_outside.rotation(self.id_data),
-        set=lambda self, value: relight_outside.set_rotation(self.id_data, value))
+        set=lambda self, value: _change(relight_outside.set_rotation, self, value))
 
 
 def look_through(studio, index: int, size: bool = False) -> str:
@@ -120,16 +141,26 @@ class ScanRelightStudio(bpy.types.PropertyGroup):
         name="Opacity", description="Of the frame's picture", min=0.0, max=1.0, default=1.0, subtype="FACTOR",
         update=_frame_changed)
     follow: bpy.props.BoolProperty(
-        name="Follow", description="Measure anew and expose after each light that is switched, added or removed here; "
-        "takes some seconds each time", default=False)
+        name="Follow", description="Set the exposure after each change of the light here, by an estimate, good to "
+        "about a stop; nothing is rendered", default=False, update=lambda self, context: follow(self.id_data))
     setup: bpy.props.StringProperty(
         name="Set-Up", description="The present light as a preset keeps it", options={"SKIP_SAVE"},
         get=lambda self: relight_setup.setup_of(self.id_data),
         set=lambda self, text: relight_setup.apply_setup(self.id_data, text))
     aim: bpy.props.EnumProperty(name="Aim At", description="What a new light is aimed at", items=AIMS)
+    unit: bpy.props.EnumProperty(name="Strength In", description="What a new light's strength is given in", items=UNITS)
     strength: bpy.props.FloatProperty(
-        name="Strength", description="Of a new light; 1 keeps the scene's exposure readable", min=0.0, soft_max=4.0,
-        default=1.0, step=5, precision=2)
+        name="Strength x", description="Of a new light, times what keeps the scene's exposure readable", min=0.0,
+        soft_max=4.0, default=1.0, step=5, precision=2)
+    watts: bpy.props.FloatProperty(
+        name="Power", description="Radiant power of a new light, as Blender's own lamps have it; of a sun for each "
+        "square metre", subtype="POWER", unit="POWER", min=0.0, soft_max=1000.0, default=10.0)
+    lumens: bpy.props.FloatProperty(
+        name="Lumens (lm)", description="Luminous flux of a new light: 683 lm for each radiant watt of white; of a sun "
+        "in lux", min=0.0, soft_max=100000.0, default=800.0, step=1000, precision=0)
+    kelvin: bpy.props.FloatProperty(
+        name="Temperature", description="Colour of a new light: 2700 a warm bulb, 6500 daylight; 0 takes what suits "
+        "its kind", subtype="TEMPERATURE", min=0.0, max=HIGHEST, default=0.0, step=10000, precision=0)
     place: bpy.props.EnumProperty(name="Place", description="Where an object is set down", items=PLACES)
     shape: SHAPE
     look: LOOK

@@ -27,7 +27,8 @@ def own(*modules) -> tuple[type, ...]:
 
 def relight_groups() -> tuple[type, ...]:
     """Property groups."""
-    return relight_props.ScanRelightLamp, relight_props.ScanRelightOutside, relight_props.ScanRelightStudio
+    return (relight_props.ScanRelightLamp, relight_props.ScanRelightLight, relight_props.ScanRelightOutside,
+            relight_props.ScanRelightStudio)
 
 
 def relight_operators() -> tuple[type, ...]:
@@ -44,5 +45,6 @@ def relight_panels() -> tuple[type, ...]:
 def relight_pointers() -> tuple[tuple[type, str, type], ...]:
     """Blender type, name and property group."""
     return ((bpy.types.Material, "scan_relight_lamp", relight_props.ScanRelightLamp),
+            (bpy.types.Light, "scan_relight_light", relight_props.ScanRelightLight),
             (bpy.types.World, "scan_relight_outside", relight_props.ScanRelightOutside),
             (bpy.types.Scene, "scan_relight_studio", relight_props.ScanRelightStudio))

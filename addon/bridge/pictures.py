@@ -21,6 +21,8 @@ from .images import image_array
 FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32"), ".jpg": ("JPEG", "8"), ".jpeg": ("JPEG", "8")}
 """By ending: Blender's name of the format and its depth."""
 CYCLES, EEVEE = "CYCLES", "EEVEE"
+_SLOT = "Scan Relight"
+"""Name of the slot of Blender's Render Result for pictures that only measure something."""
 _RENDER = ("engine", "filepath", "resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x",
            "pixel_aspect_y", "use_border", "use_file_extension", "use_compositing", "use_sequencer",
            "use_overwrite", "use_placeholder", "film_transparent")
@@ -61,6 +63,29 @@ def settings_kept(scene: bpy.types.Scene) -> Iterator[None]:
         if eevee is not None:
             scene.eevee.taa_render_samples = eevee
         scene.camera = camera
+
+
+@contextmanager
+def result_kept() -> Iterator[None]:
+    """Within: what is rendered goes into a slot of its own, so that the artist's Render Result stays."""
+    slots = _render_slots()
+    shown = slots.active_index if slots is not None else 0
+    if slots is not None:
+        if _SLOT not in [slot.name for slot in slots]:
+            slots.new(name=_SLOT)
+        slots.active_index = [slot.name for slot in slots].index(_SLOT)
+    try:
+        yield
+    finally:
+        slots = _render_slots()
+        if slots is not None and shown < len(slots):
+            slots.active_index = shown
+
+
+def _render_slots():
+    """The slots of the Render Result; None before anything was rendered."""
+    image = next((one for one in bpy.data.images if one.type == "RENDER_RESULT"), None)
+    return image.render_slots if image is not None else None
 
 
 def prepare(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 0, percentage: int = 0) -> None:

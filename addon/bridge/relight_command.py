@@ -15,6 +15,7 @@ from .before_after import COPY as SCENE
 from .before_after import render_pair
 from .cameras import frame_cameras, use_camera
 from .pictures import CYCLES, check_format, prepare, seconds_expected, settings_kept, shoot, ticking
+from .relight_kelvin import rgb_of
 from .relight_lights import SOFTBOX, SPOT, SUN, WINDOW, add_light
 from .render_device import use_device
 
@@ -32,15 +33,18 @@ class Light:
     world_strength : float or None
     hdri : Path or None
         Picture to put around the room.
-    added : dict of str to float
-        Strength of each new light, by `relight_lights.PRESETS`.
+    added : dict of str to (float, str)
+        Strength of each new light and its unit (`relight_units.UNITS`), by `relight_lights.PRESETS`.
+    kelvin : float or None
+        Temperature of the new lights; None: what suits each.
     """
 
     lamps: str | None = None
     world: str | None = None
     world_strength: float | None = None
     hdri: Path | None = None
-    added: dict[str, float] = field(default_factory=dict)
+    added: dict[str, tuple[float, str]] = field(default_factory=dict)
+    kelvin: float | None = None
 
 
 def relight(result: Path, light: Light, out: Path, camera: str | None = None, samples: int = 0,
@@ -124,6 +128,8 @@ def scene_named(name: str | None) -> bpy.types.Scene:
 
 def apply_light(scene: bpy.types.Scene, light: Light) -> list[str]:
     """Change a scene's light; returns remarks, raises `BadInputError` where something is unknown."""
+    if light.kelvin is not None:
+        rgb_of(light.kelvin)  # which raises where there is no such temperature
     if light.lamps is not None:
         set_lamps(scene, light.lamps)
     if light.hdri is not None:
@@ -135,8 +141,8 @@ def apply_light(scene: bpy.types.Scene, light: Light) -> list[str]:
             relight_outside.set_rotation(scene.world, math.radians(turn))
     if scene.world is not None and light.world_strength is not None:
         relight_outside.set_factor(scene.world, light.world_strength)
-    for preset, strength in light.added.items():
-        add_light(scene, preset, strength)
+    for preset, (strength, unit) in light.added.items():
+        add_light(scene, preset, strength, kelvin=light.kelvin, unit=unit)
     return relight_outside.remarks(scene) if light.hdri is not None else []
 
 

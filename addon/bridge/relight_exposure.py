@@ -13,8 +13,10 @@ import bpy
 import numpy as np
 
 from ..core.errors import BadInputError
-from .pictures import prepare, settings_kept, shoot
+from . import relight_estimate
+from .pictures import prepare, result_kept, settings_kept, shoot
 from .relight_kelvin import LUMINANCE
+from .room_scene import EXPOSURE
 
 CAPTURED = "scan_relight_captured_exposure"
 """Custom property of a scene: its exposure before ours, in stops."""
@@ -38,7 +40,7 @@ def measure(scene: bpy.types.Scene) -> float:
 
     if scene.camera is None:
         raise BadInputError("The scene has no camera to measure the light through; choose a frame first.")
-    with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, settings_kept(scene):
+    with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, result_kept(), settings_kept(scene):
         prepare(scene, samples=_SAMPLES)
         render = scene.render
         render.resolution_y = max(round(_WIDTH * render.resolution_y / render.resolution_x), 8)
@@ -71,13 +73,42 @@ def restore(scene: bpy.types.Scene) -> None:
         del scene[ASKED]
 
 
+def captured_exposure(scene: bpy.types.Scene) -> float:
+    """The exposure in stops that shows the captured light: the room's own, else what it was before `expose`."""
+    return float(scene.get(EXPOSURE, scene.get(CAPTURED, scene.view_settings.exposure)))
+
+
+def follow(scene: bpy.types.Scene) -> None:
+    """Set the exposure to what the light asks for by `relight_estimate`: no picture is rendered, none is lost.
+
+    Without effect where nothing can be estimated: no camera, no light.
+    """
+    stops = relight_estimate.estimate(scene)
+    if stops is None or stops == relight_estimate.NO_LIGHT:
+        return
+    captured = captured_exposure(scene)
+    if CAPTURED not in scene:
+        scene[CAPTURED] = scene.view_settings.exposure
+    scene.view_settings.exposure = min(max(captured - stops, -_MOST), _MOST)
+    if ASKED in scene:
+        del scene[ASKED]  # of another light
+
+
 def darkness(scene: bpy.types.Scene) -> str:
-    """A sentence where the last measured light is much darker or brighter than the exposure shows; '' else."""
-    if ASKED not in scene:
+    """A sentence where the picture is much darker or brighter than the captured one was; '' else, or if unknown.
+
+    By `relight_estimate.stops`, which renders nothing.
+    """
+    stops = relight_estimate.stops(scene)
+    if stops is None:
         return ""
-    stops = scene[ASKED] - scene.view_settings.exposure
+    if stops == relight_estimate.NO_LIGHT:
+        return "No light is on that reaches what the camera looks at."
+    raised = scene.view_settings.exposure - captured_exposure(scene)
+    if abs(stops + raised) < 0.5:
+        return ""
+    light = f"about {abs(stops):.1f} stops {'darker' if stops < 0 else 'brighter'} than captured"
     if abs(stops) < 0.5:
-        return ""
-    how = "darker" if stops > 0 else "brighter"
-    kept = "as captured" if CAPTURED not in scene else "as it was set"
-    return f"The light is {abs(stops):.1f} stops {how} than the exposure asks for; the exposure is {kept}."
+        light = "about as captured"
+    exposure = "as captured" if abs(raised) < 0.05 else f"{abs(raised):.1f} stops {'up' if raised > 0 else 'down'}"
+    return f"The light is {light}; exposure is {exposure}."

@@ -134,8 +134,12 @@ def is_changed(material: bpy.types.Material) -> bool:
     """Whether a lamp differs from what was recovered."""
     if _STRENGTH not in material:
         return False
-    return not is_on(material) or factor(material) != 1 or (
-        _COLOUR in material and tuple(material[_COLOUR]) != colour(material))
+    return not is_on(material) or factor(material) != 1 or is_coloured(material)
+
+
+def is_coloured(material: bpy.types.Material) -> bool:
+    """Whether a lamp's colour is another one than was recovered."""
+    return _COLOUR in material and tuple(material[_COLOUR]) != colour(material)
 
 
 def restore(material: bpy.types.Material) -> None:

@@ -25,6 +25,7 @@ from .own_collection import own_collection
 from .relight_aim import Placement, softbox_place, spot_place, sun_place, window_place
 from .relight_room import room_light
 from .relight_subject import Subject, side_of, subject_of
+from .relight_units import ROOM, UNITS, set_strength
 
 KIND = "scan_relight_light"
 """Custom property of a light that was added here: which of `PRESETS`."""
@@ -45,7 +46,7 @@ _BEAM = math.radians(12.0)
 
 def add_light(scene: bpy.types.Scene, preset: str, strength: float = 1.0, aim: str = "VIEW",
               thing: bpy.types.Object | None = None,
-              kelvin: float | None = None) -> bpy.types.Object:
+              kelvin: float | None = None, unit: str = ROOM) -> bpy.types.Object:
     """Add a light within the room, aimed at what is looked at.
 
     Parameters
@@ -54,26 +55,32 @@ def add_light(scene: bpy.types.Scene, preset: str, strength: float = 1.0, aim: s
     preset : str
         One of `PRESETS`.
     strength : float
-        1 keeps the exposure readable; a factor on the light that falls on the target.
+        In `unit`.
     aim : str
         See `relight_room.target_of`.
     thing : bpy.types.Object, optional
         What `aim` = "OBJECT" means.
     kelvin : float, optional
         Temperature of its colour; by default the preset's in `KELVIN`.
+    unit : str
+        Of `relight_units.UNITS`; `ROOM`: a factor on the light that falls on the target, 1 keeps the exposure readable.
 
     Raises
     ------
     BadInputError
-        No such preset, no room in the scene, or no object to aim at.
+        No such preset or unit, no room in the scene, or no object to aim at.
     """
     if preset not in PRESETS:
         raise BadInputError(f"There is no light '{preset}'; choose one of {', '.join(PRESETS)}.")
+    if unit not in UNITS:
+        raise BadInputError(f"There is no unit '{unit}'; choose one of {', '.join(UNITS)}.")
     subject = subject_of(scene, aim, thing)
     place = _PLACES[preset](scene, subject)
-    irradiance = room_light(scene) * _STRONGER[preset] * strength
+    irradiance = room_light(scene) * _STRONGER[preset] * (strength if unit == ROOM else 1.0)
     data = _lamp(preset, place, (subject.target - place.origin).length, irradiance, subject.radius)
     data.temperature = kelvin or KELVIN[preset]
+    if unit != ROOM:
+        set_strength(data, strength, unit)
     data.name = _name(scene, preset, subject, place)
     light = bpy.data.objects.new(data.name, data)
     light.matrix_world = Matrix.LocRotScale(place.origin, place.rotation, None)

@@ -166,6 +166,17 @@ def is_changed(scene: bpy.types.Scene) -> bool:
         not is_on(world) or factor(world) != 1 or rotation(world) != 0)
 
 
+def strength(world: bpy.types.World | None) -> float:
+    """What the world's picture or colour is multiplied by now; 0 without a world."""
+    node = _background(world)
+    return 0.0 if node is None else float(node.inputs["Strength"].default_value)
+
+
+def recovered_strength(world: bpy.types.World | None) -> float:
+    """`strength` as it was recovered."""
+    return float(world[_KEPT]) if world is not None and _KEPT in world else strength(world)
+
+
 def usual_radiance(scene: bpy.types.Scene) -> float:
     """Mean radiance that a picture around this room is scaled to, in the frames' unit."""
     return _BRIGHTER * room_light(scene) / math.pi

@@ -1,6 +1,9 @@
 """Light probes for EEVEE: the room's indirect light baked into a volume, so that a preview is as bright as the picture.
 
-EEVEE knows of no light that bounces between surfaces, nor of what shines and is no lamp, unless it is baked.
+EEVEE knows of no light that bounces between surfaces, nor of what shines and is no lamp, unless it is baked. Measured
+in Blender 5.2 (median luminance beside that of Cycles): the demo's small room 2.4 stops darker before and 0.6 after,
+the living room 0.4 stops brighter. What matters is that the volume goes beyond the walls, whose light it else mixes
+with the world's, and that the walls' backs count as such; more samples or surfels change little.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from mathutils import Matrix
 from ..core.errors import BadInputError, ScanRelightError
 from .own_collection import own_collection
 from .pictures import EEVEE, prepare, settings_kept, shoot
-from .relight_room import bounds
+from .relight_room import bounds, room_objects
 
 COLLECTION = "Preview Light"
 PROBE = "scan_relight_probe"
@@ -23,6 +26,8 @@ PROBE = "scan_relight_probe"
 _NO_CARD = "EEVEE has no graphics card to bake the preview's light on here; use a Blender with a window, or Cycles."
 _STEP, _MOST = 0.3, 24
 """Metres between two places where the light is kept, and how many of them a side has at most."""
+_BEYOND = 0.4
+"""Metres by which the volume goes beyond the room: at its rim it fades into the world, whose light is no wall's."""
 
 
 def probes(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -36,7 +41,7 @@ def add_volume(scene: bpy.types.Scene) -> bpy.types.Object:
     remove(scene)
     data = bpy.data.lightprobes.new("Preview light", "VOLUME")
     thing = bpy.data.objects.new("Preview light", data)
-    half = [max((high[k] - low[k]) / 2 * 1.02, 0.1) for k in range(3)]
+    half = [(high[k] - low[k]) / 2 + _BEYOND for k in range(3)]
     thing.matrix_world = Matrix.LocRotScale((low + high) / 2, None, half)
     for axis, extent in zip("xyz", half, strict=True):
         setattr(data, f"resolution_{axis}", min(max(math.ceil(2 * extent / _STEP), 3), _MOST))
@@ -53,8 +58,14 @@ def prepare_eevee(scene: bpy.types.Scene) -> None:
          clamp_surface_indirect=0.0, gi_irradiance_pool_size="64")
 
 
-def bake(scene: bpy.types.Scene) -> bpy.types.Object:
-    """Bake the room's light, at once.
+def bake(scene: bpy.types.Scene, wait: bool = True) -> bpy.types.Object:
+    """Bake the room's light.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    wait : bool
+        Return when it is done; else, in a window, Blender bakes on, with a bar in its status line, and ESC ends that.
 
     Raises
     ------
@@ -67,11 +78,15 @@ def bake(scene: bpy.types.Scene) -> bpy.types.Object:
         _try_eevee(scene)
     thing = add_volume(scene)
     prepare_eevee(scene)
+    for material in {slot.material for one in room_objects(scene) for slot in one.material_slots if slot.material}:
+        # Places behind a wall count as within it then: they lend the wall neither the night nor the sun outside.
+        material.use_backface_culling_lightprobe_volume = True
     layer = bpy.context.view_layer
     layer.update()
     active, layer.objects.active = layer.objects.active, thing
     try:
-        done = bpy.ops.object.lightprobe_cache_bake(subset="ACTIVE") == {"FINISHED"}
+        done = bpy.ops.object.lightprobe_cache_bake(
+            "EXEC_DEFAULT" if wait else "INVOKE_DEFAULT", subset="ACTIVE") <= {"FINISHED", "RUNNING_MODAL"}
         reason = ""
     except RuntimeError as error:
         done, reason = False, " ".join(str(error).split()).removeprefix("Error: ").rstrip(".")
@@ -79,7 +94,7 @@ def bake(scene: bpy.types.Scene) -> bpy.types.Object:
         layer.objects.active = active
     if not done:
         remove(scene)
-        raise BadInputError(f"{_NO_CARD[:-1]} ({reason})." if reason else _NO_CARD)
+        raise BadInputError(f"Blender can't bake the preview's light here: {reason}." if reason else _NO_CARD)
     return thing
 
 

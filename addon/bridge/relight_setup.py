@@ -1,7 +1,7 @@
 """A set-up of light as text, so that it can be kept as a preset and used in another room.
 
-New lights are kept as seen by the camera, in units of the room's size and of its own light; lamps by their class; the
-outside by its factor and turn.
+New lights are kept as seen by the camera, in units of the room's size and of its own light; lamps by their class, with
+the colour that the artist gave them; the outside by its factor and turn, a picture around the room by its path.
 """
 
 from __future__ import annotations
@@ -41,16 +41,24 @@ def setup_of(scene: bpy.types.Scene) -> str:
     lamps = {}
     for lamp in relight_lamps.find_lamps(scene):
         if relight_lamps.is_changed(lamp):
-            lamps[_class(lamp)] = [relight_lamps.is_on(lamp), relight_lamps.factor(lamp)]
+            # Its colour only where it is the artist's: another room's lamps have colours of their own.
+            tint = relight_lamps.colour(lamp) if relight_lamps.is_coloured(lamp) else None
+            lamps[_class(lamp)] = [relight_lamps.is_on(lamp), relight_lamps.factor(lamp), tint]
     world = scene.world
     outside = None if world is None else [relight_outside.is_on(world), relight_outside.factor(world),
                                           relight_outside.rotation(world)]
     dark = not any(map(relight_lamps.is_on, relight_lamps.find_lamps(scene)))
-    return json.dumps({"lights": lights, "lamps": lamps, "dark": dark, "outside": outside})
+    return json.dumps({"lights": lights, "lamps": lamps, "dark": dark, "outside": outside,
+                       "picture": world.get(relight_outside.HDRI) if world is not None else None})
 
 
-def apply_setup(scene: bpy.types.Scene, text: str) -> None:
+def apply_setup(scene: bpy.types.Scene, text: str) -> list[str]:
     """Light a scene as `setup_of` told; its new lights are replaced, lamps of unknown classes are as captured.
+
+    Returns
+    -------
+    list of str
+        One sentence where the picture around the room is gone: the recovered outside shines then.
 
     Raises
     ------
@@ -61,9 +69,10 @@ def apply_setup(scene: bpy.types.Scene, text: str) -> None:
         told = json.loads(text)
         lights, lamps, outside = told["lights"], dict(told["lamps"]), told["outside"]
         poses = [Matrix(one["pose"]) for one in lights]
+        states = {name: (bool(one[0]), float(one[1]), one[2] if len(one) > 2 else None) for name, one in lamps.items()}
         known = all(math.isfinite(c) for pose in poses for row in pose for c in row) and all(
             one["kind"] in PRESETS and one["type"] in ("AREA", "SPOT", "SUN", "POINT") for one in lights)
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, IndexError):
         known = False
     if not known:
         raise BadInputError("This preset holds no light that was saved here; save it anew.")
@@ -88,14 +97,30 @@ def apply_setup(scene: bpy.types.Scene, text: str) -> None:
         own_collection(scene, COLLECTION).objects.link(thing)
     for lamp in relight_lamps.find_lamps(scene):
         relight_lamps.restore(lamp)
-        on, factor = lamps.get(_class(lamp), (not told.get("dark"), 1.0))
+        on, factor, tint = states.get(_class(lamp), (not told.get("dark"), 1.0, None))
+        if tint is not None:
+            relight_lamps.set_colour(lamp, tint)
         if not on or factor != 1.0:
             relight_lamps.set_factor(lamp, factor)
             relight_lamps.set_on(lamp, on)
+    remarks = _put_picture(scene, told.get("picture"))
     if outside is not None and scene.world is not None:
         relight_outside.set_on(scene.world, outside[0])
         relight_outside.set_factor(scene.world, outside[1])
         relight_outside.set_rotation(scene.world, outside[2])
+    return remarks
+
+
+def _put_picture(scene, picture: str | None) -> list[str]:
+    """Put a picture around the room, or the recovered outside; returns what there is to say."""
+    relight_outside.restore(scene)
+    if not picture:
+        return []
+    try:
+        relight_outside.use_hdri(scene, picture, relight_outside.usual_radiance(scene))
+    except BadInputError:
+        return [f"The picture around the room, '{picture}', is gone; the recovered outside shines instead."]
+    return relight_outside.remarks(scene)
 
 
 def _frame(scene) -> Matrix:

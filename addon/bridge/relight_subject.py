@@ -13,8 +13,10 @@ from .marks import OBJECT_ID
 from .relight_room import CURSOR, OBJECT, Hit, bounds, cast, picture_ray, target_of, view_direction
 
 _GRID = 11
-_THING = 0.08
+_THING = 0.05
 """Weighted share of the picture from which on a single thing is what the picture is of."""
+_STANDS_OUT = 0.3, 0.1
+"""Metres by which a thing stands out from the walls, and from the floor, if it is more than a part of them."""
 
 
 @dataclass(frozen=True)
@@ -93,18 +95,27 @@ def _seen(scene) -> tuple[list[Hit], np.ndarray]:
 
 
 def _shell(scene) -> set[str]:
-    """Names of the scanned objects that make up the room itself: as wide as most of it, or above one's head."""
-    low, high = bounds(scene)
-    extent = high - low
-    found = set()
-    for thing in scene.objects:
-        if OBJECT_ID not in thing or thing.type != "MESH":
-            continue
-        corners = np.array([thing.matrix_world @ Vector(corner) for corner in thing.bound_box])
-        size = np.ptp(corners, axis=0)
-        if sum(size[k] > 0.6 * extent[k] for k in range(3)) > 1 or corners[:, 2].min() > low.z + 0.85 * extent.z:
-            found.add(thing.name)
-    return found
+    """Names of the scanned objects that make up the room itself.
+
+    As wide as most of it, above one's head, or all within a hand's breadth of its walls or its floor, as panels,
+    doors and cupboards in an alcove are.
+    """
+    low, high = (np.array(one) for one in bounds(scene))
+    boxes = {thing.name: np.array([thing.matrix_world @ Vector(corner) for corner in thing.bound_box])
+             for thing in scene.objects if OBJECT_ID in thing and thing.type == "MESH"}
+    boxes = {name: (corners.min(0), corners.max(0)) for name, corners in boxes.items()}
+    around = {name for name, (least, most) in boxes.items() if sum(most - least > 0.6 * (high - low)) > 1}
+    upright = [box for box in boxes.values() if all(box[1] - box[0] > 0.6 * (high - low))]  # walls all around
+    # What lies behind the walls, as alcoves and panes do, widens the room's bounds: the walls' own are narrower.
+    inner, outer = (np.maximum.reduce([box[0] for box in upright]), np.minimum.reduce([box[1] for box in upright])) \
+        if upright else (low, high)
+    wall, floor = min(_STANDS_OUT[0], 0.1 * min((high - low)[:2])), min(_STANDS_OUT[1], 0.1 * (high - low)[2])
+
+    def is_part(least: np.ndarray, most: np.ndarray) -> bool:
+        out = min(*(most - inner)[:2], *(outer - least)[:2])
+        return out < wall or most[2] - low[2] < floor or least[2] > low[2] + 0.85 * (high - low)[2]
+
+    return around | {name for name, (least, most) in boxes.items() if is_part(least, most)}
 
 
 def side_of(scene: bpy.types.Scene, target: Vector, place: Vector) -> str:

@@ -89,7 +89,9 @@ class Window:
         self.folder, self._blender, self._count, self.actions = folder, blender, 0, []
         self._screen = screen.name
         self._environment = dict(
-            environment(user), DISPLAY=screen.name, LIBGL_ALWAYS_SOFTWARE="1", XDG_RUNTIME_DIR=str(folder))
+            environment(user), DISPLAY=screen.name, LIBGL_ALWAYS_SOFTWARE="1", XDG_RUNTIME_DIR=str(folder),
+            # Mesa's software says that a card has no memory left; Blender would bake nothing on such a one.
+            MESA_EXTENSION_OVERRIDE="-GL_NVX_gpu_memory_info -GL_ATI_meminfo")
         folder.chmod(0o700)
         self._log = open(folder / "blender.log", "wb")
         self.process = subprocess.Popen(

@@ -123,6 +123,24 @@ def test_its_name_says_what_it_does(scene):
     assert side_of(scene, Vector((0, 1, 0.5)), Vector((0.1, 0.9, 2.5))) == "above"
 
 
+def test_a_panel_on_the_wall_is_no_subject(scene):
+    """A panel fills the picture's middle, and of a stool only a little is seen: the light is for the stool."""
+    sheet(scene, "floor", 4, (0, 0, 0))
+    for number, (place, turn) in enumerate((((0, 2, 1), (math.pi / 2, 0, 0)), ((2, 0, 1), (0, -math.pi / 2, 0)),
+                                            ((-2, 0, 1), (0, math.pi / 2, 0)), ((0, -2, 1), (-math.pi / 2, 0, 0))), 1):
+        sheet(scene, f"wall {number}", 4, place, turn, number)
+    sheet(scene, "panel 5", 2.5, (0, 1.9, 1.3), (math.pi / 2, 0, 0), 5)
+    bpy.ops.mesh.primitive_cube_add(size=0.7, location=(0.5, 0.6, 0.35))
+    stool = bpy.context.object
+    stool.name, stool["object_id"] = "stool 6", 6
+    scene.camera = camera(scene, (0, -1.8, 1.2), Vector((0, 1, -0.1)))
+    bpy.context.view_layer.update()
+    assert subject_of(scene, "VIEW").name == "stool 6"
+    stool.hide_set(True)
+    bpy.context.view_layer.update()
+    assert subject_of(scene, "VIEW").name == ""
+
+
 def test_strength_is_relative_to_the_rooms_own_light(room):
     one, two = (lights.add_light(room, "SOFTBOX", strength) for strength in (1.0, 2.0))
     assert two.data.energy == pytest.approx(2 * one.data.energy, rel=1e-5)
