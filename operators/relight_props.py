@@ -77,7 +77,7 @@ class ScanRelightLight(bpy.types.PropertyGroup):
     """`Light.scan_relight_light`: a lamp of Blender's in lumens."""
 
     lumens: bpy.props.FloatProperty(
-        name="lm", description="Luminous flux in lumens, a sun's in lux: 683 for each radiant watt of white light",
+        name="Lumens", description="Luminous flux in lumens, a sun's in lux: 683 for each radiant watt of white light",
         min=0.0, soft_max=100000.0, step=1000, precision=0,
         get=lambda self: relight_units.lumens(self.id_data),
         set=lambda self, value: _change(relight_units.set_lumens, self, value))
@@ -156,7 +156,7 @@ class ScanRelightStudio(bpy.types.PropertyGroup):
         name="Power", description="Radiant power of a new light, as Blender's own lamps have it; of a sun for each "
         "square metre", subtype="POWER", unit="POWER", min=0.0, soft_max=1000.0, default=10.0)
     lumens: bpy.props.FloatProperty(
-        name="Lumens (lm)", description="Luminous flux of a new light: 683 lm for each radiant watt of white; of a sun "
+        name="Lumens", description="Luminous flux of a new light: 683 lm for each radiant watt of white; of a sun "
         "in lux", min=0.0, soft_max=100000.0, default=800.0, step=1000, precision=0)
     kelvin: bpy.props.FloatProperty(
         name="Temperature", description="Colour of a new light: 2700 a warm bulb, 6500 daylight; 0 takes what suits "
