@@ -3,8 +3,8 @@
     BLENDER=... .venv/bin/python scripts/guide_pictures.py CAPTURE --zip dist/scan_relight-...zip [--home FOLDER]
 
 CAPTURE is dragged in under its own path, which the pictures show. The home folder of the artist, with the result and
-the saved room.blend, is a temporary one unless given. Whole pictures go to build/guide, those of docs/guide.md, cut to
-what the text speaks of, to docs/images/guide. The count of what the hand did is printed.
+the files recovered.blend, relit.blend and room.blend, is temporary unless given. Whole pictures go to build/guide,
+those of docs/guide.md, cut to what the text speaks of, to docs/images/guide. The count of what the hand did is printed.
 
 Only two things differ from what a reader does: buttons are looked for in Solid shading, as the search moves the mouse
 over every one of them, and a picture is taken once the Rendered viewport has had time.
@@ -31,10 +31,10 @@ from tests.window.story import ACTIVE, JOB, Story  # noqa: E402
 
 SIZE = 1360, 1240
 """Most of the sidebar at once."""
-VIEW, SIDE = (0, 0, 1120, 1130), (840, 60, 1120, 1130)
-"""What is left of the properties, and the sidebar."""
-PARTS = {"install": (0, 0, 1120, 860), "drag": (0, 0, 1120, 900), "progress": SIDE, "recovered": VIEW, "results": SIDE,
-         "relit": VIEW, "light": SIDE, "metal": VIEW}
+UPPER, TALL = (0, 0, 1120, 880), (0, 0, 1120, 1130)
+"""Parts of the window, without the properties."""
+PARTS = {"install": UPPER, "drag": UPPER, "progress": (840, 330, 1120, 640), "recovered": UPPER, "relit": TALL,
+         "results": (840, 60, 1120, 640), "metal": UPPER}
 """The pictures that the guide shows, and which part of the window."""
 QUALITY = 88
 
@@ -45,7 +45,7 @@ def main() -> int:
     parser.add_argument("capture", type=Path)
     parser.add_argument("--zip", type=Path, required=True)
     parser.add_argument("--home", type=Path)
-    parser.add_argument("--metal", default="TableWood 56", help="object that is called metal")
+    parser.add_argument("--metal", default="TableWood 59", help="object that is called metal")
     parser.add_argument("--wait", type=float, default=60.0, help="seconds that a Rendered viewport is given")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images" / "guide")
     options = parser.parse_args()
@@ -65,6 +65,7 @@ def main() -> int:
         finally:
             window.close()
             screen.close()
+            (full / "blender.log").write_text(window.log, encoding="utf-8")
         cut(full, options.out)
     return 0
 
@@ -96,15 +97,15 @@ def play(story: Story, options, home: Path, full: Path) -> None:
     story.finished()
     window.wait_for("isinstance(module('operators.findings').look(bpy.context.scene.scan_relight), dict)")
     picture("recovered", rendered=True)
+    window.ask(f"bpy.ops.wm.save_as_mainfile(filepath={str(home / 'recovered.blend')!r}, copy=True)")
     story.lamp_off()
     story.softbox()
     story.expose()
     picture("relit", rendered=True)
-    picture("light")
     window.ask(f"bpy.ops.wm.save_as_mainfile(filepath={str(home / 'relit.blend')!r}, copy=True)")
     story.render_both()
-    picture("before-after")
-    close_further_windows(window)
+    story.close_picture()
+    print(f"a render of it: {len(window.actions)} actions so far", flush=True)
     story.choose_in_view(options.metal)
     window.ask("scroll(-100000)")
     picture("results")
@@ -118,15 +119,6 @@ def play(story: Story, options, home: Path, full: Path) -> None:
 def shade(window: Window, kind: str) -> None:
     """The viewport's shading."""
     window.ask(f"setattr(place()['area'].spaces.active.shading, 'type', {kind!r})")
-
-
-def close_further_windows(window: Window) -> None:
-    """Close the window that shows the two pictures."""
-    window.ask("""
-for one in bpy.context.window_manager.windows[1:]:
-    with bpy.context.temp_override(window=one):
-        bpy.ops.wm.window_close()
-""")
 
 
 def cut(full: Path, out: Path) -> None:

@@ -82,7 +82,7 @@ def test_content(archive, root):
     assert wheels == {wheel.removeprefix("./") for wheel in manifest["build"]["generated"]["wheels"]}
     assert not any("numpy" in name for name in wheels)
     assert not any("__pycache__" in name for name in names)
-    assert {"docs/panel.html", "docs/guide.html", "docs/images/guide/empty.png"} <= set(names)
+    assert {"docs/panel.html", "docs/guide.html", "docs/images/guide/recovered.jpg"} <= set(names)
     tracked = {path.relative_to(root).as_posix() for part in ("addon", "operators")
                for path in (root / part).rglob("*.py")}
     assert tracked <= set(code)

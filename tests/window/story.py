@@ -22,7 +22,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d as shown
 where, wanted = place(), bpy.data.objects[{name!r}]
 region, view, graph = where["region"], where["area"].spaces.active.region_3d, bpy.context.evaluated_depsgraph_get()
 eye, free, found = view.view_matrix.inverted().translation, place("UI")["region"], []
-for polygon in wanted.data.polygons[::max(1, len(wanted.data.polygons) // 500)]:
+for polygon in list(wanted.data.polygons)[::max(1, len(wanted.data.polygons) // 500)]:
     point = wanted.matrix_world @ polygon.center
     at = shown(region, view, point)
     hit = bpy.context.scene.ray_cast(graph, eye, point - eye)
