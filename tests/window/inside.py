@@ -131,12 +131,16 @@ def look_over(words, across, seen):
 
 
 def next_page():
-    """Scroll the sidebar on; whether there was anything to scroll to. A busy window takes its time."""
-    region = place("UI")["region"]
-    before = region.view2d.region_to_view(0, 0)
+    """Scroll the sidebar on; whether there was anything to scroll to."""
     for _ in range(3):
+        where = place("UI")
+        where["area"].tag_redraw()  # scrolling alone lays nothing out anew, and Blender stops at the old end
+        for _ in range(5):
+            yield
+        region = place("UI")["region"]
+        before = region.view2d.region_to_view(0, 0)
         scroll(region.height * 0.6)
-        for _ in range(8):
+        for _ in range(3):
             yield
         if place("UI")["region"].view2d.region_to_view(0, 0) != before:
             return True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 
-PARTS = {"Capture", "Recover", "Results", "Look", "Relight", "Export"}
+PARTS = {"Missing", "Capture", "Recover", "Results", "Look", "Relight", "Export"}
 
 
 def test_the_tab_stands_in_the_sidebar(window, pictures):
