@@ -18,6 +18,8 @@ import bpy
 
 TAB = "Scan Relight"
 STALL = 0.1
+WHEEL = 40
+"""Pixels of one turn of the mouse's wheel."""
 FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
 state = {"next": 0, "task": None, "last": None, "stalls": [], "own": [], "phases": [], "watching": False,
          "known": {}}
@@ -78,9 +80,15 @@ def under_mouse():
 
 
 def scroll(pixels):
-    """Move the sidebar's content up."""
-    with bpy.context.temp_override(**place("UI")):
-        bpy.ops.view2d.scroll_down(deltax=0, deltay=round(pixels))
+    """Move the sidebar's content up, by steps of what one turn of the wheel moves: Blender heeds no other amount."""
+    step = bpy.ops.view2d.scroll_down if pixels > 0 else bpy.ops.view2d.scroll_up
+    where = place("UI")
+    with bpy.context.temp_override(**where):
+        for _ in range(int(abs(pixels) // WHEEL)):
+            before = where["region"].view2d.region_to_view(0, 0)
+            step()
+            if where["region"].view2d.region_to_view(0, 0) == before:
+                break
 
 
 def find(words, across=(0.5, 0.25, 0.75, 0.12, 0.9), top=True):
