@@ -257,7 +257,8 @@ def test_a_capture_is_refused(name, capture, recover, tmp_path):
     code, err = recover()
     assert code == 2 and re.search(told, err), err
     if (tmp_path / "out").exists():
-        assert files(tmp_path / "out") <= {f"stages/{name}.npz" for name in STAGES}
+        # capture.json says whose folder it is; the next run goes on there.
+        assert files(tmp_path / "out") <= {"capture.json", *(f"stages/{name}.npz" for name in STAGES)}
 
 
 @pytest.mark.parametrize("options, told", [
@@ -341,7 +342,7 @@ def test_a_disk_that_is_full_of_observations(recover, tmp_path, monkeypatch):
     monkeypatch.setattr(Exact, "_flush", full)
     code, err = recover("--median", "exact")
     assert code == 1 and "free some space" in err
-    assert files(tmp_path / "out") == {"stages/surface.npz"}
+    assert files(tmp_path / "out") == {"capture.json", "stages/surface.npz"}
     assert not list((tmp_path / "out").glob("tmp-*"))
 
 
@@ -418,7 +419,7 @@ def test_interrupted_in_the_middle_and_gone_on(capture, tmp_path, root):
     assert process.returncode == 130
     assert err == ("scan-relight: Stopped on request; the finished stages are kept and the next run goes on from "
                    "them.\n")
-    assert files(out) == {"stages/surface.npz", "stages/lit_diffuse.npz"}
+    assert files(out) == {"capture.json", "stages/surface.npz", "stages/lit_diffuse.npz"}
     quick = [word if word != "2048" else "8" for word in slow]
     done = subprocess.run(quick, cwd=root, capture_output=True, text=True)
     assert done.returncode == 0 and done.stderr == "" and whole(out)

@@ -61,7 +61,7 @@ def test_it_stands_free_in_the_room_and_faces_what_it_is_for(room, preset, camer
 @pytest.mark.parametrize("preset", ["WINDOW", "SOFTBOX", "SPOT"])
 @pytest.mark.parametrize("camera", [1, 4, 8])
 def test_what_the_camera_looks_at_is_lit(room, shoot, preset, camera):
-    """With nothing else on, most of the picture is within three stops of the captured one; of a spot's, a part."""
+    """With nothing else on, most of the picture is within three stops of the captured one; of a spot's, a tenth."""
     room.camera = [thing for thing in room.objects if thing.type == "CAMERA"][camera]
     before = shoot(room, 48, 36, 32) @ LUMINANCE
     for lamp in state.relight_lamps.find_lamps(room):
@@ -69,7 +69,7 @@ def test_what_the_camera_looks_at_is_lit(room, shoot, preset, camera):
     state.relight_outside.set_on(room.world, False)
     lights.add_light(room, preset)
     after = shoot(room, 48, 36, 32) @ LUMINANCE
-    assert np.quantile(after / np.maximum(before, 1e-6), 0.8 if preset == "SPOT" else 0.5) > 1 / 8
+    assert np.quantile(after / np.maximum(before, 1e-6), 0.9 if preset == "SPOT" else 0.5) > 1 / 8
     assert np.quantile(after, 0.99) < 40 * np.quantile(before, 0.9)
 
 
