@@ -66,8 +66,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_FAILURE
     except MemoryError:
-        return complain("The memory is used up; a greater --texel-size, a smaller --atlas-size or fewer rays "
-                        "take less.", EXIT_FAILURE)
+        return complain(
+            "The memory is used up; a greater --texel-size, a smaller --atlas-size or fewer rays take less.",
+            EXIT_FAILURE,
+        )
     except Exception as error:  # the last line of defence: a sentence, never a bare traceback
         if arguments.debug:
             traceback.print_exc()
@@ -85,37 +87,58 @@ class Parser(argparse.ArgumentParser):
 def make_parser() -> argparse.ArgumentParser:
     """The parser for every command."""
     parser = Parser(
-        prog="scan-relight", epilog=EXIT_CODES,
-        description="Recover albedo, roughness and lamps from a scanned room and write a Blender scene to relight.")
+        prog="scan-relight",
+        epilog=EXIT_CODES,
+        description="Recover albedo, roughness and lamps from a scanned room and write a Blender scene to relight.",
+    )
     parser.add_argument("--version", action="version", version=f"scan-relight {VERSION}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     recover = commands.add_parser(
-        "recover", help="recover a capture into a relightable scene", epilog=EXIT_CODES,
+        "recover",
+        help="recover a capture into a relightable scene",
+        epilog=EXIT_CODES,
         description="Recover a capture and write scene.blend, its images and a report. A stopped or repeated run goes "
-                    "on from the finished stages in RESULT.")
-    recover.add_argument("capture", metavar="CAPTURE", type=Path,
-                         help="folder with transforms.json, mesh.ply, info_semantic.json and the frames")
+        "on from the finished stages in RESULT.",
+    )
+    recover.add_argument(
+        "capture",
+        metavar="CAPTURE",
+        type=Path,
+        help="folder with transforms.json, mesh.ply, info_semantic.json and the frames",
+    )
     recover.add_argument("--out", metavar="RESULT", type=Path, required=True, help="folder to write, made if missing")
     add_reading(recover)
-    recover.add_argument("--until", metavar="STAGE", choices=RUN_STAGES, default=WRITE,
-                         help=f"last stage to do: {', '.join(RUN_STAGES)} (default write, which is all)")
-    recover.add_argument("--from-stage", metavar="STAGE", choices=RUN_STAGES,
-                         help="do this stage and all later ones anew, though they are stored")
+    recover.add_argument(
+        "--until",
+        metavar="STAGE",
+        choices=RUN_STAGES,
+        default=WRITE,
+        help=f"last stage to do: {', '.join(RUN_STAGES)} (default write, which is all)",
+    )
+    recover.add_argument(
+        "--from-stage",
+        metavar="STAGE",
+        choices=RUN_STAGES,
+        help="do this stage and all later ones anew, though they are stored",
+    )
     add_override(recover)
     add_settings(recover)
     add_leash(recover)
     add_common(recover, recover_command)
 
-    info = commands.add_parser("info", help="say what a capture holds, and what is wrong with it",
-                               description="Read and check a capture without recovering anything.", epilog=EXIT_CODES)
+    info = commands.add_parser(
+        "info",
+        help="say what a capture holds, and what is wrong with it",
+        description="Read and check a capture without recovering anything.",
+        epilog=EXIT_CODES,
+    )
     info.add_argument("capture", metavar="CAPTURE", type=Path, help="folder of the capture")
     info.add_argument("--json", action="store_true", help="machine-readable")
     info.add_argument("--room", metavar="FOLDER", type=Path, help=argparse.SUPPRESS)
     info.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)
     info.add_argument("--no-look", action="store_true", help="don't compare the frames with the mesh")
-    info.add_argument("--overlay", metavar="PNG", type=Path,
-                      help="write frames with the mesh's edges drawn over them")
+    info.add_argument("--overlay", metavar="PNG", type=Path, help="write frames with the mesh's edges drawn over them")
     add_reading(info)
     add_common(info, info_command)
 
@@ -125,25 +148,33 @@ def make_parser() -> argparse.ArgumentParser:
         add_common(command, function)
 
     demo = commands.add_parser(
-        "demo", help="render a small room, recover it, compare, relight", epilog=EXIT_CODES,
+        "demo",
+        help="render a small room, recover it, compare, relight",
+        epilog=EXIT_CODES,
         description="Render a small furnished room whose materials are known, recover it, print recovered against "
-                    "true values, and leave scene.blend and before_after.png in RESULT.")
+        "true values, and leave scene.blend and before_after.png in RESULT.",
+    )
     demo.add_argument("--out", metavar="RESULT", type=Path, required=True, help="folder to write, made if missing")
     demo.add_argument("--size", choices=DEMO_SIZES, default="small", help="number and size of frames (default small)")
     add_settings(demo)
     add_common(demo, demo_command)
 
     benchmark = commands.add_parser(
-        "benchmark", help="measure every stage's error and cost against the paper's", epilog=EXIT_CODES,
+        "benchmark",
+        help="measure every stage's error and cost against the paper's",
+        epilog=EXIT_CODES,
         description="Run each stage over its alternatives, the paper's setting among them, and write a table (CSV and "
-                    "Markdown) and a plot for each. Errors are the same from run to run; seconds are the machine's.")
-    benchmark.add_argument("stages", metavar="STAGE", nargs="*",
-                           help="medians, accumulation, shading, specular or pipeline (default all)")
+        "Markdown) and a plot for each. Errors are the same from run to run; seconds are the machine's.",
+    )
+    benchmark.add_argument(
+        "stages", metavar="STAGE", nargs="*", help="medians, accumulation, shading, specular or pipeline (default all)"
+    )
     benchmark.add_argument("--capture", metavar="DIR", type=Path, help="also measure on this capture")
     benchmark.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder to write, made if missing")
     benchmark.add_argument("--large", action="store_true", help="the real size; takes much longer")
-    benchmark.add_argument("--seed", type=int, metavar="INT", default=0,
-                           help="of every pseudo-random choice (default 0)")
+    benchmark.add_argument(
+        "--seed", type=int, metavar="INT", default=0, help="of every pseudo-random choice (default 0)"
+    )
     benchmark.add_argument("--threads", type=int, metavar="INT", default=0, help="0 takes all cores (default 0)")
     add_common(benchmark, benchmark_command)
     return parser
@@ -152,15 +183,24 @@ def make_parser() -> argparse.ArgumentParser:
 def add_reading(parser: argparse.ArgumentParser) -> None:
     """How the capture is to be read, where its folder does not tell: one option for each field of `Reading`."""
     group = parser.add_argument_group("the capture")
-    group.add_argument("--format", metavar="NAME", default="",
-                       help="its layout, such as nerfstudio (default: found from what the folder holds)")
+    group.add_argument(
+        "--format",
+        metavar="NAME",
+        default="",
+        help="its layout, such as nerfstudio (default: found from what the folder holds)",
+    )
     group.add_argument("--mesh", metavar="FILE", type=Path, help="the mesh, where it is not the format's own")
     group.add_argument("--outside", action="store_true", help="let its files name others outside of its folder")
-    group.add_argument("--transfer", metavar="CURVE", default="",
-                       help="curve of 8 and 16-bit pictures: srgb, linear, or a gamma such as 2.2")
+    group.add_argument(
+        "--transfer",
+        metavar="CURVE",
+        default="",
+        help="curve of 8 and 16-bit pictures: srgb, linear, or a gamma such as 2.2",
+    )
     group.add_argument("--exposures", metavar="CSV", type=Path, help="exposure of each frame: lines of name, exposure")
-    group.add_argument("--convention", metavar="NAME", default="",
-                       help="a correction of all poses, as `info` proposes it")
+    group.add_argument(
+        "--convention", metavar="NAME", default="", help="a correction of all poses, as `info` proposes it"
+    )
 
 
 def reading_from(arguments: argparse.Namespace):
@@ -170,15 +210,26 @@ def reading_from(arguments: argparse.Namespace):
     def import_mesh(path: Path):
         return need("import_mesh").import_mesh(path)  # only now: most captures need no Blender to be read
 
-    return Reading(arguments.format, arguments.mesh, arguments.outside, arguments.transfer, arguments.exposures,
-                   arguments.convention, import_mesh)
+    return Reading(
+        arguments.format,
+        arguments.mesh,
+        arguments.outside,
+        arguments.transfer,
+        arguments.exposures,
+        arguments.convention,
+        import_mesh,
+    )
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
     """One option for each field of `Settings`."""
     group = parser.add_argument_group("settings")
-    group.add_argument("--preset", choices=tuple(PRESETS), default="normal",
-                       help="what the settings below start from; 'paper' is the published method (default normal)")
+    group.add_argument(
+        "--preset",
+        choices=tuple(PRESETS),
+        default="normal",
+        help="what the settings below start from; 'paper' is the published method (default normal)",
+    )
     for info in setting_infos():
         text = f"{info.help} (default {info.default})".replace("%", "%%")
         option = f"--{info.name.replace('_', '-')}"
@@ -193,12 +244,24 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 def add_leash(parser: argparse.ArgumentParser) -> None:
     """Options for programs that start a run and follow it."""
     group = parser.add_argument_group("for programs that start a run")
-    group.add_argument("--progress", choices=("text", "json"), default="text",
-                       help="json: one line of JSON for each event instead of text (default text)")
-    group.add_argument("--stop-with-stdin", action="store_true",
-                       help="stop when standard input says 'stop' or ends, so that the run never outlives its starter")
-    group.add_argument("--memory-limit", type=float, metavar="GB", default=0.0,
-                       help="stop when the run takes more gigabytes (default 0, no limit)")
+    group.add_argument(
+        "--progress",
+        choices=("text", "json"),
+        default="text",
+        help="json: one line of JSON for each event instead of text (default text)",
+    )
+    group.add_argument(
+        "--stop-with-stdin",
+        action="store_true",
+        help="stop when standard input says 'stop' or ends, so that the run never outlives its starter",
+    )
+    group.add_argument(
+        "--memory-limit",
+        type=float,
+        metavar="GB",
+        default=0.0,
+        help="stop when the run takes more gigabytes (default 0, no limit)",
+    )
 
 
 def add_common(parser: argparse.ArgumentParser, function) -> None:
@@ -235,14 +298,23 @@ def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     settings = settings_from(arguments)
     run = need("run")
     with console_run(arguments, stream) as console:
-        report = run.run(arguments.capture, arguments.out, settings, run.progress_for(settings, **console),
-                         until=arguments.until, reading=reading_from(arguments), from_stage=arguments.from_stage,
-                         override=arguments.override, heed_kept=not arguments.no_overrides)
+        report = run.run(
+            arguments.capture,
+            arguments.out,
+            settings,
+            run.progress_for(settings, **console),
+            until=arguments.until,
+            reading=reading_from(arguments),
+            from_stage=arguments.from_stage,
+            override=arguments.override,
+            heed_kept=not arguments.no_overrides,
+        )
     if isinstance(console["listener"], JsonProgress):
         for warning in report.get("warnings", ()):
             console["listener"].tell("warning", text=warning)
-        console["listener"].tell("done", seconds=report["seconds"], result=str(arguments.out.absolute()),
-                                 until=arguments.until)
+        console["listener"].tell(
+            "done", seconds=report["seconds"], result=str(arguments.out.absolute()), until=arguments.until
+        )
     elif not arguments.quiet:
         for warning in report.get("warnings", ()):
             print(f"Warning: {warning}", file=stream)
@@ -259,8 +331,10 @@ def demo_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         table = demo.run_demo(arguments.out, arguments.size, settings, **console)
     if not arguments.quiet:
         print(table, file=stream)
-        print(f"\nOpen {arguments.out / 'scene.blend'} in Blender; the pictures: {arguments.out / 'before_after.png'}",
-              file=stream)
+        print(
+            f"\nOpen {arguments.out / 'scene.blend'} in Blender; the pictures: {arguments.out / 'before_after.png'}",
+            file=stream,
+        )
     return EXIT_OK
 
 
@@ -275,8 +349,9 @@ def benchmark_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         stages = check_stages(arguments.stages)
         with console_run(arguments, stream) as console:
             progress = Progress(weights=dict.fromkeys(stages, 1.0), **console)
-            options = Options(arguments.capture, arguments.large, arguments.seed, arguments.threads, arguments.out,
-                              progress)
+            options = Options(
+                arguments.capture, arguments.large, arguments.seed, arguments.threads, arguments.out, progress
+            )
             results = run_benchmark(stages, options)
     if not arguments.quiet:
         for stage, tables in results.items():
@@ -314,8 +389,11 @@ def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     print(f"{facts['capture']} ({facts['format']})", file=stream)
     told = f": {sizes} pixels; {facts['masks']} with a mask{lenses}" if facts["frames"] else ""
     print(f"  frames     {facts['frames']}{told}", file=stream)
-    print(f"  mesh       {facts['triangles']} triangles, {facts['vertices']} vertices, {facts['area_m2']:.1f} m2, "
-          f"{extent} m", file=stream)
+    print(
+        f"  mesh       {facts['triangles']} triangles, {facts['vertices']} vertices, {facts['area_m2']:.1f} m2, "
+        f"{extent} m",
+        file=stream,
+    )
     print(f"  instances  {len(facts['instances'])}", file=stream)
     for one in facts["instances"]:
         print(f"    {one['object_id']:>5}  {one['class_name']:<24} {one['triangles']:>8} triangles", file=stream)
@@ -363,8 +441,10 @@ def needed_packages():
         yield
     except ModuleNotFoundError as error:
         if error.name and error.name.split(".")[0] in ("bpy", "numpy", "scipy", "embreex", "OpenEXR"):
-            raise BadInputError(f"The Python package '{error.name}' is missing; install Scan Relight with "
-                                "scripts/demo.py or as a Blender extension.") from error
+            raise BadInputError(
+                f"The Python package '{error.name}' is missing; install Scan Relight with "
+                "scripts/demo.py or as a Blender extension."
+            ) from error
         raise
 
 

@@ -13,22 +13,37 @@ from .leash import JsonProgress
 
 def add_override(parser: argparse.ArgumentParser) -> None:
     """The options by which a run is given what is known of objects."""
-    parser.add_argument("--override", metavar="FILE", type=Path,
-                        help="JSON of what is known of objects; merged into RESULT/overrides.json, which runs heed")
+    parser.add_argument(
+        "--override",
+        metavar="FILE",
+        type=Path,
+        help="JSON of what is known of objects; merged into RESULT/overrides.json, which runs heed",
+    )
     parser.add_argument("--no-overrides", action="store_true", help="don't heed what RESULT/overrides.json keeps")
 
 
 def add_refit(commands, epilog: str) -> argparse.ArgumentParser:
     """Add the parser of `refit` to the program's `commands`."""
     parser = commands.add_parser(
-        "refit", help="fit a few objects of a result again, in seconds", epilog=epilog,
+        "refit",
+        help="fit a few objects of a result again, in seconds",
+        epilog=epilog,
         description="Fit objects of RESULT again with all else held, heeding what is given of them, and write the "
-                    "result anew. The capture is not needed; RESULT has to hold its stages.")
+        "result anew. The capture is not needed; RESULT has to hold its stages.",
+    )
     parser.add_argument("result", metavar="RESULT", type=Path, help="folder that 'recover' wrote")
-    parser.add_argument("--object", metavar="ID", type=int, action="append", default=[], dest="objects",
-                        help="object to fit, may be repeated (default those of which something new is given)")
-    parser.add_argument("--scene", action=argparse.BooleanOptionalAction, default=True,
-                        help="also write scene.blend anew (default yes)")
+    parser.add_argument(
+        "--object",
+        metavar="ID",
+        type=int,
+        action="append",
+        default=[],
+        dest="objects",
+        help="object to fit, may be repeated (default those of which something new is given)",
+    )
+    parser.add_argument(
+        "--scene", action=argparse.BooleanOptionalAction, default=True, help="also write scene.blend anew (default yes)"
+    )
     add_override(parser)
     return parser
 
@@ -40,14 +55,21 @@ def refit_command(arguments: argparse.Namespace, stream: TextIO) -> int:
 
     refit = need("refit")
     with console_run(arguments, stream) as console:
-        report = refit.refit(arguments.result, arguments.objects, Progress(weights=refit.WEIGHTS, **console),
-                             arguments.override, not arguments.no_overrides, arguments.scene)
+        report = refit.refit(
+            arguments.result,
+            arguments.objects,
+            Progress(weights=refit.WEIGHTS, **console),
+            arguments.override,
+            not arguments.no_overrides,
+            arguments.scene,
+        )
     seconds = report["refit"]["seconds"]
     if isinstance(console["listener"], JsonProgress):
         for warning in report["warnings"]:
             console["listener"].tell("warning", text=warning)
-        console["listener"].tell("done", seconds=seconds, result=str(arguments.result.absolute()),
-                                 objects=report["refit"]["objects"])
+        console["listener"].tell(
+            "done", seconds=seconds, result=str(arguments.result.absolute()), objects=report["refit"]["objects"]
+        )
     elif not arguments.quiet:
         for warning in report["warnings"]:
             print(f"Warning: {warning}", file=stream)

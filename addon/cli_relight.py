@@ -12,36 +12,62 @@ from .core.errors import EXIT_OK, BadInputError
 def add_relight(commands, epilog: str) -> argparse.ArgumentParser:
     """Add the parser of `relight` to the program's `commands`."""
     parser = commands.add_parser(
-        "relight", help="render a result's scene under another light", epilog=epilog,
+        "relight",
+        help="render a result's scene under another light",
+        epilog=epilog,
         description="Render RESULT/scene.blend with its lamps changed and new lights added. The scene is not changed. "
-                    "New lights take a strength: a factor on the room's own light, 1 if none is given, or radiant "
-                    "watts or lumens, as in 20W or 800lm.")
+        "New lights take a strength: a factor on the room's own light, 1 if none is given, or radiant "
+        "watts or lumens, as in 20W or 800lm.",
+    )
     parser.add_argument("result", metavar="RESULT", type=Path, help="folder that 'recover' wrote")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="picture to write: .png, .jpg or .exr")
     light = parser.add_argument_group("light")
-    light.add_argument("--lamps", metavar="on|off|NAME=FACTOR,...", default=None,
-                       help="the lamps of the scan; a name means one lamp or all of its class (default as saved)")
-    light.add_argument("--world", metavar="on|off|DEGREES", default=None,
-                       help="the light from outside; an angle turns it, anticlockwise from above (default as saved)")
-    light.add_argument("--world-strength", metavar="FACTOR", type=positive,
-                       help="of the light from outside (default as saved)")
+    light.add_argument(
+        "--lamps",
+        metavar="on|off|NAME=FACTOR,...",
+        default=None,
+        help="the lamps of the scan; a name means one lamp or all of its class (default as saved)",
+    )
+    light.add_argument(
+        "--world",
+        metavar="on|off|DEGREES",
+        default=None,
+        help="the light from outside; an angle turns it, anticlockwise from above (default as saved)",
+    )
+    light.add_argument(
+        "--world-strength", metavar="FACTOR", type=positive, help="of the light from outside (default as saved)"
+    )
     light.add_argument("--hdri", metavar="FILE", type=Path, help="equirectangular picture to put around the room")
-    for name, text in (("window", "a window's soft light from the side"), ("softbox", "a studio light by the camera"),
-                       ("spot", "a spot from above"), ("sun", "a low, warm sun from the side")):
-        light.add_argument(f"--{name}", metavar="STRENGTH", type=strength, nargs="?", const=(1.0, "ROOM"),
-                           help=f"add {text}")
-    light.add_argument("--kelvin", metavar="KELVIN", type=positive,
-                       help="temperature of the new lights, 1700 to 20000 (default what suits each)")
+    for name, text in (
+        ("window", "a window's soft light from the side"),
+        ("softbox", "a studio light by the camera"),
+        ("spot", "a spot from above"),
+        ("sun", "a low, warm sun from the side"),
+    ):
+        light.add_argument(
+            f"--{name}", metavar="STRENGTH", type=strength, nargs="?", const=(1.0, "ROOM"), help=f"add {text}"
+        )
+    light.add_argument(
+        "--kelvin",
+        metavar="KELVIN",
+        type=positive,
+        help="temperature of the new lights, 1700 to 20000 (default what suits each)",
+    )
     picture = parser.add_argument_group("picture")
     picture.add_argument("--camera", metavar="NUMBER|NAME", help="frame to look through, from 0 (default the first)")
     picture.add_argument("--before-after", action="store_true", help="the captured light beside the new one")
-    picture.add_argument("--samples", metavar="INT", type=int, default=0,
-                         help="for each pixel, 0 takes the scene's (default 0)")
+    picture.add_argument(
+        "--samples", metavar="INT", type=int, default=0, help="for each pixel, 0 takes the scene's (default 0)"
+    )
     picture.add_argument("--size", metavar="PERCENT", type=int, default=100, help="of the frame (default 100)")
-    picture.add_argument("--engine", choices=("cycles", "eevee"), default="cycles",
-                         help="eevee needs a graphics card (default cycles)")
-    picture.add_argument("--device", metavar="cpu|gpu|KIND", help="what Cycles renders on; KIND is optix, cuda, hip, "
-                         "metal or oneapi (default the processor)")
+    picture.add_argument(
+        "--engine", choices=("cycles", "eevee"), default="cycles", help="eevee needs a graphics card (default cycles)"
+    )
+    picture.add_argument(
+        "--device",
+        metavar="cpu|gpu|KIND",
+        help="what Cycles renders on; KIND is optix, cuda, hip, metal or oneapi (default the processor)",
+    )
     picture.add_argument("--scene", metavar="NAME", help="where the file holds several (default its active one)")
     return parser
 
@@ -59,7 +85,7 @@ def strength(text: str) -> tuple[float, str]:
     for ending, unit in (("lm", "LUMEN"), ("w", "WATT"), ("", "ROOM")):
         if text.lower().endswith(ending):
             try:
-                return positive(text[:len(text) - len(ending)]), unit
+                return positive(text[: len(text) - len(ending)]), unit
             except ValueError:
                 break
     raise argparse.ArgumentTypeError(f"'{text}' is not a strength, such as 0.5, 20W or 800lm")
@@ -74,16 +100,28 @@ def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     if arguments.samples < 0 or not 1 <= arguments.size <= 1000:
         raise BadInputError("Option --samples takes a number of at least 0, and --size 1 to 1000 percent.")
     command = need("relight_command")
-    added = {kind: getattr(arguments, name) for name, kind in command.OPTIONS.items()
-             if getattr(arguments, name) is not None}
-    light = command.Light(arguments.lamps, arguments.world, arguments.world_strength, arguments.hdri, added,
-                          arguments.kelvin)
+    added = {
+        kind: getattr(arguments, name) for name, kind in command.OPTIONS.items() if getattr(arguments, name) is not None
+    }
+    light = command.Light(
+        arguments.lamps, arguments.world, arguments.world_strength, arguments.hdri, added, arguments.kelvin
+    )
     with console_run(arguments, stream) as console:
         stages = ("before", "after") if arguments.before_after else ("after",)
         progress = Progress(weights=dict.fromkeys(stages, 1.0), **console)
-        remarks = command.relight(arguments.result, light, arguments.out, arguments.camera, arguments.samples,
-                                  arguments.engine.upper(), arguments.before_after, arguments.size, progress,
-                                  arguments.device, arguments.scene)
+        remarks = command.relight(
+            arguments.result,
+            light,
+            arguments.out,
+            arguments.camera,
+            arguments.samples,
+            arguments.engine.upper(),
+            arguments.before_after,
+            arguments.size,
+            progress,
+            arguments.device,
+            arguments.scene,
+        )
     if isinstance(console["listener"], JsonProgress):
         for remark in remarks:
             console["listener"].tell("warning", text=remark)

@@ -41,8 +41,9 @@ class JsonProgress:
         if not event.stage or not (new or ended or now - self._said >= EVENT_SECONDS):
             return
         self._stage, self._share, self._said = event.stage, event.share, now
-        self.tell("progress", stage=event.stage, share=event.share, overall=event.overall,
-                  seconds_left=event.seconds_left)
+        self.tell(
+            "progress", stage=event.stage, share=event.share, overall=event.overall, seconds_left=event.seconds_left
+        )
 
     def tell(self, kind: str, **values: object) -> None:
         """Write one line: `{"event": kind, ...}`."""
@@ -87,7 +88,7 @@ class Leash:
                 some = b""
             if not some:
                 break
-            heard = heard[-len(STOP):] + some
+            heard = heard[-len(STOP) :] + some
         self.wished = True
         time.sleep(self._grace)
         self._end(EXIT_INTERRUPTED)
@@ -117,8 +118,10 @@ class MemoryGuard:
     @property
     def sentence(self) -> str:
         """What the user is told."""
-        return (f"The run needs more than the memory limit of {self.limit:g} GB and was stopped; the finished stages "
-                "are kept. Raise the limit, or take a greater texel size, a smaller atlas size or fewer threads.")
+        return (
+            f"The run needs more than the memory limit of {self.limit:g} GB and was stopped; the finished stages "
+            "are kept. Raise the limit, or take a greater texel size, a smaller atlas size or fewer threads."
+        )
 
     def __call__(self) -> bool:
         """Asked where a run may be stopped; raises `MemoryLimitError` once the limit is passed."""

@@ -28,19 +28,29 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
     bl_options = {"UNDO"}
 
     filepath: bpy.props.StringProperty(
-        name="File", description="Picture to write; by default before_after.png in the room's result folder",
-        subtype="FILE_PATH", options={"SKIP_SAVE"})
+        name="File",
+        description="Picture to write; by default before_after.png in the room's result folder",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE"},
+    )
     engine: ENGINE
     samples: bpy.props.IntProperty(name="Samples", description="For each pixel; 0 takes the scene's", min=0, default=64)
     percentage: bpy.props.IntProperty(
-        name="Size", description="Of the scene's render size", subtype="PERCENTAGE", min=1, max=1000, default=100)
+        name="Size", description="Of the scene's render size", subtype="PERCENTAGE", min=1, max=1000, default=100
+    )
 
     @classmethod
     def poll(cls, context):
         """A camera is needed, and no other run."""
-        return (super().poll(context) and poll.check(
-            cls, context.scene.camera is not None, "The scene has no camera to render through; choose a frame first.")
-            and poll.no_run(cls))
+        return (
+            super().poll(context)
+            and poll.check(
+                cls,
+                context.scene.camera is not None,
+                "The scene has no camera to render through; choose a frame first.",
+            )
+            and poll.no_run(cls)
+        )
 
     def target(self, scene) -> Path:
         """The file to write."""
@@ -73,10 +83,26 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         except ScanRelightError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        words = ["relight", str(self._folder), "--out", str(self._folder / out.name), "--before-after",
-                 "--engine", self.engine.lower(), "--samples", str(self.samples), "--size", str(self.percentage),
-                 "--device", told_device(context.scene), "--scene", context.scene.name,
-                 "--progress", "json", "--stop-with-stdin"]
+        words = [
+            "relight",
+            str(self._folder),
+            "--out",
+            str(self._folder / out.name),
+            "--before-after",
+            "--engine",
+            self.engine.lower(),
+            "--samples",
+            str(self.samples),
+            "--size",
+            str(self.percentage),
+            "--device",
+            told_device(context.scene),
+            "--scene",
+            context.scene.name,
+            "--progress",
+            "json",
+            "--stop-with-stdin",
+        ]
         return self.start(context, command(words), title="Before and After", out=str(out), result_folder="")
 
     def load(self, job):

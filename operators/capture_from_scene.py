@@ -18,33 +18,51 @@ class SCAN_RELIGHT_OT_capture_from_scene(bpy.types.Operator):
 
     bl_idname = "scan_relight.capture_from_scene"
     bl_label = "Capture From Scene"
-    bl_description = ("Make a capture of the selected objects: their faces are the mesh, and the pictures behind the "
-                      "cameras (EXR) are the frames. Nothing in the scene is changed")
+    bl_description = (
+        "Make a capture of the selected objects: their faces are the mesh, and the pictures behind the "
+        "cameras (EXR) are the frames. Nothing in the scene is changed"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     result_folder: bpy.props.StringProperty(
-        name="Result", description="The capture goes into a folder within this one; empty takes the panel's, or a "
-        "folder of its own among the results", subtype="DIR_PATH")
+        name="Result",
+        description="The capture goes into a folder within this one; empty takes the panel's, or a "
+        "folder of its own among the results",
+        subtype="DIR_PATH",
+    )
     cameras: bpy.props.EnumProperty(
-        name="Frames", description="Which cameras took the pictures",
-        items=[("AUTO", "Automatic", "An animation where the only camera has a sequence or a clip behind it, else one "
-                "frame for each camera"),
-               ("OBJECTS", "Each Camera", "One frame for each camera that has a picture behind it; only the selected "
-                "cameras where some are selected"),
-               ("ANIMATION", "Animation", "One frame for each frame of the active camera's animation")])
-    whole_range: bpy.props.BoolProperty(
-        name="Whole Range", description="Take the scene's frame range", default=True)
+        name="Frames",
+        description="Which cameras took the pictures",
+        items=[
+            (
+                "AUTO",
+                "Automatic",
+                "An animation where the only camera has a sequence or a clip behind it, else one frame for each camera",
+            ),
+            (
+                "OBJECTS",
+                "Each Camera",
+                "One frame for each camera that has a picture behind it; only the selected "
+                "cameras where some are selected",
+            ),
+            ("ANIMATION", "Animation", "One frame for each frame of the active camera's animation"),
+        ],
+    )
+    whole_range: bpy.props.BoolProperty(name="Whole Range", description="Take the scene's frame range", default=True)
     frame_start: bpy.props.IntProperty(name="Start", description="First frame of the animation", default=1)
     frame_end: bpy.props.IntProperty(name="End", description="Last frame of the animation", default=250)
-    frame_step: bpy.props.IntProperty(name="Step", description="Frames from one that is taken to the next",
-                                       default=1, min=1)
+    frame_step: bpy.props.IntProperty(
+        name="Step", description="Frames from one that is taken to the next", default=1, min=1
+    )
 
     @classmethod
     def poll(cls, context):
         """Whether there is a mesh to capture."""
         return can_start(cls, context) and poll.check(
-            cls, any(thing.type not in ("CAMERA", "LIGHT") for thing in context.selected_objects),
-            "Select the objects of the room first.")
+            cls,
+            any(thing.type not in ("CAMERA", "LIGHT") for thing in context.selected_objects),
+            "Select the objects of the room first.",
+        )
 
     def invoke(self, context, event):
         """Ask which frames."""
@@ -70,13 +88,17 @@ class SCAN_RELIGHT_OT_capture_from_scene(bpy.types.Operator):
 
         choices = context.scene.scan_relight
         chosen = self.result_folder or choices.result_folder
-        folder = Path(bpy.path.abspath(chosen)) / FOLDER if chosen else result_home.capture_folder(
-            preferences.results_folder(), choices.capture_folder)
+        folder = (
+            Path(bpy.path.abspath(chosen)) / FOLDER
+            if chosen
+            else result_home.capture_folder(preferences.results_folder(), choices.capture_folder)
+        )
         first, last = (None, None) if self.whole_range else (self.frame_start, self.frame_end)
         try:
             result_home.check(str(folder))
-            for sentence in capture_scene(context, folder, context.selected_objects, self.cameras, first, last,
-                                          self.frame_step):
+            for sentence in capture_scene(
+                context, folder, context.selected_objects, self.cameras, first, last, self.frame_step
+            ):
                 self.report({"WARNING"}, sentence)
         except ScanRelightError as error:
             self.report({"ERROR"}, str(error))

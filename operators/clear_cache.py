@@ -23,8 +23,10 @@ class SCAN_RELIGHT_OT_clear_cache(bpy.types.Operator):
 
     bl_idname = "scan_relight.clear_cache"
     bl_label = "Clear Stages"
-    bl_description = ("Delete the finished stages that further runs would go on from: of the results in the results "
-                      "folder, beside this file, and of this scene's. The results themselves stay as they are")
+    bl_description = (
+        "Delete the finished stages that further runs would go on from: of the results in the results "
+        "folder, beside this file, and of this scene's. The results themselves stay as they are"
+    )
 
     @classmethod
     def poll(cls, context):
@@ -34,8 +36,13 @@ class SCAN_RELIGHT_OT_clear_cache(bpy.types.Operator):
     def invoke(self, context, event):
         """Ask first."""
         return context.window_manager.invoke_confirm(
-            self, event, title="Clear the finished stages?",
-            message="Results stay as they are; a further run begins anew.", confirm_text="Clear", icon="QUESTION")
+            self,
+            event,
+            title="Clear the finished stages?",
+            message="Results stay as they are; a further run begins anew.",
+            confirm_text="Clear",
+            icon="QUESTION",
+        )
 
     def execute(self, context):
         """Delete, and say how much is free again."""
@@ -45,6 +52,9 @@ class SCAN_RELIGHT_OT_clear_cache(bpy.types.Operator):
         preferences.forget_size()
         for sentence in done.left:
             self.report({"WARNING"}, sentence)
-        self.report({"INFO"}, f"{preferences.amount(done.freed)} of stages deleted; {done.results} "
-                    f"result{'s' * (done.results != 1)} kept.")
+        self.report(
+            {"INFO"},
+            f"{preferences.amount(done.freed)} of stages deleted; {done.results} "
+            f"result{'s' * (done.results != 1)} kept.",
+        )
         return {"FINISHED"}

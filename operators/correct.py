@@ -18,8 +18,10 @@ class SCAN_RELIGHT_OT_refit(RefitOperator, bpy.types.Operator):
 
     bl_idname = "scan_relight.refit"
     bl_label = "Refit"
-    bl_description = ("Fit the selected objects again under what is given of them, the rest of the room held; takes "
-                      "seconds. What is given is kept in the result folder's overrides.json")
+    bl_description = (
+        "Fit the selected objects again under what is given of them, the rest of the room held; takes "
+        "seconds. What is given is kept in the result folder's overrides.json"
+    )
     always = True
 
 
@@ -51,19 +53,27 @@ class SCAN_RELIGHT_OT_same_as(RefitOperator, bpy.types.Operator):
 
     bl_idname = "scan_relight.same_as"
     bl_label = "The Same As"
-    bl_description = ("The selected objects have the same highlight as another one, each with its own colours: the one "
-                      "that is chosen in the panel, else the active object")
+    bl_description = (
+        "The selected objects have the same highlight as another one, each with its own colours: the one "
+        "that is chosen in the panel, else the active object"
+    )
 
     object_id: bpy.props.IntProperty(
-        name="Object", description="Number of the other object in the capture; -1 takes the active one", default=-1,
-        min=-1, options={"SKIP_SAVE"})
+        name="Object",
+        description="Number of the other object in the capture; -1 takes the active one",
+        default=-1,
+        min=-1,
+        options={"SKIP_SAVE"},
+    )
 
     @classmethod
     def poll(cls, context):
         """As for all, and there has to be another object."""
         return super().poll(context) and poll.check(
-            cls, len(chosen(context)) > 1 or context.scene.scan_relight_correct.like is not None,
-            "Choose the other object, or select it too, last of all.")
+            cls,
+            len(chosen(context)) > 1 or context.scene.scan_relight_correct.like is not None,
+            "Choose the other object, or select it too, last of all.",
+        )
 
     def state(self, context, things):
         """Give the likeness."""
@@ -89,8 +99,15 @@ class SCAN_RELIGHT_OT_take_back(RefitOperator, bpy.types.Operator):
     bl_label = "Back to What Was Found"
     bl_description = "Take back what is given of the selected objects: show, and fit, what the frames say"
 
-    key: bpy.props.EnumProperty(name="Value", description="What is taken back", default="all", items=[
-        ("all", "All", "Everything"), *((key, name.capitalize(), f"The {name} alone") for key, name in _KEYS.items())])
+    key: bpy.props.EnumProperty(
+        name="Value",
+        description="What is taken back",
+        default="all",
+        items=[
+            ("all", "All", "Everything"),
+            *((key, name.capitalize(), f"The {name} alone") for key, name in _KEYS.items()),
+        ],
+    )
 
     @classmethod
     def description(cls, context, properties):
@@ -102,7 +119,8 @@ class SCAN_RELIGHT_OT_take_back(RefitOperator, bpy.types.Operator):
     def poll(cls, context):
         """Only where anything is given."""
         return super().poll(context) and poll.check(
-            cls, any(map(corrections.given, chosen(context))), "Nothing is given of the selected objects.")
+            cls, any(map(corrections.given, chosen(context))), "Nothing is given of the selected objects."
+        )
 
     def state(self, context, things):
         """Take it back; only what a refit was made with asks for another one."""
@@ -122,18 +140,26 @@ class SCAN_RELIGHT_OT_smooth_by_angle(CorrectOperator, bpy.types.Operator):
 
     bl_idname = "scan_relight.smooth_by_angle"
     bl_label = "Smooth by Angle"
-    bl_description = ("Shade recovered objects smooth, with edges above an angle sharp; 0 makes them flat again. It "
-                      "stays when the room is recovered again")
+    bl_description = (
+        "Shade recovered objects smooth, with edges above an angle sharp; 0 makes them flat again. It "
+        "stays when the room is recovered again"
+    )
 
     angle: SMOOTH_ANGLE
     everything: bpy.props.BoolProperty(
-        name="Whole Room", description="All recovered objects of the scene, not the selected ones alone")
+        name="Whole Room", description="All recovered objects of the scene, not the selected ones alone"
+    )
 
     @classmethod
     def poll(cls, context):
         """Only with recovered objects in the scene."""
-        return poll.has_scene(cls, context) and poll.object_mode(cls, context) and poll.check(
-            cls, any(map(corrections.correctable, context.scene.objects)), "The scene holds no recovered object.")
+        return (
+            poll.has_scene(cls, context)
+            and poll.object_mode(cls, context)
+            and poll.check(
+                cls, any(map(corrections.correctable, context.scene.objects)), "The scene holds no recovered object."
+            )
+        )
 
     def work(self, context, things):
         """Shade them."""

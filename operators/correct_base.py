@@ -31,8 +31,11 @@ class CorrectOperator(AtOnce):
     @classmethod
     def poll(cls, context):
         """Only with a recovered object selected."""
-        return poll.has_scene(cls, context) and poll.object_mode(cls, context) and poll.check(
-            cls, bool(chosen(context)), "Select a recovered object first.")
+        return (
+            poll.has_scene(cls, context)
+            and poll.object_mode(cls, context)
+            and poll.check(cls, bool(chosen(context)), "Select a recovered object first.")
+        )
 
     def act(self, context):
         """On what is selected."""

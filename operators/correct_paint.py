@@ -14,11 +14,14 @@ class SCAN_RELIGHT_OT_paint_unseen(CorrectOperator, bpy.types.Operator):
 
     bl_idname = "scan_relight.paint_unseen"
     bl_label = "Paint"
-    bl_description = ("Paint what no frame saw of the active object in Texture Paint, on an image of your own that no "
-                      "run writes over; what was seen is masked")
+    bl_description = (
+        "Paint what no frame saw of the active object in Texture Paint, on an image of your own that no "
+        "run writes over; what was seen is masked"
+    )
 
     masked: bpy.props.BoolProperty(
-        name="Only Unseen Spots", description="Protect what any frame saw by a stencil mask", default=True)
+        name="Only Unseen Spots", description="Protect what any frame saw by a stencil mask", default=True
+    )
 
     def work(self, context, things):
         """Canvas, mask, brush, mode."""
@@ -34,8 +37,10 @@ class SCAN_RELIGHT_OT_fill_unseen(CorrectOperator, bpy.types.Operator):
 
     bl_idname = "scan_relight.fill_unseen"
     bl_label = "Fill"
-    bl_description = ("Fill what no frame saw of the selected objects from the measured spots around, on an image of "
-                      "your own that no run writes over")
+    bl_description = (
+        "Fill what no frame saw of the selected objects from the measured spots around, on an image of "
+        "your own that no run writes over"
+    )
 
     def work(self, context, things):
         """Fill them."""
@@ -53,14 +58,17 @@ class SCAN_RELIGHT_OT_restore_painted(CorrectOperator, bpy.types.Operator):
     bl_description = "Show what was found instead of what was painted or filled on the selected objects"
 
     discard: bpy.props.BoolProperty(
-        name="Forget What Was Painted", description="Take it out of your image too; else Paint shows it again",
-        default=False)
+        name="Forget What Was Painted",
+        description="Take it out of your image too; else Paint shows it again",
+        default=False,
+    )
 
     @classmethod
     def poll(cls, context):
         """Only where anything was painted."""
         return super().poll(context) and poll.check(
-            cls, any(map(unseen.painted, chosen(context))), "Nothing was painted or filled on the selected objects.")
+            cls, any(map(unseen.painted, chosen(context))), "Nothing was painted or filled on the selected objects."
+        )
 
     def work(self, context, things):
         """Restore them."""

@@ -14,19 +14,33 @@ from ..addon.core.material import TRANSPARENT
 from ..addon.core.overrides import MODELS
 
 LABELS = {"lambertian": "Matt", "specular": "Glossy", "metal": "Metal", "emitter": "Lamp", "transparent": "Glass"}
-TEXTS = {"lambertian": "Reflects the same to all sides, as chalk and plain wall paint",
-         "specular": "Colour under a clear highlight, as plastic, lacquer, varnished wood, tiles",
-         "metal": "Bare metal: all that it reflects is its highlight, in the metal's colour",
-         "emitter": "Gives light of itself",
-         "transparent": "Shows what is behind it; found by a run, it can't be given"}
+TEXTS = {
+    "lambertian": "Reflects the same to all sides, as chalk and plain wall paint",
+    "specular": "Colour under a clear highlight, as plastic, lacquer, varnished wood, tiles",
+    "metal": "Bare metal: all that it reflects is its highlight, in the metal's colour",
+    "emitter": "Gives light of itself",
+    "transparent": "Shows what is behind it; found by a run, it can't be given",
+}
 STATEMENTS = [(model, LABELS[model], TEXTS[model]) for model in ("metal", "specular", "lambertian", "emitter")]
 _ITEMS = [(model, LABELS[model], TEXTS[model], number) for number, model in enumerate((*MODELS, TRANSPARENT))]
 SMOOTH_ANGLE = bpy.props.FloatProperty(
-    name="Angle", description="Edges where faces meet at a greater angle stay sharp", subtype="ANGLE", min=0.0,
-    max=radians(180), default=radians(30))
+    name="Angle",
+    description="Edges where faces meet at a greater angle stay sharp",
+    subtype="ANGLE",
+    min=0.0,
+    max=radians(180),
+    default=radians(30),
+)
 ALBEDO = bpy.props.FloatVectorProperty(
-    name="Albedo", description="Share of the light that it reflects, for each channel, linear: white wall paint has "
-    "about 0.80, a grey card 0.18", subtype="COLOR", size=3, min=0.01, max=1.0, default=(0.8, 0.8, 0.8))
+    name="Albedo",
+    description="Share of the light that it reflects, for each channel, linear: white wall paint has "
+    "about 0.80, a grey card 0.18",
+    subtype="COLOR",
+    size=3,
+    min=0.01,
+    max=1.0,
+    default=(0.8, 0.8, 0.8),
+)
 
 
 def targets(context, thing: bpy.types.Object) -> list[bpy.types.Object]:
@@ -73,21 +87,45 @@ class ScanRelightCorrection(bpy.types.PropertyGroup):
     """`Object.scan_relight_correct`."""
 
     model: bpy.props.EnumProperty(
-        name="Model", description="How the surface reflects", items=_ITEMS,
+        name="Model",
+        description="How the surface reflects",
+        items=_ITEMS,
         get=lambda self: next(item[3] for item in _ITEMS if item[0] == _value(self, "model", "lambertian")),
-        set=lambda self, value: value < len(MODELS) and _give(self, model=_ITEMS[value][0]))
+        set=lambda self, value: value < len(MODELS) and _give(self, model=_ITEMS[value][0]),
+    )
     roughness: bpy.props.FloatProperty(
-        name="Roughness", description="Of the highlight: 0 is a mirror, 1 hardly shows any", min=0.0, max=1.0,
-        subtype="FACTOR", precision=3, get=lambda self: _value(self, "roughness", 0.5),
-        set=lambda self, value: _give(self, roughness=value))
+        name="Roughness",
+        description="Of the highlight: 0 is a mirror, 1 hardly shows any",
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        precision=3,
+        get=lambda self: _value(self, "roughness", 0.5),
+        set=lambda self, value: _give(self, roughness=value),
+    )
     f0: bpy.props.FloatProperty(
-        name="F0", description="Share of the light that the surface mirrors when looked at straight on; most plastics, "
-        "lacquers and woods have 0.04", min=0.0, max=0.9, soft_max=0.2, precision=3, step=0.5,
-        get=_f0, set=lambda self, value: _give(self, f0=value))
+        name="F0",
+        description="Share of the light that the surface mirrors when looked at straight on; most plastics, "
+        "lacquers and woods have 0.04",
+        min=0.0,
+        max=0.9,
+        soft_max=0.2,
+        precision=3,
+        step=0.5,
+        get=_f0,
+        set=lambda self, value: _give(self, f0=value),
+    )
     colour: bpy.props.FloatVectorProperty(
-        name="Base Color", description="Mean colour of the object, linear; a texture keeps its detail and is scaled. "
-        "Of a metal the colour of its reflection", subtype="COLOR", size=3, min=0.0, max=1.0, get=_colour,
-        set=_give_colour)
+        name="Base Color",
+        description="Mean colour of the object, linear; a texture keeps its detail and is scaled. "
+        "Of a metal the colour of its reflection",
+        subtype="COLOR",
+        size=3,
+        min=0.0,
+        max=1.0,
+        get=_colour,
+        set=_give_colour,
+    )
 
 
 def _recovered(self, thing) -> bool:
@@ -98,13 +136,21 @@ class ScanRelightCorrecting(bpy.types.PropertyGroup):
     """`Scene.scan_relight_correct`."""
 
     refit_automatically: bpy.props.BoolProperty(
-        name="Refit Automatically", description="After a statement such as This Is Metal fit the objects again at "
-        "once; values set by hand wait for Refit", default=True)
+        name="Refit Automatically",
+        description="After a statement such as This Is Metal fit the objects again at "
+        "once; values set by hand wait for Refit",
+        default=True,
+    )
     all_selected: bpy.props.BoolProperty(
-        name="All Selected", description="A value that is set here goes to all selected objects, not to the active one "
-        "alone", default=True)
+        name="All Selected",
+        description="A value that is set here goes to all selected objects, not to the active one alone",
+        default=True,
+    )
     like: bpy.props.PointerProperty(
-        name="Like", description="The object whose highlight the selected ones have", type=bpy.types.Object,
-        poll=_recovered)
+        name="Like",
+        description="The object whose highlight the selected ones have",
+        type=bpy.types.Object,
+        poll=_recovered,
+    )
     albedo: ALBEDO
     smooth_angle: SMOOTH_ANGLE

@@ -25,8 +25,10 @@ def correct_panels() -> tuple[type, ...]:
 
 def correct_pointers() -> tuple[tuple[type, str, type], ...]:
     """Blender type, name and property group."""
-    return ((bpy.types.Object, "scan_relight_correct", correct_props.ScanRelightCorrection),
-            (bpy.types.Scene, "scan_relight_correct", correct_props.ScanRelightCorrecting))
+    return (
+        (bpy.types.Object, "scan_relight_correct", correct_props.ScanRelightCorrection),
+        (bpy.types.Scene, "scan_relight_correct", correct_props.ScanRelightCorrecting),
+    )
 
 
 def register_handlers() -> None:

@@ -18,8 +18,10 @@ class SCAN_RELIGHT_OT_this_is_white(RefitOperator, bpy.types.Operator):
 
     bl_idname = "scan_relight.this_is_white"
     bl_label = "This Is White"
-    bl_description = ("The active object's albedo is known: the albedo of the whole room is scaled with it, channel by "
-                      "channel, and with it the colour of the light")
+    bl_description = (
+        "The active object's albedo is known: the albedo of the whole room is scaled with it, channel by "
+        "channel, and with it the colour of the light"
+    )
 
     albedo: ALBEDO
     asks_for = "albedo"
@@ -29,8 +31,11 @@ class SCAN_RELIGHT_OT_this_is_white(RefitOperator, bpy.types.Operator):
         thing = context.view_layer.objects.active
         thing = thing if thing in things else things[0]
         corrections.say_white(thing, self.albedo)
-        self.report({"INFO"}, f"The whole room's albedo is scaled so that '{thing.name}' has "
-                    f"{', '.join(f'{part:.2f}' for part in self.albedo)}")
+        self.report(
+            {"INFO"},
+            f"The whole room's albedo is scaled so that '{thing.name}' has "
+            f"{', '.join(f'{part:.2f}' for part in self.albedo)}",
+        )
         return [thing]
 
 
@@ -45,7 +50,8 @@ class SCAN_RELIGHT_OT_white_back(RefitOperator, bpy.types.Operator):
     def poll(cls, context):
         """Only where one is given."""
         return super().poll(context) and poll.check(
-            cls, corrections.white_of(context.view_layer.objects.active) is not None, "No white is given.")
+            cls, corrections.white_of(context.view_layer.objects.active) is not None, "No white is given."
+        )
 
     def state(self, context, things):
         """Take it back."""
@@ -58,21 +64,34 @@ class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
 
     bl_idname = "scan_relight.pick_white"
     bl_label = "Pick White Spot"
-    bl_description = ("Click on a spot of the room whose albedo is known, such as a grey card or white paint; the "
-                      "whole room's albedo is scaled with it. ESC stops")
+    bl_description = (
+        "Click on a spot of the room whose albedo is known, such as a grey card or white paint; the "
+        "whole room's albedo is scaled with it. ESC stops"
+    )
 
     albedo: ALBEDO
     origin: bpy.props.FloatVectorProperty(
-        name="From", description="Where the ray to the spot begins, in metres", size=3, subtype="TRANSLATION",
-        options={"SKIP_SAVE"})
+        name="From",
+        description="Where the ray to the spot begins, in metres",
+        size=3,
+        subtype="TRANSLATION",
+        options={"SKIP_SAVE"},
+    )
     direction: bpy.props.FloatVectorProperty(
-        name="Direction", description="Of the ray to the spot", size=3, subtype="DIRECTION", options={"SKIP_SAVE"})
+        name="Direction", description="Of the ray to the spot", size=3, subtype="DIRECTION", options={"SKIP_SAVE"}
+    )
 
     @classmethod
     def poll(cls, context):
         """Only with recovered objects in the scene, and no run."""
-        return poll.has_scene(cls, context) and poll.object_mode(cls, context) and poll.no_run(cls) and poll.check(
-            cls, any(map(corrections.correctable, context.scene.objects)), "The scene holds no recovered object.")
+        return (
+            poll.has_scene(cls, context)
+            and poll.object_mode(cls, context)
+            and poll.no_run(cls)
+            and poll.check(
+                cls, any(map(corrections.correctable, context.scene.objects)), "The scene holds no recovered object."
+            )
+        )
 
     def invoke(self, context, event):
         """Wait for the click."""
@@ -90,8 +109,11 @@ class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
             self._end(context)
             return {"CANCELLED"}
         if event.type != "LEFTMOUSE" or event.value != "PRESS":
-            return {"PASS_THROUGH"} if event.type in {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "MOUSEMOVE",
-                                                      "TIMER"} else {"RUNNING_MODAL"}
+            return (
+                {"PASS_THROUGH"}
+                if event.type in {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "MOUSEMOVE", "TIMER"}
+                else {"RUNNING_MODAL"}
+            )
         ray = _ray(context, event)
         if ray is None:
             return {"RUNNING_MODAL"}
@@ -124,6 +146,8 @@ def _ray(context, event):
         at = event.mouse_x - region.x, event.mouse_y - region.y
         if 0 <= at[0] < region.width and 0 <= at[1] < region.height:
             view = area.spaces.active.region_3d
-            return (view3d_utils.region_2d_to_origin_3d(region, view, at),
-                    view3d_utils.region_2d_to_vector_3d(region, view, at))
+            return (
+                view3d_utils.region_2d_to_origin_3d(region, view, at),
+                view3d_utils.region_2d_to_vector_3d(region, view, at),
+            )
     return None

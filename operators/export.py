@@ -11,13 +11,17 @@ from ..addon.core.room_file import capture_name
 from . import poll
 from .relight_base import RelightOperator, default_folder
 
-FORMATS = ((".glb", "glTF (.glb)", "One file; most viewers and game engines"),
-           (".gltf", "glTF (.gltf)", "A text file with its pictures beside it"),
-           (".usdc", "USD (.usdc)", "With its pictures beside it"),
-           (".usdz", "USD (.usdz)", "One file"))
-SCOPES = (("ROOM", "Room", "What was scanned and what was set into it"),
-          ("SELECTED", "Selected", "The selected objects"),
-          ("ALL", "All", "Every object that renders"))
+FORMATS = (
+    (".glb", "glTF (.glb)", "One file; most viewers and game engines"),
+    (".gltf", "glTF (.gltf)", "A text file with its pictures beside it"),
+    (".usdc", "USD (.usdc)", "With its pictures beside it"),
+    (".usdz", "USD (.usdz)", "One file"),
+)
+SCOPES = (
+    ("ROOM", "Room", "What was scanned and what was set into it"),
+    ("SELECTED", "Selected", "The selected objects"),
+    ("ALL", "All", "Every object that renders"),
+)
 
 
 class SCAN_RELIGHT_OT_export(RelightOperator, bpy.types.Operator):
@@ -30,11 +34,11 @@ class SCAN_RELIGHT_OT_export(RelightOperator, bpy.types.Operator):
     needs_room = False
 
     filepath: bpy.props.StringProperty(
-        name="File", description="What to write", subtype="FILE_PATH", options={"SKIP_SAVE"})
+        name="File", description="What to write", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
     filter_glob: bpy.props.StringProperty(default="*.glb;*.gltf;*.usd*", options={"HIDDEN"})
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-    format: bpy.props.EnumProperty(
-        name="Format", description="Of a file whose name has no ending", items=FORMATS)
+    format: bpy.props.EnumProperty(name="Format", description="Of a file whose name has no ending", items=FORMATS)
     scope: bpy.props.EnumProperty(name="Objects", description="What is written", items=SCOPES)
     lights: bpy.props.BoolProperty(name="Lights", description="Also the lights that were added", default=True)
     cameras: bpy.props.BoolProperty(name="Camera", description="Also the scene's camera", default=False)
@@ -43,7 +47,8 @@ class SCAN_RELIGHT_OT_export(RelightOperator, bpy.types.Operator):
     def poll(cls, context):
         """Something to export."""
         return super().poll(context) and poll.check(
-            cls, any(thing.type == "MESH" for thing in context.scene.objects), "The scene has no mesh to export.")
+            cls, any(thing.type == "MESH" for thing in context.scene.objects), "The scene has no mesh to export."
+        )
 
     def invoke(self, context, event):
         """Choose the file."""

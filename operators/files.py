@@ -14,9 +14,11 @@ from .panel import SidebarPanel
 from .settings_props import preset_items
 from .translations import OWN
 
-NEXT = (("CHOOSE", "Choose Only", "Choose it in the sidebar; the panel shows what is in it"),
-        ("IMPORT", "Import", "Bring objects, cameras and frames into the scene as they were scanned"),
-        ("RUN", "Recover", "Run the recovery beside this window"))
+NEXT = (
+    ("CHOOSE", "Choose Only", "Choose it in the sidebar; the panel shows what is in it"),
+    ("IMPORT", "Import", "Bring objects, cameras and frames into the scene as they were scanned"),
+    ("RUN", "Recover", "Run the recovery beside this window"),
+)
 FILTER = "transforms*.json;materials.json;*.ply;*.obj;*.glb;*.gltf;cameras.bin;cameras.txt;scene.blend"
 
 
@@ -62,17 +64,28 @@ class FileOperator:
     """Takes a path to a scan or to a result; errors become one sentence."""
 
     filepath: bpy.props.StringProperty(
-        name="File or Folder", description="Folder of a scan or of a result, or a file in one", subtype="FILE_PATH",
-        options={"SKIP_SAVE"})
+        name="File or Folder",
+        description="Folder of a scan or of a result, or a file in one",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE"},
+    )
     directory: bpy.props.StringProperty(
-        name="Folder", description="Folder that the files lie in", subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
+        name="Folder", description="Folder that the files lie in", subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"}
+    )
     files: bpy.props.CollectionProperty(
-        name="Files", description="Names of files in the folder", type=bpy.types.OperatorFileListElement,
-        options={"HIDDEN", "SKIP_SAVE"})
+        name="Files",
+        description="Names of files in the folder",
+        type=bpy.types.OperatorFileListElement,
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
     then: bpy.props.EnumProperty(name="Then", description="What is done with a scan", items=NEXT)
     preset: bpy.props.EnumProperty(
-        name="Preset", description="What all settings of a recovery start from", items=preset_items(),
-        translation_context=OWN, default="normal")
+        name="Preset",
+        description="What all settings of a recovery start from",
+        items=preset_items(),
+        translation_context=OWN,
+        default="normal",
+    )
 
     @classmethod
     def poll(cls, context):
@@ -121,7 +134,8 @@ class SCAN_RELIGHT_OT_open_capture(FileOperator, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     filter_glob: bpy.props.StringProperty(
-        name="Filter", description="Which files are shown", default=FILTER, options={"HIDDEN"})
+        name="Filter", description="Which files are shown", default=FILTER, options={"HIDDEN"}
+    )
 
     def invoke(self, context, event):
         """Choose it."""
@@ -158,7 +172,8 @@ class SCAN_RELIGHT_OT_drop(FileOperator, bpy.types.Operator):
             return {"CANCELLED"}
         self.then, self.preset = "RUN", context.scene.scan_relight.preset
         return context.window_manager.invoke_props_dialog(
-            self, title=f"Recover '{content.name}'?", confirm_text="Run", width=320)
+            self, title=f"Recover '{content.name}'?", confirm_text="Run", width=320
+        )
 
     def draw(self, context):
         """The dialog."""
@@ -209,12 +224,14 @@ class SCAN_RELIGHT_OT_open_result(AtOnce, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     folder: bpy.props.StringProperty(
-        name="Folder", description="Result folder of a finished run", subtype="DIR_PATH", options={"SKIP_SAVE"})
+        name="Folder", description="Result folder of a finished run", subtype="DIR_PATH", options={"SKIP_SAVE"}
+    )
     directory: bpy.props.StringProperty(
-        name="Folder", description="What the file browser chooses", subtype="DIR_PATH",
-        options={"HIDDEN", "SKIP_SAVE"})
+        name="Folder", description="What the file browser chooses", subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"}
+    )
     filter_folder: bpy.props.BoolProperty(
-        name="Folders", description="Only folders are shown", default=True, options={"HIDDEN", "SKIP_SAVE"})
+        name="Folders", description="Only folders are shown", default=True, options={"HIDDEN", "SKIP_SAVE"}
+    )
 
     @classmethod
     def poll(cls, context):
@@ -235,8 +252,10 @@ class SCAN_RELIGHT_OT_open_result(AtOnce, bpy.types.Operator):
             raise BadInputError("Choose the folder of a finished result first.")
         content = folders.of_path(folder)
         if content.kind != folders.RESULT:
-            raise BadInputError(f"Folder '{folder.name}' holds no finished result; run the recovery to its end "
-                                "first, or choose another.")
+            raise BadInputError(
+                f"Folder '{folder.name}' holds no finished result; run the recovery to its end "
+                "first, or choose another."
+            )
         return self.bring(context, content.folder)
 
     def bring(self, context, folder: Path) -> tuple[str, ...]:

@@ -19,18 +19,26 @@ class SCAN_RELIGHT_OT_find_result(bpy.types.Operator):
 
     bl_idname = "scan_relight.find_result"
     bl_label = "Find It"
-    bl_description = ("Choose where the result folder lies now: all pictures, objects and looks that came from it are "
-                      "pointed there")
+    bl_description = (
+        "Choose where the result folder lies now: all pictures, objects and looks that came from it are pointed there"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     missing: bpy.props.StringProperty(
-        name="Missing", description="The result folder that is gone; empty takes the first that is", subtype="DIR_PATH",
-        options={"HIDDEN", "SKIP_SAVE"})
+        name="Missing",
+        description="The result folder that is gone; empty takes the first that is",
+        subtype="DIR_PATH",
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
     directory: bpy.props.StringProperty(
-        name="Folder", description="Where it lies now; the folder above or below will do", subtype="DIR_PATH",
-        options={"SKIP_SAVE"})
+        name="Folder",
+        description="Where it lies now; the folder above or below will do",
+        subtype="DIR_PATH",
+        options={"SKIP_SAVE"},
+    )
     filter_folder: bpy.props.BoolProperty(
-        name="Folders", description="Show folders", default=True, options={"HIDDEN", "SKIP_SAVE"})
+        name="Folders", description="Show folders", default=True, options={"HIDDEN", "SKIP_SAVE"}
+    )
 
     def invoke(self, context, event):
         """Choose it."""

@@ -72,7 +72,7 @@ def begin(choices) -> None:
 
 def facts(job: jobs.Job) -> dict:
     """What a job that runs `info --json` said; raises ValueError where that is no JSON."""
-    return json.loads(job.text[job.text.index("{"):])
+    return json.loads(job.text[job.text.index("{") :])
 
 
 def _result(job: jobs.Job) -> dict | str:

@@ -58,8 +58,11 @@ def redraw(context) -> None:
 def over_3d_view(context, event) -> bool:
     """Whether the mouse is in a 3D view."""
     return context.window is not None and any(
-        area.type == "VIEW_3D" and area.x <= event.mouse_x < area.x + area.width
-        and area.y <= event.mouse_y < area.y + area.height for area in context.window.screen.areas)
+        area.type == "VIEW_3D"
+        and area.x <= event.mouse_x < area.x + area.width
+        and area.y <= event.mouse_y < area.y + area.height
+        for area in context.window.screen.areas
+    )
 
 
 class JobOperator:
@@ -149,8 +152,11 @@ class JobOperator:
         scene = next((one for one in bpy.data.scenes if one.session_uid == job.facts["scene"]), None)
         if scene is None:
             where = job.facts.get("result_folder")
-            return self._fail(context, "The scene that the run was started for is gone" + (
-                f"; its result lies in '{where}'." if where else "."))
+            return self._fail(
+                context,
+                "The scene that the run was started for is gone"
+                + (f"; its result lies in '{where}'." if where else "."),
+            )
         job.facts["phase"], job.facts["changed"] = "change", 0.0
         self._slices = self.change(scene, self._ready)
         self._hurry(context, True)

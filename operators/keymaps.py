@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import bpy
 
-ENTRIES = (("scan_relight.run", {"target": "recover"}), ("scan_relight.stop", {}), ("scan_relight.before_after", {}),
-           ("scan_relight.match_frame", {"step": 1}), ("scan_relight.match_frame", {"step": -1}))
+ENTRIES = (
+    ("scan_relight.run", {"target": "recover"}),
+    ("scan_relight.stop", {}),
+    ("scan_relight.before_after", {}),
+    ("scan_relight.match_frame", {"step": 1}),
+    ("scan_relight.match_frame", {"step": -1}),
+)
 """Operator and properties: run, stop, before and after, next frame, previous frame."""
 LABELS = ("Run", "Stop", "Before and After", "Next Frame", "Previous Frame")
 MAP = "3D View"
@@ -48,8 +53,15 @@ def draw(layout, context) -> None:
     body.use_property_split = body.use_property_decorate = False
     left = list(zip(ENTRIES, LABELS, strict=True))
     for item in keymap.keymap_items:
-        fits = next((one for one in left if one[0][0] == item.idname and all(
-            getattr(item.properties, name, None) == value for name, value in one[0][1].items())), None)
+        fits = next(
+            (
+                one
+                for one in left
+                if one[0][0] == item.idname
+                and all(getattr(item.properties, name, None) == value for name, value in one[0][1].items())
+            ),
+            None,
+        )
         if fits:
             left.remove(fits)
             body.label(text=fits[1])

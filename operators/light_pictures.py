@@ -7,10 +7,12 @@ from pathlib import Path
 
 import bpy
 
-PRESETS = (("WINDOW", "Window", "A window's soft, cool light from the side"),
-           ("SOFTBOX", "Softbox", "A studio light beside the camera"),
-           ("SPOT", "Spot", "A spot from above, a little on the camera's side"),
-           ("SUN", "Evening Sun", "A low, warm sun: through an opening of the scan, else as a window would let it in"))
+PRESETS = (
+    ("WINDOW", "Window", "A window's soft, cool light from the side"),
+    ("SOFTBOX", "Softbox", "A studio light beside the camera"),
+    ("SPOT", "Spot", "A spot from above, a little on the camera's side"),
+    ("SUN", "Evening Sun", "A low, warm sun: through an opening of the scan, else as a window would let it in"),
+)
 FOLDER = Path(__file__).with_name("thumbnails")
 _pictures = None
 

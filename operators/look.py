@@ -23,8 +23,11 @@ class SCAN_RELIGHT_OT_look(bpy.types.Operator):
 
     look: bpy.props.EnumProperty(name="Look", description="What the viewport shows", items=look_items())
     switch_view: bpy.props.BoolProperty(
-        name="Switch the View", description="Turn viewports that show no materials (Solid, Wireframe) to Material "
-        "Preview, where the look can be seen", default=True)
+        name="Switch the View",
+        description="Turn viewports that show no materials (Solid, Wireframe) to Material "
+        "Preview, where the look can be seen",
+        default=True,
+    )
 
     @classmethod
     def description(cls, context, properties):
@@ -35,8 +38,9 @@ class SCAN_RELIGHT_OT_look(bpy.types.Operator):
     def poll(cls, context):
         """Whether anything recovered is there."""
         return poll.check(
-            cls, context.scene is not None and bool(look.recovered(context.scene)),
-            "No object of this scene wears recovered materials; run the recovery first."
+            cls,
+            context.scene is not None and bool(look.recovered(context.scene)),
+            "No object of this scene wears recovered materials; run the recovery first.",
         ) and poll.object_mode(cls, context)
 
     def execute(self, context):

@@ -64,7 +64,8 @@ class SCAN_RELIGHT_OT_manual(bpy.types.Operator):
     bl_description = "Open the documentation in the browser; it came with the extension and needs no network"
 
     page: bpy.props.StringProperty(
-        name="Page", description="Which page, and which part of it", default="guide", options={"SKIP_SAVE"})
+        name="Page", description="Which page, and which part of it", default="guide", options={"SKIP_SAVE"}
+    )
 
     def execute(self, context):
         """Open it; in the background only say where it lies."""

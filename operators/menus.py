@@ -30,8 +30,11 @@ def names() -> list[str]:
     """The operators in the menu."""
     from . import classes
 
-    found = (cls for cls in classes()
-             if issubclass(cls, bpy.types.Operator) and "INTERNAL" not in getattr(cls, "bl_options", ()))
+    found = (
+        cls
+        for cls in classes()
+        if issubclass(cls, bpy.types.Operator) and "INTERNAL" not in getattr(cls, "bl_options", ())
+    )
     return [name for name in (cls.bl_idname.partition(".")[2] for cls in found) if name not in NEED_MORE]
 
 

@@ -13,15 +13,18 @@ class SCAN_RELIGHT_OT_move_results(bpy.types.Operator):
 
     bl_idname = "scan_relight.move_results"
     bl_label = "Move Out"
-    bl_description = ("Move the results of earlier versions out of the extension's own folder into the results folder, "
-                      "so that removing the extension can't delete them; this file's images are pointed there")
+    bl_description = (
+        "Move the results of earlier versions out of the extension's own folder into the results folder, "
+        "so that removing the extension can't delete them; this file's images are pointed there"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context):
         """Not while a run may be writing there."""
-        return poll.no_run(cls) and poll.check(cls, bool(result_home.earlier_results()),
-                                               "No result lies in the extension's own folder.")
+        return poll.no_run(cls) and poll.check(
+            cls, bool(result_home.earlier_results()), "No result lies in the extension's own folder."
+        )
 
     def execute(self, context):
         """Move each; one that can't be moved stays whole where it is, and is told."""
@@ -35,6 +38,9 @@ class SCAN_RELIGHT_OT_move_results(bpy.types.Operator):
         preferences.forget_size()
         if not moved:
             return {"CANCELLED"}
-        self.report({"INFO"}, f"{moved} result{'s' * (moved != 1)} moved into '{preferences.results_folder()}'; save "
-                    "this file to keep its images there.")
+        self.report(
+            {"INFO"},
+            f"{moved} result{'s' * (moved != 1)} moved into '{preferences.results_folder()}'; save "
+            "this file to keep its images there.",
+        )
         return {"FINISHED"}

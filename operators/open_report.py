@@ -18,8 +18,11 @@ class SCAN_RELIGHT_OT_open_report(bpy.types.Operator):
     def poll(cls, context):
         """Whether there is a page."""
         folder = results.folder_of(context.scene) if context.scene else None
-        return poll.check(cls, folder is not None and (folder / results.PAGE).is_file(),
-                          "There is no report yet; run the recovery to its end first.")
+        return poll.check(
+            cls,
+            folder is not None and (folder / results.PAGE).is_file(),
+            "There is no report yet; run the recovery to its end first.",
+        )
 
     def execute(self, context):
         """Open it; in the background only say where it lies."""

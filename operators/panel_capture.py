@@ -11,8 +11,20 @@ from .panel import SidebarPanel
 
 SHOWN = 12
 """Objects that are listed before the rest is counted."""
-TOLD = ("capture", "format", "triangles", "vertices", "area_m2", "bounds_m", "extent_m", "frames", "resolutions",
-        "masks", "instances", "warnings")
+TOLD = (
+    "capture",
+    "format",
+    "triangles",
+    "vertices",
+    "area_m2",
+    "bounds_m",
+    "extent_m",
+    "frames",
+    "resolutions",
+    "masks",
+    "instances",
+    "warnings",
+)
 
 
 class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
@@ -55,8 +67,9 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
         column = layout.column()
         self.say(column, context, content.sentence, "INFO" if content.captures or content.results else "CANCEL")
         for folder in content.captures:
-            column.operator("scan_relight.use_folder", text=f"Use '{folder.name}'", icon="FILE_FOLDER",
-                            translate=False).folder = str(folder)
+            column.operator(
+                "scan_relight.use_folder", text=f"Use '{folder.name}'", icon="FILE_FOLDER", translate=False
+            ).folder = str(folder)
         for folder in content.results:
             text = "Open It" if folder == content.folder else f"Open Result '{folder.name}'"
             column.operator("scan_relight.open_result", text=text, icon="IMPORT").folder = str(folder)
@@ -70,11 +83,19 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
             self.say(layout, context, sentence, "ERROR")
         sizes = ", ".join(f"{count} of {size}" for size, count in found.get("resolutions", {}).items())
         masks = f", {found['masks']} with a mask" if found.get("masks") else ""
-        self.say(layout, context, f"{found.get('frames', 0)} frames ({found.get('format', '')}): {sizes}{masks}",
-                 "CAMERA_DATA")
+        self.say(
+            layout,
+            context,
+            f"{found.get('frames', 0)} frames ({found.get('format', '')}): {sizes}{masks}",
+            "CAMERA_DATA",
+        )
         extent = " x ".join(f"{length:.2f}" for length in found.get("extent_m", ()))
-        self.say(layout, context, f"{found.get('triangles', 0):,} triangles, {found.get('area_m2', 0):.1f} m\u00b2, "
-                 f"{extent} m", "MESH_DATA")
+        self.say(
+            layout,
+            context,
+            f"{found.get('triangles', 0):,} triangles, {found.get('area_m2', 0):.1f} m\u00b2, {extent} m",
+            "MESH_DATA",
+        )
         for name, value in found.items():
             if name not in TOLD:
                 self.other(layout, context, name, value)

@@ -10,8 +10,12 @@ from .correct_props import STATEMENTS
 from .job_operator import active, bar
 from .panel import SidebarPanel
 
-ICONS = {"metal": "SHADING_RENDERED", "specular": "SHADING_TEXTURE", "lambertian": "SHADING_SOLID",
-         "emitter": "LIGHT_AREA"}
+ICONS = {
+    "metal": "SHADING_RENDERED",
+    "specular": "SHADING_TEXTURE",
+    "lambertian": "SHADING_SOLID",
+    "emitter": "LIGHT_AREA",
+}
 GREY_CARD = 0.18
 
 
@@ -39,8 +43,9 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
         layout, thing = self.layout, the_object(context)
         choices, things = context.scene.scan_relight_correct, chosen(context)
         others = len([one for one in things if one != thing])
-        layout.label(text=f"{thing.name} and {others} more" if others else thing.name, icon="OBJECT_DATA",
-                     translate=False)
+        layout.label(
+            text=f"{thing.name} and {others} more" if others else thing.name, icon="OBJECT_DATA", translate=False
+        )
         self.statements(layout, context, choices, thing)
         self.values(layout, thing)
         if others:
@@ -55,8 +60,9 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
         for pair in (STATEMENTS[:2], STATEMENTS[2:]):
             row = column.row(align=True)
             for model, label, _ in pair:
-                row.operator("scan_relight.this_is", text=label, icon=ICONS[model],
-                             depress=said.get("model") == model).model = model
+                row.operator(
+                    "scan_relight.this_is", text=label, icon=ICONS[model], depress=said.get("model") == model
+                ).model = model
         row = column.row(align=True)
         row.prop(choices, "like", text="", icon="OBJECT_DATA")
         row.operator("scan_relight.same_as", text="The Same As")
@@ -81,8 +87,12 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
         for key, name in rows:
             pinned = key in said or (metal and name == "colour" and "base_color" in said)
             row = column.row(align=True)
-            row.prop(values, name, icon="PINNED" if pinned else "NONE",
-                     **({"text": "F0 Color"} if metal and name == "colour" else {}))
+            row.prop(
+                values,
+                name,
+                icon="PINNED" if pinned else "NONE",
+                **({"text": "F0 Color"} if metal and name == "colour" else {}),
+            )
             back = row.row(align=True)
             back.enabled = pinned
             key = "base_color" if pinned and key not in said else key
@@ -121,13 +131,13 @@ class SCAN_RELIGHT_PT_correct_scale(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("scan_relight.this_is_white", text="This Object").albedo = choices.albedo
         row.operator("scan_relight.pick_white", text="Spot", icon="EYEDROPPER").albedo = choices.albedo
-        layout.operator("scan_relight.pick_white", text="Grey Card (0.18)",
-                        icon="EYEDROPPER").albedo = (GREY_CARD,) * 3
+        layout.operator("scan_relight.pick_white", text="Grey Card (0.18)", icon="EYEDROPPER").albedo = (GREY_CARD,) * 3
         known = corrections.white_of(thing) if thing is not None else None
         if known is not None:
             row = layout.row(align=True)
-            row.label(text=f"{known[0].name}: {', '.join(f'{part:.2f}' for part in known[1])}", icon="PINNED",
-                      translate=False)
+            row.label(
+                text=f"{known[0].name}: {', '.join(f'{part:.2f}' for part in known[1])}", icon="PINNED", translate=False
+            )
             row.operator("scan_relight.white_back", text="", icon="LOOP_BACK")
 
 

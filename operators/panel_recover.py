@@ -84,15 +84,21 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
     def start(self, context) -> None:
         """The button; where a run was stopped, it goes on, and there is another to start anew."""
         choices = context.scene.scan_relight
-        stage = goes_on_with(preferences.result_folder(choices.result_folder, choices.capture_folder, context.scene)) \
-            if choices.capture_folder else ""
+        stage = (
+            goes_on_with(preferences.result_folder(choices.result_folder, choices.capture_folder, context.scene))
+            if choices.capture_folder
+            else ""
+        )
         row = self.layout.row()
         row.scale_y = 1.4
         row.enabled = findings.wrong_folder(choices) is None
         row.operator("scan_relight.run", text="Resume" if stage else "Run", icon="PLAY").target = "recover"
         if stage:
-            self.say(self.layout, context, f"Goes on with: {LABELS[stage]}. What is finished is kept, where its "
-                     "settings are the same.")
+            self.say(
+                self.layout,
+                context,
+                f"Goes on with: {LABELS[stage]}. What is finished is kept, where its settings are the same.",
+            )
             again = self.layout.operator("scan_relight.run", text="Start Anew", icon="FILE_REFRESH")
             again.target, again.from_stage = "recover", STAGES[0]
 

@@ -102,8 +102,10 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
         colour.enabled = relight_lamps.colour(lamp) is not None
         colour.prop(lamp.scan_relight_lamp, "kelvin")
         colour.prop(lamp.scan_relight_lamp, "colour")
-        now, found = (" ".join(f"{c:.3g}" for c in values) for values in
-                      (relight_lamps.radiance(lamp), relight_lamps.recovered_radiance(lamp)))
+        now, found = (
+            " ".join(f"{c:.3g}" for c in values)
+            for values in (relight_lamps.radiance(lamp), relight_lamps.recovered_radiance(lamp))
+        )
         self.say(layout, context, f"{lamp.name}: radiance {now} (R G B, in the frames' unit)")
         if relight_lamps.is_changed(lamp):
             row = layout.row()

@@ -13,17 +13,27 @@ from . import preferences, results
 from .panel import NamedRows, SidebarPanel, places
 from .select_result_object import select
 
-ICONS = {"lambertian": "SHADING_SOLID", "specular": "SHADING_TEXTURE", "metal": "SHADING_RENDERED",
-         "emitter": "LIGHT_AREA", "transparent": "MOD_OPACITY"}
+ICONS = {
+    "lambertian": "SHADING_SOLID",
+    "specular": "SHADING_TEXTURE",
+    "metal": "SHADING_RENDERED",
+    "emitter": "LIGHT_AREA",
+    "transparent": "MOD_OPACITY",
+}
 SIGNS = {"sure": "CHECKMARK", "fair": "DOT", "unsure": "QUESTION", "unknown": "BLANK1"}
-MODELS = [("ALL", "All models", "Show every object"),
-          ("lambertian", "Lambertian", "Only objects without a highlight"),
-          ("specular", "Specular", "Only objects with a highlight over their colour"),
-          ("metal", "Metal", "Only metals"),
-          ("emitter", "Lamps", "Only objects that give light"),
-          ("transparent", "Transparent", "Only glass and objects with holes that the mesh does not have")]
-ORDERS = [("NAME", "Name", "By name"), ("MODEL", "Model", "By model, then by name"),
-          ("CERTAINTY", "Least sure first", "By how sure the material is, the least sure first")]
+MODELS = [
+    ("ALL", "All models", "Show every object"),
+    ("lambertian", "Lambertian", "Only objects without a highlight"),
+    ("specular", "Specular", "Only objects with a highlight over their colour"),
+    ("metal", "Metal", "Only metals"),
+    ("emitter", "Lamps", "Only objects that give light"),
+    ("transparent", "Transparent", "Only glass and objects with holes that the mesh does not have"),
+]
+ORDERS = [
+    ("NAME", "Name", "By name"),
+    ("MODEL", "Model", "By model, then by name"),
+    ("CERTAINTY", "Least sure first", "By how sure the material is, the least sure first"),
+]
 
 
 class SCAN_RELIGHT_UL_results(NamedRows, bpy.types.UIList):
@@ -99,8 +109,13 @@ def choose_row(scene, row: int) -> None:
 
 def active_row_property():
     """`Scene.scan_relight_row`: follows the active object and is kept nowhere."""
-    return bpy.props.IntProperty(name="Object", description="Click to select the object in the scene", get=active_row,
-                                 set=choose_row, options={"SKIP_SAVE"})
+    return bpy.props.IntProperty(
+        name="Object",
+        description="Click to select the object in the scene",
+        get=active_row,
+        set=choose_row,
+        options={"SKIP_SAVE"},
+    )
 
 
 class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
@@ -120,8 +135,12 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
             self.bring_in(layout, scene, folder)
         found = results.result_of(scene)
         if not rows and not refused and (found is None or not found.objects):
-            self.say(layout, context, "No result yet: run the recovery to its end, or choose the folder of one that "
-                     "is finished.", "INFO")
+            self.say(
+                layout,
+                context,
+                "No result yet: run the recovery to its end, or choose the folder of one that is finished.",
+                "INFO",
+            )
             return
         if rows:
             head = layout.split(factor=0.52)
@@ -131,8 +150,13 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
             row.label(text="F0")
             layout.template_list("SCAN_RELIGHT_UL_results", "", scene, "objects", scene, "scan_relight_row", rows=6)
         elif not refused:
-            self.say(layout, context, f"{len(found.objects)} objects in '{found.folder.name}'; none of them is in "
-                     "this scene. Import the capture to see them.", "INFO")
+            self.say(
+                layout,
+                context,
+                f"{len(found.objects)} objects in '{found.folder.name}'; none of them is in "
+                "this scene. Import the capture to see them.",
+                "INFO",
+            )
         thing = results.active(scene)
         one = rows.get(thing)
         if one is not None:
@@ -142,8 +166,11 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
     def bring_in(self, layout, scene, folder: Path | None) -> None:
         """The button that renews objects of an earlier run from a folder: the panel's own capture's, or by itself."""
         choices = scene.scan_relight
-        chosen = preferences.result_folder(choices.result_folder, choices.capture_folder, scene) \
-            if choices.capture_folder else None
+        chosen = (
+            preferences.result_folder(choices.result_folder, choices.capture_folder, scene)
+            if choices.capture_folder
+            else None
+        )
         if chosen is not None and folder in (None, chosen):
             layout.operator("scan_relight.run", text="Bring In", icon="IMPORT").target = "write"
         elif folder is not None:

@@ -29,5 +29,8 @@ def no_run(operator) -> bool:
 
 def has_capture(operator, context) -> bool:
     """The scene's panel has a capture's folder."""
-    return check(operator, context.scene is not None and bool(context.scene.scan_relight.capture_folder),
-                 "Choose the capture's folder first.")
+    return check(
+        operator,
+        context.scene is not None and bool(context.scene.scan_relight.capture_folder),
+        "Choose the capture's folder first.",
+    )

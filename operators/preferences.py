@@ -19,17 +19,28 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
     bl_idname = PACKAGE
 
     results_folder: bpy.props.StringProperty(
-        name="Results Folder", description="Where results go whose folder is not chosen and whose .blend was never "
+        name="Results Folder",
+        description="Where results go whose folder is not chosen and whose .blend was never "
         "saved; empty takes 'Scan Relight' among your documents. A saved .blend has its results beside it",
-        subtype="DIR_PATH")
+        subtype="DIR_PATH",
+    )
     cache_folder: bpy.props.StringProperty(
-        name="Cache Folder", description="The results folder as earlier versions called it; heeded where none is set",
-        subtype="DIR_PATH", options={"HIDDEN"})
+        name="Cache Folder",
+        description="The results folder as earlier versions called it; heeded where none is set",
+        subtype="DIR_PATH",
+        options={"HIDDEN"},
+    )
     threads: bpy.props.IntProperty(
-        name="Threads", description="Processor threads that a run may take; 0 takes all", min=0, soft_max=64)
+        name="Threads", description="Processor threads that a run may take; 0 takes all", min=0, soft_max=64
+    )
     memory_limit: bpy.props.FloatProperty(
-        name="Memory Limit (GB)", description="Memory that a run may take before it is stopped; 0 sets no limit. A run "
-        "is a process of its own: Blender's own memory does not count", min=0.0, soft_max=256.0, precision=1)
+        name="Memory Limit (GB)",
+        description="Memory that a run may take before it is stopped; 0 sets no limit. A run "
+        "is a process of its own: Blender's own memory does not count",
+        min=0.0,
+        soft_max=256.0,
+        precision=1,
+    )
 
     def draw(self, context):
         """The choices."""
@@ -42,8 +53,11 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
         count = len(result_home.earlier_results())
         if count:
             row = layout.row()
-            row.label(text=f"{count} result{'s' * (count != 1)} of an earlier version in the extension's own folder: "
-                      "removing the extension would delete them.", icon="ERROR")
+            row.label(
+                text=f"{count} result{'s' * (count != 1)} of an earlier version in the extension's own folder: "
+                "removing the extension would delete them.",
+                icon="ERROR",
+            )
             row.operator("scan_relight.move_results", icon="EXPORT")
         layout.prop(self, "threads")
         layout.prop(self, "memory_limit")
@@ -109,8 +123,10 @@ def _add_up(folder: Path) -> None:
 
     found = results(folder)
     whole, stages = (sum(size(one / part) for one in found) for part in ("", STAGES))
-    text = f"{len(found)} result{'s' * (len(found) != 1)}, {amount(whole)}, of it {amount(stages)} that can be made " \
-           f"again, in {folder}"
+    text = (
+        f"{len(found)} result{'s' * (len(found) != 1)}, {amount(whole)}, of it {amount(stages)} that can be made "
+        f"again, in {folder}"
+    )
     _size.update(folder=folder, time=time.monotonic(), text=text)
 
 

@@ -11,34 +11,64 @@ from ..addon.core.capture.layout import Reading
 from .translations import OWN
 
 FOUND = "FOUND"
-CURVES = (("FOUND", "Not Given", "Pictures of 8 and 16 bits are refused, as their curve is unknown"),
-          ("srgb", "sRGB", "The curve of screens and of most pictures of 8 bits"),
-          ("linear", "Linear", "Stored numbers are proportional to light"))
-NAMES = ("reading_format", "reading_mesh", "reading_outside", "reading_transfer", "reading_exposures",
-         "reading_convention")
+CURVES = (
+    ("FOUND", "Not Given", "Pictures of 8 and 16 bits are refused, as their curve is unknown"),
+    ("srgb", "sRGB", "The curve of screens and of most pictures of 8 bits"),
+    ("linear", "Linear", "Stored numbers are proportional to light"),
+)
+NAMES = (
+    "reading_format",
+    "reading_mesh",
+    "reading_outside",
+    "reading_transfer",
+    "reading_exposures",
+    "reading_convention",
+)
 
 
 def format_items() -> list[tuple[str, str, str]]:
     """Items of an enumeration of the formats."""
-    return [(FOUND, "From the Folder", "Find the format from what the folder holds"),
-            *((name, name, f"Known by {wants}") for name, wants in FORMATS.items())]
+    return [
+        (FOUND, "From the Folder", "Find the format from what the folder holds"),
+        *((name, name, f"Known by {wants}") for name, wants in FORMATS.items()),
+    ]
 
 
 def with_reading(cls):
     """Class decorator: give an operator or property group one property for each field of `Reading`."""
     string, own = bpy.props.StringProperty, inspect.get_annotations(cls)
-    cls.__annotations__ = own | dict(zip(NAMES, (
-        bpy.props.EnumProperty(name="Format", description="Layout of the capture's folder", items=format_items(),
-                               default=FOUND),
-        string(name="Mesh", description="The mesh, where it is not the one that the format names",
-               subtype="FILE_PATH", translation_context=OWN),
-        bpy.props.BoolProperty(name="Files Outside", description="Let the capture's files name others outside of its "
-                               "folder"),
-        bpy.props.EnumProperty(name="Picture Curve", description="Curve of pictures of 8 and 16 bits", items=CURVES),
-        string(name="Exposures", description="CSV file with the exposure of each frame: lines of name, exposure",
-               subtype="FILE_PATH"),
-        string(name="Poses", description="Name of a correction of all poses, as the check of the capture proposes it"),
-    ), strict=True))
+    cls.__annotations__ = own | dict(
+        zip(
+            NAMES,
+            (
+                bpy.props.EnumProperty(
+                    name="Format", description="Layout of the capture's folder", items=format_items(), default=FOUND
+                ),
+                string(
+                    name="Mesh",
+                    description="The mesh, where it is not the one that the format names",
+                    subtype="FILE_PATH",
+                    translation_context=OWN,
+                ),
+                bpy.props.BoolProperty(
+                    name="Files Outside", description="Let the capture's files name others outside of its folder"
+                ),
+                bpy.props.EnumProperty(
+                    name="Picture Curve", description="Curve of pictures of 8 and 16 bits", items=CURVES
+                ),
+                string(
+                    name="Exposures",
+                    description="CSV file with the exposure of each frame: lines of name, exposure",
+                    subtype="FILE_PATH",
+                ),
+                string(
+                    name="Poses",
+                    description="Name of a correction of all poses, as the check of the capture proposes it",
+                ),
+            ),
+            strict=True,
+        )
+    )
     return cls
 
 
@@ -62,6 +92,7 @@ def options(owner) -> list[str]:
 
 def reading(owner) -> Reading:
     """What `owner`'s properties are for `read_capture`."""
+
     def import_mesh(path: Path):
         from ..addon.bridge.import_mesh import import_mesh as through_blender
 
@@ -73,7 +104,9 @@ def reading(owner) -> Reading:
         owner.reading_outside,
         "" if owner.reading_transfer == FOUND else owner.reading_transfer,
         Path(bpy.path.abspath(owner.reading_exposures)) if owner.reading_exposures else None,
-        owner.reading_convention, import_mesh)
+        owner.reading_convention,
+        import_mesh,
+    )
 
 
 def draw(layout, owner) -> None:

@@ -56,7 +56,8 @@ class SCAN_RELIGHT_OT_restore_light(RelightOperator, bpy.types.Operator):
     def poll(cls, context):
         """Only where anything differs."""
         return super().poll(context) and poll.check(
-            cls, relight_state.is_relit(context.scene), "The light is as it was captured.")
+            cls, relight_state.is_relit(context.scene), "The light is as it was captured."
+        )
 
     def work(self, context):
         """All of it."""
@@ -72,12 +73,21 @@ class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
 
     preset: bpy.props.EnumProperty(name="Light", description="What kind of light", items=PRESETS)
     strength: bpy.props.FloatProperty(
-        name="Strength", description="In the unit below; of the room's light 1 keeps the scene's exposure readable",
-        min=0.0, soft_max=4.0, default=1.0)
+        name="Strength",
+        description="In the unit below; of the room's light 1 keeps the scene's exposure readable",
+        min=0.0,
+        soft_max=4.0,
+        default=1.0,
+    )
     unit: bpy.props.EnumProperty(name="Strength In", description="What the strength is given in", items=UNITS)
     kelvin: bpy.props.FloatProperty(
-        name="Temperature", description="Of its colour; 0 takes the preset's own", subtype="TEMPERATURE", min=0.0,
-        max=20000.0, default=0.0)
+        name="Temperature",
+        description="Of its colour; 0 takes the preset's own",
+        subtype="TEMPERATURE",
+        min=0.0,
+        max=20000.0,
+        default=0.0,
+    )
     aim: bpy.props.EnumProperty(name="Aim At", description="What the light is aimed at", items=AIMS)
 
     @classmethod
@@ -88,8 +98,9 @@ class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
 
     def work(self, context):
         """Add it and make it the active object."""
-        light = relight_lights.add_light(context.scene, self.preset, self.strength, self.aim, context.object,
-                                         self.kelvin or None, self.unit)
+        light = relight_lights.add_light(
+            context.scene, self.preset, self.strength, self.aim, context.object, self.kelvin or None, self.unit
+        )
         make_active(context, light)
         follow(context.scene)
 
@@ -105,7 +116,8 @@ class SCAN_RELIGHT_OT_remove_lights(RelightOperator, bpy.types.Operator):
     def poll(cls, context):
         """Only where there are any."""
         return super().poll(context) and poll.check(
-            cls, bool(relight_lights.added_lights(context.scene)), "No light was added here.")
+            cls, bool(relight_lights.added_lights(context.scene)), "No light was added here."
+        )
 
     def work(self, context):
         """All of them."""
@@ -127,7 +139,8 @@ class SCAN_RELIGHT_OT_use_hdri(RelightOperator, bpy.types.Operator):
     bl_description = "Put an equirectangular HDR picture around the room; the recovered outside is kept"
 
     filepath: bpy.props.StringProperty(
-        name="Picture", description="EXR or HDR file", subtype="FILE_PATH", options={"SKIP_SAVE"})
+        name="Picture", description="EXR or HDR file", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
     filter_glob: bpy.props.StringProperty(default="*.exr;*.hdr;*.png;*.jpg", options={"HIDDEN"})
 
     def invoke(self, context, event):
@@ -148,8 +161,10 @@ _items: list[tuple[str, str, str]] = []  # Blender keeps no reference to what a 
 
 
 def _studio_items(operator, context):
-    _items[:] = [(str(path), path.stem.capitalize(), f"Blender's own picture '{path.stem}'")
-                 for path in relight_outside.studio_lights()]
+    _items[:] = [
+        (str(path), path.stem.capitalize(), f"Blender's own picture '{path.stem}'")
+        for path in relight_outside.studio_lights()
+    ]
     return _items
 
 
@@ -166,8 +181,10 @@ class SCAN_RELIGHT_OT_use_studio_light(RelightOperator, bpy.types.Operator):
     def poll(cls, context):
         """Some builds have none."""
         return super().poll(context) and poll.check(
-            cls, bool(relight_outside.studio_lights()),
-            "This Blender comes without its HDR pictures; choose a file instead.")
+            cls,
+            bool(relight_outside.studio_lights()),
+            "This Blender comes without its HDR pictures; choose a file instead.",
+        )
 
     def work(self, context):
         """As any other picture."""

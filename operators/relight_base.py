@@ -18,9 +18,15 @@ class RelightOperator(AtOnce):
     @classmethod
     def poll(cls, context):
         """Whether the operator can run now; where not, one sentence says what is missing."""
-        return poll.has_scene(cls, context) and poll.object_mode(cls, context) and poll.check(
-            cls, not cls.needs_room or has_room(context.scene),
-            "The scene holds no scanned room yet; recover a capture or open a result's scene.blend.")
+        return (
+            poll.has_scene(cls, context)
+            and poll.object_mode(cls, context)
+            and poll.check(
+                cls,
+                not cls.needs_room or has_room(context.scene),
+                "The scene holds no scanned room yet; recover a capture or open a result's scene.blend.",
+            )
+        )
 
 
 def has_room(scene: bpy.types.Scene) -> bool:

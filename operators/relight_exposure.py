@@ -20,8 +20,10 @@ class SCAN_RELIGHT_OT_expose(RelightOperator, bpy.types.Operator):
 
     bl_idname = "scan_relight.expose"
     bl_label = "Expose for This Light"
-    bl_description = ("Measure the light in a small picture and set the exposure so that its median is middle grey; "
-                      "takes some seconds")
+    bl_description = (
+        "Measure the light in a small picture and set the exposure so that its median is middle grey; "
+        "takes some seconds"
+    )
 
     def work(self, context):
         """Measure and set."""

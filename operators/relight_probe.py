@@ -14,10 +14,12 @@ class SCAN_RELIGHT_OT_bake_preview(RelightOperator, bpy.types.Operator):
 
     bl_idname = "scan_relight.bake_preview"
     bl_label = "Bake Preview Light"
-    bl_description = ("Bake how light bounces through the room for EEVEE, so that its preview comes nearer to the "
-                      "picture by Cycles; it may stay up to two stops darker. Bake again after the "
-                      "light has changed. The status bar shows how far "
-                      "it is, ESC ends it")
+    bl_description = (
+        "Bake how light bounces through the room for EEVEE, so that its preview comes nearer to the "
+        "picture by Cycles; it may stay up to two stops darker. Bake again after the "
+        "light has changed. The status bar shows how far "
+        "it is, ESC ends it"
+    )
 
     _wait = True
 
@@ -42,7 +44,8 @@ class SCAN_RELIGHT_OT_remove_preview(RelightOperator, bpy.types.Operator):
     def poll(cls, context):
         """Only where there is any."""
         return super().poll(context) and poll.check(
-            cls, bool(relight_probe.probes(context.scene)), "No preview light was baked here.")
+            cls, bool(relight_probe.probes(context.scene)), "No preview light was baked here."
+        )
 
     def work(self, context):
         """All of it."""

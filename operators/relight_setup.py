@@ -27,8 +27,10 @@ class SCAN_RELIGHT_OT_light_preset_add(AddPresetBase, bpy.types.Operator):
 
     bl_idname = "scan_relight.light_preset_add"
     bl_label = "Save This Light"
-    bl_description = ("Save the lights that were added, the lamps' factors and the outside under a name, to light "
-                      "other rooms the same way")
+    bl_description = (
+        "Save the lights that were added, the lamps' factors and the outside under a name, to light "
+        "other rooms the same way"
+    )
     preset_menu = "SCAN_RELIGHT_MT_light_presets"
     preset_subdir = FOLDER
     preset_defines = ["studio = bpy.context.scene.scan_relight_studio"]
@@ -38,4 +40,5 @@ class SCAN_RELIGHT_OT_light_preset_add(AddPresetBase, bpy.types.Operator):
     def poll(cls, context):
         """Only with a room."""
         return poll.has_scene(cls, context) and poll.check(
-            cls, has_room(context.scene), "The scene holds no scanned room to light.")
+            cls, has_room(context.scene), "The scene holds no scanned room to light."
+        )

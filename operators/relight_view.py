@@ -22,14 +22,16 @@ class SCAN_RELIGHT_OT_match_frame(RelightOperator, bpy.types.Operator):
 
     index: bpy.props.IntProperty(name="Frame", description="In the capture's order, from 0", min=0)
     size: bpy.props.BoolProperty(
-        name="Match Render Size", description="Render at the frame's size and with its shape of pixels, too")
+        name="Match Render Size", description="Render at the frame's size and with its shape of pixels, too"
+    )
     step: bpy.props.IntProperty(name="Step", description="So many frames on from the present one; 0 takes the frame")
 
     @classmethod
     def poll(cls, context):
         """Only with cameras of a capture."""
         return super().poll(context) and poll.check(
-            cls, bool(frame_cameras(context.scene)), "The scene has no camera of a capture; import a capture first.")
+            cls, bool(frame_cameras(context.scene)), "The scene has no camera of a capture; import a capture first."
+        )
 
     def work(self, context):
         """Set the camera; in a window, look through it."""
@@ -48,16 +50,20 @@ class SCAN_RELIGHT_OT_follow_track(RelightOperator, bpy.types.Operator):
 
     bl_idname = "scan_relight.follow_track"
     bl_label = "Go Along the Track"
-    bl_description = ("Look and render through a camera that goes where the capture's went: play the timeline, a frame "
-                      "of it for each of the capture's")
+    bl_description = (
+        "Look and render through a camera that goes where the capture's went: play the timeline, a frame "
+        "of it for each of the capture's"
+    )
     needs_room = False
 
     @classmethod
     def poll(cls, context):
         """Only with such a camera."""
         return super().poll(context) and poll.check(
-            cls, bool(track_cameras(context.scene)), "The scene has no camera along a capture's track; bring a room "
-            "of at least two frames in first.")
+            cls,
+            bool(track_cameras(context.scene)),
+            "The scene has no camera along a capture's track; bring a room of at least two frames in first.",
+        )
 
     def work(self, context):
         """Make it the scene's camera; in a window, look through it."""

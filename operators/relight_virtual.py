@@ -47,8 +47,11 @@ class OwnObject(RelightOperator):
         if not super().poll(context):
             return False
         thing = context.object
-        return poll.check(cls, thing is not None and thing.type == "MESH" and OBJECT_ID not in thing,
-                          "Select an object of your own, not one of the scan.")
+        return poll.check(
+            cls,
+            thing is not None and thing.type == "MESH" and OBJECT_ID not in thing,
+            "Select an object of your own, not one of the scan.",
+        )
 
 
 class SCAN_RELIGHT_OT_place_object(OwnObject, bpy.types.Operator):

@@ -11,12 +11,15 @@ class SCAN_RELIGHT_OT_restore_materials(bpy.types.Operator):
 
     bl_idname = "scan_relight.restore_materials"
     bl_label = "Restore Materials"
-    bl_description = ("Give your objects back the materials and UV maps that they had before the recovered ones; "
-                      "copies that were made for recovered materials are removed")
+    bl_description = (
+        "Give your objects back the materials and UV maps that they had before the recovered ones; "
+        "copies that were made for recovered materials are removed"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     selected_only: bpy.props.BoolProperty(
-        name="Selected Only", description="Leave the objects that are not selected as they are", default=False)
+        name="Selected Only", description="Leave the objects that are not selected as they are", default=False
+    )
 
     @classmethod
     def poll(cls, context):
@@ -24,8 +27,10 @@ class SCAN_RELIGHT_OT_restore_materials(bpy.types.Operator):
         from ..addon.bridge.write_back import wearing
 
         return poll.object_mode(cls, context) and poll.check(
-            cls, context.scene is not None and bool(wearing(context.scene.objects)),
-            "No object of this scene wears a recovered material over its own.")
+            cls,
+            context.scene is not None and bool(wearing(context.scene.objects)),
+            "No object of this scene wears a recovered material over its own.",
+        )
 
     def execute(self, context):
         """Give them back."""

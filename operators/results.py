@@ -14,8 +14,13 @@ from . import preferences
 PAGE = "report.html"
 SURE, FAIR = 0.15, 0.4
 """Doubt (`doubt`) up to which an object counts as sure, and as fairly sure."""
-MODELS = {"lambertian": "Lambertian (matt)", "specular": "Specular", "metal": "Metal", "emitter": "Lamp",
-          "transparent": "Transparent"}
+MODELS = {
+    "lambertian": "Lambertian (matt)",
+    "specular": "Specular",
+    "metal": "Metal",
+    "emitter": "Lamp",
+    "transparent": "Transparent",
+}
 GIVEN = {"model": "model", "roughness": "roughness", "f0": "F0", "base_color": "colour", "same_as": "same as object"}
 
 
@@ -63,11 +68,20 @@ def refused(things) -> list[tuple[str, Path | None]]:
         if state in (EARLIER, UNTOLD):
             folder = result.folder if state == EARLIER else None
             counts[folder] = counts.get(folder, 0) + 1
-    return [(f"{count} object{'s' * (count > 1)} of this scene {'are' if count > 1 else 'is'} "
-             + (f"of an earlier run than the one that lies in '{folder.name}' now; bring in the new one to see what "
-                "was found." if folder else
-                "of an older version of Scan Relight, so that nobody can tell which run made them; run again and bring "
-                "in the result."), folder) for folder, count in counts.items()]
+    return [
+        (
+            f"{count} object{'s' * (count > 1)} of this scene {'are' if count > 1 else 'is'} "
+            + (
+                f"of an earlier run than the one that lies in '{folder.name}' now; bring in the new one to see what "
+                "was found."
+                if folder
+                else "of an older version of Scan Relight, so that nobody can tell which run made them; run again and bring "
+                "in the result."
+            ),
+            folder,
+        )
+        for folder, count in counts.items()
+    ]
 
 
 forget = result_file.forget

@@ -25,8 +25,11 @@ class SCAN_RELIGHT_OT_run(bpy.types.Operator):
     bl_description = "Run what the panel has chosen"
 
     target: bpy.props.EnumProperty(
-        name="Operator", description="What is run", default="recover",
-        items=[(name, name.replace("_", " ").capitalize(), text) for name, text in TARGETS.items()])
+        name="Operator",
+        description="What is run",
+        default="recover",
+        items=[(name, name.replace("_", " ").capitalize(), text) for name, text in TARGETS.items()],
+    )
     from_stage: FROM_STAGE
 
     @classmethod
@@ -66,10 +69,12 @@ class SCAN_RELIGHT_OT_run(bpy.types.Operator):
         found |= {name: getattr(choices.reading, name) for name in reading_props.NAMES}
         if self.target == "import_capture":
             return found
-        found["result_folder"] = str(preferences.result_folder(choices.result_folder, choices.capture_folder,
-                                                                choices.id_data))
+        found["result_folder"] = str(
+            preferences.result_folder(choices.result_folder, choices.capture_folder, choices.id_data)
+        )
         found |= {"preset": choices.preset, "from_stage": self.from_stage}
         found |= {name: getattr(choices, name) for name in ("images", "copies")}
         wanted = {*choices.settings.changed(choices.preset), "threads", "seed"}
-        return found | {info.name: setting_value(choices.settings, info) for info in setting_infos()
-                        if info.name in wanted}
+        return found | {
+            info.name: setting_value(choices.settings, info) for info in setting_infos() if info.name in wanted
+        }

@@ -16,8 +16,9 @@ from .translations import OWN
 
 def preset_chosen(choices, context) -> None:
     """Lay the preset's values into the settings, keeping what says how and not what is computed."""
-    choices.settings.take(replace(PRESETS[choices.preset], threads=choices.settings.threads,
-                                  seed=choices.settings.seed))
+    choices.settings.take(
+        replace(PRESETS[choices.preset], threads=choices.settings.threads, seed=choices.settings.seed)
+    )
 
 
 def capture_chosen(choices, context) -> None:
@@ -44,9 +45,12 @@ class ScanRelightSettings(bpy.types.PropertyGroup):
         """Names of the settings that differ from the preset's."""
         wanted = PRESETS[preset]
         same = {bool: bool.__eq__, int: int.__eq__, str: str.__eq__, float: lambda a, b: abs(a - b) <= 1e-5}
-        return [info.name for info in setting_infos()
-                if info.name not in ("threads", "seed")
-                and not same[info.kind](getattr(self, info.name), getattr(wanted, info.name))]
+        return [
+            info.name
+            for info in setting_infos()
+            if info.name not in ("threads", "seed")
+            and not same[info.kind](getattr(self, info.name), getattr(wanted, info.name))
+        ]
 
 
 @with_reading
@@ -58,17 +62,30 @@ class ScanRelightScene(bpy.types.PropertyGroup):
     """`Scene.scan_relight`."""
 
     capture_folder: bpy.props.StringProperty(
-        name="Capture", description="Folder of the scan: its mesh, its frames and their cameras", subtype="DIR_PATH",
-        update=capture_chosen)
+        name="Capture",
+        description="Folder of the scan: its mesh, its frames and their cameras",
+        subtype="DIR_PATH",
+        update=capture_chosen,
+    )
     reading: bpy.props.PointerProperty(
-        name="How It Is Read", description="How the capture is to be read", type=ScanRelightReading)
+        name="How It Is Read", description="How the capture is to be read", type=ScanRelightReading
+    )
     result_folder: bpy.props.StringProperty(
-        name="Result", description="Folder for the recovered scene and the finished stages; empty takes one beside "
-        "the saved .blend, or in the preferences' results folder", subtype="DIR_PATH")
+        name="Result",
+        description="Folder for the recovered scene and the finished stages; empty takes one beside "
+        "the saved .blend, or in the preferences' results folder",
+        subtype="DIR_PATH",
+    )
     preset: bpy.props.EnumProperty(
-        name="Preset", description="What all settings start from", items=preset_items(), default="normal",
-        translation_context=OWN, update=preset_chosen)
+        name="Preset",
+        description="What all settings start from",
+        items=preset_items(),
+        default="normal",
+        translation_context=OWN,
+        update=preset_chosen,
+    )
     settings: bpy.props.PointerProperty(
-        name="Settings", description="All settings of a recovery", type=ScanRelightSettings)
+        name="Settings", description="All settings of a recovery", type=ScanRelightSettings
+    )
     images: IMAGES
     copies: COPIES

@@ -9,8 +9,11 @@ from . import poll
 
 def result_objects(scene) -> dict[int, bpy.types.Object]:
     """The recovered objects of a scene by `object_id`; of several imports the last one's."""
-    return {thing[OBJECT_ID]: thing for thing in scene.objects
-            if thing.type == "MESH" and isinstance(thing.get(OBJECT_ID), int)}
+    return {
+        thing[OBJECT_ID]: thing
+        for thing in scene.objects
+        if thing.type == "MESH" and isinstance(thing.get(OBJECT_ID), int)
+    }
 
 
 def make_active(context, thing: bpy.types.Object, extend: bool = False) -> None:
@@ -42,7 +45,8 @@ class SCAN_RELIGHT_OT_select_result_object(bpy.types.Operator):
 
     object_id: bpy.props.IntProperty(name="Object", description="Number of the object in the capture", min=0)
     extend: bpy.props.BoolProperty(
-        name="Extend", description="Keep what is selected", default=False, options={"SKIP_SAVE"})
+        name="Extend", description="Keep what is selected", default=False, options={"SKIP_SAVE"}
+    )
 
     @classmethod
     def poll(cls, context):

@@ -28,26 +28,46 @@ PRESET_TEXTS = {
     "fine": "Finer texels and three times the rays; takes several times as long",
     "paper": "The published method, for comparison; very slow",
 }
-TARGETS = [("AUTO", "What Was Captured", "Imported objects of a scan; your own objects where they were captured"),
-           ("IMPORTED", "Imported Objects", "The objects that Import Capture made"),
-           ("SELECTED", "Your Own Objects", "The objects that were selected when the scene was captured; what they "
-            "wear now is kept and can be restored")]
+TARGETS = [
+    ("AUTO", "What Was Captured", "Imported objects of a scan; your own objects where they were captured"),
+    ("IMPORTED", "Imported Objects", "The objects that Import Capture made"),
+    (
+        "SELECTED",
+        "Your Own Objects",
+        "The objects that were selected when the scene was captured; what they wear now is kept and can be restored",
+    ),
+]
 IMAGES = bpy.props.EnumProperty(
-    name="Images", description="Where the recovered images are kept", items=[
+    name="Images",
+    description="Where the recovered images are kept",
+    items=[
         ("RESULT", "In the Result Folder", "Refer to the images where they are"),
         ("FOLDER", "Beside the File", "Copy the images into a folder beside the saved .blend"),
-        ("PACK", "Packed", "Keep the images within the .blend")])
+        ("PACK", "Packed", "Keep the images within the .blend"),
+    ],
+)
 INTO = bpy.props.EnumProperty(
-    name="Into", description="Where the room goes", items=[
+    name="Into",
+    description="Where the room goes",
+    items=[
         ("OWN", "A Scene of Its Own", "With its light, exposure and cameras; your scenes stay as they are"),
-        ("SCENE", "This Scene", "Only link the room into this scene; its world, exposure, engine and camera stay")])
+        ("SCENE", "This Scene", "Only link the room into this scene; its world, exposure, engine and camera stay"),
+    ],
+)
 COPIES = bpy.props.BoolProperty(
-    name="Make Copies", description="Where modifiers or instances make an object's faces, put the material onto a "
-    "copy of it and hide the object; without this such objects are left as they are", default=False)
+    name="Make Copies",
+    description="Where modifiers or instances make an object's faces, put the material onto a "
+    "copy of it and hide the object; without this such objects are left as they are",
+    default=False,
+)
 FROM_STAGE = bpy.props.EnumProperty(
-    name="Again From", description="Do this stage and all later ones anew, though they are stored",
-    items=[("NONE", "Nothing", "Go on from what is stored"),
-           *((name, LABELS[name], f"From '{LABELS[name]}' on") for name in RUN_STAGES)])
+    name="Again From",
+    description="Do this stage and all later ones anew, though they are stored",
+    items=[
+        ("NONE", "Nothing", "Go on from what is stored"),
+        *((name, LABELS[name], f"From '{LABELS[name]}' on") for name in RUN_STAGES),
+    ],
+)
 PACKAGES = ("scipy", "embreex", "OpenEXR")
 
 
@@ -86,8 +106,12 @@ def missing_packages() -> tuple[str, ...]:
 def can_start(operator, context) -> bool:
     """What everything asks in `poll` that reads a capture; also those that only start another operator."""
     missing = missing_packages()
-    return (poll.check(operator, not missing, f"{' and '.join(missing)} missing: install the extension again.")
-            and poll.has_scene(operator, context) and poll.object_mode(operator, context) and poll.no_run(operator))
+    return (
+        poll.check(operator, not missing, f"{' and '.join(missing)} missing: install the extension again.")
+        and poll.has_scene(operator, context)
+        and poll.object_mode(operator, context)
+        and poll.no_run(operator)
+    )
 
 
 def preset_items() -> list[tuple[str, str, str]]:
@@ -104,8 +128,11 @@ class CaptureOperator(JobOperator):
 
     bl_options = {"UNDO", "PRESET"}
     capture_folder: bpy.props.StringProperty(
-        name="Capture", description="Folder with transforms.json, mesh.ply and the frames", subtype="DIR_PATH",
-        options={"SKIP_PRESET"})
+        name="Capture",
+        description="Folder with transforms.json, mesh.ply and the frames",
+        subtype="DIR_PATH",
+        options={"SKIP_PRESET"},
+    )
     ask: bpy.props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"}, description="Ask for the folders first")
 
     @classmethod
@@ -156,14 +183,22 @@ class StageOperator(CaptureOperator):
     """An operator that runs stages of the method: also a result folder and the settings."""
 
     result_folder: bpy.props.StringProperty(
-        name="Result", description="Folder for the recovered scene and the finished stages", subtype="DIR_PATH",
-        options={"SKIP_PRESET"})
+        name="Result",
+        description="Folder for the recovered scene and the finished stages",
+        subtype="DIR_PATH",
+        options={"SKIP_PRESET"},
+    )
     preset: bpy.props.EnumProperty(
-        name="Preset", description="What the settings that are not given start from", items=preset_items(),
-        translation_context=OWN, default="normal")
+        name="Preset",
+        description="What the settings that are not given start from",
+        items=preset_items(),
+        translation_context=OWN,
+        default="normal",
+    )
     from_stage: FROM_STAGE
     paper: bpy.props.BoolProperty(
-        name="As in the Paper", description="The published method; the other settings are not looked at", default=False)
+        name="As in the Paper", description="The published method; the other settings are not looked at", default=False
+    )
 
     def work(self, context) -> list[str]:
         """Run the stages up to the operator's own; returns warnings."""
@@ -178,8 +213,11 @@ class StageOperator(CaptureOperator):
 
     def settings(self) -> Settings:
         """The preset with every setting that was given; threads are the preferences' where they are not."""
-        given = {info.name: setting_value(self, info) for info in setting_infos()
-                 if self.properties.is_property_set(info.name)}
+        given = {
+            info.name: setting_value(self, info)
+            for info in setting_infos()
+            if self.properties.is_property_set(info.name)
+        }
         if self.paper:
             given = {name: given[name] for name in ("threads", "seed") if name in given}
         ours = preferences.preferences()
@@ -194,9 +232,16 @@ class StageOperator(CaptureOperator):
         settings = self.settings()
         guard = MemoryGuard(self.memory_limit())
         with contextlib.closing(guard):
-            report = run(self.folder("capture_folder"), self.folder("result_folder"), settings,
-                         progress_for(settings, should_stop=guard), until, reading=reading_props.reading(self),
-                         from_stage=None if self.from_stage == "NONE" else self.from_stage, **where)
+            report = run(
+                self.folder("capture_folder"),
+                self.folder("result_folder"),
+                settings,
+                progress_for(settings, should_stop=guard),
+                until,
+                reading=reading_props.reading(self),
+                from_stage=None if self.from_stage == "NONE" else self.from_stage,
+                **where,
+            )
         return report["warnings"]
 
     @staticmethod
@@ -210,15 +255,28 @@ class StageOperator(CaptureOperator):
         from ..addon.bridge.job_command import command
 
         capture, result, settings = self.folder("capture_folder"), self.folder("result_folder"), self.settings()
-        words = ["recover", capture, "--out", result, *reading_props.options(self), "--until", self.until,
-                 "--progress", "json", "--stop-with-stdin", "--memory-limit", str(self.memory_limit())]
+        words = [
+            "recover",
+            capture,
+            "--out",
+            result,
+            *reading_props.options(self),
+            "--until",
+            self.until,
+            "--progress",
+            "json",
+            "--stop-with-stdin",
+            "--memory-limit",
+            str(self.memory_limit()),
+        ]
         if self.from_stage != "NONE":
             words += ["--from-stage", self.from_stage]
         for info in setting_infos():
             value, option = getattr(settings, info.name), info.name.replace("_", "-")
             words += [f"--{'' if value else 'no-'}{option}"] if info.kind is bool else [f"--{option}", str(value)]
-        return self.start(context, command(words), title=self.bl_label, capture_folder=capture, result_folder=result,
-                          until=self.until)
+        return self.start(
+            context, command(words), title=self.bl_label, capture_folder=capture, result_folder=result, until=self.until
+        )
 
 
 class SceneStageOperator(StageOperator):
@@ -226,8 +284,7 @@ class SceneStageOperator(StageOperator):
 
     until = WRITE
     import_first = True
-    target: bpy.props.EnumProperty(
-        name="Onto", description="Which objects the materials go onto", items=TARGETS)
+    target: bpy.props.EnumProperty(name="Onto", description="Which objects the materials go onto", items=TARGETS)
     images: IMAGES
     copies: COPIES
     into: INTO
@@ -235,8 +292,16 @@ class SceneStageOperator(StageOperator):
     def work(self, context):
         """Run, then bring the room, so that a failed run leaves the file alone."""
         scene = context.scene
-        warnings = self.run(context, self.until, scene=scene, import_first=self.import_first, target=self.target,
-                            images=self.images, copies=self.copies, into=self.into)
+        warnings = self.run(
+            context,
+            self.until,
+            scene=scene,
+            import_first=self.import_first,
+            target=self.target,
+            images=self.images,
+            copies=self.copies,
+            into=self.into,
+        )
         if self.into == "OWN":
             room_window.show_own(scene, self.folder("capture_folder"))
         return warnings
@@ -268,10 +333,14 @@ class SceneStageOperator(StageOperator):
         from ..addon.bridge.write_back import is_own, writing_back
 
         if is_own(loaded.capture.root, self.target):
-            return (yield from writing_back(scene, loaded.capture, loaded.atlas_uv, loaded.materials, loaded.folder,
-                                            self.images, self.copies))
-        brought = yield from bringing(loaded.folder, scene if self.into == "SCENE" else None, self.images,
-                                      known=not self.import_first)
+            return (
+                yield from writing_back(
+                    scene, loaded.capture, loaded.atlas_uv, loaded.materials, loaded.folder, self.images, self.copies
+                )
+            )
+        brought = yield from bringing(
+            loaded.folder, scene if self.into == "SCENE" else None, self.images, known=not self.import_first
+        )
         if self.into == "OWN":
             room_window.show(scene, brought.scene)
         self.job.facts["room"] = brought.scene.name

@@ -53,16 +53,32 @@ def main() -> int:
     builder = blender_ext()
     hashes = locked_hashes({Path(wheel).name.split("-")[0].lower() for wheel in manifest["wheels"]})
     tags = {f"cp{version.replace('.', '')}" for version in arguments.python or ()}
-    wanted = {platform: [Path(wheel).name for wheel in manifest["wheels"]
-                         if re.search(WHEEL_PLATFORMS[platform] + r"\.whl$", wheel)
-                         and (not tags or wheel.split("-")[2] in tags)] for platform in platforms}
+    wanted = {
+        platform: [
+            Path(wheel).name
+            for wheel in manifest["wheels"]
+            if re.search(WHEEL_PLATFORMS[platform] + r"\.whl$", wheel) and (not tags or wheel.split("-")[2] in tags)
+        ]
+        for platform in platforms
+    }
     for platform, names in wanted.items():
         fetch(platform, names, hashes)
     arguments.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as scratch:
         stage(Path(scratch), platforms, {name for names in wanted.values() for name in names})
-        subprocess.run([sys.executable, builder, "build", "--split-platforms", "--source-dir", scratch,
-                        "--output-dir", arguments.out.resolve()], check=True)
+        subprocess.run(
+            [
+                sys.executable,
+                builder,
+                "build",
+                "--split-platforms",
+                "--source-dir",
+                scratch,
+                "--output-dir",
+                arguments.out.resolve(),
+            ],
+            check=True,
+        )
     for platform in platforms:
         made = arguments.out / f"{manifest['id']}-{manifest['version']}-{platform.replace('-', '_')}.zip"
         print(f"{made}  {made.stat().st_size / 1e6:.1f} MB")
@@ -74,8 +90,10 @@ def blender_ext() -> Path:
     bpy = importlib.util.find_spec("bpy")
     found = sorted(Path(bpy.origin).parent.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")) if bpy else []
     if not found:
-        sys.exit("This Python has no bpy, which brings the extension builder; run it as: "
-                 ".venv/bin/python scripts/build_extension.py")
+        sys.exit(
+            "This Python has no bpy, which brings the extension builder; run it as: "
+            ".venv/bin/python scripts/build_extension.py"
+        )
     return found[-1]
 
 
@@ -106,10 +124,28 @@ def fetch(platform: str, names: list[str], hashes: dict[str, tuple[str, set[str]
                 # Hashes are taken from a requirements file alone.
                 lines = [requirement, *(f"--hash=sha256:{value}" for value in sorted(allowed))]
                 (Path(scratch) / "wheel.txt").write_text(" ".join(lines) + "\n")
-                subprocess.run([sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet",
-                                "--no-deps", "--only-binary=:all:", "--require-hashes", "--dest", WHEELS,
-                                "--platform", PIP_PLATFORMS[platform], "--python-version", f"{tag[2]}.{tag[3:]}",
-                                "-r", Path(scratch) / "wheel.txt"], check=True)
+                subprocess.run(
+                    [
+                        sys.executable,
+                        "-m",
+                        "pip",
+                        "--disable-pip-version-check",
+                        "download",
+                        "--quiet",
+                        "--no-deps",
+                        "--only-binary=:all:",
+                        "--require-hashes",
+                        "--dest",
+                        WHEELS,
+                        "--platform",
+                        PIP_PLATFORMS[platform],
+                        "--python-version",
+                        f"{tag[2]}.{tag[3:]}",
+                        "-r",
+                        Path(scratch) / "wheel.txt",
+                    ],
+                    check=True,
+                )
         if not wheel.is_file():
             sys.exit(f"pip fetched another wheel of {requirement} than the manifest's {name}; mend the manifest.")
 

@@ -39,8 +39,9 @@ def main() -> int:
 
 def load():
     """The checkout as the package `scan_relight`."""
-    spec = importlib.util.spec_from_file_location("scan_relight", ROOT / "__init__.py",
-                                                  submodule_search_locations=[str(ROOT)])
+    spec = importlib.util.spec_from_file_location(
+        "scan_relight", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)]
+    )
     package = sys.modules["scan_relight"] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(package)
     return package

@@ -1,6 +1,6 @@
 """One command for a newcomer: makes `.venv`, installs Scan Relight into it, and runs its demo into demo-result/.
 
-    python3.11 scripts/demo.py [what `scan-relight demo` takes, such as --size large]
+python3.11 scripts/demo.py [what `scan-relight demo` takes, such as --size large]
 """
 
 from __future__ import annotations

@@ -18,8 +18,10 @@ STAMP = "scan-relight.stamp"
 def lock_for(version: tuple[int, int]) -> Path:
     """The lock for a Python; ends the program with one sentence where Blender has none."""
     if version not in LOCKS:
-        sys.exit(f"This is Python {version[0]}.{version[1]}, but Blender's Python package needs 3.11 or 3.13; "
-                 f"run it as: python3.11 scripts/{Path(sys.argv[0]).name}")
+        sys.exit(
+            f"This is Python {version[0]}.{version[1]}, but Blender's Python package needs 3.11 or 3.13; "
+            f"run it as: python3.11 scripts/{Path(sys.argv[0]).name}"
+        )
     return ROOT / "requirements" / LOCKS[version]
 
 
@@ -57,8 +59,12 @@ def prepare(tools: bool = False, folder: Path = ROOT / ".venv") -> Path:
     if found == stamp_of(with_tools) or (found == stamp_of([lock]) and not tools):
         return python
     locks = with_tools if tools else [lock]
-    print(f"Installing {', '.join(path.name for path in locks)} into {folder.relative_to(ROOT)} "
-          "(about 600 MB the first time) ...", file=sys.stderr, flush=True)
+    print(
+        f"Installing {', '.join(path.name for path in locks)} into {folder.relative_to(ROOT)} "
+        "(about 600 MB the first time) ...",
+        file=sys.stderr,
+        flush=True,
+    )
     stamp.unlink(missing_ok=True)
     venv.create(folder, with_pip=True, clear=not found)
     pip = [str(python), "-m", "pip", "--disable-pip-version-check", "--quiet"]

@@ -33,8 +33,15 @@ SIZE = 1360, 1240
 """Most of the sidebar at once."""
 UPPER, TALL = (0, 0, 1120, 880), (0, 0, 1120, 1130)
 """Parts of the window, without the properties."""
-PARTS = {"install": UPPER, "drag": UPPER, "progress": (840, 330, 1120, 640), "recovered": UPPER, "relit": TALL,
-         "results": (840, 60, 1120, 640), "metal": UPPER}
+PARTS = {
+    "install": UPPER,
+    "drag": UPPER,
+    "progress": (840, 330, 1120, 640),
+    "recovered": UPPER,
+    "relit": TALL,
+    "results": (840, 60, 1120, 640),
+    "metal": UPPER,
+}
 """The pictures that the guide shows, and which part of the window."""
 QUALITY = 88
 
@@ -128,7 +135,8 @@ def cut(full: Path, out: Path) -> None:
     for name, part in {**PARTS, "pair": None}.items():
         with Image.open(full / f"{name}.png") as picture:
             picture.convert("RGB").crop(part or (0, 0, *picture.size)).save(
-                out / f"{name}.jpg", quality=QUALITY, subsampling=0, optimize=True)
+                out / f"{name}.jpg", quality=QUALITY, subsampling=0, optimize=True
+            )
 
 
 if __name__ == "__main__":

@@ -24,8 +24,21 @@ def main() -> int:
     uv = sys.argv[1] if len(sys.argv) > 1 else "uv"
     for name, options in LOCKS.items():
         lock = FOLDER / f"{name}.txt"
-        command = [uv, "pip", "compile", "--quiet", "--upgrade", "--generate-hashes", "--no-emit-index-url",
-                   "--no-header", "--no-annotate", *options, f"{name}.in", "-o", lock.name]
+        command = [
+            uv,
+            "pip",
+            "compile",
+            "--quiet",
+            "--upgrade",
+            "--generate-hashes",
+            "--no-emit-index-url",
+            "--no-header",
+            "--no-annotate",
+            *options,
+            f"{name}.in",
+            "-o",
+            lock.name,
+        ]
         subprocess.run(command, cwd=FOLDER, check=True)
         lock.write_text(f"# Made by scripts/lock.py from {name}.in; do not edit.\n" + lock.read_text())
         print(lock.relative_to(FOLDER.parent))

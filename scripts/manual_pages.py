@@ -27,13 +27,16 @@ def write_pages(docs: Path, out: Path) -> None:
     """Write a page for each Markdown file of `docs` into the new folder `out`, with the pictures that they show."""
     out.mkdir(parents=True)
     names = sorted(docs.glob("*.md"))
-    links = " &middot; ".join(f'<a href="{one.stem}.html">{one.stem.replace("_", " ").replace("-", " ")}</a>'
-                              for one in names)
+    links = " &middot; ".join(
+        f'<a href="{one.stem}.html">{one.stem.replace("_", " ").replace("-", " ")}</a>' for one in names
+    )
     for path in names:
         body = page(path.read_text(encoding="utf-8"))
         (out / f"{path.stem}.html").write_text(
             f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Scan Relight: {path.stem}</title>'
-            f"<style>{STYLE}</style><nav>{links}</nav>{body}</html>\n", encoding="utf-8")
+            f"<style>{STYLE}</style><nav>{links}</nav>{body}</html>\n",
+            encoding="utf-8",
+        )
     for path in (*docs.rglob("*.png"), *docs.rglob("*.jpg")):
         place = path.relative_to(docs)
         if place.parts[0] not in LEFT_OUT:

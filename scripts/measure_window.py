@@ -34,7 +34,7 @@ def main() -> None:
     parser.add_argument("--result", required=True)
     parser.add_argument("--events", required=True)
     parser.add_argument("--scenario", default="run")
-    options = parser.parse_args(sys.argv[sys.argv.index("--") + 1:])
+    options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :])
     events = open(options.events, "w", encoding="utf-8")
     bpy.context.preferences.view.show_splash = False
     bpy.app.timers.register(begin, first_interval=0.5)

@@ -90,8 +90,9 @@ def perturb_mesh(source: Path, target: Path, metres: float, share: float, rng: n
         raise SystemExit(f"'{source}' does not begin with its vertices.")
     ply = read_ply(source)
     vertices, triangles = np.asarray(ply.vertices, np.float64), np.asarray(ply.triangles)
-    _, first, place = np.unique(np.round(vertices / SEAM).astype(np.int64), axis=0, return_index=True,
-                                return_inverse=True)
+    _, first, place = np.unique(
+        np.round(vertices / SEAM).astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
     place = place.ravel()
     normal = vertex_normals(vertices, triangles, place)
     moved = vertices + (normal * offsets(vertices[first], metres, share, rng)[:, None])[place]
@@ -112,8 +113,9 @@ def perturb_mesh(source: Path, target: Path, metres: float, share: float, rng: n
     target.write_bytes(content)
 
 
-def perturb_picture(source: Path, target: Path, noise: float, exposure: float, clip: float, sensor: bool,
-                    rng: np.random.Generator) -> None:
+def perturb_picture(
+    source: Path, target: Path, noise: float, exposure: float, clip: float, sensor: bool, rng: np.random.Generator
+) -> None:
     """Copy a picture with noise, exposed and clipped."""
     rgb = read_exr(source).rgb
     rgb = rgb * (1 + noise * rng.normal(size=rgb.shape))
@@ -163,15 +165,23 @@ def main(argv: Sequence[str] | None = None) -> int:
         if given.poses:
             millimetres, degrees = given.poses
             frame["transform_matrix"] = perturbed_pose(
-                frame["transform_matrix"], millimetres / 1000, np.radians(degrees), poses)
+                frame["transform_matrix"], millimetres / 1000, np.radians(degrees), poses
+            )
         exposure = 1.0
         if given.exposure:
             exposure = float(2 ** exposures.uniform(-given.exposure / 2, given.exposure / 2))
             frame["exposure"] = exposure
         if given.tell and given.clip:
             frame["saturation"] = clip if given.clip_at == "sensor" else clip * exposure
-        perturb_picture(source / frame["file_path"], out / frame["file_path"], given.noise or 0.0, exposure, clip,
-                        given.clip_at == "sensor", pictures)
+        perturb_picture(
+            source / frame["file_path"],
+            out / frame["file_path"],
+            given.noise or 0.0,
+            exposure,
+            clip,
+            given.clip_at == "sensor",
+            pictures,
+        )
     (out / "transforms.json").write_text(json.dumps(top, indent=1))
     return 0
 

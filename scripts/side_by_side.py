@@ -51,8 +51,9 @@ def open_scene(blend: Path, frame: str, samples: int) -> bpy.types.Scene:
     """The room's scene of a file, ready to render through a frame's camera."""
     bpy.ops.wm.open_mainfile(filepath=str(blend.absolute()), load_ui=False)
     scene = next(one for one in bpy.data.scenes if one.get("scan_relight_own"))
-    scene.camera = next(one for one in scene.objects if one.type == "CAMERA"
-                        and Path(one.get("frame_path", "")).stem == frame)
+    scene.camera = next(
+        one for one in scene.objects if one.type == "CAMERA" and Path(one.get("frame_path", "")).stem == frame
+    )
     width, height = scene.camera["width"], scene.camera["height"]
     render, cycles = scene.render, scene.cycles
     render.engine, cycles.device, cycles.samples, cycles.seed = "CYCLES", "CPU", samples, 0

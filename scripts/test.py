@@ -1,6 +1,6 @@
 """One command for the tests: makes or completes `.venv` with the test tools and runs pytest in it.
 
-    python3.11 scripts/test.py [what pytest takes, such as tests/core or -k name]
+python3.11 scripts/test.py [what pytest takes, such as tests/core or -k name]
 """
 
 from __future__ import annotations

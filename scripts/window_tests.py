@@ -34,8 +34,14 @@ def main() -> int:
     os.environ["BLENDER"] = blender
     shutil.rmtree(ROOT / "build" / "window", ignore_errors=True)
     python = sys.executable if running_inside() else str(prepare(tools=True))
-    return hand_over([python, "-m", "pytest", *(words if any("tests/window" in word for word in words)
-                                                    else ["tests/window", *words])])
+    return hand_over(
+        [
+            python,
+            "-m",
+            "pytest",
+            *(words if any("tests/window" in word for word in words) else ["tests/window", *words]),
+        ]
+    )
 
 
 def running_inside() -> bool:

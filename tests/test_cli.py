@@ -64,10 +64,19 @@ def test_every_option_arrives():
     assert given == Settings(texel_size=0.01, median="mean", interpolate=False, seed=7)
 
 
-@pytest.mark.parametrize("argv", [
-    [], ["nonsense"], ["recover"], ["recover", "capture"], ["recover", "c", "--out", "r", "--median", "median"],
-    ["recover", "c", "--out", "r", "--shading-rays", "many"], ["demo"], ["demo", "--out", "x", "--size", "giant"],
-])
+@pytest.mark.parametrize(
+    "argv",
+    [
+        [],
+        ["nonsense"],
+        ["recover"],
+        ["recover", "capture"],
+        ["recover", "c", "--out", "r", "--median", "median"],
+        ["recover", "c", "--out", "r", "--shading-rays", "many"],
+        ["demo"],
+        ["demo", "--out", "x", "--size", "giant"],
+    ],
+)
 def test_what_argparse_refuses_is_bad_input(argv, capsys):
     assert cli.main(argv) == 2
     err = capsys.readouterr().err
@@ -96,10 +105,17 @@ def test_info_of_nothing(tmp_path, capsys):
     assert "nowhere" in err and "Traceback" not in err and err.count("\n") == 1
 
 
-@pytest.mark.parametrize("error, code", [
-    (BadInputError("What was given is bad."), 2), (StorageError("The disk is full."), 1),
-    (InterruptedRun("Stopped."), 130), (KeyboardInterrupt(), 130), (MemoryError(), 1), (ValueError("deep\ninside"), 1),
-])
+@pytest.mark.parametrize(
+    "error, code",
+    [
+        (BadInputError("What was given is bad."), 2),
+        (StorageError("The disk is full."), 1),
+        (InterruptedRun("Stopped."), 130),
+        (KeyboardInterrupt(), 130),
+        (MemoryError(), 1),
+        (ValueError("deep\ninside"), 1),
+    ],
+)
 def test_errors_become_one_sentence_and_an_exit_code(error, code, monkeypatch, capsys, tmp_path):
     def fail(arguments, stream):
         raise error
@@ -123,10 +139,16 @@ def test_debug_shows_the_traceback(monkeypatch, capsys, tmp_path):
 
 def test_without_blender_one_sentence_says_so(tmp_path):
     """A Python that has no bpy: exit code 2, no traceback."""
-    code = ("import sys; sys.modules['bpy'] = None\nfrom addon import cli\n"
-            f"sys.exit(cli.main(['recover', {str(tmp_path)!r}, '--out', {str(tmp_path / 'out')!r}]))")
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True,
-                          cwd=os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+    code = (
+        "import sys; sys.modules['bpy'] = None\nfrom addon import cli\n"
+        f"sys.exit(cli.main(['recover', {str(tmp_path)!r}, '--out', {str(tmp_path / 'out')!r}]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=os.path.dirname(os.path.dirname(os.path.abspath(__file__))),
+    )
     assert done.returncode == 2 and "'bpy' is missing" in done.stderr and "Traceback" not in done.stderr
 
 

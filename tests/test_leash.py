@@ -24,7 +24,10 @@ def test_events_are_lines_of_json():
     progress.stage("shading")
     events = [json.loads(line) for line in stream.getvalue().splitlines()]
     assert [(one["event"], one["stage"], one["share"]) for one in events] == [
-        ("progress", "surface", 0.0), ("progress", "surface", 1.0), ("progress", "shading", 0.0)]
+        ("progress", "surface", 0.0),
+        ("progress", "surface", 1.0),
+        ("progress", "shading", 0.0),
+    ]
     assert [one["overall"] for one in events] == pytest.approx([0, 0.25, 0.25])
 
 
@@ -99,8 +102,10 @@ def test_the_peak_is_of_this_process_alone():
 
     if peak_memory() is None:
         pytest.skip("the system does not tell")
-    code = ("import subprocess, sys; big = bytearray(600_000_000); big[::4096] = b'x' * len(big[::4096]);"
-            "subprocess.run([sys.executable, '-c',"
-            "'from addon.core.memory import peak_memory; print(peak_memory())'], check=True)")
+    code = (
+        "import subprocess, sys; big = bytearray(600_000_000); big[::4096] = b'x' * len(big[::4096]);"
+        "subprocess.run([sys.executable, '-c',"
+        "'from addon.core.memory import peak_memory; print(peak_memory())'], check=True)"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert 1e6 < int(done.stdout) < 300e6

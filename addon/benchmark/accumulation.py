@@ -166,8 +166,17 @@ def _large(options: Options) -> Table:
         "accumulation-large",
         "Accumulation at its real size, alone in its process",
         ("frames", "width", "height", "elements", "observations", "seconds", "CPU seconds", "peak memory (GiB)"),
-        [(LARGE_FRAMES, *LARGE_SIZE, found["elements"], found["observations"], found["seconds"], found["cpu_seconds"],
-          found["peak"] / 2**30)],  # fmt: skip
+        [
+            (
+                LARGE_FRAMES,
+                *LARGE_SIZE,
+                found["elements"],
+                found["observations"],
+                found["seconds"],
+                found["cpu_seconds"],
+                found["peak"] / 2**30,
+            )
+        ],  # fmt: skip
         ("Frames are made by ray casting when they are read, which is part of the time.",),
     )
 

@@ -104,8 +104,11 @@ def make_room(name: str, elements: int, seed: int, threads: int = 0) -> LitRoom:
             emitted[first + i] = float(rng.uniform(20, 200))
     elif name == "window":
         sides = quads[0]
-        wall = int(np.argmin([abs(np.cross(q[1], q[2]) / np.linalg.norm(np.cross(q[1], q[2])) - (1, 0, 0)).sum()
-                              for q in sides]))
+        wall = int(
+            np.argmin(
+                [abs(np.cross(q[1], q[2]) / np.linalg.norm(np.cross(q[1], q[2])) - (1, 0, 0)).sum() for q in sides]
+            )
+        )
         quads[0] = np.concatenate([np.delete(sides, wall, 0), _opened(sides[wall])])
         ids[0] = np.concatenate([np.delete(np.arange(6), wall), np.full(8, wall)])
         sky = _sky()

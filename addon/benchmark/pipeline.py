@@ -95,8 +95,22 @@ def _presets_table(folder: Path, scratch: Path, options: Options) -> Table:
         result = scratch / name
         took = once(lambda: run_all(folder, result, settings, Progress()))  # noqa: B023
         found = score(folder, result)
-        rows.append((folder.name, name, name == "paper", took.seconds, took.cpu_seconds, peak_memory() / 2**20,
-                     found.albedo, found.albedo_error, found.roughness, found.specular, found.models, found.relight))
+        rows.append(
+            (
+                folder.name,
+                name,
+                name == "paper",
+                took.seconds,
+                took.cpu_seconds,
+                peak_memory() / 2**20,
+                found.albedo,
+                found.albedo_error,
+                found.roughness,
+                found.specular,
+                found.models,
+                found.relight,
+            )
+        )
         shutil.rmtree(result, ignore_errors=True)
         options.progress.update(0.2 + 0.1 * (done + 1))
     return Table(
@@ -125,8 +139,17 @@ def _cost_table(capture: Capture, scratch: Path, options: Options) -> Table:
         recovery = took.value
         seconds = [recovery.log[stage]["seconds"] for stage in STAGES]
         first.setdefault(what, took.cpu_seconds)
-        rows.append((what, len(recovery.surface().atlas), len(capture.mesh.triangles) * 4**cut, False, *seconds,
-                     took.cpu_seconds, took.cpu_seconds / first[what]))
+        rows.append(
+            (
+                what,
+                len(recovery.surface().atlas),
+                len(capture.mesh.triangles) * 4**cut,
+                False,
+                *seconds,
+                took.cpu_seconds,
+                took.cpu_seconds / first[what],
+            )
+        )
     return Table(
         "pipeline-cost", "Whole pipeline: cost of texels and triangles",
         ("more", "texels", "triangles", BASELINE, "surface s", "lit diffuse s", "shading s", "specular s",

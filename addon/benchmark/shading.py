@@ -120,8 +120,10 @@ def _alternatives(room: LitRoom, seed: int) -> dict[str, tuple[tuple[int, ...], 
         "uniform, Sobol": ((128, 1024, 8192), pattern("uniform, Sobol")),
         "cosine": ((64, 512, 4096), pattern("cosine, random")),
         "cosine, Sobol": ((16, 64, 256, 1024, 4096), pattern("cosine, Sobol")),
-        "cosine and aimed": ((8, 16, 32, 64, 128, 256, 512),
-                             lambda f, p, n, rays, seed: _aimed(f, *targets, p, n, rays, seed)),
+        "cosine and aimed": (
+            (8, 16, 32, 64, 128, 256, 512),
+            lambda f, p, n, rays, seed: _aimed(f, *targets, p, n, rays, seed),
+        ),
     }
 
 
@@ -151,8 +153,16 @@ def run(options: Options) -> Iterator[Table]:
             for rays in counts:
                 timing = once(lambda: estimate(room.field, position, normal, rays, options.seed))  # noqa: B023
                 error = relative_error(timing.value, true)
-                rows.append((name, alternative, alternative == "uniform" and rays in PAPER, rays, error,
-                             1e6 * timing.cpu_seconds / len(element)))
+                rows.append(
+                    (
+                        name,
+                        alternative,
+                        alternative == "uniform" and rays in PAPER,
+                        rays,
+                        error,
+                        1e6 * timing.cpu_seconds / len(element),
+                    )
+                )
                 found.setdefault(alternative, ([], []))
                 found[alternative][0].append(rays)
                 found[alternative][1].append(error)

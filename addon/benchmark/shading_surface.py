@@ -73,12 +73,25 @@ def surface_tables(rooms: dict[str, LitRoom], options: Options) -> Iterator[Tabl
                 found = once(lambda: over(room, way, options))  # noqa: B023
             E, points = found.value
             error = relative_error(E[element], true)
-            timing = alternately({
-                "all": lambda: over(room, way, options),  # noqa: B023
-                "raw": lambda: rays.trace(options.threads),
-            }, repeats=2)
-            rows.append((name, way, way == PAPER_WAY, error, timing["all"].seconds, len(rays), points,
-                         timing["all"].cpu_seconds / timing["raw"].cpu_seconds))
+            timing = alternately(
+                {
+                    "all": lambda: over(room, way, options),  # noqa: B023
+                    "raw": lambda: rays.trace(options.threads),
+                },
+                repeats=2,
+            )
+            rows.append(
+                (
+                    name,
+                    way,
+                    way == PAPER_WAY,
+                    error,
+                    timing["all"].seconds,
+                    len(rays),
+                    points,
+                    timing["all"].cpu_seconds / timing["raw"].cpu_seconds,
+                )
+            )
             best[name, way] = error, timing["all"]
         options.progress.update(0.4 + 0.3 * (done + 1) / len(rooms))
     yield Table(
@@ -99,8 +112,9 @@ def surface_tables(rooms: dict[str, LitRoom], options: Options) -> Iterator[Tabl
             seconds = min(found.cpu_seconds, again.cpu_seconds)
             first = first or seconds
             E, points = found.value
-            rows.append((name, len(room.atlas), False, relative_error(E[element], true), points, seconds,
-                         seconds / first))
+            rows.append(
+                (name, len(room.atlas), False, relative_error(E[element], true), points, seconds, seconds / first)
+            )
         options.progress.update(0.85 if name == "lamp" else 0.9)
     yield Table(
         "shading-texels", "Shading: time when the same surface has more texels",

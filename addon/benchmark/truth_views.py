@@ -29,9 +29,7 @@ def views(capture: Path, recovery: Recovery) -> list[dict]:
     found = []
     for frame in spec["frames"]:
         name = Path(frame["file_path"]).name
-        camera = Camera(
-            *(spec[k] for k in ("w", "h", "fl_x", "fl_y", "cx", "cy")), np.array(frame["transform_matrix"])
-        )
+        camera = Camera(*(spec[k] for k in ("w", "h", "fl_x", "fl_y", "cx", "cy")), np.array(frame["transform_matrix"]))
         elements = []
         for shift in SHIFTS:
             directions = camera.directions(camera.pixel_centres() + shift)

@@ -60,7 +60,7 @@ def is_renamed(thing: bpy.types.Object) -> bool:
 def made_at(thing: bpy.types.Object) -> Matrix:
     """The own matrix that an object was made with."""
     kept = list(thing[PLACE])
-    return Matrix([kept[k:k + 4] for k in range(0, 16, 4)])
+    return Matrix([kept[k : k + 4] for k in range(0, 16, 4)])
 
 
 def shape(data: bpy.types.Mesh) -> str:

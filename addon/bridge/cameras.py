@@ -90,8 +90,9 @@ def best_view(frames: Iterable[Frame], mesh: Mesh) -> int:
 
 def show_camera(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
     """Show one camera of a room whose others are hidden: Blender draws no picture behind a hidden one."""
-    top = next((one for one in scene.collection.children_recursive
-                if CAPTURE in one and thing in set(one.all_objects)), None)
+    top = next(
+        (one for one in scene.collection.children_recursive if CAPTURE in one and thing in set(one.all_objects)), None
+    )
     if top is None or thing.name in top.objects:
         return
     for other in [one for one in top.objects if FRAME_INDEX in one and len(one.users_collection) > 1]:
@@ -116,8 +117,11 @@ def _pixel(thing: bpy.types.Object) -> tuple[float, float]:
 
 def frame_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The cameras of a scene that `make_cameras` made, one room after the other, in the capture's order."""
-    found = [thing for thing in scene.objects if thing.type == "CAMERA" and "pixel_aspect" in thing
-             and thing.get(FRAME_INDEX, 0) >= 0]
+    found = [
+        thing
+        for thing in scene.objects
+        if thing.type == "CAMERA" and "pixel_aspect" in thing and thing.get(FRAME_INDEX, 0) >= 0
+    ]
     return sorted(found, key=lambda thing: (thing.get(CAPTURE, ""), thing.get(FRAME_INDEX, 0)))
 
 
@@ -129,8 +133,10 @@ def differing(frames: Iterable[Frame]) -> str:
     kinds = {(f.camera.width, f.camera.height, round(f.camera.fx / f.camera.fy, 6)) for f in frames}
     if len(kinds) < 2:
         return ""
-    return (f"The frames have {len(kinds)} different sizes or pixel shapes, which Blender keeps in the scene, not in a "
-            "camera: set the render size from the camera's custom properties before you render through another one.")
+    return (
+        f"The frames have {len(kinds)} different sizes or pixel shapes, which Blender keeps in the scene, not in a "
+        "camera: set the render size from the camera's custom properties before you render through another one."
+    )
 
 
 def kept_lens(thing: bpy.types.Object) -> tuple[Lens, tuple[float, ...]] | None:
@@ -155,8 +161,10 @@ def unlike(frames: Iterable[Frame]) -> str:
     far, camera = max(worst.values(), key=lambda pair: pair[0], default=(0.0, None))
     if far < _TOLD:
         return ""
-    return (f"Blender has no camera with a lens such as {camera.lens.name}: its cameras show what the frames show "
-            f"up to {far:.1f} pixels beside it, most of all in the corners; the recovery itself uses the exact lens.")
+    return (
+        f"Blender has no camera with a lens such as {camera.lens.name}: its cameras show what the frames show "
+        f"up to {far:.1f} pixels beside it, most of all in the corners; the recovery itself uses the exact lens."
+    )
 
 
 def off_by(camera: Camera) -> float:

@@ -36,9 +36,14 @@ _NUMBERS = (METALLIC, ROUGHNESS, IOR, SPECULAR_LEVEL, EMISSION_STRENGTH)
 
 def worn_material(thing: bpy.types.Object) -> bpy.types.Material | None:
     """The recovered material that an object wears; None where it wears none that can be changed."""
-    return next((slot.material for slot in thing.material_slots
-                 if slot.material and MODEL in slot.material and not slot.material.library
-                 and principled(slot.material)), None)
+    return next(
+        (
+            slot.material
+            for slot in thing.material_slots
+            if slot.material and MODEL in slot.material and not slot.material.library and principled(slot.material)
+        ),
+        None,
+    )
 
 
 def found(thing: bpy.types.Object, entry: dict[str, Any]) -> dict[str, Any]:
@@ -116,16 +121,22 @@ def _shown(material, entry: dict) -> dict[str, Any]:
     f0 = {METAL: colour, SPECULAR: material.get("scan_relight_psi", 0.0)}.get(model)
     albedo = (entry.get("evidence") or {}).get("albedo")
     base = None if model == METAL else list(albedo) if albedo else colour
-    return {"model": model, "roughness": inputs[ROUGHNESS].default_value if shiny else None, "f0": f0,
-            "base_color": base if model != EMITTER else None}
+    return {
+        "model": model,
+        "roughness": inputs[ROUGHNESS].default_value if shiny else None,
+        "f0": f0,
+        "base_color": base if model != EMITTER else None,
+    }
 
 
 def _sockets(material) -> dict[str, Any]:
     inputs = principled(material).inputs
     link = inputs[BASE_COLOR].links[0] if inputs[BASE_COLOR].links else None
-    return {"numbers": {name: inputs[name].default_value for name in _NUMBERS},
-            "colour": list(inputs[BASE_COLOR].default_value),
-            "from": [link.from_node.name, link.from_socket.identifier] if link else None}
+    return {
+        "numbers": {name: inputs[name].default_value for name in _NUMBERS},
+        "colour": list(inputs[BASE_COLOR].default_value),
+        "from": [link.from_node.name, link.from_socket.identifier] if link else None,
+    }
 
 
 def _restore(material, sockets: dict) -> None:

@@ -31,8 +31,13 @@ _written: dict[Path, set[int | str]] = {}
 
 def correctable(thing: bpy.types.Object | None) -> bool:
     """Whether an object wears a recovered material that can be changed."""
-    return thing is not None and thing.type == "MESH" and OBJECT_ID in thing and not thing.library \
+    return (
+        thing is not None
+        and thing.type == "MESH"
+        and OBJECT_ID in thing
+        and not thing.library
         and correct_material.worn_material(thing) is not None
+    )
 
 
 def result_folder(thing: bpy.types.Object) -> Path | None:
@@ -82,8 +87,11 @@ def give(thing: bpy.types.Object, **values) -> None:
     """
     number = thing[OBJECT_ID]
     room = {one[OBJECT_ID]: one for one in _room_of(thing)}
-    newer = parse({"objects": {str(number): {key: _plain(value) for key, value in values.items()}}},
-                  f"Object '{thing.name}'", room)
+    newer = parse(
+        {"objects": {str(number): {key: _plain(value) for key, value in values.items()}}},
+        f"Object '{thing.name}'",
+        room,
+    )
     older = {i: Given(**_tuples(given(one))) for i, one in room.items() if i == number or GIVEN in one}
     said = merge(Overrides(older), newer).of(number).as_dict()
     correct_material.note(thing, entry(thing))
@@ -112,15 +120,29 @@ def _tuples(said: dict[str, Any]) -> dict[str, Any]:
 def by_id(thing: bpy.types.Object, number: int) -> bpy.types.Object | None:
     """Another object of the same room."""
     folder = thing.get(RESULT)
-    return next((one for scene in thing.users_scene for one in scene.objects
-                 if one.get(OBJECT_ID) == number and one.get(RESULT) == folder and correctable(one)), None)
+    return next(
+        (
+            one
+            for scene in thing.users_scene
+            for one in scene.objects
+            if one.get(OBJECT_ID) == number and one.get(RESULT) == folder and correctable(one)
+        ),
+        None,
+    )
 
 
 def _followers(thing: bpy.types.Object) -> list[bpy.types.Object]:
     """Objects that are said to be the same as this one."""
-    return [one for scene in thing.users_scene for one in scene.objects if GIVEN in one and one != thing
-            and given(one).get("same_as") == thing.get(OBJECT_ID) and one.get(RESULT) == thing.get(RESULT)
-            and correctable(one)]
+    return [
+        one
+        for scene in thing.users_scene
+        for one in scene.objects
+        if GIVEN in one
+        and one != thing
+        and given(one).get("same_as") == thing.get(OBJECT_ID)
+        and one.get(RESULT) == thing.get(RESULT)
+        and correctable(one)
+    ]
 
 
 def found(thing: bpy.types.Object) -> dict[str, Any]:
@@ -218,8 +240,14 @@ def take_white_back(thing: bpy.types.Object) -> None:
 
 
 def _room_of(thing: bpy.types.Object) -> list[bpy.types.Object]:
-    return list({one: None for scene in thing.users_scene for one in scene.objects
-                 if OBJECT_ID in one and one.get(RESULT) == thing.get(RESULT)})
+    return list(
+        {
+            one: None
+            for scene in thing.users_scene
+            for one in scene.objects
+            if OBJECT_ID in one and one.get(RESULT) == thing.get(RESULT)
+        }
+    )
 
 
 def folder_for(things: Iterable[bpy.types.Object]) -> Path:
@@ -229,15 +257,19 @@ def folder_for(things: Iterable[bpy.types.Object]) -> Path:
         raise BadInputError("The selected objects come from several results; select those of one room.")
     folder = folders.pop()
     if folder is None:
-        raise BadInputError("The result folder of the selected objects is gone; choose where it lies now, or run the "
-                            "recovery again.")
+        raise BadInputError(
+            "The result folder of the selected objects is gone; choose where it lies now, or run the recovery again."
+        )
     return folder
 
 
 def keep_for_run(scene: bpy.types.Scene, folder: Path, capture: Path) -> None:
     """`keep` before a capture is run into `folder`, which may be another one than the scene's room came from."""
-    things = [thing for thing in look.recovered(scene)
-              if result_folder(thing) == folder or str(capture) in [thing.get(CAPTURE), *_captures(thing)]]
+    things = [
+        thing
+        for thing in look.recovered(scene)
+        if result_folder(thing) == folder or str(capture) in [thing.get(CAPTURE), *_captures(thing)]
+    ]
     if any(GIVEN in thing or WHITE in thing for thing in things) or _written.get(folder):
         if not folder.exists():
             folder.mkdir(parents=True)
@@ -288,5 +320,3 @@ def keep(scene: bpy.types.Scene, folder: Path, things: Iterable[bpy.types.Object
 def forget() -> None:
     """Know nothing of what was written in this session."""
     _written.clear()
-
-

@@ -31,8 +31,13 @@ LIGHTS = (
 """Of the relit picture: where, where to, colour, watts."""
 
 
-def run_demo(out: Path | str, size: str, settings: Settings, listener: Callable[[ProgressEvent], None] | None = None,
-             should_stop: Callable[[], bool] | None = None) -> str:
+def run_demo(
+    out: Path | str,
+    size: str,
+    settings: Settings,
+    listener: Callable[[ProgressEvent], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> str:
     """Render the known room into OUT/capture, recover it into OUT, and compare.
 
     Parameters

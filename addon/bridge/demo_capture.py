@@ -39,8 +39,13 @@ def write_all_but_frames(folder: Path, things: tuple[Thing, ...], poses: np.ndar
     width, height = size
     focal = width / 2 / np.tan(FIELD_OF_VIEW / 2)
     transforms = {
-        "camera_model": "PINHOLE", "w": width, "h": height, "fl_x": focal, "fl_y": focal,
-        "cx": width / 2, "cy": height / 2,
+        "camera_model": "PINHOLE",
+        "w": width,
+        "h": height,
+        "fl_x": focal,
+        "fl_y": focal,
+        "cx": width / 2,
+        "cy": height / 2,
         "frames": [{"file_path": frame_path(k), "transform_matrix": pose.tolist()} for k, pose in enumerate(poses)],
     }
     (folder / "transforms.json").write_text(json.dumps(transforms, indent=1))
@@ -50,8 +55,12 @@ def truth(thing: Thing) -> dict:
     """What the room's maker knows of `thing`, for the comparison at the demo's end."""
     paint = thing.paints[0]
     return {
-        "id": thing.object_id, "class_name": thing.class_name, "emission": paint.emission,
-        "alpha": paint.roughness ** 2 if paint.f0 else None, "f0": paint.f0, "metallic": 0.0,
+        "id": thing.object_id,
+        "class_name": thing.class_name,
+        "emission": paint.emission,
+        "alpha": paint.roughness**2 if paint.f0 else None,
+        "f0": paint.f0,
+        "metallic": 0.0,
         "base_color": [round(float(c), 4) for c in thing.mean_albedo()],
     }
 

@@ -48,13 +48,20 @@ def comparison(capture: Path, result: Path) -> str:
             continue
         found = describe(thing, measured)
         emitter, gloss = known["emission"] is not None, known["alpha"] is not None
-        rows.append((
-            known["class_name"], found["model"],
-            colour(found["base_color"]), "" if emitter else colour(true_colours[known["id"]]),
-            number(found["roughness"]), number(known["alpha"] ** 0.5) if gloss else "",
-            number(found["f0"]), number(known["f0"]) if gloss else "",
-            colour(found["emission"]), colour(known["emission"]),
-        ))
+        rows.append(
+            (
+                known["class_name"],
+                found["model"],
+                colour(found["base_color"]),
+                "" if emitter else colour(true_colours[known["id"]]),
+                number(found["roughness"]),
+                number(known["alpha"] ** 0.5) if gloss else "",
+                number(found["f0"]),
+                number(known["f0"]) if gloss else "",
+                colour(found["emission"]),
+                colour(known["emission"]),
+            )
+        )
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows)
 
@@ -121,9 +128,11 @@ def seen_albedo(capture: Capture) -> dict[int, np.ndarray]:
             facing = (ray * normals).sum(1) > MIN_COSINE * distance
             inside = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(1) & (depth > 0)
             ask = np.flatnonzero(facing & inside & ~seen)
-            seen[ask] = ~scene.occluded(points[ask].astype(np.float32),
-                                        (ray[ask] / distance[ask, None]).astype(np.float32),
-                                        distance[ask].astype(np.float32))
+            seen[ask] = ~scene.occluded(
+                points[ask].astype(np.float32),
+                (ray[ask] / distance[ask, None]).astype(np.float32),
+                distance[ask].astype(np.float32),
+            )
         weight = share.ravel() * seen
         means[thing.object_id] = weight @ colours.reshape(-1, 3) / weight.sum() if seen.any() else np.full(3, np.nan)
     return means

@@ -20,11 +20,7 @@ from .images import array_image
 from .materials import BASE_COLOR, IOR, ROUGHNESS, SPECULAR_LEVEL, ior_of
 from .pictures import can_denoise
 
-SIZES = {
-    "tiny": (10, 64, 48, 24),
-    "small": (36, 160, 120, 24),
-    "large": (64, 320, 240, 128),
-}
+SIZES = {"tiny": (10, 64, 48, 24), "small": (36, 160, 120, 24), "large": (64, 320, 240, 128)}
 """Frames, width, height and samples for each pixel."""
 
 FORMAT = 3  # raise when the room or its rendering changes, so that an older capture is not taken for this one
@@ -63,8 +59,9 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
         os.replace(part, folder)
     except (OSError, RuntimeError, BadInputError) as error:  # Blender's failures to write are RuntimeErrors, or silent
         reason = " ".join(str(getattr(error, "strerror", None) or error).split()).removeprefix("Error: ").rstrip(".")
-        raise StorageError(f"The demo's capture can't be written to '{folder}' ({reason}); free some space or choose "
-                           "another folder.") from error
+        raise StorageError(
+            f"The demo's capture can't be written to '{folder}' ({reason}); free some space or choose another folder."
+        ) from error
     finally:
         shutil.rmtree(part, ignore_errors=True)
     return folder

@@ -42,8 +42,9 @@ def can_export(ending: str) -> str:
     return ""
 
 
-def export(scene: bpy.types.Scene, path: Path | str, scope: str = ROOM, lights: bool = True,
-           cameras: bool = False) -> list[str]:
+def export(
+    scene: bpy.types.Scene, path: Path | str, scope: str = ROOM, lights: bool = True, cameras: bool = False
+) -> list[str]:
     """Write a scene's objects with plain materials.
 
     Parameters
@@ -76,8 +77,11 @@ def export(scene: bpy.types.Scene, path: Path | str, scope: str = ROOM, lights: 
     things = chosen(scene, scope)
     if not things:
         raise BadInputError("There is nothing to export: no visible mesh among what was chosen.")
-    extra = [thing for thing in scene.objects if not thing.hide_render and (
-        lights and thing.type == "LIGHT" or cameras and thing == scene.camera)]
+    extra = [
+        thing
+        for thing in scene.objects
+        if not thing.hide_render and (lights and thing.type == "LIGHT" or cameras and thing == scene.camera)
+    ]
     folder = Path(tempfile.mkdtemp(prefix="scan_relight_"))
     try:
         made = folder / "made"
@@ -93,8 +97,9 @@ def export(scene: bpy.types.Scene, path: Path | str, scope: str = ROOM, lights: 
         try:
             put(made, path)
         except OSError as error:
-            raise StorageError(f"'{path}' can't be written ({error.strerror or error}); free some space or choose "
-                               "another folder.") from error
+            raise StorageError(
+                f"'{path}' can't be written ({error.strerror or error}); free some space or choose another folder."
+            ) from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     return remarks(ending, things, extra, scene)
@@ -112,27 +117,37 @@ def chosen(scene: bpy.types.Scene, scope: str) -> list[bpy.types.Object]:
     return meshes
 
 
-def remarks(ending: str, things: Iterable[bpy.types.Object], lamps: Iterable[bpy.types.Object],
-            scene: bpy.types.Scene) -> list[str]:
+def remarks(
+    ending: str, things: Iterable[bpy.types.Object], lamps: Iterable[bpy.types.Object], scene: bpy.types.Scene
+) -> list[str]:
     """What a format loses of these, one sentence each."""
     told = []
     if FORMATS[ending] == "USD":
-        told.append("USD's preview surface has no one-sided emission and Blender writes no Specular IOR Level to it: "
-                    "objects without highlight get an index of refraction of 1 instead.")
+        told.append(
+            "USD's preview surface has no one-sided emission and Blender writes no Specular IOR Level to it: "
+            "objects without highlight get an index of refraction of 1 instead."
+        )
         if any(opacity(slot.material) < 0.99 for thing in things for slot in thing.material_slots if slot.material):
             told.append("Blender 5.2 writes no Alpha to USD, so glass may be opaque there; glTF keeps it.")
     else:
         if any(lamp.type == "LIGHT" and lamp.data.type == "AREA" for lamp in lamps):
             told.append("glTF has no area lights, so they are left out.")
         if scene.world is not None and scene.world.node_tree:
-            told.append("glTF holds no light from outside, and few viewers light a room by its glowing lamps: add the "
-                        "light there.")
+            told.append(
+                "glTF holds no light from outside, and few viewers light a room by its glowing lamps: add the "
+                "light there."
+            )
     return told
 
 
 @contextmanager
-def copies(scene: bpy.types.Scene, things: Iterable[bpy.types.Object], extra: Iterable[bpy.types.Object],
-           textures: Path, level: bool = True) -> Iterator[bpy.types.Collection]:
+def copies(
+    scene: bpy.types.Scene,
+    things: Iterable[bpy.types.Object],
+    extra: Iterable[bpy.types.Object],
+    textures: Path,
+    level: bool = True,
+) -> Iterator[bpy.types.Collection]:
     """A collection of copies with plain materials; afterwards no trace of it is left.
 
     `textures` gets the 8-bit sRGB pictures that the materials show; for `level` see `plain_copy`.
@@ -220,16 +235,33 @@ def _with_own_pictures(world: bpy.types.World, textures: Path) -> bpy.types.Worl
 def _write(path: Path, ending: str, collection: bpy.types.Collection) -> None:
     """Have Blender's exporter write the collection."""
     if FORMATS[ending] == "USD":
-        bpy.ops.wm.usd_export(filepath=str(path), collection=collection.name, export_materials=True,
-                              generate_preview_surface=True, rename_uvmaps=True, relative_paths=True,
-                              export_textures_mode="KEEP" if ending in _BESIDE else "NEW", overwrite_textures=True,
-                              evaluation_mode="RENDER", convert_world_material=True)
+        bpy.ops.wm.usd_export(
+            filepath=str(path),
+            collection=collection.name,
+            export_materials=True,
+            generate_preview_surface=True,
+            rename_uvmaps=True,
+            relative_paths=True,
+            export_textures_mode="KEEP" if ending in _BESIDE else "NEW",
+            overwrite_textures=True,
+            evaluation_mode="RENDER",
+            convert_world_material=True,
+        )
         return
-    bpy.ops.export_scene.gltf(filepath=str(path), export_format=FORMATS[ending], collection=collection.name,
-                              export_apply=True, export_lights=True, export_cameras=True, export_yup=True,
-                              export_image_format="AUTO",
-                              export_texture_dir=textures_of(path), export_extras=False, export_animations=False,
-                              use_active_scene=True)
+    bpy.ops.export_scene.gltf(
+        filepath=str(path),
+        export_format=FORMATS[ending],
+        collection=collection.name,
+        export_apply=True,
+        export_lights=True,
+        export_cameras=True,
+        export_yup=True,
+        export_image_format="AUTO",
+        export_texture_dir=textures_of(path),
+        export_extras=False,
+        export_animations=False,
+        use_active_scene=True,
+    )
 
 
 def srgb(linear: np.ndarray) -> np.ndarray:

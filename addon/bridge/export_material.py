@@ -31,8 +31,13 @@ WHOLE = "base_color.exr"
 FIRST_TILE = 1001
 
 
-def plain_copy(material: bpy.types.Material, textures: Path, pictures: dict, level: bool = True,
-               tiles: frozenset[int] = frozenset()) -> bpy.types.Material:
+def plain_copy(
+    material: bpy.types.Material,
+    textures: Path,
+    pictures: dict,
+    level: bool = True,
+    tiles: frozenset[int] = frozenset(),
+) -> bpy.types.Material:
     """A material that exporters understand.
 
     Parameters
@@ -54,8 +59,9 @@ def plain_copy(material: bpy.types.Material, textures: Path, pictures: dict, lev
     bpy.types.Material
         Culled from behind where the original shines on one side only: glTF then has it single-sided.
     """
-    shader = next((n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED"), None) \
-        if material.node_tree else None
+    shader = (
+        next((n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED"), None) if material.node_tree else None
+    )
     if shader is None:
         return plain_material(material.name)
     value = shader.inputs
@@ -67,9 +73,16 @@ def plain_copy(material: bpy.types.Material, textures: Path, pictures: dict, lev
         # Blender's glTF exporter writes an index of refraction only beside a specular factor that is not 1.
         specular = 0.49999
     made = plain_material(
-        material.name, tuple(value[BASE_COLOR].default_value[:3]), value[ROUGHNESS].default_value,
-        specular, value[METALLIC].default_value, ior, emission(material),
-        None if image is None else _picture(*_one_tile(image, tiles), textures, pictures), value[ALPHA].default_value)
+        material.name,
+        tuple(value[BASE_COLOR].default_value[:3]),
+        value[ROUGHNESS].default_value,
+        specular,
+        value[METALLIC].default_value,
+        ior,
+        emission(material),
+        None if image is None else _picture(*_one_tile(image, tiles), textures, pictures),
+        value[ALPHA].default_value,
+    )
     made.use_backface_culling = bool(value[EMISSION_COLOR].links) and relight_lamps.is_lamp(material)
     return made
 
@@ -105,8 +118,16 @@ def _one_tile(image: bpy.types.Image, tiles: frozenset[int]) -> tuple[bpy.types.
     if len(tiles) == 1:
         return image, next(iter(tiles))
     folder = Path(bpy.path.abspath(image.filepath)).parent
-    whole = next((one for one in bpy.data.images if one.source == "FILE" and UV_MAP not in one and (
-        one.get(IMAGE) == str(folder / WHOLE) or Path(bpy.path.abspath(one.filepath)) == folder / WHOLE)), None)
+    whole = next(
+        (
+            one
+            for one in bpy.data.images
+            if one.source == "FILE"
+            and UV_MAP not in one
+            and (one.get(IMAGE) == str(folder / WHOLE) or Path(bpy.path.abspath(one.filepath)) == folder / WHOLE)
+        ),
+        None,
+    )
     return (whole, 0) if whole else (image, min(tiles, default=FIRST_TILE))
 
 

@@ -64,8 +64,10 @@ class Missing:
             return f"The result folder '{where}' is gone: {what}."
         names, count = ", ".join(f"'{name}'" for name in self.images[:NAMED]), len(self.images)
         more = f" and {count - NAMED} more" if count > NAMED else ""
-        return (f"{names}{more} {'are' if count > 1 else 'is'} missing in '{where}' and can't be shown; find the "
-                "result or run again.")
+        return (
+            f"{names}{more} {'are' if count > 1 else 'is'} missing in '{where}' and can't be shown; find the "
+            "result or run again."
+        )
 
 
 _known: dict = {"time": -FRESH, "found": []}
@@ -110,8 +112,9 @@ def missing() -> list[Missing]:
         gone = not (folder / MATERIALS).is_file()
         if gone or folder in lost:
             known = runs.get(folder, set()) - {""}
-            found.append(Missing(folder, known.pop() if len(known) == 1 else "",
-                                 tuple(sorted(lost.get(folder, ()))), gone))
+            found.append(
+                Missing(folder, known.pop() if len(known) == 1 else "", tuple(sorted(lost.get(folder, ()))), gone)
+            )
     return found
 
 
@@ -126,18 +129,25 @@ def search(home: Path) -> list[str]:
         if not one.gone:
             count = repoint(one.folder, one.folder)
             if count:
-                told.append(f"{count} picture{'s' * (count > 1)} {'are' if count > 1 else 'is'} shown from "
-                            f"'{shown(one.folder)}', as the file's own {'are' if count > 1 else 'is'} gone; save the "
-                            "file to keep it so.")
+                told.append(
+                    f"{count} picture{'s' * (count > 1)} {'are' if count > 1 else 'is'} shown from "
+                    f"'{shown(one.folder)}', as the file's own {'are' if count > 1 else 'is'} gone; save the "
+                    "file to keep it so."
+                )
             continue
         beside = [Path(bpy.data.filepath).parent] if bpy.data.filepath else []
-        places = [*beside, *(folder / part / one.folder.name for folder in beside for part in ("", BESIDE)),
-                  home / one.folder.name]
+        places = [
+            *beside,
+            *(folder / part / one.folder.name for folder in beside for part in ("", BESIDE)),
+            home / one.folder.name,
+        ]
         new = next((place for place in places if one.run and run_of(place) == one.run), None)
         if new is not None:
             repoint(one.folder, new)
-            told.append(f"The result '{one.folder.name}' was moved and is found again in '{shown(new)}'; save the file "
-                        "to keep it so.")
+            told.append(
+                f"The result '{one.folder.name}' was moved and is found again in '{shown(new)}'; save the file "
+                "to keep it so."
+            )
     forget()
     return told
 
@@ -159,10 +169,13 @@ def find(one: Missing, chosen: Path) -> Path:
         if (run_of(place) == one.run) if one.run else _holds(place, one.folder):
             return place
     if not results:
-        raise BadInputError(f"'{chosen}' is no result folder ('{MATERIALS}' is missing); choose the one that the run "
-                            "wrote.")
-    raise BadInputError(f"'{results[0]}' holds another run than '{one.folder.name}' did; choose that one's folder, "
-                        "or run again and bring in the new one.")
+        raise BadInputError(
+            f"'{chosen}' is no result folder ('{MATERIALS}' is missing); choose the one that the run wrote."
+        )
+    raise BadInputError(
+        f"'{results[0]}' holds another run than '{one.folder.name}' did; choose that one's folder, "
+        "or run again and bring in the new one."
+    )
 
 
 def repoint(old: Path, new: Path) -> int:
@@ -223,8 +236,10 @@ def move(folder: Path, home: Path) -> Path:
         except OSError:  # another disk
             _copy(folder, target)
     except OSError as error:
-        raise StorageError(f"'{folder}' can't be moved to '{target}' ({error.strerror or error}); free some space or "
-                           "choose another results folder.") from error
+        raise StorageError(
+            f"'{folder}' can't be moved to '{target}' ({error.strerror or error}); free some space or "
+            "choose another results folder."
+        ) from error
     if known:
         write_capture(target, known[0])
     repoint(folder, target)
@@ -242,8 +257,9 @@ def _copy(folder: Path, target: Path) -> None:
 
 def _owners() -> Iterable[bpy.types.ID]:
     """The open file's own objects and collections that say where they came from."""
-    return [one for kind in (bpy.data.objects, bpy.data.collections) for one in kind
-            if one.get(RESULT) and not one.library]
+    return [
+        one for kind in (bpy.data.objects, bpy.data.collections) for one in kind if one.get(RESULT) and not one.library
+    ]
 
 
 def _images() -> list[bpy.types.Image]:

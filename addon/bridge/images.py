@@ -21,8 +21,9 @@ DATA = "Non-Color"
 """Colour space of numbers that are no colours."""
 
 
-def load_image(path: Path | str, name: str | None = None, colour_space: str = RADIANCE, packed: bool = False,
-               keep: bool = True) -> bpy.types.Image:
+def load_image(
+    path: Path | str, name: str | None = None, colour_space: str = RADIANCE, packed: bool = False, keep: bool = True
+) -> bpy.types.Image:
     """Link an image file of a result folder; it is marked (`marks.IMAGE`) with where it came from.
 
     Parameters
@@ -55,7 +56,7 @@ def load_image(path: Path | str, name: str | None = None, colour_space: str = RA
         if tiles:
             image.source, image.filepath = "TILED", str(path)
             for tile in tiles[1:]:
-                image.tiles.new(int(tile.name[len(path.name.split(UDIM)[0]):][:4]))
+                image.tiles.new(int(tile.name[len(path.name.split(UDIM)[0]) :][:4]))
     except RuntimeError as error:
         raise BadInputError(f"{path} can't be opened as an image; run the stage that writes it again.") from error
     image.name = name or path.stem
@@ -73,8 +74,9 @@ def tiles_of(path: Path) -> list[Path]:
     return sorted(path.parent.glob(path.name.replace(UDIM, "[0-9]" * 4))) if UDIM in path.name else []
 
 
-def load_parts(folder: Path, files: dict[int, str], room: str,
-               descriptions: dict[int, ObjectMaterial]) -> dict[int, bpy.types.Image]:
+def load_parts(
+    folder: Path, files: dict[int, str], room: str, descriptions: dict[int, ObjectMaterial]
+) -> dict[int, bpy.types.Image]:
     """The images of a result folder's `Parts`, by object; objects of one file share its image."""
     found: dict[str, bpy.types.Image] = {}
     for number, file in files.items():

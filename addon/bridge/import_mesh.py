@@ -17,8 +17,24 @@ from ..core.errors import BadInputError
 
 NUMBERED = re.compile(r"^(.*?)(?:\.(\d{3,}))?$", re.DOTALL)
 """Blender's ending of a name that was taken already."""
-OWNED = ("objects", "meshes", "materials", "images", "textures", "collections", "scenes", "actions", "armatures",
-         "cameras", "lights", "curves", "node_groups", "texts", "worlds", "shape_keys")
+OWNED = (
+    "objects",
+    "meshes",
+    "materials",
+    "images",
+    "textures",
+    "collections",
+    "scenes",
+    "actions",
+    "armatures",
+    "cameras",
+    "lights",
+    "curves",
+    "node_groups",
+    "texts",
+    "worlds",
+    "shape_keys",
+)
 
 
 def import_mesh(path: Path) -> RawMesh:
@@ -34,16 +50,18 @@ def import_mesh(path: Path) -> RawMesh:
     """
     path = Path(path)
     if not path.is_file():
-        raise BadInputError(f"Mesh '{path}' {'is not a file' if path.exists() else 'does not exist'}; a capture needs "
-                            "its mesh there.")
+        raise BadInputError(
+            f"Mesh '{path}' {'is not a file' if path.exists() else 'does not exist'}; a capture needs its mesh there."
+        )
     try:
         with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, _scene_apart() as scene:
             _import(path, Path(folder), scene)
             parts = _parts(scene)
     except OSError as error:
         reason = error.strerror or error
-        raise BadInputError(f"Mesh '{path}' can't be read ({reason}); check the file, its rights and the space for "
-                            "temporary files.") from error
+        raise BadInputError(
+            f"Mesh '{path}' can't be read ({reason}); check the file, its rights and the space for temporary files."
+        ) from error
     except MemoryError as error:
         raise BadInputError(f"Mesh '{path}' does not fit in memory; simplify it.") from error
     if not parts:
@@ -53,13 +71,23 @@ def import_mesh(path: Path) -> RawMesh:
 
 def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> None:
     """Run Blender's importer on a copy of `path` that names nothing else."""
-    with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0], collection=scene.collection,
-                                   layer_collection=scene.view_layers[0].layer_collection):
+    with bpy.context.temp_override(
+        scene=scene,
+        view_layer=scene.view_layers[0],
+        collection=scene.collection,
+        layer_collection=scene.view_layers[0].layer_collection,
+    ):
         try:
             if path.suffix.lower() == ".obj":
                 copy, named = copy_obj(path, folder)
-                bpy.ops.wm.obj_import(filepath=str(copy), forward_axis="Y", up_axis="Z", use_split_objects=named,
-                                      use_split_groups=not named, validate_meshes=True)
+                bpy.ops.wm.obj_import(
+                    filepath=str(copy),
+                    forward_axis="Y",
+                    up_axis="Z",
+                    use_split_objects=named,
+                    use_split_groups=not named,
+                    validate_meshes=True,
+                )
                 return
             copy = copy_gltf(path, folder)
             if not hasattr(bpy.types, "IMPORT_SCENE_OT_gltf"):  # its add-on is switched off
@@ -125,8 +153,9 @@ def _joined(parts: list, name: str) -> RawMesh:
     triangles = np.concatenate([part[2] + offset for part, offset in zip(parts, begin)]).astype(np.int32)
     uv = None
     if any(part[3] is not None for part in parts):
-        uv = np.concatenate([np.zeros((len(part[2]), 3, 2), np.float32) if part[3] is None else part[3]
-                             for part in parts])
+        uv = np.concatenate(
+            [np.zeros((len(part[2]), 3, 2), np.float32) if part[3] is None else part[3] for part in parts]
+        )
     if len(parts) == 1:
         return RawMesh(vertices, triangles, uv=uv, name=name)
     ids = np.repeat(np.arange(len(parts)), [len(part[2]) for part in parts])

@@ -69,10 +69,13 @@ class Job:
         if os.name == "nt":
             flags = {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS}
         self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **flags)
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **flags
+        )
         _alive.add(self)
-        self._readers = [threading.Thread(target=target, name=f"scan relight {name}", daemon=True)
-                         for name, target in (("output", self._read), ("errors", self._read_errors))]
+        self._readers = [
+            threading.Thread(target=target, name=f"scan relight {name}", daemon=True)
+            for name, target in (("output", self._read), ("errors", self._read_errors))
+        ]
         for reader in self._readers:
             reader.start()
         threading.Thread(target=self._wait, name="scan relight end", daemon=True).start()
@@ -173,8 +176,10 @@ class Job:
         if said:
             return said[-1]
         if code in (-9, 137):
-            return ("The system ended the run, most likely because memory ran out; the finished stages are kept. "
-                    "Take a greater texel size or a smaller atlas size, or close other programs.")
+            return (
+                "The system ended the run, most likely because memory ran out; the finished stages are kept. "
+                "Take a greater texel size or a smaller atlas size, or close other programs."
+            )
         last = next((line for line in reversed(self._errors) if line.strip()), "it left no word")
         return f"The run ended with code {code}: {last[:300]}"
 

@@ -39,6 +39,14 @@ def command(arguments: Sequence[str]) -> list[str]:
     told = {"root": ROOT.as_posix(), "path": path, "arguments": [str(one) for one in arguments]}
     code = CHILD.format(told=ascii(json.dumps(told)))
     if bpy.app.binary_path:
-        return [bpy.app.binary_path, "--background", "--factory-startup", "-noaudio", "--python-exit-code", "1",
-                "--python-expr", code]
+        return [
+            bpy.app.binary_path,
+            "--background",
+            "--factory-startup",
+            "-noaudio",
+            "--python-exit-code",
+            "1",
+            "--python-expr",
+            code,
+        ]
     return [sys.executable, "-c", code]

@@ -18,8 +18,9 @@ AROUND = 1
 """Texels to each side of the spot that its albedo is the median of."""
 
 
-def of_object(thing: bpy.types.Object, place: Vector, albedo: tuple[float, float, float],
-              depsgraph: bpy.types.Depsgraph) -> list[float]:
+def of_object(
+    thing: bpy.types.Object, place: Vector, albedo: tuple[float, float, float], depsgraph: bpy.types.Depsgraph
+) -> list[float]:
     """The mean albedo of an object one spot of which has a known one.
 
     Parameters
@@ -50,8 +51,10 @@ def of_object(thing: bpy.types.Object, place: Vector, albedo: tuple[float, float
         raise BadInputError(f"That spot on '{thing.name}' is black in the result; click on a brighter one.")
     wanted = [known * whole / spot for known, whole, spot in zip(albedo, mean, found, strict=True)]
     if max(wanted) > 1:
-        raise BadInputError(f"With that spot at {', '.join(f'{part:.2f}' for part in albedo)} the mean of "
-                            f"'{thing.name}' would be above 1; give a darker albedo or click on a brighter spot.")
+        raise BadInputError(
+            f"With that spot at {', '.join(f'{part:.2f}' for part in albedo)} the mean of "
+            f"'{thing.name}' would be above 1; give a darker albedo or click on a brighter spot."
+        )
     return wanted
 
 

@@ -23,7 +23,13 @@ from .result_file import FITS, standings
 from .result_images import image
 
 MATERIAL, ALBEDO, SHADING, LIT_DIFFUSE, COVERAGE, CERTAINTY = (
-    "MATERIAL", "ALBEDO", "SHADING", "LIT_DIFFUSE", "COVERAGE", "CERTAINTY")
+    "MATERIAL",
+    "ALBEDO",
+    "SHADING",
+    "LIT_DIFFUSE",
+    "COVERAGE",
+    "CERTAINTY",
+)
 NAME = "Scan Relight look"
 MARK = "scan_relight_look"
 """Custom property of the look's node group and material: which look it is."""
@@ -62,10 +68,17 @@ LOOKS = {
     ALBEDO: Look("Albedo", "The colour of every spot without any light", "albedo.exr"),
     SHADING: Look("Shading", "The light on every spot, as it would look on white paint", "shading.exr", True),
     LIT_DIFFUSE: Look("Lit Diffuse", "What the frames saw of every spot, without highlights", "lit_diffuse.exr", True),
-    COVERAGE: Look("Coverage", "How often each spot was seen: dark blue once, yellow 256 times or more; purple never",
-                   "coverage.exr"),
-    CERTAINTY: Look("Certainty", "How sure the albedo is: yellow within 3 %, dark blue 50 % or worse; purple where it "
-                    "was filled in or is a lamp", "albedo_error.exr"),
+    COVERAGE: Look(
+        "Coverage",
+        "How often each spot was seen: dark blue once, yellow 256 times or more; purple never",
+        "coverage.exr",
+    ),
+    CERTAINTY: Look(
+        "Certainty",
+        "How sure the albedo is: yellow within 3 %, dark blue 50 % or worse; purple where it "
+        "was filled in or is a lamp",
+        "albedo_error.exr",
+    ),
 }
 
 
@@ -80,8 +93,11 @@ def current(scene: bpy.types.Scene) -> str:
 
 def recovered(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """The objects that wear recovered materials."""
-    return [thing for thing in scene.objects
-            if thing.type == "MESH" and OBJECT_ID in thing and ATLAS_UV in thing.data.uv_layers and not thing.library]
+    return [
+        thing
+        for thing in scene.objects
+        if thing.type == "MESH" and OBJECT_ID in thing and ATLAS_UV in thing.data.uv_layers and not thing.library
+    ]
 
 
 def result_of(scene: bpy.types.Scene) -> Path | None:
@@ -119,8 +135,10 @@ def set_look(scene: bpy.types.Scene, look: str) -> int:
         raise BadInputError("No object of this scene wears recovered materials; run the recovery first.")
     folders = {thing: result.folder for thing, (state, result) in standings(things).items() if state == FITS}
     if not folders:
-        raise BadInputError("The result folder holds no images of the run that this scene's objects came from; run "
-                            "again and bring in the result.")
+        raise BadInputError(
+            "The result folder holds no images of the run that this scene's objects came from; run "
+            "again and bring in the result."
+        )
     for folder in dict.fromkeys(folders.values()):
         if not (folder / LOOKS[look].file).is_file():
             raise BadInputError(f"'{folder / LOOKS[look].file}' is missing; run the recovery again to its end.")
@@ -184,8 +202,9 @@ def _group(material: bpy.types.Material, look: str) -> bpy.types.NodeTree:
     group[MARK] = look
     for way in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-    start, put, end = (group.nodes.new(kind) for kind in ("NodeGroupInput", "GeometryNodeSetMaterial",
-                                                          "NodeGroupOutput"))
+    start, put, end = (
+        group.nodes.new(kind) for kind in ("NodeGroupInput", "GeometryNodeSetMaterial", "NodeGroupOutput")
+    )
     put.location, end.location = (200, 0), (400, 0)
     put.inputs["Material"].default_value = material
     group.links.new(start.outputs[0], put.inputs["Geometry"])
@@ -256,9 +275,10 @@ def _often(tree, coverage):
 
 def _sure(tree, folder: Path):
     """0...1 for relative errors of the albedo from `DOUBTFUL` down to 1/16 of it, by their logarithm."""
-    error, albedo = (_math(tree, "ADD", _math(tree, "ADD", *(_channel(tree, colour, k) for k in (0, 1))),
-                           _channel(tree, colour, 2))
-                     for colour in (_texture(tree, folder, name) for name in ("albedo_error.exr", "albedo.exr")))
+    error, albedo = (
+        _math(tree, "ADD", _math(tree, "ADD", *(_channel(tree, colour, k) for k in (0, 1))), _channel(tree, colour, 2))
+        for colour in (_texture(tree, folder, name) for name in ("albedo_error.exr", "albedo.exr"))
+    )
     relative = _math(tree, "DIVIDE", error, _math(tree, "MAXIMUM", albedo, 1e-3))
     relative = _math(tree, "MAXIMUM", relative, DOUBTFUL / 64)
     return _math(tree, "DIVIDE", _math(tree, "LOGARITHM", _math(tree, "DIVIDE", DOUBTFUL, relative), 2.0), 4.0)

@@ -10,8 +10,15 @@ from .cameras import frame_cameras, shows_as_framed, use_camera
 from .images import RADIANCE
 
 
-def match_frame(scene: bpy.types.Scene, index: int, background: bool = True, alpha: float = 1.0,
-                front: bool = False, capture_folder: str = "", size: bool = False) -> str:
+def match_frame(
+    scene: bpy.types.Scene,
+    index: int,
+    background: bool = True,
+    alpha: float = 1.0,
+    front: bool = False,
+    capture_folder: str = "",
+    size: bool = False,
+) -> str:
     """Render and look through a frame's camera.
 
     Parameters
@@ -43,8 +50,10 @@ def match_frame(scene: bpy.types.Scene, index: int, background: bool = True, alp
     thing.data.show_background_images = background
     told = show_picture(thing, alpha, front, capture_folder) if background else ""
     if not shows_as_framed(scene, thing):
-        other = (f"Frame '{thing.name}' ({thing['width']} x {thing['height']} pixels) has another shape than the "
-                 "picture that is rendered; turn Match Render Size on to render it whole.")
+        other = (
+            f"Frame '{thing.name}' ({thing['width']} x {thing['height']} pixels) has another shape than the "
+            "picture that is rendered; turn Match Render Size on to render it whole."
+        )
         told = " ".join(filter(None, (told, other)))
     return told
 
@@ -62,8 +71,10 @@ def show_picture(thing: bpy.types.Object, alpha: float = 1.0, front: bool = Fals
     if shown is None or shown.image is None:
         path = picture_path(thing, capture_folder)
         if path is None:
-            return (f"The picture of frame '{thing.name}' is not where the capture had it; choose the capture's folder "
-                    "under Capture.")
+            return (
+                f"The picture of frame '{thing.name}' is not where the capture had it; choose the capture's folder "
+                "under Capture."
+            )
         try:
             image = bpy.data.images.load(str(path), check_existing=True)
         except RuntimeError:

@@ -33,8 +33,12 @@ def ior_of(f0: float) -> float:
     return (1 + root) / (1 - root)
 
 
-def make_material(description: ObjectMaterial, base_color: bpy.types.Image | None = None,
-                  emission: bpy.types.Image | None = None, one_sided: bool = False) -> bpy.types.Material:
+def make_material(
+    description: ObjectMaterial,
+    base_color: bpy.types.Image | None = None,
+    emission: bpy.types.Image | None = None,
+    one_sided: bool = False,
+) -> bpy.types.Material:
     """Make the material of one object.
 
     Parameters
@@ -56,12 +60,19 @@ def make_material(description: ObjectMaterial, base_color: bpy.types.Image | Non
     return dress(bpy.data.materials.new(description.name), description, base_color, emission, one_sided)
 
 
-def dress(material: bpy.types.Material, description: ObjectMaterial, base_color: bpy.types.Image | None = None,
-          emission: bpy.types.Image | None = None, one_sided: bool = False) -> bpy.types.Material:
+def dress(
+    material: bpy.types.Material,
+    description: ObjectMaterial,
+    base_color: bpy.types.Image | None = None,
+    emission: bpy.types.Image | None = None,
+    one_sided: bool = False,
+) -> bpy.types.Material:
     """`make_material` with a material that is there: its nodes go, its name and whoever wears it stay."""
     nodes, links, principled = _fresh_tree(material)
-    value = {name: principled.inputs[name] for name in (
-        BASE_COLOR, METALLIC, ROUGHNESS, IOR, SPECULAR_LEVEL, EMISSION_COLOR, EMISSION_STRENGTH, ALPHA)}
+    value = {
+        name: principled.inputs[name]
+        for name in (BASE_COLOR, METALLIC, ROUGHNESS, IOR, SPECULAR_LEVEL, EMISSION_COLOR, EMISSION_STRENGTH, ALPHA)
+    }
     # The fitted lobe is single scattering.
     principled.distribution = "GGX"
     if description.phi is not None:  # else Blender's default, which shows nowhere while there is no specular lobe
@@ -113,10 +124,17 @@ def opacity(material: bpy.types.Material) -> float:
     return 1.0 if shader is None else shader.inputs[ALPHA].default_value
 
 
-def plain_material(name: str, colour: tuple[float, float, float] = (0.5, 0.5, 0.5), roughness: float = 0.5,
-                   specular: float = 0.5, metallic: float = 0.0, ior: float = 1.5,
-                   emission: tuple[float, float, float] = (0.0, 0.0, 0.0),
-                   base_color: bpy.types.Image | None = None, alpha: float = 1.0) -> bpy.types.Material:
+def plain_material(
+    name: str,
+    colour: tuple[float, float, float] = (0.5, 0.5, 0.5),
+    roughness: float = 0.5,
+    specular: float = 0.5,
+    metallic: float = 0.0,
+    ior: float = 1.5,
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    base_color: bpy.types.Image | None = None,
+    alpha: float = 1.0,
+) -> bpy.types.Material:
     """A Principled material of plain numbers and at most a picture over the atlas, such as any program understands.
 
     `specular` is Specular IOR Level, 0.5 being what `ior` says; `colour` and `emission` are linear Rec.709.
@@ -167,8 +185,12 @@ def mix_node(nodes):
     mix.data_type = "RGBA"
     # By type, as the node has sockets of the same name for each of its data types.
     colours = [s for s in mix.inputs if s.type == "RGBA"]
-    return (mix, next(s for s in mix.inputs if s.type == "VALUE"), *colours,
-            next(s for s in mix.outputs if s.type == "RGBA"))
+    return (
+        mix,
+        next(s for s in mix.inputs if s.type == "VALUE"),
+        *colours,
+        next(s for s in mix.outputs if s.type == "RGBA"),
+    )
 
 
 def _texture(nodes, links, image, place):

@@ -18,8 +18,13 @@ CAPTURE_UV = "Capture"
 """Name of the capture's own texture coordinates, where it has any."""
 
 
-def make_objects(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray, collection: bpy.types.Collection,
-                 parts_uv: np.ndarray | None = None) -> dict[int, bpy.types.Object]:
+def make_objects(
+    mesh: Mesh,
+    instances: Iterable[Instance],
+    atlas_uv: np.ndarray,
+    collection: bpy.types.Collection,
+    parts_uv: np.ndarray | None = None,
+) -> dict[int, bpy.types.Object]:
     """Make one mesh object for each instance and link it to a collection.
 
     Parameters
@@ -43,8 +48,13 @@ def make_objects(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray
     return dict(each_object(mesh, instances, atlas_uv, collection, parts_uv))
 
 
-def each_object(mesh: Mesh, instances: Iterable[Instance], atlas_uv: np.ndarray, collection: bpy.types.Collection,
-                parts_uv: np.ndarray | None = None) -> Iterator[tuple[int, bpy.types.Object]]:
+def each_object(
+    mesh: Mesh,
+    instances: Iterable[Instance],
+    atlas_uv: np.ndarray,
+    collection: bpy.types.Collection,
+    parts_uv: np.ndarray | None = None,
+) -> Iterator[tuple[int, bpy.types.Object]]:
     """`make_objects` one by one, so that a window can be drawn in between."""
     order = np.argsort(mesh.object_id, kind="stable")
     sorted_id = mesh.object_id[order]

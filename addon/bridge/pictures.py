@@ -23,9 +23,22 @@ FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32"), ".jpg": ("JPEG", "8
 CYCLES, EEVEE = "CYCLES", "EEVEE"
 _SLOT = "Scan Relight"
 """Name of the slot of Blender's Render Result for pictures that only measure something."""
-_RENDER = ("engine", "filepath", "resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x",
-           "pixel_aspect_y", "use_border", "use_file_extension", "use_compositing", "use_sequencer",
-           "use_overwrite", "use_placeholder", "film_transparent")
+_RENDER = (
+    "engine",
+    "filepath",
+    "resolution_x",
+    "resolution_y",
+    "resolution_percentage",
+    "pixel_aspect_x",
+    "pixel_aspect_y",
+    "use_border",
+    "use_file_extension",
+    "use_compositing",
+    "use_sequencer",
+    "use_overwrite",
+    "use_placeholder",
+    "film_transparent",
+)
 _IMAGE = ("media_type", "file_format", "color_mode", "color_depth", "color_management")
 _CYCLES = ("samples", "use_denoising", "use_adaptive_sampling", "device")
 _VIEW = ("view_transform", "look", "exposure", "gamma", "use_curve_mapping")
@@ -137,8 +150,9 @@ def shoot(scene: bpy.types.Scene, path: Path | str) -> None:
         scene.render.filepath = str(temporary.absolute())
         bpy.ops.render.render(write_still=True, scene=scene.name)
         if "EEVEE" in scene.render.engine and _is_black(temporary):
-            raise BadInputError("EEVEE gave a black picture: it needs a graphics card, which Blender has none of here; "
-                                "take Cycles.")
+            raise BadInputError(
+                "EEVEE gave a black picture: it needs a graphics card, which Blender has none of here; take Cycles."
+            )
 
 
 def seconds_expected(scene: bpy.types.Scene) -> float:
@@ -208,8 +222,9 @@ def saving(path: Path) -> Iterator[Path]:
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     except (OSError, RuntimeError) as error:
         reason = " ".join(str(getattr(error, "strerror", None) or error).split()).removeprefix("Error: ").rstrip(".")
-        raise StorageError(f"'{path}' can't be written ({reason}); free some space or choose another result folder."
-                           ) from error
+        raise StorageError(
+            f"'{path}' can't be written ({reason}); free some space or choose another result folder."
+        ) from error
 
 
 def beside(left: Path, right: Path, out: Path) -> None:

@@ -22,8 +22,12 @@ OUTDATED = f"{SCENE} shows the room as it was before objects were fitted again."
 
 
 def refit(
-    folder: Path | str, objects: Collection[int], progress: Progress, override: Path | None = None,
-    heed_kept: bool = True, scene: bool = True,
+    folder: Path | str,
+    objects: Collection[int],
+    progress: Progress,
+    override: Path | None = None,
+    heed_kept: bool = True,
+    scene: bool = True,
 ) -> dict:
     """Fit objects of a result again with all else held.
 
@@ -71,8 +75,17 @@ def refit(
         if scene:
             capture = result.room.capture
             posed = replace(capture, frames=run.room_poses().of(capture.frames), mesh=run.written_mesh())
-            write_scene(store.path(SCENE), posed, run.surface().atlas.uv, run.materials(), store.folder,
-                        run.median_radiance(), fresh=True, facing=True, parts=run.parts)
+            write_scene(
+                store.path(SCENE),
+                posed,
+                run.surface().atlas.uv,
+                run.materials(),
+                store.folder,
+                run.median_radiance(),
+                fresh=True,
+                facing=True,
+                parts=run.parts,
+            )
         else:
             report["warnings"].append(OUTDATED)
         report["versions"] = versions()

@@ -66,8 +66,9 @@ def fitted(folder: Path) -> result_file.Result:
     return result
 
 
-def bringing(scene: bpy.types.Scene, folder: Path, before: dict[int, dict],
-             after: result_file.Result) -> Generator[float, None, tuple[str, ...]]:
+def bringing(
+    scene: bpy.types.Scene, folder: Path, before: dict[int, dict], after: result_file.Result
+) -> Generator[float, None, tuple[str, ...]]:
     """Put onto a scene's objects what a refit changed; yields the share done, returns warnings.
 
     Only materials that the refit changed are made anew, so that what an artist did to others by hand stays.
@@ -81,8 +82,11 @@ def bringing(scene: bpy.types.Scene, folder: Path, before: dict[int, dict],
     after : result_file.Result
         What `words` and `fitted` gave.
     """
-    things = [thing for thing in scene.objects if corrections.correctable(thing)
-              and corrections.result_folder(thing) == folder]
+    things = [
+        thing
+        for thing in scene.objects
+        if corrections.correctable(thing) and corrections.result_folder(thing) == folder
+    ]
     image = _renew_images(folder)
     run, warnings, by_hand = after.run, [], []
     for done, thing in enumerate(things):
@@ -161,5 +165,6 @@ def _copy(source: Path, target: Path) -> None:
     try:
         shutil.copyfile(source, target)
     except OSError as error:
-        raise StorageError(f"'{target}' can't be written ({error.strerror or error}); free some space and refit "
-                           "again.") from error
+        raise StorageError(
+            f"'{target}' can't be written ({error.strerror or error}); free some space and refit again."
+        ) from error

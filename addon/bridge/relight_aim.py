@@ -21,9 +21,21 @@ _CLEAR = 0.05
 """Metres that a light keeps off what is behind it."""
 _OFF_CEILING = 0.45
 """Metres below the room's top: a lamp closer to a ceiling burns its edge into it."""
-_AROUND = [Vector(one).normalized() for one in
-           ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1),
-            (1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0))]
+_AROUND = [
+    Vector(one).normalized()
+    for one in (
+        (1, 0, 0),
+        (-1, 0, 0),
+        (0, 1, 0),
+        (0, -1, 0),
+        (0, 0, 1),
+        (0, 0, -1),
+        (1, 1, 0),
+        (1, -1, 0),
+        (-1, 1, 0),
+        (-1, -1, 0),
+    )
+]
 _ALMOST = 0.03
 """Metres by which a ray may end before a point and still count as reaching it."""
 
@@ -40,8 +52,9 @@ class Placement(NamedTuple):
 
 def softbox_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
     """A key light: to one side of the camera, a little above, with room around it."""
-    place = _best(scene, subject, _around(scene, subject, (40, -40, 60, -60, 25, -25), (35, 20, 50), (2.2, 1.6, 1.1)),
-                  0.4, 1.6)
+    place = _best(
+        scene, subject, _around(scene, subject, (40, -40, 60, -60, 25, -25), (35, 20, 50), (2.2, 1.6, 1.1)), 0.4, 1.6
+    )
     distance = (subject.target - place).length
     room = _room_around(scene, place, 0.6)
     edge = min(max(0.4 * distance, 0.3), 0.9, 1.6 * room)
@@ -50,8 +63,9 @@ def softbox_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
 
 def spot_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
     """From above, a little on the camera's side of the target."""
-    place = _best(scene, subject, _around(scene, subject, (0, 35, -35, 60, -60), (60, 72, 45), (2.4, 1.8, 1.2)),
-                  0.15, 1.0)
+    place = _best(
+        scene, subject, _around(scene, subject, (0, 35, -35, 60, -60), (60, 72, 45), (2.4, 1.8, 1.2)), 0.15, 1.0
+    )
     return Placement(place, _facing(subject.target - place), 0.2, 0.2)
 
 
@@ -102,20 +116,25 @@ def sun_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
                     continue
                 direction = _towards(-view_direction(scene), side, up)
                 cosine = np.maximum(subject.normals @ np.array(direction), 0.0)
-                through = sum(subject.weights[k] * cosine[k] for k in range(0, len(starts), 2)
-                              if cosine[k] > 0.05 and leaves(scene, starts[k], direction))
+                through = sum(
+                    subject.weights[k] * cosine[k]
+                    for k in range(0, len(starts), 2)
+                    if cosine[k] > 0.05 and leaves(scene, starts[k], direction)
+                )
                 if best is None or through > best[0]:
                     best = through, direction
     if best is not None and best[0] > 0.02:
         direction = best[1]
         origin = subject.target + direction * (_exit(subject.target, direction, low, high) + 1.0)
         return Placement(origin, _facing(-direction), 1.0, 1.2, outside=True)
-    place = _best(scene, subject, _around(scene, subject, (75, -75, 100, -100, 50, -50), (16, 24, 10), (3.2, 2.2, 1.4)),
-                  0.25, 1.2)
+    place = _best(
+        scene, subject, _around(scene, subject, (75, -75, 100, -100, 50, -50), (16, 24, 10), (3.2, 2.2, 1.4)), 0.25, 1.2
+    )
     distance = (subject.target - place).length
     room = _room_around(scene, place, 0.6)
-    return Placement(place, _facing(subject.target - place), *(min(edge, 1.8 * room, 0.5 * distance)
-                                                              for edge in (0.9, 1.1)))
+    return Placement(
+        place, _facing(subject.target - place), *(min(edge, 1.8 * room, 0.5 * distance) for edge in (0.9, 1.1))
+    )
 
 
 def _around(scene, subject: Subject, sides, ups, distances) -> Iterator[tuple[Vector, float]]:
@@ -220,8 +239,9 @@ def _free(scene, target: Vector, direction: Vector, wanted: float) -> float:
 
 def _exit(place: Vector, direction: Vector, low: Vector, high: Vector) -> float:
     """Distance along a ray from within a box to its side; 0 from without."""
-    ways = [((high if direction[k] > 0 else low)[k] - place[k]) / direction[k] for k in range(3)
-            if abs(direction[k]) > 1e-9]
+    ways = [
+        ((high if direction[k] > 0 else low)[k] - place[k]) / direction[k] for k in range(3) if abs(direction[k]) > 1e-9
+    ]
     return max(min(ways, default=0.0), 0.0)
 
 

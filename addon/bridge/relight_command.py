@@ -47,9 +47,19 @@ class Light:
     kelvin: float | None = None
 
 
-def relight(result: Path, light: Light, out: Path, camera: str | None = None, samples: int = 0,
-            engine: str = CYCLES, before_after: bool = False, percentage: int = 100,
-            progress: Progress | None = None, device: str | None = None, of: str | None = None) -> list[str]:
+def relight(
+    result: Path,
+    light: Light,
+    out: Path,
+    camera: str | None = None,
+    samples: int = 0,
+    engine: str = CYCLES,
+    before_after: bool = False,
+    percentage: int = 100,
+    progress: Progress | None = None,
+    device: str | None = None,
+    of: str | None = None,
+) -> list[str]:
     """Open a result's scene, change its light, render.
 
     Parameters
@@ -93,8 +103,9 @@ def relight(result: Path, light: Light, out: Path, camera: str | None = None, sa
     try:
         bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False)
     except RuntimeError as error:
-        raise BadInputError(f"'{path}' can't be opened by Blender {bpy.app.version_string}; recover the capture "
-                            "again.") from error
+        raise BadInputError(
+            f"'{path}' can't be opened by Blender {bpy.app.version_string}; recover the capture again."
+        ) from error
     scene = scene_named(of)
     if camera is not None:
         use_camera(scene, camera_named(scene, camera))
@@ -187,8 +198,11 @@ def camera_named(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
         found = cameras[int(name)]
     if found is None:
         some = ", ".join(f"'{c.name}'" for c in cameras[:3])
-        raise BadInputError(f"There is no camera '{name}'; take a number from 0 to {len(cameras) - 1} or a name such "
-                            f"as {some}." if cameras else f"There is no camera '{name}'; the scene has none at all.")
+        raise BadInputError(
+            f"There is no camera '{name}'; take a number from 0 to {len(cameras) - 1} or a name such as {some}."
+            if cameras
+            else f"There is no camera '{name}'; the scene has none at all."
+        )
     return found
 
 

@@ -80,8 +80,12 @@ def stops(scene: bpy.types.Scene) -> float | None:
 def is_known(scene: bpy.types.Scene) -> bool:
     """Whether `stops` has all that it needs, or can't be answered at all, as without a camera."""
     known = _known.get(scene.name)
-    return scene.camera is None or known is not None and known.view == _view(scene) and all(
-        key in known.reaches for key, _, _ in _sources(scene))
+    return (
+        scene.camera is None
+        or known is not None
+        and known.view == _view(scene)
+        and all(key in known.reaches for key, _, _ in _sources(scene))
+    )
 
 
 def looking(scene: bpy.types.Scene) -> Iterator[None]:
@@ -123,8 +127,13 @@ def _view(scene) -> tuple:
     camera = scene.camera
     if camera is None:
         return ()
-    return (camera.name, *(round(c, 4) for row in camera.matrix_world for c in row), round(camera.data.lens, 3),
-            scene.render.resolution_x, scene.render.resolution_y)
+    return (
+        camera.name,
+        *(round(c, 4) for row in camera.matrix_world for c in row),
+        round(camera.data.lens, 3),
+        scene.render.resolution_x,
+        scene.render.resolution_y,
+    )
 
 
 def _places(scene) -> tuple[list, list, np.ndarray]:
@@ -172,16 +181,23 @@ def _lamps(scene) -> dict[str, tuple]:
         chosen = np.searchsorted(edges, (np.arange(_ON_LAMP) + 0.5) / _ON_LAMP).clip(max=len(areas) - 1)
         for lamp in lamps:
             both = not any(node.type == "NEW_GEOMETRY" for node in lamp.node_tree.nodes)
-            found[lamp.name] = (three[chosen].mean(1), across[chosen] / areas[chosen, None],
-                                areas.sum() / _ON_LAMP, both)
+            found[lamp.name] = (
+                three[chosen].mean(1),
+                across[chosen] / areas[chosen, None],
+                areas.sum() / _ON_LAMP,
+                both,
+            )
     return found
 
 
 def _sources(scene) -> Iterator[tuple[tuple, float, float]]:
     """Of each source its key, which tells all that its reach depends on, and its strength now and as captured."""
     for lamp in relight_lamps.find_lamps(scene):
-        yield ("lamp", lamp.name), luminance(relight_lamps.radiance(lamp)), luminance(
-            relight_lamps.recovered_radiance(lamp))
+        yield (
+            ("lamp", lamp.name),
+            luminance(relight_lamps.radiance(lamp)),
+            luminance(relight_lamps.recovered_radiance(lamp)),
+        )
     for thing in scene.objects:
         if thing.type == "LIGHT" and not thing.hide_render:
             data = thing.data
@@ -264,8 +280,9 @@ def _from_sky(scene, world, turn: float, place: Vector, normal: Vector) -> float
     beside, total = normal.cross(across), 0.0
     for k in range(_SKY):
         radius, angle = math.sqrt((k + 0.5) / _SKY), _GOLDEN * k
-        direction = (across * radius * math.cos(angle) + beside * radius * math.sin(angle)
-                     + normal * math.sqrt(1 - radius**2))
+        direction = (
+            across * radius * math.cos(angle) + beside * radius * math.sin(angle) + normal * math.sqrt(1 - radius**2)
+        )
         if leaves(scene, place, direction):
             total += sky(world, direction, turn)
     return total * math.pi / _SKY

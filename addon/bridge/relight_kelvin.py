@@ -14,8 +14,9 @@ from ..core.errors import BadInputError
 LOWEST, HIGHEST = 1700.0, 20000.0
 """Kelvin that can be asked for: a match, the blue sky."""
 LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
-_TO_RGB = np.array(((3.2404542, -1.5371385, -0.4985314), (-0.9692660, 1.8760108, 0.0415560),
-                    (0.0556434, -0.2040259, 1.0572252)))
+_TO_RGB = np.array(
+    ((3.2404542, -1.5371385, -0.4985314), (-0.9692660, 1.8760108, 0.0415560), (0.0556434, -0.2040259, 1.0572252))
+)
 """From CIE XYZ to linear Rec.709 (IEC 61966-2-1)."""
 _TO_XYZ = np.linalg.inv(_TO_RGB)
 

@@ -56,12 +56,14 @@ def lamp_named(scene: bpy.types.Scene, name: str) -> list[bpy.types.Material]:
     """
     lamps = find_lamps(scene)
     wanted = name.strip().casefold()
-    found = [m for m in lamps if m.name.casefold() == wanted] or \
-        [m for m in lamps if numbered(m.name.casefold())[0] == wanted]
+    found = [m for m in lamps if m.name.casefold() == wanted] or [
+        m for m in lamps if numbered(m.name.casefold())[0] == wanted
+    ]
     if not found:
         known = ", ".join(f"'{m.name}'" for m in lamps)
-        raise BadInputError(f"There is no lamp '{name}'; " + (f"known are {known}." if known else
-                                                             "the scan has no lamp at all."))
+        raise BadInputError(
+            f"There is no lamp '{name}'; " + (f"known are {known}." if known else "the scan has no lamp at all.")
+        )
     return found
 
 
@@ -158,8 +160,12 @@ def restore(material: bpy.types.Material) -> None:
 
 def snapshot(material: bpy.types.Material) -> dict:
     """The state of a lamp for `put_back`."""
-    return {"on": is_on(material), "factor": factor(material), "colour": colour(material),
-            "touched": _STRENGTH in material}
+    return {
+        "on": is_on(material),
+        "factor": factor(material),
+        "colour": colour(material),
+        "touched": _STRENGTH in material,
+    }
 
 
 def put_back(material: bpy.types.Material, state: dict) -> None:

@@ -44,9 +44,15 @@ _PLACES = {WINDOW: window_place, SOFTBOX: softbox_place, SPOT: spot_place, SUN: 
 _BEAM = math.radians(12.0)
 
 
-def add_light(scene: bpy.types.Scene, preset: str, strength: float = 1.0, aim: str = "VIEW",
-              thing: bpy.types.Object | None = None,
-              kelvin: float | None = None, unit: str = ROOM) -> bpy.types.Object:
+def add_light(
+    scene: bpy.types.Scene,
+    preset: str,
+    strength: float = 1.0,
+    aim: str = "VIEW",
+    thing: bpy.types.Object | None = None,
+    kelvin: float | None = None,
+    unit: str = ROOM,
+) -> bpy.types.Object:
     """Add a light within the room, aimed at what is looked at.
 
     Parameters
@@ -123,7 +129,7 @@ def _lamp(preset: str, place: Placement, distance: float, irradiance: float, rad
     if kind == "SUN":
         data.energy, data.angle = irradiance, math.radians(0.53)
     elif kind == "SPOT":
-        data.energy = irradiance * 4 * math.pi * distance ** 2
+        data.energy = irradiance * 4 * math.pi * distance**2
         # The cone fades from its axis to its rim, so it is wider than what it is for.
         data.spot_size = min(max(2 * math.atan(2.2 * radius / distance), math.radians(40)), math.radians(80))
         data.spot_blend, data.shadow_soft_size = 1.0, min(0.05 * distance, 0.1)

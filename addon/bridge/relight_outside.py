@@ -126,8 +126,9 @@ def use_hdri(scene: bpy.types.Scene, path: Path | str, mean: float | None = None
         world.use_nodes = True
     nodes, links = world.node_tree.nodes, world.node_tree.links
     nodes.clear()
-    texture, background, output = (nodes.new(f"ShaderNode{name}") for name in
-                                   ("TexEnvironment", "Background", "OutputWorld"))
+    texture, background, output = (
+        nodes.new(f"ShaderNode{name}") for name in ("TexEnvironment", "Background", "OutputWorld")
+    )
     texture.image, texture.location, output.location = image, (-300, 0), (300, 0)
     background.inputs["Strength"].default_value = strength
     links.new(texture.outputs[0], background.inputs["Color"])
@@ -162,8 +163,11 @@ def recovered_world(scene: bpy.types.Scene) -> bpy.types.World | None:
 def is_changed(scene: bpy.types.Scene) -> bool:
     """Whether the outside differs from what was recovered."""
     world = scene.world
-    return scene.get(RECOVERED) is not None or world is not None and (
-        not is_on(world) or factor(world) != 1 or rotation(world) != 0)
+    return (
+        scene.get(RECOVERED) is not None
+        or world is not None
+        and (not is_on(world) or factor(world) != 1 or rotation(world) != 0)
+    )
 
 
 def strength(world: bpy.types.World | None) -> float:

@@ -46,8 +46,16 @@ def add_volume(scene: bpy.types.Scene) -> bpy.types.Object:
     thing.matrix_world = Matrix.LocRotScale((low + high) / 2, None, half)
     for axis, extent in zip("xyz", half, strict=True):
         setattr(data, f"resolution_{axis}", min(max(math.ceil(2 * extent / _STEP), 3), _MOST))
-    _set(data, bake_samples=1024, capture_world=True, capture_indirect=True, capture_emission=True,
-         clamp_direct=0.0, clamp_indirect=0.0, surfel_density=15)
+    _set(
+        data,
+        bake_samples=1024,
+        capture_world=True,
+        capture_indirect=True,
+        capture_emission=True,
+        clamp_direct=0.0,
+        clamp_indirect=0.0,
+        surfel_density=15,
+    )
     thing[PROBE] = True
     own_collection(scene, COLLECTION).objects.link(thing)
     return thing
@@ -55,8 +63,15 @@ def add_volume(scene: bpy.types.Scene) -> bpy.types.Object:
 
 def prepare_eevee(scene: bpy.types.Scene) -> None:
     """What EEVEE needs to show the room: rays on the screen, shadows, no clamping."""
-    _set(scene.eevee, use_raytracing=True, use_shadows=True, light_threshold=0.001, clamp_surface_direct=0.0,
-         clamp_surface_indirect=0.0, gi_irradiance_pool_size="64")
+    _set(
+        scene.eevee,
+        use_raytracing=True,
+        use_shadows=True,
+        light_threshold=0.001,
+        clamp_surface_direct=0.0,
+        clamp_surface_indirect=0.0,
+        gi_irradiance_pool_size="64",
+    )
 
 
 def bake(scene: bpy.types.Scene, wait: bool = True) -> bpy.types.Object:
@@ -86,8 +101,10 @@ def bake(scene: bpy.types.Scene, wait: bool = True) -> bpy.types.Object:
     layer.update()
     active, layer.objects.active = layer.objects.active, thing
     try:
-        done = bpy.ops.object.lightprobe_cache_bake(
-            "EXEC_DEFAULT" if wait else "INVOKE_DEFAULT", subset="ACTIVE") <= {"FINISHED", "RUNNING_MODAL"}
+        done = bpy.ops.object.lightprobe_cache_bake("EXEC_DEFAULT" if wait else "INVOKE_DEFAULT", subset="ACTIVE") <= {
+            "FINISHED",
+            "RUNNING_MODAL",
+        }
         reason = ""
     except RuntimeError as error:
         done, reason = False, " ".join(str(error).split()).removeprefix("Error: ").rstrip(".")

@@ -39,15 +39,17 @@ def room_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """
     things = [thing for thing in scene.objects if OBJECT_ID in thing and thing.type == "MESH"]
     if not things:
-        raise BadInputError(f"Scene '{scene.name}' holds no scanned room; recover a capture or open a result's "
-                            "scene.blend first.")
+        raise BadInputError(
+            f"Scene '{scene.name}' holds no scanned room; recover a capture or open a result's scene.blend first."
+        )
     return things
 
 
 def bounds(scene: bpy.types.Scene) -> tuple[Vector, Vector]:
     """Lowest and highest corner of the scanned room in metres; raises `BadInputError` where there is none."""
-    corners = np.array([thing.matrix_world @ Vector(corner) for thing in room_objects(scene)
-                        for corner in thing.bound_box])
+    corners = np.array(
+        [thing.matrix_world @ Vector(corner) for thing in room_objects(scene) for corner in thing.bound_box]
+    )
     return Vector(corners.min(0)), Vector(corners.max(0))
 
 
@@ -138,7 +140,7 @@ def room_light(scene: bpy.types.Scene) -> float:
     kept = scene.get(ROOM_LIGHT)
     if kept:
         return float(kept)
-    found = _median_shading() or math.pi * _GREY / 2 ** scene.view_settings.exposure / _ALBEDO
+    found = _median_shading() or math.pi * _GREY / 2**scene.view_settings.exposure / _ALBEDO
     scene[ROOM_LIGHT] = found
     return found
 

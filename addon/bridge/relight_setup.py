@@ -30,11 +30,17 @@ def setup_of(scene: bpy.types.Scene) -> str:
     lights = []
     for thing in added_lights(scene):
         data = thing.data
-        told = {"kind": thing[KIND], "type": data.type, "name": thing.name, "shown": not thing.hide_render,
-                "pose": [list(row) for row in back @ thing.matrix_world], "color": list(data.color),
-                "use_temperature": data.use_temperature,
-                # The power of a lamp goes with the square of its distance; a sun's strength does not.
-                "energy": data.energy / light / (1.0 if data.type == "SUN" else size**2)}
+        told = {
+            "kind": thing[KIND],
+            "type": data.type,
+            "name": thing.name,
+            "shown": not thing.hide_render,
+            "pose": [list(row) for row in back @ thing.matrix_world],
+            "color": list(data.color),
+            "use_temperature": data.use_temperature,
+            # The power of a lamp goes with the square of its distance; a sun's strength does not.
+            "energy": data.energy / light / (1.0 if data.type == "SUN" else size**2),
+        }
         told.update({name: getattr(data, name) for name in _NUMBERS if hasattr(data, name)})
         told.update({name: getattr(data, name) / size for name in _LENGTHS if hasattr(data, name)})
         lights.append(told)
@@ -45,11 +51,21 @@ def setup_of(scene: bpy.types.Scene) -> str:
             tint = relight_lamps.colour(lamp) if relight_lamps.is_coloured(lamp) else None
             lamps[_class(lamp)] = [relight_lamps.is_on(lamp), relight_lamps.factor(lamp), tint]
     world = scene.world
-    outside = None if world is None else [relight_outside.is_on(world), relight_outside.factor(world),
-                                          relight_outside.rotation(world)]
+    outside = (
+        None
+        if world is None
+        else [relight_outside.is_on(world), relight_outside.factor(world), relight_outside.rotation(world)]
+    )
     dark = not any(map(relight_lamps.is_on, relight_lamps.find_lamps(scene)))
-    return json.dumps({"lights": lights, "lamps": lamps, "dark": dark, "outside": outside,
-                       "picture": world.get(relight_outside.HDRI) if world is not None else None})
+    return json.dumps(
+        {
+            "lights": lights,
+            "lamps": lamps,
+            "dark": dark,
+            "outside": outside,
+            "picture": world.get(relight_outside.HDRI) if world is not None else None,
+        }
+    )
 
 
 def apply_setup(scene: bpy.types.Scene, text: str) -> list[str]:
@@ -71,7 +87,8 @@ def apply_setup(scene: bpy.types.Scene, text: str) -> list[str]:
         poses = [Matrix(one["pose"]) for one in lights]
         states = {name: (bool(one[0]), float(one[1]), one[2] if len(one) > 2 else None) for name, one in lamps.items()}
         known = all(math.isfinite(c) for pose in poses for row in pose for c in row) and all(
-            one["kind"] in PRESETS and one["type"] in ("AREA", "SPOT", "SUN", "POINT") for one in lights)
+            one["kind"] in PRESETS and one["type"] in ("AREA", "SPOT", "SUN", "POINT") for one in lights
+        )
     except (ValueError, TypeError, KeyError, IndexError):
         known = False
     if not known:

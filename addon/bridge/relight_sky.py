@@ -46,8 +46,10 @@ def _fields(image: bpy.types.Image) -> np.ndarray:
     if key not in _maps:
         pixels = np.nan_to_num(image_array(image)[..., :3], posinf=0.0).clip(0) @ LUMINANCE
         height, width = pixels.shape
-        rows, columns = (np.linspace(0, size, count + 1).astype(int)[:-1] for size, count in (
-            (height, min(_ROWS, height)), (width, min(_COLUMNS, width))))
+        rows, columns = (
+            np.linspace(0, size, count + 1).astype(int)[:-1]
+            for size, count in ((height, min(_ROWS, height)), (width, min(_COLUMNS, width)))
+        )
         summed = np.add.reduceat(np.add.reduceat(pixels, rows, 0), columns, 1)
         counts = np.outer(np.diff([*rows, height]), np.diff([*columns, width]))
         small = summed / counts

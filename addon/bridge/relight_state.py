@@ -39,8 +39,11 @@ def captured_light(scene: bpy.types.Scene) -> Iterator[None]:
 
 def is_relit(scene: bpy.types.Scene) -> bool:
     """Whether the scene's light differs from the captured one."""
-    return (any(map(relight_lamps.is_changed, relight_lamps.find_lamps(scene))) or relight_outside.is_changed(scene)
-            or any(not light.hide_render for light in relight_lights.added_lights(scene)))
+    return (
+        any(map(relight_lamps.is_changed, relight_lamps.find_lamps(scene)))
+        or relight_outside.is_changed(scene)
+        or any(not light.hide_render for light in relight_lights.added_lights(scene))
+    )
 
 
 def restore_captured(scene: bpy.types.Scene) -> None:

@@ -62,8 +62,12 @@ def subject_of(scene: bpy.types.Scene, aim: str, thing: bpy.types.Object | None 
     if not name or shares[name] < _THING * weights.sum():
         name = ""
     # A ceiling is seldom what a picture is of.
-    counts = np.array([weight * (4.0 if hit.thing.name == name else 0.25 if hit.normal.z < -0.7 else 1.0)
-                       for hit, weight in zip(hits, weights, strict=True)])
+    counts = np.array(
+        [
+            weight * (4.0 if hit.thing.name == name else 0.25 if hit.normal.z < -0.7 else 1.0)
+            for hit, weight in zip(hits, weights, strict=True)
+        ]
+    )
     of = [k for k, hit in enumerate(hits) if not name or hit.thing.name == name]
     places = np.array([hits[k].place for k in of])
     middle = np.average(places, axis=0, weights=counts[of])
@@ -75,8 +79,14 @@ def subject_of(scene: bpy.types.Scene, aim: str, thing: bpy.types.Object | None 
 def _subject(target, name, hits: list[Hit], counts: np.ndarray, radius: float) -> Subject:
     if not hits:
         return Subject(target, name, np.array([target]), np.array([(0.0, 0.0, 1.0)]), np.ones(1), radius)
-    return Subject(target, name, np.array([hit.place for hit in hits]), np.array([hit.normal for hit in hits]),
-                   counts / counts.sum(), min(max(radius, 0.2), 1.5))
+    return Subject(
+        target,
+        name,
+        np.array([hit.place for hit in hits]),
+        np.array([hit.normal for hit in hits]),
+        counts / counts.sum(),
+        min(max(radius, 0.2), 1.5),
+    )
 
 
 def _seen(scene) -> tuple[list[Hit], np.ndarray]:
@@ -90,7 +100,7 @@ def _seen(scene) -> tuple[list[Hit], np.ndarray]:
             hit = cast(scene, *picture_ray(scene, x, y))
             if hit is not None and OBJECT_ID in hit.thing:
                 hits.append(hit)
-                weights.append(math.exp(-((x - 0.5) ** 2 + (y - 0.5) ** 2) / (2 * 0.3 ** 2)))
+                weights.append(math.exp(-((x - 0.5) ** 2 + (y - 0.5) ** 2) / (2 * 0.3**2)))
     return hits, np.array(weights)
 
 
@@ -101,14 +111,20 @@ def _shell(scene) -> set[str]:
     doors and cupboards in an alcove are.
     """
     low, high = (np.array(one) for one in bounds(scene))
-    boxes = {thing.name: np.array([thing.matrix_world @ Vector(corner) for corner in thing.bound_box])
-             for thing in scene.objects if OBJECT_ID in thing and thing.type == "MESH"}
+    boxes = {
+        thing.name: np.array([thing.matrix_world @ Vector(corner) for corner in thing.bound_box])
+        for thing in scene.objects
+        if OBJECT_ID in thing and thing.type == "MESH"
+    }
     boxes = {name: (corners.min(0), corners.max(0)) for name, corners in boxes.items()}
     around = {name for name, (least, most) in boxes.items() if sum(most - least > 0.6 * (high - low)) > 1}
     upright = [box for box in boxes.values() if all(box[1] - box[0] > 0.6 * (high - low))]  # walls all around
     # What lies behind the walls, as alcoves and panes do, widens the room's bounds: the walls' own are narrower.
-    inner, outer = (np.maximum.reduce([box[0] for box in upright]), np.minimum.reduce([box[1] for box in upright])) \
-        if upright else (low, high)
+    inner, outer = (
+        (np.maximum.reduce([box[0] for box in upright]), np.minimum.reduce([box[1] for box in upright]))
+        if upright
+        else (low, high)
+    )
     wall, floor = min(_STANDS_OUT[0], 0.1 * min((high - low)[:2])), min(_STANDS_OUT[1], 0.1 * (high - low)[2])
 
     def is_part(least: np.ndarray, most: np.ndarray) -> bool:

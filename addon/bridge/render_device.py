@@ -56,8 +56,11 @@ def use_device(scene: bpy.types.Scene, told: str) -> str:
             scene.cycles.device = "GPU"
             return ""
     scene.cycles.device = "CPU"
-    return ("Blender finds no such graphics card here, so the processor renders."
-            if kind == GPU else f"Blender finds no {kind} device here, so the processor renders.")
+    return (
+        "Blender finds no such graphics card here, so the processor renders."
+        if kind == GPU
+        else f"Blender finds no {kind} device here, so the processor renders."
+    )
 
 
 def _enable(kind: str, wanted: set[str]) -> bool:

@@ -59,10 +59,20 @@ def read(folder: Path) -> Result | None:
             _read.clear()
         report, told = _json(folder / REPORT), _json(folder / MATERIALS)
         run, listed = told.get("run"), told.get("objects")
-        objects = {one["object_id"]: one for one in listed if isinstance(one, dict) and "object_id" in one} \
-            if isinstance(listed, list) else {}
-        _read[folder] = stamp, Result(folder, run if isinstance(run, str) else "", objects, *(
-            report[key] if isinstance(report.get(key), dict) else {} for key in ("stages", "figures")))
+        objects = (
+            {one["object_id"]: one for one in listed if isinstance(one, dict) and "object_id" in one}
+            if isinstance(listed, list)
+            else {}
+        )
+        _read[folder] = (
+            stamp,
+            Result(
+                folder,
+                run if isinstance(run, str) else "",
+                objects,
+                *(report[key] if isinstance(report.get(key), dict) else {} for key in ("stages", "figures")),
+            ),
+        )
     return _read[folder][1]
 
 
@@ -105,8 +115,11 @@ def standing(thing: bpy.types.Object | None) -> tuple[str, Result | None]:
 
 def rows(things: Iterable[bpy.types.Object]) -> dict[bpy.types.Object, dict[str, Any]]:
     """The entry of materials.json of each object whose run lies in its folder."""
-    return {thing: result.objects[thing[OBJECT_ID]] for thing, (state, result) in standings(things).items()
-            if state == FITS and thing[OBJECT_ID] in result.objects}
+    return {
+        thing: result.objects[thing[OBJECT_ID]]
+        for thing, (state, result) in standings(things).items()
+        if state == FITS and thing[OBJECT_ID] in result.objects
+    }
 
 
 def _stamp(path: Path) -> tuple[int, int] | None:

@@ -86,8 +86,10 @@ def is_ours(folder: Path) -> bool:
 def check(folder: str) -> None:
     """Raise `BadInputError` where a chosen result folder is one that results are lost in."""
     if is_ours(Path(folder)):
-        raise BadInputError(f"Result folder '{folder}' belongs to the extension, and removing that would delete the "
-                            "result; choose another.")
+        raise BadInputError(
+            f"Result folder '{folder}' belongs to the extension, and removing that would delete the "
+            "result; choose another."
+        )
 
 
 def earlier_homes() -> list[Path]:

@@ -17,8 +17,15 @@ from .scene import ALBEDO, BASE_COLOR, SHADING
 
 RESULT, FOLDER, PACK = "RESULT", "FOLDER", "PACK"
 """Refer to the result folder; copy into a folder beside the saved .blend; pack into it."""
-COLOUR_SPACES = {BASE_COLOR: RADIANCE, ALBEDO: RADIANCE, SHADING: RADIANCE, "lit_diffuse.exr": RADIANCE,
-                 "coverage.exr": DATA, "albedo_error.exr": DATA, "evidence.exr": DATA}
+COLOUR_SPACES = {
+    BASE_COLOR: RADIANCE,
+    ALBEDO: RADIANCE,
+    SHADING: RADIANCE,
+    "lit_diffuse.exr": RADIANCE,
+    "coverage.exr": DATA,
+    "albedo_error.exr": DATA,
+    "evidence.exr": DATA,
+}
 NEVER_SAVED = "Images can't go beside a file that was never saved; save it first, or pack them."
 BAKED = (BASE_COLOR, ALBEDO, SHADING)
 
@@ -43,8 +50,9 @@ def bring(folder: Path | str, where: str = RESULT) -> bpy.types.Image | None:
     return found.get(BASE_COLOR)
 
 
-def image(folder: Path | str, name: str, where: str = RESULT, keep: bool = True,
-          share: bool = False) -> bpy.types.Image:
+def image(
+    folder: Path | str, name: str, where: str = RESULT, keep: bool = True, share: bool = False
+) -> bpy.types.Image:
     """One image of a result folder, with the colour space that its content asks for; raises as `bring`.
 
     `keep` gives it a fake user; with `share` one that is there already is read again.
@@ -115,8 +123,9 @@ def settle(images: Iterable[bpy.types.Image], where: str = RESULT) -> None:
     for number, (one, source) in places.items():
         if number in gone:
             continue
-        for earlier in [other for other in bpy.data.images
-                        if other != one and other.get(IMAGE) == str(source) and not other.library]:
+        for earlier in [
+            other for other in bpy.data.images if other != one and other.get(IMAGE) == str(source) and not other.library
+        ]:
             gone.add(earlier.session_uid)
             replace(earlier, one)
         if one.packed_file:
@@ -149,8 +158,11 @@ def _beside(source: Path) -> Path:
     """A copy of `source` in the folder of images beside the saved file; each result has a folder of its own."""
     check(FOLDER)
     saved = Path(bpy.data.filepath)
-    theirs = {Path(bpy.path.abspath(one.filepath)).parent for one in bpy.data.images
-              if one.get(IMAGE) and not _of_one_result(Path(one[IMAGE]).parent, source.parent)}
+    theirs = {
+        Path(bpy.path.abspath(one.filepath)).parent
+        for one in bpy.data.images
+        if one.get(IMAGE) and not _of_one_result(Path(one[IMAGE]).parent, source.parent)
+    }
     names = (f"{saved.stem} images{f' {number}' if number > 1 else ''}" for number in count(1))
     target = next(one for one in (saved.parent / name for name in names) if one not in theirs) / source.name
     try:
@@ -158,6 +170,7 @@ def _beside(source: Path) -> Path:
         for one in tiles_of(source) or [source]:
             shutil.copyfile(one, target.parent / one.name)
     except OSError as error:
-        raise StorageError(f"'{target}' can't be written ({error.strerror or error}); free some space or save the file "
-                           "elsewhere.") from error
+        raise StorageError(
+            f"'{target}' can't be written ({error.strerror or error}); free some space or save the file elsewhere."
+        ) from error
     return target

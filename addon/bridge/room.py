@@ -52,8 +52,9 @@ class Brought:
     changes: tuple[dict, ...] = ()
 
 
-def bringing(folder: Path | str, scene: bpy.types.Scene | None = None, where: str = result_images.RESULT,
-             known: bool = False) -> Generator[float, None, Brought]:
+def bringing(
+    folder: Path | str, scene: bpy.types.Scene | None = None, where: str = result_images.RESULT, known: bool = False
+) -> Generator[float, None, Brought]:
     """Bring a finished result's room into the open file, or update the one that is there; yields the share done.
 
     Nothing that was in the file changes before the last slice: a generator that fails, or is closed before, leaves all
@@ -87,8 +88,10 @@ def bringing(folder: Path | str, scene: bpy.types.Scene | None = None, where: st
     folder = Path(folder).absolute()
     root = root_of(folder)
     if root is None:
-        raise MissingStageError(f"Folder '{folder}' holds no finished result ('{ROOM}' is missing or damaged); run the "
-                                "recovery to its end first.")
+        raise MissingStageError(
+            f"Folder '{folder}' holds no finished result ('{ROOM}' is missing or damaged); run the "
+            "recovery to its end first."
+        )
     top = imported(root) if known else find_room(root)
     made = Made()
     try:
@@ -151,8 +154,9 @@ def _append(path: Path) -> bpy.types.Scene:
         with bpy.data.libraries.load(str(path), link=False) as (there, wanted):
             wanted.scenes = there.scenes[:1]
     except OSError as error:
-        raise BadInputError(f"'{path}' can't be read by Blender {bpy.app.version_string}; run the recovery again from "
-                            "its last stage.") from error
+        raise BadInputError(
+            f"'{path}' can't be read by Blender {bpy.app.version_string}; run the recovery again from its last stage."
+        ) from error
     if not wanted.scenes or wanted.scenes[0] is None or not wanted.scenes[0].collection.children:
         raise BadInputError(f"'{path}' holds no room; run the recovery again from its last stage.")
     return wanted.scenes[0]

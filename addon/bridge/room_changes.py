@@ -31,9 +31,12 @@ def found(folder: Path) -> dict[str, dict[str, Any]]:
 def _facts(one: dict) -> dict[str, Any]:
     albedo = (one.get("evidence") or {}).get("albedo")
     phi = one.get("phi")
-    return {"name": one.get("name") or f"{one.get('class_name') or 'Object'} {one['object_id']}", "model": one["model"],
-            "roughness": None if phi is None else round(math.sqrt(max(phi, 0.0)), 3),
-            "albedo": None if albedo is None else round(sum(albedo) / 3, 3)}
+    return {
+        "name": one.get("name") or f"{one.get('class_name') or 'Object'} {one['object_id']}",
+        "model": one["model"],
+        "roughness": None if phi is None else round(math.sqrt(max(phi, 0.0)), 3),
+        "albedo": None if albedo is None else round(sum(albedo) / 3, 3),
+    }
 
 
 def keep(top: bpy.types.Collection, now: dict[str, dict[str, Any]]) -> None:
@@ -56,8 +59,9 @@ def compare(before: dict[str, dict[str, Any]], now: dict[str, dict[str, Any]]) -
                 rank += abs(new[name] - old[name]) / least
                 texts.append(f"{name} {old[name]:.2f}, now {new[name]:.2f}")
         if texts:
-            told.append((-rank, {"object_id": int(key), "name": new["name"],
-                                 "text": f"{new['name']}: {'; '.join(texts)}."}))
+            told.append(
+                (-rank, {"object_id": int(key), "name": new["name"], "text": f"{new['name']}: {'; '.join(texts)}."})
+            )
     return tuple(one for _, one in sorted(told, key=lambda pair: pair[0]))
 
 

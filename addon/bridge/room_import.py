@@ -40,9 +40,15 @@ def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generat
     if top is not None:
         if scene is not None and top not in scene.collection.children_recursive:
             scene.collection.children.link(top)
-        return Brought(scene or scenes_with(top)[0], top, True,
-                       (f"Capture '{capture.root.name}' is in this file already, in its scene "
-                        f"'{scenes_with(top)[0].name}'; it stays as it is.",))
+        return Brought(
+            scene or scenes_with(top)[0],
+            top,
+            True,
+            (
+                f"Capture '{capture.root.name}' is in this file already, in its scene "
+                f"'{scenes_with(top)[0].name}'; it stays as it is.",
+            ),
+        )
     made = Made()
     try:
         top = new_room(capture.root)

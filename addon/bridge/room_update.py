@@ -62,11 +62,18 @@ def key_of(thing: bpy.types.Object) -> str:
 def things_of(top: bpy.types.Collection) -> list[bpy.types.Object]:
     """A room's objects, wherever the artist has put them, and their duplicates."""
     root = Path(top[CAPTURE]).resolve()
-    same = {name: Path(name).resolve() == root for name in
-            {thing[CAPTURE] for thing in bpy.data.objects if CAPTURE in thing}}
+    same = {
+        name: Path(name).resolve() == root
+        for name in {thing[CAPTURE] for thing in bpy.data.objects if CAPTURE in thing}
+    }
     within = {thing for thing in top.all_objects if OBJECT_ID in thing or "pixel_aspect" in thing}
-    return [thing for thing in bpy.data.objects if not thing.library and thing.users_collection
-            and (same[thing[CAPTURE]] if CAPTURE in thing else thing in within)]
+    return [
+        thing
+        for thing in bpy.data.objects
+        if not thing.library
+        and thing.users_collection
+        and (same[thing[CAPTURE]] if CAPTURE in thing else thing in within)
+    ]
 
 
 def plan(top: bpy.types.Collection, fresh: bpy.types.Collection) -> Generator[float, None, Steps]:
@@ -115,8 +122,7 @@ def _corrected(slot: bpy.types.MaterialSlot) -> bool:
     return is_ours(slot.material) and is_corrected(slot.material)
 
 
-def commit(steps: Steps, top: bpy.types.Collection, fresh: bpy.types.Collection,
-           shell: bpy.types.Scene) -> list[str]:
+def commit(steps: Steps, top: bpy.types.Collection, fresh: bpy.types.Collection, shell: bpy.types.Scene) -> list[str]:
     """Do what was planned; sentences on what stays as the artist has it."""
     lamps = {thing for thing in part_of(fresh, LAMPS).objects}
     for name in (RESULT, RUN, CAPTURE):
@@ -156,11 +162,14 @@ def note_known(top: bpy.types.Collection, things: Iterable[bpy.types.Object]) ->
 
 def _told(steps: Steps) -> list[str]:
     groups = [
-        ([pair.old.name for pair in steps.pairs if pair.edited],
-         "the mesh was edited and is left as it is; the material is new"),
+        (
+            [pair.old.name for pair in steps.pairs if pair.edited],
+            "the mesh was edited and is left as it is; the material is new",
+        ),
         ([pair.old.name for pair in steps.pairs if pair.corrected], "the material was corrected and stays"),
         (steps.deleted, "was deleted and stays so; delete the room's scene and run again to have it back"),
-        (steps.kept_removed, "is no longer part of the result, but was edited and stays")]
+        (steps.kept_removed, "is no longer part of the result, but was edited and stays"),
+    ]
     return [f"{few(names)}: {what}." for names, what in groups if names]
 
 

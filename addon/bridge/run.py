@@ -46,17 +46,32 @@ WEIGHTS = {READ: 1, "surface": 5, "lit_diffuse": 8, "shading": 17, "specular": 1
 LEFT_OUT = f"The corrections that the result folder keeps in {OVERRIDES} were left out of this run, as was asked."
 
 
-def progress_for(settings: Settings, listener: Callable[[ProgressEvent], None] | None = None,
-                 should_stop: Callable[[], bool] | None = None) -> Progress:
+def progress_for(
+    settings: Settings,
+    listener: Callable[[ProgressEvent], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> Progress:
     """A `Progress` that knows what the stages of a run cost under `settings`."""
     return Progress(listener, should_stop, WEIGHTS)
 
 
-def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, progress: Progress,
-        until: str = WRITE, scene: bpy.types.Scene | None = None, import_first: bool = True,
-        reading: Reading = AS_FOUND, from_stage: str | None = None, target: str = AUTO,
-        images: str = result_images.RESULT, copies: bool = False, override: Path | None = None,
-        heed_kept: bool = True, into: str = OWN) -> dict:
+def run(
+    capture_folder: Path | str,
+    out_folder: Path | str,
+    settings: Settings,
+    progress: Progress,
+    until: str = WRITE,
+    scene: bpy.types.Scene | None = None,
+    import_first: bool = True,
+    reading: Reading = AS_FOUND,
+    from_stage: str | None = None,
+    target: str = AUTO,
+    images: str = result_images.RESULT,
+    copies: bool = False,
+    override: Path | None = None,
+    heed_kept: bool = True,
+    into: str = OWN,
+) -> dict:
     """Recover a capture up to a stage; stages that the result folder holds already are not done again.
 
     Parameters
@@ -118,7 +133,7 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
     with Store(out_folder) as store, told_in_a_sentence(out_folder):
         write_capture(store.folder, capture.root)
         if from_stage in STAGES:
-            store.drop(STAGES[STAGES.index(from_stage):])
+            store.drop(STAGES[STAGES.index(from_stage) :])
         if override is not None and heed_kept:
             store.write_json(OVERRIDES, given.as_dict())
         faces = polygons_of(capture.root, capture.mesh)
@@ -144,19 +159,33 @@ def run(capture_folder: Path | str, out_folder: Path | str, settings: Settings, 
             posed = replace(capture, frames=recovery.room_poses().of(capture.frames))
             facing = replace(posed, mesh=recovery.written_mesh())
             write_room(store.folder, posed, surface.first_uv)
-            warnings = write_scene(store.path("scene.blend"), facing, surface.atlas.uv, materials, store.folder,
-                                   recovery.median_radiance(), fresh=scene is None, facing=True, parts=recovery.parts)
+            warnings = write_scene(
+                store.path("scene.blend"),
+                facing,
+                surface.atlas.uv,
+                materials,
+                store.folder,
+                recovery.median_radiance(),
+                fresh=scene is None,
+                facing=True,
+                parts=recovery.parts,
+            )
             if scene is not None and own:
-                warnings += whole(writing_back(scene, capture, surface.first_uv, materials, store.folder, images,
-                                               copies))
+                warnings += whole(
+                    writing_back(scene, capture, surface.first_uv, materials, store.folder, images, copies)
+                )
             elif scene is not None:
-                warnings += whole(bringing(store.folder, scene if into == SCENE else None, images,
-                                           known=not import_first)).warnings
+                warnings += whole(
+                    bringing(store.folder, scene if into == SCENE else None, images, known=not import_first)
+                ).warnings
             progress.done()
         report = recovery.report()
         if until == WRITE:
-            report["stages"][WRITE] = {"seconds": round(time.monotonic() - writing, 2), "stored": False,
-                                       "peak_memory_bytes": peak_memory()}
+            report["stages"][WRITE] = {
+                "seconds": round(time.monotonic() - writing, 2),
+                "stored": False,
+                "peak_memory_bytes": peak_memory(),
+            }
         left = [] if heed_kept or not (store.folder / OVERRIDES).is_file() else [LEFT_OUT]
         report["warnings"] += (*left, *told, *warnings)
         report["versions"] = versions()
@@ -176,9 +205,10 @@ def _look(capture: Capture, reading: Reading) -> list[str]:
     """
     found = look(capture, read_pixels, search=not reading.convention)
     if found.best is not None:
-        raise BadInputError(f"Capture '{capture.root}': {found.sentence()} Give that, or --convention {AS_READ} to go "
-                            "on all the same.")
-    return found.sentences()[found.fits:]
+        raise BadInputError(
+            f"Capture '{capture.root}': {found.sentence()} Give that, or --convention {AS_READ} to go on all the same."
+        )
+    return found.sentences()[found.fits :]
 
 
 @contextmanager
@@ -188,8 +218,10 @@ def told_in_a_sentence(folder: Path) -> Iterator[None]:
         yield
     except OSError as error:
         where = f" for '{error.filename}'" if error.filename else ""
-        raise StorageError(f"Result folder '{folder}' can't be written any more ({error.strerror or error}{where}); "
-                           "free some space or choose another.") from error
+        raise StorageError(
+            f"Result folder '{folder}' can't be written any more ({error.strerror or error}{where}); "
+            "free some space or choose another."
+        ) from error
 
 
 def versions() -> dict[str, str]:

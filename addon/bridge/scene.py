@@ -64,9 +64,17 @@ class BuiltScene:
     warnings: tuple[str, ...] = ()
 
 
-def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
-                result_folder: Path | str, median_radiance: float = 0.0, own: bool = False,
-                facing: bool = False, parts: Parts | None = None) -> BuiltScene:
+def build_scene(
+    scene: bpy.types.Scene,
+    capture: Capture,
+    atlas_uv: np.ndarray,
+    materials: Iterable[ObjectMaterial],
+    result_folder: Path | str,
+    median_radiance: float = 0.0,
+    own: bool = False,
+    facing: bool = False,
+    parts: Parts | None = None,
+) -> BuiltScene:
     """Add the recovered room to a scene as a new collection; nothing that is there is changed.
 
     Parameters
@@ -98,8 +106,11 @@ def build_scene(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, 
         An image of the result folder can't be read.
     """
     folder = Path(result_folder).absolute()
-    images = {name: load_image(folder / name, image_name(capture.root.name, name))
-              for name in (BASE_COLOR, ALBEDO, SHADING) if (folder / name).exists()}
+    images = {
+        name: load_image(folder / name, image_name(capture.root.name, name))
+        for name in (BASE_COLOR, ALBEDO, SHADING)
+        if (folder / name).exists()
+    }
     top = new_room(capture.root)
     room, lamps, eyes = (part_of(top, name) for name in (ROOM, LAMPS, CAMERAS))
     scene.collection.children.link(top)
@@ -152,9 +163,17 @@ def _overview(capture: Capture, collection: bpy.types.Collection) -> bpy.types.O
     return make_view("overview", overview(capture.mesh), collection)
 
 
-def write_scene(path: Path | str, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
-                result_folder: Path | str, median_radiance: float = 0.0,
-                fresh: bool | None = None, facing: bool = False, parts: Parts | None = None) -> tuple[str, ...]:
+def write_scene(
+    path: Path | str,
+    capture: Capture,
+    atlas_uv: np.ndarray,
+    materials: Iterable[ObjectMaterial],
+    result_folder: Path | str,
+    median_radiance: float = 0.0,
+    fresh: bool | None = None,
+    facing: bool = False,
+    parts: Parts | None = None,
+) -> tuple[str, ...]:
     """Save the recovered room as a .blend of its own that renders when opened.
 
     The file appears whole or not at all, and refers to the images by paths relative to itself.
@@ -192,8 +211,9 @@ def write_scene(path: Path | str, capture: Capture, atlas_uv: np.ndarray, materi
         made = Made()
         scene = bpy.data.scenes.new("Scan Relight")
     try:
-        built = build_scene(scene, capture, atlas_uv, materials, result_folder, median_radiance, own=True,
-                            facing=facing, parts=parts)
+        built = build_scene(
+            scene, capture, atlas_uv, materials, result_folder, median_radiance, own=True, facing=facing, parts=parts
+        )
         for image in built.images:
             relative_to(image, path.parent)
         _save_whole(path, lambda name: _save(name, scene, built, fresh))
@@ -226,8 +246,9 @@ def _save_whole(path: Path, save: Callable[[str], None]) -> None:
         with suppress(OSError):
             writing.unlink(missing_ok=True)
         reason = getattr(error, "strerror", None) or str(error).strip().removeprefix("Error: ").rstrip(".")
-        raise StorageError(f"{path} can't be saved ({' '.join(reason.split())}); free some space or choose another "
-                           "folder.") from error
+        raise StorageError(
+            f"{path} can't be saved ({' '.join(reason.split())}); free some space or choose another folder."
+        ) from error
 
 
 def is_whole(path: Path) -> bool:

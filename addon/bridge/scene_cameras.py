@@ -79,8 +79,9 @@ def frame_size(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[float, 
     return (float(render.resolution_x), float(render.resolution_y), render.pixel_aspect_y / render.pixel_aspect_x)
 
 
-def camera_of(thing: bpy.types.Object, size: tuple[int, int], shown: tuple[float, float, float],
-              method: str = "STRETCH") -> Camera:
+def camera_of(
+    thing: bpy.types.Object, size: tuple[int, int], shown: tuple[float, float, float], method: str = "STRETCH"
+) -> Camera:
     """What took a picture of `size` that a camera has as its background.
 
     Parameters
@@ -118,21 +119,30 @@ def camera_of(thing: bpy.types.Object, size: tuple[int, int], shown: tuple[float
         raise BadInputError(f"Camera '{thing.name}' is sheared or has no size; apply its scale.")
     if np.linalg.det(matrix[:3, :3]) < 0:
         raise BadInputError(f"Camera '{thing.name}' is mirrored; apply its scale.")
-    return Camera(*size, fx / across, fy / down, size[0] / 2 + (cx - width / 2) / across,
-                  size[1] / 2 + (cy - height / 2) / down, matrix, lens)
+    return Camera(
+        *size,
+        fx / across,
+        fy / down,
+        size[0] / 2 + (cx - width / 2) / across,
+        size[1] / 2 + (cy - height / 2) / down,
+        matrix,
+        lens,
+    )
 
 
 def cameras_with_pictures(scene: bpy.types.Scene, among: Iterable[bpy.types.Object] = ()) -> list[bpy.types.Object]:
     """The cameras of `among` (of the scene, where there is none) that have a picture behind them, by name."""
-    chosen = [thing for thing in among if thing.type == "CAMERA"] or \
-        [thing for thing in scene.objects if thing.type == "CAMERA"]
+    chosen = [thing for thing in among if thing.type == "CAMERA"] or [
+        thing for thing in scene.objects if thing.type == "CAMERA"
+    ]
     return sorted((thing for thing in chosen if background(thing.data)), key=lambda thing: thing.name)
 
 
 def background(data: bpy.types.Camera) -> bpy.types.CameraBackgroundImage | None:
     """The first background that holds a picture."""
-    return next((one for one in data.background_images
-                 if (one.image if one.source == "IMAGE" else one.clip) is not None), None)
+    return next(
+        (one for one in data.background_images if (one.image if one.source == "IMAGE" else one.clip) is not None), None
+    )
 
 
 def is_moving(back: bpy.types.CameraBackgroundImage) -> bool:
@@ -140,9 +150,16 @@ def is_moving(back: bpy.types.CameraBackgroundImage) -> bool:
     return back.source == "MOVIE_CLIP" or back.image.source in ("SEQUENCE", "MOVIE")
 
 
-def views(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, things: list[bpy.types.Object],
-          how: str = AUTO, first: int | None = None, last: int | None = None, step: int = 1,
-          problems: list[str] | None = None) -> Iterator[View]:
+def views(
+    scene: bpy.types.Scene,
+    depsgraph: bpy.types.Depsgraph,
+    things: list[bpy.types.Object],
+    how: str = AUTO,
+    first: int | None = None,
+    last: int | None = None,
+    step: int = 1,
+    problems: list[str] | None = None,
+) -> Iterator[View]:
     """Every picture with the camera that took it.
 
     Parameters
@@ -166,8 +183,9 @@ def views(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, things: list[b
     moments: Iterable[int | None] = (None,)
     if how == ANIMATION:
         things = [scene.camera] if scene.camera in things else things[:1]
-        moments = range(scene.frame_start if first is None else first,
-                        (scene.frame_end if last is None else last) + 1, max(step, 1))
+        moments = range(
+            scene.frame_start if first is None else first, (scene.frame_end if last is None else last) + 1, max(step, 1)
+        )
     taken: set[str] = set()
     for moment in moments:
         if moment is not None:
@@ -187,8 +205,13 @@ def views(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, things: list[b
 
 def _view(scene, depsgraph, thing, moment, name) -> View:
     back = background(thing.data)
-    if abs(back.scale - 1) > 1e-6 or max(map(abs, back.offset)) > 1e-6 or abs(back.rotation) > 1e-6 \
-            or back.use_flip_x or back.use_flip_y:
+    if (
+        abs(back.scale - 1) > 1e-6
+        or max(map(abs, back.offset)) > 1e-6
+        or abs(back.rotation) > 1e-6
+        or back.use_flip_x
+        or back.use_flip_y
+    ):
         raise BadInputError(f"The background of camera '{thing.name}' is moved, scaled, turned or flipped; reset it.")
     path = picture(back, moment, thing.name)
     size = read_header(path)
@@ -217,19 +240,26 @@ def picture(back: bpy.types.CameraBackgroundImage, moment: int, owner: str) -> P
                 raise BadInputError(f"Camera '{owner}' has no picture at frame {moment}.")
             number = position + user.frame_offset
         elif kind == "FILE" and image.packed_file and not path.is_file():
-            raise BadInputError(f"The picture behind camera '{owner}' is packed into the file; unpack it (File, "
-                                "External Data) so that it can be read.")
+            raise BadInputError(
+                f"The picture behind camera '{owner}' is packed into the file; unpack it (File, "
+                "External Data) so that it can be read."
+            )
     if kind == "SEQUENCE":
         path = _with_number(path, number)
     elif kind == "MOVIE":
-        raise BadInputError(f"Camera '{owner}' has the film '{path.name}' behind it; materials need linear radiance: "
-                            "give a sequence of EXR pictures.")
+        raise BadInputError(
+            f"Camera '{owner}' has the film '{path.name}' behind it; materials need linear radiance: "
+            "give a sequence of EXR pictures."
+        )
     if path.suffix.lower() != ".exr":
-        raise BadInputError(f"Camera '{owner}' has the picture '{path.name or back.image.name}' behind it, which is no "
-                            "EXR; materials need linear radiance.")
+        raise BadInputError(
+            f"Camera '{owner}' has the picture '{path.name or back.image.name}' behind it, which is no "
+            "EXR; materials need linear radiance."
+        )
     if not path.is_file():
-        raise BadInputError(f"The picture '{path}' behind camera '{owner}' is missing; find it again (File, External "
-                            "Data).")
+        raise BadInputError(
+            f"The picture '{path}' behind camera '{owner}' is missing; find it again (File, External Data)."
+        )
     return path
 
 
@@ -246,8 +276,9 @@ def _with_number(path: Path, number: int) -> Path:
     found = _DIGITS.search(path.stem)
     if not found:
         return path
-    return path.with_name(f"{path.stem[:found.start()]}{number:0{len(found[1])}d}{path.stem[found.end():]}"
-                          f"{path.suffix}")
+    return path.with_name(
+        f"{path.stem[: found.start()]}{number:0{len(found[1])}d}{path.stem[found.end() :]}{path.suffix}"
+    )
 
 
 def _plain(name: str) -> str:

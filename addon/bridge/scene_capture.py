@@ -62,9 +62,15 @@ class Source:
     corner_start: int
 
 
-def capture_scene(context: bpy.types.Context, folder: Path | str, things: Iterable[bpy.types.Object],
-                  how: str = scene_cameras.AUTO, first: int | None = None, last: int | None = None,
-                  step: int = 1) -> tuple[str, ...]:
+def capture_scene(
+    context: bpy.types.Context,
+    folder: Path | str,
+    things: Iterable[bpy.types.Object],
+    how: str = scene_cameras.AUTO,
+    first: int | None = None,
+    last: int | None = None,
+    step: int = 1,
+) -> tuple[str, ...]:
     """Write objects and cameras of the open scene as a capture; the scene stays as it is.
 
     Parameters
@@ -96,8 +102,10 @@ def capture_scene(context: bpy.types.Context, folder: Path | str, things: Iterab
     things = sorted(things, key=lambda thing: thing.name)
     cameras = scene_cameras.cameras_with_pictures(scene, things)
     if not cameras:
-        raise BadInputError("No camera has a picture behind it; give each camera its frame as a background image, or "
-                            "one animated camera a sequence (Camera, Background Images).")
+        raise BadInputError(
+            "No camera has a picture behind it; give each camera its frame as a background image, or "
+            "one animated camera a sequence (Camera, Background Images)."
+        )
     parts = gather(context.evaluated_depsgraph_get(), things)
     if not parts:
         raise BadInputError("No object with faces is selected; select the room's objects first.")
@@ -105,8 +113,9 @@ def capture_scene(context: bpy.types.Context, folder: Path | str, things: Iterab
     problems: list[str] = []
     now = scene.frame_current, scene.frame_subframe
     try:
-        views = list(scene_cameras.views(scene, context.evaluated_depsgraph_get(), cameras, how, first, last, step,
-                                         problems))
+        views = list(
+            scene_cameras.views(scene, context.evaluated_depsgraph_get(), cameras, how, first, last, step, problems)
+        )
     finally:
         if (scene.frame_current, scene.frame_subframe) != now:
             scene.frame_set(now[0], subframe=now[1])
@@ -116,8 +125,9 @@ def capture_scene(context: bpy.types.Context, folder: Path | str, things: Iterab
         raise BadInputError(f"None of the pictures can be used: {told}")
     metre = scene.unit_settings.scale_length if scene.unit_settings.system != "NONE" else 1.0
     _write_whole(folder, lambda part: _write(part, mesh, parts, views, metre))
-    return ((f"{len(problems)} of {len(problems) + len(views)} pictures are left out: {told}",) if problems else ()) \
-        + _doubts(parts)
+    return (
+        (f"{len(problems)} of {len(problems) + len(views)} pictures are left out: {told}",) if problems else ()
+    ) + _doubts(parts)
 
 
 def _without_flat(mesh: SceneMesh) -> SceneMesh:
@@ -136,16 +146,21 @@ def _doubts(parts: list[Part]) -> tuple[str, ...]:
     if made:
         found.append(f"{few(made)}: modifiers or instances make the faces, so the materials can only go onto a copy.")
     if linked:
-        found.append(f"{few(linked)}: linked from another file, so the materials can't go there; make it local first "
-                     "(Object, Relations, Make Local).")
+        found.append(
+            f"{few(linked)}: linked from another file, so the materials can't go there; make it local first "
+            "(Object, Relations, Make Local)."
+        )
     return tuple(found)
 
 
 def few(names: list[str]) -> str:
     """The objects of these names, for a sentence: the first ones, and how many more."""
     shown = ", ".join(f"'{name}'" for name in names[:MAX_TOLD])
-    return f"Objects {shown} and {len(names) - MAX_TOLD} more" if len(names) > MAX_TOLD else \
-        f"Object{'s' if len(names) > 1 else ''} {shown}"
+    return (
+        f"Objects {shown} and {len(names) - MAX_TOLD} more"
+        if len(names) > MAX_TOLD
+        else f"Object{'s' if len(names) > 1 else ''} {shown}"
+    )
 
 
 def _write_whole(folder: Path, write) -> None:
@@ -158,8 +173,10 @@ def _write_whole(folder: Path, write) -> None:
         shutil.rmtree(folder, ignore_errors=True)
         os.replace(part, folder)
     except OSError as error:
-        raise StorageError(f"The scene can't be captured into '{folder}' ({error.strerror or error}); free some space "
-                           "or choose another folder.") from error
+        raise StorageError(
+            f"The scene can't be captured into '{folder}' ({error.strerror or error}); free some space "
+            "or choose another folder."
+        ) from error
     finally:
         shutil.rmtree(part, ignore_errors=True)
 
@@ -175,15 +192,33 @@ def _write(folder: Path, mesh: SceneMesh, parts: list[Part], views: list[scene_c
         bring(view.path, folder / place)
         camera, pose = view.camera, view.camera.camera_to_world.copy()
         pose[:3, 3] *= metre
-        frame = {"file_path": place, "w": camera.width, "h": camera.height, "fl_x": camera.fx, "fl_y": camera.fy,
-                 "cx": camera.cx, "cy": camera.cy, "transform_matrix": pose.tolist()}
+        frame = {
+            "file_path": place,
+            "w": camera.width,
+            "h": camera.height,
+            "fl_x": camera.fx,
+            "fl_y": camera.fy,
+            "cx": camera.cx,
+            "cy": camera.cy,
+            "transform_matrix": pose.tolist(),
+        }
         if camera.lens is not None:
             frame[OWN_LENS] = told_lens(camera.lens)
-        frames.append(frame | {key: value for key in ("exposure", "saturation")
-                               if (value := getattr(view, key)) is not None})
+        frames.append(
+            frame | {key: value for key in ("exposure", "saturation") if (value := getattr(view, key)) is not None}
+        )
     _json(folder / "transforms.json", {"camera_model": "PINHOLE", "frames": frames})
-    objects = [{"object_id": part.object_id, "name": part.name, "thing": part.thing.name, "own": part.own,
-                "topology": part.topology, "corner_start": mesh.corner_start[part.object_id]} for part in parts]
+    objects = [
+        {
+            "object_id": part.object_id,
+            "name": part.name,
+            "thing": part.thing.name,
+            "own": part.own,
+            "topology": part.topology,
+            "corner_start": mesh.corner_start[part.object_id],
+        }
+        for part in parts
+    ]
     packed = io.BytesIO()
     np.savez(packed, **mesh.polygons._asdict())
     (folder / FACES).write_bytes(packed.getvalue())
@@ -239,8 +274,11 @@ def polygons_of(folder: Path | str, mesh: Mesh) -> Polygons | None:
             found = Polygons(*(stored[name] for name in Polygons._fields))
     except (OSError, ValueError, KeyError, EOFError, BadZipFile):
         return None
-    same = len(found.corner) == len(mesh.triangles) and found.corner.max(initial=-1) < len(found.vertex) and \
-        np.array_equal(found.vertex[found.corner], mesh.triangles)
+    same = (
+        len(found.corner) == len(mesh.triangles)
+        and found.corner.max(initial=-1) < len(found.vertex)
+        and np.array_equal(found.vertex[found.corner], mesh.triangles)
+    )
     return found if same else None
 
 

@@ -31,7 +31,11 @@ class Made:
         """Take away what nothing uses: of what is new, and of the data whose `session_uid` is in `also`."""
         also = set(also)
         for kind in KINDS[1:]:
-            while found := [one for one in getattr(bpy.data, kind)
-                            if (one.session_uid not in self._before or one.session_uid in also)
-                            and not one.users and not one.library]:
+            while found := [
+                one
+                for one in getattr(bpy.data, kind)
+                if (one.session_uid not in self._before or one.session_uid in also)
+                and not one.users
+                and not one.library
+            ]:
                 bpy.data.batch_remove(found)

@@ -124,8 +124,9 @@ def gather(depsgraph: bpy.types.Depsgraph, things: Iterable[bpy.types.Object]) -
             name = f"{owner.name}/{shown.object.name}" if instanced else owner.name
             part = found[key] = Part(0, name, "", owner)
         data = shown.object.data
-        part.own &= (not shown.is_instance and not part.pieces and owner.type == "MESH"
-                     and same_topology(data, owner.data))
+        part.own &= (
+            not shown.is_instance and not part.pieces and owner.type == "MESH" and same_topology(data, owner.data)
+        )
         piece = _piece(data, np.array(shown.matrix_world, np.float64))
         if not np.isfinite(piece[0]).all():
             raise BadInputError(f"Object '{owner.name}' has vertices that are not finite; mend its mesh first.")
@@ -140,8 +141,9 @@ def gather(depsgraph: bpy.types.Depsgraph, things: Iterable[bpy.types.Object]) -
 
 def same_topology(one: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
     """Whether two meshes have the same faces in the same order, wherever their vertices are."""
-    return (len(one.vertices) == len(other.vertices)
-            and all(np.array_equal(a, b) for a, b in zip(topology(one), topology(other))))
+    return len(one.vertices) == len(other.vertices) and all(
+        np.array_equal(a, b) for a, b in zip(topology(one), topology(other))
+    )
 
 
 def topology(data: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
@@ -196,5 +198,6 @@ def joined(parts: Iterable[Part]) -> SceneMesh:
     corner = np.concatenate(corners).astype(np.int32)
     loop = np.concatenate(loops).astype(np.int32)
     start = np.append(np.concatenate(starts), first_corner).astype(np.int32)
-    return SceneMesh(np.concatenate(vertices), corner[loop], np.concatenate(ids), Polygons(start, corner, loop),
-                     corner_start)
+    return SceneMesh(
+        np.concatenate(vertices), corner[loop], np.concatenate(ids), Polygons(start, corner, loop), corner_start
+    )

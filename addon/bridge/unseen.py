@@ -78,8 +78,14 @@ def own_image(thing: bpy.types.Object, where: str = result_images.PACK) -> bpy.t
     if source.source == "TILED":
         raise BadInputError(f"The colour of object '{thing.name}' lies in tiles; run with another atlas to paint it.")
     name, key = f"{source.name.removesuffix('.exr')} painted", path_of(source)
-    image = next((one for one in bpy.data.images if one.get(PAINTED) == key and one.size[:] == source.size[:]
-                  and not one.library), None)
+    image = next(
+        (
+            one
+            for one in bpy.data.images
+            if one.get(PAINTED) == key and one.size[:] == source.size[:] and not one.library
+        ),
+        None,
+    )
     if image is None:
         image = array_image(name, image_array(source))
         image[PAINTED], image[RUN] = key, thing.get(RUN, "")
@@ -125,8 +131,10 @@ def reapply(thing: bpy.types.Object) -> list[str]:
     if image is None or node is None or node.image == image:
         return []
     if thing.get(_UV) != _digest(thing.data):
-        return [f"What was painted on '{thing.name}' lies on other texture coordinates than this run's; it is kept as "
-                f"image '{image.name}' and not shown."]
+        return [
+            f"What was painted on '{thing.name}' lies on other texture coordinates than this run's; it is kept as "
+            f"image '{image.name}' and not shown."
+        ]
     image[_SOURCE] = node.image
     _show(thing, node, image)
     return []
@@ -245,8 +253,9 @@ def _fill(things, seen, where, passed) -> int:
     flat = image_array(image).reshape(seen.shape[0] * seen.shape[1], -1) if spots else None
     for wanted, measured in spots.values():
         tree, nearest = cKDTree(atlas.place(measured)), min(NEIGHBOURS, len(measured))
-        distance, near = (found.reshape(len(wanted), -1)
-                          for found in tree.query(atlas.place(wanted), nearest, workers=-1))
+        distance, near = (
+            found.reshape(len(wanted), -1) for found in tree.query(atlas.place(wanted), nearest, workers=-1)
+        )
         weight = 1 / (distance**2 + atlas.texel_edge**2)
         value[wanted] = (weight[..., None] * flat[atlas.texel[measured], :3][near]).sum(1) / weight.sum(1)[:, None]
         filled[wanted] = True
@@ -264,9 +273,17 @@ def _fill(things, seen, where, passed) -> int:
 
 def _sharing(thing: bpy.types.Object) -> list[bpy.types.Object]:
     """All objects of the room whose texture coordinates lie in the same atlas."""
-    return list({one: None for scene in thing.users_scene for one in scene.objects
-                 if one.type == "MESH" and OBJECT_ID in one and one.get(RESULT) == thing.get(RESULT)
-                 and ATLAS_UV in one.data.uv_layers})
+    return list(
+        {
+            one: None
+            for scene in thing.users_scene
+            for one in scene.objects
+            if one.type == "MESH"
+            and OBJECT_ID in one
+            and one.get(RESULT) == thing.get(RESULT)
+            and ATLAS_UV in one.data.uv_layers
+        }
+    )
 
 
 def _elements(things: list[bpy.types.Object], size: int) -> Atlas:
@@ -315,8 +332,10 @@ def _save_beside(image) -> None:
         image.filepath_raw, image.file_format = str(path), "OPEN_EXR"
         image.save()
     except (OSError, RuntimeError) as error:
-        raise StorageError(f"'{path}' can't be written ({getattr(error, 'strerror', None) or error}); free some space "
-                           "or save the file elsewhere.") from error
+        raise StorageError(
+            f"'{path}' can't be written ({getattr(error, 'strerror', None) or error}); free some space "
+            "or save the file elsewhere."
+        ) from error
 
 
 def path_of(image: bpy.types.Image) -> str:

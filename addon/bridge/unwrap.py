@@ -84,13 +84,15 @@ def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0, polygons: P
 
 def _with_more(polygons, triangles):
     """The faces, and one for each triangle beyond theirs."""
-    more = triangles[len(polygons.corner):]
+    more = triangles[len(polygons.corner) :]
     if not len(more):
         return polygons
     corner = len(polygons.vertex) + np.arange(more.size).reshape(-1, 3)
-    return Polygons(np.r_[polygons.start, corner[:, 2] + 1].astype(polygons.start.dtype),
-                    np.r_[polygons.vertex, more.ravel()].astype(polygons.vertex.dtype),
-                    np.r_[polygons.corner, corner].astype(polygons.corner.dtype))
+    return Polygons(
+        np.r_[polygons.start, corner[:, 2] + 1].astype(polygons.start.dtype),
+        np.r_[polygons.vertex, more.ravel()].astype(polygons.vertex.dtype),
+        np.r_[polygons.corner, corner].astype(polygons.corner.dtype),
+    )
 
 
 def _unwrapped(vertices, triangles, object_id, size, margin_texels, polygons):
@@ -106,7 +108,7 @@ def _unwrapped(vertices, triangles, object_id, size, margin_texels, polygons):
     face, height = np.arange(len(uv)), _height(vertices[triangles], island)
     if polygons is not None:
         face = _faces(polygons.face, pairs)
-        height = (np.bincount(face, height) / np.bincount(face))
+        height = np.bincount(face, height) / np.bincount(face)
         pairs = np.unique(np.sort(face[pairs], axis=1), axis=0)
     layer = layers(pairs, height)[face]
     if layer.any():
@@ -119,8 +121,15 @@ def _unwrapped(vertices, triangles, object_id, size, margin_texels, polygons):
 def _projected(points, vertex, start):
     """Coordinates of each corner, (c, 2) float32, by Blender's projection of each face along one of few directions."""
     with _temporary(points, vertex, start) as data:
-        _operate(data, bpy.ops.uv.smart_project, angle_limit=_PROJECTION_ANGLE, island_margin=0.0, area_weight=0.0,
-                 correct_aspect=False, scale_to_bounds=False)
+        _operate(
+            data,
+            bpy.ops.uv.smart_project,
+            angle_limit=_PROJECTION_ANGLE,
+            island_margin=0.0,
+            area_weight=0.0,
+            correct_aspect=False,
+            scale_to_bounds=False,
+        )
         return np.nan_to_num(_layout(data), nan=0.0, posinf=0.0, neginf=0.0)
 
 
@@ -145,8 +154,17 @@ def _packed(points, corners, uv, size, margin_texels):
         for _ in range(3):
             with _temporary(points, corners.ravel(), 3 * np.arange(len(corners))) as data:
                 data.uv_layers[0].data.foreach_set("uv", uv.ravel())
-                _operate(data, bpy.ops.uv.pack_islands, rotate=True, rotate_method=turn, scale=True, margin=margin,
-                         margin_method="ADD", shape_method="AABB", udim_source="CLOSEST_UDIM")
+                _operate(
+                    data,
+                    bpy.ops.uv.pack_islands,
+                    rotate=True,
+                    rotate_method=turn,
+                    scale=True,
+                    margin=margin,
+                    margin_method="ADD",
+                    shape_method="AABB",
+                    udim_source="CLOSEST_UDIM",
+                )
                 packed = np.nan_to_num(_layout(data).reshape(-1, 3, 2), nan=0.0, posinf=0.0, neginf=0.0)
             border = packed.min()
             if border >= 0.97 * wanted or border <= 0:
@@ -211,8 +229,13 @@ def _operate(data, operator, **settings):
     layer = scene.view_layers[0]
     layer.objects.active = thing
     thing.select_set(True, view_layer=layer)
-    context = {"scene": scene, "view_layer": layer, "object": thing, "active_object": thing,
-               "selected_objects": [thing]}
+    context = {
+        "scene": scene,
+        "view_layer": layer,
+        "object": thing,
+        "active_object": thing,
+        "selected_objects": [thing],
+    }
     with bpy.context.temp_override(**context):
         bpy.ops.object.mode_set(mode="EDIT")
     try:

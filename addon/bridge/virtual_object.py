@@ -33,8 +33,9 @@ _FLAT = 0.18
 _PROBES = 400
 
 
-def add_virtual(scene: bpy.types.Scene, shape: str, size: float = 0.3, look: str = MATTE,
-                at: Hit | None = None) -> bpy.types.Object:
+def add_virtual(
+    scene: bpy.types.Scene, shape: str, size: float = 0.3, look: str = MATTE, at: Hit | None = None
+) -> bpy.types.Object:
     """Make a simple thing and stand it on a surface of the room.
 
     Parameters
@@ -178,8 +179,10 @@ def _flat_in_view(scene: bpy.types.Scene) -> Hit | None:
         hit = cast(scene, origin, direction)
         if hit is None or hit.normal.z < 0.95:
             continue
-        around = [cast(scene, hit.place + Vector((dx, dy, 0.05)), Vector((0, 0, -1)), 0.1)
-                  for dx, dy in ((_FLAT, 0), (-_FLAT, 0), (0, _FLAT), (0, -_FLAT))]
+        around = [
+            cast(scene, hit.place + Vector((dx, dy, 0.05)), Vector((0, 0, -1)), 0.1)
+            for dx, dy in ((_FLAT, 0), (-_FLAT, 0), (0, _FLAT), (0, -_FLAT))
+        ]
         if not all(one and abs(one.place.z - hit.place.z) < 0.02 for one in around):
             continue
         above = [hit.place + Vector((dx, dy, 0.2)) for dx, dy in ((0, 0), (_FLAT, 0), (-_FLAT, 0))]
@@ -217,8 +220,13 @@ def _clear_of_walls(scene, place: Vector, radius: float, tall: float) -> Vector:
             hit = cast(scene, place + Vector((0, 0, max(tall / 2, 0.02))), way, radius)
             if hit and hit.distance < radius:
                 need = way * -(radius - hit.distance + 0.005)
-                push = Vector((need.x if abs(need.x) > abs(push.x) else push.x,
-                               need.y if abs(need.y) > abs(push.y) else push.y, 0))
+                push = Vector(
+                    (
+                        need.x if abs(need.x) > abs(push.x) else push.x,
+                        need.y if abs(need.y) > abs(push.y) else push.y,
+                        0,
+                    )
+                )
         if not push.length:
             break
         place = place + push
@@ -229,7 +237,7 @@ def _drop(scene, points: np.ndarray, height: float) -> float:
     """How far a thing can fall until one of its points touches: the least gap below any of them, in metres."""
     lift = float(np.ptp(points[:, 2])) * 0.5 + 0.02
     lowest = np.argsort(points[:, 2])
-    chosen = np.unique(np.concatenate([lowest[:_PROBES // 2], lowest[::max(len(lowest) * 2 // _PROBES, 1)]]))
+    chosen = np.unique(np.concatenate([lowest[: _PROBES // 2], lowest[:: max(len(lowest) * 2 // _PROBES, 1)]]))
     gaps = []
     for x, y, z in points[chosen].tolist():
         # From as high as the thing's middle: what reaches over it, a table top above the floor, is not below it.

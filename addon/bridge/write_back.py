@@ -39,8 +39,15 @@ AUTO, IMPORTED, SELECTED = "AUTO", "IMPORTED", "SELECTED"
 SUFFIX = " (Scan Relight)"
 
 
-def write_back(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray, materials: Iterable[ObjectMaterial],
-               result_folder: Path | str, where: str = result_images.RESULT, copies: bool = False) -> tuple[str, ...]:
+def write_back(
+    scene: bpy.types.Scene,
+    capture: Capture,
+    atlas_uv: np.ndarray,
+    materials: Iterable[ObjectMaterial],
+    result_folder: Path | str,
+    where: str = result_images.RESULT,
+    copies: bool = False,
+) -> tuple[str, ...]:
     """Put the recovered materials onto the objects that a capture was made of.
 
     Parameters
@@ -77,9 +84,15 @@ def is_own(capture_folder: Path | str, target: str = AUTO) -> bool:
     return target == SELECTED or target == AUTO and bool(sources(capture_folder))
 
 
-def writing_back(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray,
-                 materials: Iterable[ObjectMaterial], result_folder: Path | str, where: str = result_images.RESULT,
-                 copies: bool = False) -> Generator[float, None, tuple[str, ...]]:
+def writing_back(
+    scene: bpy.types.Scene,
+    capture: Capture,
+    atlas_uv: np.ndarray,
+    materials: Iterable[ObjectMaterial],
+    result_folder: Path | str,
+    where: str = result_images.RESULT,
+    copies: bool = False,
+) -> Generator[float, None, tuple[str, ...]]:
     """`write_back` in slices of an object each; yields the share done, so that a window can be drawn."""
     known, polygons = sources(capture.root), polygons_of(capture.root, capture.mesh)
     check_own(capture.root)
@@ -100,25 +113,26 @@ def writing_back(scene: bpy.types.Scene, capture: Capture, atlas_uv: np.ndarray,
             locked.append(source.name)
             continue
         description = descriptions.get(source.object_id) or undescribed(source.object_id, source.name)
-        own = corner_uv[source.corner_start:]
+        own = corner_uv[source.corner_start :]
         if not source.own:
             made.append((source, thing, description, own))
         elif thing.type != "MESH" or hash_of([topology(thing.data)]) != source.topology:
             edited.append(source.name)
         else:
-            work.dress(thing, source, description, own[:len(thing.data.loops)])
-            if torn[source.corner_start:source.corner_start + len(thing.data.loops)].any():
+            work.dress(thing, source, description, own[: len(thing.data.loops)])
+            if torn[source.corner_start : source.corner_start + len(thing.data.loops)].any():
                 torn_names.append(source.name)
     # Copies that are there already are renewed, or they would show an older result.
     copied = [one for one in made if copies or "copies" in one[1].get(BEFORE, {})]
     left = [one[0].name for one in made if one not in copied]
     edited += work.copy(copied)
-    told = [(gone, "deleted or renamed since the capture, so no material went there"),
-            (edited, "edited since the capture and left as it is; capture the scene again"),
-            (locked, "linked from another file, so no material went there; make it local (Object, Relations, Make "
-             "Local)"),
-            (left, "modifiers or instances make the faces, so no material went there; write again with Make Copies on"),
-            (torn_names, "faces that fold onto themselves show the texture of one part only")]
+    told = [
+        (gone, "deleted or renamed since the capture, so no material went there"),
+        (edited, "edited since the capture and left as it is; capture the scene again"),
+        (locked, "linked from another file, so no material went there; make it local (Object, Relations, Make Local)"),
+        (left, "modifiers or instances make the faces, so no material went there; write again with Make Copies on"),
+        (torn_names, "faces that fold onto themselves show the texture of one part only"),
+    ]
     return tuple(f"{few(names)}: {what}." for names, what in told if names)
 
 
@@ -180,13 +194,16 @@ class _Work:
                 changed.append(source.name)
                 continue
             copy = self._frozen(part, source, depsgraph)
-            self.dress(copy, source, description, uv[:len(copy.data.loops)])
+            self.dress(copy, source, description, uv[: len(copy.data.loops)])
             del copy[BEFORE]
             copy[COPY_OF] = thing
             copies.setdefault(thing, []).append(copy)
         for thing, ones in copies.items():
-            thing[BEFORE] = {"copies": [{"copy": one} for one in ones], "hide_viewport": thing.hide_viewport,
-                             "hide_render": thing.hide_render}
+            thing[BEFORE] = {
+                "copies": [{"copy": one} for one in ones],
+                "hide_viewport": thing.hide_viewport,
+                "hide_render": thing.hide_render,
+            }
             thing.hide_viewport = thing.hide_render = True
         return changed
 
@@ -195,8 +212,9 @@ class _Work:
         thing, data = part.thing, None
         matrix = thing.evaluated_get(depsgraph).matrix_world.copy()
         if thing.type == "MESH" and len(part.pieces) == 1:  # with its own texture coordinates and all else
-            data = bpy.data.meshes.new_from_object(thing.evaluated_get(depsgraph), preserve_all_data_layers=True,
-                                                   depsgraph=depsgraph)
+            data = bpy.data.meshes.new_from_object(
+                thing.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
+            )
             if hash_of([topology(data)]) != part.topology:  # its one piece is an instance
                 bpy.data.meshes.remove(data)
                 data = None
@@ -257,8 +275,10 @@ def restore(things: Iterable[bpy.types.Object]) -> tuple[int, tuple[str, ...]]:
                 del thing[key]
         drop_ours(worn)
     result_images.drop_unused({thing[RESULT] for thing in bpy.data.objects if RESULT in thing})
-    told = [(edited, "edited since; the mesh from before is back, and the edited one is kept among the file's meshes"),
-            (slots, "material slots were added or removed since; as many old materials as there are slots are back")]
+    told = [
+        (edited, "edited since; the mesh from before is back, and the edited one is kept among the file's meshes"),
+        (slots, "material slots were added or removed since; as many old materials as there are slots are back"),
+    ]
     return count, tuple(f"{few(names)}: {what}." for names, what in told if names)
 
 

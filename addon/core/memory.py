@@ -31,8 +31,16 @@ def _windows_peak() -> int | None:
     import ctypes
     from ctypes import wintypes
 
-    sizes = ("peak", "now", "quota_peak_paged", "quota_paged", "quota_peak_nonpaged", "quota_nonpaged", "pagefile",
-             "peak_pagefile")
+    sizes = (
+        "peak",
+        "now",
+        "quota_peak_paged",
+        "quota_paged",
+        "quota_peak_nonpaged",
+        "quota_nonpaged",
+        "pagefile",
+        "peak_pagefile",
+    )
 
     class Counters(ctypes.Structure):
         _fields_ = [("cb", wintypes.DWORD), ("faults", wintypes.DWORD), *((name, ctypes.c_size_t) for name in sizes)]

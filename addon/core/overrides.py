@@ -69,8 +69,11 @@ class Given:
     def as_dict(self) -> dict[str, Any]:
         """What is given, as the file has it."""
         told = {one.name: getattr(self, one.name) for one in fields(self)}
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in told.items()
-                if value is not None}
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in told.items()
+            if value is not None
+        }
 
 
 @dataclass(frozen=True)
@@ -163,8 +166,10 @@ def merge(older: Overrides, newer: Overrides) -> Overrides:
     white = newer.white or (None if ("white", "") in newer.back else older.white)
     merged = Overrides({i: one for i, one in sorted(objects.items()) if one.any}, white)
     if circle := _circle(merged):
-        raise BadInputError(f"What is kept and what is given together make objects the same as each other in a circle "
-                            f"({circle}); give one of them values of its own.")
+        raise BadInputError(
+            f"What is kept and what is given together make objects the same as each other in a circle "
+            f"({circle}); give one of them values of its own."
+        )
     return merged
 
 
@@ -230,8 +235,9 @@ def parse(told: Any, name: str, known: Iterable[int]) -> Overrides:
     objects, back = {}, set()
     entries = told.get("objects") or {}
     if not isinstance(entries, dict):
-        raise BadInputError(f"{name}: 'objects' has to be an object of JSON by object_id, such as "
-                            '{"12": {"model": "metal"}}.')
+        raise BadInputError(
+            f'{name}: \'objects\' has to be an object of JSON by object_id, such as {{"12": {{"model": "metal"}}}}.'
+        )
     for number, entry in entries.items():
         object_id = _object(number, known, name)
         if entry is None:
@@ -247,8 +253,9 @@ def parse(told: Any, name: str, known: Iterable[int]) -> Overrides:
         back |= {("white", "")} if white is None else set()
     found = Overrides(objects, white, frozenset(back))
     if circle := _circle(found):
-        raise BadInputError(f"{name}: objects are the same as each other in a circle ({circle}); give one of them "
-                            "values of its own.")
+        raise BadInputError(
+            f"{name}: objects are the same as each other in a circle ({circle}); give one of them values of its own."
+        )
     return found
 
 
@@ -330,8 +337,10 @@ def _colour(value: Any, where: str, number: bool = True, keep_number: bool = Fal
         share = _share(value, where)
         return share if keep_number else (share,) * 3
     if not isinstance(value, (list, tuple)) or len(value) != 3:
-        raise BadInputError(f"{where} is {value!r}; give {'a number or ' if number else ''}three numbers from 0 to 1 "
-                            "(red, green, blue).")
+        raise BadInputError(
+            f"{where} is {value!r}; give {'a number or ' if number else ''}three numbers from 0 to 1 "
+            "(red, green, blue)."
+        )
     return tuple(_share(one, where) for one in value)
 
 
@@ -343,5 +352,5 @@ def _circle(overrides: Overrides) -> str:
             chain.append(here)
             here = overrides.of(here).same_as
         if here is not None:
-            return " -> ".join(map(str, (*chain[chain.index(here):], here)))
+            return " -> ".join(map(str, (*chain[chain.index(here) :], here)))
     return ""

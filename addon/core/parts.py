@@ -98,19 +98,25 @@ def footprints(surface: Surface, cameras: list[Camera]) -> dict[int, float]:
         hits = surface.scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
         met = np.flatnonzero(hits.triangle >= 0)
         edge = hits.distance[met] * (
-            camera.pixel_angles(pixels[met]) if camera.lens is not None else 1 / np.sqrt(camera.fx * camera.fy))
+            camera.pixel_angles(pixels[met]) if camera.lens is not None else 1 / np.sqrt(camera.fx * camera.fy)
+        )
         owner = surface.mesh.object_id[hits.triangle[met]]
         for number in np.unique(owner):
             found.setdefault(int(number), []).append(edge[(owner == number) & (edge > 0)])
-    return {number: float(np.percentile(np.concatenate(all_edges), 25)) for number, all_edges in found.items()
-            if sum(map(len, all_edges))}
+    return {
+        number: float(np.percentile(np.concatenate(all_edges), 25))
+        for number, all_edges in found.items()
+        if sum(map(len, all_edges))
+    }
 
 
 def scales(run: Recovery) -> dict[int, float]:
     """By object: how much finer than the room's its texels are to be; 1 where left out."""
     surface, s = run.surface(), run.settings
-    wanted = {number: s.texel_size or edge / s.detail
-              for number, edge in footprints(surface, [frame.camera for frame in run.frames]).items()}
+    wanted = {
+        number: s.texel_size or edge / s.detail
+        for number, edge in footprints(surface, [frame.camera for frame in run.frames]).items()
+    }
     finer = {number: float(np.clip(surface.texel_size / texel, 1, FINEST)) for number, texel in wanted.items()}
     finer = {number: scale for number, scale in finer.items() if scale > WORTH}
     taken = np.bincount(surface.atlas.object_id) / max(len(surface.atlas), 1) * surface.atlas.size**2
@@ -175,8 +181,14 @@ def _looked(run: Recovery, part: Mesh, atlas: Atlas, chosen: np.ndarray) -> LitD
         return element
 
     rounds = Rounds(run.progress, 0, LOOKED)
-    how = {"median": s.median, "order": s.frame_order, "seed": s.seed, "threads": s.threads, "folder": run.store.folder,
-           "progress": rounds}
+    how = {
+        "median": s.median,
+        "order": s.frame_order,
+        "seed": s.seed,
+        "threads": s.threads,
+        "folder": run.store.folder,
+        "progress": rounds,
+    }
     finer = replace(surface, atlas=atlas)
     found = accumulate(surface.mesh, atlas, surface.scene, run.frames, run.read, **how)
     rounds.next()
@@ -200,8 +212,11 @@ def write_parts(run: Recovery, parting: Parting, base_color: np.ndarray) -> Part
     materials = {m.object_id: m for m in run.materials()}
     shown = {number: m for number, m in materials.items() if m.model not in (EMITTER, METAL)}
     if run.settings.atlas == OBJECT:
-        images = {page.number: f"{FOLDER}/{file_name(shown[page.number].name)} base_color.exr"
-                  for page in pages.pages if page.number in shown}
+        images = {
+            page.number: f"{FOLDER}/{file_name(shown[page.number].name)} base_color.exr"
+            for page in pages.pages
+            if page.number in shown
+        }
         files = {images[page.number]: page for page in pages.pages if page.number in images}
         tiles = ()
     else:

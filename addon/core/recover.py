@@ -118,8 +118,7 @@ class Recovery(Corrected):
         s, surface = self.settings, self._surface_key
         lit = key("lit_diffuse", surface, s.refine_poses, s.median, s.sharpen, s.frame_order, s.seed)
         shading = key(
-            "shading", lit, s.shading, s.shading_rays, s.emitter_rays, s.portal_rays, s.interpolate,
-            s.mirrors, s.seed,
+            "shading", lit, s.shading, s.shading_rays, s.emitter_rays, s.portal_rays, s.interpolate, s.mirrors, s.seed
         )
         specular = key("specular", shading, s.specular, s.specular_rays, s.refine, *self.overrides.lobes_key())
         return {"surface": surface, "lit_diffuse": lit, "shading": shading, "specular": specular}
@@ -166,7 +165,10 @@ class Recovery(Corrected):
             found = build_surface(
                 mesh,
                 [frame.camera for frame in capture.frames],
-                self._unwrap, texel, self.settings.detail, self.settings.atlas_size,
+                self._unwrap,
+                texel,
+                self.settings.detail,
+                self.settings.atlas_size,
             )
             first = found.mesh.triangles[: len(mesh.triangles)]
             sign = np.where((first == mesh.triangles).all(1), 1, -1).astype(np.int8)

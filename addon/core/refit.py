@@ -111,17 +111,21 @@ def open_result(
     except FileNotFoundError as error:
         raise _again(folder, f"'{REPORT}' is missing") from error
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise BadInputError(f"The result in '{folder}' is damaged ({type(error).__name__}: {error}); "
-                            "run recover again.") from error
+        raise BadInputError(
+            f"The result in '{folder}' is damaged ({type(error).__name__}: {error}); run recover again."
+        ) from error
     if not result.changed and overrides.as_dict().get("white") == materials.get("white"):
-        raise BadInputError(f"Nothing is to be fitted again in '{folder}': name objects, or give a file of corrections "
-                            "that changes something.")
+        raise BadInputError(
+            f"Nothing is to be fitted again in '{folder}': name objects, or give a file of corrections "
+            "that changes something."
+        )
     return result
 
 
 def _again(folder: Path, why: str) -> MissingStageError:
-    return MissingStageError(f"Result '{folder}' can't be fitted in part ({why}); run recover again, it heeds the "
-                             "corrections, too.")
+    return MissingStageError(
+        f"Result '{folder}' can't be fitted in part ({why}); run recover again, it heeds the corrections, too."
+    )
 
 
 class Refit(Recovery):
@@ -183,8 +187,11 @@ class Refit(Recovery):
     def fitted_again(self) -> set[int]:
         """Those of them that are fitted: something else is given of their highlight, or nothing new at all."""
         before, now, given = self._specular_before[1], self.overrides.lobes(), self.result.given
-        first = {i for i in self.touched if before.get(i) != now.get(i)
-                 or i in self.result.asked and given[i] == self.overrides.of(i).as_dict()}
+        first = {
+            i
+            for i in self.touched
+            if before.get(i) != now.get(i) or i in self.result.asked and given[i] == self.overrides.of(i).as_dict()
+        }
         return {i for i in self.touched if {i, *self.overrides.chain(i)} & first}
 
     def refit(self) -> None:
@@ -246,8 +253,11 @@ class Refit(Recovery):
     @cached_property
     def _materials(self) -> list[ObjectMaterial]:
         found = Corrected._materials.func(self)
-        return found if self.whole else [
-            m if m.object_id in self.touched else self._before.get(m.object_id, m) for m in found]
+        return (
+            found
+            if self.whole
+            else [m if m.object_id in self.touched else self._before.get(m.object_id, m) for m in found]
+        )
 
     @cached_property
     def evidence(self) -> Evidence:
@@ -262,7 +272,10 @@ class Refit(Recovery):
         gloss_was, gloss = (
             gloss_error(atlas, albedo, told, specular, self.irradiance)[:, None]
             for albedo, told, specular in (
-                (before, was, self._specular_before[0].specular), (now, mine, self.specular().specular)))
+                (before, was, self._specular_before[0].specular),
+                (now, mine, self.specular().specular),
+            )
+        )
         relative = np.sqrt(np.maximum(np.square(error) - np.square(gloss_was), 0)) / np.maximum(before.rho, DARK)
         bare = ~(error > 0).any(1, keepdims=True)
         relative = np.where(bare, np.hypot(shading, UNKNOWN_BEFORE)[:, None], relative)
@@ -272,8 +285,9 @@ class Refit(Recovery):
         texels = TexelEvidence(shading, np.where(self._own[:, None], fresh, error).astype(np.float32), unseen, clipped)
         zeros = np.zeros(len(atlas), np.float32)
         count = int(self.result.report["figures"].get("evidence", {}).get("spots_checked", 0))
-        return Evidence(LightEvidence(zeros, unseen, zeros, {}, count), texels,
-                        object_evidence(atlas, lit, now, texels))
+        return Evidence(
+            LightEvidence(zeros, unseen, zeros, {}, count), texels, object_evidence(atlas, lit, now, texels)
+        )
 
     def write(self) -> None:
         """Images, materials.json and report.html of the result folder."""
@@ -282,8 +296,11 @@ class Refit(Recovery):
     def report(self) -> dict[str, Any]:
         """The result's report.json with what has changed."""
         old, new = self.result.report, super().report()
-        models = {name: new["figures"][name] for name in ("models", "coats", "evidence", "white_scale", "white_light")
-                  if name in new["figures"]}
+        models = {
+            name: new["figures"][name]
+            for name in ("models", "coats", "evidence", "white_scale", "white_light")
+            if name in new["figures"]
+        }
         figures = {name: value for name, value in old["figures"].items() if not name.startswith("white_")} | models
         warnings = [one for one in old["warnings"] if one != old.get("white_warning")]
         told = {"white_warning": self.white.warning} if self.white is not None and self.white.warning else {}

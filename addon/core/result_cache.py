@@ -23,8 +23,13 @@ class Cleared:
 
 def is_result(folder: Path) -> bool:
     """Whether a run wrote a folder: it has a store's lock file and its folder of stages; no links."""
-    return (folder.is_dir() and not folder.is_symlink() and (folder / LOCK).is_file() and (folder / STAGES).is_dir()
-            and not (folder / STAGES).is_symlink())
+    return (
+        folder.is_dir()
+        and not folder.is_symlink()
+        and (folder / LOCK).is_file()
+        and (folder / STAGES).is_dir()
+        and not (folder / STAGES).is_symlink()
+    )
 
 
 def results(parent: Path | str) -> list[Path]:
@@ -61,6 +66,9 @@ def clear(folders: Iterable[Path]) -> Cleared:
             freed += before
             touched += 1
         except (ScanRelightError, OSError) as error:
-            left.append(str(error) if isinstance(error, ScanRelightError)
-                        else f"'{folder.name}' can't be cleared ({error.strerror or error}).")
+            left.append(
+                str(error)
+                if isinstance(error, ScanRelightError)
+                else f"'{folder.name}' can't be cleared ({error.strerror or error})."
+            )
     return Cleared(freed, touched, tuple(left))

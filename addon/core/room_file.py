@@ -72,9 +72,15 @@ def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = Non
         "root": str(capture.root.absolute()),
         "format": capture.format,
         "instances": [[one.object_id, one.class_name] for one in capture.instances],
-        "frames": [[frame.name, str(frame.path.absolute()), [getattr(frame.camera, name) for name in CAMERA],
-                    told_lens(frame.camera.lens)]
-                   for frame in capture.frames],
+        "frames": [
+            [
+                frame.name,
+                str(frame.path.absolute()),
+                [getattr(frame.camera, name) for name in CAMERA],
+                told_lens(frame.camera.lens),
+            ]
+            for frame in capture.frames
+        ],
         "pictures": [_told_picture(frame) for frame in capture.frames],
     }
     arrays = {
@@ -104,8 +110,9 @@ def read_room(folder: Path | str) -> Room:
     folder = Path(folder).absolute()
     for name in (ROOM, MATERIALS):
         if not (folder / name).is_file():
-            raise MissingStageError(f"Folder '{folder}' holds no finished result ('{name}' is missing); "
-                                    "run the recovery to its end first.")
+            raise MissingStageError(
+                f"Folder '{folder}' holds no finished result ('{name}' is missing); run the recovery to its end first."
+            )
     capture, atlas_uv = read_capture_file(folder)
     try:
         told = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))
@@ -121,8 +128,10 @@ def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
         with open(folder / ROOM, "rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         told = json.loads(arrays["told"].tobytes())
-        frames = tuple(Frame(name, Path(path), Camera(*camera, pose, lens_of(lens)))
-                       for (name, path, camera, lens), pose in zip(told["frames"], arrays["poses"], strict=True))
+        frames = tuple(
+            Frame(name, Path(path), Camera(*camera, pose, lens_of(lens)))
+            for (name, path, camera, lens), pose in zip(told["frames"], arrays["poses"], strict=True)
+        )
         pictures = told.get("pictures") or [{}] * len(frames)
         frames = tuple(replace(frame, **_picture(one)) for frame, one in zip(frames, pictures, strict=True))
         mesh = Mesh(*(arrays[name] for name in ("vertices", "triangles", "object_id")), arrays.get("uv"))
@@ -134,15 +143,21 @@ def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
 
 def _told_picture(frame: Frame) -> dict[str, Any]:
     """How a frame's pictures are to be read, as JSON; JSON has no inf, so null stands for it."""
+
     def told(path: Path | None) -> str | None:
         return path and str(path.absolute())
 
     def finite(value: float) -> float | None:
         return value if math.isfinite(value) else None
 
-    return {"mask_path": told(frame.mask_path), "id_path": told(frame.id_path), "exposure": frame.exposure,
-            "saturation": finite(frame.saturation), "transfer": frame.transfer,
-            "brackets": [[told(shot.path), shot.exposure, finite(shot.saturation)] for shot in frame.brackets]}
+    return {
+        "mask_path": told(frame.mask_path),
+        "id_path": told(frame.id_path),
+        "exposure": frame.exposure,
+        "saturation": finite(frame.saturation),
+        "transfer": frame.transfer,
+        "brackets": [[told(shot.path), shot.exposure, finite(shot.saturation)] for shot in frame.brackets],
+    }
 
 
 def _picture(told: dict[str, Any]) -> dict[str, Any]:
@@ -155,8 +170,12 @@ def _picture(told: dict[str, Any]) -> dict[str, Any]:
 
     paths = {name: told[name] and Path(told[name]) for name in ("mask_path", "id_path")}
     brackets = tuple(Shot(Path(path), exposure, level(value)) for path, exposure, value in told["brackets"])
-    return paths | {"exposure": told["exposure"], "saturation": level(told["saturation"]),
-                    "transfer": told["transfer"], "brackets": brackets}
+    return paths | {
+        "exposure": told["exposure"],
+        "saturation": level(told["saturation"]),
+        "transfer": told["transfer"],
+        "brackets": brackets,
+    }
 
 
 def capture_name(folder: Path | str) -> str:
@@ -179,5 +198,6 @@ def root_of(folder: Path | str) -> Path | None:
 
 
 def _damaged(folder: Path, error: Exception) -> BadInputError:
-    return BadInputError(f"The result in '{folder}' is damaged ({type(error).__name__}: {error}); "
-                         "run the recovery again.")
+    return BadInputError(
+        f"The result in '{folder}' is damaged ({type(error).__name__}: {error}); run the recovery again."
+    )

@@ -109,9 +109,22 @@ class Settings:
             raise BadInputError("Settings shading_rays and specular_rays must be at least 1, atlas_size at least 64.")
 
 
-PAPER = Settings(denoise_mesh=False, refine_poses=False, median="p2", sharpen=False, frame_order="capture",
-                 shading="uniform", shading_rays=10000, emitter_rays=0, portal_rays=0, interpolate=False, mirrors=False,
-                 specular="target", refine=0, coat=False)
+PAPER = Settings(
+    denoise_mesh=False,
+    refine_poses=False,
+    median="p2",
+    sharpen=False,
+    frame_order="capture",
+    shading="uniform",
+    shading_rays=10000,
+    emitter_rays=0,
+    portal_rays=0,
+    interpolate=False,
+    mirrors=False,
+    specular="target",
+    refine=0,
+    coat=False,
+)
 """Haefner et al. 2021: P-square in video order, uniform rays, one target frame."""
 DRAFT = Settings(detail=0.5, sharpen=False, shading_rays=48, emitter_rays=16, portal_rays=16, specular_rays=96)
 """A first look: texels of two pixels' edge, few rays."""

@@ -11,5 +11,11 @@ WRITE = "write"
 """Comes after them: images, scene.blend, report."""
 RUN_STAGES = (*STAGES, WRITE)
 """What a run can be asked to end with, or to begin anew from."""
-LABELS = {READ: "Reading the capture", "surface": "Surface", "lit_diffuse": "Frames to texture",
-          "shading": "Light and albedo", "specular": "Highlights", WRITE: "Writing"}
+LABELS = {
+    READ: "Reading the capture",
+    "surface": "Surface",
+    "lit_diffuse": "Frames to texture",
+    "shading": "Light and albedo",
+    "specular": "Highlights",
+    WRITE: "Writing",
+}

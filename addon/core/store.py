@@ -32,8 +32,17 @@ SPILLED = "tmp-observations-"
 LOCK = ".lock"
 META = "__meta__"
 FULL = (errno.ENOSPC, errno.EDQUOT if hasattr(errno, "EDQUOT") else errno.ENOSPC)
-DAMAGE = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError, TypeError,
-          AttributeError)
+DAMAGE = (
+    OSError,
+    ValueError,
+    KeyError,
+    EOFError,
+    zipfile.BadZipFile,
+    zlib.error,
+    NotImplementedError,
+    TypeError,
+    AttributeError,
+)
 """What reading a damaged archive raises."""
 
 
@@ -72,13 +81,16 @@ class Store:
             self.close()
             reason = error.strerror or error
             if error.errno in FULL:
-                raise StorageError(f"Result folder '{self.folder}' can't be written ({reason}); "
-                                   "free some space or choose another.") from error
+                raise StorageError(
+                    f"Result folder '{self.folder}' can't be written ({reason}); free some space or choose another."
+                ) from error
             if isinstance(error, (FileExistsError, NotADirectoryError)):
-                raise BadInputError(f"Result folder '{self.folder}' can't be made: a file is in its way; "
-                                    "choose another.") from error
-            raise BadInputError(f"Result folder '{self.folder}' can't be written ({reason}); "
-                                "choose one that you may write.") from error
+                raise BadInputError(
+                    f"Result folder '{self.folder}' can't be made: a file is in its way; choose another."
+                ) from error
+            raise BadInputError(
+                f"Result folder '{self.folder}' can't be written ({reason}); choose one that you may write."
+            ) from error
 
     def __enter__(self) -> Store:
         return self
@@ -174,8 +186,9 @@ class Store:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise StorageError(f"'{path.parent}' can't be made ({error.strerror or error}); "
-                               "choose another result folder.") from error
+            raise StorageError(
+                f"'{path.parent}' can't be made ({error.strerror or error}); choose another result folder."
+            ) from error
         return path
 
     def _stage(self, name: str) -> Path:
@@ -244,8 +257,10 @@ def _take_lock(folder: Path):
             file.seek(0)
             owner = file.read(20).decode("ascii", "replace")
             file.close()
-            raise BadInputError(f"Result folder '{folder}' is being written by another run (process {owner}); "
-                                "wait for it or choose another folder.") from error
+            raise BadInputError(
+                f"Result folder '{folder}' is being written by another run (process {owner}); "
+                "wait for it or choose another folder."
+            ) from error
         # Some network disks know no locks; a run there is worth more than the protection.
     with contextlib.suppress(OSError):
         file.truncate(0)

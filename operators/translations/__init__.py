@@ -29,9 +29,13 @@ def texts(locale: str) -> dict[str, str]:
 
 def register() -> None:
     """Hand the table to Blender."""
-    bpy.app.translations.register(__name__, {
-        locale: {(context, english): other for english, other in texts(locale).items() for context in CONTEXTS}
-        for locale in LANGUAGES})
+    bpy.app.translations.register(
+        __name__,
+        {
+            locale: {(context, english): other for english, other in texts(locale).items() for context in CONTEXTS}
+            for locale in LANGUAGES
+        },
+    )
 
 
 def unregister() -> None:
@@ -64,5 +68,6 @@ def _patterns(locale: str) -> list[tuple[re.Pattern, str]]:
     """The entries with '{}', those with more words of their own first: '{} left' fits much."""
     entries = [(english, other) for english, other in texts(locale).items() if "{}" in english]
     entries.sort(key=lambda entry: -len(entry[0]))
-    return [(re.compile("(.+?)".join(map(re.escape, english.split("{}"))), re.DOTALL), other)
-            for english, other in entries]
+    return [
+        (re.compile("(.+?)".join(map(re.escape, english.split("{}"))), re.DOTALL), other) for english, other in entries
+    ]

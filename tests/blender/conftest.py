@@ -36,8 +36,9 @@ def scene():
 def package(root):
     """The checkout as the registered package `scan_relight`."""
     pytest.importorskip("bpy")
-    spec = importlib.util.spec_from_file_location("scan_relight", root / "__init__.py",
-                                                  submodule_search_locations=[str(root)])
+    spec = importlib.util.spec_from_file_location(
+        "scan_relight", root / "__init__.py", submodule_search_locations=[str(root)]
+    )
     package = importlib.util.module_from_spec(spec)
     sys.modules["scan_relight"] = package
     spec.loader.exec_module(package)

@@ -24,12 +24,37 @@ from addon.core import atomic
 from addon.core.capture.exr import read_exr, write_exr
 from addon.core.capture.ply import read_ply
 
-QUICK = ("--shading-rays", "8", "--specular-rays", "2", "--emitter-rays", "2", "--refine", "0", "--texel-size", "0.2",
-         "--atlas-size", "256")
+QUICK = (
+    "--shading-rays",
+    "8",
+    "--specular-rays",
+    "2",
+    "--emitter-rays",
+    "2",
+    "--refine",
+    "0",
+    "--texel-size",
+    "0.2",
+    "--atlas-size",
+    "256",
+)
 FRAMES = 10
-RESULTS = {"albedo.exr", "albedo_error.exr", "base_color.exr", "capture.json", "coverage.exr", "environment.exr",
-           "evidence.exr", "lit_diffuse.exr", "materials.json", "report.html", "report.json", "room.npz", "scene.blend",
-           "shading.exr"}
+RESULTS = {
+    "albedo.exr",
+    "albedo_error.exr",
+    "base_color.exr",
+    "capture.json",
+    "coverage.exr",
+    "environment.exr",
+    "evidence.exr",
+    "lit_diffuse.exr",
+    "materials.json",
+    "report.html",
+    "report.json",
+    "room.npz",
+    "scene.blend",
+    "shading.exr",
+}
 STAGES = ("surface", "lit_diffuse", "shading", "specular")
 
 
@@ -128,10 +153,13 @@ def mesh(capture, change):
     record["n"], record["v"] = 3, triangles
     if ids is not None:
         record["o"] = ids
-    header = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\nproperty float x\n"
-              f"property float y\nproperty float z\nelement face {len(triangles)}\n"
-              "property list uchar int vertex_indices\n" + ("property int object_id\n" if ids is not None else "")
-              + "end_header\n")
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\nproperty float x\n"
+        f"property float y\nproperty float z\nelement face {len(triangles)}\n"
+        "property list uchar int vertex_indices\n"
+        + ("property int object_id\n" if ids is not None else "")
+        + "end_header\n"
+    )
     (capture / "mesh.ply").write_bytes(header.encode() + vertices.astype("<f4").tobytes() + record.tobytes())
 
 
@@ -142,8 +170,10 @@ def far_object(capture):
     semantic["objects"].append({"id": 99, "class_name": "attic"})
     path.write_text(json.dumps(semantic))
     corner = np.float32([[1, 1, 9], [2, 1, 9], [1, 2, 9]])
-    mesh(capture, lambda v, t, o: (np.concatenate([v, corner]), np.concatenate([t, [np.arange(3) + len(v)]]),
-                                   np.append(o, 99)))
+    mesh(
+        capture,
+        lambda v, t, o: (np.concatenate([v, corner]), np.concatenate([t, [np.arange(3) + len(v)]]), np.append(o, 99)),
+    )
 
 
 def unlabelled(v, t, o):
@@ -152,7 +182,7 @@ def unlabelled(v, t, o):
 
 
 def outside(v, t, o):
-    t[3, 1] = 10 ** 6
+    t[3, 1] = 10**6
     return v, t, o
 
 
@@ -188,7 +218,8 @@ FINISHED = {
     "a pose is 3 x 3": (lambda c: poses(c, lambda m: m[:3, :3]), "no 4 x 4"),
     "triangles without area": (
         lambda c: mesh(c, lambda v, t, o: (v, np.concatenate([t, [[0, 0, 1], [2, 2, 2]]]), np.append(o, [0, 0]))),
-        "2 triangles .*no area"),
+        "2 triangles .*no area",
+    ),
     "a corner is not finite": (lambda c: mesh(c, infinite_corner), "not finite"),
     "faces without object": (lambda c: mesh(c, unlabelled), "4 of .* belong to no object"),
     "no face has an object": (lambda c: mesh(c, lambda v, t, o: (v, t, None)), "Nothing tells the mesh.s objects"),
@@ -208,11 +239,15 @@ REFUSED = {
     "most frames are missing": (lambda c: [picture(c, k).unlink() for k in range(5)], "5 bad frames of 10"),
     "most frames are damaged": (lambda c: [garble(c, k) for k in range(5)], "frames can't be read"),
     "all frames have another size": (
-        lambda c: [write_exr(picture(c, k), np.ones((7, 9, 3))) for k in ALL], "9 x 7 pixels"),
+        lambda c: [write_exr(picture(c, k), np.ones((7, 9, 3))) for k in ALL],
+        "9 x 7 pixels",
+    ),
     "all frames are NaN": (lambda c: [paint(c, np.nan, k) for k in ALL], "all pixels are invalid"),
     "all poses are mirrored": (lambda c: poses(c, lambda m: m @ MIRROR, ALL), "mirrored"),
     "all poses are elsewhere": (
-        lambda c: poses(c, lambda m: m + 1000 * np.eye(4, k=3), ALL), "No camera of the capture looks at the mesh"),
+        lambda c: poses(c, lambda m: m + 1000 * np.eye(4, k=3), ALL),
+        "No camera of the capture looks at the mesh",
+    ),
     "no frames": (lambda c: keep(c, 0), "lists no frames"),
     "an empty mesh": (lambda c: mesh(c, lambda v, t, o: (v, t[:0], o[:0])), "has no triangles"),
     "an empty mesh file": (lambda c: (c / "mesh.ply").write_bytes(b""), "is empty"),
@@ -243,8 +278,16 @@ def test_pixels_that_say_nothing_do_no_harm(name, capture, recover, tmp_path):
     UNTOLD[name](capture)
     assert recover() == (0, "")
     assert whole(tmp_path / "out")
-    for image in ("albedo", "base_color", "shading", "lit_diffuse", "coverage", "environment", "evidence",
-                  "albedo_error"):
+    for image in (
+        "albedo",
+        "base_color",
+        "shading",
+        "lit_diffuse",
+        "coverage",
+        "environment",
+        "evidence",
+        "albedo_error",
+    ):
         assert np.isfinite(read_exr(tmp_path / "out" / f"{image}.exr").rgb).all(), image
     albedo = read_exr(tmp_path / "out" / "albedo.exr").rgb
     assert 0 <= albedo.min() and albedo.max() <= 1
@@ -261,11 +304,17 @@ def test_a_capture_is_refused(name, capture, recover, tmp_path):
         assert files(tmp_path / "out") <= {"capture.json", *(f"stages/{name}.npz" for name in STAGES)}
 
 
-@pytest.mark.parametrize("options, told", [
-    (("--bogus",), "Unrecognized arguments: --bogus"), (("--median", "middle"), "invalid choice"),
-    (("--shading-rays", "many"), "invalid int value"), (("--seed", "-3"), "of at least 0"),
-    (("--texel-size", "nan"), "texel_size"), (("--shading-rays", "0"), "at least 1"),
-])
+@pytest.mark.parametrize(
+    "options, told",
+    [
+        (("--bogus",), "Unrecognized arguments: --bogus"),
+        (("--median", "middle"), "invalid choice"),
+        (("--shading-rays", "many"), "invalid int value"),
+        (("--seed", "-3"), "of at least 0"),
+        (("--texel-size", "nan"), "texel_size"),
+        (("--shading-rays", "0"), "at least 1"),
+    ],
+)
 def test_a_bad_option_is_refused(options, told, recover, tmp_path):
     code, err = recover(*options)
     assert code == 2 and told in err
@@ -288,6 +337,7 @@ def test_a_file_in_the_way(below, recover, tmp_path):
 
 def test_a_folder_that_may_not_be_written(recover, tmp_path, monkeypatch):
     """A stand-in for permissions: tests may run as root, whom no permission stops."""
+
     def refuse(self, content):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(self))
 
@@ -307,10 +357,19 @@ def test_a_folder_in_use(recover, tmp_path):
 NO_SPACE = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-@pytest.mark.parametrize("full_at, done", [
-    ("surface.npz", 0), ("lit_diffuse.npz", 1), ("shading.npz", 2), ("specular.npz", 3), ("albedo.exr", 4),
-    ("coverage.exr", 4), ("materials.json", 4), ("report.json", 4),
-])
+@pytest.mark.parametrize(
+    "full_at, done",
+    [
+        ("surface.npz", 0),
+        ("lit_diffuse.npz", 1),
+        ("shading.npz", 2),
+        ("specular.npz", 3),
+        ("albedo.exr", 4),
+        ("coverage.exr", 4),
+        ("materials.json", 4),
+        ("report.json", 4),
+    ],
+)
 def test_a_disk_that_gets_full(full_at, done, recover, tmp_path, monkeypatch):
     """What was finished is kept, and the next run goes on from it."""
     out, replace = tmp_path / "out", os.replace
@@ -369,8 +428,11 @@ def test_half_a_scene_is_never_taken_for_a_whole_one(share, recover, tmp_path, m
 def test_a_disk_that_is_really_full(left, capture, recover, tmp_path, root):
     recover()
     sizes = {name: (tmp_path / "out" / name).stat().st_size for name in files(tmp_path / "out")}
-    room = sum(sizes.values()) // 3 if left == "a third" else sum(
-        -(-size // 4096) * 4096 for size in sizes.values()) - sizes["scene.blend"] // 4
+    room = (
+        sum(sizes.values()) // 3
+        if left == "a third"
+        else sum(-(-size // 4096) * 4096 for size in sizes.values()) - sizes["scene.blend"] // 4
+    )
     disk = tmp_path / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", f"size={room // 4096 * 4}k", "tmpfs", disk]
@@ -408,8 +470,21 @@ def test_a_stage_that_was_damaged_is_done_again(recover, tmp_path):
 @pytest.mark.slow
 def test_interrupted_in_the_middle_and_gone_on(capture, tmp_path, root):
     out = tmp_path / "out"
-    slow = command("recover", capture, "--out", out, "--shading-rays", "2048", "--no-interpolate", "--specular-rays",
-                   "2", "--refine", "0", "--texel-size", "0.1")
+    slow = command(
+        "recover",
+        capture,
+        "--out",
+        out,
+        "--shading-rays",
+        "2048",
+        "--no-interpolate",
+        "--specular-rays",
+        "2",
+        "--refine",
+        "0",
+        "--texel-size",
+        "0.1",
+    )
     process = subprocess.Popen(slow, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     for line in process.stdout:
         if line.startswith("shading"):
@@ -417,8 +492,9 @@ def test_interrupted_in_the_middle_and_gone_on(capture, tmp_path, root):
             break
     _, err = process.communicate(timeout=120)
     assert process.returncode == 130
-    assert err == ("scan-relight: Stopped on request; the finished stages are kept and the next run goes on from "
-                   "them.\n")
+    assert err == (
+        "scan-relight: Stopped on request; the finished stages are kept and the next run goes on from them.\n"
+    )
     assert files(out) == {"capture.json", "stages/surface.npz", "stages/lit_diffuse.npz"}
     quick = [word if word != "2048" else "8" for word in slow]
     done = subprocess.run(quick, cwd=root, capture_output=True, text=True)
@@ -431,8 +507,9 @@ def test_interrupted_in_the_middle_and_gone_on(capture, tmp_path, root):
 def test_the_console_is_the_programs_own(capture, tmp_path, root):
     """Neither Blender's chatter nor OpenEXR's remarks on damaged pixels; a warning is told at the end."""
     garble(capture)
-    done = subprocess.run(command("recover", capture, "--out", tmp_path / "out", *QUICK), cwd=root, capture_output=True,
-                          text=True)
+    done = subprocess.run(
+        command("recover", capture, "--out", tmp_path / "out", *QUICK), cwd=root, capture_output=True, text=True
+    )
     assert done.returncode == 0 and done.stderr == ""
     lines = done.stdout.splitlines()
     told = [line for line in lines if "   whole " not in line]

@@ -99,11 +99,15 @@ def test_a_full_disk_leaves_no_capture(tmp_path, monkeypatch):
 def test_half_a_picture_is_never_taken_for_a_whole_one(content, tmp_path):
     from addon.bridge.pictures import saving
 
-    with pytest.raises(StorageError, match="relit.png' can't be written .No space left"), \
-            saving(tmp_path / "relit.png") as temporary:
+    with (
+        pytest.raises(StorageError, match="relit.png' can't be written .No space left"),
+        saving(tmp_path / "relit.png") as temporary,
+    ):
         temporary.write_bytes(content)
-    with pytest.raises(StorageError, match="relit.png' can't be written .it fell over"), \
-            saving(tmp_path / "relit.png") as temporary:
+    with (
+        pytest.raises(StorageError, match="relit.png' can't be written .it fell over"),
+        saving(tmp_path / "relit.png") as temporary,
+    ):
         raise RuntimeError("Error: it fell over.\n")
     assert not list(tmp_path.iterdir())
 

@@ -14,8 +14,12 @@ import pytest
 
 pytest.importorskip("bpy")
 
-PLATFORMS = {("Linux", "x86_64"): "linux-x64", ("Windows", "AMD64"): "windows-x64",
-             ("Darwin", "arm64"): "macos-arm64", ("Darwin", "x86_64"): "macos-x64"}
+PLATFORMS = {
+    ("Linux", "x86_64"): "linux-x64",
+    ("Windows", "AMD64"): "windows-x64",
+    ("Darwin", "arm64"): "macos-arm64",
+    ("Darwin", "x86_64"): "macos-x64",
+}
 INSTALLED = """
 import importlib, sys
 from pathlib import Path
@@ -65,8 +69,19 @@ def archive(root, tmp_path_factory) -> Path:
     if key not in PLATFORMS:
         pytest.skip(f"no wheels for {' '.join(key)}")
     out = tmp_path_factory.mktemp("dist")
-    subprocess.run([sys.executable, root / "scripts" / "build_extension.py", "--platform", PLATFORMS[key],
-                    "--python", f"{sys.version_info[0]}.{sys.version_info[1]}", "--out", out], check=True)
+    subprocess.run(
+        [
+            sys.executable,
+            root / "scripts" / "build_extension.py",
+            "--platform",
+            PLATFORMS[key],
+            "--python",
+            f"{sys.version_info[0]}.{sys.version_info[1]}",
+            "--out",
+            out,
+        ],
+        check=True,
+    )
     return next(out.glob("*.zip"))
 
 
@@ -77,14 +92,23 @@ def test_content(archive, root):
     code = [name for name in names if not name.endswith(".whl")]
     assert {"__init__.py", "LICENSE", "addon/cli.py", "operators/recover.py"} <= set(code)
     assert {name.split("/")[0] for name in code} == {
-        "__init__.py", "LICENSE", "README.md", "CHANGELOG.md", "blender_manifest.toml", "addon", "operators", "docs"}
+        "__init__.py",
+        "LICENSE",
+        "README.md",
+        "CHANGELOG.md",
+        "blender_manifest.toml",
+        "addon",
+        "operators",
+        "docs",
+    }
     wheels = {name for name in names if name.endswith(".whl")}
     assert wheels == {wheel.removeprefix("./") for wheel in manifest["build"]["generated"]["wheels"]}
     assert not any("numpy" in name for name in wheels)
     assert not any("__pycache__" in name for name in names)
     assert {"docs/panel.html", "docs/guide.html", "docs/images/guide/recovered.jpg"} <= set(names)
-    tracked = {path.relative_to(root).as_posix() for part in ("addon", "operators")
-               for path in (root / part).rglob("*.py")}
+    tracked = {
+        path.relative_to(root).as_posix() for part in ("addon", "operators") for path in (root / part).rglob("*.py")
+    }
     assert tracked <= set(code)
 
 
@@ -99,6 +123,11 @@ def test_blender_takes_it_as_valid(archive):
 def test_installs_enables_and_runs(archive, grey_capture, tmp_path):
     environment = {key: value for key, value in os.environ.items() if not key.startswith(("BLENDER_", "PYTHONPATH"))}
     environment["BLENDER_USER_RESOURCES"] = str(tmp_path)
-    done = subprocess.run([sys.executable, "-c", INSTALLED, archive, grey_capture], env=environment, cwd=tmp_path,
-                          capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", INSTALLED, archive, grey_capture],
+        env=environment,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0 and "INSTALLED AND RUN" in done.stdout, done.stdout + done.stderr

@@ -38,13 +38,15 @@ def as_colmap(capture, root, names):
     on_disk.write_colmap(capture.frames, root / "sparse/0", "{:05d}.exr")
     on_disk.write_ply(root / "mesh.ply", capture.mesh)
     (root / "info_semantic.json").write_text(
-        json.dumps({"objects": [{"id": i, "class_name": name} for i, name in names.items()]}))
+        json.dumps({"objects": [{"id": i, "class_name": name} for i, name in names.items()]})
+    )
 
 
 def in_traj(capture, root, names):
     on_disk.as_traj(capture, root)
     (root / "info_semantic.json").write_text(
-        json.dumps({"objects": [{"id": i, "class_name": name} for i, name in names.items()]}))
+        json.dumps({"objects": [{"id": i, "class_name": name} for i, name in names.items()]})
+    )
 
 
 WRITERS = {"colmap": as_colmap, "fipt": lambda c, r, n: on_disk.as_fipt(c, r, names=n),

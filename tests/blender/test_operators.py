@@ -38,8 +38,11 @@ def test_every_setting_is_a_property(ops, name):
 
     properties = getattr(ops, name).get_rna_type().properties
     for info in setting_infos():
-        assert properties[info.name].default == pytest.approx(info.default) if info.kind is float else \
-            properties[info.name].default == info.default
+        assert (
+            properties[info.name].default == pytest.approx(info.default)
+            if info.kind is float
+            else properties[info.name].default == info.default
+        )
 
 
 def test_import_brings_objects_cameras_and_frames(ops, grey_capture):
@@ -118,6 +121,7 @@ def test_the_capture_as_result_is_told(ops, grey_capture):
 
 def fails_with(package, monkeypatch, error):
     """Let the whole of the work fail."""
+
     def fail(*arguments, **keywords):
         raise error
 
@@ -141,14 +145,25 @@ def test_used_up_memory_is_told(ops, package, grey_capture, tmp_path, monkeypatc
 
 @pytest.mark.parametrize("name", NAMES)
 def test_missing_packages_are_told(ops, name, package, monkeypatch):
-    monkeypatch.setattr(importlib.import_module("scan_relight.operators.settings_props"), "missing_packages",
-                        lambda: ("scipy", "OpenEXR"))
+    monkeypatch.setattr(
+        importlib.import_module("scan_relight.operators.settings_props"),
+        "missing_packages",
+        lambda: ("scipy", "OpenEXR"),
+    )
     with pytest.raises(RuntimeError, match="scipy and OpenEXR missing: install the extension again"):
         getattr(ops, name)()
 
 
-@pytest.mark.parametrize("name, until", [
-    ("accumulate", "lit_diffuse"), ("shade", "shading"), ("fit", "specular"), ("write", "write"), ("recover", "write")])
+@pytest.mark.parametrize(
+    "name, until",
+    [
+        ("accumulate", "lit_diffuse"),
+        ("shade", "shading"),
+        ("fit", "specular"),
+        ("write", "write"),
+        ("recover", "write"),
+    ],
+)
 @pytest.mark.parametrize("paper", [False, True])
 def test_what_is_chosen_arrives(ops, name, until, paper, package, tmp_path, monkeypatch):
     """Folders, settings and the last stage, in the words of the one function that does the work."""

@@ -98,7 +98,7 @@ def test_later_runs_heed_what_is_kept(tiny_capture, tmp_path, capsys):
     assert main(["recover", str(tiny_capture), "--out", str(result), "--override", str(tmp_path / "none")]) == 2
 
 
-COARSE = [*FAST[:FAST.index("--texel-size")], "--atlas-size", "128"]
+COARSE = [*FAST[: FAST.index("--texel-size")], "--atlas-size", "128"]
 """The room's atlas is too small for what the frames show: parts of it are finer."""
 
 
@@ -109,8 +109,11 @@ def test_parts_of_an_atlas_are_renewed_without_the_capture(tiny_capture, tmp_pat
     shutil.rmtree(capture)
 
     def parts():
-        return {path.relative_to(result).as_posix(): path.read_bytes() for path in sorted(result.rglob("*base_color.*"))
-                if path.name != "base_color.exr"}
+        return {
+            path.relative_to(result).as_posix(): path.read_bytes()
+            for path in sorted(result.rglob("*base_color.*"))
+            if path.name != "base_color.exr"
+        }
 
     before = parts()
     assert len(before) > 1
@@ -123,8 +126,11 @@ def test_parts_of_an_atlas_are_renewed_without_the_capture(tiny_capture, tmp_pat
     assert after.keys() == before.keys()
     assert changed == {told[0]} if kind == "object" else changed
     bpy.ops.wm.open_mainfile(filepath=str(result / "scene.blend"))
-    assert any("ScanRelightParts" in (layer.name for layer in thing.data.uv_layers)
-               for thing in bpy.data.objects if thing.type == "MESH")
+    assert any(
+        "ScanRelightParts" in (layer.name for layer in thing.data.uv_layers)
+        for thing in bpy.data.objects
+        if thing.type == "MESH"
+    )
     (result / "stages/detail.npz").unlink()
     written = {path: path.read_bytes() for path in result.rglob("[!.]*.*") if path.is_file()}
     capsys.readouterr()

@@ -100,7 +100,5 @@ class Box:
             A, B = self.lobe(element, direction, phi)
             seen = seen + np.asarray(psi) * A + B
         seen = seen * np.exp(np.random.default_rng(seed).normal(0, noise, (m, 3)))
-        light = reflected_light(
-            self.field, self.bright, element, direction, rays=rays, threads=2, seed=seed
-        )
+        light = reflected_light(self.field, self.bright, element, direction, rays=rays, threads=2, seed=seed)
         return Problem(element, seen, np.array(diffuse, float), light, direction[:, 2])

@@ -63,8 +63,9 @@ class OnDisk:
         assert len(mesh.triangles) == len(self.room.mesh.triangles)
         return self.room.uv
 
-    def run(self, result: Path, settings: Settings = CHEAP, progress: Progress | None = None, capture=None,
-            overrides=NONE):
+    def run(
+        self, result: Path, settings: Settings = CHEAP, progress: Progress | None = None, capture=None, overrides=NONE
+    ):
         """A finished run: its albedo, materials, report and the stages' arrays."""
         with Store(result) as store:
             capture = capture or read_capture(self.root)

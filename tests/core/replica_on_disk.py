@@ -22,8 +22,17 @@ def interleave(cell) -> int:
 class ReplicaOnDisk:
     """`room` cut into quads of about `edge` metres and written to `root`; `light` is its radiance by element."""
 
-    def __init__(self, root: Path, room: Room, light: np.ndarray, edge: float = 0.5, size: int = 4,
-                 split_size: float = 1.6, order_file: bool = False, seed: int = 0):
+    def __init__(
+        self,
+        root: Path,
+        room: Room,
+        light: np.ndarray,
+        edge: float = 0.5,
+        size: int = 4,
+        split_size: float = 1.6,
+        order_file: bool = False,
+        seed: int = 0,
+    ):
         self.root, self.size, self.split_size = root, size, split_size
         rng = np.random.default_rng(seed)
         pieces = []
@@ -43,8 +52,10 @@ class ReplicaOnDisk:
         write_quads(root / "mesh.ply", corners, faces)
         mixed = rng.permutation(len(faces))
         write_quads(root / "habitat/mesh_semantic.ply", corners, faces[mixed], ids[mixed])
-        names = {"classes": [{"id": 9, "name": "thing"}],
-                 "objects": [{"id": int(i), "class_id": 9} for i in np.unique(ids)]}
+        names = {
+            "classes": [{"id": 9, "name": "thing"}],
+            "objects": [{"id": int(i), "class_id": 9} for i in np.unique(ids)],
+        }
         (root / "habitat/info_semantic.json").write_text(json.dumps(names))
         (root / "textures/parameters.json").write_text(json.dumps({"splitSize": split_size, "tileSize": size}))
         chunks = self.chunks(corners, faces)
@@ -78,8 +89,9 @@ class ReplicaOnDisk:
             own = np.flatnonzero(room.atlas.object_id == q.object_id)
             nearest = cKDTree(room.atlas.position[own]).query(points.reshape(-1, 3))[1]
             row, column = divmod(k, across)
-            result[row * self.size :][: self.size, column * self.size :][:, : self.size] = \
-                light[own[nearest]].reshape(self.size, self.size, 3)
+            result[row * self.size :][: self.size, column * self.size :][:, : self.size] = light[own[nearest]].reshape(
+                self.size, self.size, 3
+            )
         return result
 
     def unwrap(self, mesh, size):

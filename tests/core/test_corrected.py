@@ -25,8 +25,10 @@ def folder(tmp_path_factory):
 @pytest.fixture
 def recovered(disk, folder):
     """A run with overrides; stages that they don't change are those of the first one."""
+
     def run(told=None):
         return disk.run(folder, CHEAP, overrides=parse(told or {}, "given", range(7)))
+
     return run
 
 
@@ -122,15 +124,19 @@ def test_a_coat_is_for_what_nothing_is_known_of():
     rho = room.by_object(bright, 0.5)
     albedo = Albedo(rho, np.full(len(rho), MEASURED, np.int8), np.zeros(len(rho), np.float32))
     looked = {"scores": {"lambertian": 1.0, "specular": 1.001}}
-    found = coated([
-        ObjectMaterial(0, "wood", SPECULAR, phi=0.09, psi=0.05),
-        ObjectMaterial(1, "wood", LAMBERTIAN),
-        ObjectMaterial(2, "wall", LAMBERTIAN, **looked),
-        ObjectMaterial(3, "wood", LAMBERTIAN),
-        ObjectMaterial(4, "cloth", LAMBERTIAN, given={"model": "lambertian"}),
-        ObjectMaterial(5, "door", LAMBERTIAN),
-        ObjectMaterial(6, "wall", LAMBERTIAN),
-    ], albedo, room.atlas)
+    found = coated(
+        [
+            ObjectMaterial(0, "wood", SPECULAR, phi=0.09, psi=0.05),
+            ObjectMaterial(1, "wood", LAMBERTIAN),
+            ObjectMaterial(2, "wall", LAMBERTIAN, **looked),
+            ObjectMaterial(3, "wood", LAMBERTIAN),
+            ObjectMaterial(4, "cloth", LAMBERTIAN, given={"model": "lambertian"}),
+            ObjectMaterial(5, "door", LAMBERTIAN),
+            ObjectMaterial(6, "wall", LAMBERTIAN),
+        ],
+        albedo,
+        room.atlas,
+    )
     assert found[1].coat == {"f0": 0.04, "roughness": pytest.approx(0.3)} and found[1].model == LAMBERTIAN
     assert found[5].coat["roughness"] == pytest.approx(0.3)  # no door has one: the room's
     assert not any(found[i].coat for i in (0, 2, 3, 4, 6))  # glossy; looked at; too dark; given; as wall 2

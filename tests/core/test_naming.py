@@ -7,8 +7,10 @@ from addon.core.material import LAMBERTIAN, ObjectMaterial
 from addon.core.naming import in_order, numbered
 
 
-@pytest.mark.parametrize(("kind", "number", "name"), [
-    ("sofa", 12, "sofa 12"), ("", 3, "Object 3"), (" \n", 3, "Object 3"), ("coffee\ttable ", 0, "coffee table 0")])
+@pytest.mark.parametrize(
+    ("kind", "number", "name"),
+    [("sofa", 12, "sofa 12"), ("", 3, "Object 3"), (" \n", 3, "Object 3"), ("coffee\ttable ", 0, "coffee table 0")],
+)
 def test_an_object_and_its_material_have_one_name(kind, number, name):
     assert Instance(number, kind).name == ObjectMaterial(number, kind, LAMBERTIAN).name == name
 

@@ -40,38 +40,41 @@ def test_nothing_is_nothing():
     assert read({"objects": {"1": {}}}).lobes_key() == NONE.lobes_key() == ()
 
 
-@pytest.mark.parametrize(("told", "says"), [
-    ([], ("objects, white",)),
-    ({"object": {}}, ("'object'", "objects, white")),
-    ({"objects": [1]}, ("'objects'", "object_id")),
-    ({"objects": {"7": {}}}, ("no object 7", "0 to 4")),
-    ({"objects": {"sofa": {}}}, ("'sofa'", "whole number")),
-    ({"objects": {"1": 3}}, ("object 1", "model, roughness")),
-    ({"objects": {"1": {"rougness": 0.1}}}, ("object 1", "'rougness'", "roughness")),
-    ({"objects": {"1": {"model": "glass"}}}, ("object 1", "'glass'", "metal")),
-    ({"objects": {"1": {"model": ["metal"]}}}, ("object 1", "'model'", "metal")),
-    ({"objects": {"1": {"roughness": 1.01}}}, ("object 1", "'roughness'", "0 to 1")),
-    ({"objects": {"1": {"roughness": -0.1}}}, ("object 1", "'roughness'", "0 to 1")),
-    ({"objects": {"1": {"roughness": float("nan")}}}, ("object 1", "nan", "0 to 1")),
-    ({"objects": {"1": {"roughness": True}}}, ("object 1", "True")),
-    ({"objects": {"1": {"roughness": "0.5"}}}, ("object 1", "'0.5'")),
-    ({"objects": {"1": {"f0": [1, 1]}}}, ("object 1", "'f0'", "three numbers")),
-    ({"objects": {"1": {"f0": [1, 1, float("inf")]}}}, ("object 1", "'f0'", "inf")),
-    ({"objects": {"1": {"base_color": 0.5}}}, ("object 1", "'base_color'", "three numbers")),
-    ({"objects": {"1": {"same_as": 9}}}, ("object 1", "'same_as'", "no object 9")),
-    ({"objects": {"1": {"same_as": 1.0}}}, ("object 1", "'same_as'", "whole number")),
-    ({"objects": {"1": {"same_as": 1}}}, ("circle", "1 -> 1")),
-    ({"objects": {"1": {"same_as": 2}, "2": {"same_as": 3}, "3": {"same_as": 1}}}, ("circle", "1 -> 2 -> 3 -> 1")),
-    ({"objects": {"1": {"same_as": 2, "roughness": 0.1}}}, ("object 1", "'same_as'", "roughness")),
-    ({"objects": {"1": {"model": "lambertian", "roughness": 0.1}}}, ("object 1", "'lambertian'", "'roughness'")),
-    ({"objects": {"1": {"model": "emitter", "base_color": [1, 1, 1]}}}, ("object 1", "'emitter'", "'base_color'")),
-    ({"white": {"object": 1}}, ("'white'", "'albedo'")),
-    ({"white": {"albedo": 0.8}}, ("'white'", "'object'")),
-    ({"white": {"object": 8, "albedo": 0.8}}, ("'white'", "no object 8")),
-    ({"white": {"object": 1, "albedo": 1.2}}, ("'white'", "0 to 1")),
-    ({"white": {"object": 1, "albedo": [0.8, 0, 0.8]}}, ("'white'", "more than 0")),
-    ({"white": 0.8}, ("'white'", "object, albedo")),
-])
+@pytest.mark.parametrize(
+    ("told", "says"),
+    [
+        ([], ("objects, white",)),
+        ({"object": {}}, ("'object'", "objects, white")),
+        ({"objects": [1]}, ("'objects'", "object_id")),
+        ({"objects": {"7": {}}}, ("no object 7", "0 to 4")),
+        ({"objects": {"sofa": {}}}, ("'sofa'", "whole number")),
+        ({"objects": {"1": 3}}, ("object 1", "model, roughness")),
+        ({"objects": {"1": {"rougness": 0.1}}}, ("object 1", "'rougness'", "roughness")),
+        ({"objects": {"1": {"model": "glass"}}}, ("object 1", "'glass'", "metal")),
+        ({"objects": {"1": {"model": ["metal"]}}}, ("object 1", "'model'", "metal")),
+        ({"objects": {"1": {"roughness": 1.01}}}, ("object 1", "'roughness'", "0 to 1")),
+        ({"objects": {"1": {"roughness": -0.1}}}, ("object 1", "'roughness'", "0 to 1")),
+        ({"objects": {"1": {"roughness": float("nan")}}}, ("object 1", "nan", "0 to 1")),
+        ({"objects": {"1": {"roughness": True}}}, ("object 1", "True")),
+        ({"objects": {"1": {"roughness": "0.5"}}}, ("object 1", "'0.5'")),
+        ({"objects": {"1": {"f0": [1, 1]}}}, ("object 1", "'f0'", "three numbers")),
+        ({"objects": {"1": {"f0": [1, 1, float("inf")]}}}, ("object 1", "'f0'", "inf")),
+        ({"objects": {"1": {"base_color": 0.5}}}, ("object 1", "'base_color'", "three numbers")),
+        ({"objects": {"1": {"same_as": 9}}}, ("object 1", "'same_as'", "no object 9")),
+        ({"objects": {"1": {"same_as": 1.0}}}, ("object 1", "'same_as'", "whole number")),
+        ({"objects": {"1": {"same_as": 1}}}, ("circle", "1 -> 1")),
+        ({"objects": {"1": {"same_as": 2}, "2": {"same_as": 3}, "3": {"same_as": 1}}}, ("circle", "1 -> 2 -> 3 -> 1")),
+        ({"objects": {"1": {"same_as": 2, "roughness": 0.1}}}, ("object 1", "'same_as'", "roughness")),
+        ({"objects": {"1": {"model": "lambertian", "roughness": 0.1}}}, ("object 1", "'lambertian'", "'roughness'")),
+        ({"objects": {"1": {"model": "emitter", "base_color": [1, 1, 1]}}}, ("object 1", "'emitter'", "'base_color'")),
+        ({"white": {"object": 1}}, ("'white'", "'albedo'")),
+        ({"white": {"albedo": 0.8}}, ("'white'", "'object'")),
+        ({"white": {"object": 8, "albedo": 0.8}}, ("'white'", "no object 8")),
+        ({"white": {"object": 1, "albedo": 1.2}}, ("'white'", "0 to 1")),
+        ({"white": {"object": 1, "albedo": [0.8, 0, 0.8]}}, ("'white'", "more than 0")),
+        ({"white": 0.8}, ("'white'", "object, albedo")),
+    ],
+)
 def test_faults_are_one_sentence_that_names_them(told, says):
     with pytest.raises(BadInputError) as error:
         read(told)
@@ -94,20 +97,27 @@ def both(older, newer):
 
 
 def test_later_wins_key_by_key():
-    assert both({"1": {"model": "metal", "roughness": 0.2}, "2": {"roughness": 0.9}},
-                {"1": {"roughness": 0.4}, "3": {"model": "emitter"}}) == {
-        "1": {"model": "metal", "roughness": 0.4}, "2": {"roughness": 0.9}, "3": {"model": "emitter"}}
+    assert both(
+        {"1": {"model": "metal", "roughness": 0.2}, "2": {"roughness": 0.9}},
+        {"1": {"roughness": 0.4}, "3": {"model": "emitter"}},
+    ) == {"1": {"model": "metal", "roughness": 0.4}, "2": {"roughness": 0.9}, "3": {"model": "emitter"}}
 
 
-@pytest.mark.parametrize(("older", "newer", "left"), [
-    ({"model": "metal", "roughness": 0.2, "base_color": [1, 0, 0]}, {"same_as": 2},
-     {"base_color": [1, 0, 0], "same_as": 2}),
-    ({"same_as": 2}, {"roughness": 0.1}, {"roughness": 0.1}),
-    ({"model": "metal", "f0": 0.9}, {"model": "lambertian"}, {"model": "lambertian"}),
-    ({"model": "lambertian"}, {"roughness": 0.1}, {"roughness": 0.1}),
-    ({"base_color": [1, 0, 0]}, {"model": "emitter"}, {"model": "emitter"}),
-    ({"model": "emitter"}, {"base_color": [1, 0, 0]}, {"base_color": [1, 0, 0]}),
-])
+@pytest.mark.parametrize(
+    ("older", "newer", "left"),
+    [
+        (
+            {"model": "metal", "roughness": 0.2, "base_color": [1, 0, 0]},
+            {"same_as": 2},
+            {"base_color": [1, 0, 0], "same_as": 2},
+        ),
+        ({"same_as": 2}, {"roughness": 0.1}, {"roughness": 0.1}),
+        ({"model": "metal", "f0": 0.9}, {"model": "lambertian"}, {"model": "lambertian"}),
+        ({"model": "lambertian"}, {"roughness": 0.1}, {"roughness": 0.1}),
+        ({"base_color": [1, 0, 0]}, {"model": "emitter"}, {"model": "emitter"}),
+        ({"model": "emitter"}, {"base_color": [1, 0, 0]}, {"base_color": [1, 0, 0]}),
+    ],
+)
 def test_what_goes_not_together_is_replaced(older, newer, left):
     merged = merge(read({"objects": {"1": older}}), read({"objects": {"1": newer}}))
     assert merged.as_dict()["objects"] == {"1": left}

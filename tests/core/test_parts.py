@@ -100,7 +100,8 @@ def test_each_way_takes_the_others_images_away(disk, tmp_path):
     run(disk, tmp_path, atlas="object")
     assert parts() == {"base_color.exr", *(f"objects/thing {i} {i} base_color.exr" for i in range(6))}
     assert run(disk, tmp_path, atlas="udim").parts.tiles == tuple(
-        int(name.split(".")[1]) for name in sorted(parts()) if name.count(".") == 2)
+        int(name.split(".")[1]) for name in sorted(parts()) if name.count(".") == 2
+    )
     assert not any(name.startswith("objects/") for name in parts())
     run(disk, tmp_path)
     assert parts() == {"base_color.exr"}
@@ -115,8 +116,10 @@ def test_the_look_at_the_frames_is_told_and_stopped_and_done_once(striped, tmp_p
 
     def follow(stop_at):
         shares.clear()
-        return Progress(lambda event: event.stage == "write" and shares.append(event.share),
-                        lambda: any(stop_at < share < 0.5 for share in shares))
+        return Progress(
+            lambda event: event.stage == "write" and shares.append(event.share),
+            lambda: any(stop_at < share < 0.5 for share in shares),
+        )
 
     def write(kind, stop_at=1.0):
         progress = follow(stop_at)

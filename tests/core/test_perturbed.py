@@ -63,7 +63,8 @@ def test_one_perturbation_alone(disk, tmp_path):
     everything, alone = perturbed(disk, tmp_path / "all"), perturbed(disk, tmp_path / "mesh", "--mesh", "5")
     assert (everything / "mesh.ply").read_bytes() == (alone / "mesh.ply").read_bytes()
     assert json.loads((alone / "transforms.json").read_text()) == json.loads(
-        (disk.root / "transforms.json").read_text())
+        (disk.root / "transforms.json").read_text()
+    )
     assert np.allclose(read_exr(alone / "images/000.exr").rgb, read_exr(disk.path(0)).rgb, rtol=1e-3)
     told = read_capture(perturbed(disk, tmp_path / "told", "--clip", "4", "--tell"))
     assert [frame.saturation for frame in told.frames] == [4.0] * disk.count and not told.warnings
@@ -113,8 +114,13 @@ def test_noise_is_taken_out_of_the_mesh_and_stored(disk, tmp_path):
     assert np.array_equal(same.vertices, mesh.vertices) and np.array_equal(again.atlas.normal, found.atlas.normal)
     # Switched off, or with nothing to take out, every vertex is the capture's own, far from the origin, too.
     assert np.array_equal(surface(noisy, "off", replace(CHEAP, denoise_mesh=False))[1].vertices, noisy.mesh.vertices)
-    frames = tuple(replace(f, camera=replace(f.camera, camera_to_world=f.camera.camera_to_world + np.pad(
-        far[:, None], ((0, 1), (3, 0))))) for f in capture.frames)
+    frames = tuple(
+        replace(
+            f,
+            camera=replace(f.camera, camera_to_world=f.camera.camera_to_world + np.pad(far[:, None], ((0, 1), (3, 0)))),
+        )
+        for f in capture.frames
+    )
     distant = replace(capture, mesh=replace(fine, vertices=fine.vertices + far), frames=frames)
     _, mesh, report = surface(distant, "far")
     assert np.array_equal(mesh.vertices, distant.mesh.vertices) and report["figures"]["mesh_noise_metres"] == 0

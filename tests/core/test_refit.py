@@ -81,14 +81,26 @@ def test_as_a_whole_run_with_the_same_corrections(disk, finished, result, tmp_pa
     ours, theirs, before = materials(result), materials(tmp_path / "whole"), materials(finished)
     assert ours[3]["model"] == SPECULAR and ours[3]["given"] == GIVEN["objects"]["3"]
     for i in (3, 5):
-        for name in ("model", "phi", "psi", "roughness_low", "roughness_high", "specular_low", "specular_high", "given",
-                     "note", "observations", "coat"):
+        for name in (
+            "model",
+            "phi",
+            "psi",
+            "roughness_low",
+            "roughness_high",
+            "specular_low",
+            "specular_high",
+            "given",
+            "note",
+            "observations",
+            "coat",
+        ):
             assert ours[i][name] == theirs[i][name], name
         for name in ("albedo", "albedo_low", "albedo_high"):
             assert np.allclose(ours[i]["evidence"][name], theirs[i]["evidence"][name], atol=0.02), (i, name)
     assert ours[5]["evidence"]["albedo"] == ours[5]["evidence"]["albedo_low"] == [0.2, 0.4, 0.1]
     assert {i: one for i, one in ours.items() if i not in (3, 5)} == {
-        i: one for i, one in before.items() if i not in (3, 5)}
+        i: one for i, one in before.items() if i not in (3, 5)
+    }
     images, wholes = pictures(result), pictures(tmp_path / "whole")
     atlas = run.surface().atlas
     for i in (3, 5):
@@ -108,8 +120,10 @@ def test_all_else_is_held(finished, result):
     for name in before:
         assert np.array_equal(before[name][other], after[name][other]), name
     assert (before["albedo"][~other] != after["albedo"][~other]).any()
-    assert json.loads((result / "materials.json").read_text())["run"] != (
-        json.loads((finished / "materials.json").read_text())["run"])
+    assert (
+        json.loads((result / "materials.json").read_text())["run"]
+        != (json.loads((finished / "materials.json").read_text())["run"])
+    )
 
 
 def test_a_later_run_keeps_it(disk, result):

@@ -48,8 +48,10 @@ def test_a_project_that_is_moved_as_a_whole_keeps_its_result(tmp_path):
 def test_results_of_earlier_versions_tell_by_their_room(tmp_path):
     capture = a_capture()
     (tmp_path / "capture").mkdir()
-    write_room(tmp_path / "capture", Capture(Path("/scans/capture"), *(
-        getattr(capture, name) for name in ("mesh", "instances", "frames"))))
+    write_room(
+        tmp_path / "capture",
+        Capture(Path("/scans/capture"), *(getattr(capture, name) for name in ("mesh", "instances", "frames"))),
+    )
     assert own_folder(tmp_path, Path("/scans/capture")) == tmp_path / "capture"
     assert own_folder(tmp_path, Path("/others/capture")) == tmp_path / "capture 2"
 
@@ -68,7 +70,8 @@ def test_documents(tmp_path, monkeypatch):
     assert documents() == tmp_path / "Documents"
     (tmp_path / "settings").mkdir()
     (tmp_path / "settings" / "user-dirs.dirs").write_text(
-        '# XDG_DOCUMENTS_DIR="$HOME/no"\nXDG_MUSIC_DIR="$HOME/Musik"\nXDG_DOCUMENTS_DIR="$HOME/Dokumente"\n')
+        '# XDG_DOCUMENTS_DIR="$HOME/no"\nXDG_MUSIC_DIR="$HOME/Musik"\nXDG_DOCUMENTS_DIR="$HOME/Dokumente"\n'
+    )
     assert documents() == tmp_path / "Documents"  # as that one does not exist
     (tmp_path / "Dokumente").mkdir()
     assert documents() == tmp_path / "Dokumente"

@@ -22,8 +22,10 @@ def a_capture(uv=None):
     pose[:3, 3] = 1, 2, 3
     mesh = Mesh(np.arange(12.0).reshape(4, 3), np.int32([[0, 1, 2], [1, 2, 3]]), np.int32([4, 7]), uv)
     fisheye = Cropped(polynomial("OPENCV_FISHEYE", fisheye=True, numerator=(0.1, -0.02)), 0.9, 0.8)
-    frames = tuple(Frame(f"frame {k}", Path(f"/capture/{k}.exr"), Camera(32, 24, 20.5, 21, 16, 12, pose, lens))
-                   for k, lens in enumerate((None, fisheye, fisheye)))
+    frames = tuple(
+        Frame(f"frame {k}", Path(f"/capture/{k}.exr"), Camera(32, 24, 20.5, 21, 16, 12, pose, lens))
+        for k, lens in enumerate((None, fisheye, fisheye))
+    )
     return Capture(Path("/capture"), mesh, (Instance(4, "sofa"), Instance(7, "")), frames, format="nerfstudio")
 
 

@@ -20,8 +20,13 @@ from addon.core.settings import PAPER, Settings
 from addon.core.store import Store, key
 
 ROOT = Path(__file__).resolve().parents[2]
-ARRAYS = {"albedo": np.random.default_rng(0).random((5, 3), np.float32), "file": np.arange(4), "none": np.zeros((0, 3)),
-          "flag": np.array(True), "names": np.array(["a", "bc"])}
+ARRAYS = {
+    "albedo": np.random.default_rng(0).random((5, 3), np.float32),
+    "file": np.arange(4),
+    "none": np.zeros((0, 3)),
+    "flag": np.array(True),
+    "names": np.array(["a", "bc"]),
+}
 
 
 @pytest.fixture
@@ -103,8 +108,9 @@ def test_keys():
 
 
 def test_results(store):
-    path = store.write_json("report/run.json", {"psnr": np.float32(20), "bad": float("nan"), "ids": np.arange(2),
-                                                "settings": Settings()})
+    path = store.write_json(
+        "report/run.json", {"psnr": np.float32(20), "bad": float("nan"), "ids": np.arange(2), "settings": Settings()}
+    )
     told = json.loads(path.read_text())
     assert (told["psnr"], told["bad"], told["ids"], told["settings"]["refine"]) == (20, None, [0, 1], 2)
     picture = store.write_exr("textures/albedo.exr", np.full((4, 5, 3), 0.25), half=True)
@@ -112,6 +118,7 @@ def test_results(store):
 
 
 # --- folders that can't be used
+
 
 @pytest.mark.parametrize("name", ["file", "file/below"])
 def test_a_file_in_the_way(tmp_path, name):
@@ -152,6 +159,7 @@ def test_a_disk_that_is_full_at_the_start(tmp_path, monkeypatch):
 
 # --- a disk that fills up
 
+
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="the system has no /dev/full")
 @pytest.mark.parametrize("write", [
     lambda store: store.save("a", "new", {"x": np.ones(100_000)}),
@@ -191,6 +199,7 @@ def test_an_interrupt_leaves_no_remains(store, monkeypatch):
 
 
 # --- two runs, dead runs
+
 
 def test_two_runs_at_once(tmp_path):
     with Store(tmp_path):

@@ -9,17 +9,20 @@ import pytest
 from addon.core.unfinished import goes_on_with
 
 
-@pytest.mark.parametrize(("times", "stage"), [
-    ({}, ""),
-    ({"surface": 1}, "lit_diffuse"),
-    ({"surface": 1, "lit_diffuse": 2, "shading": 3}, "specular"),
-    ({"surface": 1, "lit_diffuse": 2, "shading": 3, "specular": 4}, "write"),
-    ({"surface": 1, "lit_diffuse": 2, "shading": 3, "specular": 4, "report": 5}, ""),
-    # With other settings once more, and stopped: what is older than the stage before it is of the first run.
-    ({"surface": 6, "lit_diffuse": 2, "shading": 3, "specular": 4, "report": 5}, "lit_diffuse"),
-    ({"surface": 1, "lit_diffuse": 2, "shading": 7, "specular": 4, "report": 5}, "specular"),
-    ({"lit_diffuse": 2}, ""),
-])
+@pytest.mark.parametrize(
+    ("times", "stage"),
+    [
+        ({}, ""),
+        ({"surface": 1}, "lit_diffuse"),
+        ({"surface": 1, "lit_diffuse": 2, "shading": 3}, "specular"),
+        ({"surface": 1, "lit_diffuse": 2, "shading": 3, "specular": 4}, "write"),
+        ({"surface": 1, "lit_diffuse": 2, "shading": 3, "specular": 4, "report": 5}, ""),
+        # With other settings once more, and stopped: what is older than the stage before it is of the first run.
+        ({"surface": 6, "lit_diffuse": 2, "shading": 3, "specular": 4, "report": 5}, "lit_diffuse"),
+        ({"surface": 1, "lit_diffuse": 2, "shading": 7, "specular": 4, "report": 5}, "specular"),
+        ({"lit_diffuse": 2}, ""),
+    ],
+)
 def test_where_it_goes_on(tmp_path, times, stage):
     (tmp_path / "stages").mkdir()
     for name, time in times.items():

@@ -45,13 +45,35 @@ def archive(blender, tmp_path_factory) -> Path:
     """The zip: the one that SCAN_RELIGHT_ZIP names, or a fresh one with the wheels for this Blender's Python."""
     if given := os.environ.get("SCAN_RELIGHT_ZIP"):
         return Path(given).resolve()
-    told = subprocess.run([blender, "--background", "--factory-startup", "--python-expr",
-                           "import sys; print('PYTHON', *sys.version_info[:2])"],
-                          env=environment(tmp_path_factory.mktemp("bare")), capture_output=True, text=True, check=True)
+    told = subprocess.run(
+        [
+            blender,
+            "--background",
+            "--factory-startup",
+            "--python-expr",
+            "import sys; print('PYTHON', *sys.version_info[:2])",
+        ],
+        env=environment(tmp_path_factory.mktemp("bare")),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     version = next(line for line in told.stdout.splitlines() if line.startswith("PYTHON")).split()[1:]
     out = tmp_path_factory.mktemp("dist")
-    subprocess.run([sys.executable, ROOT / "scripts" / "build_extension.py", "--platform", "linux-x64", "--python",
-                    ".".join(version), "--out", out], check=True, capture_output=True)
+    subprocess.run(
+        [
+            sys.executable,
+            ROOT / "scripts" / "build_extension.py",
+            "--platform",
+            "linux-x64",
+            "--python",
+            ".".join(version),
+            "--out",
+            out,
+        ],
+        check=True,
+        capture_output=True,
+    )
     return next(out.glob("*.zip"))
 
 
@@ -59,8 +81,12 @@ def archive(blender, tmp_path_factory) -> Path:
 def user(blender, archive, tmp_path_factory) -> Path:
     """A user's folder into which Blender's own command line has installed the zip."""
     folder = tmp_path_factory.mktemp("user")
-    told = subprocess.run([blender, "--command", "extension", "install-file", "-r", "user_default", "--enable",
-                           str(archive)], env=environment(folder), capture_output=True, text=True)
+    told = subprocess.run(
+        [blender, "--command", "extension", "install-file", "-r", "user_default", "--enable", str(archive)],
+        env=environment(folder),
+        capture_output=True,
+        text=True,
+    )
     assert told.returncode == 0 and "Installed" in told.stdout, told.stdout + told.stderr
     return folder
 
@@ -76,6 +102,7 @@ def screen(blender):
 @pytest.fixture(scope="session")
 def open_window(blender, screen, user, tmp_path_factory):
     """Opens a window; at the end of whoever asks it has to be closed."""
+
     def opened(*arguments, user: Path = user, tab: bool = True) -> Window:
         return Window(blender, screen, user, tmp_path_factory.mktemp("window") / "talk", *arguments, tab=tab)
 
@@ -94,8 +121,24 @@ def window(open_window):
 def recovered(blender, user, tiny_capture, tmp_path_factory) -> Path:
     """The result of the installed extension's command line, without a window."""
     out = tmp_path_factory.mktemp("command") / "result"
-    told = subprocess.run([blender, "--background", "--command", "scan_relight", "recover", str(tiny_capture),
-                           "--out", str(out), "--preset", "draft", "--shading-rays", "256"], env=environment(user),
-                          capture_output=True, text=True)
+    told = subprocess.run(
+        [
+            blender,
+            "--background",
+            "--command",
+            "scan_relight",
+            "recover",
+            str(tiny_capture),
+            "--out",
+            str(out),
+            "--preset",
+            "draft",
+            "--shading-rays",
+            "256",
+        ],
+        env=environment(user),
+        capture_output=True,
+        text=True,
+    )
     assert told.returncode == 0, told.stdout + told.stderr
     return out

@@ -46,9 +46,21 @@ def drop(screen: str, window: int, files: Iterable[Path], x: int, y: int) -> Non
 class _Drag:
     def __init__(self, display: Display, window: int, files: Iterable[Path]):
         self._display, self._target = display, display.create_resource_object("window", window)
-        self._atom = {name: display.intern_atom(name) for name in (
-            "XdndAware", "XdndSelection", "XdndEnter", "XdndPosition", "XdndStatus", "XdndDrop", "XdndFinished",
-            "XdndActionCopy", "text/uri-list", "TARGETS")}
+        self._atom = {
+            name: display.intern_atom(name)
+            for name in (
+                "XdndAware",
+                "XdndSelection",
+                "XdndEnter",
+                "XdndPosition",
+                "XdndStatus",
+                "XdndDrop",
+                "XdndFinished",
+                "XdndActionCopy",
+                "text/uri-list",
+                "TARGETS",
+            )
+        }
         self._data = "".join(f"{Path(one).absolute().as_uri()}\r\n" for one in files).encode()
         root = display.screen().root
         self._source = root.create_window(0, 0, 1, 1, 0, X.CopyFromParent, event_mask=X.PropertyChangeMask)
@@ -67,8 +79,9 @@ class _Drag:
         self._until("XdndFinished")
 
     def _send(self, kind: str, *rest: int) -> None:
-        message = event.ClientMessage(window=self._target, client_type=self._atom[kind],
-                                      data=(32, [self._source.id, *rest]))
+        message = event.ClientMessage(
+            window=self._target, client_type=self._atom[kind], data=(32, [self._source.id, *rest])
+        )
         self._target.send_event(message)
         self._display.flush()
 
@@ -94,7 +107,13 @@ class _Drag:
             asked.requestor.change_property(place, asked.target, 8, self._data)
         else:
             place = X.NONE
-        asked.requestor.send_event(event.SelectionNotify(
-            time=asked.time, requestor=asked.requestor, selection=asked.selection, target=asked.target,
-            property=place))
+        asked.requestor.send_event(
+            event.SelectionNotify(
+                time=asked.time,
+                requestor=asked.requestor,
+                selection=asked.selection,
+                target=asked.target,
+                property=place,
+            )
+        )
         self._display.flush()

@@ -46,8 +46,25 @@ class Screen:
             return
         out, into = os.pipe()
         self._server = subprocess.Popen(
-            [server, "-displayfd", str(into), "-screen", "0", f"{SIZE[0]}x{SIZE[1]}x24", "+extension", "GLX",
-             "+render", "-dpi", "96", "-noreset", "-nolisten", "tcp"], pass_fds=[into], stderr=subprocess.DEVNULL)
+            [
+                server,
+                "-displayfd",
+                str(into),
+                "-screen",
+                "0",
+                f"{SIZE[0]}x{SIZE[1]}x24",
+                "+extension",
+                "GLX",
+                "+render",
+                "-dpi",
+                "96",
+                "-noreset",
+                "-nolisten",
+                "tcp",
+            ],
+            pass_fds=[into],
+            stderr=subprocess.DEVNULL,
+        )
         os.close(into)
         with os.fdopen(out) as told:
             self.name = ":" + told.readline().strip()
@@ -89,15 +106,34 @@ class Window:
         self.folder, self._blender, self._count, self.actions = folder, blender, 0, []
         self._screen = screen.name
         self._environment = dict(
-            environment(user), DISPLAY=screen.name, LIBGL_ALWAYS_SOFTWARE="1", XDG_RUNTIME_DIR=str(folder),
+            environment(user),
+            DISPLAY=screen.name,
+            LIBGL_ALWAYS_SOFTWARE="1",
+            XDG_RUNTIME_DIR=str(folder),
             # Mesa's software says that a card has no memory left; Blender would bake nothing on such a one.
-            MESA_EXTENSION_OVERRIDE="-GL_NVX_gpu_memory_info -GL_ATI_meminfo")
+            MESA_EXTENSION_OVERRIDE="-GL_NVX_gpu_memory_info -GL_ATI_meminfo",
+        )
         folder.chmod(0o700)
         self._log = open(folder / "blender.log", "wb")
         self.process = subprocess.Popen(
-            [blender, "--window-geometry", "0", "0", *map(str, SIZE), "-noaudio", *map(str, arguments),
-             "--python", str(INSIDE), "--", str(folder)],
-            env=self._environment, stdout=self._log, stderr=subprocess.STDOUT, cwd=folder)
+            [
+                blender,
+                "--window-geometry",
+                "0",
+                "0",
+                *map(str, SIZE),
+                "-noaudio",
+                *map(str, arguments),
+                "--python",
+                str(INSIDE),
+                "--",
+                str(folder),
+            ],
+            env=self._environment,
+            stdout=self._log,
+            stderr=subprocess.STDOUT,
+            cwd=folder,
+        )
         self.ask("open_tab()" if tab else "None")
         self._x = self._xdotool("search", "--onlyvisible", "--name", "Blender").split()[0]
         self._xdotool("windowfocus", self._x)
@@ -153,15 +189,43 @@ class Window:
     def click_at(self, x: int, y: int) -> None:
         """Move the mouse there and press its button."""
         self.actions.append(f"click at {x}, {y}")
-        self._xdotool("mousemove", str(x), str(y), "sleep", "0.1", "mousemove_relative", "1", "0", "sleep", "0.2",
-                      "mousedown", "1", "sleep", "0.1", "mouseup", "1", "sleep", "0.2")
+        self._xdotool(
+            "mousemove",
+            str(x),
+            str(y),
+            "sleep",
+            "0.1",
+            "mousemove_relative",
+            "1",
+            "0",
+            "sleep",
+            "0.2",
+            "mousedown",
+            "1",
+            "sleep",
+            "0.1",
+            "mouseup",
+            "1",
+            "sleep",
+            "0.2",
+        )
         self.ask("None")  # it is back from whatever that was
 
     def key(self, *names: str, region: str = "WINDOW") -> float:
         """Press keys with the mouse in the middle of the 3D view; returns when that was (seconds since 1970)."""
         left, top, width, height = self.ask(f"rectangle({region!r})")
-        self._xdotool("mousemove", str(left + width // 3), str(top + height // 2), "sleep", "0.1",
-                      "mousemove_relative", "1", "0", "sleep", "0.2")
+        self._xdotool(
+            "mousemove",
+            str(left + width // 3),
+            str(top + height // 2),
+            "sleep",
+            "0.1",
+            "mousemove_relative",
+            "1",
+            "0",
+            "sleep",
+            "0.2",
+        )
         pressed = time.time()
         self.actions += [f"key {name}" for name in names]
         self._xdotool("key", *names)
@@ -189,8 +253,9 @@ class Window:
         self._xdotool("mousemove", str(left + width // 4), str(top + height - 30))
         self.ask("bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=2)")
         time.sleep(0.3)
-        done = subprocess.run([tool("xwd", self._blender), "-root", "-silent"], env=self._environment, check=True,
-                              capture_output=True)
+        done = subprocess.run(
+            [tool("xwd", self._blender), "-root", "-silent"], env=self._environment, check=True, capture_output=True
+        )
         picture = read_xwd(done.stdout)
         if sidebar:
             left, top, width, height = self.ask("rectangle('UI')")
@@ -212,21 +277,26 @@ class Window:
         self._log.close()
 
     def _xdotool(self, *words: str) -> str:
-        return subprocess.run([tool("xdotool", self._blender), *words], env=self._environment, check=True,
-                              capture_output=True, text=True).stdout
+        return subprocess.run(
+            [tool("xdotool", self._blender), *words], env=self._environment, check=True, capture_output=True, text=True
+        ).stdout
 
 
 def environment(user: Path) -> dict[str, str]:
     """What Blender is started with: nothing of this process's own Blender or Python."""
     others = ("BLENDER_", "PYTHON", "VIRTUAL_ENV")
     kept = {key: value for key, value in os.environ.items() if not key.startswith(others)}
-    return dict(kept, BLENDER_USER_RESOURCES=str(user), HOME=str(user),
-                SHARED=":".join(filter(None, (os.environ.get("SHARED"), str(INSIDE.parents[2])))))
+    return dict(
+        kept,
+        BLENDER_USER_RESOURCES=str(user),
+        HOME=str(user),
+        SHARED=":".join(filter(None, (os.environ.get("SHARED"), str(INSIDE.parents[2])))),
+    )
 
 
 def read_xwd(data: bytes) -> Image.Image:
     """A picture in the format of X's window dumps, 32 bits a pixel (XWDFile.h of the X Window System)."""
-    header = [int.from_bytes(data[k:k + 4], "big") for k in range(0, 100, 4)]
+    header = [int.from_bytes(data[k : k + 4], "big") for k in range(0, 100, 4)]
     start = header[0] + 12 * header[19]
     width, height, line = header[4], header[5], header[12]
-    return Image.frombytes("RGB", (width, height), data[start:start + line * height], "raw", "BGRX", line)
+    return Image.frombytes("RGB", (width, height), data[start : start + line * height], "raw", "BGRX", line)

@@ -21,8 +21,7 @@ STALL = 0.1
 WHEEL = 40
 """Pixels of one turn of the mouse's wheel."""
 FOLDER = Path(sys.argv[sys.argv.index("--") + 1])
-state = {"next": 0, "task": None, "last": None, "stalls": [], "own": [], "phases": [], "watching": False,
-         "known": {}}
+state = {"next": 0, "task": None, "last": None, "stalls": [], "own": [], "phases": [], "watching": False, "known": {}}
 
 
 def module(name):
@@ -34,8 +33,12 @@ def place(kind="WINDOW"):
     """A context in the 3D view: in its region of this kind."""
     window = bpy.context.window_manager.windows[0]
     area = next(one for one in window.screen.areas if one.type == "VIEW_3D")
-    return {"window": window, "screen": window.screen, "area": area,
-            "region": next(one for one in area.regions if one.type == kind)}
+    return {
+        "window": window,
+        "screen": window.screen,
+        "area": area,
+        "region": next(one for one in area.regions if one.type == kind),
+    }
 
 
 def rectangle(kind="WINDOW"):
@@ -179,9 +182,13 @@ def watch_own_code():
         return
     state["wrapped"] = True
     kinds = [cls for name in dir(bpy.types) if name.startswith("SCAN_RELIGHT_") for cls in [getattr(bpy.types, name)]]
-    owners = {id(vars(owner)[name]): (owner, name) for cls in kinds for owner in cls.__mro__
-              for name in ("draw", "modal", "execute", "invoke", "poll") if name in vars(owner)
-              and getattr(owner, "__module__", "").find("scan_relight") >= 0}
+    owners = {
+        id(vars(owner)[name]): (owner, name)
+        for cls in kinds
+        for owner in cls.__mro__
+        for name in ("draw", "modal", "execute", "invoke", "poll")
+        if name in vars(owner) and getattr(owner, "__module__", "").find("scan_relight") >= 0
+    }
     for owner, name in owners.values():
         if not isinstance(vars(owner)[name], classmethod):
             wrap(owner, name)
@@ -196,8 +203,9 @@ def wrap(owner, name):
         try:
             return call()
         finally:
-            state["own"].append((f"{owner.__name__}.{name}", time.perf_counter() - wall, time.thread_time() - cpu,
-                                 phase()))
+            state["own"].append(
+                (f"{owner.__name__}.{name}", time.perf_counter() - wall, time.thread_time() - cpu, phase())
+            )
 
     def two(self, context):
         return note(lambda: inner(self, context))

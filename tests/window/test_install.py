@@ -9,8 +9,10 @@ PARTS = {"Missing", "Capture", "Recover", "Results", "Look", "Relight", "Export"
 
 def test_the_tab_stands_in_the_sidebar(window, pictures):
     assert window.ask("place('UI')['region'].active_panel_category") == "Scan Relight"
-    names = window.ask("[cls.bl_label for name in dir(bpy.types) if name.startswith('SCAN_RELIGHT_PT_')"
-                       " for cls in [getattr(bpy.types, name)] if not getattr(cls, 'bl_parent_id', '')]")
+    names = window.ask(
+        "[cls.bl_label for name in dir(bpy.types) if name.startswith('SCAN_RELIGHT_PT_')"
+        " for cls in [getattr(bpy.types, name)] if not getattr(cls, 'bl_parent_id', '')]"
+    )
     assert set(names) == PARTS
     picture = window.picture(pictures / "01-empty.png")
     assert len(picture.getcolors(1 << 24)) > 50, "the picture is blank"
@@ -45,8 +47,10 @@ def test_a_bad_capture_says_what_is_wrong_and_what_to_do(window, grey_capture, t
     bad = shutil.copytree(grey_capture, tmp_path / "scan")
     (bad / "mesh.ply").unlink()
     window.ask(f"setattr(bpy.context.scene.scan_relight, 'capture_folder', {str(bad)!r})")
-    told = window.wait_for("(lambda found: found if isinstance(found, str) else None)"
-                           "(module('operators.findings').look(bpy.context.scene.scan_relight))")
+    told = window.wait_for(
+        "(lambda found: found if isinstance(found, str) else None)"
+        "(module('operators.findings').look(bpy.context.scene.scan_relight))"
+    )
     assert "mesh" in told and str(bad) in told
     window.picture(pictures / "03-bad-capture-sidebar.png", sidebar=True)
     shutil.copy(grey_capture / "mesh.ply", bad)

@@ -37,10 +37,13 @@ def test_eevee_is_within_a_stop_of_cycles(window, tmp_path, figures):
         return window.ask(MEDIAN.format(engine=engine, samples=samples, out=out), patience=300)
 
     traced, before = median("CYCLES", 64), median("EEVEE", 4)
-    window.ask("""
+    window.ask(
+        """
 with bpy.context.temp_override(**place()):
     answer = list(bpy.ops.scan_relight.bake_preview())
-""", patience=300)
+""",
+        patience=300,
+    )
     after = median("EEVEE", 4)
     figures["preview"] = {"cycles": traced, "eevee before": before, "eevee after": after}
     assert abs(math.log2(after / traced)) < 1 and after > 1.5 * before, figures["preview"]

@@ -40,8 +40,10 @@ bpy.context.view_layer.objects.active = None
     window.click_at(x, y + 46)
     chosen = window.wait_for("getattr(bpy.context.view_layer.objects.active, 'name', '')", patience=30)
     assert window.ask("[one.name for one in bpy.context.view_layer.objects.selected]") == [chosen]
-    known = window.ask("[module('operators.results').result_of(bpy.context.scene).objects[bpy.data.objects[name]"
-                       f"['object_id']]['model'] for name in {[chosen]!r}]")
+    known = window.ask(
+        "[module('operators.results').result_of(bpy.context.scene).objects[bpy.data.objects[name]"
+        f"['object_id']]['model'] for name in {[chosen]!r}]"
+    )
     assert set(known) <= {"lambertian", "specular", "metal", "emitter", "transparent"}
     window.ask("scroll(-100000)")
     window.picture(pictures / "09-results.png")
@@ -99,8 +101,10 @@ def test_before_and_after_are_rendered_beside_the_window(window, folder, picture
     assert window.ask("module('addon.bridge.job').current().state") == "done"
     with Image.open(folder / "before_after.png") as pair:
         assert pair.size[1] == 48 and pair.size[0] >= 2 * 64
-        left, right = (pair.convert("L").crop(box).resize((1, 1), Image.Resampling.BOX).getpixel((0, 0))
-                       for box in ((0, 0, 64, 48), (pair.width - 64, 0, pair.width, 48)))
+        left, right = (
+            pair.convert("L").crop(box).resize((1, 1), Image.Resampling.BOX).getpixel((0, 0))
+            for box in ((0, 0, 64, 48), (pair.width - 64, 0, pair.width, 48))
+        )
     assert left != right, "both pictures are alike"
     assert window.ask("[one.name for one in bpy.data.images if 'before' in one.name.lower()]")
     window.picture(pictures / "14-before-after.png")

@@ -63,8 +63,11 @@ def test_the_next_run_goes_on_to_the_end(window, result, pictures, figures):
     stages = json.loads((result / "report.json").read_text())["stages"]
     assert stages["surface"]["stored"] and stages["lit_diffuse"]["stored"] and not stages["specular"].get("stored")
     watched = window.ask("watched()")
-    figures["run"] = {"stalls_over_100_ms": watched["stalls"], "calls_of_our_own": watched["calls"],
-                      "longest_of_our_own": dict(sorted(watched["own"].items(), key=lambda one: -one[1]["processor"]))}
+    figures["run"] = {
+        "stalls_over_100_ms": watched["stalls"],
+        "calls_of_our_own": watched["calls"],
+        "longest_of_our_own": dict(sorted(watched["own"].items(), key=lambda one: -one[1]["processor"])),
+    }
     window.picture(pictures / "06-finished.png")
     window.picture(pictures / "06-finished-sidebar.png", sidebar=True)
     slow = {name: one for name, one in watched["own"].items() if one["processor"] > OWN}

@@ -54,12 +54,24 @@ def file(tmp_path_factory):
 @pytest.fixture(scope="module")
 def shot(blender, own_user, tmp_path_factory):
     """Renders a scene of a file through a frame's camera with factory settings: no extension has a say."""
+
     def rendered(blend, scene: str, frame: str) -> np.ndarray:
         out = tmp_path_factory.mktemp("shot") / "shot.exr"
         told = subprocess.run(
-            [blender, "--background", "--factory-startup", str(blend), "--python-exit-code", "1", "--python-expr",
-             RENDER.format(scene=scene, out=str(out), frame=frame)], env=environment(own_user), capture_output=True,
-            text=True)
+            [
+                blender,
+                "--background",
+                "--factory-startup",
+                str(blend),
+                "--python-exit-code",
+                "1",
+                "--python-expr",
+                RENDER.format(scene=scene, out=str(out), frame=frame),
+            ],
+            env=environment(own_user),
+            capture_output=True,
+            text=True,
+        )
         assert told.returncode == 0, told.stdout + told.stderr
         assert "LOST []" in told.stdout, told.stdout
         return OpenEXR.File(str(out)).channels()["RGB"].pixels[..., :3]
@@ -109,10 +121,11 @@ answer = [bpy.context.scene.name, sorted(one.name for one in hers.objects), hers
 def test_it_is_the_room_of_scene_blend(story, shot, tmp_path, tiny_capture, figures, pictures):
     [own] = story.window.ask(OWN_SCENES)
     story.window.ask(f"bpy.ops.wm.save_as_mainfile(filepath={str(tmp_path / 'copy.blend')!r}, copy=True)")
-    result = story.window.ask("next(one['scan_relight_result'] for one in bpy.context.scene.objects"
-                              " if 'scan_relight_result' in one)")
+    result = story.window.ask(
+        "next(one['scan_relight_result'] for one in bpy.context.scene.objects if 'scan_relight_result' in one)"
+    )
     [theirs] = story.window.ask(f"""
-with bpy.data.libraries.load({result + '/scene.blend'!r}) as (there, wanted):
+with bpy.data.libraries.load({result + "/scene.blend"!r}) as (there, wanted):
     answer = list(there.scenes)
 """)
     frame = json.loads((tiny_capture / "transforms.json").read_text())["frames"][2]["file_path"].split("/")[-1]
@@ -134,14 +147,21 @@ def test_a_lamp_goes_off_and_a_softbox_on(story, pictures, figures):
 
 def test_this_is_metal_and_fitted_again(story, pictures):
     name = story.choose()
-    light = story.window.ask("[sum(one.type == 'LIGHT' for one in bpy.context.scene.objects), "
-                             f"all({LAMPS}.is_on(one) for one in {LAMPS}.find_lamps(bpy.context.scene))]")
+    light = story.window.ask(
+        "[sum(one.type == 'LIGHT' for one in bpy.context.scene.objects), "
+        f"all({LAMPS}.is_on(one) for one in {LAMPS}.find_lamps(bpy.context.scene))]"
+    )
     story.this_is_metal()
     thing = f"bpy.data.objects[{name!r}]"
     assert story.window.ask(f"{thing}.material_slots[0].material['scan_relight_model']") == "metal"
     assert story.window.ask("sum('object_id' in one for one in bpy.data.objects)") == 15
-    assert story.window.ask("[sum(one.type == 'LIGHT' for one in bpy.context.scene.objects), "
-                            f"all({LAMPS}.is_on(one) for one in {LAMPS}.find_lamps(bpy.context.scene))]") == light
+    assert (
+        story.window.ask(
+            "[sum(one.type == 'LIGHT' for one in bpy.context.scene.objects), "
+            f"all({LAMPS}.is_on(one) for one in {LAMPS}.find_lamps(bpy.context.scene))]"
+        )
+        == light
+    )
     story.window.picture(pictures / "25-metal.png")
 
 
@@ -155,8 +175,12 @@ def test_the_room_outlives_the_extension(story, file, blender, own_user, shot, t
     assert story.window.ask("sum('object_id' in one for one in bpy.context.scene.objects)") == 15
     [name] = story.window.ask(ADDON)
     story.window.close()
-    told = subprocess.run([blender, "--command", "extension", "remove", name.removeprefix("bl_ext.")],
-                          env=environment(own_user), capture_output=True, text=True)
+    told = subprocess.run(
+        [blender, "--command", "extension", "remove", name.removeprefix("bl_ext.")],
+        env=environment(own_user),
+        capture_output=True,
+        text=True,
+    )
     assert told.returncode == 0, told.stdout + told.stderr
     assert not list(own_user.rglob("scan_relight/blender_manifest.toml"))
     assert decibels(shot(file, own, frame), before) > 60

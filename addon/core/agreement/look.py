@@ -99,29 +99,37 @@ class Agreement:
         told = [self.sentence()]
         if self.up not in ("+z", ""):
             convention = replace(self.best.convention if self.best else Convention(), up=self.up)
-            told.append(f"The capture lies on its side: {self.up} is up in its frames; --convention {convention} turns "
-                        "it upright.")
+            told.append(
+                f"The capture lies on its side: {self.up} is up in its frames; --convention {convention} turns "
+                "it upright."
+            )
         return told
 
     def sentence(self) -> str:
         """Whether the frames fit the mesh, in words."""
         fit, best = self.as_read, self.best
         if best is not None:
-            return (f"The frames don't fit the mesh as the poses are read (agreement {fit.quality:.2f} of 1, 0.5 is "
-                    f"chance), but do with --convention {best.convention} ({best.quality:.2f}).")
+            return (
+                f"The frames don't fit the mesh as the poses are read (agreement {fit.quality:.2f} of 1, 0.5 is "
+                f"chance), but do with --convention {best.convention} ({best.quality:.2f})."
+            )
         if self.fits:
             return f"The frames fit the mesh (agreement {fit.quality:.2f} of 1, 0.5 is chance){self._shift()}."
         if self.unknown:
             return "Too few spots are seen by two frames to tell whether the poses fit the mesh."
         tried = " and no usual convention fits better" if self.searched else ""
-        return (f"The frames fit the mesh badly (agreement {fit.quality:.2f} of 1, 0.5 is chance){tried}; check poses, "
-                "focal lengths and mesh against each other with an overlay picture (info --overlay).")
+        return (
+            f"The frames fit the mesh badly (agreement {fit.quality:.2f} of 1, 0.5 is chance){tried}; check poses, "
+            "focal lengths and mesh against each other with an overlay picture (info --overlay)."
+        )
 
     def _shift(self) -> str:
         if not len(self.misaligned):
             return ""
-        return (f", to {np.median(self.misaligned):.1f} pixels in the median and {self.misaligned.max():.1f} in the "
-                f"worst of {len(self.misaligned)} frames")
+        return (
+            f", to {np.median(self.misaligned):.1f} pixels in the median and {self.misaligned.max():.1f} in the "
+            f"worst of {len(self.misaligned)} frames"
+        )
 
 
 @dataclass(frozen=True)
@@ -159,8 +167,9 @@ def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True)
     Agreement
     """
     normal, _ = triangle_geometry(capture.mesh)
-    scene = _Scene(small_views(capture.frames, read), capture, RayScene(capture.mesh.vertices, capture.mesh.triangles),
-                   normal)
+    scene = _Scene(
+        small_views(capture.frames, read), capture, RayScene(capture.mesh.vertices, capture.mesh.triangles), normal
+    )
     seen = scene.shown(Convention())
     plain = replace(scene.colour(Convention()), edge=edge_score(scene.views, seen))
     if plain.quality >= AGREE:

@@ -109,14 +109,19 @@ def group_brackets(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
     merged = [_lead(frame, leaders.get(i, [])) for i, frame in enumerate(frames) if i not in inside]
     count = len(inside) + len(leaders)
     first = frames[next(iter(leaders))].name
-    return merged, [f"{count} frames share {len(leaders)} poses with different exposures (the first: '{first}'); those "
-                    "of one pose are merged to one HDR frame."]
+    return merged, [
+        f"{count} frames share {len(leaders)} poses with different exposures (the first: '{first}'); those "
+        "of one pose are merged to one HDR frame."
+    ]
 
 
 def unfold(frames: Sequence[Frame]) -> list[Frame]:
     """Each exposure as a frame of its own, so that all pictures are looked at alike."""
-    return [replace(frame, path=shot.path, exposure=shot.exposure, saturation=shot.saturation, brackets=())
-            for frame in frames for shot in frame.shots]
+    return [
+        replace(frame, path=shot.path, exposure=shot.exposure, saturation=shot.saturation, brackets=())
+        for frame in frames
+        for shot in frame.shots
+    ]
 
 
 def fold(frames: Sequence[Frame], exposures: Sequence[Frame]) -> list[Frame]:
@@ -137,5 +142,16 @@ def _key(frame: Frame) -> tuple:
     """Equal for frames that saw the same through the same lens."""
     camera = frame.camera
     pose = tuple(np.round(camera.camera_to_world[:3] / SAME_POSE).ravel().tolist())
-    return (camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, repr(camera.lens), pose,
-            frame.mask_path, frame.id_path, frame.transfer)
+    return (
+        camera.width,
+        camera.height,
+        camera.fx,
+        camera.fy,
+        camera.cx,
+        camera.cy,
+        repr(camera.lens),
+        pose,
+        frame.mask_path,
+        frame.id_path,
+        frame.transfer,
+    )

@@ -28,8 +28,10 @@ def check_camera(camera: Camera, name: str) -> None:
     side = max(camera.width, camera.height)
     for key, value in (("fx", camera.fx), ("fy", camera.fy)):
         if not FOCAL[0] * side <= value <= FOCAL[1] * side:
-            raise BadInputError(f"Frame '{name}' has a focal length {key} of {value:.4g} pixels; give pixels, or check "
-                                "the camera's angle.")
+            raise BadInputError(
+                f"Frame '{name}' has a focal length {key} of {value:.4g} pixels; give pixels, or check "
+                "the camera's angle."
+            )
     for key, value, extent in (("cx", camera.cx, camera.width), ("cy", camera.cy, camera.height)):
         if not abs(value) <= OFF * extent:
             raise BadInputError(f"Frame '{name}' has a principal point with {key} = {value:.4g}; give pixels.")

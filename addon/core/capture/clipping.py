@@ -110,6 +110,8 @@ def find_clipping(frames: Sequence[Frame], read: Callable[[Path], np.ndarray]) -
     # Of the frame that reaches the greater value by the wrong scale alone, the pile is there as well, but smaller.
     _, level, what = max(found)
     own = [level * (frame.exposure if what else 1.0) * (1 - WIDTH) for frame in frames]
-    note = (f"The frames clip at {level:.4g}{what}, as their values pile up there; what is that bright counts as a "
-            "lower bound. Give `saturation` in the poses' file if this is wrong.")
+    note = (
+        f"The frames clip at {level:.4g}{what}, as their values pile up there; what is that bright counts as a "
+        "lower bound. Give `saturation` in the poses' file if this is wrong."
+    )
     return tuple(replace(frame, saturation=s) for frame, s in zip(frames, own)), [note]

@@ -30,8 +30,10 @@ MESHES = ("dense/meshed-poisson.ply", "dense/meshed-delaunay.ply", "dense/0/mesh
           "dense/0/meshed-delaunay.ply", "meshed-poisson.ply", "meshed-delaunay.ply")  # fmt: skip
 POINTS = ("fused.ply", "dense/fused.ply", "dense/0/fused.ply", "sparse.ply", "points3D.ply")
 """Clouds of points, which are no mesh."""
-UP = ("COLMAP's world has no up of its own; +Z was taken as up and a unit as a metre. Align the model "
-      "(colmap model_aligner) if the room lies on its side, or name the axis that points up (--convention up:-y).")
+UP = (
+    "COLMAP's world has no up of its own; +Z was taken as up and a unit as a metre. Align the model "
+    "(colmap model_aligner) if the room lies on its side, or name the axis that points up (--convention up:-y)."
+)
 MAX_SIZE = 2**17
 
 
@@ -50,8 +52,10 @@ def read(root: Path, reading: Reading) -> Layout:
     """
     folder = find_model(root)
     if folder is None:
-        raise BadInputError(f"Folder '{root}' holds no COLMAP model; it needs cameras and images (.bin or .txt), there "
-                            "or in 'sparse', 'sparse/0' or 'colmap'.")
+        raise BadInputError(
+            f"Folder '{root}' holds no COLMAP model; it needs cameras and images (.bin or .txt), there "
+            "or in 'sparse', 'sparse/0' or 'colmap'."
+        )
     model = read_model(folder)
     mesh = _mesh(root, reading)
     names = instances.names_in(root)
@@ -59,13 +63,16 @@ def read(root: Path, reading: Reading) -> Layout:
     others = [path.name for path in sorted(folder.parent.iterdir())
               if path != folder and folder.name == "0" and model_files(path)]  # fmt: skip
     if others:
-        notes.append(f"COLMAP left {len(others) + 1} models that don't hang together; '{folder}' was read, not "
-                     f"{', '.join(others[:3])}.")
+        notes.append(
+            f"COLMAP left {len(others) + 1} models that don't hang together; '{folder}' was read, not "
+            f"{', '.join(others[:3])}."
+        )
     return Layout(frames, mesh, names, instances.FILE, problems, [*notes, UP])
 
 
-def frames_of(model: ColmapModel, root: Path, folder: Path,
-              reading: Reading) -> tuple[list[Frame], list[str], list[str]]:
+def frames_of(
+    model: ColmapModel, root: Path, folder: Path, reading: Reading
+) -> tuple[list[Frame], list[str], list[str]]:
     """Frames of a model whose pictures lie in `folder`, sentences on those that can't be used, and notes.
 
     In the pictures' order by name, as COLMAP's own are in no order. A model without images raises `BadInputError`.
@@ -81,11 +88,15 @@ def frames_of(model: ColmapModel, root: Path, folder: Path,
             if image.name in seen:
                 raise BadInputError(f"Frame '{name}' is listed twice in '{model.images_file}'; keep one of the two.")
             if image.camera in wrong:
-                raise BadInputError(f"Frame '{name}' has camera {image.camera}, which can't be used: "
-                                    f"{wrong[image.camera]}; mend '{model.cameras_file}'.")
+                raise BadInputError(
+                    f"Frame '{name}' has camera {image.camera}, which can't be used: "
+                    f"{wrong[image.camera]}; mend '{model.cameras_file}'."
+                )
             if image.camera not in cameras:
-                raise BadInputError(f"Frame '{name}' has camera {image.camera}, which '{model.cameras_file}' does not "
-                                    "list; export cameras and images together.")
+                raise BadInputError(
+                    f"Frame '{name}' has camera {image.camera}, which '{model.cameras_file}' does not "
+                    "list; export cameras and images together."
+                )
             frames.append(_frame(image, name, *cameras[image.camera], root, folder, reading))
         except EscapesError:
             raise
@@ -105,8 +116,9 @@ def camera_to_world(image: ColmapImage, name: str) -> np.ndarray:
         Not finite, no direction, or too far off.
     """
     if not is_pose(image):
-        raise BadInputError(f"Frame '{name}' has a pose that is not finite or whose quaternion is 0; export the model "
-                            "again.")
+        raise BadInputError(
+            f"Frame '{name}' has a pose that is not finite or whose quaternion is 0; export the model again."
+        )
     quaternion = np.array(image.quaternion) / np.abs(image.quaternion).max()  # first: squares of huge numbers are inf
     w, x, y, z = quaternion / np.linalg.norm(quaternion)
     rotation = np.array([
@@ -135,16 +147,31 @@ def _cameras(model: ColmapModel) -> tuple[dict[int, tuple[int, int, Intrinsics]]
     return good, wrong
 
 
-def _frame(image: ColmapImage, name: str, width: int, height: int, values: Intrinsics, root: Path, folder: Path,
-           reading: Reading) -> Frame:
+def _frame(
+    image: ColmapImage,
+    name: str,
+    width: int,
+    height: int,
+    values: Intrinsics,
+    root: Path,
+    folder: Path,
+    reading: Reading,
+) -> Frame:
     named = inside(root, image.name, name, reading.outside, folder)
-    camera = Camera(width, height, values.fx, values.fy, values.cx, values.cy, camera_to_world(image, name),
-                    values.lens)
+    camera = Camera(
+        width, height, values.fx, values.fy, values.cx, values.cy, camera_to_world(image, name), values.lens
+    )
     path = next((hdr for hdr in (named.with_suffix(ending) for ending in HDR) if hdr.is_file()), named)
     # COLMAP's own convention: the picture's whole name, and .png after it.
     masks = folder.parent / MASKS / named.relative_to(folder) if named.is_relative_to(folder) else named
-    mask = next((p for p in (masks.with_name(masks.name + ".png"), masks.with_suffix(".png"))
-                 if p != path and p.is_file() and MASKS in p.parts), None)
+    mask = next(
+        (
+            p
+            for p in (masks.with_name(masks.name + ".png"), masks.with_suffix(".png"))
+            if p != path and p.is_file() and MASKS in p.parts
+        ),
+        None,
+    )
     return Frame(name, path, camera, mask)
 
 
@@ -154,8 +181,10 @@ def _notes(model: ColmapModel, frames: list[Frame]) -> list[str]:
     notes = []
     if gaps:
         few = ", ".join(map(str, gaps[:5])) + (", ..." if len(gaps) > 5 else "")
-        notes.append(f"'{model.images_file}' has no pose for {len(gaps)} of {len(gaps) + len(numbers)} pictures "
-                     f"(numbers {few}): COLMAP could not place them, or they were taken out.")
+        notes.append(
+            f"'{model.images_file}' has no pose for {len(gaps)} of {len(gaps) + len(numbers)} pictures "
+            f"(numbers {few}): COLMAP could not place them, or they were taken out."
+        )
     return notes
 
 
@@ -173,8 +202,10 @@ def _mesh(root: Path, reading: Reading) -> RawMesh:
             return read_mesh(root / place, reading)
     clouds = [place for place in POINTS if (root / place).is_file()]
     if clouds and not any(_meshes(root)):
-        raise BadInputError(f"Capture '{root}' has no mesh, only the points of '{clouds[0]}'; mesh them (colmap "
-                            f"poisson_mesher) to '{MESHES[0]}' or name a mesh with --mesh.")
+        raise BadInputError(
+            f"Capture '{root}' has no mesh, only the points of '{clouds[0]}'; mesh them (colmap "
+            f"poisson_mesher) to '{MESHES[0]}' or name a mesh with --mesh."
+        )
     return read_mesh(find_mesh(root, reading), reading)
 
 
@@ -182,5 +213,6 @@ def _meshes(root: Path) -> Iterator[Path]:
     return (p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED) and p.name not in POINTS)
 
 
-READER = Reader("colmap", "cameras and images of a COLMAP model (.bin or .txt)",
-                lambda root: find_model(root) is not None, read)
+READER = Reader(
+    "colmap", "cameras and images of a COLMAP model (.bin or .txt)", lambda root: find_model(root) is not None, read
+)

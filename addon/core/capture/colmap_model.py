@@ -104,8 +104,10 @@ def _text_cameras(path: Path) -> dict[int, ColmapCamera]:
                 camera = ColmapCamera(model.decode(), int(width), int(height), tuple(map(float, parameters)))
                 cameras[int(number)] = camera
             except ValueError:
-                raise BadInputError(f"'{path}' has no camera in line {line_number} (ID MODEL WIDTH HEIGHT PARAMS); "
-                                    "export the model again.") from None
+                raise BadInputError(
+                    f"'{path}' has no camera in line {line_number} (ID MODEL WIDTH HEIGHT PARAMS); "
+                    "export the model again."
+                ) from None
     return cameras
 
 
@@ -124,8 +126,10 @@ def _text_images(path: Path) -> list[ColmapImage]:
                 values = tuple(map(float, pose))
                 images.append(ColmapImage(int(number), values[:4], values[4:], int(camera), _name(name.strip())))
             except ValueError:
-                raise BadInputError(f"'{path}' has no image in line {line_number} (ID QW QX QY QZ TX TY TZ CAMERA_ID "
-                                    "NAME); export the model again.") from None
+                raise BadInputError(
+                    f"'{path}' has no image in line {line_number} (ID QW QX QY QZ TX TY TZ CAMERA_ID "
+                    "NAME); export the model again."
+                ) from None
             points = True
     return images
 
@@ -164,8 +168,9 @@ def _mapped(path: Path) -> Iterator[mmap.mmap]:
 def _count(data: mmap.mmap, least: int, what: str, path: Path) -> int:
     count = struct.unpack_from("<Q", data)[0]
     if count > (len(data) - 8) // least:
-        raise BadInputError(f"'{path}' claims {count} {what}, more than its {len(data)} bytes can hold; export "
-                            "the model again.")
+        raise BadInputError(
+            f"'{path}' claims {count} {what}, more than its {len(data)} bytes can hold; export the model again."
+        )
     return count
 
 
@@ -181,8 +186,10 @@ def _binary_cameras(path: Path) -> dict[int, ColmapCamera]:
             try:
                 number, model, width, height = struct.unpack_from("<IiQQ", data, at)
                 if model not in NAMES:
-                    raise BadInputError(f"'{path}' has camera {number} of model number {model}, which is none of "
-                                        "COLMAP's that are known; undistort the pictures with COLMAP.")
+                    raise BadInputError(
+                        f"'{path}' has camera {number} of model number {model}, which is none of "
+                        "COLMAP's that are known; undistort the pictures with COLMAP."
+                    )
                 parameters = struct.unpack_from(f"<{COUNTS[NAMES[model]]}d", data, at + 24)
             except struct.error:
                 raise _cut_off(path, "camera", index) from None

@@ -128,9 +128,11 @@ def parse(text: str) -> Convention:
         elif kind == "scale" and _positive(value):
             found = replace(found, scale=float(value))
         else:
-            raise BadInputError(f"Convention '{text}' can't be read at '{part}'; join parts such as opencv, "
-                                "world-to-camera, camera:+x-y-z, world:+x-z+y, up:+y or scale:0.01 by commas "
-                                "(axes must make a rotation).")
+            raise BadInputError(
+                f"Convention '{text}' can't be read at '{part}'; join parts such as opencv, "
+                "world-to-camera, camera:+x-y-z, world:+x-z+y, up:+y or scale:0.01 by commas "
+                "(axes must make a rotation)."
+            )
     return found
 
 

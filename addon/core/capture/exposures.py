@@ -22,8 +22,15 @@ from .oiio import JPEG, TIFF
 from .pictures import picture_kind
 
 EXPOSURE, NAME = "exposure", ("name", "file", "file_path", "filename", "frame", "image")
-TIME = ("exposure_time", "exposuretime", "shutter", "shutter_speed", "shutter_time", "exposure_duration",
-        "exposureduration")
+TIME = (
+    "exposure_time",
+    "exposuretime",
+    "shutter",
+    "shutter_speed",
+    "shutter_time",
+    "exposure_duration",
+    "exposureduration",
+)
 F_NUMBER = ("f_number", "fnumber", "aperture", "f_stop")
 ISO = ("iso", "iso_speed", "isospeedratings", "photographicsensitivity")
 WIDEST = 1e9
@@ -99,8 +106,9 @@ def relative(settings: Sequence[Settings | None]) -> list[float | None]:
     return [None if value is None else value / median for value in values]
 
 
-def from_settings(frames: Sequence[Frame], settings: Sequence[Settings | None],
-                  source: str) -> tuple[list[Frame], list[str]]:
+def from_settings(
+    frames: Sequence[Frame], settings: Sequence[Settings | None], source: str
+) -> tuple[list[Frame], list[str]]:
     """Give the frames the exposure of their settings (None: the frame keeps its own).
 
     Returns
@@ -113,14 +121,17 @@ def from_settings(frames: Sequence[Frame], settings: Sequence[Settings | None],
     known = [value for value in values if value is not None]
     if not known:
         return list(frames), []
-    notes = [f"Exposures come from {source} (time x ISO / f-number squared, the median frame's as 1), from "
-             f"{min(known):.3g} to {max(known):.3g}; give each frame's `exposure` if this is wrong."]
+    notes = [
+        f"Exposures come from {source} (time x ISO / f-number squared, the median frame's as 1), from "
+        f"{min(known):.3g} to {max(known):.3g}; give each frame's `exposure` if this is wrong."
+    ]
     lacking = [frame.name for frame, value in zip(frames, values) if value is None and frame.exposure == 1]
     if lacking:
-        notes.append(f"{len(lacking)} of {len(frames)} frames state no exposure (the first: '{lacking[0]}'); it was "
-                     "taken as 1; give each frame its own.")
-    return [frame if value is None else replace(frame, exposure=value)
-            for frame, value in zip(frames, values)], notes
+        notes.append(
+            f"{len(lacking)} of {len(frames)} frames state no exposure (the first: '{lacking[0]}'); it was "
+            "taken as 1; give each frame its own."
+        )
+    return [frame if value is None else replace(frame, exposure=value) for frame, value in zip(frames, values)], notes
 
 
 def from_exif(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
@@ -185,13 +196,17 @@ def from_csv(frames: Sequence[Frame], path: Path) -> tuple[list[Frame], list[str
     problems = [f"Frame '{frame.name}' has no line in '{path}'." for i, frame in enumerate(frames) if i not in used]
     notes = []
     if unknown:
-        notes.append(f"'{path}' has {len(unknown)} lines for frames that the capture has not, such as '{unknown[0]}'; "
-                     "they are passed over.")
+        notes.append(
+            f"'{path}' has {len(unknown)} lines for frames that the capture has not, such as '{unknown[0]}'; "
+            "they are passed over."
+        )
     kept = [frames[i] for i in sorted(used)]
     entries = [used[i] for i in sorted(used)]
     if entries and EXPOSURE in entries[0]:
-        kept = [replace(frame, exposure=parse_number(entry[EXPOSURE], EXPOSURE, frame.name))
-                for frame, entry in zip(kept, entries)]
+        kept = [
+            replace(frame, exposure=parse_number(entry[EXPOSURE], EXPOSURE, frame.name))
+            for frame, entry in zip(kept, entries)
+        ]
         values = [frame.exposure for frame in kept]
         if max(values) > WIDEST * min(values):
             raise BadInputError(f"'{path}' holds exposures from {min(values):g} to {max(values):g}; give factors.")
@@ -214,13 +229,17 @@ def _table(path: Path) -> dict[str, dict[str, str]]:
     columns = [cell.strip().lower() for cell in rows[0]] if rows else []
     key = next((name for name in NAME if name in columns), None)
     if key is None or not any(name in columns for name in (EXPOSURE, *TIME, *F_NUMBER, *ISO)):
-        raise BadInputError(f"Table of exposures '{path}' needs a first line that names its columns: name, and "
-                            "exposure or some of shutter, aperture and iso.")
+        raise BadInputError(
+            f"Table of exposures '{path}' needs a first line that names its columns: name, and "
+            "exposure or some of shutter, aperture and iso."
+        )
     table: dict[str, dict[str, str]] = {}
     for row in rows[1:]:
         if len(row) != len(columns):
-            raise BadInputError(f"Table of exposures '{path}' has a line of {len(row)} instead of {len(columns)} cells "
-                                f"('{','.join(row)[:60]}'); mend it.")
+            raise BadInputError(
+                f"Table of exposures '{path}' has a line of {len(row)} instead of {len(columns)} cells "
+                f"('{','.join(row)[:60]}'); mend it."
+            )
         entry = {column: cell.strip() for column, cell in zip(columns, row)}
         if entry[key] in table:
             raise BadInputError(f"'{path}' names frame '{entry[key]}' twice; keep one line.")

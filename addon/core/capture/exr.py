@@ -161,8 +161,10 @@ def _supported(path: Path) -> tuple[ExrLayer, str]:
             raise BadInputError(f"Picture '{path}' holds subsampled channels, which isn't supported; write it as RGB.")
     (width, height), (data_width, data_height) = header.size, window_size(header.data_window)
     if width * height > max(1 << 24, 16 * data_width * data_height):
-        raise BadInputError(f"Picture '{path}' has {data_width} x {data_height} pixels in a display window of "
-                            f"{width} x {height}; crop its display window.")
+        raise BadInputError(
+            f"Picture '{path}' has {data_width} x {data_height} pixels in a display window of "
+            f"{width} x {height}; crop its display window."
+        )
     return layer, note
 
 

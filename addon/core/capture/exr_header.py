@@ -26,8 +26,7 @@ FREE_BYTES = 1 << 26
 """Below this many bytes of pixels the ratio is not looked at."""
 HEADER_BYTES = (1 << 18, 1 << 24)
 """How much is read in search of the header's end, and how much where the first did not hold it."""
-LINES_PER_CHUNK = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256, 10: 256, 11: 32, 12: 256,
-                   13: 1}
+LINES_PER_CHUNK = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256, 10: 256, 11: 32, 12: 256, 13: 1}
 TILED, LONG_NAMES, DEEP, MULTIPART = 0x200, 0x400, 0x800, 0x1000
 PIXEL_BYTES = {0: 4, 1: 2, 2: 4}  # uint, half, float
 

@@ -59,8 +59,12 @@ def choose_layer(headers: tuple[ExrHeader, ...], path: Path) -> tuple[ExrLayer, 
     """
     view = next((h.view for h in headers if h.view), "")
     views = tuple(dict.fromkeys([h.view for h in headers if h.view] + [v for h in headers for v in h.views]))
-    layers = [layer for i, header in enumerate(headers) if header.view in ("", view)
-              for layer in _layers(i, header, len(headers) > 1)]
+    layers = [
+        layer
+        for i, header in enumerate(headers)
+        if header.view in ("", view)
+        for layer in _layers(i, header, len(headers) > 1)
+    ]
     others = {name for header in headers for name in header.views[1:]}
     layers = [layer for layer in layers if layer.name.split(".")[-1] not in others]
     if not layers:
@@ -69,8 +73,10 @@ def choose_layer(headers: tuple[ExrHeader, ...], path: Path) -> tuple[ExrLayer, 
     ranked = sorted((layer for layer in layers if _rank(layer) < len(WHOLE)), key=_rank)
     if not ranked and len(layers) > 1:
         names = ", ".join(layer.name for layer in layers[:6]) + (", ..." if len(layers) > 6 else "")
-        raise BadInputError(f"Picture '{path}' holds the layers {names}, and none is named as the whole picture; "
-                            "write that one alone, or name it 'beauty'.")
+        raise BadInputError(
+            f"Picture '{path}' holds the layers {names}, and none is named as the whole picture; "
+            "write that one alone, or name it 'beauty'."
+        )
     chosen = ranked[0] if ranked else layers[0]
     told = []
     if len(views) > 1:

@@ -83,8 +83,10 @@ def read_real(root: Path, reading: Reading) -> Layout:
     """
     poses, intrinsics = _triples(root / CAMERAS), _triples(root / INTRINSICS)
     if len(poses) != len(intrinsics):
-        raise BadInputError(f"'{root / CAMERAS}' has {len(poses)} cameras, but '{root / INTRINSICS}' {len(intrinsics)};"
-                            " export both again.")
+        raise BadInputError(
+            f"'{root / CAMERAS}' has {len(poses)} cameras, but '{root / INTRINSICS}' {len(intrinsics)};"
+            " export both again."
+        )
 
     def camera(pose: np.ndarray, k: np.ndarray) -> Callable[[Path, str], Camera]:
         def make(picture: Path, name: str) -> Camera:
@@ -127,12 +129,22 @@ def _triples(path: Path) -> np.ndarray:
     except ValueError as error:  # no numbers, or no text
         raise BadInputError(f"'{path}' holds something that is no number; export it again.") from error
     if count < 1 or values.size != 9 * count:
-        raise BadInputError(f"'{path}' announces {count} cameras but holds {values.size} numbers instead of "
-                            f"{9 * max(count, 1)}; export it again.")
+        raise BadInputError(
+            f"'{path}' announces {count} cameras but holds {values.size} numbers instead of "
+            f"{9 * max(count, 1)}; export it again."
+        )
     return values.reshape(count, 3, 3)
 
 
-SYNTHETIC = Reader("fipt", f"{SPLIT}/{POSES} beside {MESH}",
-                   lambda root: (root / SPLIT / POSES).is_file() and (root / MESH).is_file(), read_synthetic)
-REAL = Reader("fipt-real", f"{CAMERAS} and {INTRINSICS}",
-              lambda root: (root / CAMERAS).is_file() and (root / INTRINSICS).is_file(), read_real)
+SYNTHETIC = Reader(
+    "fipt",
+    f"{SPLIT}/{POSES} beside {MESH}",
+    lambda root: (root / SPLIT / POSES).is_file() and (root / MESH).is_file(),
+    read_synthetic,
+)
+REAL = Reader(
+    "fipt-real",
+    f"{CAMERAS} and {INTRINSICS}",
+    lambda root: (root / CAMERAS).is_file() and (root / INTRINSICS).is_file(),
+    read_real,
+)

@@ -79,18 +79,26 @@ def look_into(folder: Path | str) -> Content:
     try:
         inside = sorted(os.scandir(folder), key=lambda one: one.name.lower())
     except OSError as error:
-        return Content(OTHER, folder, f"Folder '{name}' can't be read ({error.strerror or error}); check its rights.",
-                       name)
+        return Content(
+            OTHER, folder, f"Folder '{name}' can't be read ({error.strerror or error}); check its rights.", name
+        )
     if not inside:
         return Content(EMPTY, folder, f"Folder '{name}' is empty; choose the folder of a scan.", name)
     below = [Path(one.path) for one in inside[:LOOKED_AT] if not one.name.startswith(".") and one.is_dir()]
     captures = [one for one in below if is_capture(one)]
     results = [one for one in below if is_result(one)]
     if captures or results:
-        what = " and ".join(_count(found, word) for found, word in ((captures, "scan"), (results, "finished result"))
-                            if found)
-        return Content(WAY, folder, f"Folder '{name}' is no scan itself; {what} in it.", name,
-                       tuple(captures[:OFFERED]), tuple(results[:OFFERED]))
+        what = " and ".join(
+            _count(found, word) for found, word in ((captures, "scan"), (results, "finished result")) if found
+        )
+        return Content(
+            WAY,
+            folder,
+            f"Folder '{name}' is no scan itself; {what} in it.",
+            name,
+            tuple(captures[:OFFERED]),
+            tuple(results[:OFFERED]),
+        )
     above = [one for one in list(folder.absolute().parents)[:ABOVE] if is_capture(one)]
     if above:
         return Content(WAY, folder, f"Folder '{name}' is a part of the scan '{above[-1].name}'.", name, (above[-1],))
@@ -111,8 +119,13 @@ def of_path(path: Path | str) -> Content:
         begins = [one for one in (path.parent, *list(path.absolute().parents)[1:ABOVE]) if is_capture(one)]
         if begins and not (path.suffix.lower() == ".json" and not _is_ours(path)):
             return look_into(begins[-1])
-    return Content(OTHER, path, f"'{path.name}' is no part of a scan or of a result that is known here; take a scan's "
-                   f"'transforms.json' or a result's '{MATERIALS}'.", path.name)
+    return Content(
+        OTHER,
+        path,
+        f"'{path.name}' is no part of a scan or of a result that is known here; take a scan's "
+        f"'transforms.json' or a result's '{MATERIALS}'.",
+        path.name,
+    )
 
 
 def _is_ours(path: Path) -> bool:
@@ -130,11 +143,15 @@ def _other(name: str, names: list[str]) -> str:
     if blend:
         return f"Folder '{name}' holds the Blender file '{blend}' and no scan; open that by File, Open."
     if any(ending in (".exr", ".hdr", ".png", ".jpg", ".jpeg", ".tif", ".tiff") for ending in endings):
-        return (f"Folder '{name}' holds pictures, but no cameras (such as 'transforms.json' or a COLMAP model); "
-                "choose the folder above, or add them.")
+        return (
+            f"Folder '{name}' holds pictures, but no cameras (such as 'transforms.json' or a COLMAP model); "
+            "choose the folder above, or add them."
+        )
     if any(ending in (".ply", ".obj", ".glb", ".gltf") for ending in endings):
-        return (f"Folder '{name}' holds a mesh, but no cameras (such as 'transforms.json' or a COLMAP model); "
-                "add them and their frames.")
+        return (
+            f"Folder '{name}' holds a mesh, but no cameras (such as 'transforms.json' or a COLMAP model); "
+            "add them and their frames."
+        )
     return f"Folder '{name}' holds no scan: cameras (such as 'transforms.json'), frames and a mesh."
 
 

@@ -43,13 +43,16 @@ def with_curves(frames: Sequence[Frame], transfer: str) -> tuple[list[Frame], li
             problems.append(unstated(frame.path))
             continue
         limits = [clip_level(one, transfer) if one else float("inf") for one in bits]
-        shots = tuple(replace(shot, saturation=min(shot.saturation, limit))
-                      for shot, limit in zip(frame.brackets, limits[1:]))
+        shots = tuple(
+            replace(shot, saturation=min(shot.saturation, limit)) for shot, limit in zip(frame.brackets, limits[1:])
+        )
         found.append(replace(frame, transfer=transfer, saturation=min(frame.saturation, limits[0]), brackets=shots))
     if coded and coded == len(frames) and not transfer:
         raise BadInputError(problems[0])
     notes = []
     if coded and transfer:
-        notes.append(f"{coded} of {len(frames)} frames are pictures of 8 or 16 bits, decoded by the curve '{transfer}';"
-                     " where a camera or a program applied another (tone mapping), the light comes out wrong.")
+        notes.append(
+            f"{coded} of {len(frames)} frames are pictures of 8 or 16 bits, decoded by the curve '{transfer}';"
+            " where a camera or a program applied another (tone mapping), the light comes out wrong."
+        )
     return found, problems, notes

@@ -48,15 +48,19 @@ def _whole(stored: np.ndarray, path: Path) -> np.ndarray:
     if not np.isfinite(stored).all():
         raise BadInputError(f"Picture '{path}' has ids that are not finite; write whole numbers.")
     if not (stored == values[..., None]).all():
-        raise BadInputError(f"Picture '{path}' has differing channels, which is no picture of ids; write the ids to "
-                            "one channel.")
+        raise BadInputError(
+            f"Picture '{path}' has differing channels, which is no picture of ids; write the ids to one channel."
+        )
     if values.dtype.kind != "f":
         return values.astype(np.int64)
     ids = np.rint(values.astype(np.float64))
     if np.abs(values - ids).max(initial=0) > OFF:
-        raise BadInputError(f"Picture '{path}' has values between whole numbers, which are no ids; write it without "
-                            "filtering.")
+        raise BadInputError(
+            f"Picture '{path}' has values between whole numbers, which are no ids; write it without filtering."
+        )
     if np.abs(ids).max(initial=0) > EXACT[values.dtype.itemsize]:
-        raise BadInputError(f"Picture '{path}' has ids above {EXACT[values.dtype.itemsize]}, which its floats can't "
-                            "hold; write them as whole numbers (uint), or number them from 0.")
+        raise BadInputError(
+            f"Picture '{path}' has ids above {EXACT[values.dtype.itemsize]}, which its floats can't "
+            "hold; write them as whole numbers (uint), or number them from 0."
+        )
     return ids.astype(np.int64)

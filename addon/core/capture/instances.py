@@ -30,8 +30,11 @@ def read_instances(path: Path | str) -> dict[int, str]:
     objects, classes = value.get("objects"), value.get("classes", [])
     if not isinstance(objects, list):
         raise BadInputError(f"'{path}' has no list 'objects'; export it again or take it away.")
-    class_names = {c["id"]: c.get("name") for c in classes if isinstance(c, dict) and isinstance(c.get("id"), int)} \
-        if isinstance(classes, list) else {}
+    class_names = (
+        {c["id"]: c.get("name") for c in classes if isinstance(c, dict) and isinstance(c.get("id"), int)}
+        if isinstance(classes, list)
+        else {}
+    )
     names: dict[int, str] = {}
     for i, item in enumerate(objects):
         number = item.get("id") if isinstance(item, dict) else None
@@ -52,8 +55,9 @@ def names_in(root: Path) -> dict[int, str] | None:
     return read_instances(path) if path.exists() else None
 
 
-def assign(object_id: np.ndarray, names: dict[int, str] | None,
-           names_file: str = FILE) -> tuple[np.ndarray, tuple[Instance, ...], list[str]]:
+def assign(
+    object_id: np.ndarray, names: dict[int, str] | None, names_file: str = FILE
+) -> tuple[np.ndarray, tuple[Instance, ...], list[str]]:
     """Give every triangle an instance.
 
     Parameters
@@ -83,8 +87,10 @@ def assign(object_id: np.ndarray, names: dict[int, str] | None,
     instances = [Instance(int(i), names[int(i)]) for i in kept]
     idle = sorted(set(names) - {int(i) for i in kept})
     if idle:
-        warnings.append(f"{len(idle)} of the objects in {names_file} have no triangles and are left out: "
-                        f"{_few([f'{i} ({names[i]})' for i in idle])}.")
+        warnings.append(
+            f"{len(idle)} of the objects in {names_file} have no triangles and are left out: "
+            f"{_few([f'{i} ({names[i]})' for i in idle])}."
+        )
     loose = ~np.isin(object_id, kept)
     result = object_id.copy()
     if loose.any():
@@ -93,8 +99,10 @@ def assign(object_id: np.ndarray, names: dict[int, str] | None,
             number = next(i for i in range(MAX_ID) if i not in names)
         result[loose] = number
         instances = sorted([*instances, Instance(number, "unlabelled")], key=lambda one: one.object_id)
-        warnings.append(f"{int(loose.sum())} of {len(object_id)} triangles belong to no object; they become one of "
-                        f"their own, 'unlabelled' (object_id {number}).")
+        warnings.append(
+            f"{int(loose.sum())} of {len(object_id)} triangles belong to no object; they become one of "
+            f"their own, 'unlabelled' (object_id {number})."
+        )
     return result.astype(np.int32), tuple(instances), warnings
 
 

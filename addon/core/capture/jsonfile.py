@@ -28,5 +28,6 @@ def read_json(path: Path) -> dict[str, Any]:
 
 def is_number(value: Any) -> bool:
     """Whether `value` is a finite number (true and false are none)."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300 \
-        and math.isfinite(value)
+    return (
+        isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300 and math.isfinite(value)
+    )

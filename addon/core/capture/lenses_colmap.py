@@ -36,9 +36,16 @@ class Model(NamedTuple):
     lens: Callable[[Sequence[float]], Lens | None]
 
 
-def polynomial(name: str, *, fisheye: bool = False, numerator: Sequence[float] = (), denominator: Sequence[float] = (),
-               tangential: Sequence[float] = (0.0, 0.0), prism: Sequence[float] = (0.0,) * 4,
-               chained: bool = False) -> Polynomial | None:
+def polynomial(
+    name: str,
+    *,
+    fisheye: bool = False,
+    numerator: Sequence[float] = (),
+    denominator: Sequence[float] = (),
+    tangential: Sequence[float] = (0.0, 0.0),
+    prism: Sequence[float] = (0.0,) * 4,
+    chained: bool = False,
+) -> Polynomial | None:
     """A `Polynomial`, or None where that is a perspective without distortion."""
     parts = [tuple(float(c) for c in part) for part in (numerator, denominator, tangential, prism)]
     if not fisheye and not any(any(part) for part in parts):

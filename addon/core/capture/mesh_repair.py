@@ -42,8 +42,10 @@ def repair(mesh: RawMesh) -> tuple[RawMesh, list[str]]:
     good[corners_finite] = _has_area(mesh.vertices, mesh.triangles[corners_finite])
     broken, flat = int((~corners_finite).sum()), int((corners_finite & ~good).sum())
     if broken:
-        warnings.append(f"{broken} triangles of '{name}' have vertices that are not finite or over "
-                        f"{MAX_COORDINATE:g} m away, and are left out.")
+        warnings.append(
+            f"{broken} triangles of '{name}' have vertices that are not finite or over "
+            f"{MAX_COORDINATE:g} m away, and are left out."
+        )
     if flat:
         warnings.append(f"{flat} triangles of '{name}' have no area and are left out.")
     if not good.any():

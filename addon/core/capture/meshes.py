@@ -24,8 +24,9 @@ def read_mesh(path: Path, reading: Reading) -> RawMesh:
     ending = path.suffix.lower()
     if ending in IMPORTED:
         if reading.import_mesh is None:
-            raise BadInputError(f"Mesh '{path}' needs Blender to be read; run the command where bpy is installed, or "
-                                "convert it to PLY.")
+            raise BadInputError(
+                f"Mesh '{path}' needs Blender to be read; run the command where bpy is installed, or convert it to PLY."
+            )
         return reading.import_mesh(path)
     if ending != ".ply":
         raise BadInputError(f"Mesh '{path}' is of no kind that is known; give a PLY, OBJ, glTF or GLB file.")
@@ -50,6 +51,7 @@ def find_mesh(root: Path, reading: Reading) -> Path:
     if len(found) == 1:
         return found[0]
     if found:
-        raise BadInputError(f"Capture '{root}' has several meshes ({', '.join(p.name for p in found[:3])}, ...); name "
-                            "one with --mesh.")
+        raise BadInputError(
+            f"Capture '{root}' has several meshes ({', '.join(p.name for p in found[:3])}, ...); name one with --mesh."
+        )
     raise BadInputError(f"Mesh '{usual}' does not exist; a capture needs its mesh there, or named with --mesh.")

@@ -77,8 +77,10 @@ def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], l
         notes.append(f"The frames of '{TEST_SPLIT}' were left out; put those to be used into '{FILE}'.")
     names = [_name(entry, i) for i, (_, entry, _) in enumerate(listed)]
     if len(set(names)) < len(names):  # left/0001 and right/0001: tell them apart by their folders
-        names = [str(entry.get("file_path", i)) if isinstance(entry, dict) else str(i)
-                 for i, (_, entry, _) in enumerate(listed)]
+        names = [
+            str(entry.get("file_path", i)) if isinstance(entry, dict) else str(i)
+            for i, (_, entry, _) in enumerate(listed)
+        ]
     frames: list[Frame] = []
     told: list[tuple[dict[str, Any], dict[str, Any]]] = []
     problems: list[str] = []
@@ -116,8 +118,10 @@ def _without_test(top: dict[str, Any], entries: list[Any]) -> tuple[list[Any], l
                                        and _plain(e["file_path"]) in test)]  # fmt: skip
     if not kept or len(kept) == len(entries):
         return entries, []
-    return kept, [f"{len(entries) - len(kept)} of {len(entries)} frames are listed in 'test_filenames' and were left "
-                  "out; take them out of that list to use them."]
+    return kept, [
+        f"{len(entries) - len(kept)} of {len(entries)} frames are listed in 'test_filenames' and were left "
+        "out; take them out of that list to use them."
+    ]
 
 
 def _plain(path: str) -> str:
@@ -130,8 +134,10 @@ def _unexposed(top: dict[str, Any], entries: list[Any]) -> list[str]:
     if not any(stated) or all(stated) or top.get("exposure") is not None:
         return []
     index = stated.index(False)
-    return [f"{stated.count(False)} of {len(stated)} frames state no exposure (the first: "
-            f"'{_name(entries[index], index)}'); it was taken as 1; give each frame its own."]
+    return [
+        f"{stated.count(False)} of {len(stated)} frames state no exposure (the first: "
+        f"'{_name(entries[index], index)}'); it was taken as 1; give each frame its own."
+    ]
 
 
 def _orientation(top: dict[str, Any]) -> list[str]:
@@ -139,8 +145,10 @@ def _orientation(top: dict[str, Any]) -> list[str]:
     method = top.get("orientation_override")
     if method in (None, "none"):
         return []
-    return [f"The file asks nerfstudio to turn the world upright ('orientation_override' is '{method}'); the poses "
-            "were taken as stored, with +Z up."]
+    return [
+        f"The file asks nerfstudio to turn the world upright ('orientation_override' is '{method}'); the poses "
+        "were taken as stored, with +Z up."
+    ]
 
 
 def _name(entry: Any, index: int) -> str:
@@ -186,14 +194,17 @@ def applied(root: Path, top: dict[str, Any]) -> np.ndarray | None:
         if not is_number(scale) or not scale > 0 or not np.isfinite(result).all():
             raise ValueError
     except (TypeError, ValueError):
-        raise BadInputError(f"'{FILE}' in '{root}' has an applied_transform that is no 3 x 4 matrix, or an "
-                            "applied_scale that is no number above 0; mend or remove them.") from None
+        raise BadInputError(
+            f"'{FILE}' in '{root}' has an applied_transform that is no 3 x 4 matrix, or an "
+            "applied_scale that is no number above 0; mend or remove them."
+        ) from None
     result[:3] *= scale
     return None if np.array_equal(result, np.eye(4)) else result
 
 
-def _in_frames_world(mesh: RawMesh, root: Path, top: dict[str, Any], frames: list[Frame],
-                     reading: Reading) -> tuple[RawMesh, list[str]]:
+def _in_frames_world(
+    mesh: RawMesh, root: Path, top: dict[str, Any], frames: list[Frame], reading: Reading
+) -> tuple[RawMesh, list[str]]:
     """The mesh in the world of the poses, and a sentence where that is not plain.
 
     nerfstudio writes its own point cloud in the poses' world, and so a mesh is expected there; one that was made by
@@ -209,11 +220,14 @@ def _in_frames_world(mesh: RawMesh, root: Path, top: dict[str, Any], frames: lis
         if there > MOST and here < FEW:
             return replace(mesh, vertices=moved), [
                 f"'{mesh.name}' was moved from the original world to the poses' by 'applied_transform': {there:.0%} of "
-                f"the cameras are then within its box, and {here:.0%} else; --convention {AS_READ} leaves it."]
+                f"the cameras are then within its box, and {here:.0%} else; --convention {AS_READ} leaves it."
+            ]
     if top.get("applied_transform") is None and top.get("applied_scale") is None:
         return mesh, []
-    return mesh, [f"The poses were moved by 'applied_transform' or 'applied_scale'; '{mesh.name}' was taken to have "
-                  "been moved with them."]
+    return mesh, [
+        f"The poses were moved by 'applied_transform' or 'applied_scale'; '{mesh.name}' was taken to have "
+        "been moved with them."
+    ]
 
 
 def _within(vertices: np.ndarray, frames: list[Frame]) -> float:

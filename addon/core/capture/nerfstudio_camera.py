@@ -35,13 +35,16 @@ def check_model(top: dict[str, Any], entry: dict[str, Any], path: Path) -> str:
     """The camera model; raises `BadInputError` for one that is not known."""
     model = entry.get("camera_model", top.get("camera_model", MODELS[0]))
     if model not in MODELS:
-        raise BadInputError(f"'{path}' has frames of camera model '{model}', which aren't supported; undistort them to "
-                            f"one of {', '.join(MODELS)}.")
+        raise BadInputError(
+            f"'{path}' has frames of camera model '{model}', which aren't supported; undistort them to "
+            f"one of {', '.join(MODELS)}."
+        )
     return model
 
 
-def read_camera(top: dict[str, Any], entry: dict[str, Any], name: str, picture: Path, model: str,
-                pose: np.ndarray) -> Camera:
+def read_camera(
+    top: dict[str, Any], entry: dict[str, Any], name: str, picture: Path, model: str, pose: np.ndarray
+) -> Camera:
     """The camera of a frame; raises `BadInputError` where a number is missing or impossible."""
     size = [positive(top, entry, key, name, None) for key in ("w", "h")]
     if None in size:
@@ -88,16 +91,21 @@ def lens_notes(top: dict[str, Any], entries: list[Any]) -> list[str]:
             continue
         radial = [entry.get(key, top.get(key)) or 0 for key in RADIAL]
         if any(radial[4:]):
-            return ["k5 or k6 is given, which nerfstudio does not know: k1 to k6 were taken as OpenCV's rational model "
-                    "(k4 to k6 divide)."]
+            return [
+                "k5 or k6 is given, which nerfstudio does not know: k1 to k6 were taken as OpenCV's rational model "
+                "(k4 to k6 divide)."
+            ]
         if radial[3]:
-            return ["k4 was taken as nerfstudio takes it, as the factor of r^8; if the numbers are OpenCV's, where k4 "
-                    "divides, name the camera_model FULL_OPENCV."]
+            return [
+                "k4 was taken as nerfstudio takes it, as the factor of r^8; if the numbers are OpenCV's, where k4 "
+                "divides, name the camera_model FULL_OPENCV."
+            ]
     return []
 
 
-def _focal_lengths(top: dict[str, Any], entry: dict[str, Any], name: str, width: int, height: int,
-                   model: str) -> tuple[float, float]:
+def _focal_lengths(
+    top: dict[str, Any], entry: dict[str, Any], name: str, width: int, height: int, model: str
+) -> tuple[float, float]:
     fx = positive(top, entry, "fl_x", name, None)
     fy = positive(top, entry, "fl_y", name, None)
     if model == PANORAMA:  # nerfstudio's focal lengths are half the width, for pi; `Equirectangular` counts in radians
@@ -124,10 +132,12 @@ def _lens(top: dict[str, Any], entry: dict[str, Any], name: str, model: str) -> 
     listed = _listed(top, entry, name)
     if model == FISHEYE624:
         if len(listed) != 12:
-            raise BadInputError(f"Frame '{name}' has {len(listed)} {LISTED}, but FISHEYE624 takes 12: k0 to k5, p0, "
-                                "p1, s0 to s3.")
-        return polynomial(model, fisheye=True, numerator=listed[:6], tangential=(listed[7], listed[6]),
-                          prism=listed[8:], chained=True)
+            raise BadInputError(
+                f"Frame '{name}' has {len(listed)} {LISTED}, but FISHEYE624 takes 12: k0 to k5, p0, p1, s0 to s3."
+            )
+        return polynomial(
+            model, fisheye=True, numerator=listed[:6], tangential=(listed[7], listed[6]), prism=listed[8:], chained=True
+        )
     if listed:
         if any(listed) and len(listed) != 6:
             raise BadInputError(f"Frame '{name}' has {len(listed)} {LISTED}; give six: k1 to k4, p1, p2.")

@@ -48,18 +48,23 @@ def read_brackets(root: Path, top: Entry, entry: Entry, name: str, outside: bool
     if listed in (None, []):
         return ()
     if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
-        raise BadInputError(f"Frame '{name}' has brackets that are no list of objects; give file_path and exposure of "
-                            "each.")
+        raise BadInputError(
+            f"Frame '{name}' has brackets that are no list of objects; give file_path and exposure of each."
+        )
     if any(one.get(EXPOSURE) is None for one in listed):
         raise BadInputError(f"Frame '{name}' has brackets without an exposure; give each its own.")
     saturation = {"saturation": entry.get("saturation", top.get("saturation"))}
-    return tuple(Shot(ended(inside(root, one.get("file_path"), name, outside), name),
-                      positive({}, one, EXPOSURE, name, None),
-                      positive(saturation, one, "saturation", name, math.inf)) for one in listed)
+    return tuple(
+        Shot(
+            ended(inside(root, one.get("file_path"), name, outside), name),
+            positive({}, one, EXPOSURE, name, None),
+            positive(saturation, one, "saturation", name, math.inf),
+        )
+        for one in listed
+    )
 
 
-def with_settings(frames: Sequence[Frame],
-                  told: Sequence[tuple[Entry, Entry]]) -> tuple[list[Frame], list[str]]:
+def with_settings(frames: Sequence[Frame], told: Sequence[tuple[Entry, Entry]]) -> tuple[list[Frame], list[str]]:
     """Give the frames exposures by what the camera was set to, unless any of them states an exposure.
 
     Parameters

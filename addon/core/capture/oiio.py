@@ -106,14 +106,20 @@ def read_coded(path: Path | str) -> Stored:
 def _library(path: Path) -> Any:
     """The module OpenImageIO; pip's bpy has it in a folder that only Blender as a program puts on the path."""
     if importlib.util.find_spec("OpenImageIO") is None:
-        found = (folder.parent for entry in sys.path for python in ("python*/", "")
-                 for folder in Path(entry).glob(f"bpy/*/python/lib/{python}site-packages/OpenImageIO"))
+        found = (
+            folder.parent
+            for entry in sys.path
+            for python in ("python*/", "")
+            for folder in Path(entry).glob(f"bpy/*/python/lib/{python}site-packages/OpenImageIO")
+        )
         sys.path += [str(folder) for folder in found][:1]
     try:
         import OpenImageIO
     except ImportError as error:
-        raise BadInputError(f"Picture '{path}' needs OpenImageIO, which this Python has not; install it (pip: "
-                            "OpenImageIO, Debian: python3-openimageio), or write the picture as OpenEXR.") from error
+        raise BadInputError(
+            f"Picture '{path}' needs OpenImageIO, which this Python has not; install it (pip: "
+            "OpenImageIO, Debian: python3-openimageio), or write the picture as OpenEXR."
+        ) from error
     return OpenImageIO
 
 
@@ -140,14 +146,17 @@ def _checked(file: Any, path: Path) -> Header:
         raise BadInputError(f"Picture '{path}' claims {width} x {height} pixels; write it again.")
     bits = spec.get_int_attribute("oiio:BitsPerSample", 8)
     if depth not in DEPTHS or (file.format_name() == "tiff" and bits not in WHOLE_BYTES):
-        raise BadInputError(f"Picture '{path}' has channels of {bits} bits ({depth}), which isn't supported; write PNG "
-                            "or EXR.")
+        raise BadInputError(
+            f"Picture '{path}' has channels of {bits} bits ({depth}), which isn't supported; write PNG or EXR."
+        )
     if file.format_name() == "png":
         bits, colour = _png_kind(path)
         larger = 4 if colour == PALETTE else 1  # what a pixel of the file becomes when a palette is looked up
         if spec.image_bytes() * min(bits, 8) // 8 > max(LITTLE, larger * MAX_RATIO * path.stat().st_size):
-            raise BadInputError(f"Picture '{path}' claims {width} x {height} pixels, more than it can hold; it is "
-                                "damaged or cut off, so write or copy it again.")
+            raise BadInputError(
+                f"Picture '{path}' claims {width} x {height} pixels, more than it can hold; it is "
+                "damaged or cut off, so write or copy it again."
+            )
     return Header(width, height, DEPTHS[depth])
 
 

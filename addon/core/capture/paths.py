@@ -46,8 +46,10 @@ def inside(root: Path, value: Any, name: str, outside: bool = False, folder: Pat
         for kind in (PurePosixPath, PureWindowsPath):
             path = kind(value)
             if path.is_absolute() or path.drive or path.root or ".." in path.parts:
-                raise EscapesError(f"Frame '{name}' has the path '{value}', which leads out of the capture '{root}'; "
-                                   "give paths within it, or allow others with --outside.")
+                raise EscapesError(
+                    f"Frame '{name}' has the path '{value}', which leads out of the capture '{root}'; "
+                    "give paths within it, or allow others with --outside."
+                )
     if PureWindowsPath(value).drive:  # written on Windows: there alone it may lead anywhere
         return Path(value)
     return (folder or root) / PurePosixPath(value.replace("\\", "/"))
@@ -69,5 +71,7 @@ def check_links(root: Path, frame: Frame) -> None:
         except (OSError, RuntimeError, ValueError):  # a loop, or a name that can't be: told when it is read
             continue
         if not inside_root:
-            raise EscapesError(f"Frame '{frame.name}': '{path}' is a link or lies behind one that leads out of the "
-                               f"capture '{root}'; allow that with --outside.")
+            raise EscapesError(
+                f"Frame '{frame.name}': '{path}' is a link or lies behind one that leads out of the "
+                f"capture '{root}'; allow that with --outside."
+            )

@@ -42,8 +42,9 @@ def picture_kind(path: Path | str) -> str:
     for kind, magic in {EXR: exr_header.MAGIC, HDR: radiance_hdr.MAGIC, **CODED}.items():
         if head.startswith(magic):
             return kind
-    raise BadInputError(f"Picture '{path}' is not an OpenEXR, Radiance HDR, PNG, JPEG or TIFF file, or is damaged; "
-                        "write it as OpenEXR.")
+    raise BadInputError(
+        f"Picture '{path}' is not an OpenEXR, Radiance HDR, PNG, JPEG or TIFF file, or is damaged; write it as OpenEXR."
+    )
 
 
 def picture_size(path: Path) -> tuple[int, int]:
@@ -107,8 +108,10 @@ def read_picture(path: Path, transfer: str = "") -> Picture:
 
 def unstated(path: Path | str) -> str:
     """The sentence on a picture of codes whose curve nobody told."""
-    return (f"Picture '{path}' holds 8 or 16-bit codes, and tone-mapped frames give wrong light; give EXR or HDR "
-            "frames, or the codes' curve with --transfer (srgb, linear, or a gamma such as 2.2).")
+    return (
+        f"Picture '{path}' holds 8 or 16-bit codes, and tone-mapped frames give wrong light; give EXR or HDR "
+        "frames, or the codes' curve with --transfer (srgb, linear, or a gamma such as 2.2)."
+    )
 
 
 def read_mask(path: Path) -> np.ndarray:

@@ -27,8 +27,9 @@ KEPT = 4
 
 
 @functools.lru_cache(maxsize=KEPT)
-def _pixel_rays(width: int, height: int, fx: float, fy: float, cx: float, cy: float,
-                lens: Lens | None) -> tuple[np.ndarray, np.ndarray | None]:
+def _pixel_rays(
+    width: int, height: int, fx: float, fy: float, cx: float, cy: float, lens: Lens | None
+) -> tuple[np.ndarray, np.ndarray | None]:
     x = np.broadcast_to((np.arange(width) + 0.5 - cx) / fx, (height, width))
     y = np.broadcast_to(((cy - np.arange(height) - 0.5) / fy)[:, None], (height, width))
     if lens is None:

@@ -106,14 +106,14 @@ def _parse(content: bytes) -> PlyMesh:
     if "vertex" not in found:
         raise _Damaged("holds no vertices")
     element, starts, lists = found["vertex"]
-    values = {name: _scalars(body, element, starts, lists, name)
-              for name in ("x", "y", "z", *sum(UV_NAMES, ()))}
+    values = {name: _scalars(body, element, starts, lists, name) for name in ("x", "y", "z", *sum(UV_NAMES, ()))}
     if any(values[axis] is None for axis in "xyz"):
         raise _Damaged("has vertices without x, y and z")
     vertices = np.stack([values[axis] for axis in "xyz"], -1).astype(np.float64)
     if "face" not in found:
-        return PlyMesh(vertices, np.zeros((0, 3), np.int32), None, None, np.zeros(0, np.int64),
-                       np.zeros((0, 3), np.int32))
+        return PlyMesh(
+            vertices, np.zeros((0, 3), np.int32), None, None, np.zeros(0, np.int64), np.zeros((0, 3), np.int32)
+        )
 
     element, starts, lists = found["face"]
     name = next((n for n in INDEX_NAMES if n in lists), None)
@@ -236,8 +236,9 @@ def _possible(body: _Body, element: Element, begin: np.ndarray) -> tuple[np.ndar
     return end, places
 
 
-def _scalars(body: _Body, element: Element, starts: np.ndarray, lists: dict[str, np.ndarray],
-             name: str) -> np.ndarray | None:
+def _scalars(
+    body: _Body, element: Element, starts: np.ndarray, lists: dict[str, np.ndarray], name: str
+) -> np.ndarray | None:
     """The values of the scalar property `name`, (n,) in its own type (float64 where text); None where absent."""
     at = starts
     for p in element.properties:
@@ -251,8 +252,9 @@ def _scalars(body: _Body, element: Element, starts: np.ndarray, lists: dict[str,
     return None
 
 
-def _triangles(body: _Body, at: np.ndarray, count_kind: str, kind: str,
-               vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _triangles(
+    body: _Body, at: np.ndarray, count_kind: str, kind: str, vertices: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Split the polygons whose lists stand at `at`.
 
     Returns
@@ -271,8 +273,9 @@ def _triangles(body: _Body, at: np.ndarray, count_kind: str, kind: str,
         bad = ~((values >= 0) & (values < len(vertices)) & (values == np.floor(values)))
         if bad.any():
             face, corner = np.argwhere(bad)[0]
-            raise _Damaged(f"has a face ({faces[face]}) that points to vertex {values[face, corner]} "
-                           f"of {len(vertices)}")
+            raise _Damaged(
+                f"has a face ({faces[face]}) that points to vertex {values[face, corner]} of {len(vertices)}"
+            )
         polygon = values.astype(np.int32)
         later = np.arange(1, corners - 1)
         fan = np.broadcast_to(np.stack([0 * later, later, later + 1], -1), (len(faces), corners - 2, 3))

@@ -48,8 +48,10 @@ def check_pose(matrix: Any, name: str) -> np.ndarray:
     rotation = pose[:3, :3]
     # Bounded first: the square of a huge number is inf.
     if np.abs(rotation).max() > 1e3 or np.abs(rotation.T @ rotation - np.eye(3)).max() > TOLERANCE:
-        raise BadInputError(f"Frame '{name}' has a pose that is not rigid (scaled or sheared); "
-                            "take the scale out of its transform_matrix.")
+        raise BadInputError(
+            f"Frame '{name}' has a pose that is not rigid (scaled or sheared); "
+            "take the scale out of its transform_matrix."
+        )
     if np.linalg.det(rotation) < 0:
         raise BadInputError(f"Frame '{name}' has a mirrored pose; flip one axis of its transform_matrix.")
     u, _, v = np.linalg.svd(rotation)

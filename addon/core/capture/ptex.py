@@ -17,8 +17,13 @@ from ..errors import BadInputError
 
 THRESHOLD = 16
 """Up to so many elements are left to the final insertion sort."""
-SPREAD = (32, 0x1F00000000FFFF), (16, 0x1F0000FF0000FF), (8, 0x100F00F00F00F00F), (4, 0x10C30C30C30C30C3), \
-    (2, 0x1249249249249249)
+SPREAD = (
+    (32, 0x1F00000000FFFF),
+    (16, 0x1F0000FF0000FF),
+    (8, 0x100F00F00F00F00F),
+    (4, 0x10C30C30C30C30C3),
+    (2, 0x1249249249249249),
+)
 """Shifts and masks that put two zeros behind each of 21 bits."""
 
 
@@ -69,8 +74,9 @@ def read_sorted_faces(path: Path, faces: int) -> list[np.ndarray]:
     listed = np.concatenate(chunks) if chunks else np.zeros(0, np.int64)
     whole = len(listed) == faces and listed.max(initial=0) < faces and len(np.unique(listed)) == faces
     if at != len(words) or not whole or len(chunks) != words[0] + (words[1] << 32):
-        raise BadInputError(f"'{path}' does not list each of the mesh's {faces} faces once; take it away or copy it "
-                            "again.")
+        raise BadInputError(
+            f"'{path}' does not list each of the mesh's {faces} faces once; take it away or copy it again."
+        )
     return chunks
 
 

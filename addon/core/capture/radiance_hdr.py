@@ -59,8 +59,10 @@ class _Header:
             elif key == b"PRIMARIES":
                 self.chromaticities = tuple(_numbers(value, 8, path).tolist())
         if self.format not in (RGBE, XYZE):
-            raise BadInputError(f"Picture '{path}' has the format '{self.format[:40].decode('latin-1')}', which isn't "
-                                "supported; write it as RGBE.")
+            raise BadInputError(
+                f"Picture '{path}' has the format '{self.format[:40].decode('latin-1')}', which isn't "
+                "supported; write it as RGBE."
+            )
         if not ((self.scale > 1e-30) & (self.scale < 1e30)).all():
             raise BadInputError(f"Picture '{path}' states an EXPOSURE or COLORCORR that can't be; write it again.")
 
@@ -129,8 +131,12 @@ def _lines(content: bytes, header: _Header, path: Path) -> np.ndarray:
 
 def _is_new(content: bytes, at: int, width: int) -> bool:
     """Whether the line at `at` is stored channel by channel."""
-    return (RUNS[0] <= width <= RUNS[1] and content[at : at + 2] == b"\2\2" and at + 4 <= len(content)
-            and content[at + 2] << 8 | content[at + 3] == width)
+    return (
+        RUNS[0] <= width <= RUNS[1]
+        and content[at : at + 2] == b"\2\2"
+        and at + 4 <= len(content)
+        and content[at + 2] << 8 | content[at + 3] == width
+    )
 
 
 def _has_runs(content: bytes, at: int) -> bool:

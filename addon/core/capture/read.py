@@ -59,8 +59,11 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
     notes = [*grouped, *_chosen(frames), *notes]
     known = {one.object_id for one in objects}
     turn = upright(convention.up)
-    mirrors = tuple(replace(one, point=turn @ one.point, normal=turn @ one.normal)
-                    for one in layout.mirrors if one.object_id in known)
+    mirrors = tuple(
+        replace(one, point=turn @ one.point, normal=turn @ one.normal)
+        for one in layout.mirrors
+        if one.object_id in known
+    )
     warnings = tuple(one_line(text) for text in (*warnings, *more, *notes))
     return Capture(root, mesh, objects, tuple(frames), warnings, reader.name, mirrors)
 
@@ -73,8 +76,9 @@ def _exposed(layout: Layout, reading: Reading) -> Layout:
     else:
         frames, notes = from_exif(frames)
     frames, more, curves = with_curves(frames, reading.transfer)
-    return replace(layout, frames=frames, problems=[*layout.problems, *problems, *more],
-                   notes=[*layout.notes, *notes, *curves])
+    return replace(
+        layout, frames=frames, problems=[*layout.problems, *problems, *more], notes=[*layout.notes, *notes, *curves]
+    )
 
 
 def _chosen(frames: list[Frame]) -> list[str]:
@@ -98,9 +102,11 @@ def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str
         found = connected_parts(raw.vertices, raw.triangles)
         count = int(found.max()) + 1
         names = {i: f"part_{i}" for i in range(count)} if count > 1 else {0: "room"}
-        warnings.append(f"Nothing tells the mesh's objects; each of its {count} connected parts is taken as one." if
-                        count > 1 else "The mesh has no object_id on its faces and hangs together; the whole room is "
-                        "taken as one object.")
+        warnings.append(
+            f"Nothing tells the mesh's objects; each of its {count} connected parts is taken as one."
+            if count > 1
+            else "The mesh has no object_id on its faces and hangs together; the whole room is taken as one object."
+        )
     ids, objects, more = instances.assign(found, names, layout.names_file or instances.FILE)
     return Mesh(raw.vertices, raw.triangles, ids, raw.uv, None if frames else raw.lit), objects, warnings + more
 
@@ -125,12 +131,15 @@ def _usable(root: Path, layout: Layout, outside: bool) -> tuple[list[Frame], lis
     if problems:
         few = " ".join(problems[:LISTED]) + (f" And {len(problems) - LISTED} more." if len(problems) > LISTED else "")
         if len(problems) > MAX_BAD_SHARE * total:
-            raise BadInputError(f"Capture '{root}' has {len(problems)} bad frames of {total}, too many to leave out; "
-                                f"mend these: {few}")
+            raise BadInputError(
+                f"Capture '{root}' has {len(problems)} bad frames of {total}, too many to leave out; mend these: {few}"
+            )
         warnings.append(f"{len(problems)} of {total} frames are left out: {few}")
     if len(good) == 1:
-        warnings.append("The capture has a single frame; highlights can't be told from colour, and what it does not "
-                        "see stays unknown.")
+        warnings.append(
+            "The capture has a single frame; highlights can't be told from colour, and what it does not "
+            "see stays unknown."
+        )
     return good, warnings
 
 
@@ -142,8 +151,10 @@ def _check_frame(frame: Frame) -> None:
     sizes = [(path, picture_size(path)) for path in paths if path is not None]
     for path, (width, height) in sizes:
         if (width, height) != wanted:
-            raise BadInputError(f"Frame '{frame.name}': '{path}' has {width} x {height} pixels, but its camera has "
-                                f"{wanted[0]} x {wanted[1]}; give them one size.")
+            raise BadInputError(
+                f"Frame '{frame.name}': '{path}' has {width} x {height} pixels, but its camera has "
+                f"{wanted[0]} x {wanted[1]}; give them one size."
+            )
 
 
 def describe(capture: Capture) -> dict[str, Any]:
@@ -155,8 +166,10 @@ def describe(capture: Capture) -> dict[str, Any]:
     sizes: dict[str, int] = {}
     lenses: dict[str, int] = {}
     for camera in (frame.camera for frame in capture.frames):
-        for counted, key in ((sizes, f"{camera.width}x{camera.height}"),
-                             (lenses, "PINHOLE" if camera.lens is None else camera.lens.name)):
+        for counted, key in (
+            (sizes, f"{camera.width}x{camera.height}"),
+            (lenses, "PINHOLE" if camera.lens is None else camera.lens.name),
+        ):
             counted[key] = counted.get(key, 0) + 1
     return {
         "capture": str(capture.root),

@@ -8,8 +8,15 @@ from ..errors import BadInputError
 from . import colmap, fipt, nerfstudio, replica, scannetpp, traj
 from .layout import Reader
 
-READERS: tuple[Reader, ...] = (replica.READER, fipt.SYNTHETIC, fipt.REAL, scannetpp.READER, traj.READER,
-                               nerfstudio.READER, colmap.READER)
+READERS: tuple[Reader, ...] = (
+    replica.READER,
+    fipt.SYNTHETIC,
+    fipt.REAL,
+    scannetpp.READER,
+    traj.READER,
+    nerfstudio.READER,
+    colmap.READER,
+)
 
 
 def reader_for(root: Path, name: str = "") -> Reader:

@@ -52,8 +52,9 @@ def read(root: Path, reading: Reading) -> Layout:
     if (root / SEMANTIC).is_file():
         ids, far = _object_id(root / SEMANTIC, ply)
         mesh = replace(mesh, object_id=ids)
-        notes += [f"{far:.1%} of the triangles have no face of '{SEMANTIC}' near; they belong to no object."] if far \
-            else []
+        notes += (
+            [f"{far:.1%} of the triangles have no face of '{SEMANTIC}' near; they belong to no object."] if far else []
+        )
     elif (root / FILE).is_file():
         names_file = FILE
     if (root / names_file).is_file():
@@ -69,8 +70,10 @@ def read(root: Path, reading: Reading) -> Layout:
         mesh = replace(mesh, vertices=layout.mesh.vertices)  # its reader may have moved it to the poses' world
         notes.append("The capture has frames; the light stored on its mesh is not used.")
         return Layout(layout.frames, mesh, names, names_file, layout.problems, layout.notes + notes, mirrors)
-    notes.append("The capture has no frames; its light is taken from the textures on its mesh, which hold one value "
-                 "for all views: highlights can't be told, nor what lies outside.")
+    notes.append(
+        "The capture has no frames; its light is taken from the textures on its mesh, which hold one value "
+        "for all views: highlights can't be told, nor what lies outside."
+    )
     return Layout([], replace(mesh, lit=_tiles(root, ply)), names, names_file, notes=notes, mirrors=mirrors)
 
 
@@ -79,8 +82,9 @@ def _tiles(root: Path, ply: PlyMesh) -> LitTiles:
     split, size = _parameters(root / PARAMETERS)
     faces = int(ply.face.max(initial=-1)) + 1
     if len(ply.triangles) != 2 * faces or ply.corner.max(initial=0) > 3:
-        raise BadInputError(f"Mesh '{root / MESH}' is not made of quads alone, as its textures need; use the one that "
-                            "came with them.")
+        raise BadInputError(
+            f"Mesh '{root / MESH}' is not made of quads alone, as its textures need; use the one that came with them."
+        )
     quads = np.zeros((faces, 4), np.int64)
     quads[ply.face[:, None], ply.corner] = ply.triangles
     if (root / ORDER).is_file():
@@ -95,8 +99,10 @@ def _tiles(root: Path, ply: PlyMesh) -> LitTiles:
         sides.append(_side(path, size, len(chunk), root, i))
         picture[chunk], tile[chunk] = i, np.arange(len(chunk))
     if (root / TEXTURES / PICTURE.format(len(chunks))).exists():
-        raise BadInputError(f"'{root / TEXTURES}' has more pictures than the mesh's {len(chunks)} chunks; use the mesh "
-                            "that came with them.")
+        raise BadInputError(
+            f"'{root / TEXTURES}' has more pictures than the mesh's {len(chunks)} chunks; use the mesh "
+            "that came with them."
+        )
     return LitTiles(tuple(paths), tuple(sides), size, picture[ply.face], tile[ply.face], CORNERS[ply.corner])
 
 
@@ -118,11 +124,14 @@ def _side(path: Path, size: int, faces: int, root: Path, i: int) -> int:
     count = path.stat().st_size
     side = round((count / TEXEL_BYTES) ** 0.5)
     if TEXEL_BYTES * side * side != count:
-        raise BadInputError(f"Texture '{path}' has {count} bytes, which is no square of raw half floats; copy it "
-                            "again.")
+        raise BadInputError(
+            f"Texture '{path}' has {count} bytes, which is no square of raw half floats; copy it again."
+        )
     if (side // size) ** 2 < faces:
-        raise BadInputError(f"Texture '{path}' has room for {(side // size) ** 2} faces of {size} x {size} texels, but "
-                            f"its chunk has {faces}; use the mesh and parameters that came with it.")
+        raise BadInputError(
+            f"Texture '{path}' has room for {(side // size) ** 2} faces of {size} x {size} texels, but "
+            f"its chunk has {faces}; use the mesh and parameters that came with it."
+        )
     return side
 
 
@@ -147,5 +156,9 @@ def _object_id(path: Path, ply: PlyMesh) -> tuple[np.ndarray, float]:
     return np.where(far, -1, other.object_id[nearest]), float(far.mean())
 
 
-READER = Reader("replica", f"{PARAMETERS} beside {MESH}",
-                lambda root: (root / PARAMETERS).is_file() and (root / MESH).is_file(), read)
+READER = Reader(
+    "replica",
+    f"{PARAMETERS} beside {MESH}",
+    lambda root: (root / PARAMETERS).is_file() and (root / MESH).is_file(),
+    read,
+)

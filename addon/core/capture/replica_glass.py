@@ -87,11 +87,15 @@ def mirrors_of(panes: list[Pane], mesh: RawMesh, names: dict[int, str]) -> tuple
     notes = []
     if panes:
         told = ", ".join(f"{names.get(i, 'object')} ({i}) {m.reflectivity:.0%}" for i, m in sorted(found.items()))
-        notes.append(f"'{FILE}' lists {glass} panes of glass, which are taken as opaque, and {len(panes) - glass} "
-                     f"mirrors: {told or 'none that is an object'}.")
+        notes.append(
+            f"'{FILE}' lists {glass} panes of glass, which are taken as opaque, and {len(panes) - glass} "
+            f"mirrors: {told or 'none that is an object'}."
+        )
     if lost:
-        notes.append(f"{lost} mirrors of '{FILE}' are part of a larger object, or none; they are taken as a picture of "
-                     "what they show.")
+        notes.append(
+            f"{lost} mirrors of '{FILE}' are part of a larger object, or none; they are taken as a picture of "
+            "what they show."
+        )
     return list(found.values()), notes
 
 

@@ -86,8 +86,10 @@ def objects_of(root: Path, mesh: RawMesh) -> tuple[np.ndarray, dict[int, str]]:
     except (TypeError, ValueError, OverflowError):
         segment = np.zeros(0)
     if segment.shape != (len(mesh.vertices),):
-        raise BadInputError(f"'{root / SEGMENTS}' does not name a segment for each of the {len(mesh.vertices)} vertices"
-                            f" of '{mesh.name}'; copy both from the same scan.")
+        raise BadInputError(
+            f"'{root / SEGMENTS}' does not name a segment for each of the {len(mesh.vertices)} vertices"
+            f" of '{mesh.name}'; copy both from the same scan."
+        )
     groups = read_json(root / OBJECTS).get("segGroups")
     if not isinstance(groups, list):
         raise BadInputError(f"'{root / OBJECTS}' has no list 'segGroups'; copy it again.")
@@ -115,8 +117,10 @@ def _group(group: Any, i: int, root: Path) -> tuple[int, list[int]]:
     own = group.get("segments") if isinstance(group, dict) else None
     good = isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= MAX_ID
     if not good or not isinstance(own, list) or not all(isinstance(one, int) and abs(one) < 2**62 for one in own):
-        raise BadInputError(f"'{root / OBJECTS}' has an object (number {i}) without a whole 'objectId' and a list of "
-                            "'segments'; copy it again.")
+        raise BadInputError(
+            f"'{root / OBJECTS}' has an object (number {i}) without a whole 'objectId' and a list of "
+            "'segments'; copy it again."
+        )
     return number, own
 
 
@@ -125,11 +129,19 @@ def _undistorted(frames: list[Frame], root: Path) -> list[Frame]:
     top = read_json(root / PINHOLE)
     found = [top.get(key) for key in ("w", "h", "fl_x", "fl_y", "cx", "cy")]
     if not all(is_number(value) for value in found) or min(found[:4]) <= 0 or any(v != int(v) for v in found[:2]):
-        raise BadInputError(f"'{root / PINHOLE}' does not give w, h, fl_x, fl_y, cx and cy; undistort the pictures "
-                            "again.")
+        raise BadInputError(
+            f"'{root / PINHOLE}' does not give w, h, fl_x, fl_y, cx and cy; undistort the pictures again."
+        )
     width, height, fx, fy, cx, cy = found
-    pinhole = {"width": int(width), "height": int(height), "fx": float(fx), "fy": float(fy), "cx": float(cx),
-               "cy": float(cy), "lens": None}
+    pinhole = {
+        "width": int(width),
+        "height": int(height),
+        "fx": float(fx),
+        "fy": float(fy),
+        "cx": float(cx),
+        "cy": float(cy),
+        "lens": None,
+    }
     return [replace(frame, camera=replace(frame.camera, **pinhole)) for frame in frames]
 
 
@@ -155,8 +167,11 @@ def _tests(top: dict[str, Any]) -> set[str]:
 
 def _bad(top: dict[str, Any]) -> set[str]:
     listed = top.get("frames")
-    return {Path(str(one.get("file_path"))).stem for one in listed if isinstance(one, dict) and one.get("is_bad")} \
-        if isinstance(listed, list) else set()
+    return (
+        {Path(str(one.get("file_path"))).stem for one in listed if isinstance(one, dict) and one.get("is_bad")}
+        if isinstance(listed, list)
+        else set()
+    )
 
 
 def _masked(frame: Frame, folder: Path, masks: Path) -> Frame:
@@ -165,5 +180,6 @@ def _masked(frame: Frame, folder: Path, masks: Path) -> Frame:
     return replace(frame, mask_path=path) if path.is_file() else frame
 
 
-READER = Reader("scannet++", f"{MODEL} and {MESH}",
-                lambda root: (root / MESH).is_file() and bool(model_files(root / MODEL)), read)
+READER = Reader(
+    "scannet++", f"{MODEL} and {MESH}", lambda root: (root / MESH).is_file() and bool(model_files(root / MODEL)), read
+)

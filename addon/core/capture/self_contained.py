@@ -144,10 +144,16 @@ def _beside(path: Path, uri: Any) -> Path:
     """The file that `uri` names, which has to lie in the folder of `path` or below."""
     name = unquote(uri) if isinstance(uri, str) else ""
     kinds = PurePosixPath(name), PureWindowsPath(name)
-    if not name or "\0" in name or "://" in name or any(
-            kind.is_absolute() or kind.drive or kind.root or ".." in kind.parts for kind in kinds):
-        raise BadInputError(f"Mesh '{path}' names the buffer {str(uri)[:80]!r}, which does not lie beside it; "
-                            "export it as one GLB file.")
+    if (
+        not name
+        or "\0" in name
+        or "://" in name
+        or any(kind.is_absolute() or kind.drive or kind.root or ".." in kind.parts for kind in kinds)
+    ):
+        raise BadInputError(
+            f"Mesh '{path}' names the buffer {str(uri)[:80]!r}, which does not lie beside it; "
+            "export it as one GLB file."
+        )
     found = path.parent / name
     if not found.is_file():
         raise BadInputError(f"Mesh '{path}' names the buffer '{found}', which is not there; copy it as well.")

@@ -48,8 +48,9 @@ def read_frames(root: Path) -> tuple[list[Frame], list[str], list[str]]:
     lines = _lines(root / POSES)
     pictures = _pictures(root / FOLDER)
     if not pictures:
-        raise BadInputError(f"Folder '{root / FOLDER}' has no pictures called frame000000.exr and so on; put the "
-                            "frames there.")
+        raise BadInputError(
+            f"Folder '{root / FOLDER}' has no pictures called frame000000.exr and so on; put the frames there."
+        )
     frames, problems = [], []
     for i, path in sorted(pictures.items()):
         name = path.stem
@@ -71,15 +72,18 @@ def _camera(root: Path) -> Camera:
     """The one camera of all frames, without a pose."""
     path = next((p for p in (root / PARAMETERS, root.absolute().parent / PARAMETERS) if p.is_file()), None)
     if path is None:
-        raise BadInputError(f"'{root / PARAMETERS}' does not exist; give the camera there: "
-                            '{"camera": {"w": 1200, "h": 680, "fx": 600, "fy": 600, "cx": 599.5, "cy": 339.5}}.')
+        raise BadInputError(
+            f"'{root / PARAMETERS}' does not exist; give the camera there: "
+            '{"camera": {"w": 1200, "h": 680, "fx": 600, "fy": 600, "cx": 599.5, "cy": 339.5}}.'
+        )
     top = read_json(path)
     values = top.get("camera", top)
     names = ("w", "h", "fx", "fy", "cx", "cy")
     found = [values.get(name) if isinstance(values, dict) else None for name in names]
     if not all(is_number(value) for value in found) or min(found[:4]) <= 0:
-        raise BadInputError(f"'{path}' lacks a number among {', '.join(names)}, or one of the first four is not above "
-                            "0; mend it.")
+        raise BadInputError(
+            f"'{path}' lacks a number among {', '.join(names)}, or one of the first four is not above 0; mend it."
+        )
     if any(value != int(value) for value in found[:2]):
         raise BadInputError(f"'{path}' has a size of {found[0]} x {found[1]}; give whole pixels as w and h.")
     return Camera(int(found[0]), int(found[1]), *(float(value) for value in found[2:]), np.eye(4))
@@ -133,5 +137,9 @@ def _mesh(root: Path, reading: Reading) -> RawMesh:
     return read_mesh(find_mesh(root, reading), reading)
 
 
-READER = Reader("traj", f"{POSES} and {FOLDER}/frame000000.exr",
-                lambda root: (root / POSES).is_file() and (root / FOLDER).is_dir(), read)
+READER = Reader(
+    "traj",
+    f"{POSES} and {FOLDER}/frame000000.exr",
+    lambda root: (root / POSES).is_file() and (root / FOLDER).is_dir(),
+    read,
+)

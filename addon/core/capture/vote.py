@@ -20,8 +20,9 @@ PACK = 8
 """Frames whose votes are summed at once; bounds the memory."""
 
 
-def vote(vertices: np.ndarray, triangles: np.ndarray, frames: Sequence[Frame],
-         read: Callable[[Frame], np.ndarray]) -> tuple[np.ndarray, list[str]]:
+def vote(
+    vertices: np.ndarray, triangles: np.ndarray, frames: Sequence[Frame], read: Callable[[Frame], np.ndarray]
+) -> tuple[np.ndarray, list[str]]:
     """Give every triangle the id that most pixels have that see it first.
 
     Pixels next to one of another id are left out: at edges, a mesh and a picture rarely agree. A triangle that no
@@ -68,9 +69,11 @@ def vote(vertices: np.ndarray, triangles: np.ndarray, frames: Sequence[Frame],
     result[triangle[order][last]], known[triangle[order][last]] = ids[order][last], True
     agreeing = count[order][last].sum() / count.sum()
     result = _spread(vertices, triangles, result, known)
-    notes = [f"The objects are voted from {len(frames) - len(problems)} pictures of ids; {agreeing:.1%} of the pixels "
-             f"agree with their triangle, and {1 - known.mean():.1%} of the triangles, which none sees, take their "
-             "neighbours'."]
+    notes = [
+        f"The objects are voted from {len(frames) - len(problems)} pictures of ids; {agreeing:.1%} of the pixels "
+        f"agree with their triangle, and {1 - known.mean():.1%} of the triangles, which none sees, take their "
+        "neighbours'."
+    ]
     if problems:
         notes.append(f"{len(problems)} pictures of ids can't be used; the first: {problems[0]}")
     return result, notes
@@ -80,13 +83,18 @@ def _votes(scene: RayScene, frame: Frame, ids: np.ndarray, step: int) -> tuple[n
     """Triangle, id and number of votes of a frame; each pair once."""
     camera = frame.camera
     if ids.shape != (camera.height, camera.width):
-        raise BadInputError(f"Frame '{frame.name}': '{frame.id_path}' has {ids.shape[1]} x {ids.shape[0]} pixels, but "
-                            f"its camera has {camera.width} x {camera.height}; give them one size.")
+        raise BadInputError(
+            f"Frame '{frame.name}': '{frame.id_path}' has {ids.shape[1]} x {ids.shape[0]} pixels, but "
+            f"its camera has {camera.width} x {camera.height}; give them one size."
+        )
     same = np.ones(ids.shape, bool)
     for axis in (0, 1):
         equal = np.diff(ids, axis=axis) == 0
-        before, after = ((slice(None, -1), slice(1, None)) if axis == 0 else
-                         ((slice(None), slice(None, -1)), (slice(None), slice(1, None))))
+        before, after = (
+            (slice(None, -1), slice(1, None))
+            if axis == 0
+            else ((slice(None), slice(None, -1)), (slice(None), slice(1, None)))
+        )
         same[before] &= equal
         same[after] &= equal
     chosen = np.zeros(ids.shape, bool)

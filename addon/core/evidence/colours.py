@@ -6,11 +6,18 @@ import numpy as np
 
 from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT
 
-HEAT = np.array([(12, 8, 38), (75, 12, 107), (145, 38, 103), (207, 68, 70), (246, 125, 21), (251, 200, 60),
-                 (252, 255, 200)], np.float32)
+HEAT = np.array(
+    [(12, 8, 38), (75, 12, 107), (145, 38, 103), (207, 68, 70), (246, 125, 21), (251, 200, 60), (252, 255, 200)],
+    np.float32,
+)
 """Dark to light, also in grey (anchors of the inferno map of matplotlib, CC0, rounded)."""
-MODEL = {LAMBERTIAN: (150, 150, 150), SPECULAR: (60, 130, 220), METAL: (225, 150, 40), EMITTER: (255, 240, 150),
-         TRANSPARENT: (120, 200, 190)}
+MODEL = {
+    LAMBERTIAN: (150, 150, 150),
+    SPECULAR: (60, 130, 220),
+    METAL: (225, 150, 40),
+    EMITTER: (255, 240, 150),
+    TRANSPARENT: (120, 200, 190),
+}
 NOTHING = (40, 40, 46)
 
 

@@ -78,7 +78,7 @@ def spots(atlas: Atlas, seen: np.ndarray, count: int, seed: int = 0) -> tuple[np
     extent = cell.max(0) + 1
     main = np.abs(atlas.normal).argmax(1)
     side = 2 * main + (np.take_along_axis(atlas.normal, main[:, None], 1)[:, 0] > 0)
-    key = (12 * atlas.object_id.astype(np.int64) + 6 * seen + side)
+    key = 12 * atlas.object_id.astype(np.int64) + 6 * seen + side
     for axis in range(3):
         key = key * extent[axis] + cell[:, axis]
     names, nearest = np.unique(key, return_inverse=True)

@@ -62,8 +62,12 @@ def _facts(run: Recovery, report: dict[str, Any]) -> str:
         (f"{sure.get('unseen_light_mean', 0):.0%}", "of the light comes from what no frame saw"),
         (f"{glossy} of {len(run.materials())}", "objects with a highlight"),
         (f"{len(lamps)}", "lamps" + (f", {hidden} of them solved for" if hidden else "")),
-        (f"{figures['frames']}", f"frames, {figures['observations_median']:.0f} views of a spot in the median"
-         if figures["frames"] else "frames; the light is stored on the mesh"),
+        (
+            f"{figures['frames']}",
+            f"frames, {figures['observations_median']:.0f} views of a spot in the median"
+            if figures["frames"]
+            else "frames; the light is stored on the mesh",
+        ),
     ]
     return '<div class="tiles">' + "".join(f"<div><b>{value}</b>{text}</div>" for value, text in tiles) + "</div>"
 

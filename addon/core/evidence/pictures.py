@@ -97,8 +97,12 @@ def worst_blocks(residual: np.ndarray, object_id: np.ndarray) -> list[tuple[int,
 
 def _boxed(image: np.ndarray, corners: list[tuple[int, int, float]]) -> np.ndarray:
     for y, x, _ in corners:
-        for edge in (image[y, x : x + BLOCK], image[y + BLOCK - 1, x : x + BLOCK], image[y : y + BLOCK, x],
-                     image[y : y + BLOCK, x + BLOCK - 1]):
+        for edge in (
+            image[y, x : x + BLOCK],
+            image[y + BLOCK - 1, x : x + BLOCK],
+            image[y : y + BLOCK, x],
+            image[y : y + BLOCK, x + BLOCK - 1],
+        ):
             edge[:] = MARK
     return image
 

@@ -33,9 +33,7 @@ def to_world(local: np.ndarray, normal: np.ndarray) -> np.ndarray:
     (n, k, 3) float32
     """
     tangent, bitangent = tangent_frame(normal)
-    return (
-        local[..., 0:1] * tangent[:, None] + local[..., 1:2] * bitangent[:, None] + local[..., 2:3] * normal[:, None]
-    )
+    return local[..., 0:1] * tangent[:, None] + local[..., 1:2] * bitangent[:, None] + local[..., 2:3] * normal[:, None]
 
 
 def sobol(count: int, seed: int, axes: int = 2) -> np.ndarray:

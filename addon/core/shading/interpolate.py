@@ -51,9 +51,7 @@ def _one_per_cell(position: np.ndarray, normal: np.ndarray, spacing: float) -> n
     return order[np.concatenate([[True], np.diff(key[order]) != 0])]
 
 
-def _bound(
-    points: _Points, index: np.ndarray, position: np.ndarray, normal: np.ndarray, spacing: float
-) -> np.ndarray:
+def _bound(points: _Points, index: np.ndarray, position: np.ndarray, normal: np.ndarray, spacing: float) -> np.ndarray:
     """Ward's e_i of each element for each of its neighbours `index` ((n, k)): (n, k) float32.
 
     No point reaches further than about two of the present spacings: where a level was found too coarse, its points

@@ -191,7 +191,7 @@ def direct(
         weight[row, ray] = cosine / np.maximum(share, 1e-20)
         shown = light[pattern]
         total[part] = np.matmul(weight[:, None], shown)[:, 0]
-        weight[:, emitter_rays // 2:] *= -1
+        weight[:, emitter_rays // 2 :] *= -1
         noise[part] = BOTH_HALVES * np.abs(np.matmul(weight[:, None], shown)[:, 0]).mean(1)
     return total, noise
 

@@ -56,9 +56,7 @@ def less_noise(
     return (result / np.float32(GRIDS)), np.sqrt(around / GRIDS).astype(np.float32)
 
 
-def cells(
-    position: np.ndarray, normal: np.ndarray, shift: float, size: float = CELL
-) -> tuple[np.ndarray, np.ndarray]:
+def cells(position: np.ndarray, normal: np.ndarray, shift: float, size: float = CELL) -> tuple[np.ndarray, np.ndarray]:
     """Cell of each element, by place and by the way that it faces, (m,) int; and the elements in each."""
     place = np.floor(position / size + shift).astype(np.int64)
     facing = np.round(normal * TURNED / 2).astype(np.int64) + TURNED
@@ -70,9 +68,7 @@ def cells(
     return group.ravel(), count
 
 
-def _planes(
-    position: np.ndarray, light: np.ndarray, group: np.ndarray, count: np.ndarray, size: float
-) -> np.ndarray:
+def _planes(position: np.ndarray, light: np.ndarray, group: np.ndarray, count: np.ndarray, size: float) -> np.ndarray:
     """Least squares of light over the position, cell by cell: its values at the elements, (m, 3) float32."""
     cells = len(count)
 

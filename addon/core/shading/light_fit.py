@@ -161,8 +161,13 @@ class Sample:
         return float(np.exp(found.x)), self.spread(sent - np.log(received + 1e-12)), float(found.fun)
 
     def refine(
-        self, sent: np.ndarray, received: np.ndarray, thrown: np.ndarray, start: np.ndarray,
-        least: np.ndarray, most: np.ndarray,
+        self,
+        sent: np.ndarray,
+        received: np.ndarray,
+        thrown: np.ndarray,
+        start: np.ndarray,
+        least: np.ndarray,
+        most: np.ndarray,
     ) -> np.ndarray:
         """All radiances together, under the tighter cap.
 

@@ -71,8 +71,12 @@ def known_mirror(known: KnownMirror, field: LightField) -> Mirror:
     """The mirror that a capture tells of, its normal turned to its object's front."""
     own = field.mesh.object_id == known.object_id
     turn = -1.0 if (field.normal[own] @ known.normal).sum() < 0 else 1.0
-    return Mirror(known.object_id, np.float32(known.point), np.float32(turn * known.normal),
-                  np.full(3, known.reflectivity, np.float32))
+    return Mirror(
+        known.object_id,
+        np.float32(known.point),
+        np.float32(turn * known.normal),
+        np.full(3, known.reflectivity, np.float32),
+    )
 
 
 def reflect(vectors: np.ndarray, normal: np.ndarray) -> np.ndarray:

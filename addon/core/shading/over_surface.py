@@ -88,9 +88,7 @@ def irradiance(
             at = index[part]
             here = seed + 7919 * steps["count"] + part.start
             if aimed:
-                found = gather(
-                    field, bright, position[at], normal[at], rays, lamp_rays, here, portals, portal_rays
-                )
+                found = gather(field, bright, position[at], normal[at], rays, lamp_rays, here, portals, portal_rays)
                 value[part, :3], radius[part], value[part, 3] = found
             else:
                 value[part, :3], value[part, 3] = uniform(field, position[at], normal[at], rays, here)

@@ -69,16 +69,21 @@ class Sky:
         for i in sorted(self.solved):
             values, guess = (", ".join(f"{x:.3g}" for x in one[i]) for one in (self.radiance, self.guess))
             if self._is_clipped(i):
-                said.append("Part of the sky is clipped in every frame that sees it; it was solved from the light it "
-                            f"throws: radiance {values} (at least {guess}).")
+                said.append(
+                    "Part of the sky is clipped in every frame that sees it; it was solved from the light it "
+                    f"throws: radiance {values} (at least {guess})."
+                )
             else:
-                said.append(f"Part {i + 1} of the sky that no frame sees was solved from the light it throws: radiance "
-                            f"{values} (its seen neighbours: {guess}).")
+                said.append(
+                    f"Part {i + 1} of the sky that no frame sees was solved from the light it throws: radiance "
+                    f"{values} (its seen neighbours: {guess})."
+                )
         return said
 
 
-def all_light(base: np.ndarray, lamps: list[Lamp], thrown: dict[int, np.ndarray], sky: Sky,
-              without: int = -1) -> np.ndarray:
+def all_light(
+    base: np.ndarray, lamps: list[Lamp], thrown: dict[int, np.ndarray], sky: Sky, without: int = -1
+) -> np.ndarray:
     """E from everything, (m, 3): `base`, the lamps, and the sky but for one part."""
     total = base.copy()
     for lamp in lamps:
@@ -102,9 +107,17 @@ def shared_by_class(
     return result
 
 
-def refined(sample: Sample, lamps: list[Lamp], thrown: dict[int, np.ndarray], least: dict[int, float],
-            instances: tuple[Instance, ...], seen: list[Lamp], sky: Sky, base: np.ndarray,
-            colours: dict[int, np.ndarray]) -> list[Lamp]:
+def refined(
+    sample: Sample,
+    lamps: list[Lamp],
+    thrown: dict[int, np.ndarray],
+    least: dict[int, float],
+    instances: tuple[Instance, ...],
+    seen: list[Lamp],
+    sky: Sky,
+    base: np.ndarray,
+    colours: dict[int, np.ndarray],
+) -> list[Lamp]:
     """The lamps with refined radiances; those of the sky are refined in place.
 
     Parameters
@@ -123,8 +136,11 @@ def refined(sample: Sample, lamps: list[Lamp], thrown: dict[int, np.ndarray], le
     parts = sorted(sky.solved)
     if not free and not parts:
         return lamps
-    others = Sky([G for i, G in enumerate(sky.thrown) if i not in parts],
-                 [r for i, r in enumerate(sky.radiance) if i not in parts], False)
+    others = Sky(
+        [G for i, G in enumerate(sky.thrown) if i not in parts],
+        [r for i, r in enumerate(sky.radiance) if i not in parts],
+        False,
+    )
 
     def thrown_by() -> np.ndarray:
         """E that each of `free` and `parts` throws at radiance 1, (m, k)."""

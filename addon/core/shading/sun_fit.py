@@ -192,6 +192,7 @@ def find_sun(
     edges = Edges(Spots(field, along, irradiance(along)))
     found = min((edges.explained(best.direction, best.strength, r) for r in RADII), key=lambda one: one.cost)
     for steps in (SOFT, SOFT[1:]):
+
         def cost(way: np.ndarray, now: Guess = found) -> Guess:
             return edges.explained(way, now.strength, now.radius)
 
@@ -220,6 +221,8 @@ def _coloured(spots: Spots, direction: np.ndarray, radius: float, before: float,
     channels = np.clip(channels, luminance / COLOUR, luminance * COLOUR)
     light = np.float32(channels * (luminance / float(channels @ LUMINANCE)))
     sun = Sun(np.float32(direction), light, radius)
-    note = (f"A sun that no frame sees was solved from the patch of light that it throws: {sun.where()} "
-            f"(spread of log albedo around it {before:.3f} to {after:.3f}).")
+    note = (
+        f"A sun that no frame sees was solved from the patch of light that it throws: {sun.where()} "
+        f"(spread of log albedo around it {before:.3f} to {after:.3f})."
+    )
     return replace(sun, note=note)

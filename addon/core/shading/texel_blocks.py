@@ -65,11 +65,7 @@ class TexelBlocks:
         return index[right], corner[right], weight[right]
 
     def evaluate(
-        self,
-        function: Callable[[np.ndarray], np.ndarray],
-        step: int,
-        tolerance: float,
-        base: np.ndarray | None = None,
+        self, function: Callable[[np.ndarray], np.ndarray], step: int, tolerance: float, base: np.ndarray | None = None
     ) -> np.ndarray:
         """Evaluate a quantity where it changes and interpolate it elsewhere.
 
@@ -98,6 +94,7 @@ class TexelBlocks:
             wanted = np.zeros(count, bool)
             served: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
             if step >= 2:
+
                 def mark(part: slice, step=step, todo=todo, wanted=wanted, served=served) -> None:
                     served[part.start] = self._served(todo[part], step)
                     wanted[served[part.start][1]] = True

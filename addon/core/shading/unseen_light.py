@@ -146,9 +146,13 @@ def find_light(
         known = known.with_zone(zone, np.zeros(3, np.float32))
     dark, even, unlit = np.zeros_like(field.radiance), evened(field), field.with_sun(None)
     received = old.received if old else irradiance_at(unlit.with_light(even, known), element, seed)
-    thrown_sky = old.sky if old else [
-        irradiance_at(unlit.with_light(dark, Environment.only(zone.pattern)), element, seed)[:, 0] for zone in zones
-    ]
+    thrown_sky = (
+        old.sky
+        if old
+        else [
+            irradiance_at(unlit.with_light(dark, Environment.only(zone.pattern)), element, seed)[:, 0] for zone in zones
+        ]
+    )
     sunless = received
     if field.sun is not None:
         received = received + from_sun(field, element)

@@ -130,9 +130,7 @@ def _met(room: LightField, light: _Light) -> tuple[np.ndarray, np.ndarray, np.nd
     return element[at], place, at
 
 
-def _sent_on(
-    room: LightField, lobes: Lobes, element: np.ndarray, light: _Light, rng: np.random.Generator
-) -> _Light:
+def _sent_on(room: LightField, lobes: Lobes, element: np.ndarray, light: _Light, rng: np.random.Generator) -> _Light:
     """The photons that glossy elements send on."""
     phi = lobes.phi[element]
     glossy = np.flatnonzero(phi > 0)

@@ -173,8 +173,12 @@ def robust_scale(size: np.ndarray) -> float:
 
 
 def fit_lobe(
-    problem: Problem | Layout, way: str = "frames", coloured: bool = False, least_psi: float = 0.0,
-    prior: Prior | None = None, psi: np.ndarray | None = None,
+    problem: Problem | Layout,
+    way: str = "frames",
+    coloured: bool = False,
+    least_psi: float = 0.0,
+    prior: Prior | None = None,
+    psi: np.ndarray | None = None,
 ) -> LobeFit:
     """Best phi, with its psi.
 

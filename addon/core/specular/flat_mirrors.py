@@ -62,7 +62,11 @@ def plane_of(field: LightField, object_id: int) -> tuple[np.ndarray, np.ndarray]
 
 
 def find_mirrors(
-    field: LightField, lamps: tuple[Lamp, ...], samples: Samples, instances: tuple[Instance, ...], seed: int = 0,
+    field: LightField,
+    lamps: tuple[Lamp, ...],
+    samples: Samples,
+    instances: tuple[Instance, ...],
+    seed: int = 0,
     noisy: bool = False,
 ) -> tuple[Mirror, ...]:
     """Flat objects whose frames show the room mirrored.

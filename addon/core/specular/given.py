@@ -108,9 +108,11 @@ def given_note(given: Given) -> str:
     """One sentence on what was given."""
     told = given.as_dict()
     said = [f"{name} {_said(told[name])}" for name in ("model", "roughness", "f0", "base_color") if name in told]
-    rest = [] if given.model in (LAMBERTIAN, EMITTER) else [
-        name for name, found in (("roughness", given.roughness), ("f0", given.f0)) if found is None
-    ]
+    rest = (
+        []
+        if given.model in (LAMBERTIAN, EMITTER)
+        else [name for name, found in (("roughness", given.roughness), ("f0", given.f0)) if found is None]
+    )
     fitted = f"; {' and '.join(rest)} fitted under it" if rest and len(told) else ""
     lamp = " The light on the room was not found anew." if given.model == EMITTER else ""
     return f"Given by the user: {', '.join(said)}{fitted}.{lamp}"

@@ -107,8 +107,14 @@ class Excess(LightField):
 
 
 def glossy_light(
-    excess: Excess, element: np.ndarray, irradiance: np.ndarray, *, threads: int = 0, seed: int = 0,
-    progress: Progress | None = None, share: tuple[float, float] = (0.0, 1.0),
+    excess: Excess,
+    element: np.ndarray,
+    irradiance: np.ndarray,
+    *,
+    threads: int = 0,
+    seed: int = 0,
+    progress: Progress | None = None,
+    share: tuple[float, float] = (0.0, 1.0),
 ) -> np.ndarray:
     """What is to be added to E, radiance * steradian, (m, 3) float32.
 

@@ -54,9 +54,7 @@ class LobeLight:
 
     def part(self, chosen: np.ndarray) -> LobeLight:
         """Those of the observations `chosen` ((m,) bool or indices)."""
-        return LobeLight(
-            self.A[chosen], self.B[chosen], self.A_noise[chosen], self.B_noise[chosen], self.grid
-        )
+        return LobeLight(self.A[chosen], self.B[chosen], self.A_noise[chosen], self.B_noise[chosen], self.grid)
 
     def replaced(self, at: np.ndarray, other: LobeLight) -> LobeLight:
         """With another's values for the observations `at` ((k,) indices), in its order."""

@@ -168,8 +168,10 @@ def choose_model(problem: Problem) -> Choice:
     metal, likely = fit_lobe(layout, **HOW[METAL]), None
     found = [(metal, *held_out(metal, METAL))] if _metallic(metal) else []
     # Errors of the light draw psi down where each element has a diffuse part of its own; without one they don't.
-    bare = min((_bare_metal(problem, layout, phi, metal, scale) for phi in layout.grid[layout.grid <= BROADEST_PHI]),
-               key=lambda one: one[1].sum())
+    bare = min(
+        (_bare_metal(problem, layout, phi, metal, scale) for phi in layout.grid[layout.grid <= BROADEST_PHI]),
+        key=lambda one: one[1].sum(),
+    )
     found += [(*bare, without)] if _metallic(bare[0]) else []
     no_diffuse = _metallic(bare[0]) and bool(bare[1].sum() <= BARE * without.sum())
     for fit_of_metal, with_metal, matt in found:
@@ -197,8 +199,11 @@ def set_apart(choice: Choice, found: SeeThrough | None) -> Choice:
     scores = choice.scores | {TRANSPARENT: found.score}
     if not is_sure(found):
         return replace(choice, scores=scores)
-    what = f"cut out, with holes over {found.transmission:.0%} of it" if found.cut_out else (
-        f"transparent: {found.transmission:.0%} of what is behind it passes")
+    what = (
+        f"cut out, with holes over {found.transmission:.0%} of it"
+        if found.cut_out
+        else (f"transparent: {found.transmission:.0%} of what is behind it passes")
+    )
     note = f"Set apart as {what}. Its own colour is uncertain."
     return Choice(TRANSPARENT, None, found.gain, found.sigmas, note, scores, see_through=found)
 

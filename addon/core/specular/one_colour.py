@@ -148,9 +148,7 @@ def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
     )
 
 
-def _told(
-    problem: Problem, irradiance: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+def _told(problem: Problem, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
     """Which observations tell something, (m,) bool, and their radiance, E (k, 3) and element (k,); None if too few."""
     bright, E = problem.radiance @ LUMINANCE, irradiance[problem.element]
     usable = (bright > 1e-3 * np.median(bright)) & (E @ LUMINANCE > 0)

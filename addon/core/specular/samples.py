@@ -78,7 +78,10 @@ class SampleCollector:
         count = int(keep.sum())
         self._parts.append(
             Samples(
-                seen.element[keep], np.full(count, frame, np.int32), seen.radiance[keep], seen.direction[keep],
+                seen.element[keep],
+                np.full(count, frame, np.int32),
+                seen.radiance[keep],
+                seen.direction[keep],
                 seen.tier[keep] == SATURATED,
             )  # fmt: skip
         )

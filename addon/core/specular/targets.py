@@ -10,12 +10,7 @@ MIN_OBSERVATIONS = 12
 """A frame that shows fewer of the object's sampled elements says too little."""
 
 
-def score_frames(
-    frame: np.ndarray,
-    highlight: np.ndarray,
-    diffuse: np.ndarray,
-    frames: int,
-) -> np.ndarray:
+def score_frames(frame: np.ndarray, highlight: np.ndarray, diffuse: np.ndarray, frames: int) -> np.ndarray:
     """How good a target each frame is for one object (Haefner et al. 2021, assumptions A1 and A2).
 
     Parameters

@@ -30,8 +30,12 @@ def overview(mesh: Mesh) -> Camera:
     a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
     normal = np.cross(b - a, c - a)
     height = low[2] + min(EYES, 0.6 * (high[2] - low[2]))
-    views = [_view(low[:2] + (high - low)[:2] * (x, y), height, turn) for x in INWARD for y in INWARD
-             for turn in 2 * np.pi * np.arange(TRIED) / TRIED]
+    views = [
+        _view(low[:2] + (high - low)[:2] * (x, y), height, turn)
+        for x in INWARD
+        for y in INWARD
+        for turn in 2 * np.pi * np.arange(TRIED) / TRIED
+    ]
     return max(views, key=lambda camera: _worth(camera, scene, normal))
 
 

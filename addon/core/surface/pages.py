@@ -79,11 +79,12 @@ class Pages:
             foreign = None if owner is None else owner[box] != number
             if foreign is not None and foreign.any() and not foreign.all():
                 shown = shown[tuple(distance_transform_edt(foreign, return_distances=False, return_indices=True))]
-            rows, columns = ((low - start, high - start, share)
-                             for (low, high, share), start in ((rows, bottom), (columns, left)))
+            rows, columns = (
+                (low - start, high - start, share) for (low, high, share), start in ((rows, bottom), (columns, left))
+            )
             part = shown[rows[0][:, None], columns[0]] if scale == 1 else _between(shown, rows, columns)
-            sheet[y:y + height, x:x + width] = part
-            empty[y:y + height, x:x + width] = False
+            sheet[y : y + height, x : x + width] = part
+            empty[y : y + height, x : x + width] = False
         for page in self.pages:
             part, gaps = self.of(sheet, page), self.of(empty, page)
             part[gaps] = part[~gaps].mean(0)
@@ -99,11 +100,11 @@ class Pages:
         if len(own) != len(there) or (own[:, [0, 1, 4, 5]] != there[:, [0, 1, 4, 5]]).any():
             raise ValueError("the other layout is not of the same atlas at the same scale")
         for (x, y, width, height), (x0, y0) in zip(own[:, 2:].tolist(), there[:, 2:4].tolist(), strict=True):
-            sheet[y:y + height, x:x + width] *= factor[y0:y0 + height, x0:x0 + width]
+            sheet[y : y + height, x : x + width] *= factor[y0 : y0 + height, x0 : x0 + width]
 
     def of(self, sheet: np.ndarray, page: Page) -> np.ndarray:
         """A page's part of an image of the sheet."""
-        return sheet[page.y:page.y + page.height, page.x:page.x + page.width]
+        return sheet[page.y : page.y + page.height, page.x : page.x + page.width]
 
 
 def _weights(start: float, count: int, scale: float, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -122,8 +123,15 @@ def _between(room, rows, columns):
     return low * (1 - b) + high * b
 
 
-def lay_out(kind: str, triangles: np.ndarray, uv: np.ndarray, object_id: np.ndarray, size: int,
-            scale: dict[int, float], largest: int) -> Pages:
+def lay_out(
+    kind: str,
+    triangles: np.ndarray,
+    uv: np.ndarray,
+    object_id: np.ndarray,
+    size: int,
+    scale: dict[int, float],
+    largest: int,
+) -> Pages:
     """Part a room's atlas.
 
     Parameters
@@ -168,15 +176,24 @@ def lay_out(kind: str, triangles: np.ndarray, uv: np.ndarray, object_id: np.ndar
     place += np.array([(page[k].x, page[k].y) for k in tile]) + offset
     factor = np.array([scale[int(number)] for number in owner])
     on_sheet = (uv * size - corner[island][:, None]) * factor[island][:, None, None] + place[island][:, None]
-    origin, extents = (np.array([[getattr(one, a), getattr(one, b)] for one in page], np.float64)
-                       for a, b in (("x", "y"), ("width", "height")))
+    origin, extents = (
+        np.array([[getattr(one, a), getattr(one, b)] for one in page], np.float64)
+        for a, b in (("x", "y"), ("width", "height"))
+    )
     of_page = np.asarray(tile)[island]
     own_uv = (on_sheet - origin[of_page][:, None]) / extents[of_page][:, None]
     if kind == UDIM:
         number = np.array([one.number - 1001 for one in page])[of_page]
         own_uv += np.stack([number % 10, number // 10], -1)[:, None]
-    return Pages(tuple(page), own_uv.astype(np.float32), (on_sheet / sheet).astype(np.float32), int(sheet), scale,
-                 np.concatenate([corner, place, box], 1), owner)
+    return Pages(
+        tuple(page),
+        own_uv.astype(np.float32),
+        (on_sheet / sheet).astype(np.float32),
+        int(sheet),
+        scale,
+        np.concatenate([corner, place, box], 1),
+        owner,
+    )
 
 
 def _shelves(box: np.ndarray, width: int) -> tuple[np.ndarray, int, int]:

@@ -70,8 +70,9 @@ def boxes(uv: np.ndarray, island: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.minimum.reduceat(uv.min(1)[order], start), np.maximum.reduceat(uv.max(1)[order], start)
 
 
-def cut_sparse(uv: np.ndarray, corners: np.ndarray, island: np.ndarray, margin: float,
-               face: np.ndarray | None = None) -> np.ndarray:
+def cut_sparse(
+    uv: np.ndarray, corners: np.ndarray, island: np.ndarray, margin: float, face: np.ndarray | None = None
+) -> np.ndarray:
     """Cut islands that fill little of their box (window frames, skirting boards) until the boxes get no smaller.
 
     Parameters

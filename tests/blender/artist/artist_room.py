@@ -54,9 +54,12 @@ def build_room():
     things = {"room": mesh_object("room", *box((-2, -1.5, 0), (2, 1.5, 2.5), True), [grey])}
     # A table of five corners, dented: no triangulation but Blender's own is right.
     top = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0.5, 0.4, 0), (0, 1, 0)]
-    things["table"] = mesh_object("table", top + [(x, y, -0.5) for x, y, _ in top],
-                                  [(0, 1, 2, 3, 4), (9, 8, 7, 6, 5), *((i, i + 5, (i + 1) % 5 + 5, (i + 1) % 5)
-                                                                       for i in range(5))], [red, green, None])
+    things["table"] = mesh_object(
+        "table",
+        top + [(x, y, -0.5) for x, y, _ in top],
+        [(0, 1, 2, 3, 4), (9, 8, 7, 6, 5), *((i, i + 5, (i + 1) % 5 + 5, (i + 1) % 5) for i in range(5))],
+        [red, green, None],
+    )
     things["table"].location = (-1.5, -1, 0.8)
     things["mirrored"] = mesh_object("mirrored", *box((0, 0, 0), (0.4, 0.5, 0.6)), [green])
     things["mirrored"].scale, things["mirrored"].location = (-1, 1.5, 1), (1.6, 0.4, 0.01)
@@ -84,8 +87,12 @@ def build_room():
     shelf = things["shelf"] = bpy.data.objects.new("shelf", None)
     shelf.instance_type, shelf.instance_collection, shelf.location = "COLLECTION", group, (0.6, 1.2, 1.2)
     bpy.context.scene.collection.objects.link(shelf)
-    lamp = things["lamp"] = mesh_object("lamp", [(-0.5, -0.5, 2.49), (0.5, -0.5, 2.49), (0.5, 0.5, 2.49),
-                                                 (-0.5, 0.5, 2.49)], [(3, 2, 1, 0)], [paint("glow")])
+    lamp = things["lamp"] = mesh_object(
+        "lamp",
+        [(-0.5, -0.5, 2.49), (0.5, -0.5, 2.49), (0.5, 0.5, 2.49), (-0.5, 0.5, 2.49)],
+        [(3, 2, 1, 0)],
+        [paint("glow")],
+    )
     principled = lamp.data.materials[0].node_tree.nodes["Principled BSDF"].inputs
     principled["Emission Color"].default_value, principled["Emission Strength"].default_value = (1, 0.9, 0.8, 1), 8
     for thing in things.values():
@@ -127,10 +134,19 @@ def node_trees():
     found = {}
     for material in bpy.data.materials:
         tree = material.node_tree
-        nodes = {node.name: (node.bl_idname, tuple(node.location), getattr(getattr(node, "image", None), "name", ""),
-                             {socket.identifier: plain(socket) for socket in node.inputs}) for node in tree.nodes}
-        links = sorted((link.from_node.name, link.from_socket.identifier, link.to_node.name, link.to_socket.identifier)
-                       for link in tree.links)
+        nodes = {
+            node.name: (
+                node.bl_idname,
+                tuple(node.location),
+                getattr(getattr(node, "image", None), "name", ""),
+                {socket.identifier: plain(socket) for socket in node.inputs},
+            )
+            for node in tree.nodes
+        }
+        links = sorted(
+            (link.from_node.name, link.from_socket.identifier, link.to_node.name, link.to_socket.identifier)
+            for link in tree.links
+        )
         found[material.name] = nodes, links
     return found
 

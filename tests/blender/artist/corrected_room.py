@@ -15,8 +15,14 @@ ENTRIES = [
     {"object_id": BOARD, "class_name": "board", "model": "lambertian", "evidence": {"albedo": [0.4, 0.2, 0.1]}},
     {"object_id": TAP, "class_name": "tap", "model": "metal", "phi": 0.04, "f0": [0.9, 0.6, 0.3]},
     {"object_id": LAMP, "class_name": "lamp", "model": "emitter", "emission": [3.0, 2.0, 1.0]},
-    {"object_id": TABLE, "class_name": "table", "model": "specular", "phi": 0.09, "psi": 0.05,
-     "evidence": {"albedo": [0.5, 0.5, 0.5]}},
+    {
+        "object_id": TABLE,
+        "class_name": "table",
+        "model": "specular",
+        "phi": 0.09,
+        "psi": 0.05,
+        "evidence": {"albedo": [0.5, 0.5, 0.5]},
+    },
 ]
 
 
@@ -61,8 +67,11 @@ def build(folder):
         owner += [entry["object_id"]] * 2
     mesh = Mesh(np.float32(vertices), np.int32(triangles), np.int32(owner))
     objects = bridge("mesh_objects").make_objects(
-        mesh, [Instance(one["object_id"], one["class_name"]) for one in ENTRIES], np.float32(uv),
-        bpy.context.scene.collection)
+        mesh,
+        [Instance(one["object_id"], one["class_name"]) for one in ENTRIES],
+        np.float32(uv),
+        bpy.context.scene.collection,
+    )
     image = bridge("result_images").image(folder, "base_color.exr")
     for entry in ENTRIES:
         thing = objects[entry["object_id"]]
@@ -82,8 +91,10 @@ def select(*things):
 def sockets(thing):
     """Plain values of an object's Principled node."""
     node = next(n for n in thing.material_slots[0].material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
-    found = {name: node.inputs[name].default_value for name in (
-        "Metallic", "Roughness", "IOR", "Specular IOR Level", "Emission Strength")}
+    found = {
+        name: node.inputs[name].default_value
+        for name in ("Metallic", "Roughness", "IOR", "Specular IOR Level", "Emission Strength")
+    }
     found["Base Color"] = tuple(round(one, 4) for one in node.inputs["Base Color"].default_value[:3])
     found["linked"] = bool(node.inputs["Base Color"].links)
     return found

@@ -28,10 +28,12 @@ def room(ops, tmp_path):
 @pytest.fixture
 def kept(room, tmp_path):
     """What `keep` writes, and the objects that a refit has to do."""
+
     def keep():
         folder = tmp_path / "result"
         numbers = bridge("corrections").keep(bpy.context.scene, folder)
         return json.loads((folder / "overrides.json").read_text()), numbers
+
     return keep
 
 

@@ -32,9 +32,19 @@ def entries(folder):
 def plain(thing):
     """All that a material's nodes hold."""
     tree = thing.material_slots[0].material.node_tree
-    return sorted((node.name, socket.identifier, bool(socket.links), str(getattr(socket, "default_value", None) and (
-        tuple(socket.default_value) if hasattr(socket.default_value, "__len__") else socket.default_value)))
-        for node in tree.nodes for socket in node.inputs)
+    return sorted(
+        (
+            node.name,
+            socket.identifier,
+            bool(socket.links),
+            str(
+                getattr(socket, "default_value", None)
+                and (tuple(socket.default_value) if hasattr(socket.default_value, "__len__") else socket.default_value)
+            ),
+        )
+        for node in tree.nodes
+        for socket in node.inputs
+    )
 
 
 def test_this_is_metal_refits_that_object_alone(room, ops):
@@ -55,7 +65,8 @@ def test_this_is_metal_refits_that_object_alone(room, ops):
     runs = {thing["scan_relight_run"] for thing in things.values()}
     assert len(runs) == 1 and runs != {run} and bridge("corrections").entry(sofa)["given"] == {"model": "metal"}
     assert json.loads((folder / "overrides.json").read_text())["objects"] == {
-        str(sofa["object_id"]): {"model": "metal"}}
+        str(sofa["object_id"]): {"model": "metal"}
+    }
 
 
 def test_taken_back_it_is_found_again(room, ops):

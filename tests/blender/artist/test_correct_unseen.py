@@ -35,8 +35,8 @@ def shown(thing):
 def hole(board=True):
     """What no frame saw of one of the two objects."""
     part = unseen()
-    part[SIZE // 2:] &= not board
-    part[:SIZE // 2] &= board
+    part[SIZE // 2 :] &= not board
+    part[: SIZE // 2] &= board
     return part
 
 

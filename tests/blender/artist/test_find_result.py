@@ -76,8 +76,11 @@ def said():
 
 def shown():
     """First pixels of the images that can be shown, by file name."""
-    return {one["scan_relight_image"].split("/")[-1]: one.pixels[0] for one in bpy.data.images
-            if "scan_relight_image" in one and one.has_data or one.size[0]}
+    return {
+        one["scan_relight_image"].split("/")[-1]: one.pixels[0]
+        for one in bpy.data.images
+        if "scan_relight_image" in one and one.has_data or one.size[0]
+    }
 
 
 def marks():

@@ -39,11 +39,14 @@ def scene(dressed):
 
 def everything(scene):
     """What a look must not leave a trace on."""
-    slots = {thing.name: [slot.material and slot.material.name for slot in thing.material_slots]
-             for thing in scene.objects}
+    slots = {
+        thing.name: [slot.material and slot.material.name for slot in thing.material_slots] for thing in scene.objects
+    }
     stacks = {thing.name: [(one.name, one.show_render) for one in thing.modifiers] for thing in scene.objects}
-    counts = {kind: sorted(one.name for one in getattr(bpy.data, kind))
-              for kind in ("materials", "images", "node_groups", "meshes", "objects")}
+    counts = {
+        kind: sorted(one.name for one in getattr(bpy.data, kind))
+        for kind in ("materials", "images", "node_groups", "meshes", "objects")
+    }
     return slots, stacks, counts, node_trees()
 
 
@@ -111,14 +114,22 @@ def test_saved_with_a_look_and_opened(scene, dressed, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("look, space", [("ALBEDO", "Linear Rec.709"), ("SHADING", "Linear Rec.709"),
-                                         ("LIT_DIFFUSE", "Linear Rec.709"), ("COVERAGE", "Non-Color")])
+@pytest.mark.parametrize(
+    "look, space",
+    [
+        ("ALBEDO", "Linear Rec.709"),
+        ("SHADING", "Linear Rec.709"),
+        ("LIT_DIFFUSE", "Linear Rec.709"),
+        ("COVERAGE", "Non-Color"),
+    ],
+)
 def test_colour_management(scene, look, space):
     """Data as data; radiance under the scene's exposure, and an albedo independent of it, also when it changes."""
     bpy.ops.scan_relight.look(look=look)
     [material] = [one for one in bpy.data.materials if "scan_relight_look" in one]
     assert {node.image.colorspace_settings.name for node in material.node_tree.nodes if node.type == "TEX_IMAGE"} == {
-        space}
+        space
+    }
     strengths = []
     for exposure in (0.0, -3.0):
         scene.view_settings.exposure = exposure

@@ -11,11 +11,31 @@ bpy = pytest.importorskip("bpy")
 from tests.blender.artist.artist_room import box, mesh_object  # noqa: E402
 
 OBJECTS = [
-    {"object_id": 0, "model": "specular", "phi": 0.09, "psi": 0.04, "roughness_low": 0.1, "roughness_high": 0.7,
-     "evidence": {"albedo": [0.5, 0.5, 0.5], "albedo_low": [0.4] * 3, "albedo_high": [0.6] * 3, "seen_share": 0.5,
-                  "area": 2.0, "observations": 12}},
-    {"object_id": 1, "model": "lambertian", "phi": None, "psi": None, "roughness_low": 0.0, "roughness_high": 1.0,
-     "evidence": {"albedo": [0.5] * 3, "albedo_low": [0.45] * 3, "albedo_high": [0.55] * 3}},
+    {
+        "object_id": 0,
+        "model": "specular",
+        "phi": 0.09,
+        "psi": 0.04,
+        "roughness_low": 0.1,
+        "roughness_high": 0.7,
+        "evidence": {
+            "albedo": [0.5, 0.5, 0.5],
+            "albedo_low": [0.4] * 3,
+            "albedo_high": [0.6] * 3,
+            "seen_share": 0.5,
+            "area": 2.0,
+            "observations": 12,
+        },
+    },
+    {
+        "object_id": 1,
+        "model": "lambertian",
+        "phi": None,
+        "psi": None,
+        "roughness_low": 0.0,
+        "roughness_high": 1.0,
+        "evidence": {"albedo": [0.5] * 3, "albedo_low": [0.45] * 3, "albedo_high": [0.55] * 3},
+    },
     {"object_id": 2, "model": "metal", "phi": 0.04, "f0": [0.9, 0.6, 0.3], "roughness_low": 0.1, "roughness_high": 0.4},
     {"object_id": 3, "model": "emitter", "emission": [3.0, 2.0, 1.0]},
 ]
@@ -69,9 +89,14 @@ def test_facts_name_what_is_known(results):
     assert results.facts({"model": "something new"})[0] == ("Model", "something new")
 
 
-@pytest.mark.parametrize("order, names", [
-    ("NAME", ["Apple", "lamp", "tap", "wall"]), ("MODEL", ["lamp", "Apple", "tap", "wall"]),
-    ("CERTAINTY", ["wall", "tap", "Apple", "lamp"])])
+@pytest.mark.parametrize(
+    "order, names",
+    [
+        ("NAME", ["Apple", "lamp", "tap", "wall"]),
+        ("MODEL", ["lamp", "Apple", "tap", "wall"]),
+        ("CERTAINTY", ["wall", "tap", "Apple", "lamp"]),
+    ],
+)
 def test_orders(scene, results, order, names):
     key = importlib.import_module("scan_relight.operators.panel_results").order_key
     known = results.result_of(scene).objects
@@ -131,7 +156,7 @@ def test_objects_whose_run_nobody_can_tell_are_refused(scene, results, tmp_path)
     assert listed(scene, results) == {} and results.refused(scene.objects)[0][0].startswith("3 objects")
 
 
-@pytest.mark.parametrize("text", ["", "[1, 2]", "{\"objects\": 3}", "{\"objects\": [{\"model\": \"metal\"}]}"])
+@pytest.mark.parametrize("text", ["", "[1, 2]", '{"objects": 3}', '{"objects": [{"model": "metal"}]}'])
 def test_a_damaged_file_is_an_empty_result(scene, results, tmp_path, text):
     (tmp_path / "materials.json").write_text(text)
     found = results.result_of(scene)
@@ -166,8 +191,9 @@ def test_the_report(scene, ops, tmp_path):
     assert ops.open_report() == {"FINISHED"}
 
 
-@pytest.mark.parametrize("name", ["capture_from_scene", "restore_materials", "select_result_object", "look",
-                                  "open_report", "write"])
+@pytest.mark.parametrize(
+    "name", ["capture_from_scene", "restore_materials", "select_result_object", "look", "open_report", "write"]
+)
 def test_every_property_has_its_text(ops, name):
     kind = getattr(ops, name).get_rna_type()
     assert kind.description

@@ -55,4 +55,5 @@ def test_from_run_to_reopened(ops, tiny_capture, tmp_path, monkeypatch):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "moved" / "file.blend"))
     assert set(shown().values()) == {True}
     assert {thing["scan_relight_result"] for thing in bpy.data.objects if "scan_relight_run" in thing} == {
-        str(tmp_path / "moved" / "scan relight" / result.name)}
+        str(tmp_path / "moved" / "scan relight" / result.name)
+    }

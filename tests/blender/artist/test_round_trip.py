@@ -19,10 +19,13 @@ def state(things):
     found = {}
     for name, thing in things.items():
         data = thing.data
-        entry = {"hidden": (thing.hide_viewport, thing.hide_render), "keys": sorted(thing.keys()),
-                 "modifiers": [modifier.name for modifier in thing.modifiers],
-                 "matrix": tuple(map(tuple, thing.matrix_world)),
-                 "slots": [(slot.link, slot.material and slot.material.name) for slot in thing.material_slots]}
+        entry = {
+            "hidden": (thing.hide_viewport, thing.hide_render),
+            "keys": sorted(thing.keys()),
+            "modifiers": [modifier.name for modifier in thing.modifiers],
+            "matrix": tuple(map(tuple, thing.matrix_world)),
+            "slots": [(slot.link, slot.material and slot.material.name) for slot in thing.material_slots],
+        }
         if data is not None:
             index = np.empty(len(data.polygons), np.int32)
             data.polygons.foreach_get("material_index", index)
@@ -31,11 +34,15 @@ def state(things):
                 layers[layer.name] = np.empty(2 * len(data.loops), np.float32)
                 layer.uv.foreach_get("vector", layers[layer.name])
             active = data.uv_layers.active
-            entry |= {"mesh": data.name, "indices": index.tolist(), "active": active and active.name,
-                      "render": [layer.name for layer in data.uv_layers if layer.active_render],
-                      "uv": {name: uv.tolist() for name, uv in layers.items()},
-                      "corners": [loop.vertex_index for loop in data.loops],
-                      "attributes": sorted(a.name for a in data.attributes)}
+            entry |= {
+                "mesh": data.name,
+                "indices": index.tolist(),
+                "active": active and active.name,
+                "render": [layer.name for layer in data.uv_layers if layer.active_render],
+                "uv": {name: uv.tolist() for name, uv in layers.items()},
+                "corners": [loop.vertex_index for loop in data.loops],
+                "attributes": sorted(a.name for a in data.attributes),
+            }
         found[name] = entry
     return found
 
@@ -51,14 +58,22 @@ def room(ops, tmp_path):
 
 def recover(ops, tmp_path, **more):
     assert ops.capture_from_scene(result_folder=str(tmp_path / "result")) == {"FINISHED"}
-    assert ops.recover(capture_folder=str(tmp_path / "result" / "scene_capture"),
-                       result_folder=str(tmp_path / "result"), **QUICK, **more) == {"FINISHED"}
+    assert ops.recover(
+        capture_folder=str(tmp_path / "result" / "scene_capture"),
+        result_folder=str(tmp_path / "result"),
+        **QUICK,
+        **more,
+    ) == {"FINISHED"}
     return json.loads((tmp_path / "result" / "report.json").read_text())["warnings"]
 
 
 def again(ops, tmp_path, **more):
-    assert ops.write(capture_folder=str(tmp_path / "result" / "scene_capture"), result_folder=str(tmp_path / "result"),
-                     **QUICK, **more) == {"FINISHED"}
+    assert ops.write(
+        capture_folder=str(tmp_path / "result" / "scene_capture"),
+        result_folder=str(tmp_path / "result"),
+        **QUICK,
+        **more,
+    ) == {"FINISHED"}
     return json.loads((tmp_path / "result" / "report.json").read_text())["warnings"]
 
 
@@ -176,8 +191,11 @@ def test_images_and_their_colour_spaces(ops, room, tmp_path, where):
     room = {name: bpy.context.scene.objects[name] for name in room}
     recover(ops, tmp_path, images=where)
     found = {image.name: image for image in bpy.data.images if "scan_relight_image" in image}
-    files = {"scene_capture base color": "base_color.exr", "scene_capture albedo": "albedo.exr",
-             "scene_capture shading": "shading.exr"}
+    files = {
+        "scene_capture base color": "base_color.exr",
+        "scene_capture albedo": "albedo.exr",
+        "scene_capture shading": "shading.exr",
+    }
     assert set(found) == set(files)
     for image in found.values():
         assert image.colorspace_settings.name == "Linear Rec.709"
@@ -200,8 +218,12 @@ def test_images_beside_a_file_that_was_never_saved(ops, room, tmp_path):
     assert ops.capture_from_scene(result_folder=str(tmp_path / "result")) == {"FINISHED"}
     before = state(room)
     with pytest.raises(RuntimeError, match="never saved; save it first"):
-        ops.recover(capture_folder=str(tmp_path / "result" / "scene_capture"), result_folder=str(tmp_path / "result"),
-                    images="FOLDER", **QUICK)
+        ops.recover(
+            capture_folder=str(tmp_path / "result" / "scene_capture"),
+            result_folder=str(tmp_path / "result"),
+            images="FOLDER",
+            **QUICK,
+        )
     assert state(room) == before
 
 

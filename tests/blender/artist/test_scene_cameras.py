@@ -72,15 +72,18 @@ def test_lenses_there_and_back(scene, tmp_path, lens):
         assert camera_of(thing, (640, 480), frame_size(scene, thing)).lens is None
 
 
-@pytest.mark.parametrize("fit, size, aspect", list(itertools.product(
-    ("AUTO", "HORIZONTAL", "VERTICAL"), ((640, 480), (480, 640)), ((1, 1), (1, 1.5), (2, 1)))))
+@pytest.mark.parametrize(
+    "fit, size, aspect",
+    list(itertools.product(("AUTO", "HORIZONTAL", "VERTICAL"), ((640, 480), (480, 640)), ((1, 1), (1, 1.5), (2, 1)))),
+)
 def test_as_blender_projects(scene, fit, size, aspect):
     thing = made(scene, sensor_fit=fit, sensor_width=30, sensor_height=20, lens=27.5, shift_x=0.11, shift_y=-0.07)
     render = scene.render
     render.resolution_x, render.resolution_y = size
     render.pixel_aspect_x, render.pixel_aspect_y = aspect
-    matrix = thing.calc_matrix_camera(bpy.context.evaluated_depsgraph_get(), x=size[0], y=size[1], scale_x=aspect[0],
-                                      scale_y=aspect[1])
+    matrix = thing.calc_matrix_camera(
+        bpy.context.evaluated_depsgraph_get(), x=size[0], y=size[1], scale_x=aspect[0], scale_y=aspect[1]
+    )
     fx, fy, cx, cy = pixel_lens(thing.data, *size, aspect[1] / aspect[0])
     for x, y, z in np.random.default_rng(0).uniform((-1, -1, -5), (1, 1, -2), (20, 3)):
         clip = matrix @ Vector((x, y, z, 1))
@@ -154,17 +157,25 @@ def test_an_animation_with_a_sequence(scene, animated, tmp_path):
 def test_frames_beyond_the_sequence_are_told(scene, animated):
     problems = []
     found = list(views(scene, bpy.context.evaluated_depsgraph_get(), [animated], ANIMATION, 4, 7, problems=problems))
-    assert len(found) == 2 and problems == ["Camera 'camera' has no picture at frame 6.",
-                                            "Camera 'camera' has no picture at frame 7."]
+    assert len(found) == 2 and problems == [
+        "Camera 'camera' has no picture at frame 6.",
+        "Camera 'camera' has no picture at frame 7.",
+    ]
 
 
-@pytest.mark.parametrize("change, sentence", [
-    (lambda thing, back, folder: setattr(back, "scale", 2.0), "is moved, scaled, turned or flipped"),
-    (lambda thing, back, folder: setattr(back, "use_flip_x", True), "is moved, scaled, turned or flipped"),
-    (lambda thing, back, folder: setattr(back.image, "filepath", str(folder / "photo.jpg")), "is no EXR"),
-    (lambda thing, back, folder: setattr(back.image, "filepath", str(folder / "gone.exr")), "gone.exr' behind camera"),
-    (lambda thing, back, folder: setattr(thing.data, "type", "PANO"), "frames need perspective"),
-])
+@pytest.mark.parametrize(
+    "change, sentence",
+    [
+        (lambda thing, back, folder: setattr(back, "scale", 2.0), "is moved, scaled, turned or flipped"),
+        (lambda thing, back, folder: setattr(back, "use_flip_x", True), "is moved, scaled, turned or flipped"),
+        (lambda thing, back, folder: setattr(back.image, "filepath", str(folder / "photo.jpg")), "is no EXR"),
+        (
+            lambda thing, back, folder: setattr(back.image, "filepath", str(folder / "gone.exr")),
+            "gone.exr' behind camera",
+        ),
+        (lambda thing, back, folder: setattr(thing.data, "type", "PANO"), "frames need perspective"),
+    ],
+)
 def test_pictures_that_cant_be_used_are_told(scene, tmp_path, change, sentence):
     write_exr(tmp_path / "one.exr", np.ones((4, 6, 3), np.float32))
     thing = made(scene)

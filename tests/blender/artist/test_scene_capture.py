@@ -41,7 +41,8 @@ def test_objects_and_their_places(room, tmp_path):
     capture, warnings = captured(tmp_path / "capture", room.values())
     names = {source.object_id: source for source in sources(tmp_path / "capture")}
     assert [names[one.object_id].name for one in capture.instances] == sorted(
-        [*(set(room) - {"shelf"}), "shelf/board 0", "shelf/board 1"])
+        [*(set(room) - {"shelf"}), "shelf/board 0", "shelf/board 1"]
+    )
     for one in capture.instances:
         source, own = names[one.object_id], capture.mesh.object_id == one.object_id
         thing = bpy.context.scene.objects[source.thing]
@@ -79,8 +80,9 @@ def test_frames_are_the_cameras(room, tmp_path, scene):
         assert frame.camera.fx == pytest.approx(18 / 36 * 48) and frame.camera.cx == pytest.approx(24 - 0.03 * 48)
 
 
-@pytest.mark.parametrize("lens", [polynomial("OPENCV", numerator=(-0.1, 0.01), tangential=(1e-3, 2e-3)),
-                                  EnhancedUnified(0.7, 1.1)])
+@pytest.mark.parametrize(
+    "lens", [polynomial("OPENCV", numerator=(-0.1, 0.01), tangential=(1e-3, 2e-3)), EnhancedUnified(0.7, 1.1)]
+)
 def test_lens_and_exposure_of_imported_cameras(scene, tmp_path, lens):
     pose = np.array([[1, 0, 0, 0.1], [0, 1, 0, 0.2], [0, 0, 1, 3.0], [0, 0, 0, 1]])
     write_exr(tmp_path / "photo.exr", np.ones((36, 48, 3), np.float32))
@@ -106,8 +108,11 @@ def test_the_scene_is_left_as_it_was(room, tmp_path, scene):
 
 def test_once_more_gives_the_same_files(room, tmp_path):
     def content():
-        return {path.name: path.read_bytes() for path in (tmp_path / "capture").iterdir() if path.is_file()
-                and path.suffix != ".npz"}
+        return {
+            path.name: path.read_bytes()
+            for path in (tmp_path / "capture").iterdir()
+            if path.is_file() and path.suffix != ".npz"
+        }
 
     captured(tmp_path / "capture", room.values())
     first = content()
@@ -142,14 +147,23 @@ def test_a_bad_picture_among_good_ones_is_left_out(room, tmp_path):
     assert "photo_2.exr' behind camera 'cam 2' is missing" in warnings[0]
 
 
-@pytest.mark.parametrize("spoil, sentence", [
-    (lambda room: [thing.data.background_images.clear() for thing in bpy.context.scene.objects
-                   if thing.type == "CAMERA"], "No camera has a picture behind it"),
-    (lambda room: [setattr(image, "filepath", "//photo.png") for image in bpy.data.images],
-     "None of the pictures can be used: .* no EXR"),
-    (lambda room: room["room"].data.clear_geometry(), "No object with faces is selected"),
-    (lambda room: room["room"].data.vertices[0].co.__setitem__(0, float("nan")), "'room' has vertices that are"),
-])
+@pytest.mark.parametrize(
+    "spoil, sentence",
+    [
+        (
+            lambda room: [
+                thing.data.background_images.clear() for thing in bpy.context.scene.objects if thing.type == "CAMERA"
+            ],
+            "No camera has a picture behind it",
+        ),
+        (
+            lambda room: [setattr(image, "filepath", "//photo.png") for image in bpy.data.images],
+            "None of the pictures can be used: .* no EXR",
+        ),
+        (lambda room: room["room"].data.clear_geometry(), "No object with faces is selected"),
+        (lambda room: room["room"].data.vertices[0].co.__setitem__(0, float("nan")), "'room' has vertices that are"),
+    ],
+)
 def test_what_cant_be_captured_is_told(room, tmp_path, spoil, sentence):
     spoil(room)
     bpy.context.view_layer.update()

@@ -159,8 +159,11 @@ def test_a_room_is_first_seen_through_the_frame_that_shows_most_objects(tmp_path
 
     middles = np.array([[0, 5, 0], [1, 5, 0.5], [5, 0, 0], [0, -5, 0], [-1, -5, 0.2], [0.5, -4, 0]])
     corners = np.array([[0.1, 0, 0], [-0.1, 0.1, 0], [0, -0.1, 0]])
-    mesh = Mesh((middles[:, None] + corners).reshape(-1, 3), np.arange(18, dtype=np.int32).reshape(6, 3),
-                np.int32([3, 5, 7, 20, 21, 40]))
+    mesh = Mesh(
+        (middles[:, None] + corners).reshape(-1, 3),
+        np.arange(18, dtype=np.int32).reshape(6, 3),
+        np.int32([3, 5, 7, 20, 21, 40]),
+    )
     ways = {"one": (1, 0, 0), "two": (0, 1, 0), "three": (0, -1, 0), "three again": (0, -1, 0), "none": (-1, 0, 0)}
     frames = [Frame(name, tmp_path, looking(way)) for name, way in ways.items()]
     assert frames[best_view(frames, mesh)].name == "three"

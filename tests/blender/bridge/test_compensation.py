@@ -18,8 +18,10 @@ def test_it_rises_with_psi_and_falls_with_roughness():
     assert (table >= psi[:, None] - 1e-12).all() and table.max() <= 0.91
 
 
-@pytest.mark.parametrize(("psi", "phi", "measured"), [
-    (0.03, 0.15, 0.0653), (0.2, 0.35, 0.2161), (0.1, 0.02, 0.1496), (0.001, 0.05, 0.0153), (0.04, 0.002, 0.0921)])
+@pytest.mark.parametrize(
+    ("psi", "phi", "measured"),
+    [(0.03, 0.15, 0.0653), (0.2, 0.35, 0.2161), (0.1, 0.02, 0.1496), (0.001, 0.05, 0.0153), (0.04, 0.002, 0.0921)],
+)
 def test_measured_between_the_knots(psi, phi, measured):
     """Furnace values of scripts/measure_cycles_layering.py away from its grid."""
     assert layer_reflectance(psi, phi) == pytest.approx(measured, abs=0.0015)

@@ -24,8 +24,10 @@ def volume(mesh, i):
 @pytest.mark.parametrize("letter", ["o", "g"])
 def test_an_obj_keeps_its_coordinates_and_its_parts(tmp_path, letter):
     path = tmp_path / "a.obj"
-    path.write_text(f"mtllib no.mtl\n{letter} chair\n{QUAD}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl wood\n"
-                    f"f 1/1 2/2 3/3 4/4\n{letter} table\nv 5 5 5\nv 6 5 5\nv 5 6 5\nf 5 6 7\n")
+    path.write_text(
+        f"mtllib no.mtl\n{letter} chair\n{QUAD}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nusemtl wood\n"
+        f"f 1/1 2/2 3/3 4/4\n{letter} table\nv 5 5 5\nv 6 5 5\nv 5 6 5\nf 5 6 7\n"
+    )
     before, scene = counts(), bpy.context.scene
     mesh = import_mesh(path)
     assert mesh.names == {0: "chair", 1: "table"} and mesh.object_id.tolist() == [0, 0, 1]
@@ -75,13 +77,20 @@ def test_gltf_stands_upright_and_mirrored_objects_keep_their_outside(tmp_path, k
         assert volume(mesh, i) == pytest.approx(2, abs=1e-4)
 
 
-@pytest.mark.parametrize("name, content", [
-    ("a.obj", b""), ("a.obj", b"\xff\xfe\x00garbage" * 50), ("a.obj", b"v 0 0 0\nf 1 2 99\n"),
-    ("a.obj", b"v nan nan nan\nv 1 0 0\n"), ("a.glb", b"glTF\x02\0\0\0"), ("a.gltf", b"{}"),
-    ("a.gltf", b'{"asset": {"version": "2.0"}}'),
-    ("a.gltf", b'{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 7}]}'),
-    ("a.gltf", b'{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"children": [0]}]}'),
-])
+@pytest.mark.parametrize(
+    "name, content",
+    [
+        ("a.obj", b""),
+        ("a.obj", b"\xff\xfe\x00garbage" * 50),
+        ("a.obj", b"v 0 0 0\nf 1 2 99\n"),
+        ("a.obj", b"v nan nan nan\nv 1 0 0\n"),
+        ("a.glb", b"glTF\x02\0\0\0"),
+        ("a.gltf", b"{}"),
+        ("a.gltf", b'{"asset": {"version": "2.0"}}'),
+        ("a.gltf", b'{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 7}]}'),
+        ("a.gltf", b'{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]}], "nodes": [{"children": [0]}]}'),
+    ],
+)
 def test_a_broken_file_is_one_sentence(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     before = counts()

@@ -36,8 +36,11 @@ def dielectric(cosine, psi):
     """Fresnel's own formula for the index of refraction that `psi` means."""
     ior = (1 + np.sqrt(psi)) / (1 - np.sqrt(psi))
     g = np.sqrt(ior**2 - 1 + cosine**2)
-    return 0.5 * ((g - cosine) / (g + cosine)) ** 2 * (
-        1 + ((cosine * (g + cosine) - 1) / (cosine * (g - cosine) + 1)) ** 2)
+    return (
+        0.5
+        * ((g - cosine) / (g + cosine)) ** 2
+        * (1 + ((cosine * (g + cosine) - 1) / (cosine * (g - cosine) + 1)) ** 2)
+    )
 
 
 def lobe(w, v, normal, phi, psi, fresnel=schlick):
@@ -93,8 +96,9 @@ def test_furnace_specular(scene, shoot, look, white_world, phi, psi):
     specular = disc_mean(shoot(16, 16, 400))
     np.testing.assert_allclose(whole - specular, albedo, rtol=0.01)
     expected = albedo + lobe_reflectance(phi, psi)
-    print(f"phi {phi} psi {psi}: specular {specular.mean():.4f}, method {expected[0] - 0.2:.4f}; "
-          f"whole {whole / expected}")
+    print(
+        f"phi {phi} psi {psi}: specular {specular.mean():.4f}, method {expected[0] - 0.2:.4f}; whole {whole / expected}"
+    )
     np.testing.assert_allclose(whole, expected, rtol=0.03)
 
 
@@ -130,8 +134,12 @@ def lamp_points(half, height, centre=(0.0, 0.0), n=12):
 def test_lamp_over_a_plane(scene, shoot, look):
     radiance, albedo = np.array([30.0, 20.0, 5.0]), np.array([0.2, 0.5, 0.8])
     add("plane", make_material(ObjectMaterial(0, "Floor", LAMBERTIAN), plain(albedo)), size=4)
-    add("plane", make_material(ObjectMaterial(1, "Lamp", EMITTER, emission=tuple(radiance))), size=0.5,
-        location=(0.3, 0, 2))
+    add(
+        "plane",
+        make_material(ObjectMaterial(1, "Lamp", EMITTER, emission=tuple(radiance))),
+        size=0.5,
+        location=(0.3, 0, 2),
+    )
     points, area = lamp_points(0.25, 2.0, (0.3, 0.0))
     distance2 = (points**2).sum(1)
     irradiance = (radiance * (area * points[:, 2:] ** 2 / distance2[:, None] ** 2)).sum(0)
@@ -174,8 +182,12 @@ def test_highlight_profile(scene, shoot, look, phi, psi):
     size, width, half, height = 24, 3.0, 0.1, 2.0
     lamp = (0.0, 2.0)
     add("plane", make_material(ObjectMaterial(0, "Table", SPECULAR, phi=phi, psi=psi), plain((0, 0, 0))), size=20)
-    add("plane", make_material(ObjectMaterial(1, "Lamp", EMITTER, emission=(100.0,) * 3)), size=2 * half,
-        location=(*lamp, height))
+    add(
+        "plane",
+        make_material(ObjectMaterial(1, "Lamp", EMITTER, emission=(100.0,) * 3)),
+        size=2 * half,
+        location=(*lamp, height),
+    )
     look((0, -4, 4), (np.pi / 4, 0, 0), width=width)
     got = shoot(size, size, 100)[..., 1]
     view = np.array([0, -1, 1]) / np.sqrt(2)

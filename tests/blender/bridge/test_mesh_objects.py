@@ -15,8 +15,12 @@ INSTANCES = (Instance(2, "Sofa"), Instance(5, "Sofa"), Instance(7, "Wall"), Inst
 @pytest.fixture
 def mesh():
     rng = np.random.default_rng(0)
-    return Mesh(rng.uniform(-4, 4, (40, 3)) + (100, 0, 0), rng.integers(0, 40, (60, 3)).astype(np.int32),
-                rng.permutation(np.repeat([2, 5, 7], 20)).astype(np.int32), rng.random((60, 3, 2)).astype(np.float32))
+    return Mesh(
+        rng.uniform(-4, 4, (40, 3)) + (100, 0, 0),
+        rng.integers(0, 40, (60, 3)).astype(np.int32),
+        rng.permutation(np.repeat([2, 5, 7], 20)).astype(np.int32),
+        rng.random((60, 3, 2)).astype(np.float32),
+    )
 
 
 def read(data, name):

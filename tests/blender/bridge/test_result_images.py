@@ -30,8 +30,11 @@ def opened_again(tmp_path):
     """The first pixel of each image, by its result, after saving, moving the file's folder and opening."""
     bpy.ops.wm.save_mainfile()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "file.blend"))
-    return {one["scan_relight_image"].replace("\\", "/").split("/")[-2]: one.pixels[0] for one in bpy.data.images
-            if "scan_relight_image" in one}
+    return {
+        one["scan_relight_image"].replace("\\", "/").split("/")[-2]: one.pixels[0]
+        for one in bpy.data.images
+        if "scan_relight_image" in one
+    }
 
 
 @pytest.mark.parametrize("where", ["RESULT", "FOLDER", "PACK"])

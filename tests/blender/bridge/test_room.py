@@ -88,7 +88,7 @@ def render(scene, path, camera_name):
     bpy.ops.render.render(write_still=True, scene=scene.name)
     image = bpy.data.images.load(str(path))
     pixels = np.array(image.pixels[:], np.float32).reshape(image.size[1], image.size[0], 4)[..., :3]
-    return pixels * 2 ** scene.view_settings.exposure
+    return pixels * 2**scene.view_settings.exposure
 
 
 def psnr(one, other):
@@ -100,9 +100,16 @@ def psnr(one, other):
 def state_of(scene):
     """What an artist would notice of a scene."""
     world = scene.world
-    return (scene.render.engine, scene.view_settings.exposure, scene.camera, world,
-            tuple(world.node_tree.nodes["Background"].inputs["Color"].default_value), scene.render.resolution_x,
-            scene.frame_end, sorted(thing.name for thing in scene.objects))
+    return (
+        scene.render.engine,
+        scene.view_settings.exposure,
+        scene.camera,
+        world,
+        tuple(world.node_tree.nodes["Background"].inputs["Color"].default_value),
+        scene.render.resolution_x,
+        scene.frame_end,
+        sorted(thing.name for thing in scene.objects),
+    )
 
 
 def test_the_windows_room_renders_as_scene_blend(first, artist, tmp_path):
@@ -120,8 +127,11 @@ def test_the_windows_room_renders_as_scene_blend(first, artist, tmp_path):
     assert here.max() > 0.05
     assert psnr(here, there) > 45
     assert (exposure, engine) == (opened.view_settings.exposure, "CYCLES") and exposure != 0
-    assert one_sided == sum(any(node.type == "NEW_GEOMETRY" for node in slot.material.node_tree.nodes)
-                            for thing in opened.objects for slot in thing.material_slots)
+    assert one_sided == sum(
+        any(node.type == "NEW_GEOMETRY" for node in slot.material.node_tree.nodes)
+        for thing in opened.objects
+        for slot in thing.material_slots
+    )
 
 
 def test_the_room_has_a_scene_of_its_own(first, artist, tiny_capture):
@@ -171,8 +181,9 @@ def test_the_second_result_is_shown(first, second, artist):
     assert things == kept  # the same objects
     with bpy.data.libraries.load(str(second / "scene.blend"), link=False) as (there, wanted):
         wanted.objects = [name for name in there.objects if name.startswith("ball ")]
-    np.testing.assert_allclose(shape_in_world(named(brought.scene, "ball ")), shape_in_world(wanted.objects[0]),
-                               atol=1e-5)
+    np.testing.assert_allclose(
+        shape_in_world(named(brought.scene, "ball ")), shape_in_world(wanted.objects[0]), atol=1e-5
+    )
     assert all(thing["scan_relight_result"] == str(second) for thing in things.values())
     assert not any(str(first) in bpy.path.abspath(image.filepath) for image in bpy.data.images)
 
@@ -271,8 +282,9 @@ def test_a_duplicate_is_updated_too(first, second, artist):
 def test_import_then_run_gives_one_room(first, artist, tiny_capture):
     before = state_of(artist)
     imported = whole(importing(read_capture(tiny_capture)))
-    assert imported.scene != artist and not any(thing.data.materials for thing in imported.scene.objects
-                                                if thing.type == "MESH")
+    assert imported.scene != artist and not any(
+        thing.data.materials for thing in imported.scene.objects if thing.type == "MESH"
+    )
     brought = bring(first)
     assert brought.scene == imported.scene and brought.collection == imported.collection
     things = [thing for thing in bpy.data.objects if "object_id" in thing]

@@ -57,15 +57,26 @@ def test_it_renders_when_opened_elsewhere(scene, tmp_path, result, capture, fres
     (result / "materials.json").write_text('{"run": "0123456789abcdef", "objects": []}')
     assert write_scene(result / "scene.blend", capture, ATLAS, MATERIALS, result, 0.36, fresh=fresh) == ()
     assert sorted(p.name for p in result.iterdir()) == [
-        "albedo.exr", "base_color.exr", "environment.exr", "materials.json", "scene.blend", "shading.exr"]
+        "albedo.exr",
+        "base_color.exr",
+        "environment.exr",
+        "materials.json",
+        "scene.blend",
+        "shading.exr",
+    ]
     shutil.move(result, tmp_path / "moved")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "moved" / "scene.blend"))
     opened = bpy.context.scene
     assert {i.name for i in bpy.data.images if i.size[0]} == {i.name for i in bpy.data.images}
     assert sorted(i.filepath for i in bpy.data.images) == [
-        "//albedo.exr", "//base_color.exr", "//environment.exr", "//shading.exr"]
+        "//albedo.exr",
+        "//base_color.exr",
+        "//environment.exr",
+        "//shading.exr",
+    ]
     assert {i.name for i in bpy.data.images} == {
-        f"{tmp_path.name} {what}" for what in ("albedo", "base color", "environment", "shading")}
+        f"{tmp_path.name} {what}" for what in ("albedo", "base color", "environment", "shading")
+    }
     for thing in (one for one in opened.objects if one.type == "MESH"):
         name = {4: "Floor 4", 9: "Lamp 9"}[thing["object_id"]]
         assert (thing.name, thing.data.name, thing.active_material.name) == (name, name, name)
@@ -152,8 +163,10 @@ def test_a_file_that_blender_cannot_write_is_told(scene, tmp_path, result, captu
 @pytest.mark.parametrize("where", ["RESULT", "FOLDER", "PACK"])
 @pytest.mark.parametrize("kind", ["object", "udim"])
 def test_an_objects_own_image_comes_along(scene, tmp_path, result, capture, kind, where):
-    written, told = {"object": ("objects/Floor 4 base_color.exr",) * 2,
-                     "udim": ("base_color.1002.exr", "base_color.<UDIM>.exr")}[kind]
+    written, told = {
+        "object": ("objects/Floor 4 base_color.exr",) * 2,
+        "udim": ("base_color.1002.exr", "base_color.<UDIM>.exr"),
+    }[kind]
     (result / "objects").mkdir()
     write_exr(result / written, np.broadcast_to(np.float32([0.9, 0.1, 0.3]), (4, 4, 3)))
     if kind == "udim":

@@ -36,8 +36,10 @@ def soup():
 
 def rectangles(count):
     rng = np.random.default_rng(0)
-    quads = [np.array([[0, 0, 0], [w, 0, 0], [w, h, 0], [0, h, 0]]) + (3 * i, 0, i)
-             for i, (w, h) in enumerate(rng.uniform(0.5, 2, (count, 2)))]
+    quads = [
+        np.array([[0, 0, 0], [w, 0, 0], [w, h, 0], [0, h, 0]]) + (3 * i, 0, i)
+        for i, (w, h) in enumerate(rng.uniform(0.5, 2, (count, 2)))
+    ]
     faces = np.arange(count)[:, None, None] * 4 + [[0, 1, 2], [0, 2, 3]]
     return room(np.concatenate(quads), faces.reshape(-1, 3), np.repeat(np.arange(count), 2))
 

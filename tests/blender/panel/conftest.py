@@ -85,10 +85,16 @@ def draw(ops):
                     setattr(panel, name, getattr(cls, name))
                 else:
                     setattr(panel, name, value.__get__(panel))
-        context = SimpleNamespace(scene=bpy.context.scene, preferences=bpy.context.preferences, mode=bpy.context.mode,
-                                  region=SimpleNamespace(width=width), window_manager=bpy.context.window_manager,
-                                  view_layer=bpy.context.view_layer, active_object=bpy.context.active_object,
-                                  selected_objects=bpy.context.selected_objects)
+        context = SimpleNamespace(
+            scene=bpy.context.scene,
+            preferences=bpy.context.preferences,
+            mode=bpy.context.mode,
+            region=SimpleNamespace(width=width),
+            window_manager=bpy.context.window_manager,
+            view_layer=bpy.context.view_layer,
+            active_object=bpy.context.active_object,
+            selected_objects=bpy.context.selected_objects,
+        )
         assert cls.poll(context)
         cls.draw(panel, context)
         return layout

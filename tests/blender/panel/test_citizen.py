@@ -32,10 +32,25 @@ def test_every_operator_is_where_the_search_looks(package, ops, module):
     menus.SCAN_RELIGHT_MT_all.draw(SimpleNamespace(layout=menu), bpy.context)
     registered = {f"scan_relight.{name}" for name in dir(ops)}
     hidden = {f"scan_relight.{name}" for name in (*menus.NEED_MORE, "use_folder", "drop")}
-    assert set(menu.operators) >= {f"scan_relight.{name}" for name in (
-        "recover", "run", "stop", "open_capture", "open_result", "export", "before_after", "manual", "mark_assets")}
-    inner = {name for name in registered if "INTERNAL" in getattr(
-        getattr(bpy.types, "SCAN_RELIGHT_OT_" + name.partition(".")[2]), "bl_options", ())}
+    assert set(menu.operators) >= {
+        f"scan_relight.{name}"
+        for name in (
+            "recover",
+            "run",
+            "stop",
+            "open_capture",
+            "open_result",
+            "export",
+            "before_after",
+            "manual",
+            "mark_assets",
+        )
+    }
+    inner = {
+        name
+        for name in registered
+        if "INTERNAL" in getattr(getattr(bpy.types, "SCAN_RELIGHT_OT_" + name.partition(".")[2]), "bl_options", ())
+    }
     assert registered - set(menu.operators) == hidden | inner
     labels = [getattr(ops, name.partition(".")[2]).get_rna_type().name for name in menu.operators]
     assert len(set(labels)) == len(labels) and {"Recover Capture", "Export Room"} <= set(labels)
@@ -51,11 +66,19 @@ def manual(name):
     return viewer._lookup_rna_url(name, verbose=False)
 
 
-@pytest.mark.parametrize("name", [
-    "bpy.ops.scan_relight.recover", "bpy.ops.scan_relight.export", "bpy.ops.scan_relight.add_light",
-    "bpy.types.ScanRelightScene.preset", "bpy.types.ScanRelightSettings.shading_rays",
-    "bpy.types.ScanRelightReading.reading_mesh", "bpy.types.ScanRelightStudio.aim",
-    "bpy.types.ScanRelightPreferences.threads"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "bpy.ops.scan_relight.recover",
+        "bpy.ops.scan_relight.export",
+        "bpy.ops.scan_relight.add_light",
+        "bpy.types.ScanRelightScene.preset",
+        "bpy.types.ScanRelightSettings.shading_rays",
+        "bpy.types.ScanRelightReading.reading_mesh",
+        "bpy.types.ScanRelightStudio.aim",
+        "bpy.types.ScanRelightPreferences.threads",
+    ],
+)
 def test_the_online_manual_leads_to_pages_that_are_there(package, ops, name):
     found = urlparse(manual(name))
     assert found.scheme == "file" and Path(unquote(found.path)).is_file()
@@ -72,8 +95,11 @@ def test_every_part_that_is_linked_is_a_heading(package, ops, module):
     for page in pages:
         name, _, part = page.partition("#")
         text = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
-        headings = {anchor.sub("", line.lstrip("# ").lower()).strip().replace(" ", "-")
-                    for line in text.splitlines() if line.startswith("#")}
+        headings = {
+            anchor.sub("", line.lstrip("# ").lower()).strip().replace(" ", "-")
+            for line in text.splitlines()
+            if line.startswith("#")
+        }
         assert not part or part in headings, page
 
 
@@ -96,6 +122,9 @@ def test_the_keys_are_of_operators_and_properties_that_there_are(package, ops, m
 def test_operators_with_settings_have_presets_that_keep_no_folder(package, ops, name):
     assert "PRESET" in getattr(bpy.types, f"SCAN_RELIGHT_OT_{name}").bl_options
     properties = getattr(ops, name).get_rna_type().properties
-    paths = [prop for prop in properties if prop.type == "STRING" and prop.identifier in (
-        "capture_folder", "result_folder", "filepath", "directory")]
+    paths = [
+        prop
+        for prop in properties
+        if prop.type == "STRING" and prop.identifier in ("capture_folder", "result_folder", "filepath", "directory")
+    ]
     assert paths and all(prop.is_skip_preset or prop.is_skip_save for prop in paths)

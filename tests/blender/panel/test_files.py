@@ -154,8 +154,17 @@ def finished(grey_capture, tmp_path_factory):
     from addon.core.settings import Settings
 
     out = tmp_path_factory.mktemp("finished") / "result"
-    quick = Settings(shading_rays=16, specular_rays=4, emitter_rays=2, portal_rays=0, refine=0, texel_size=0.12,
-                     atlas_size=512, mirrors=False, threads=1)
+    quick = Settings(
+        shading_rays=16,
+        specular_rays=4,
+        emitter_rays=2,
+        portal_rays=0,
+        refine=0,
+        texel_size=0.12,
+        atlas_size=512,
+        mirrors=False,
+        threads=1,
+    )
     run(grey_capture, out, quick, Progress(), "write")
     return out
 

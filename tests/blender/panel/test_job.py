@@ -17,8 +17,25 @@ from addon.bridge.job import DONE, FAILED, STOPPED, Job
 from addon.bridge.job_command import command
 from addon.core.room_file import read_room
 
-QUICK = ["--shading-rays", "16", "--specular-rays", "4", "--emitter-rays", "2", "--portal-rays", "0", "--refine", "0",
-         "--texel-size", "0.12", "--atlas-size", "512", "--no-mirrors", "--threads", "1"]
+QUICK = [
+    "--shading-rays",
+    "16",
+    "--specular-rays",
+    "4",
+    "--emitter-rays",
+    "2",
+    "--portal-rays",
+    "0",
+    "--refine",
+    "0",
+    "--texel-size",
+    "0.12",
+    "--atlas-size",
+    "512",
+    "--no-mirrors",
+    "--threads",
+    "1",
+]
 DEAF = "import signal, sys, time; signal.signal(signal.SIGINT, signal.SIG_IGN); print('up', flush=True); time.sleep(60)"
 
 
@@ -35,8 +52,9 @@ def until(true, seconds=60):
 
 
 def recover(capture, result, *more):
-    return command(["recover", str(capture), "--out", str(result), *QUICK, "--progress", "json", "--stop-with-stdin",
-                    *more])
+    return command(
+        ["recover", str(capture), "--out", str(result), *QUICK, "--progress", "json", "--stop-with-stdin", *more]
+    )
 
 
 def alive(pid):
@@ -48,10 +66,14 @@ def alive(pid):
 
 
 def test_events_arrive_and_other_words_are_kept():
-    lines = [{"event": "progress", "stage": "shading", "share": 0.5, "overall": 0.25, "seconds_left": 7.0},
-             {"event": "warning", "text": "This was odd."}, {"event": "done", "seconds": 3.0, "result": "there"}]
+    lines = [
+        {"event": "progress", "stage": "shading", "share": 0.5, "overall": 0.25, "seconds_left": 7.0},
+        {"event": "warning", "text": "This was odd."},
+        {"event": "done", "seconds": 3.0, "result": "there"},
+    ]
     code = "print('Blender 5.2'); print('{\"event\": broken')\n" + "".join(
-        f"print({json.dumps(line)!r})\n" for line in lines)
+        f"print({json.dumps(line)!r})\n" for line in lines
+    )
     job = Job(python(code), capture_folder="here")
     assert job.wait(30) and job.state == DONE and job.sentence == ""
     assert (job.stage, job.share, job.overall) == ("shading", 0.5, 0.25) and 0 <= job.seconds_left <= 7
@@ -60,15 +82,21 @@ def test_events_arrive_and_other_words_are_kept():
 
 
 def test_a_failure_is_the_command_lines_own_sentence():
-    job = Job(python("import sys; print('noise\\nscan-relight: The mesh is empty; scan again.\\n', file=sys.stderr);"
-                     "sys.exit(2)"))
+    job = Job(
+        python(
+            "import sys; print('noise\\nscan-relight: The mesh is empty; scan again.\\n', file=sys.stderr);sys.exit(2)"
+        )
+    )
     assert job.wait(30) and (job.state, job.sentence) == (FAILED, "The mesh is empty; scan again.")
 
 
-@pytest.mark.parametrize(("code", "sentence"), [
-    ("import os; os._exit(7)", "The run ended with code 7: it left no word"),
-    ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", "most likely because memory ran out"),
-])
+@pytest.mark.parametrize(
+    ("code", "sentence"),
+    [
+        ("import os; os._exit(7)", "The run ended with code 7: it left no word"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", "most likely because memory ran out"),
+    ],
+)
 @pytest.mark.skipif(os.name == "nt", reason="signals")
 def test_an_end_without_a_word_is_told(code, sentence):
     job = Job(python(code))
@@ -129,7 +157,9 @@ def test_stopped_in_the_middle_then_finished(grey_capture, tmp_path):
     assert second.wait(300) and second.state == DONE, second.sentence
     report = json.loads((tmp_path / "report.json").read_text())
     assert {name: report["stages"][name]["stored"] for name in ("surface", "lit_diffuse")} == {
-        "surface": True, "lit_diffuse": True}
+        "surface": True,
+        "lit_diffuse": True,
+    }
     assert second.answer["until"] == "write" and second.warnings == report["warnings"]
     room = read_room(tmp_path)
     assert len(room.materials) == len(room.capture.instances) == 15 and room.atlas_uv.any()
@@ -146,12 +176,15 @@ def room_time(folder):
 @pytest.mark.skipif(sys.platform != "linux", reason="/proc")
 def test_a_job_ends_with_its_starter(grey_capture, tmp_path):
     """A Blender that crashes leaves nothing that goes on for hours."""
-    code = ("import json, os, sys, time\nfrom addon.bridge.job import Job\nimport bpy\n"
-            "job = Job(json.loads(sys.argv[1]))\n"
-            "while not job.stage: time.sleep(0.02)\n"
-            "print(job.process_id, flush=True)\nos.kill(os.getpid(), 9)")
-    done = subprocess.run([sys.executable, "-c", code, json.dumps(recover(grey_capture, tmp_path))],
-                          capture_output=True, text=True)
+    code = (
+        "import json, os, sys, time\nfrom addon.bridge.job import Job\nimport bpy\n"
+        "job = Job(json.loads(sys.argv[1]))\n"
+        "while not job.stage: time.sleep(0.02)\n"
+        "print(job.process_id, flush=True)\nos.kill(os.getpid(), 9)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, json.dumps(recover(grey_capture, tmp_path))], capture_output=True, text=True
+    )
     pid = int(done.stdout.split()[-1])
     until(lambda: not alive(pid), 30)
     assert not (tmp_path / "report.json").exists()

@@ -67,8 +67,9 @@ def stage(module, ops):
     operator = Operator()
     area = SimpleNamespace(type="VIEW_3D", x=0, y=0, width=100, height=100, regions=[])
     window = SimpleNamespace(screen=SimpleNamespace(areas=[area]))
-    context = SimpleNamespace(scene=bpy.context.scene, window=window, window_manager=Manager(), workspace=None,
-                              mode="OBJECT")
+    context = SimpleNamespace(
+        scene=bpy.context.scene, window=window, window_manager=Manager(), workspace=None, mode="OBJECT"
+    )
 
     def send(kind="TIMER", value="PRESS", x=50):
         return operator.modal(context, SimpleNamespace(type=kind, value=value, mouse_x=x, mouse_y=50))
@@ -80,9 +81,15 @@ def stage(module, ops):
             time.sleep(0.01)
         return verdict
 
-    return SimpleNamespace(operator=operator, context=context, send=send, play=play, active=job_operator.active,
-                           bar=job_operator.bar,
-                           start=lambda command: operator.start(context, command, title="Recover"))
+    return SimpleNamespace(
+        operator=operator,
+        context=context,
+        send=send,
+        play=play,
+        active=job_operator.active,
+        bar=job_operator.bar,
+        start=lambda command: operator.start(context, command, title="Recover"),
+    )
 
 
 def test_a_run_changes_the_scene_at_its_end(stage):
@@ -148,8 +155,10 @@ def test_a_scene_that_is_gone_is_told(stage):
     bpy.data.scenes.remove(bpy.context.scene)
     stage.operator.job.facts["result_folder"] = "/somewhere"
     assert stage.play() == {"CANCELLED"}
-    assert stage.operator.reports[-1] == ("ERROR", "The scene that the run was started for is gone; "
-                                          "its result lies in '/somewhere'.")
+    assert stage.operator.reports[-1] == (
+        "ERROR",
+        "The scene that the run was started for is gone; its result lies in '/somewhere'.",
+    )
 
 
 def test_a_renamed_scene_is_found(stage):

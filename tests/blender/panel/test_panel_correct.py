@@ -27,9 +27,15 @@ def test_only_for_a_recovered_object(room, panels):
     assert not panels[0].poll(bpy.context)
 
 
-@pytest.mark.parametrize("number, rows", [
-    (BOARD, {"Model", "Base Color"}), (TABLE, {"Model", "Roughness", "F0", "Base Color"}),
-    (TAP, {"Model", "Roughness", "F0 Color"}), (LAMP, {"Model"})])
+@pytest.mark.parametrize(
+    "number, rows",
+    [
+        (BOARD, {"Model", "Base Color"}),
+        (TABLE, {"Model", "Roughness", "F0", "Base Color"}),
+        (TAP, {"Model", "Roughness", "F0 Color"}),
+        (LAMP, {"Model"}),
+    ],
+)
 def test_each_model_has_its_values(room, panels, draw, number, rows):
     select(room[number])
     words = draw(panels[0]).words

@@ -13,8 +13,10 @@ bpy = pytest.importorskip("bpy")
 
 PANELS = (("panel_capture", "SCAN_RELIGHT_PT_capture"), ("panel_recover", "SCAN_RELIGHT_PT_recover"))
 DEAF = [sys.executable, "-c", "import time; time.sleep(60)"]
-TELLS = "print('{\"event\": \"progress\", \"stage\": \"shading\", \"share\": 0.42, \"overall\": 0.5, " \
-        "\"seconds_left\": 125.0}', flush=True)\n"
+TELLS = (
+    'print(\'{"event": "progress", "stage": "shading", "share": 0.42, "overall": 0.5, '
+    '"seconds_left": 125.0}\', flush=True)\n'
+)
 
 
 @pytest.fixture
@@ -63,7 +65,8 @@ def test_register_twice_and_back(package):
 def test_the_parts_are_in_the_order_of_the_work(panels):
     assert [panel.bl_order for panel in panels] == [0, 1]
     assert {(panel.bl_space_type, panel.bl_region_type, panel.bl_category) for panel in panels} == {
-        ("VIEW_3D", "UI", "Scan Relight")}
+        ("VIEW_3D", "UI", "Scan Relight")
+    }
 
 
 @pytest.mark.parametrize("open_panels", [True, False])
@@ -110,8 +113,16 @@ def test_a_warning_is_shown(draw, capture, choices, grey_capture, tmp_path):
 
 def test_facts_of_further_readers_are_shown(draw, capture, choices, module):
     choices.capture_folder = "/somewhere"
-    module("operators.findings").put(choices, {"frames": 2, "warnings": [], "proposals": ["Give --transfer srgb."],
-                                               "scale": "unknown", "nested": {"left": "out"}})
+    module("operators.findings").put(
+        choices,
+        {
+            "frames": 2,
+            "warnings": [],
+            "proposals": ["Give --transfer srgb."],
+            "scale": "unknown",
+            "nested": {"left": "out"},
+        },
+    )
     assert "Give --transfer srgb." in draw(capture).text and "Scale: unknown" in draw(capture).text
 
 
@@ -158,12 +169,15 @@ def test_a_run_is_shown_with_stage_share_and_time(draw, recover, begin, choices)
     assert not bpy.ops.scan_relight.run.poll() and bpy.ops.scan_relight.stop.poll()
 
 
-@pytest.mark.parametrize(("code", "said"), [
-    ("import sys; sys.exit('scan-relight: The mesh is empty; scan again.')", "The mesh is empty; scan again."),
-    ("import sys; sys.exit(130)", "Stopped; the finished stages are kept"),
-    ("print('{\"event\": \"warning\", \"text\": \"This was odd.\"}')", "This was odd."),
-    ("", "Recover: done in"),
-])
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        ("import sys; sys.exit('scan-relight: The mesh is empty; scan again.')", "The mesh is empty; scan again."),
+        ("import sys; sys.exit(130)", "Stopped; the finished stages are kept"),
+        ('print(\'{"event": "warning", "text": "This was odd."}\')', "This was odd."),
+        ("", "Recover: done in"),
+    ],
+)
 def test_the_outcome_is_shown(draw, recover, begin, choices, code, said):
     choices.capture_folder = "/somewhere"
     job = begin(code, phase="end", result_folder="/there", until="write")
@@ -174,8 +188,13 @@ def test_the_outcome_is_shown(draw, recover, begin, choices, code, said):
 
 def test_run_hands_over_what_was_chosen(choices, module, monkeypatch, tmp_path):
     asked = []
-    monkeypatch.setattr(module("addon.bridge.run"), "run", lambda capture, result, settings, progress, until, **where:
-                        asked.append((capture, result, settings, until, where)) or {"warnings": []})
+    monkeypatch.setattr(
+        module("addon.bridge.run"),
+        "run",
+        lambda capture, result, settings, progress, until, **where: (
+            asked.append((capture, result, settings, until, where)) or {"warnings": []}
+        ),
+    )
     monkeypatch.setenv("HOME", str(tmp_path / "me"))
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     choices.capture_folder, choices.preset = str(tmp_path / "room"), "draft"
@@ -235,4 +254,10 @@ def test_reading_options_match_the_command_line(choices, module):
     given = make_parser().parse_args(["info", "/capture", *reading_props.options(owner)])
     here = reading_props.reading(owner)
     assert (given.format, given.mesh, given.outside, given.transfer, given.exposures, given.convention) == (
-        here.format, here.mesh, here.outside, here.transfer, here.exposures, here.convention)
+        here.format,
+        here.mesh,
+        here.outside,
+        here.transfer,
+        here.exposures,
+        here.convention,
+    )

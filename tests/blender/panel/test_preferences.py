@@ -33,8 +33,10 @@ def test_they_are_drawn(preferences, module):
 
     shown = Layout()
     cls = preferences.ScanRelightPreferences
-    drawn = SimpleNamespace(layout=shown, bl_rna=bpy.types.ScanRelightPreferences.bl_rna
-                            if hasattr(bpy.types, "ScanRelightPreferences") else cls.bl_rna)
+    drawn = SimpleNamespace(
+        layout=shown,
+        bl_rna=bpy.types.ScanRelightPreferences.bl_rna if hasattr(bpy.types, "ScanRelightPreferences") else cls.bl_rna,
+    )
     shown.prop = lambda owner, name, **_: shown.words.append(owner.bl_rna.properties[name].description)
     cls.draw(drawn, bpy.context)
     assert "scan_relight.clear_cache" in shown.buttons and all(shown.words)
@@ -72,8 +74,11 @@ def test_stages_beside_the_file_are_cleared_too(preferences, module, ops, tmp_pa
 
 def test_threads_and_memory_reach_a_run(preferences, module, ops, monkeypatch, tmp_path):
     asked, limits = [], []
-    monkeypatch.setattr(module("addon.bridge.run"), "run", lambda capture, result, settings, *rest, **where:
-                        asked.append(settings) or {"warnings": []})
+    monkeypatch.setattr(
+        module("addon.bridge.run"),
+        "run",
+        lambda capture, result, settings, *rest, **where: asked.append(settings) or {"warnings": []},
+    )
     props = module("operators.settings_props")
     guard = props.MemoryGuard
     monkeypatch.setattr(props, "MemoryGuard", lambda limit: limits.append(limit) or guard(0))
@@ -121,11 +126,17 @@ def test_beside_the_file_once_it_is_saved_and_where_the_room_is(preferences, mod
 def extension(package, monkeypatch, tmp_path):
     """Blender's folders as they are where the extension is installed: its own ones lie in `tmp_path / "own"`."""
     own = tmp_path / "own"
-    monkeypatch.setattr(bpy.utils, "extension_path_user",
-                        lambda name, path="", create=False: str(own / ".user" / "scan_relight" / path))
+    monkeypatch.setattr(
+        bpy.utils, "extension_path_user", lambda name, path="", create=False: str(own / ".user" / "scan_relight" / path)
+    )
     resource = bpy.utils.user_resource
-    monkeypatch.setattr(bpy.utils, "user_resource", lambda kind, path="", create=False:
-                        str(own / path) if kind == "EXTENSIONS" else resource(kind, path=path, create=create))
+    monkeypatch.setattr(
+        bpy.utils,
+        "user_resource",
+        lambda kind, path="", create=False: (
+            str(own / path) if kind == "EXTENSIONS" else resource(kind, path=path, create=create)
+        ),
+    )
     return own
 
 

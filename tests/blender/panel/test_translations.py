@@ -35,8 +35,14 @@ def german(translations):
 
 def test_the_script_finds_what_is_shown(strings):
     """A label, a tooltip, an item, a panel's text, a disabled button's, and one with figures."""
-    assert {"Recover Capture", "Edge of a texel in metres; 0 takes what the frames resolve", "As Filmed", "Resume",
-            "No run is going on.", "{}: done in {}."} <= strings
+    assert {
+        "Recover Capture",
+        "Edge of a texel in metres; 0 takes what the frames resolve",
+        "As Filmed",
+        "Resume",
+        "No run is going on.",
+        "{}: done in {}.",
+    } <= strings
 
 
 def test_german_is_complete(german, strings):
@@ -50,20 +56,28 @@ def test_german_has_no_leftovers(german, strings):
 
 def test_every_entry_is_one(german):
     """As many figures as in English, no full stop at a tooltip's end, nothing empty, and each line of the file read."""
-    wrong = [english for english, other in german.items()
-             if not other or english.count("{}") != other.count("{}") or english.endswith(".") != other.endswith(".")]
+    wrong = [
+        english
+        for english, other in german.items()
+        if not other or english.count("{}") != other.count("{}") or english.endswith(".") != other.endswith(".")
+    ]
     assert not wrong
     text = (ROOT / "operators" / "translations" / "de.po").read_text(encoding="utf-8")
     assert len(re.findall("^msgid", text, re.MULTILINE)) == len(german)
 
 
-@pytest.mark.parametrize(("english", "other"), [
-    ("Resume", "Fortsetzen"),
-    ("Goes on with: Light and albedo. What is finished is kept, where its settings are the same.",
-     "Geht weiter mit: Licht und Albedo. Fertiges bleibt, wo die Einstellungen dieselben sind."),
-    ("Recover Capture: done in 2 min 05 s.", "Aufnahme rekonstruieren: fertig in 2 min 05 s."),
-    ("Nobody has translated this.", "Nobody has translated this."),
-])
+@pytest.mark.parametrize(
+    ("english", "other"),
+    [
+        ("Resume", "Fortsetzen"),
+        (
+            "Goes on with: Light and albedo. What is finished is kept, where its settings are the same.",
+            "Geht weiter mit: Licht und Albedo. Fertiges bleibt, wo die Einstellungen dieselben sind.",
+        ),
+        ("Recover Capture: done in 2 min 05 s.", "Aufnahme rekonstruieren: fertig in 2 min 05 s."),
+        ("Nobody has translated this.", "Nobody has translated this."),
+    ],
+)
 def test_sentences_are_put_together(translations, english, other):
     assert translations.composed(english, "de_DE") == other
 

@@ -29,8 +29,7 @@ def described(package):
             known = [prop for prop in cls.bl_rna.properties if prop.identifier in cls.__annotations__]
         else:
             continue
-        yield from ((cls.__name__, prop) for prop in known
-                    if prop.identifier not in OF_BLENDER and not prop.is_hidden)
+        yield from ((cls.__name__, prop) for prop in known if prop.identifier not in OF_BLENDER and not prop.is_hidden)
 
 
 def wrong_with(text):
@@ -48,8 +47,11 @@ def test_every_property_is_explained_in_plain_words(package, ops):
     for owner, prop in described(package):
         wrong += [f"{owner}.{prop.identifier} {wrong_with(prop.description)}"] * bool(wrong_with(prop.description))
         if prop.type == "ENUM":
-            wrong += [f"{owner}.{prop.identifier}, {one.identifier}: {wrong_with(one.description)}"
-                      for one in prop.enum_items if wrong_with(one.description)]
+            wrong += [
+                f"{owner}.{prop.identifier}, {one.identifier}: {wrong_with(one.description)}"
+                for one in prop.enum_items
+                if wrong_with(one.description)
+            ]
     assert not wrong, "\n".join(wrong)
 
 
@@ -67,10 +69,35 @@ def test_every_operator_has_a_label_and_a_tooltip(package, ops):
 
 def test_labels_are_title_case(package, ops):
     """As Blender's are; small words stay small."""
-    small = {"a", "an", "and", "as", "at", "by", "for", "from", "in", "it", "not", "of", "on", "or", "the", "to", "px",
-             "m", "with", "is", "its", "x"}
-    wrong = [f"{owner}.{prop.identifier}: {prop.name}" for owner, prop in described(package)
-             if any(word[0].islower() and word not in small for word in re.findall(r"[A-Za-z][\w']*", prop.name))]
+    small = {
+        "a",
+        "an",
+        "and",
+        "as",
+        "at",
+        "by",
+        "for",
+        "from",
+        "in",
+        "it",
+        "not",
+        "of",
+        "on",
+        "or",
+        "the",
+        "to",
+        "px",
+        "m",
+        "with",
+        "is",
+        "its",
+        "x",
+    }
+    wrong = [
+        f"{owner}.{prop.identifier}: {prop.name}"
+        for owner, prop in described(package)
+        if any(word[0].islower() and word not in small for word in re.findall(r"[A-Za-z][\w']*", prop.name))
+    ]
     assert not wrong, "\n".join(wrong)
 
 
@@ -79,8 +106,9 @@ def test_no_animation_dots(path):
     """Wherever a layout splits label and value, Blender would draw a dot for keyframes beside it."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.FunctionDef):
-            names = [one.attr for one in ast.walk(node) if isinstance(one, ast.Attribute)
-                     and isinstance(one.ctx, ast.Store)]
+            names = [
+                one.attr for one in ast.walk(node) if isinstance(one, ast.Attribute) and isinstance(one.ctx, ast.Store)
+            ]
             assert names.count("use_property_split") <= names.count("use_property_decorate"), node.name
 
 

@@ -12,8 +12,21 @@ from tests.blender.conftest import honest
 
 os.environ.setdefault("BLENDER_USER_EXTENSIONS", tempfile.mkdtemp())
 
-QUICK = ("--shading-rays", "16", "--specular-rays", "4", "--emitter-rays", "2", "--refine", "0", "--texel-size", "0.1",
-         "--atlas-size", "512", "--quiet")
+QUICK = (
+    "--shading-rays",
+    "16",
+    "--specular-rays",
+    "4",
+    "--emitter-rays",
+    "2",
+    "--refine",
+    "0",
+    "--texel-size",
+    "0.1",
+    "--atlas-size",
+    "512",
+    "--quiet",
+)
 
 
 @pytest.fixture(scope="session")
@@ -21,8 +34,12 @@ def result(tmp_path_factory, tiny_capture, root):
     """A result folder of the demo's room, recovered with very few rays."""
     folder = tmp_path_factory.mktemp("relight") / "result"
     code = "import sys; from addon.cli import main; sys.exit(main(sys.argv[1:]))"
-    done = subprocess.run([sys.executable, "-c", code, "recover", str(tiny_capture), "--out", str(folder), *QUICK],
-                          cwd=root, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code, "recover", str(tiny_capture), "--out", str(folder), *QUICK],
+        cwd=root,
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stderr
     return folder
 

@@ -12,8 +12,10 @@ from addon.core.material import EMITTER, LAMBERTIAN, ObjectMaterial
 def sheet(scene, name, size, place, rotation=(0, 0, 0), object_id=0, emission=None, one_sided=False, grey=0.5):
     """A square of `size` metres whose normal is +Z before `rotation`; a lamp where it has an `emission`."""
     h = size / 2
-    thing = bpy.data.objects.new(name, mesh_data(
-        name, np.array([[-h, -h, 0], [h, -h, 0], [h, h, 0], [-h, h, 0]]), np.array([[0, 1, 2], [0, 2, 3]])))
+    thing = bpy.data.objects.new(
+        name,
+        mesh_data(name, np.array([[-h, -h, 0], [h, -h, 0], [h, h, 0], [-h, h, 0]]), np.array([[0, 1, 2], [0, 2, 3]])),
+    )
     model = LAMBERTIAN if emission is None else EMITTER
     material = make_material(ObjectMaterial(object_id, name, model, emission=emission), one_sided=one_sided)
     if emission is None:

@@ -29,9 +29,13 @@ def files(folder):
 def test_lamps_change_the_picture_and_the_result_stays(result, tmp_path):
     before = files(result)
     half = ("--lamps", "ceiling lamp=0.5,lamp shade=off")
-    for name, options in (("on", ()), ("off", ("--lamps", "off")), ("half", half),
-                          ("spot", ("--lamps", "off", "--spot")),
-                          ("bright", ("--lamps", "off", "--spot", "3"))):
+    for name, options in (
+        ("on", ()),
+        ("off", ("--lamps", "off")),
+        ("half", half),
+        ("spot", ("--lamps", "off", "--spot")),
+        ("bright", ("--lamps", "off", "--spot", "3")),
+    ):
         assert relight(result, tmp_path / f"{name}.exr", *options) == 0
     on, off, half, spot, bright = (mean(tmp_path / f"{n}.exr") for n in ("on", "off", "half", "spot", "bright"))
     assert off.max() < 1e-6 < half.min() and np.all(half < 0.55 * on)
@@ -42,8 +46,20 @@ def test_lamps_change_the_picture_and_the_result_stays(result, tmp_path):
 @pytest.mark.parametrize("camera", ["3", None])
 def test_before_and_after_beside_each_other(result, tmp_path, camera):
     name = camera and bpy_camera_name(result, 3)
-    assert relight(result, tmp_path / "a.png", "--before-after", "--lamps", "off", "--softbox",
-                   *(("--camera", name) if name else ()), "--size", "50") == 0
+    assert (
+        relight(
+            result,
+            tmp_path / "a.png",
+            "--before-after",
+            "--lamps",
+            "off",
+            "--softbox",
+            *(("--camera", name) if name else ()),
+            "--size",
+            "50",
+        )
+        == 0
+    )
     width, height = picture_size(tmp_path / "a.png")
     assert height == 24 and width == 2 * 32 + 1
     image = bpy.data.images.load(str(tmp_path / "a.png"))
@@ -65,18 +81,21 @@ def test_a_number_and_a_name_are_the_same_camera(result, tmp_path):
     assert np.array_equal(n, m) and not np.array_equal(n, o)
 
 
-@pytest.mark.parametrize("options, says", [
-    (("--lamps", "sun=2"), "no lamp 'sun'; known are 'ceiling lamp 3'"),
-    (("--lamps", "ceiling lamp=-1"), "factors of at least 0, not '-1'"),
-    (("--lamps", "brighter"), "takes on, off or NAME=FACTOR"),
-    (("--world", "left"), "angle in degrees, not 'left'"),
-    (("--hdri", "nowhere.hdr"), "no picture"),
-    (("--camera", "99"), "take a number from 0 to 9"),
-    (("--camera", "kitchen"), "There is no camera 'kitchen'"),
-    (("--samples", "-1"), "--samples"),
-    (("--spot", "-1"), "--spot"),
-    (("--world-strength", "nan"), "--world-strength"),
-])
+@pytest.mark.parametrize(
+    "options, says",
+    [
+        (("--lamps", "sun=2"), "no lamp 'sun'; known are 'ceiling lamp 3'"),
+        (("--lamps", "ceiling lamp=-1"), "factors of at least 0, not '-1'"),
+        (("--lamps", "brighter"), "takes on, off or NAME=FACTOR"),
+        (("--world", "left"), "angle in degrees, not 'left'"),
+        (("--hdri", "nowhere.hdr"), "no picture"),
+        (("--camera", "99"), "take a number from 0 to 9"),
+        (("--camera", "kitchen"), "There is no camera 'kitchen'"),
+        (("--samples", "-1"), "--samples"),
+        (("--spot", "-1"), "--spot"),
+        (("--world-strength", "nan"), "--world-strength"),
+    ],
+)
 def test_errors_are_one_sentence_and_no_picture(result, tmp_path, capsys, options, says):
     says = says.replace("ceiling lamp 3", first_lamp(result))
     capsys.readouterr()

@@ -62,12 +62,23 @@ def a_room(scene, folder, name):
 def everything():
     """Names and numbers of all that the scene holds."""
     kinds = ("objects", "meshes", "materials", "images", "collections", "scenes", "cameras", "lights")
-    return ({kind: sorted(x.name for x in getattr(bpy.data, kind)) for kind in kinds},
-            [(t.name, t.select_get(), t.hide_viewport, t.parent, [s.material.name + s.link for s in t.material_slots])
-             for t in bpy.context.scene.objects],
-            {(m.name, n.name, s.name): (len(s.links), list(s.default_value) if hasattr(s.default_value, "__len__")
-                                        else s.default_value)
-             for m in bpy.data.materials for n in m.node_tree.nodes for s in n.inputs if hasattr(s, "default_value")})
+    return (
+        {kind: sorted(x.name for x in getattr(bpy.data, kind)) for kind in kinds},
+        [
+            (t.name, t.select_get(), t.hide_viewport, t.parent, [s.material.name + s.link for s in t.material_slots])
+            for t in bpy.context.scene.objects
+        ],
+        {
+            (m.name, n.name, s.name): (
+                len(s.links),
+                list(s.default_value) if hasattr(s.default_value, "__len__") else s.default_value,
+            )
+            for m in bpy.data.materials
+            for n in m.node_tree.nodes
+            for s in n.inputs
+            if hasattr(s, "default_value")
+        },
+    )
 
 
 def read_back(path):
@@ -145,7 +156,7 @@ def test_the_extensions_are_named_in_the_file(things, tmp_path):
 def gltf(path):
     """The JSON of a glTF file."""
     data = path.read_bytes()
-    return json.loads(data if path.suffix == ".gltf" else data[20:20 + int.from_bytes(data[12:16], "little")])
+    return json.loads(data if path.suffix == ".gltf" else data[20 : 20 + int.from_bytes(data[12:16], "little")])
 
 
 @pytest.mark.parametrize("ending", [".glb", ".gltf"])
@@ -218,7 +229,8 @@ def test_the_same_file_again_replaces_its_own_textures(things, tmp_path, ending)
         thing.select_set(thing.name == "lamp 4")
     exporting.export(things, path, exporting.SELECTED)
     assert sorted(one.name for one in path.parent.iterdir()) == sorted(
-        {path.name} | ({"room.bin"} if ending == ".gltf" else set()))
+        {path.name} | ({"room.bin"} if ending == ".gltf" else set())
+    )
 
 
 def test_where_the_disk_refuses_all_is_as_it_was(things, tmp_path, monkeypatch):

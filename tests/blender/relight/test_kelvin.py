@@ -20,7 +20,7 @@ def test_it_is_what_blenders_lights_show(kelvin):
 
 def test_a_lamp_keeps_its_luminance(scene):
     sheet(scene, "lamp 1", 1, (0, 0, 0), emission=(6, 5, 4))
-    lamp, = relight_lamps.find_lamps(scene)
+    (lamp,) = relight_lamps.find_lamps(scene)
     before = np.array(relight_lamps.radiance(lamp))
     relight_lamps.set_kelvin(lamp, 2700)
     after = np.array(relight_lamps.radiance(lamp))

@@ -69,8 +69,12 @@ def test_another_colour_is_what_arrives(scene, shoot, look_down, one_sided):
 
 def every_value(material):
     tree = material.node_tree
-    values = {(n.name, s.identifier): tuple(s.default_value) if hasattr(s.default_value, "__len__")
-              else s.default_value for n in tree.nodes for s in n.inputs if hasattr(s, "default_value")}
+    values = {
+        (n.name, s.identifier): tuple(s.default_value) if hasattr(s.default_value, "__len__") else s.default_value
+        for n in tree.nodes
+        for s in n.inputs
+        if hasattr(s, "default_value")
+    }
     return values, len(tree.links), {key: material[key] for key in material.keys()}
 
 
@@ -80,8 +84,11 @@ def test_restored_is_exact(scene, one_sided):
     material = sheet(scene, "lamp", 1, (0, 0, 2), DOWN, 3, radiance, one_sided).data.materials[0]
     before = every_value(material)
     assert not lamps.is_changed(material)
-    for change in (lambda: lamps.set_factor(material, 0.37), lambda: lamps.set_colour(material, (1, 0, 0.5)),
-                   lambda: lamps.set_on(material, False)):
+    for change in (
+        lambda: lamps.set_factor(material, 0.37),
+        lambda: lamps.set_colour(material, (1, 0, 0.5)),
+        lambda: lamps.set_on(material, False),
+    ):
         change()
         assert lamps.is_changed(material) and every_value(material) != before
     lamps.restore(material)
@@ -103,7 +110,7 @@ def test_the_state_survives_saving(scene, tmp_path):
     lamps.set_factor(lamps.find_lamps(scene)[0], 0.5)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
-    lamp, = lamps.find_lamps(bpy.context.scene)
+    (lamp,) = lamps.find_lamps(bpy.context.scene)
     assert lamps.factor(lamp) == 0.5
     lamps.restore(lamp)
     assert lamps.radiance(lamp) == pytest.approx(WARM)

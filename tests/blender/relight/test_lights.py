@@ -21,8 +21,10 @@ from tests.blender.relight.sheets import sheet  # noqa: E402
 DOWN = Vector((0, 0, -1)).to_track_quat("-Z", "Y")
 
 
-@pytest.mark.parametrize("preset, tall, opening", [
-    ("SOFTBOX", 0.4, False), ("SPOT", 0.1, False), ("WINDOW", 1.3, False), ("SUN", 0.8, False), ("SUN", 1.0, True)])
+@pytest.mark.parametrize(
+    "preset, tall, opening",
+    [("SOFTBOX", 0.4, False), ("SPOT", 0.1, False), ("WINDOW", 1.3, False), ("SUN", 0.8, False), ("SUN", 1.0, True)],
+)
 def test_the_irradiance_that_was_asked_for_arrives(scene, shoot, look_down, preset, tall, opening):
     """On a floor of albedo 0.5 straight below: radiance = 0.5 E / pi."""
     sheet(scene, "floor", 6, (0, 0, 0), grey=0.5)
@@ -76,8 +78,14 @@ def test_what_the_camera_looks_at_is_lit(room, shoot, preset, camera):
 @pytest.mark.parametrize("preset, steepest", [("SOFTBOX", 0.25), ("SPOT", 0.3)])
 def test_no_edge_is_burnt_into_the_ceiling(scene, shoot, preset, steepest):
     """In a room of 5 x 4 x 2.7 m, seen across; the ceiling from below, 5 cm a pixel."""
-    walls = (((0, 0, 0), (0, 0, 0)), ((0, 0, 2.7), (math.pi, 0, 0)), ((2.5, 0, 0), (0, -math.pi / 2, 0)),
-             ((-2.5, 0, 0), (0, math.pi / 2, 0)), ((0, 2, 0), (math.pi / 2, 0, 0)), ((0, -2, 0), (-math.pi / 2, 0, 0)))
+    walls = (
+        ((0, 0, 0), (0, 0, 0)),
+        ((0, 0, 2.7), (math.pi, 0, 0)),
+        ((2.5, 0, 0), (0, -math.pi / 2, 0)),
+        ((-2.5, 0, 0), (0, math.pi / 2, 0)),
+        ((0, 2, 0), (math.pi / 2, 0, 0)),
+        ((0, -2, 0), (-math.pi / 2, 0, 0)),
+    )
     for number, (place, turn) in enumerate(walls):
         sheet(scene, f"wall {number}", 6, place, turn, number)
     scene["scan_relight_room_light"] = 1.0
@@ -126,8 +134,15 @@ def test_its_name_says_what_it_does(scene):
 def test_a_panel_on_the_wall_is_no_subject(scene):
     """A panel fills the picture's middle, and of a stool only a little is seen: the light is for the stool."""
     sheet(scene, "floor", 4, (0, 0, 0))
-    for number, (place, turn) in enumerate((((0, 2, 1), (math.pi / 2, 0, 0)), ((2, 0, 1), (0, -math.pi / 2, 0)),
-                                            ((-2, 0, 1), (0, math.pi / 2, 0)), ((0, -2, 1), (-math.pi / 2, 0, 0))), 1):
+    for number, (place, turn) in enumerate(
+        (
+            ((0, 2, 1), (math.pi / 2, 0, 0)),
+            ((2, 0, 1), (0, -math.pi / 2, 0)),
+            ((-2, 0, 1), (0, math.pi / 2, 0)),
+            ((0, -2, 1), (-math.pi / 2, 0, 0)),
+        ),
+        1,
+    ):
         sheet(scene, f"wall {number}", 4, place, turn, number)
     sheet(scene, "panel 5", 2.5, (0, 1.9, 1.3), (math.pi / 2, 0, 0), 5)
     bpy.ops.mesh.primitive_cube_add(size=0.7, location=(0.5, 0.6, 0.35))

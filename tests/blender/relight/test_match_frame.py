@@ -48,7 +48,7 @@ def test_it_reprojects_to_a_thousandth_of_a_pixel(scene, frames, index):
 def test_the_frame_stands_behind_as_bright_as_the_scene(scene, frames):
     make_cameras(frames, scene.collection)
     assert match_frame(scene, 0, alpha=0.6, front=True, size=True) == "" and current(scene) == 0
-    shown, = scene.camera.data.background_images
+    (shown,) = scene.camera.data.background_images
     assert scene.camera.data.show_background_images and shown.image.size[:] == (64, 48)
     assert shown.image.colorspace_settings.name == "Linear Rec.709" and shown.image.use_view_as_render
     assert shown.alpha == pytest.approx(0.6) and shown.display_depth == "FRONT" and shown.frame_method == "STRETCH"

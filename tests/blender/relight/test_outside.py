@@ -61,8 +61,12 @@ def brightest_sum(scene, shoot):
 
 def state(world):
     tree = world.node_tree
-    return (sorted(n.bl_idname for n in tree.nodes), len(tree.links), list(world.keys()),
-            next(n for n in tree.nodes if n.type == "BACKGROUND").inputs["Strength"].default_value)
+    return (
+        sorted(n.bl_idname for n in tree.nodes),
+        len(tree.links),
+        list(world.keys()),
+        next(n for n in tree.nodes if n.type == "BACKGROUND").inputs["Strength"].default_value,
+    )
 
 
 def test_restored_is_exact(scene, towards_x, tmp_path):
@@ -105,9 +109,14 @@ def test_a_bad_picture_is_told_and_changes_nothing(scene, tmp_path, content):
 
 
 def test_a_closed_room_is_told_from_an_open_one(scene):
-    for name, place, turn in (("floor", (0, 0, 0), (0, 0, 0)), ("ceiling", (0, 0, 2), (0, 0, 0)),
-                              ("a", (1, 0, 1), (0, math.pi / 2, 0)), ("b", (-1, 0, 1), (0, math.pi / 2, 0)),
-                              ("c", (0, 1, 1), (math.pi / 2, 0, 0)), ("d", (0, -1, 1), (math.pi / 2, 0, 0))):
+    for name, place, turn in (
+        ("floor", (0, 0, 0), (0, 0, 0)),
+        ("ceiling", (0, 0, 2), (0, 0, 0)),
+        ("a", (1, 0, 1), (0, math.pi / 2, 0)),
+        ("b", (-1, 0, 1), (0, math.pi / 2, 0)),
+        ("c", (0, 1, 1), (math.pi / 2, 0, 0)),
+        ("d", (0, -1, 1), (math.pi / 2, 0, 0)),
+    ):
         wall = sheet(scene, name, 2.0, place, turn)
     assert not outside.is_open(scene)
     shader = next(n for n in wall.data.materials[0].node_tree.nodes if n.type == "BSDF_PRINCIPLED")

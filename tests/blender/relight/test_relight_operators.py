@@ -7,9 +7,22 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-OPERATORS = ("switch_lamps", "restore_lamp", "restore_light", "add_light", "remove_lights", "use_hdri",
-             "use_studio_light", "match_frame", "add_virtual", "place_object", "virtual_look", "pick_place",
-             "before_after", "export")
+OPERATORS = (
+    "switch_lamps",
+    "restore_lamp",
+    "restore_light",
+    "add_light",
+    "remove_lights",
+    "use_hdri",
+    "use_studio_light",
+    "match_frame",
+    "add_virtual",
+    "place_object",
+    "virtual_look",
+    "pick_place",
+    "before_after",
+    "export",
+)
 
 
 @pytest.fixture
@@ -117,10 +130,18 @@ def test_objects(ops):
 
 def settings(scene):
     groups = scene.render, scene.render.image_settings, scene.cycles, scene.view_settings, scene.eevee
-    return [(p.identifier, str(getattr(group, p.identifier))) for group in groups
-            for p in group.bl_rna.properties if not p.is_readonly], scene.camera.name, scene.world.name, \
-        [(m.name, m.scan_relight_lamp.on, m.scan_relight_lamp.factor) for m in lamps()], \
-        [(t.name, t.hide_render) for t in scene.objects]
+    return (
+        [
+            (p.identifier, str(getattr(group, p.identifier)))
+            for group in groups
+            for p in group.bl_rna.properties
+            if not p.is_readonly
+        ],
+        scene.camera.name,
+        scene.world.name,
+        [(m.name, m.scan_relight_lamp.on, m.scan_relight_lamp.factor) for m in lamps()],
+        [(t.name, t.hide_render) for t in scene.objects],
+    )
 
 
 @pytest.mark.parametrize("fails", [None, 1, 2])

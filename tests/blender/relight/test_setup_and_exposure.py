@@ -26,14 +26,21 @@ from tests.blender.relight.sheets import sheet  # noqa: E402
 
 def build(scene, size):
     """A box room `size` times 4 x 3 x 2.5 m with a lamp under its ceiling; a camera that looks along +X."""
-    for number, (place, turn) in enumerate((((0, 0, 0), (0, 0, 0)), ((0, 0, 2.5), (math.pi, 0, 0)),
-                                            ((2, 0, 1), (0, -math.pi / 2, 0)), ((-2, 0, 1), (0, math.pi / 2, 0)))):
+    for number, (place, turn) in enumerate(
+        (
+            ((0, 0, 0), (0, 0, 0)),
+            ((0, 0, 2.5), (math.pi, 0, 0)),
+            ((2, 0, 1), (0, -math.pi / 2, 0)),
+            ((-2, 0, 1), (0, math.pi / 2, 0)),
+        )
+    ):
         sheet(scene, f"wall {number}", 3 * size, Vector(place) * size, turn, number)
     sheet(scene, "lamp 9", 0.5 * size, Vector((0, 0, 2.4)) * size, (math.pi, 0, 0), 9, emission=(8, 8, 8))
     data = bpy.data.cameras.new("camera")
     scene.camera = bpy.data.objects.new("camera", data)
-    scene.camera.matrix_world = Matrix.LocRotScale(Vector((-1.2, 0, 1.2)) * size,
-                                                   Vector((1, 0, -0.1)).to_track_quat("-Z", "Y"), None)
+    scene.camera.matrix_world = Matrix.LocRotScale(
+        Vector((-1.2, 0, 1.2)) * size, Vector((1, 0, -0.1)).to_track_quat("-Z", "Y"), None
+    )
     scene.collection.objects.link(scene.camera)
     scene[relight_room.ROOM_LIGHT] = 2.0
     bpy.context.view_layer.update()
@@ -51,7 +58,7 @@ def test_a_setup_lights_another_room_alike(scene, shoot):
     other.render.engine = "CYCLES"
     build(other, 2)
     relight_setup.apply_setup(other, told)
-    lamp, = relight_lamps.find_lamps(other)
+    (lamp,) = relight_lamps.find_lamps(other)
     assert relight_lamps.factor(lamp) == pytest.approx(0.25) and len(relight_lights.added_lights(other)) == 2
     assert np.median(shoot(other, 32, 24, 64)) == pytest.approx(np.median(before), rel=0.05)
 
@@ -130,7 +137,7 @@ def test_one_volume_of_probes_covers_the_room(scene):
     build(scene, 1)
     relight_probe.add_volume(scene)
     relight_probe.add_volume(scene)  # renewed, not doubled
-    thing, = relight_probe.probes(scene)
+    (thing,) = relight_probe.probes(scene)
     bpy.context.view_layer.update()
     corners = np.array([thing.matrix_world @ Vector(c) for c in ((-1, -1, -1), (1, 1, 1))])
     low, high = relight_room.bounds(scene)

@@ -29,8 +29,10 @@ def write_text(folder: Path, cameras: Numbered, images: Sequence[tuple], points:
     """`images`: (number, quaternion, translation, camera, name)."""
     folder.mkdir(parents=True, exist_ok=True)
     lines = ["# Camera list with one line of data per camera:", "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]"]
-    lines += [" ".join(map(str, [number, model, width, height, *map(repr, map(float, values))]))
-              for number, (model, width, height, values) in cameras.items()]
+    lines += [
+        " ".join(map(str, [number, model, width, height, *map(repr, map(float, values))]))
+        for number, (model, width, height, values) in cameras.items()
+    ]
     (folder / "cameras.txt").write_text("\n".join(lines) + "\n")
     lines = ["# Image list with two lines of data per image:"]
     for number, quaternion, translation, camera, name in images:

@@ -31,8 +31,9 @@ def write_ply(path: Path, mesh: Mesh, ids: bool = True) -> None:
     faces["n"], faces["v"] = 3, mesh.triangles
     if ids:
         faces["id"] = mesh.object_id
-    path.write_bytes("\n".join([*header, "end_header\n"]).encode() + mesh.vertices.astype("<f8").tobytes()
-                     + faces.tobytes())
+    path.write_bytes(
+        "\n".join([*header, "end_header\n"]).encode() + mesh.vertices.astype("<f8").tobytes() + faces.tobytes()
+    )
 
 
 def write_obj(path: Path, mesh: Mesh, names: dict[int, str] | None = None) -> None:
@@ -47,8 +48,9 @@ def write_obj(path: Path, mesh: Mesh, names: dict[int, str] | None = None) -> No
 
 def as_fipt(capture: Capture, root: Path, **obj) -> None:
     camera = capture.frames[0].camera
-    frames = [{"file_path": "x", "transform_matrix": (f.camera.camera_to_world @ FIPT).tolist()}
-              for f in capture.frames]
+    frames = [
+        {"file_path": "x", "transform_matrix": (f.camera.camera_to_world @ FIPT).tolist()} for f in capture.frames
+    ]
     for i, frame in enumerate(capture.frames):
         put(frame.path, root / f"train/Image/{i:03d}_0001.exr")
     angle = 2 * np.arctan(camera.width / 2 / camera.fx)
@@ -86,8 +88,9 @@ def as_traj(capture: Capture, root: Path, beside: bool = False) -> None:
 def as_scannetpp(capture: Capture, root: Path, names: dict[int, str]) -> None:
     """Each triangle gets vertices of its own, as a segment is told for each vertex."""
     mesh = capture.mesh
-    loose = Mesh(mesh.vertices[mesh.triangles].reshape(-1, 3), np.arange(3 * len(mesh.triangles)).reshape(-1, 3),
-                 mesh.object_id)
+    loose = Mesh(
+        mesh.vertices[mesh.triangles].reshape(-1, 3), np.arange(3 * len(mesh.triangles)).reshape(-1, 3), mesh.object_id
+    )
     write_ply(root / "scans/mesh_aligned_0.05.ply", loose, ids=False)
     segment = np.repeat(2 * mesh.object_id + np.arange(len(mesh.triangles)) % 2, 3)
     (root / "scans/segments.json").write_text(json.dumps({"segIndices": segment.tolist()}))

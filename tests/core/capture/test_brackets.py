@@ -78,8 +78,12 @@ def bracketed(capture, i, times=(0.125, 1.0, 8.0)):
 def test_brackets_in_the_poses_file(capture):
     times = (0.125, 1.0, 8.0)
     scene, names = bracketed(capture, 0)
-    capture.frame(0, file_path=names[0], exposure=times[0], brackets=[
-        {"file_path": name, "exposure": time} for name, time in zip(names[1:], times[1:])])
+    capture.frame(
+        0,
+        file_path=names[0],
+        exposure=times[0],
+        brackets=[{"file_path": name, "exposure": time} for name, time in zip(names[1:], times[1:])],
+    )
     for i in range(1, 10):
         capture.frame(i, exposure=1)
     result = read_capture(capture.root, Reading(transfer="2.2"))
@@ -93,9 +97,9 @@ def test_frames_of_one_pose_and_different_exposures_are_brackets(capture):
     scene, names = bracketed(capture, 0)
     first = capture.transforms["frames"][0]
     rest = capture.transforms["frames"][1:]
-    capture.transforms["frames"] = [dict(first, file_path=name, exposure=time)
-                                    for name, time in zip(names, (0.125, 1.0, 8.0))] + [dict(one, exposure=1)
-                                                                                       for one in rest]
+    capture.transforms["frames"] = [
+        dict(first, file_path=name, exposure=time) for name, time in zip(names, (0.125, 1.0, 8.0))
+    ] + [dict(one, exposure=1) for one in rest]
     capture.save()
     result = read_capture(capture.root, Reading(transfer="2.2"))
     assert len(result.frames) == 10 and [len(frame.brackets) for frame in result.frames] == [2] + [0] * 9

@@ -60,12 +60,15 @@ def test_text_and_binary_agree(tmp_path):
     cameras = {3: ("OPENCV", 640, 480, (500.123456789012, 510.9, 320.1, 240.2, -0.1, 0.01, 0.001, -0.002)),
                9: ("OPENCV_FISHEYE", 800, 800, (300.0, 301.0, 400.5, 399.5, 0.01, -0.02, 0.003, 0.0)),
                4: ("EQUIRECTANGULAR", 400, 200, (400.0, 200.0))}  # fmt: skip
-    images = [(i, rng.standard_normal(4), rng.standard_normal(3), list(cameras)[i % 3], f"left/a {i:02d}.exr")
-              for i in range(1, 12)]
+    images = [
+        (i, rng.standard_normal(4), rng.standard_normal(3), list(cameras)[i % 3], f"left/a {i:02d}.exr")
+        for i in range(1, 12)
+    ]
     write_text(tmp_path / "text", cameras, images)
     write_binary(tmp_path / "binary", cameras, images)
-    text, binary = (frames_of(read_model(tmp_path / kind), tmp_path, tmp_path, AS_FOUND)[0]
-                    for kind in ("text", "binary"))
+    text, binary = (
+        frames_of(read_model(tmp_path / kind), tmp_path, tmp_path, AS_FOUND)[0] for kind in ("text", "binary")
+    )
     assert len(text) == len(binary) == 11
     for one, other in zip(text, binary):
         assert one.name == other.name and one.camera.lens == other.camera.lens
@@ -80,8 +83,10 @@ def test_real_models(shared):
     for folder in sorted((shared / "data/colmap").iterdir()):
         if folder.is_dir():
             found[folder.name] = frames_of(read_model(folder), folder, folder / "images", AS_FOUND)
-    binary, text, apart, missing = (found[f"colmap_example_model_{name}"] for name in (
-        "bin", "txt", "not_shared_txt", "txt_missing_cams_and_subfolders"))
+    binary, text, apart, missing = (
+        found[f"colmap_example_model_{name}"]
+        for name in ("bin", "txt", "not_shared_txt", "txt_missing_cams_and_subfolders")
+    )
     assert [f.name for f in binary[0]] == [f.name for f in text[0]] and len(binary[0]) == len(apart[0]) == 11
     for one, other in zip(binary[0], text[0]):  # COLMAP writes six digits as text
         np.testing.assert_allclose(one.camera.camera_to_world, other.camera.camera_to_world, atol=1e-5)
@@ -149,8 +154,13 @@ def test_a_camera_that_is_not_listed(as_colmap):
 def test_a_bad_image_costs_its_frame(as_colmap, change, words):
     capture, images, _ = as_colmap
     number, quaternion, translation, camera, name = images[3]
-    images[3] = (number, change.get("quaternion", quaternion), change.get("translation", translation), camera,
-                 change.get("name", name))
+    images[3] = (
+        number,
+        change.get("quaternion", quaternion),
+        change.get("translation", translation),
+        camera,
+        change.get("name", name),
+    )
     write_binary(capture.root, CAMERA, images)
     got = read_capture(capture.root)
     assert len(got.frames) == 9 and any(words in warning for warning in got.warnings)

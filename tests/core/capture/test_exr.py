@@ -53,13 +53,15 @@ def test_pixel_types_and_tiles(tmp_path, kind, storage):
     header = {"type": storage}
     if storage == OpenEXR.tiledimage:
         header["tiles"] = OpenEXR.TileDescription()
-    write_with_library(tmp_path / "a.exr", {c: np.ascontiguousarray(values[..., i]) for i, c in enumerate("RGB")},
-                       **header)
+    write_with_library(
+        tmp_path / "a.exr", {c: np.ascontiguousarray(values[..., i]) for i, c in enumerate("RGB")}, **header
+    )
     np.testing.assert_array_equal(read_exr(tmp_path / "a.exr").rgb, values.astype(np.float32))
 
 
-@pytest.mark.parametrize("name", ["NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "B44A", "DWAA", "DWAB",
-                                  "ZSTD", "HTJ2K256", "HTJ2K32"])
+@pytest.mark.parametrize(
+    "name", ["NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "B44", "B44A", "DWAA", "DWAB", "ZSTD", "HTJ2K256", "HTJ2K32"]
+)
 def test_every_compression_passes_the_look_at_the_header(tmp_path, name):
     planes = {c: np.ascontiguousarray(PICTURE[..., i].astype(np.float16)) for i, c in enumerate("RGB")}
     compression = getattr(OpenEXR, f"{name}_COMPRESSION", None)
@@ -95,8 +97,9 @@ def test_other_primaries_become_rec709(shared):
 
 def test_senseless_primaries(tmp_path):
     plane = np.ones((4, 4), np.float32)
-    write_with_library(tmp_path / "a.exr", dict.fromkeys("RGB", plane),
-                       chromaticities=(0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3))
+    write_with_library(
+        tmp_path / "a.exr", dict.fromkeys("RGB", plane), chromaticities=(0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3)
+    )
     with pytest.raises(BadInputError, match="primaries"):
         read_exr(tmp_path / "a.exr")
 
@@ -174,8 +177,10 @@ def test_parts(tmp_path):
 
 def test_views(tmp_path):
     path = tmp_path / "a.exr"
-    parts = [OpenEXR.Part({"view": view}, planes_of(PICTURE * (k + 1)), f"rgba.{view}")
-             for k, view in enumerate(("left", "right"))]
+    parts = [
+        OpenEXR.Part({"view": view}, planes_of(PICTURE * (k + 1)), f"rgba.{view}")
+        for k, view in enumerate(("left", "right"))
+    ]
     OpenEXR.File(parts).write(str(path))
     np.testing.assert_array_equal(read_exr(path).rgb, PICTURE[..., :3])
     assert exr_note(path) == "of the views left, right, 'left'"
@@ -190,13 +195,15 @@ def test_levels_of_tiles(tmp_path, mode):
     path, edge = tmp_path / "a.exr", 16
     tiles = OpenEXR.TileDescription()
     tiles.xSize, tiles.ySize, tiles.mode = edge, edge, mode
-    write_with_library(path, planes_of(PICTURE), type=OpenEXR.tiledimage, tiles=tiles,
-                       compression=OpenEXR.NO_COMPRESSION)
+    write_with_library(
+        path, planes_of(PICTURE), type=OpenEXR.tiledimage, tiles=tiles, compression=OpenEXR.NO_COMPRESSION
+    )
     content = path.read_bytes()
     (_, at, (chunks,)) = exr_header._parse(content, len(content))
     sizes = [[max(n >> level, 1) for level in range(7)] for n in (70, 40)]
-    levels = ([(k, k) for k in range(7)] if mode == OpenEXR.MIPMAP_LEVELS
-              else [(i, j) for j in range(6) for i in range(7)])
+    levels = (
+        [(k, k) for k in range(7)] if mode == OpenEXR.MIPMAP_LEVELS else [(i, j) for j in range(6) for i in range(7)]
+    )
     table, body = [], b""
     for i, j in levels:
         width, height = sizes[0][i], sizes[1][j]
@@ -278,8 +285,13 @@ def test_what_is_no_picture(tmp_path):
     (tmp_path / "text.exr").write_text("hello " * 100)
     (tmp_path / "folder.exr").mkdir()
     os.mkfifo(tmp_path / "pipe.exr")
-    wanted = {"empty": "is empty", "text": "not an OpenEXR", "folder": "not a file", "pipe": "not a file",
-              "absent": "does not exist"}
+    wanted = {
+        "empty": "is empty",
+        "text": "not an OpenEXR",
+        "folder": "not a file",
+        "pipe": "not a file",
+        "absent": "does not exist",
+    }
     for name, words in wanted.items():
         with pytest.raises(BadInputError, match=words):
             read_exr(tmp_path / f"{name}.exr")
@@ -308,8 +320,9 @@ def test_no_damaged_file_crashes_hangs_or_fills_memory(shared):
     # One process of its own for all of them: a crash takes only that one along.
     paths = sorted(map(str, (shared / "data/exr/Damaged").iterdir()))
     assert len(paths) > 150
-    done = subprocess.run([sys.executable, "-c", DAMAGED, *paths], cwd=ROOT, capture_output=True, timeout=120,
-                          text=True, errors="replace")
+    done = subprocess.run(
+        [sys.executable, "-c", DAMAGED, *paths], cwd=ROOT, capture_output=True, timeout=120, text=True, errors="replace"
+    )
     assert done.returncode == 0 and f"all {len(paths)}" in done.stdout, done.stderr[-2000:]
 
 

@@ -51,13 +51,16 @@ def test_a_result_is_recognised_here_and_below(result):
     assert look_into(result.parent).results == (result,)
 
 
-@pytest.mark.parametrize(("files", "kind", "words"), [
-    ((), found.EMPTY, "is empty"),
-    (("room.blend",), found.OTHER, "Blender file 'room.blend'"),
-    (("a.exr", "b.exr"), found.OTHER, "pictures, but no cameras"),
-    (("mesh.ply",), found.OTHER, "a mesh, but no cameras"),
-    (("letter.txt",), found.OTHER, "holds no scan"),
-])
+@pytest.mark.parametrize(
+    ("files", "kind", "words"),
+    [
+        ((), found.EMPTY, "is empty"),
+        (("room.blend",), found.OTHER, "Blender file 'room.blend'"),
+        (("a.exr", "b.exr"), found.OTHER, "pictures, but no cameras"),
+        (("mesh.ply",), found.OTHER, "a mesh, but no cameras"),
+        (("letter.txt",), found.OTHER, "holds no scan"),
+    ],
+)
 def test_everything_else_is_one_sentence(tmp_path, files, kind, words):
     chosen = tmp_path / "chosen"
     chosen.mkdir()

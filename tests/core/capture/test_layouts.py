@@ -232,11 +232,16 @@ def test_scannetpp_undistorted(source, tmp_path):
     assert {(f.camera.fx, f.camera.cy, f.camera.lens) for f in got.frames} == {(5.0, 3.1, None)}
 
 
-@pytest.mark.parametrize("groups, told", [
-    (None, "segGroups"), ([7], "number 0"), ([{"objectId": 0.5, "segments": []}], "number 0"),
-    ([{"objectId": 1, "segments": ["x"]}], "number 0"),
-    ([{"objectId": 1, "segments": []}, {"id": 1, "segments": []}], "twice"),
-])
+@pytest.mark.parametrize(
+    "groups, told",
+    [
+        (None, "segGroups"),
+        ([7], "number 0"),
+        ([{"objectId": 0.5, "segments": []}], "number 0"),
+        ([{"objectId": 1, "segments": ["x"]}], "number 0"),
+        ([{"objectId": 1, "segments": []}, {"id": 1, "segments": []}], "twice"),
+    ],
+)
 def test_scannetpp_with_a_damaged_list_of_objects(source, tmp_path, groups, told):
     root = tmp_path / "other"
     as_scannetpp(source, root, NAMES)

@@ -33,6 +33,7 @@ def moved(capture, matrix, scale=1.0):
 
 # --- lenses
 
+
 def nerfstudio_distorts(x, y, k1, k2, k3, k4, p1, p2):
     """As cameras/camera_utils.py tells."""
     r = x * x + y * y
@@ -141,6 +142,7 @@ def test_a_fisheye_needs_a_focal_length(capture):
 
 # --- which frames
 
+
 def test_test_frames_are_left_out(capture):
     names = [frame["file_path"] for frame in capture.transforms["frames"]]
     capture.top(train_filenames=names[:6], val_filenames=names[6:8], test_filenames=["./" + n for n in names[7:]])
@@ -186,6 +188,7 @@ def test_real_split_files(shared, tmp_path):
 
 # --- paths
 
+
 def test_paths_may_lead_out_when_allowed(capture, tmp_path_factory):
     far = tmp_path_factory.mktemp("far")
     write_exr(far / "a.exr", np.ones((6, 8, 3), np.float32))
@@ -205,6 +208,7 @@ def test_depth_is_not_looked_at(capture):
 
 # --- worlds
 
+
 def test_a_moved_world_is_told(capture):
     capture.top(applied_transform=[[1, 0, 0, 0.1], [0, 1, 0, 0], [0, 0, 1, 0]], orientation_override="up")
     warnings = read_capture(capture.root).warnings
@@ -220,8 +224,9 @@ def test_a_mesh_of_the_original_world_follows_the_poses(capture, scale):
     moved(capture, TURNED, scale)
     capture.top(applied_transform=TURNED.tolist(), applied_scale=scale)
     got = read_capture(capture.root)
-    assert any("moved from the original world" in warning and "100% of the cameras" in warning
-               for warning in got.warnings)
+    assert any(
+        "moved from the original world" in warning and "100% of the cameras" in warning for warning in got.warnings
+    )
     np.testing.assert_allclose(got.mesh.vertices, scale * plain.mesh.vertices @ TURNED[:, :3].T, atol=1e-12)
     for frame, before in zip(got.frames, plain.frames):
         back = TURNED[:, :3].T @ frame.camera.centre / scale
@@ -250,9 +255,16 @@ def test_files_from_before_applied_transform(capture):
     assert any("moved from the original world" in warning for warning in read_capture(capture.root).warnings)
 
 
-@pytest.mark.parametrize("values", [{"applied_transform": [[1, 0], [0, 1]]}, {"applied_transform": "up"},
-                                    {"applied_scale": 0}, {"applied_scale": "2"},
-                                    {"applied_transform": [[1, 0, 0, math.nan], [0, 1, 0, 0], [0, 0, 1, 0]]}])
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"applied_transform": [[1, 0], [0, 1]]},
+        {"applied_transform": "up"},
+        {"applied_scale": 0},
+        {"applied_scale": "2"},
+        {"applied_transform": [[1, 0, 0, math.nan], [0, 1, 0, 0], [0, 0, 1, 0]]},
+    ],
+)
 def test_worlds_that_are_none(capture, values):
     capture.top(**values)
     with pytest.raises(BadInputError, match="applied_"):

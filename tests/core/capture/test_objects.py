@@ -146,8 +146,13 @@ def test_ids_of_16_bits(tmp_path):
     rows = b"".join(b"\0" + row.tobytes() for row in plane)
     chunks = ((b"IHDR", struct.pack(">IIBBBBB", 2, 2, 16, 0, 0, 0, 0)), (b"IDAT", zlib.compress(rows)), (b"IEND", b""))
     path = tmp_path / "ids.png"
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(struct.pack(">I", len(data)) + kind + data
-                     + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks))
+    path.write_bytes(
+        b"\x89PNG\r\n\x1a\n"
+        + b"".join(
+            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+            for kind, data in chunks
+        )
+    )
     assert read_ids(Frame("a", path, all_round((1, 1, 1))[0], id_path=path)).tolist() == plane.tolist()
 
 

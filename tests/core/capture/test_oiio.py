@@ -34,8 +34,14 @@ def chunk(kind, data):
 def png(lines: bytes, width, height, bits, colour, extra=b"", interlaced=0) -> bytes:
     header = struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, interlaced)
     packed = zlib.compress(lines)  # in two chunks, as large files have it
-    return (SIGNATURE + chunk(b"IHDR", header) + extra + chunk(b"IDAT", packed[:5]) + chunk(b"IDAT", packed[5:])
-            + chunk(b"IEND", b""))
+    return (
+        SIGNATURE
+        + chunk(b"IHDR", header)
+        + extra
+        + chunk(b"IDAT", packed[:5])
+        + chunk(b"IDAT", packed[5:])
+        + chunk(b"IEND", b"")
+    )
 
 
 def filtered(array: np.ndarray, kinds) -> bytes:
@@ -99,8 +105,15 @@ def test_interlaced(tmp_path, size, bits):
     width, height = size
     values = np.random.default_rng(4).integers(0, 1 << bits, (height, width), np.uint8)
     lines = b""
-    for y, x, down, right in ((0, 0, 8, 8), (0, 4, 8, 8), (4, 0, 8, 4), (0, 2, 4, 4), (2, 0, 4, 2), (0, 1, 2, 2),
-                              (1, 0, 2, 1)):
+    for y, x, down, right in (
+        (0, 0, 8, 8),
+        (0, 4, 8, 8),
+        (4, 0, 8, 4),
+        (0, 2, 4, 4),
+        (2, 0, 4, 2),
+        (0, 1, 2, 2),
+        (1, 0, 2, 1),
+    ):
         part = values[y::down, x::right]
         if part.size:
             part = np.packbits(part, axis=1) if bits == 1 else part

@@ -46,7 +46,8 @@ def test_polygons_of_mixed_length(tmp_path, order, count, index):
     mesh = read_ply(write(tmp_path, binary(FACES, IDS, order, count=count, index=index)))
     np.testing.assert_array_equal(mesh.vertices, VERTICES)
     np.testing.assert_array_equal(
-        mesh.triangles, [(0, 1, 2), (0, 1, 2), (0, 2, 3), (0, 1, 2), (0, 2, 4), (0, 4, 3), (2, 4, 3)])
+        mesh.triangles, [(0, 1, 2), (0, 1, 2), (0, 2, 3), (0, 1, 2), (0, 2, 4), (0, 4, 3), (2, 4, 3)]
+    )
     np.testing.assert_array_equal(mesh.object_id, [7, 8, 8, 9, 9, 9, 7])
     assert mesh.vertices.dtype == np.float64 and mesh.triangles.dtype == np.int32 and mesh.uv is None
 
@@ -179,8 +180,10 @@ def test_large_meshes_are_read_at_once(tmp_path, mixed):
     rows[:, 1:] = corners.astype("<i4").view(np.uint8)
     keep = np.ones(rows.shape, bool)
     keep[~quad, 13:] = False
-    path = write(tmp_path, HEADER.format("binary_little_endian", 1000, n, "uchar").encode() + vertices.tobytes()
-                 + rows[keep].tobytes())
+    path = write(
+        tmp_path,
+        HEADER.format("binary_little_endian", 1000, n, "uchar").encode() + vertices.tobytes() + rows[keep].tobytes(),
+    )
     started = time.process_time()
     mesh = read_ply(path)
     assert time.process_time() - started < 3  # some 0.3 s; a loop over faces would take far longer than this

@@ -51,6 +51,7 @@ def test_the_living_room(shared):
 
 # --- the folder
 
+
 def test_no_folder_a_file_and_an_empty_folder(tmp_path):
     (tmp_path / "file").touch()
     for name, words in (("absent", "does not exist"), ("file", "not a folder"), (".", "transforms.json")):
@@ -68,6 +69,7 @@ def test_poses_that_are_none(capture, text, words):
 
 
 # --- the mesh
+
 
 def test_no_mesh(capture):
     (capture.root / "mesh.ply").unlink()
@@ -88,8 +90,10 @@ def test_degenerate_triangles_are_counted_and_left_out(capture, text_of_ply):
     result = warned(capture, "2 triangles of 'mesh.ply' have no area")
     assert any("3 triangles of 'mesh.ply' have vertices that are not finite" in w for w in result.warnings)
     assert np.isfinite(result.mesh.vertices).all() and np.isfinite(result.mesh.uv).all()
-    np.testing.assert_array_equal(result.mesh.vertices[result.mesh.triangles],
-                                  [[(0, 0, 0), (4, 0, 0), (0, 4, 0)], [(4, 0, 0), (8, 0, 0), (0, 4, 0)]])
+    np.testing.assert_array_equal(
+        result.mesh.vertices[result.mesh.triangles],
+        [[(0, 0, 0), (4, 0, 0), (0, 4, 0)], [(4, 0, 0), (8, 0, 0), (0, 4, 0)]],
+    )
     assert result.mesh.object_id.tolist() == [0, 1]
 
 
@@ -99,6 +103,7 @@ def test_a_mesh_in_millimetres_is_told(capture, text_of_ply):
 
 
 # --- the objects
+
 
 def test_faces_without_an_object(capture, text_of_ply):
     capture.mesh(text_of_ply([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)] * 4, [0, -1, 77, 1]))
@@ -126,8 +131,9 @@ def test_no_object_id(capture, text_of_ply):
 
 
 def test_replicas_classes(capture):
-    capture.objects({"classes": [{"id": 5, "name": "sofa"}], "objects": [{"id": i, "class_id": 5 + (i > 2)}
-                                                                        for i in range(6)]})
+    capture.objects(
+        {"classes": [{"id": 5, "name": "sofa"}], "objects": [{"id": i, "class_id": 5 + (i > 2)} for i in range(6)]}
+    )
     names = [i.class_name for i in read_capture(capture.root).instances]
     assert names == ["sofa"] * 3 + ["object_3", "object_4", "object_5"]
 
@@ -143,6 +149,7 @@ def test_objects_that_are_none(capture, value, words):
 
 
 # --- the frames: one bad one is left out, many are not
+
 
 def test_a_missing_frame(capture):
     (capture.root / "images/004.exr").unlink()
@@ -199,8 +206,9 @@ def test_a_pose_that_is_none(capture, pose, words):
 
 
 def test_rounding_is_taken_out_of_a_pose(capture):
-    capture.frame(4, transform_matrix=(np.array(capture.pose(4)) + np.array([[1e-4] * 3 + [0]] * 3 + [[0] * 4]))
-                  .tolist()[:3])
+    capture.frame(
+        4, transform_matrix=(np.array(capture.pose(4)) + np.array([[1e-4] * 3 + [0]] * 3 + [[0] * 4])).tolist()[:3]
+    )
     pose = read_capture(capture.root).frames[4].camera.camera_to_world
     np.testing.assert_allclose(pose[:3, :3].T @ pose[:3, :3], np.eye(3), atol=1e-12)
     np.testing.assert_allclose(pose, capture.pose(4), atol=5e-4)
@@ -237,6 +245,7 @@ def test_a_single_bad_frame(make_capture):
 
 
 # --- intrinsics
+
 
 def test_intrinsics_of_each_frame(capture):
     capture.picture(2, np.ones((4, 4, 3)))
@@ -277,9 +286,22 @@ def test_lenses_without_distortion(capture, model):
     assert not read_capture(capture.root).warnings
 
 
-@pytest.mark.parametrize("values", [{"fl_x": 0}, {"fl_x": "6"}, {"w": 7.5}, {"h": -6}, {"cx": "middle"},
-                                    {"exposure": 0}, {"exposure": float("nan")}, {"saturation": -1}, {"fl_y": 1e999},
-                                    {"camera_angle_x": 4}, {"w": True}])
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"fl_x": 0},
+        {"fl_x": "6"},
+        {"w": 7.5},
+        {"h": -6},
+        {"cx": "middle"},
+        {"exposure": 0},
+        {"exposure": float("nan")},
+        {"saturation": -1},
+        {"fl_y": 1e999},
+        {"camera_angle_x": 4},
+        {"w": True},
+    ],
+)
 def test_numbers_that_are_none(capture, values):
     capture.frame(4, **values)
     assert len(warned(capture, "'004'").frames) == 9
@@ -287,8 +309,10 @@ def test_numbers_that_are_none(capture, values):
 
 # --- paths
 
-@pytest.mark.parametrize("path", ["/etc/passwd", "../other/000.exr", "images/../../x.exr", "C:\\x.exr", "..\\x.exr",
-                                  "\\\\server\\x.exr"])
+
+@pytest.mark.parametrize(
+    "path", ["/etc/passwd", "../other/000.exr", "images/../../x.exr", "C:\\x.exr", "..\\x.exr", "\\\\server\\x.exr"]
+)
 @pytest.mark.parametrize("key", ["file_path", "mask_path"])
 def test_paths_do_not_lead_out(capture, key, path):
     capture.frame(7, **{key: path})
@@ -315,6 +339,7 @@ def test_frames_of_one_name_in_two_folders(capture):
 
 
 # --- pixels
+
 
 def pixels_of(capture, array, **values):
     capture.picture(0, array)
@@ -396,6 +421,7 @@ def test_a_picture_that_changes_during_the_run(capture):
 
 
 # --- what the rest asks for
+
 
 def test_describe(capture):
     told = describe(read_capture(capture.root))

@@ -23,8 +23,46 @@ from tests.core.replica_on_disk import ReplicaOnDisk, interleave
 from tests.core.rooms import lit_box, make_room, radiosity
 
 SORTED_40 = [
-    12, 24, 23, 22, 21, 0, 19, 18, 17, 31, 35, 28, 11, 10, 9, 8, 37, 6, 5, 4, 3, 38,
-    29, 34, 30, 32, 33, 20, 36, 39, 27, 26, 25, 16, 15, 14, 13, 7, 2, 1,
+    12,
+    24,
+    23,
+    22,
+    21,
+    0,
+    19,
+    18,
+    17,
+    31,
+    35,
+    28,
+    11,
+    10,
+    9,
+    8,
+    37,
+    6,
+    5,
+    4,
+    3,
+    38,
+    29,
+    34,
+    30,
+    32,
+    33,
+    20,
+    36,
+    39,
+    27,
+    26,
+    25,
+    16,
+    15,
+    14,
+    13,
+    7,
+    2,
+    1,
 ]
 
 
@@ -147,12 +185,17 @@ def test_mirrors_are_told_and_followed(replica, tmp_path):
     assert material.model == METAL and material.f0 == pytest.approx((0.9,) * 3) and material.phi == 0
 
 
-@pytest.mark.parametrize("content, told", [
-    (json.dumps([wall_mirror(0.1)]), "1 panes of glass"), ("{", "can't be read"), ("[[[", "can't be read"),
-    (json.dumps([{**wall_mirror(0.9), "boundary_w": [(4, 0, 0), (4, 0.1, 0), (4, 0.1, 0.1)]}]), "part of a larger"),
-    (json.dumps([{**wall_mirror(0.9), "plane_w": [-1, 0, 0, 3]}]), "part of a larger"),
-    (json.dumps([{**wall_mirror(0.9), "plane_w": [0, 0, 0, 3]}]), "1 of 1 panes"),
-])
+@pytest.mark.parametrize(
+    "content, told",
+    [
+        (json.dumps([wall_mirror(0.1)]), "1 panes of glass"),
+        ("{", "can't be read"),
+        ("[[[", "can't be read"),
+        (json.dumps([{**wall_mirror(0.9), "boundary_w": [(4, 0, 0), (4, 0.1, 0), (4, 0.1, 0.1)]}]), "part of a larger"),
+        (json.dumps([{**wall_mirror(0.9), "plane_w": [-1, 0, 0, 3]}]), "part of a larger"),
+        (json.dumps([{**wall_mirror(0.9), "plane_w": [0, 0, 0, 3]}]), "1 of 1 panes"),
+    ],
+)
 def test_panes_that_are_no_mirrors(replica, content, told):
     (replica.root / "glass.sur").write_text(content)
     capture = read_capture(replica.root)
@@ -176,8 +219,10 @@ SPOILS = {
     "one too many": (lambda r: r.texture(len(list((r.root / "textures").glob("*.hdr")))).write_bytes(b""), "more pict"),
     "no tile": (lambda r: (r.root / "textures/parameters.json").write_text('{"splitSize": 1, "tileSize": 0}'), "tileS"),
     "no split": (lambda r: (r.root / "textures/parameters.json").write_text('{"tileSize": 4}'), "splitSize None"),
-    "no ids": (lambda r: (r.root / "habitat/mesh_semantic.ply").write_bytes((r.root / "mesh.ply").read_bytes()),
-               "no object_id"),
+    "no ids": (
+        lambda r: (r.root / "habitat/mesh_semantic.ply").write_bytes((r.root / "mesh.ply").read_bytes()),
+        "no object_id",
+    ),
     "another order": (lambda r: (r.root / "habitat/sorted_faces.bin").write_bytes(bytes(8)), "sorted_faces"),
     "a hostile order": (lambda r: (r.root / "habitat/sorted_faces.bin").write_bytes(b"\xff" * 64), "sorted_faces"),
     "a cut mesh": (lambda r: (r.root / "mesh.ply").write_bytes((r.root / "mesh.ply").read_bytes()[:-99]), "damaged"),

@@ -32,8 +32,13 @@ def test_a_gltf_keeps_its_surface_only(tmp_path, binary):
     if binary:
         del top["buffers"][0]["uri"]
         text = json.dumps(top).encode()
-        (tmp_path / "a.gltf").write_bytes(b"glTF" + struct.pack("<III4s", 2, 0, len(text), b"JSON") + text
-                                          + struct.pack("<I4s", 12, b"BIN\0") + b"A" * 12)
+        (tmp_path / "a.gltf").write_bytes(
+            b"glTF"
+            + struct.pack("<III4s", 2, 0, len(text), b"JSON")
+            + text
+            + struct.pack("<I4s", 12, b"BIN\0")
+            + b"A" * 12
+        )
     else:
         (tmp_path / "mesh.bin").write_bytes(b"A" * 12)
         (tmp_path / "a.gltf").write_text(json.dumps(top))
@@ -43,21 +48,24 @@ def test_a_gltf_keeps_its_surface_only(tmp_path, binary):
     assert copy["buffers"][0]["uri"] == "buffer0.bin" and (tmp_path / "copy/buffer0.bin").read_bytes() == b"A" * 12
 
 
-@pytest.mark.parametrize("changes, told", [
-    ({"buffers": [{"uri": "../mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
-    ({"buffers": [{"uri": "%2e%2e/mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
-    ({"buffers": [{"uri": "C:\\mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
-    ({"buffers": [{"uri": "http://x/mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
-    ({"buffers": [{"uri": "no.bin", "byteLength": 12}]}, "is not there"),
-    ({"buffers": [{"uri": "data:;base64,%%%", "byteLength": 12}]}, "damaged buffer"),
-    ({"buffers": [{"byteLength": 12}]}, "without content"),
-    ({"buffers": [{"uri": "mesh.bin", "byteLength": 13}]}, "cut off"),
-    ({"buffers": 7}, "no list of objects"),
-    ({"bufferViews": [{"buffer": 0, "byteLength": 1 << 40}]}, "beyond its buffers"),
-    ({"bufferViews": [{"buffer": "0", "byteLength": 1}]}, "beyond its buffers"),
-    ({"accessors": [{"count": 1 << 40}]}, "more values than it holds"),
-    ({"asset": {"version": "1.0"}}, "no glTF 2.0"),
-])
+@pytest.mark.parametrize(
+    "changes, told",
+    [
+        ({"buffers": [{"uri": "../mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
+        ({"buffers": [{"uri": "%2e%2e/mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
+        ({"buffers": [{"uri": "C:\\mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
+        ({"buffers": [{"uri": "http://x/mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
+        ({"buffers": [{"uri": "no.bin", "byteLength": 12}]}, "is not there"),
+        ({"buffers": [{"uri": "data:;base64,%%%", "byteLength": 12}]}, "damaged buffer"),
+        ({"buffers": [{"byteLength": 12}]}, "without content"),
+        ({"buffers": [{"uri": "mesh.bin", "byteLength": 13}]}, "cut off"),
+        ({"buffers": 7}, "no list of objects"),
+        ({"bufferViews": [{"buffer": 0, "byteLength": 1 << 40}]}, "beyond its buffers"),
+        ({"bufferViews": [{"buffer": "0", "byteLength": 1}]}, "beyond its buffers"),
+        ({"accessors": [{"count": 1 << 40}]}, "more values than it holds"),
+        ({"asset": {"version": "1.0"}}, "no glTF 2.0"),
+    ],
+)
 def test_what_is_wrong_with_a_gltf_is_one_sentence(tmp_path, changes, told):
     (tmp_path / "mesh.bin").write_bytes(b"A" * 12)
     (tmp_path / "a.gltf").write_text(json.dumps(gltf(**changes)))

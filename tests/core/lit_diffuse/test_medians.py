@@ -279,8 +279,12 @@ def test_batched_shuffled_has_a_tenth_of_p_squares_error_as_filmed(n, share):
 
 def test_batched_takes_ties_zeros_and_six_decades():
     rng = np.random.default_rng(4)
-    for x in (np.full((300, 4, 3), 0.7), np.zeros((300, 4, 3)), np.full((50, 4, 3), -0.0),
-              rng.choice([0.25, 0.5], (301, 4, 3), p=[0.2, 0.8])):
+    for x in (
+        np.full((300, 4, 3), 0.7),
+        np.zeros((300, 4, 3)),
+        np.full((50, 4, 3), -0.0),
+        rng.choice([0.25, 0.5], (301, 4, 3), p=[0.2, 0.8]),
+    ):
         x = x.astype(np.float32)
         assert np.array_equal(batched(x).median, np.median(x, 0))
     wide = (10 ** rng.uniform(-4, 2, (1000, 50, 3))).astype(np.float32)

@@ -36,8 +36,15 @@ class Filmed:
 
     def soft(self, camera) -> Pixels:
         """A picture whose pixels are means over 3 x 3, as a sensor's are over their area."""
-        fine = replace(camera, width=3 * camera.width, height=3 * camera.height, fx=3 * camera.fx, fy=3 * camera.fy,
-                       cx=3 * camera.cx, cy=3 * camera.cy)
+        fine = replace(
+            camera,
+            width=3 * camera.width,
+            height=3 * camera.height,
+            fx=3 * camera.fx,
+            fy=3 * camera.fy,
+            cx=3 * camera.cx,
+            cy=3 * camera.cy,
+        )
         return picture(self.room, fine, self.light).coarser(3)
 
     def refined(self, cameras=None, **options) -> Poses:

@@ -5,21 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading.directions import (
-    cosine_hemisphere,
-    shifted,
-    sobol,
-    tangent_frame,
-    to_world,
-    uniform_hemisphere,
-)
+from addon.core.shading.directions import cosine_hemisphere, shifted, sobol, tangent_frame, to_world, uniform_hemisphere
 
 COUNT = 4096
 
 
 @pytest.mark.parametrize(
-    ("sample", "moments"),
-    [(cosine_hemisphere, (2 / 3, 1 / 2, 2 / 5)), (uniform_hemisphere, (1 / 2, 1 / 3, 1 / 4))],
+    ("sample", "moments"), [(cosine_hemisphere, (2 / 3, 1 / 2, 2 / 5)), (uniform_hemisphere, (1 / 2, 1 / 3, 1 / 4))]
 )
 def test_moments_of_the_height(sample, moments):
     """E[z^k]: 2 / (k + 2) for density cos / pi, 1 / (k + 1) for 1 / (2 pi)."""

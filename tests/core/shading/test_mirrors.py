@@ -115,9 +115,7 @@ def test_a_perfect_mirror_in_a_furnace_changes_nothing():
     own = room.atlas.object_id == wall
     glass = Mirror(wall, room.atlas.position[own][0], room.atlas.normal[own][0], np.ones(3, np.float32))
     position, normal = room.atlas.position[~own][::7], room.atlas.normal[~own][::7]
-    E, _, _ = gather(
-        field.with_mirrors((glass,)), bright_triangles(field), position, normal, 64, 0, 0
-    )
+    E, _, _ = gather(field.with_mirrors((glass,)), bright_triangles(field), position, normal, 64, 0, 0)
     assert np.allclose(E, np.pi, rtol=1e-4)
 
 

@@ -23,8 +23,9 @@ def room():
     sky = Environment(np.ones((8, 16, 3), np.float32), np.ones((8, 16), np.int32))
     field = made.field(made.by_object({}, default=(0, 0, 0)), sky)
     (u, v), corner = WINDOW, wall.corner
-    opening = quad(corner + u[0] * wall.edge_u + v[0] * wall.edge_v, (u[1] - u[0]) * wall.edge_u,
-                   (v[1] - v[0]) * wall.edge_v, 0)
+    opening = quad(
+        corner + u[0] * wall.edge_u + v[0] * wall.edge_v, (u[1] - u[0]) * wall.edge_u, (v[1] - v[0]) * wall.edge_v, 0
+    )
     atlas = made.atlas
     inside = np.flatnonzero(atlas.position[:, 0] > 0.5)[::5]
     position, normal = atlas.position[inside], atlas.normal[inside]

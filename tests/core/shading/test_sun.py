@@ -83,6 +83,7 @@ def test_paper_and_posters_are_no_sun(room):
 
 def test_what_a_lamp_lights_is_no_sun(room):
     """A spotlight that the mesh lacks throws a round spot on the floor, brighter than all else."""
+
     def spot(points, normals):
         off = np.linalg.norm(points - (1.1, 1.0, 0.0), axis=1)
         return (np.float64([12, 11, 9]) * np.clip((0.4 - off) / 0.05, 0, 1)[:, None]) * (normals[:, 2:] > 0.9)

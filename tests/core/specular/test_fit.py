@@ -61,9 +61,7 @@ def test_the_median_may_hold_some_of_the_lobe(box):
     """'frames' does without L_d: one that is 30 % too bright changes nothing; it would mislead 'target'."""
     element, direction, _ = box.views(60, 10)
     problem = box.problem(element, direction, 0.11, 0.1, paint(element))
-    spoilt = type(problem)(
-        problem.element, problem.radiance, 1.3 * problem.lit_diffuse, problem.light, problem.cosine
-    )
+    spoilt = type(problem)(problem.element, problem.radiance, 1.3 * problem.lit_diffuse, problem.light, problem.cosine)
     one, other = fit_lobe(problem), fit_lobe(spoilt)
     assert one.phi == other.phi and np.array_equal(one.psi, other.psi)
     assert abs(fit_lobe(spoilt, "target").psi[0] - 0.1) > abs(one.psi[0] - 0.1)

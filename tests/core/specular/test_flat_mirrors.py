@@ -31,8 +31,9 @@ def frames(box, f0, diffuse=0.0, noise=0.1, tilt=0.0, seed=0):
     origin = box.room.atlas.position[element].astype(float) + [0, 0, 1e-6]
     seen = f0 * box.arriving(origin, along) + diffuse
     seen = seen * np.exp(np.random.default_rng(seed).normal(0, noise, seen.shape))
-    return Samples(element.astype(np.int32), frame.astype(np.int32), np.float32(seen), direction,
-                   np.zeros(len(element), bool))
+    return Samples(
+        element.astype(np.int32), frame.astype(np.int32), np.float32(seen), direction, np.zeros(len(element), bool)
+    )
 
 
 def test_a_mirror(box):

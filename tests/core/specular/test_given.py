@@ -49,8 +49,20 @@ class Seen:
 
     def all(self, given=None, held=None):
         lamp = Lamp(LAMP, np.float32(GLOW), True, "")
-        return fit_specular(self.box.room.instances, self.field, self.lit, self.irradiance, (lamp,), self.samples,
-                            [f"{i:03d}" for i in range(10)], rays=64, refine=1, threads=2, given=given, held=held)
+        return fit_specular(
+            self.box.room.instances,
+            self.field,
+            self.lit,
+            self.irradiance,
+            (lamp,),
+            self.samples,
+            [f"{i:03d}" for i in range(10)],
+            rays=64,
+            refine=1,
+            threads=2,
+            given=given,
+            held=held,
+        )
 
 
 @pytest.fixture(scope="module")
@@ -100,8 +112,17 @@ def test_all_given_leaves_nothing_to_fit(glossy):
 
 
 def test_descriptions_say_what_was_given(glossy):
-    found = glossy.all({FLOOR: Given("specular", 0.3), 1: Given("metal"), 2: Given("emitter"), 3: Given("lambertian"),
-                        4: Given(same_as=5), 5: Given(same_as=FLOOR), LAMP: Given("lambertian")})
+    found = glossy.all(
+        {
+            FLOOR: Given("specular", 0.3),
+            1: Given("metal"),
+            2: Given("emitter"),
+            3: Given("lambertian"),
+            4: Given(same_as=5),
+            5: Given(same_as=FLOOR),
+            LAMP: Given("lambertian"),
+        }
+    )
     by_id = {m.object_id: m for m in found.materials}
     floor = by_id[FLOOR]
     assert floor.phi == pytest.approx(0.09) and (floor.roughness_low, floor.roughness_high) == (0.3, 0.3)
@@ -135,5 +156,6 @@ def test_a_few_fitted_again_are_what_a_whole_fit_gives(glossy):
     assert np.array_equal(whole.specular[floor], few.specular[floor])
     assert not np.array_equal(before.specular[floor], few.specular[floor])
     assert [m for m in few.materials if m.object_id not in (FLOOR, 4)] == [
-        m for m in before.materials if m.object_id not in (FLOOR, 4)]
+        m for m in before.materials if m.object_id not in (FLOOR, 4)
+    ]
     assert glossy.all(None, Held(few, {FLOOR})).materials[FLOOR] == before.materials[FLOOR]  # taken back

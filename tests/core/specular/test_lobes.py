@@ -38,9 +38,7 @@ def test_a_furnace_gives_the_lobes_own_albedo(cosine):
     turn = np.linspace(0, 2 * np.pi, len(element), endpoint=False)
     sine = np.sqrt(1 - cosine**2)
     direction = np.stack([sine * np.cos(turn), sine * np.sin(turn), np.full(len(turn), cosine)], -1).astype(np.float32)
-    found = reflected_light(
-        field, bright_triangles(field), element, direction, rays=256, grid=PHIS, threads=2
-    )
+    found = reflected_light(field, bright_triangles(field), element, direction, rays=256, grid=PHIS, threads=2)
     assert np.allclose(found.A[..., 1], 2 * found.A[..., 0], rtol=1e-4)
     for i, phi in enumerate(PHIS):
         A, B = albedo_of_lobe(cosine, float(phi))
@@ -96,9 +94,7 @@ def test_a_room_with_a_lamp():
     box = Box()
     element, direction, _ = box.views(30, 3)
     grid = np.float32([0.08, 0.2, 0.5])
-    found = reflected_light(
-        box.field, box.bright, element, direction, rays=2048, grid=grid, threads=2
-    )
+    found = reflected_light(box.field, box.bright, element, direction, rays=2048, grid=grid, threads=2)
     for i, phi in enumerate(grid):
         A, B = box.lobe(element, direction, float(phi), 60)
         off = found.A[:, i] / A - 1

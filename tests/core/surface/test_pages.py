@@ -35,8 +35,10 @@ def sample(image, at):
     """Bilinear, as a renderer has it; `at` in texels."""
     low = np.floor(at - 0.5).astype(int)
     a, b = (at - 0.5 - low).T[..., None]
-    x0, x1, y0, y1 = (np.clip(v, 0, n - 1) for v, n in zip(
-        (low[:, 0], low[:, 0] + 1, low[:, 1], low[:, 1] + 1), np.repeat(image.shape[1::-1], 2)))
+    x0, x1, y0, y1 = (
+        np.clip(v, 0, n - 1)
+        for v, n in zip((low[:, 0], low[:, 0] + 1, low[:, 1], low[:, 1] + 1), np.repeat(image.shape[1::-1], 2))
+    )
     return (1 - b) * ((1 - a) * image[y0, x0] + a * image[y0, x1]) + b * ((1 - a) * image[y1, x0] + a * image[y1, x1])
 
 
@@ -73,7 +75,7 @@ def test_islands_lie_apart_and_objects_together(kind, largest):
     found = lay_out(kind, triangles, uv, owner, SIZE, {5: 1.5}, largest)
     taken = np.zeros((found.size, found.size), int)
     for _, _, x, y, width, height in found.island.astype(int):
-        taken[y:y + height, x:x + width] += 1
+        taken[y : y + height, x : x + width] += 1
     assert taken.max() == 1
     assert found.sheet_uv.min() >= 0 and found.sheet_uv.max() <= 1
     if kind == OBJECT:

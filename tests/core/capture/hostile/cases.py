@@ -52,12 +52,21 @@ def nerfstudio(root: Path) -> None:
     for i in range(COUNT):
         capture.picture(i, RADIANCE)
     write_png(root / "mask.png", CODES)
-    capture.frame(0, mask_path="mask.png", exposure=1.0, saturation=5.0,
-                  brackets=[{"file_path": "images/001.exr", "exposure": 2.0}])
+    capture.frame(
+        0,
+        mask_path="mask.png",
+        exposure=1.0,
+        saturation=5.0,
+        brackets=[{"file_path": "images/001.exr", "exposure": 2.0}],
+    )
     capture.transforms["frames"] = [frame for i, frame in enumerate(capture.transforms["frames"]) if i != 1]
     capture.frame(1, shutter="1/60", iso=200, fl_x=6.0, k1=0.01)
-    capture.top(applied_transform=[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]], applied_scale=1.0,
-                camera_model="OPENCV", train_filenames=["images/000.exr"])
+    capture.top(
+        applied_transform=[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]],
+        applied_scale=1.0,
+        camera_model="OPENCV",
+        train_filenames=["images/000.exr"],
+    )
 
 
 def with_table(root: Path) -> None:
@@ -68,9 +77,13 @@ def with_table(root: Path) -> None:
 
 def with_binary_ply(root: Path) -> None:
     nerfstudio(root)
-    head = ("ply\nformat binary_little_endian 1.0\n" + f"element vertex {len(CORNERS)}\n"
-            + "".join(f"property float {axis}\n" for axis in "xyz") + f"element face {len(SIDES)}\n"
-            + "property list uchar int vertex_indices\nproperty int object_id\nend_header\n")
+    head = (
+        "ply\nformat binary_little_endian 1.0\n"
+        + f"element vertex {len(CORNERS)}\n"
+        + "".join(f"property float {axis}\n" for axis in "xyz")
+        + f"element face {len(SIDES)}\n"
+        + "property list uchar int vertex_indices\nproperty int object_id\nend_header\n"
+    )
     body = b"".join(struct.pack("<3f", *corner) for corner in CORNERS)
     body += b"".join(struct.pack("<B5i", 4, *side, i) for i, side in enumerate(SIDES))
     (root / "mesh.ply").write_bytes(head.encode() + body)
@@ -78,6 +91,7 @@ def with_binary_ply(root: Path) -> None:
 
 def with_pictures(ending: str, content: bytes | Callable[[Path], None]) -> Callable[[Path], None]:
     """Frames of another kind than EXR; frame 0 alone is spoiled, the others are good."""
+
     def make(root: Path) -> None:
         capture = CaptureOnDisk(root, 6)
         for i, frame in enumerate(capture.transforms["frames"]):
@@ -86,6 +100,7 @@ def with_pictures(ending: str, content: bytes | Callable[[Path], None]) -> Calla
             frame["file_path"] = path.relative_to(root).as_posix()
             content(path) if callable(content) else path.write_bytes(content)
         capture.save()
+
     return make
 
 
@@ -94,6 +109,7 @@ def colmap(write) -> Callable[[Path], None]:
         poses = [frame["transform_matrix"] for frame in mesh_only(root).transforms["frames"]]
         camera = "OPENCV", WIDTH, HEIGHT, (6.0, 6.5, 4.0, 3.0, 0.01, 0.0, 0.0, 0.0)
         write(root / "sparse/0", {1: camera}, images_of(poses))
+
     return make
 
 
@@ -107,16 +123,24 @@ def hdr_content() -> bytes:
 
 def png_content() -> bytes:
     """16 bits, interlaced, all filters."""
+
     def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
     lines = b""
-    for y, x, down, right in ((0, 0, 8, 8), (0, 4, 8, 8), (4, 0, 8, 4), (0, 2, 4, 4), (2, 0, 4, 2), (0, 1, 2, 2),
-                              (1, 0, 2, 1)):
+    for y, x, down, right in (
+        (0, 0, 8, 8),
+        (0, 4, 8, 8),
+        (4, 0, 8, 4),
+        (0, 2, 4, 4),
+        (2, 0, 4, 2),
+        (0, 1, 2, 2),
+        (1, 0, 2, 1),
+    ):
         part = CODES[y::down, x::right].astype(">u2")
         lines += b"".join(bytes((k % 5,)) + line.tobytes() for k, line in enumerate(part) if part.size)
     header = struct.pack(">IIBBBBB", WIDTH, HEIGHT, 16, 2, 0, 0, 1)
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(lines)) + chunk(b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(lines)) + chunk(b"IEND", b"")
 
 
 def write_frame(path: Path) -> None:
@@ -138,8 +162,9 @@ def traj(root: Path) -> None:
         (root / f"results/{i:03d}.exr").rename(root / f"results/frame{i:06d}.exr")
     poses = [np.array(frame["transform_matrix"]) @ flip for frame in capture.transforms["frames"]]
     (root / "traj.txt").write_text("".join(" ".join(map(repr, pose.ravel().tolist())) + "\n" for pose in poses))
-    (root / "cam_params.json").write_text(json.dumps(
-        {"camera": {"w": WIDTH, "h": HEIGHT, "fx": 6.0, "fy": 6.5, "cx": 4.0, "cy": 3.0, "scale": 6553.5}}))
+    (root / "cam_params.json").write_text(
+        json.dumps({"camera": {"w": WIDTH, "h": HEIGHT, "fx": 6.0, "fy": 6.5, "cx": 4.0, "cy": 3.0, "scale": 6553.5}})
+    )
 
 
 def scannetpp(root: Path) -> None:
@@ -179,11 +204,27 @@ def replica(root: Path) -> None:
 
 def tiff_content() -> bytes:
     """8 bits, no compression, an EXIF pointer that leads back to the first directory."""
-    tags = ((256, 3, WIDTH), (257, 3, HEIGHT), (258, 3, 8), (259, 3, 1), (262, 3, 2), (273, 4, 8), (277, 3, 3),
-            (278, 3, HEIGHT), (279, 4, CODES.size), (0x8769, 4, 8 + CODES.size))
+    tags = (
+        (256, 3, WIDTH),
+        (257, 3, HEIGHT),
+        (258, 3, 8),
+        (259, 3, 1),
+        (262, 3, 2),
+        (273, 4, 8),
+        (277, 3, 3),
+        (278, 3, HEIGHT),
+        (279, 4, CODES.size),
+        (0x8769, 4, 8 + CODES.size),
+    )
     directory = b"".join(struct.pack("<HHII", tag, kind, 1, value) for tag, kind, value in tags)
-    return (b"II*\0" + struct.pack("<I", 8 + CODES.size) + CODES.tobytes() + struct.pack("<H", len(tags)) + directory
-            + struct.pack("<I", 0))
+    return (
+        b"II*\0"
+        + struct.pack("<I", 8 + CODES.size)
+        + CODES.tobytes()
+        + struct.pack("<H", len(tags))
+        + directory
+        + struct.pack("<I", 0)
+    )
 
 
 CODED = Reading(transfer="srgb")

@@ -8,13 +8,73 @@ import struct
 
 from hypothesis import strategies as st
 
-NUMBERS = ("nan", "inf", "-inf", "NaN", "Infinity", "1e308", "-1e308", "1e999", "-1", "0", "-0.0", "1e-320",
-           str(2**31), str(2**63), str(2**64), "9" * 400, "0x10", "1/0", "abc", "", "\u0663", "1_0")
-WORDS = (b"\xff" * 4, b"\xff" * 8, b"\x7f\xff\xff\xff", b"\xff\xff\xff\x7f", struct.pack("<Q", 1 << 63),
-         struct.pack("<Q", 1 << 32), struct.pack("<d", float("nan")), struct.pack("<d", 1e308), struct.pack("<f", 1e38),
-         b"\0" * 8, b"\0\0\0\x80", b"\x80\0\0\0", b"\n", b"\0", b"\xc3\x28", b"\xed\xa0\x80", b"\xff\xfe")
-VALUES = (None, True, -1, 0, 2**63, 1e308, float("nan"), float("inf"), "", "a", "x" * 100_000, [], {}, [[]], [None],
-          {"a": {}}, "../../etc/passwd", "\0", "\ud800", [1e308] * 4, "C:\\a.exr", "//host/share/a.exr")
+NUMBERS = (
+    "nan",
+    "inf",
+    "-inf",
+    "NaN",
+    "Infinity",
+    "1e308",
+    "-1e308",
+    "1e999",
+    "-1",
+    "0",
+    "-0.0",
+    "1e-320",
+    str(2**31),
+    str(2**63),
+    str(2**64),
+    "9" * 400,
+    "0x10",
+    "1/0",
+    "abc",
+    "",
+    "\u0663",
+    "1_0",
+)
+WORDS = (
+    b"\xff" * 4,
+    b"\xff" * 8,
+    b"\x7f\xff\xff\xff",
+    b"\xff\xff\xff\x7f",
+    struct.pack("<Q", 1 << 63),
+    struct.pack("<Q", 1 << 32),
+    struct.pack("<d", float("nan")),
+    struct.pack("<d", 1e308),
+    struct.pack("<f", 1e38),
+    b"\0" * 8,
+    b"\0\0\0\x80",
+    b"\x80\0\0\0",
+    b"\n",
+    b"\0",
+    b"\xc3\x28",
+    b"\xed\xa0\x80",
+    b"\xff\xfe",
+)
+VALUES = (
+    None,
+    True,
+    -1,
+    0,
+    2**63,
+    1e308,
+    float("nan"),
+    float("inf"),
+    "",
+    "a",
+    "x" * 100_000,
+    [],
+    {},
+    [[]],
+    [None],
+    {"a": {}},
+    "../../etc/passwd",
+    "\0",
+    "\ud800",
+    [1e308] * 4,
+    "C:\\a.exr",
+    "//host/share/a.exr",
+)
 NUMBER = re.compile(rb"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 
 
@@ -83,8 +143,22 @@ def emptied(draw, content):
     return b""
 
 
-BLOWS = (cut, flip, flip, overwrite, overwrite, insert, repeat, remove, swap_lines, number, number, number,
-         other_endian, emptied)
+BLOWS = (
+    cut,
+    flip,
+    flip,
+    overwrite,
+    overwrite,
+    insert,
+    repeat,
+    remove,
+    swap_lines,
+    number,
+    number,
+    number,
+    other_endian,
+    emptied,
+)
 
 
 @st.composite

@@ -44,8 +44,10 @@ KINDS = {
     "jpg": lambda path: pillow.fromarray(PICTURE).save(path),
     "progressive.jpg": lambda path: pillow.fromarray(PICTURE).save(path, progressive=True),
     "tif": lambda path: path.write_bytes(tiff_content()),
-    **{f"{name}.tif": lambda path, name=name: pillow.fromarray(PICTURE).save(path, compression=name)
-       for name in ("tiff_lzw", "tiff_adobe_deflate", "packbits", "jpeg")},
+    **{
+        f"{name}.tif": lambda path, name=name: pillow.fromarray(PICTURE).save(path, compression=name)
+        for name in ("tiff_lzw", "tiff_adobe_deflate", "packbits", "jpeg")
+    },
     "float.tif": lambda path: pillow.fromarray(PICTURE[..., 0].astype(np.float32)).save(path, compression="tiff_lzw"),
 }
 
@@ -58,7 +60,13 @@ def test_spoiled(kind, tmp_path):
     rng = np.random.default_rng(SEED)
     for path in paths[1:]:
         path.write_bytes(spoiled(paths[0].read_bytes(), 400, rng))
-    done = subprocess.run([sys.executable, "-c", CHILD, *map(str, paths)], cwd=ROOT, capture_output=True, timeout=300,
-                          text=True, errors="replace")
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD, *map(str, paths)],
+        cwd=ROOT,
+        capture_output=True,
+        timeout=300,
+        text=True,
+        errors="replace",
+    )
     assert done.returncode == 0 and f"all {len(paths)}" in done.stdout, done.stderr[-2000:]
     assert " good 0" not in done.stdout  # the file as it was written, at the least

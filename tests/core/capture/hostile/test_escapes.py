@@ -15,8 +15,17 @@ from addon.core.errors import BadInputError
 from tests.core.capture.colmap_files import write_text
 from tests.core.capture.hostile.cases import COUNT, Case, colmap, fresh, nerfstudio
 
-OUT = ("../secret.exr", "images/../../secret.exr", "/etc/passwd", "C:\\secret.exr", "C:secret.exr", "..\\secret.exr",
-       "\\\\host\\share\\a.exr", "//host/share/a.exr", "\\secret.exr")
+OUT = (
+    "../secret.exr",
+    "images/../../secret.exr",
+    "/etc/passwd",
+    "C:\\secret.exr",
+    "C:secret.exr",
+    "..\\secret.exr",
+    "\\\\host\\share\\a.exr",
+    "//host/share/a.exr",
+    "\\secret.exr",
+)
 
 
 @pytest.fixture
@@ -77,8 +86,14 @@ def test_links_within(root):
 
 def test_nothing_is_unpickled_or_run():
     core = Path(__file__).resolve().parents[4] / "addon" / "core"
-    wrong = re.compile(r"\b(pickle|marshal|shelve|dill|joblib|yaml)\b|allow_pickle\s*=\s*True|\beval\(|\bexec\("
-                       r"|__import__|os\.system|subprocess|np\.load\((?!.*allow_pickle=False)")
-    found = [f"{path.relative_to(core)}:{number}: {line.strip()}" for path in sorted(core.rglob("*.py"))
-             for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1) if wrong.search(line)]
+    wrong = re.compile(
+        r"\b(pickle|marshal|shelve|dill|joblib|yaml)\b|allow_pickle\s*=\s*True|\beval\(|\bexec\("
+        r"|__import__|os\.system|subprocess|np\.load\((?!.*allow_pickle=False)"
+    )
+    found = [
+        f"{path.relative_to(core)}:{number}: {line.strip()}"
+        for path in sorted(core.rglob("*.py"))
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if wrong.search(line)
+    ]
     assert not found, found

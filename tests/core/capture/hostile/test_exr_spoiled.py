@@ -58,9 +58,16 @@ def parts(path):
     OpenEXR.File(both).write(str(path))
 
 
-KINDS = {"scanlines": one_part, "tiles": tiled, "parts": parts,
-         **{name: lambda path, name=name: one_part(path, compression=getattr(OpenEXR, f"{name}_COMPRESSION"))
-            for name in ("PIZ", "PXR24", "B44", "DWAA", "HTJ2K32", "ZSTD") if hasattr(OpenEXR, f"{name}_COMPRESSION")}}
+KINDS = {
+    "scanlines": one_part,
+    "tiles": tiled,
+    "parts": parts,
+    **{
+        name: lambda path, name=name: one_part(path, compression=getattr(OpenEXR, f"{name}_COMPRESSION"))
+        for name in ("PIZ", "PXR24", "B44", "DWAA", "HTJ2K32", "ZSTD")
+        if hasattr(OpenEXR, f"{name}_COMPRESSION")
+    },
+}
 
 
 def spoiled(content: bytes, head: int, rng: np.random.Generator) -> bytes:
@@ -95,7 +102,13 @@ def test_spoiled(kind, tmp_path):
     paths = [tmp_path / "good.exr", *(tmp_path / f"{i}.exr" for i in range(COUNT))]
     for path in paths[1:]:
         path.write_bytes(spoiled(good, 800, rng))
-    done = subprocess.run([sys.executable, "-c", CHILD, *map(str, paths)], cwd=ROOT, capture_output=True, timeout=300,
-                          text=True, errors="replace")
+    done = subprocess.run(
+        [sys.executable, "-c", CHILD, *map(str, paths)],
+        cwd=ROOT,
+        capture_output=True,
+        timeout=300,
+        text=True,
+        errors="replace",
+    )
     assert done.returncode == 0 and f"all {len(paths)}" in done.stdout, done.stderr[-2000:]
     assert " good 0" not in done.stdout  # the file as it was written, at the least

@@ -32,13 +32,15 @@ HANG = 10
 """Seconds from which on reading a file of a few thousand bytes is a hang."""
 MEMORY = 200 << 20
 """Bytes that a capture of a few thousand may take: headers may claim 64 MiB of pixels before they are doubted."""
-SETTINGS = settings(max_examples=EXAMPLES, deadline=None, derandomize=not WIDER, database=None,
-                    suppress_health_check=list(HealthCheck))
+SETTINGS = settings(
+    max_examples=EXAMPLES, deadline=None, derandomize=not WIDER, database=None, suppress_health_check=list(HealthCheck)
+)
 
 
 @contextlib.contextmanager
 def bounded():
     """Fail on a hang, and on memory out of all proportion."""
+
     def hang(*_):
         pytest.fail(f"no answer within {HANG} s")
 
