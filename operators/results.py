@@ -75,8 +75,8 @@ def refused(things) -> list[tuple[str, Path | None]]:
                 f"of an earlier run than the one that lies in '{folder.name}' now; bring in the new one to see what "
                 "was found."
                 if folder
-                else "of an older version of Scan Relight, so that nobody can tell which run made them; run again and bring "
-                "in the result."
+                else "of an older version of Scan Relight, so that nobody can tell which run made them; run again and "
+                "bring in the result."
             ),
             folder,
         )
