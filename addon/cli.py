@@ -205,7 +205,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
 
 def reading_from(arguments: argparse.Namespace):
     """The `Reading` that was asked for."""
-    from .core.capture.layout import Reading
+    from .core.io.layout import Reading
 
     def import_mesh(path: Path):
         return need("import_mesh").import_mesh(path)  # only now: most captures need no Blender to be read
@@ -367,13 +367,13 @@ def benchmark_command(arguments: argparse.Namespace, stream: TextIO) -> int:
 
 def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`info CAPTURE`."""
-    from .core.capture.read import describe, read_capture
+    from .core.io.read import describe, read_capture
 
     if arguments.stop_with_stdin:
         Leash(grace=0.0)
     capture = read_capture(arguments.capture, reading_from(arguments))
     if arguments.room is not None:
-        from .core.room_file import write_room
+        from .core.results.room_file import write_room
 
         write_room(arguments.room, capture)
     facts = describe(capture)
@@ -410,9 +410,9 @@ def compare(capture, arguments: argparse.Namespace) -> dict:
         from .core.agreement.look import look
         from .core.agreement.overlay import overlay
         from .core.atomic import write_bytes
-        from .core.capture.conventions import Convention
-        from .core.capture.pixels import read_pixels
-        from .core.png import png
+        from .core.io.conventions import Convention
+        from .core.io.pixels import read_pixels
+        from .core.io.png import png
 
         found = look(capture, read_pixels, search=not arguments.convention)
         if arguments.overlay is not None:

@@ -30,7 +30,7 @@ class SCAN_RELIGHT_OT_check_capture(bpy.types.Operator):
                 self.report({"ERROR"}, f"The check can't be started ({error.strerror or error}); start Blender anew.")
                 return {"CANCELLED"}
             return {"FINISHED"}
-        from ..addon.core.capture.read import describe, read_capture
+        from ..addon.core.io.read import describe, read_capture
 
         try:
             facts = describe(read_capture(findings.key(choices)[0], reading_props.reading(choices.reading)))

@@ -11,7 +11,7 @@ from . import poll, preferences, results
 
 def folders(scene: bpy.types.Scene | None) -> list[Path]:
     """The results whose stages can be cleared: in the results folder, beside the .blend, and the scene's own."""
-    from ..addon.core.result_cache import results as below
+    from ..addon.core.results.cache import results as below
 
     beside = result_home.beside()
     own = results.folder_of(scene) if scene is not None else None
@@ -46,7 +46,7 @@ class SCAN_RELIGHT_OT_clear_cache(bpy.types.Operator):
 
     def execute(self, context):
         """Delete, and say how much is free again."""
-        from ..addon.core.result_cache import clear
+        from ..addon.core.results.cache import clear
 
         done = clear(folders(context.scene))
         preferences.forget_size()

@@ -7,7 +7,7 @@ import bpy
 
 from ..addon.bridge import export
 from ..addon.core.errors import BadInputError
-from ..addon.core.room_file import capture_name
+from ..addon.core.results.room_file import capture_name
 from . import poll
 from .relight_base import RelightOperator, default_folder
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import bpy
 
-from ..addon.core.capture import folder as folders
 from ..addon.core.errors import BadInputError, ScanRelightError
+from ..addon.core.io import folder as folders
 from . import poll, room_window
 from .at_once import AtOnce
 from .panel import SidebarPanel

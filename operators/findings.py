@@ -8,7 +8,7 @@ import time
 import bpy
 
 from ..addon.bridge import job as jobs
-from ..addon.core.capture.folder import CAPTURE, Content, look_into
+from ..addon.core.io.folder import CAPTURE, Content, look_into
 from . import reading_props
 from .job_operator import redraw
 

@@ -22,7 +22,7 @@ class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
     def work(self, context):
         """Read, then build."""
         from ..addon.bridge.slices import whole
-        from ..addon.core.capture.read import read_capture
+        from ..addon.core.io.read import read_capture
 
         capture = read_capture(self.folder("capture_folder"), reading_props.reading(self))
         return (*capture.warnings, *whole(self.change(context.scene, capture)))
@@ -37,7 +37,7 @@ class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
 
     def load(self, job):
         """The capture as it was read."""
-        from ..addon.core.room_file import read_capture_file
+        from ..addon.core.results.room_file import read_capture_file
 
         job.warnings.extend(findings.facts(job)["warnings"])
         return read_capture_file(job.facts["scratch"])[0]

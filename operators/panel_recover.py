@@ -8,8 +8,8 @@ from ..addon.bridge import job as jobs
 from ..addon.bridge import result_home, result_images, room_changes
 from ..addon.bridge.marks import OWN_SCENE
 from ..addon.console import duration
+from ..addon.core.results.unfinished import goes_on_with
 from ..addon.core.stages import LABELS, STAGES
-from ..addon.core.unfinished import goes_on_with
 from ..addon.settings_info import setting_infos
 from . import findings, preferences
 from .job_operator import active, bar

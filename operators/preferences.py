@@ -118,8 +118,8 @@ def amount(size: int) -> str:
 
 
 def _add_up(folder: Path) -> None:
-    from ..addon.core.result_cache import results, size
-    from ..addon.core.store import STAGES
+    from ..addon.core.results.cache import results, size
+    from ..addon.core.results.store import STAGES
 
     found = results(folder)
     whole, stages = (sum(size(one / part) for one in found) for part in ("", STAGES))

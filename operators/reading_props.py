@@ -6,8 +6,8 @@ from pathlib import Path
 
 import bpy
 
-from ..addon.core.capture.formats import FORMATS
-from ..addon.core.capture.layout import Reading
+from ..addon.core.io.formats import FORMATS
+from ..addon.core.io.layout import Reading
 from .translations import OWN
 
 FOUND = "FOUND"

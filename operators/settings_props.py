@@ -323,7 +323,7 @@ class SceneStageOperator(StageOperator):
 
     def load(self, job):
         """The room that the run has left."""
-        from ..addon.core.room_file import read_room
+        from ..addon.core.results.room_file import read_room
 
         return read_room(job.facts["result_folder"])
 

@@ -5,7 +5,7 @@
 An orthographic view of a sphere averages over view directions with the cosine as weight, so the mean over its disc is
 the bihemispherical reflectance. Written are ``phi`` (p,), ``psi`` (s,), ``specular`` (s, p): the lobe alone, and
 ``diffuse`` (s, p): what is left of a white diffuse under it. Printed are the rows
-of the table in addon/core/specular/compensation.py. Needs pip's bpy.
+of the table in addon/core/brdf/compensation.py. Needs pip's bpy.
 """
 
 import argparse
@@ -77,7 +77,7 @@ def main():
     sphere = furnace(arguments.samples)
     black, white = (np.array([[reflectance(sphere, p, s, b) for p in PHI] for s in PSI]) for b in (0, 1))
     np.savez(arguments.out, phi=PHI, psi=PSI, specular=black, diffuse=white - black)
-    # The rows of `core.specular.compensation`: the share of 1 - psi that the layer takes beyond psi.
+    # The rows of `core.brdf.compensation`: the share of 1 - psi that the layer takes beyond psi.
     for row in (1 - (white - black) - PSI[:, None]) / (1 - PSI[:, None]):
         print("    (" + ", ".join(f"{x:.4f}" for x in row) + "),")
 

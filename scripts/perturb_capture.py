@@ -32,9 +32,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from addon.core.capture.exr import read_exr, write_exr
-from addon.core.capture.ply import read_ply
-from addon.core.capture.ply_header import parse_header
+from addon.core.io.exr import read_exr, write_exr
+from addon.core.io.ply import read_ply
+from addon.core.io.ply_header import parse_header
 
 WAVES = 200
 SHORTEST, LONGEST = 0.25, 2.0

@@ -28,7 +28,7 @@ def grey_capture(tmp_path_factory) -> Path:
     """The demo's room seen by three frames of flat grey: a valid capture, made in no time."""
     from addon.bridge.demo_capture import frame_path, write_all_but_frames
     from addon.bridge.demo_room import room, tour
-    from addon.core.capture.exr import write_exr
+    from addon.core.io.exr import write_exr
 
     folder = tmp_path_factory.mktemp("grey") / "capture"
     write_all_but_frames(folder, room(), tour(3), (32, 24))

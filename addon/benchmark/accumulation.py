@@ -12,16 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.capture.model import Frame, Mesh, Pixels
-from ..core.capture.pixels import read_pixels
-from ..core.capture.read import read_capture
-from ..core.lit_diffuse.accumulate import LitDiffuse, accumulate
+from ..core.io.pixels import read_pixels
+from ..core.io.read import read_capture
 from ..core.memory import peak_memory
 from ..core.parallel import ordered_map
+from ..core.passes.lit_diffuse.accumulate import LitDiffuse, accumulate
+from ..core.scene.atlas import Atlas
+from ..core.scene.model import Frame, Mesh, Pixels
+from ..core.scene.rays import RayScene
+from ..core.scene.surface import build_surface
 from ..core.settings import PAPER, Settings
-from ..core.surface.atlas import Atlas
-from ..core.surface.build import build_surface
-from ..core.surface.rays import RayScene
 from .run import Options
 from .synthetic import synthetic_capture
 from .table import BASELINE, Curves, Table

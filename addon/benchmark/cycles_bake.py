@@ -43,7 +43,7 @@ def _material(image: bpy.types.Image, target: bpy.types.Image) -> bpy.types.Mate
 
 
 def _world(room: LitRoom) -> bpy.types.World:
-    """The room's environment as the world; mapped as `core.shading.environment` says."""
+    """The room's environment as the world; mapped as `core.light.environment` says."""
     radiance = room.field.environment.radiance
     height, width = radiance.shape[:2]
     image = bpy.data.images.new("benchmark sky", width, height, alpha=False, float_buffer=True, is_data=True)

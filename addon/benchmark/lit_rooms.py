@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.shading.environment import Environment
-from ..core.shading.field import LightField
-from ..core.shading.over_surface import finest_spacing, irradiance
-from ..core.surface.atlas import Atlas
-from ..core.surface.rays import RayScene
+from ..core.light.environment import Environment
+from ..core.light.field import LightField
+from ..core.light.over_surface import finest_spacing, irradiance
+from ..core.scene.atlas import Atlas
+from ..core.scene.rays import RayScene
 from .synthetic import box, tiled
 
 SIZE = np.array([5.0, 4.0, 2.6])

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.capture.model import Capture, Mesh
-from ..core.capture.read import read_capture
+from ..core.io.read import read_capture
 from ..core.memory import peak_memory
+from ..core.pipeline.recover import Recovery
 from ..core.progress import Progress
-from ..core.recover import Recovery
+from ..core.results.store import Store
+from ..core.scene.model import Capture, Mesh
 from ..core.settings import PRESETS, Settings
 from ..core.stages import STAGES
-from ..core.store import Store
 from .run import Options, SkippedStage
 from .table import BASELINE, Curves, Table
 from .timing import once

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from ..core.parallel import ordered_map
-from ..core.surface.rays import RayScene
+from ..core.scene.rays import RayScene
 
 
 class RecordedRays:

@@ -15,10 +15,10 @@ from ..bridge.demo_compare import describe, seen_albedo
 from ..bridge.demo_render import build, set_up_cycles
 from ..bridge.demo_room import room
 from ..bridge.marks import OBJECT_ID
-from ..core.capture.exr import read_exr
-from ..core.capture.read import read_capture
+from ..core.io.exr import read_exr
+from ..core.io.read import read_capture
 from ..core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR
-from ..core.shading.albedo import MEASURED
+from ..core.passes.albedo.albedo import MEASURED
 from .truth_views import albedo_psnr
 
 PICTURE, SAMPLES = (160, 120), 64

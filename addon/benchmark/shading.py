@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from ..core.light.directions import cosine_hemisphere, shifted, sobol, to_world, uniform_hemisphere
+from ..core.light.emitters import bright_triangles
+from ..core.light.field import LightField
+from ..core.light.irradiance import direct, gather, uniform
+from ..core.light.portals import find_portals
 from ..core.parallel import for_blocks
-from ..core.shading.directions import cosine_hemisphere, shifted, sobol, to_world, uniform_hemisphere
-from ..core.shading.emitters import bright_triangles
-from ..core.shading.field import LightField
-from ..core.shading.irradiance import direct, gather, uniform
-from ..core.shading.portals import find_portals
 from .lit_rooms import ROOMS, LitRoom, make_room
 from .run import Options
 from .shading_surface import surface_tables

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 from scipy import ndimage
 
+from ..core.light.over_surface import finest_spacing, irradiance
+from ..core.scene.atlas import Atlas
 from ..core.settings import Settings
-from ..core.shading.over_surface import finest_spacing, irradiance
-from ..core.surface.atlas import Atlas
 from .lit_rooms import LitRoom, make_room
 from .recorded_rays import recorded
 from .run import Options

@@ -12,14 +12,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..core.shading.directions import shifted, sobol, to_world, uniform_hemisphere
-from ..core.shading.emitters import bright_triangles
-from ..core.shading.environment import Environment
-from ..core.shading.field import LightField
-from ..core.specular import brdf
-from ..core.specular.layout import Problem
-from ..core.specular.lobes import GRID, LobeLight, reflected_light
-from ..core.specular.models import choose_model
+from ..core.brdf import ggx as brdf
+from ..core.light.directions import shifted, sobol, to_world, uniform_hemisphere
+from ..core.light.emitters import bright_triangles
+from ..core.light.environment import Environment
+from ..core.light.field import LightField
+from ..core.light.lobes import GRID, LobeLight, reflected_light
+from ..core.passes.specular.layout import Problem
+from ..core.passes.specular.models import choose_model
 from .run import Options
 from .synthetic import ROOM, synthetic_capture
 from .table import BASELINE, Curves, Table

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.capture.exr import write_exr
-from ..core.capture.model import Camera, Frame, Mesh, Pixels
-from ..core.surface.atlas import Atlas
-from ..core.surface.elements import make_atlas
-from ..core.surface.rays import RayScene
+from ..core.io.exr import write_exr
+from ..core.scene.atlas import Atlas
+from ..core.scene.elements import make_atlas
+from ..core.scene.model import Camera, Frame, Mesh, Pixels
+from ..core.scene.rays import RayScene
 
 ROOM = (6.0, 5.0, 2.8)
 BOXES = 12

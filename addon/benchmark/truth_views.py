@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.capture.exr import read_exr
-from ..core.capture.model import Camera
-from ..core.capture.read import read_capture
+from ..core.io.exr import read_exr
+from ..core.io.read import read_capture
+from ..core.pipeline.recover import Recovery
 from ..core.progress import Progress
-from ..core.recover import Recovery
+from ..core.results.store import Store
+from ..core.scene.elements import ElementLookup
+from ..core.scene.model import Camera
 from ..core.settings import Settings
-from ..core.store import Store
-from ..core.surface.elements import ElementLookup
 
 SHIFTS = ((-0.25, -0.25), (0.25, 0.25), (-0.25, 0.25), (0.25, -0.25))
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from ..core.capture.folder import capture_name
+from ..core.io.folder import capture_name
 from .marks import RESULT
 from .materials import MODEL
 

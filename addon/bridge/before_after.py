@@ -17,7 +17,7 @@ import bpy
 from ..core.atomic import TEMPORARY
 from ..core.errors import BadInputError, StorageError
 from ..core.progress import Progress
-from ..core.room_file import MATERIALS
+from ..core.results.room_file import MATERIALS
 from .marks import RESULT
 from .pictures import beside, check_format, seconds_expected, shoot, ticking
 from .relight_state import captured_light

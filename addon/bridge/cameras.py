@@ -14,11 +14,11 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..core.capture.lens import Lens
-from ..core.capture.lenses import Cropped, Equirectangular
-from ..core.capture.lenses_told import lens_of, told_lens
-from ..core.capture.model import Camera, Frame, Mesh
-from ..core.capture.pixel_rays import widest_angle
+from ..core.scene.lens import Lens
+from ..core.scene.lenses import Cropped, Equirectangular
+from ..core.scene.lenses_told import lens_of, told_lens
+from ..core.scene.model import Camera, Frame, Mesh
+from ..core.scene.pixel_rays import widest_angle
 from .marks import CAPTURE
 
 LENS = "lens_model"

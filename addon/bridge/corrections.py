@@ -17,7 +17,7 @@ from ..core.atomic import write_bytes
 from ..core.errors import BadInputError
 from ..core.material import LAMBERTIAN, METAL, SPECULAR
 from ..core.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
-from ..core.result_place import write_capture
+from ..core.results.place import write_capture
 from . import correct_material, look, result_file, smoothing, unseen
 from .as_made import is_corrected, our_own
 from .marks import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, WHITE

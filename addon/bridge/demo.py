@@ -11,8 +11,8 @@ from mathutils import Matrix
 
 from ..core.atomic import write_bytes
 from ..core.progress import Progress, ProgressEvent
+from ..core.results.store import Store
 from ..core.settings import Settings
-from ..core.store import Store
 from . import relight_outside
 from .demo_compare import comparison
 from .demo_render import is_rendered, render_capture

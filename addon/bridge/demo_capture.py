@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.capture.ply_write import ply_bytes
+from ..core.io.ply_write import ply_bytes
 from .demo_room import Thing
 
 FIELD_OF_VIEW = np.radians(78)

@@ -8,12 +8,12 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.capture.exr import read_exr
-from ..core.capture.model import Capture
-from ..core.capture.read import read_capture
+from ..core.io.exr import read_exr
+from ..core.io.read import read_capture
 from ..core.material import EMITTER
-from ..core.shading.albedo import MEASURED
-from ..core.surface.rays import RayScene
+from ..core.passes.albedo.albedo import MEASURED
+from ..core.scene.model import Capture
+from ..core.scene.rays import RayScene
 from .demo_room import room
 from .images import image_array
 from .marks import OBJECT_ID

@@ -11,8 +11,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..core.capture.exr import read_header
 from ..core.errors import BadInputError, StorageError
+from ..core.io.exr import read_header
 from ..core.progress import Progress
 from .demo_capture import FIELD_OF_VIEW, frame_path, write_all_but_frames
 from .demo_room import Paint, Thing, room, tour

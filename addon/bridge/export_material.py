@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.png import write_png
+from ..core.io.png import write_png
 from . import relight_lamps
 from .images import UDIM, image_array, load_image
 from .marks import IMAGE, UV_MAP

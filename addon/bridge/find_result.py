@@ -17,9 +17,9 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import BadInputError, StorageError
-from ..core.result_place import BESIDE, captures, free_folder, write_capture
-from ..core.room_file import MATERIALS, run_of
-from ..core.store import Store
+from ..core.results.place import BESIDE, captures, free_folder, write_capture
+from ..core.results.room_file import MATERIALS, run_of
+from ..core.results.store import Store
 from . import result_file
 from .images import relative_to
 from .marks import IMAGE, OBJECT_ID, RESULT, RUN

@@ -11,9 +11,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.capture.layout import RawMesh
-from ..core.capture.self_contained import copy_gltf, copy_obj
 from ..core.errors import BadInputError
+from ..core.io.layout import RawMesh
+from ..core.io.self_contained import copy_gltf, copy_obj
 
 NUMBERED = re.compile(r"^(.*?)(?:\.(\d{3,}))?$", re.DOTALL)
 """Blender's ending of a name that was taken already."""

@@ -68,7 +68,7 @@ def _around(thing, uv) -> list[float]:
     path = base.with_name(base.name.replace("base_color", Path(ALBEDO).stem))
     if not path.is_file():
         raise BadInputError(f"'{path}' is missing; run the recovery again to its end.")
-    from ..core.capture.exr import read_exr  # not earlier: Blender's start should not wait for it
+    from ..core.io.exr import read_exr  # not earlier: Blender's start should not wait for it
 
     image = np.array(read_exr(path).rgb)[::-1]
     height, width = image.shape[:2]

@@ -46,7 +46,7 @@ def make_material(
     description : ObjectMaterial
     base_color : bpy.types.Image, optional
         Lambertian and specular: Base Color over the atlas, linear Rec.709; for specular objects already compensated
-        (see `core.specular.compensation`). Without it the colour is mid-grey.
+        (see `core.brdf.compensation`). Without it the colour is mid-grey.
     emission : bpy.types.Image, optional
         Emitter: radiance over the atlas; without it the description's one radiance.
     one_sided : bool

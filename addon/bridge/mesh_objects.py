@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 import bpy
 import numpy as np
 
-from ..core.capture.model import Instance, Mesh
+from ..core.scene.model import Instance, Mesh
 from .marks import OBJECT_ID
 
 ATLAS_UV = "ScanRelight"

@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..core.overrides import OVERRIDES
+from ..core.pipeline.refit import REPORT, Refit, open_result
 from ..core.progress import Progress
-from ..core.refit import REPORT, Refit, open_result
+from ..core.results.store import Store
 from ..core.stages import READ, WRITE
-from ..core.store import Store
 from .run import told_in_a_sentence, versions
 from .scene import write_scene
 

@@ -11,7 +11,7 @@ import bpy
 
 from ..core.errors import MissingStageError, StorageError
 from ..core.material import EMITTER
-from ..core.room_file import material
+from ..core.results.room_file import material
 from . import corrections, relight_lamps, result_file, result_images, room_changes, unseen
 from .as_made import is_corrected, stamp_tree
 from .correct_material import worn_material

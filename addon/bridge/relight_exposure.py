@@ -36,7 +36,7 @@ def measure(scene: bpy.types.Scene) -> float:
     StorageError
         The small picture can't be written.
     """
-    from ..core.capture.exr import read_exr  # not earlier: Blender's start should not wait for OpenEXR
+    from ..core.io.exr import read_exr  # not earlier: Blender's start should not wait for OpenEXR
 
     if scene.camera is None:
         raise BadInputError("The scene has no camera to measure the light through; choose a frame first.")

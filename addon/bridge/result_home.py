@@ -9,8 +9,8 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import BadInputError
-from ..core.result_cache import results
-from ..core.result_place import BESIDE, HOME, captures, documents, free_folder, own_folder
+from ..core.results.cache import results
+from ..core.results.place import BESIDE, HOME, captures, documents, free_folder, own_folder
 from .marks import CAPTURE, RESULT
 
 PACKAGE = __package__.rsplit(".", 2)[0]

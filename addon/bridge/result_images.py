@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import BadInputError, StorageError
-from ..core.room_file import capture_name
+from ..core.results.room_file import capture_name
 from .images import DATA, RADIANCE, image_name, load_image, relative_to, tiles_of
 from .marks import IMAGE
 from .scene import ALBEDO, BASE_COLOR, SHADING

@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import BadInputError, MissingStageError
-from ..core.room_file import ROOM, root_of, run_of
+from ..core.results.room_file import ROOM, root_of, run_of
 from . import result_images, room_changes
 from .as_made import stamp, stamp_tree
 from .cameras import show_camera

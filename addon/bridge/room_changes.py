@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from ..core.room_file import DAMAGE, MATERIALS
+from ..core.results.room_file import DAMAGE, MATERIALS
 
 FOUND = "scan_relight_found"
 """Of a room's collection: what its last run found of each object, as JSON."""

@@ -7,7 +7,7 @@ from collections.abc import Generator
 import bpy
 import numpy as np
 
-from ..core.capture.model import Capture
+from ..core.scene.model import Capture
 from .as_made import stamp
 from .camera_track import make_track
 from .cameras import make_cameras, show_camera, use_camera

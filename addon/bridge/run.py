@@ -14,21 +14,21 @@ from pathlib import Path
 import bpy
 
 from ..core.agreement.look import look
-from ..core.capture.conventions import AS_READ
-from ..core.capture.layout import AS_FOUND, Reading
-from ..core.capture.model import Capture
-from ..core.capture.pixels import read_pixels
-from ..core.capture.read import read_capture
 from ..core.errors import BadInputError, StorageError
+from ..core.io.conventions import AS_READ
+from ..core.io.layout import AS_FOUND, Reading
+from ..core.io.pixels import read_pixels
+from ..core.io.read import read_capture
 from ..core.memory import peak_memory
 from ..core.overrides import OVERRIDES, heeded
+from ..core.pipeline.recover import Recovery
 from ..core.progress import Progress, ProgressEvent
-from ..core.recover import Recovery
-from ..core.result_place import write_capture
-from ..core.room_file import ROOM, write_room
+from ..core.results.place import write_capture
+from ..core.results.room_file import ROOM, write_room
+from ..core.results.store import Store
+from ..core.scene.model import Capture
 from ..core.settings import Settings
 from ..core.stages import READ, RUN_STAGES, STAGES, WRITE
-from ..core.store import Store
 from ..version import VERSION
 from . import result_images
 from .room import bringing

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ..core.capture.model import Capture
 from ..core.errors import StorageError
 from ..core.material import EMITTER, ObjectMaterial, undescribed
-from ..core.room_file import run_of
+from ..core.results.room_file import run_of
+from ..core.scene.model import Capture
 from .as_made import stamp, stamp_tree
 from .camera_track import make_track
 from .cameras import best_view, differing, make_cameras, make_view, unlike, use_camera
@@ -32,7 +32,7 @@ from .scene_data import Made
 from .world import set_world
 
 if TYPE_CHECKING:
-    from ..core.parts import Parts
+    from ..core.pipeline.parts import Parts
 
 BASE_COLOR, ALBEDO, SHADING, ENVIRONMENT = "base_color.exr", "albedo.exr", "shading.exr", "environment.exr"
 """Files of the result folder that the scene shows; a missing one is left out."""
@@ -158,7 +158,7 @@ def build_scene(
 
 def _overview(capture: Capture, collection: bpy.types.Collection) -> bpy.types.Object:
     """A camera for a capture that has none."""
-    from ..core.surface.overview import overview  # not earlier: Blender's start should not wait for embreex
+    from ..core.scene.overview import overview  # not earlier: Blender's start should not wait for embreex
 
     return make_view("overview", overview(capture.mesh), collection)
 

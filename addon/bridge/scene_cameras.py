@@ -14,9 +14,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.capture.exr import read_header
-from ..core.capture.model import Camera
 from ..core.errors import BadInputError
+from ..core.io.exr import read_header
+from ..core.scene.model import Camera
 from .cameras import kept_lens
 
 PROPERTIES = (("frame_exposure", "exposure"), ("exposure", "exposure"), ("saturation", "saturation"))
@@ -35,7 +35,7 @@ class View:
         In the pixels of the picture; its pose in Blender's units.
     path : Path
     exposure, saturation : float or None
-        The camera's custom properties of these names; see `core.capture.model.Frame`.
+        The camera's custom properties of these names; see `core.scene.model.Frame`.
     """
 
     name: str

@@ -19,13 +19,13 @@ from zipfile import BadZipFile
 import bpy
 import numpy as np
 
-from ..core.capture.layout import RawMesh
-from ..core.capture.lenses_told import told_lens
-from ..core.capture.mesh_repair import repair
-from ..core.capture.model import Mesh
-from ..core.capture.nerfstudio_camera import OWN_LENS
-from ..core.capture.ply_write import ply_bytes
 from ..core.errors import BadInputError, MissingStageError, StorageError
+from ..core.io.layout import RawMesh
+from ..core.io.mesh_repair import repair
+from ..core.io.nerfstudio_camera import OWN_LENS
+from ..core.io.ply_write import ply_bytes
+from ..core.scene.lenses_told import told_lens
+from ..core.scene.model import Mesh
 from . import scene_cameras
 from .scene_mesh import Part, SceneMesh, gather, joined
 from .unwrap import Polygons

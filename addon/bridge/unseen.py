@@ -13,9 +13,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.capture.model import Mesh
 from ..core.errors import BadInputError, StorageError
-from ..core.surface.atlas import Atlas
+from ..core.scene.atlas import Atlas
+from ..core.scene.model import Mesh
 from . import result_images
 from .as_made import our_own
 from .correct_material import worn_material
@@ -176,7 +176,7 @@ def coverage(thing: bpy.types.Object) -> np.ndarray:
     path = base.with_name(base.name.replace("base_color", "coverage"))
     if path == base or not path.is_file():
         raise BadInputError(f"'{path}' is missing, so nobody knows what no frame saw; run the recovery again.")
-    from ..core.capture.exr import read_exr  # not earlier, as all such: Blender's start should not wait for it
+    from ..core.io.exr import read_exr  # not earlier, as all such: Blender's start should not wait for it
 
     found = np.array(read_exr(path).rgb)[::-1]
     if found.shape[:2] != (image.size[1], image.size[0]):
@@ -288,7 +288,7 @@ def _sharing(thing: bpy.types.Object) -> list[bpy.types.Object]:
 
 def _elements(things: list[bpy.types.Object], size: int) -> Atlas:
     """The texels of objects with their place; `object_id` counts `things`."""
-    from ..core.surface.elements import make_atlas
+    from ..core.scene.elements import make_atlas
 
     vertices, triangles, uv, number, first = [], [], [], [], 0
     for k, thing in enumerate(things):

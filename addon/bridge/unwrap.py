@@ -12,8 +12,8 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
-from ..core.capture.model import Mesh
-from ..core.surface.uv_islands import areas, connected, corner_ids, cut_sparse
+from ..core.scene.model import Mesh
+from ..core.scene.uv_islands import areas, connected, corner_ids, cut_sparse
 from .uv_overlap import layers, overlapping_pairs
 
 OVERLAP_TEXELS = 0.02

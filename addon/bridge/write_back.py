@@ -14,10 +14,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..core.capture.model import Capture
 from ..core.errors import BadInputError, MissingStageError
 from ..core.material import ObjectMaterial, undescribed
-from ..core.room_file import run_of
+from ..core.results.room_file import run_of
+from ..core.scene.model import Capture
 from . import result_images
 from .marks import OBJECT_ID, RESULT, RUN, mark
 from .materials import MODEL, make_material

@@ -16,10 +16,10 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from .capture.jsonfile import is_number
 from .errors import BadInputError
+from .io.jsonfile import is_number
 from .material import EMITTER, LAMBERTIAN, METAL, SPECULAR
-from .store import key
+from .results.store import key
 
 OVERRIDES = "overrides.json"
 MODELS = (LAMBERTIAN, SPECULAR, METAL, EMITTER)

@@ -6,8 +6,8 @@ import numpy as np
 
 from addon.benchmark.truth_views import projected_truth
 from addon.core.material import LAMBERTIAN, METAL, SPECULAR, Z90
-from addon.core.recover import Recovery
-from addon.core.shading.albedo import MEASURED
+from addon.core.passes.albedo.albedo import MEASURED
+from addon.core.pipeline.recover import Recovery
 
 LEAST_POINTS = 2
 """In the views, that an element is known from."""

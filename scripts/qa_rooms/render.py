@@ -14,9 +14,9 @@ from addon.bridge import demo_render
 from addon.bridge.demo_capture import FIELD_OF_VIEW, frame_path, write_all_but_frames
 from addon.bridge.demo_room import look_at
 from addon.bridge.materials import BASE_COLOR, METALLIC
-from addon.core.capture.exr import write_exr
-from addon.core.capture.model import Camera
-from addon.core.surface.rays import RayScene
+from addon.core.io.exr import write_exr
+from addon.core.scene.model import Camera
+from addon.core.scene.rays import RayScene
 
 from .furnish import FurnishedRoom
 

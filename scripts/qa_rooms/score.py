@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from addon.benchmark.truth_views import projected_truth, psnr, views
-from addon.core.capture.exr import read_exr
-from addon.core.capture.read import read_capture
+from addon.core.io.exr import read_exr
+from addon.core.io.read import read_capture
 from addon.core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR
+from addon.core.passes.albedo.albedo import MEASURED
+from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
-from addon.core.recover import Recovery
+from addon.core.results.store import Store
 from addon.core.settings import Settings
-from addon.core.shading.albedo import MEASURED
-from addon.core.store import Store
 
 from .held import held
 

@@ -21,8 +21,8 @@ pytest.importorskip("bpy")
 from addon import cli
 from addon.bridge import scene as scene_module
 from addon.core import atomic
-from addon.core.capture.exr import read_exr, write_exr
-from addon.core.capture.ply import read_ply
+from addon.core.io.exr import read_exr, write_exr
+from addon.core.io.ply import read_ply
 
 QUICK = (
     "--shading-rays",
@@ -347,7 +347,7 @@ def test_a_folder_that_may_not_be_written(recover, tmp_path, monkeypatch):
 
 
 def test_a_folder_in_use(recover, tmp_path):
-    from addon.core.store import Store
+    from addon.core.results.store import Store
 
     with Store(tmp_path / "out"):
         code, err = recover()
@@ -392,7 +392,7 @@ def test_a_disk_that_gets_full(full_at, done, recover, tmp_path, monkeypatch):
 
 
 def test_a_disk_that_is_full_of_observations(recover, tmp_path, monkeypatch):
-    from addon.core.lit_diffuse.medians import Exact
+    from addon.core.passes.lit_diffuse.medians import Exact
 
     def full(self):
         raise OSError("1000 requested and 12 written")  # numpy's words for a full disk
@@ -448,7 +448,7 @@ def test_a_disk_that_is_really_full(left, capture, recover, tmp_path, root):
 
 
 def test_the_memory_is_used_up(recover, monkeypatch):
-    from addon.core.recover import Recovery
+    from addon.core.pipeline.recover import Recovery
 
     def too_much(self):
         raise MemoryError

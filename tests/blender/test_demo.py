@@ -11,12 +11,12 @@ bpy = pytest.importorskip("bpy")
 
 from addon.bridge.demo_render import SIZES, is_rendered, render_capture  # noqa: E402
 from addon.bridge.demo_room import room, tour  # noqa: E402
-from addon.core.capture.exr import read_exr  # noqa: E402
-from addon.core.capture.pixels import read_pixels  # noqa: E402
-from addon.core.capture.read import read_capture  # noqa: E402
 from addon.core.errors import StorageError  # noqa: E402
+from addon.core.io.exr import read_exr  # noqa: E402
+from addon.core.io.pixels import read_pixels  # noqa: E402
+from addon.core.io.read import read_capture  # noqa: E402
+from addon.core.scene.rays import RayScene  # noqa: E402
 from addon.core.settings import Settings  # noqa: E402
-from addon.core.surface.rays import RayScene  # noqa: E402
 
 QUICK = Settings(shading_rays=32, specular_rays=8, emitter_rays=4, refine=0, texel_size=0.08, atlas_size=1024)
 

@@ -13,13 +13,13 @@ import pytest
 from addon.bridge.import_mesh import import_mesh
 from addon.bridge.run import run
 from addon.bridge.unwrap import unwrap
-from addon.core.capture.layout import Reading
-from addon.core.capture.model import Capture
-from addon.core.capture.read import read_capture
+from addon.core.io.layout import Reading
+from addon.core.io.read import read_capture
+from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
-from addon.core.recover import Recovery
+from addon.core.results.store import Store
+from addon.core.scene.model import Capture
 from addon.core.settings import Settings
-from addon.core.store import Store
 from tests.core.capture import layouts_on_disk as on_disk
 from tests.core.on_disk import ALBEDO, LAMP
 from tests.core.replica_on_disk import ReplicaOnDisk

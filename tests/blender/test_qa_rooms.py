@@ -9,8 +9,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from addon.core.capture.exr import read_exr  # noqa: E402
-from addon.core.capture.read import read_capture  # noqa: E402
+from addon.core.io.exr import read_exr  # noqa: E402
+from addon.core.io.read import read_capture  # noqa: E402
 from scripts.qa_rooms.render import TOO_NEW, render  # noqa: E402
 from scripts.qa_rooms.rooms import ROOMS  # noqa: E402
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from addon.core.shading import unseen_light
+from addon.core.passes.unseen_light import unseen_light
 from tests.core.on_disk import OnDisk
 
 

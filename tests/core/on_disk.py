@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from addon.core.capture.exr import write_exr
-from addon.core.capture.read import read_capture
+from addon.core.io.exr import write_exr
+from addon.core.io.read import read_capture
 from addon.core.overrides import NONE
+from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
-from addon.core.recover import Recovery
+from addon.core.results.store import Store
 from addon.core.settings import Settings
-from addon.core.store import Store
 from tests.core.rooms import all_round, lit_box, make_room, picture, radiosity
 
 ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from addon.core.capture.ptex import std_sort
+from addon.core.io.ptex import std_sort
 from tests.core.rooms import Quad, Room, make_room, split
 
 OPENED = "ply\nformat binary_little_endian 1.0\nelement vertex {}\n"

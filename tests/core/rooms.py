@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from addon.core.capture.model import Camera, Instance, Mesh, Pixels
-from addon.core.shading.albedo import albedo_of
-from addon.core.shading.environment import Environment
-from addon.core.shading.field import LightField
-from addon.core.surface.elements import make_atlas, triangle_geometry
-from addon.core.surface.rays import RayScene
+from addon.core.light.environment import Environment
+from addon.core.light.field import LightField
+from addon.core.passes.albedo.albedo import albedo_of
+from addon.core.scene.elements import make_atlas, triangle_geometry
+from addon.core.scene.model import Camera, Instance, Mesh, Pixels
+from addon.core.scene.rays import RayScene
 
 GAP = 3
 """Texels between two islands."""

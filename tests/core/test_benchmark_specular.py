@@ -7,7 +7,7 @@ import pytest
 
 from addon.benchmark import specular
 from addon.benchmark.run import Options
-from addon.core.specular.lobes import reflected_light
+from addon.core.light.lobes import reflected_light
 
 
 @pytest.fixture

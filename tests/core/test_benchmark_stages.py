@@ -10,7 +10,7 @@ from addon.benchmark.median_rivals import LogPSquare, TwoPasses
 from addon.benchmark.run import Options
 from addon.benchmark.sequences import SEQUENCES, video
 from addon.benchmark.synthetic import synthetic_capture
-from addon.core.capture.pixels import read_pixels
+from addon.core.io.pixels import read_pixels
 
 
 @pytest.fixture

@@ -7,10 +7,10 @@ import json
 import numpy as np
 import pytest
 
-from addon.core.corrected import coated
 from addon.core.material import EMITTER, LAMBERTIAN, SPECULAR, ObjectMaterial
 from addon.core.overrides import parse
-from addon.core.shading.albedo import MEASURED, NONE, Albedo
+from addon.core.passes.albedo.albedo import MEASURED, NONE, Albedo
+from addon.core.pipeline.corrected import coated
 from tests.core.on_disk import ALBEDO, CHEAP, LAMP
 from tests.core.rooms import lit_box, make_room, radiosity
 

@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
-from addon.core.capture.lenses import Cropped, Division, EnhancedUnified, Equirectangular, FieldOfView
-from addon.core.capture.lenses_colmap import polynomial
-from addon.core.capture.model import Camera, Frame
-from addon.core.capture.pixels import read_pixels
-from addon.core.capture.read import read_capture
-from addon.core.lit_diffuse.groups import ElementGroups
-from addon.core.lit_diffuse.visibility import CLEAN, observe, view_frame
-from addon.core.shading.environment import EnvironmentAccumulator
-from addon.core.surface.orientation import seen_sides
+from addon.core.io.exr import write_exr
+from addon.core.io.pixels import read_pixels
+from addon.core.io.read import read_capture
+from addon.core.light.environment import EnvironmentAccumulator
+from addon.core.scene.element_groups import ElementGroups
+from addon.core.scene.lenses import Cropped, Division, EnhancedUnified, Equirectangular, FieldOfView
+from addon.core.scene.lenses_colmap import polynomial
+from addon.core.scene.model import Camera, Frame
+from addon.core.scene.orientation import seen_sides
+from addon.core.scene.visibility import CLEAN, observe, view_frame
 from tests.core.on_disk import ALBEDO, EYES
 from tests.core.rooms import lit_box, look_at, make_room, picture, pixels_of
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from addon.core.capture.model import Instance
 from addon.core.material import LAMBERTIAN, ObjectMaterial
 from addon.core.naming import in_order, numbered
+from addon.core.scene.model import Instance
 
 
 @pytest.mark.parametrize(

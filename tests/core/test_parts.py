@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import read_exr
-from addon.core.capture.read import read_capture
 from addon.core.errors import InterruptedRun
+from addon.core.io.exr import read_exr
+from addon.core.io.read import read_capture
+from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
-from addon.core.recover import Recovery
-from addon.core.store import Store
+from addon.core.results.store import Store
 from tests.core.on_disk import ALBEDO, CHEAP, LAMP, OnDisk
 from tests.core.rooms import radiosity
 

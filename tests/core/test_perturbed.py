@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from addon.benchmark.pipeline import cut_in_four
-from addon.core.capture.exr import read_exr
-from addon.core.capture.read import read_capture
-from addon.core.lit_diffuse import poses as poses_found
+from addon.core.io.exr import read_exr
+from addon.core.io.read import read_capture
+from addon.core.passes.pose_refinement import poses as poses_found
+from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
-from addon.core.recover import Recovery
-from addon.core.store import Store
-from addon.core.surface.mesh_noise import noise_of, tilt
-from addon.core.surface.weld import point_normals, welded
+from addon.core.results.store import Store
+from addon.core.scene.mesh_noise import noise_of, tilt
+from addon.core.scene.weld import point_normals, welded
 from tests.core.on_disk import ALBEDO, CHEAP, LAMP, OnDisk
 from tests.core.rooms import make_room, patches, quad, split
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.capture.oiio import coded_header, read_coded
-from addon.core.png import write_png
+from addon.core.io.oiio import coded_header, read_coded
+from addon.core.io.png import write_png
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])

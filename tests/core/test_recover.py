@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import read_exr, write_exr
-from addon.core.capture.read import read_capture
 from addon.core.errors import BadInputError, InterruptedRun
+from addon.core.io.exr import read_exr, write_exr
+from addon.core.io.read import read_capture
 from addon.core.material import EMITTER, LAMBERTIAN
+from addon.core.passes.albedo.albedo import NONE
 from addon.core.progress import Progress
 from addon.core.settings import PAPER
-from addon.core.shading.albedo import NONE
 from tests.core.on_disk import ALBEDO, CHEAP, LAMP, QUICK, Finished, OnDisk
 from tests.core.rooms import lit_box, make_room, quad, radiosity
 

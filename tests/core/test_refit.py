@@ -9,16 +9,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import read_exr
-from addon.core.capture.read import read_capture
 from addon.core.errors import BadInputError, MissingStageError
+from addon.core.io.exr import read_exr
+from addon.core.io.read import read_capture
 from addon.core.material import METAL, SPECULAR
 from addon.core.overrides import parse
+from addon.core.pipeline.recover import Recovery
+from addon.core.pipeline.refit import Refit, open_result
 from addon.core.progress import Progress
-from addon.core.recover import Recovery
-from addon.core.refit import Refit, open_result
-from addon.core.room_file import write_room
-from addon.core.store import Store
+from addon.core.results.room_file import write_room
+from addon.core.results.store import Store
 from tests.core.on_disk import QUICK
 
 pytestmark = pytest.mark.usefixtures("few_samples")

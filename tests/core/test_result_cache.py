@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.result_cache import clear, results, size
-from addon.core.store import Store
+from addon.core.results.cache import clear, results, size
+from addon.core.results.store import Store
 
 
 def made(folder, **files):

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from addon.core.capture.model import Capture
-from addon.core.result_place import captures, documents, own_folder, write_capture
-from addon.core.room_file import write_room
+from addon.core.results.place import captures, documents, own_folder, write_capture
+from addon.core.results.room_file import write_room
+from addon.core.scene.model import Capture
 from tests.core.test_room_file import a_capture
 
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.capture.lenses import Cropped
-from addon.core.capture.lenses_colmap import polynomial
-from addon.core.capture.model import Camera, Capture, Frame, Instance, Mesh
 from addon.core.errors import BadInputError, MissingStageError
 from addon.core.material import METAL, ObjectMaterial
-from addon.core.room_file import read_capture_file, read_room, run_of, write_room
+from addon.core.results.room_file import read_capture_file, read_room, run_of, write_room
+from addon.core.scene.lenses import Cropped
+from addon.core.scene.lenses_colmap import polynomial
+from addon.core.scene.model import Camera, Capture, Frame, Instance, Mesh
 
 
 def a_capture(uv=None):

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core import store as module
-from addon.core.capture.exr import read_exr
 from addon.core.errors import BadInputError, StorageError
+from addon.core.io.exr import read_exr
+from addon.core.results import store as module
+from addon.core.results.store import Store, key
 from addon.core.settings import PAPER, Settings
-from addon.core.store import Store, key
 
 ROOT = Path(__file__).resolve().parents[2]
 ARRAYS = {
@@ -210,7 +210,7 @@ def test_two_runs_at_once(tmp_path):
 
 KILLED = """
 import os, sys, time
-from addon.core.store import Store
+from addon.core.results.store import Store
 store = Store(sys.argv[1])
 (store.folder / "stages" / ".partial-1-a.npz").write_bytes(b"half")
 print("ready", flush=True)

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from addon.core.unfinished import goes_on_with
+from addon.core.results.unfinished import goes_on_with
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.shading import unseen_light
+from addon.core.passes.unseen_light import unseen_light
 from tests.hard_cases.figures import FIGURES, Figure
 from tests.hard_cases.rooms import Captured
 

@@ -13,15 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from addon.core.capture.exr import read_exr, write_exr
-from addon.core.capture.model import Camera
-from addon.core.capture.read import read_capture
+from addon.core.io.exr import read_exr, write_exr
+from addon.core.io.read import read_capture
 from addon.core.material import ObjectMaterial
+from addon.core.passes.albedo.albedo import MEASURED
+from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
-from addon.core.recover import Recovery
+from addon.core.results.store import Store
+from addon.core.scene.model import Camera
 from addon.core.settings import PAPER, Settings
-from addon.core.shading.albedo import MEASURED
-from addon.core.store import Store
 from tests.core.rooms import Room, all_round, box_sides, lit_box, make_room, picture, quad, radiosity
 
 SIZE = (2.0, 2.0, 2.0)

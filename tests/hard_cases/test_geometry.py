@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.shading.albedo import MEASURED
+from addon.core.passes.albedo.albedo import MEASURED
 from tests.core.rooms import all_round, box_sides, lit_box, make_room, quad
 from tests.hard_cases.rooms import (
     CLOSE,

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from addon.core.capture.read import read_capture
+from addon.core.io.read import read_capture
 from addon.core.material import EMITTER
+from addon.core.passes.albedo.albedo import MEASURED
+from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
-from addon.core.recover import Recovery
-from addon.core.shading.albedo import MEASURED
-from addon.core.store import Store
+from addon.core.results.store import Store
 from tests.core import sunny
 from tests.core.rooms import all_round, box_sides, lit_box, look_at, make_room, picture, polygon_irradiance, quad
 from tests.hard_cases.rooms import (

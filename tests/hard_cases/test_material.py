@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from addon.core.light.emitters import bright_triangles
+from addon.core.light.lobes import reflected_light
 from addon.core.material import LAMBERTIAN, METAL, SPECULAR
-from addon.core.shading.emitters import bright_triangles
-from addon.core.specular.lobes import reflected_light
 from tests.core.glossy_box import GLOW, WALLS, Box
 from tests.core.rooms import box_sides, look_at, make_room, picture
 from tests.hard_cases.rooms import DEFAULT, PAPERS

@@ -12,7 +12,7 @@ import importlib
 import numpy as np
 scene = bpy.context.scene
 pictures = module("addon.bridge.pictures")
-exr = importlib.import_module(pictures.__name__.replace("bridge.pictures", "core.capture.exr"))
+exr = importlib.import_module(pictures.__name__.replace("bridge.pictures", "core.io.exr"))
 with pictures.settings_kept(scene):
     pictures.prepare(scene, {engine!r}, {samples})
     scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 64, 48, 100

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from ..capture.model import Camera, Mesh
-from ..surface.rays import RayScene
+from ..scene.model import Camera, Mesh
+from ..scene.rays import RayScene
 from .views import SmallView
 
 JUMP = 0.05

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..capture.conventions import SCALES, Convention, alternatives
-from ..capture.model import Capture, Frame, Pixels
-from ..surface.elements import triangle_geometry
-from ..surface.rays import RayScene
+from ..io.conventions import SCALES, Convention, alternatives
+from ..scene.elements import triangle_geometry
+from ..scene.model import Capture, Frame, Pixels
+from ..scene.rays import RayScene
 from .edges import Shown, edge_score, shown
 from .misalignment import misalignments
 from .photometric import consistency

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..capture.model import Camera
-from ..surface.rays import RayScene
+from ..scene.model import Camera
+from ..scene.rays import RayScene
 from .edges import Shown
 from .views import SmallView, sees
 

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..capture.conventions import Convention
-from ..capture.model import Capture, Frame, Pixels
 from ..evidence.colours import photo
-from ..surface.elements import triangle_geometry
-from ..surface.rays import RayScene
+from ..io.conventions import Convention
+from ..scene.elements import triangle_geometry
+from ..scene.model import Capture, Frame, Pixels
+from ..scene.rays import RayScene
 from .edges import shown
 
 ROWS = 3

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..capture.model import Camera
-from ..surface.rays import RayScene
+from ..scene.model import Camera
+from ..scene.rays import RayScene
 from .views import SmallView, sees
 
 GRID = 20

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..capture.model import Camera, Frame, Pixels
 from ..errors import BadInputError
-from ..surface.rays import RayScene
+from ..scene.model import Camera, Frame, Pixels
+from ..scene.rays import RayScene
 
 COUNT = 16
 """Frames that are looked at, spread evenly."""

@@ -12,7 +12,7 @@ from .objects import ObjectEvidence, object_evidence
 from .texel import TexelEvidence, texel_evidence, without_light
 
 if TYPE_CHECKING:
-    from ..recover import Recovery
+    from ..pipeline.recover import Recovery
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..lit_diffuse.accumulate import LitDiffuse
-from ..lit_diffuse.visibility import SATURATED
-from ..shading.emitters import LUMINANCE
-from ..shading.environment import Environment
-from ..shading.field import LightField
-from ..shading.over_surface import irradiance
-from ..shading.shade import Shading
-from ..surface.atlas import Atlas
+from ..light.emitters import LUMINANCE
+from ..light.environment import Environment
+from ..light.field import LightField
+from ..light.over_surface import irradiance
+from ..passes.lit_diffuse.accumulate import LitDiffuse
+from ..pipeline.shading import Shading
+from ..scene.atlas import Atlas
+from ..scene.visibility import SATURATED
 from .calibration import CLIPPED_UNSURE, LAMP_UNSURE, ROUGH_LIGHT, SKY_UNSURE, SUN_UNSURE, SURFACES
 
 SPOTS = 4000

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..groups import by_label
-from ..lit_diffuse.accumulate import LitDiffuse
 from ..material import Z90
-from ..shading.albedo import MEASURED, Albedo
-from ..surface.atlas import Atlas
+from ..passes.albedo.albedo import MEASURED, Albedo
+from ..passes.lit_diffuse.accumulate import LitDiffuse
+from ..scene.atlas import Atlas
 from .calibration import OF_OBJECT
 from .texel import TexelEvidence
 

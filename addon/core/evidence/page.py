@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import BadInputError
+from ..io.png import data_address
 from ..material import EMITTER, METAL, SPECULAR, Z90, ObjectMaterial
-from ..png import data_address
 from .colours import MODEL, encoded, heat_css
 from .objects import ObjectEvidence
 from .pictures import Picture, pictures_of
@@ -17,7 +17,7 @@ from .style import STYLE
 from .views import choose_frames, view
 
 if TYPE_CHECKING:
-    from ..recover import Recovery
+    from ..pipeline.recover import Recovery
 
 FRAMES = 3
 ROWS = 80

@@ -13,7 +13,7 @@ from .colours import NOTHING, encoded, gloss, heat, photo
 from .views import View
 
 if TYPE_CHECKING:
-    from ..recover import Recovery
+    from ..pipeline.recover import Recovery
 
 ERROR_TOP, RESIDUAL_TOP, VIEWS_TOP = 0.5, 0.5, 20
 """What lies at the bright end of the heat maps: relative errors, and the number of views."""

@@ -8,11 +8,11 @@ import numpy as np
 from scipy import ndimage
 
 from ..groups import by_label
-from ..lit_diffuse.accumulate import LitDiffuse
-from ..lit_diffuse.visibility import EDGE
 from ..material import EMITTER, SPECULAR, ObjectMaterial
-from ..shading.albedo import MEASURED, Albedo
-from ..surface.atlas import Atlas
+from ..passes.albedo.albedo import MEASURED, Albedo
+from ..passes.lit_diffuse.accumulate import LitDiffuse
+from ..scene.atlas import Atlas
+from ..scene.visibility import EDGE
 from . import calibration as c
 from .light import LightEvidence
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..capture.pixels import read_pixels
+from ..io.pixels import read_pixels
+from ..light.emitters import bright_triangles
+from ..light.lobes import GRID, reflected_light
 from ..material import METAL, SPECULAR
-from ..shading.emitters import bright_triangles
-from ..specular.lobes import GRID, reflected_light
 
 if TYPE_CHECKING:
-    from ..recover import Recovery
+    from ..pipeline.recover import Recovery
 
 WIDTH = 240
 """Pictures are this wide at most."""

@@ -6,7 +6,7 @@ import math
 import bpy
 import numpy as np
 
-from addon.core.capture.exr import write_exr
+from addon.core.io.exr import write_exr
 
 SIZE = (48, 36)
 

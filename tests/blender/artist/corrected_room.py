@@ -5,7 +5,7 @@ import json
 import bpy
 import numpy as np
 
-from addon.core.capture.exr import write_exr
+from addon.core.io.exr import write_exr
 from tests.blender.artist.artist_room import bridge
 
 SIZE = 64
@@ -53,8 +53,8 @@ def write_result(folder, entries=ENTRIES, run=RUN):
 
 def build(folder):
     """The room in the open scene, by object id; nothing is selected."""
-    from addon.core.capture.model import Instance, Mesh
-    from addon.core.room_file import material
+    from addon.core.results.room_file import material
+    from addon.core.scene.model import Instance, Mesh
 
     write_result(folder)
     vertices, triangles, owner, uv = [], [], [], []

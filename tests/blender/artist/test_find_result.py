@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
+from addon.core.io.exr import write_exr
 
 bpy = pytest.importorskip("bpy")
 

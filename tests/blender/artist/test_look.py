@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
+from addon.core.io.exr import write_exr
 
 bpy = pytest.importorskip("bpy")
 

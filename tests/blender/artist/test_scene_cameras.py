@@ -5,11 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
-from addon.core.capture.lenses import Cropped, EnhancedUnified, Equirectangular
-from addon.core.capture.lenses_colmap import polynomial
-from addon.core.capture.model import Camera, Frame
 from addon.core.errors import BadInputError
+from addon.core.io.exr import write_exr
+from addon.core.scene.lenses import Cropped, EnhancedUnified, Equirectangular
+from addon.core.scene.lenses_colmap import polynomial
+from addon.core.scene.model import Camera, Frame
 
 bpy = pytest.importorskip("bpy")
 

@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
-from addon.core.capture.lenses import EnhancedUnified
-from addon.core.capture.lenses_colmap import polynomial
-from addon.core.capture.model import Camera, Frame
-from addon.core.capture.read import read_capture
 from addon.core.errors import BadInputError
+from addon.core.io.exr import write_exr
+from addon.core.io.read import read_capture
+from addon.core.scene.lenses import EnhancedUnified
+from addon.core.scene.lenses_colmap import polynomial
+from addon.core.scene.model import Camera, Frame
 
 bpy = pytest.importorskip("bpy")
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from addon.core.capture.lenses import Cropped, EnhancedUnified, Equirectangular
-from addon.core.capture.lenses_colmap import polynomial
-from addon.core.capture.model import Camera, Frame, Mesh
+from addon.core.scene.lenses import Cropped, EnhancedUnified, Equirectangular
+from addon.core.scene.lenses_colmap import polynomial
+from addon.core.scene.model import Camera, Frame, Mesh
 
 bpy = pytest.importorskip("bpy")
 

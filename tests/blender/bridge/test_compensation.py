@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.core.specular.compensation import base_color, layer_reflectance
+from addon.core.brdf.compensation import base_color, layer_reflectance
 
 
 def test_nothing_is_taken_without_a_lobe():

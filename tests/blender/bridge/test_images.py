@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
 from addon.core.errors import BadInputError
+from addon.core.io.exr import write_exr
 
 bpy = pytest.importorskip("bpy")
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from addon.core.brdf.compensation import base_color, base_colors
 from addon.core.material import EMITTER, LAMBERTIAN, LAMP_ALBEDO, METAL, SPECULAR, ObjectMaterial
-from addon.core.specular.compensation import base_color, base_colors
 
 bpy = pytest.importorskip("bpy")
 

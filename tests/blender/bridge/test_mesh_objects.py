@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.core.capture.model import Instance, Mesh
+from addon.core.scene.model import Instance, Mesh
 
 bpy = pytest.importorskip("bpy")
 

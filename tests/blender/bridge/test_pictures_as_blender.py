@@ -8,9 +8,9 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import read_exr
-from addon.core.capture.oiio import coded_header, read_coded
 from addon.core.errors import BadInputError
+from addon.core.io.exr import read_exr
+from addon.core.io.oiio import coded_header, read_coded
 
 SHARED = Path(__file__).resolve().parents[4] / "shared"
 CODES = np.repeat(np.repeat(np.random.default_rng(0).integers(20, 230, (3, 4, 3), np.uint8), 8, 0), 8, 1)

@@ -21,8 +21,8 @@ from addon.bridge.room import bringing, link_room, rooms  # noqa: E402
 from addon.bridge.room_import import importing  # noqa: E402
 from addon.bridge.run import run  # noqa: E402
 from addon.bridge.slices import whole  # noqa: E402
-from addon.core.capture.read import read_capture  # noqa: E402
 from addon.core.errors import BadInputError, MissingStageError  # noqa: E402
+from addon.core.io.read import read_capture  # noqa: E402
 from addon.core.progress import Progress  # noqa: E402
 from addon.core.settings import Settings  # noqa: E402
 

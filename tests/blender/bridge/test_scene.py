@@ -5,12 +5,12 @@ import shutil
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
-from addon.core.capture.model import Camera, Capture, Frame, Instance, Mesh
 from addon.core.errors import StorageError
+from addon.core.io.exr import write_exr
 from addon.core.material import EMITTER, LAMBERTIAN, LAMP_ALBEDO, ObjectMaterial
-from addon.core.parts import Parts
-from addon.core.room_file import write_room
+from addon.core.pipeline.parts import Parts
+from addon.core.results.room_file import write_room
+from addon.core.scene.model import Camera, Capture, Frame, Instance, Mesh
 
 bpy = pytest.importorskip("bpy")
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
-from addon.core.capture.model import Instance
+from addon.core.io.exr import write_exr
 from addon.core.material import LAMBERTIAN, ObjectMaterial
-from addon.core.surface.two_sides import laid_apart, with_backs
+from addon.core.scene.model import Instance
+from addon.core.scene.two_sides import laid_apart, with_backs
 from tests.core.surface.test_two_sides import ROUND, laid_out, tube
 from tests.hard_cases.rooms import QUICK, Captured, sheet_between_rooms
 
@@ -22,7 +22,7 @@ from addon.bridge.run import run  # noqa: E402
 from addon.bridge.unwrap import Polygons, unwrap  # noqa: E402
 from addon.bridge.uv_overlap import overlapping_pairs  # noqa: E402
 from addon.core.progress import Progress  # noqa: E402
-from addon.core.surface.uv_islands import areas  # noqa: E402
+from addon.core.scene.uv_islands import areas  # noqa: E402
 
 
 @pytest.mark.parametrize("in_faces", [False, True])

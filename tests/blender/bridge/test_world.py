@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
-from addon.core.capture.model import Camera, Frame
 from addon.core.errors import BadInputError
-from addon.core.shading.environment import Environment
-from addon.core.shading.sun import Sun, put_in
+from addon.core.io.exr import write_exr
+from addon.core.light.environment import Environment
+from addon.core.light.sun import Sun, put_in
+from addon.core.scene.model import Camera, Frame
 
 bpy = pytest.importorskip("bpy")
 

@@ -10,9 +10,9 @@ import numpy as np
 from addon.bridge.demo_capture import write_all_but_frames
 from addon.bridge.demo_render import render_frames
 from addon.bridge.demo_room import SIZE, Paint, Thing, grid, look_at, room, tour
+from addon.core.brdf.compensation import layer_reflectance
 from addon.core.progress import Progress
-from addon.core.specular.compensation import layer_reflectance
-from addon.core.surface.atlas import Atlas
+from addon.core.scene.atlas import Atlas
 
 
 @dataclass(frozen=True)

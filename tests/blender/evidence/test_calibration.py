@@ -8,13 +8,13 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from addon.bridge.unwrap import unwrap  # noqa: E402
-from addon.core.capture.read import read_capture  # noqa: E402
+from addon.core.io.read import read_capture  # noqa: E402
 from addon.core.material import METAL, Z90  # noqa: E402
+from addon.core.passes.albedo.albedo import MEASURED  # noqa: E402
+from addon.core.pipeline.recover import Recovery  # noqa: E402
 from addon.core.progress import Progress  # noqa: E402
-from addon.core.recover import Recovery  # noqa: E402
+from addon.core.results.store import Store  # noqa: E402
 from addon.core.settings import Settings  # noqa: E402
-from addon.core.shading.albedo import MEASURED  # noqa: E402
-from addon.core.store import Store  # noqa: E402
 from tests.blender.evidence.known_rooms import known_rooms  # noqa: E402
 
 FRAMES, SIZE, SAMPLES = 16, (72, 54), 16

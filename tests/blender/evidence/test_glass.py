@@ -10,13 +10,13 @@ bpy = pytest.importorskip("bpy")
 from addon.bridge import demo_render  # noqa: E402
 from addon.bridge.demo_room import Paint, Thing, grid, room, tour  # noqa: E402
 from addon.bridge.unwrap import unwrap  # noqa: E402
-from addon.core.capture.read import read_capture  # noqa: E402
+from addon.core.io.read import read_capture  # noqa: E402
 from addon.core.material import TRANSPARENT  # noqa: E402
+from addon.core.passes.albedo.albedo import NONE  # noqa: E402
+from addon.core.pipeline.recover import Recovery  # noqa: E402
 from addon.core.progress import Progress  # noqa: E402
-from addon.core.recover import Recovery  # noqa: E402
+from addon.core.results.store import Store  # noqa: E402
 from addon.core.settings import Settings  # noqa: E402
-from addon.core.shading.albedo import NONE  # noqa: E402
-from addon.core.store import Store  # noqa: E402
 from tests.blender.evidence.known_rooms import KnownRoom  # noqa: E402
 
 PANE = "pane"

@@ -15,7 +15,7 @@ pytest.importorskip("bpy")
 from addon.bridge import job as jobs
 from addon.bridge.job import DONE, FAILED, STOPPED, Job
 from addon.bridge.job_command import command
-from addon.core.room_file import read_room
+from addon.core.results.room_file import read_room
 
 QUICK = [
     "--shading-rays",

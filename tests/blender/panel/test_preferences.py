@@ -22,7 +22,7 @@ def preferences(module, ops, tmp_path, monkeypatch):
 
 
 def result(module, folder):
-    store = module("addon.core.store").Store(folder)
+    store = module("addon.core.results.store").Store(folder)
     with store:
         store.save("surface", "key", {"values": np.zeros(250_000)})
     return folder
@@ -88,7 +88,7 @@ def test_threads_and_memory_reach_a_run(preferences, module, ops, monkeypatch, t
 
 
 def test_results_of_two_captures_of_one_name_are_apart(preferences, module, ops, tmp_path):
-    place = module("addon.core.result_place")
+    place = module("addon.core.results.place")
     one, other = ((tmp_path / where / "room") for where in ("a", "b"))
     folder = preferences.result_folder("", str(one))
     assert folder == tmp_path / "home" / "room"
@@ -114,7 +114,7 @@ def test_beside_the_file_once_it_is_saved_and_where_the_room_is(preferences, mod
     # The room came from a run before the file was saved: that one is gone on with.
     before = tmp_path / "home" / "room"
     before.mkdir(parents=True)
-    module("addon.core.result_place").write_capture(before, capture)
+    module("addon.core.results.place").write_capture(before, capture)
     top = bpy.data.collections.new("Scan Relight")
     scene.collection.children.link(top)
     module("addon.bridge.marks").mark(top, before, "a" * 16, capture)
@@ -169,7 +169,7 @@ def test_no_result_is_kept_where_removing_the_extension_deletes_it(extension, mo
 
 
 def test_results_of_an_earlier_version_are_moved_out(extension, module, ops, tmp_path, monkeypatch):
-    from addon.core.capture.exr import write_exr
+    from addon.core.io.exr import write_exr
 
     preferences = module("operators.preferences")
     chosen = SimpleNamespace(results_folder=str(tmp_path / "home"), cache_folder="", threads=0, memory_limit=0)

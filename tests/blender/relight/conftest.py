@@ -58,7 +58,7 @@ def room(result):
 def shoot(tmp_path):
     """``shoot(scene, width, height, samples)``: (height, width, 3) float32, row 0 at the top, linear Rec.709."""
     from addon.bridge import pictures
-    from addon.core.capture.exr import read_exr
+    from addon.core.io.exr import read_exr
 
     def render(scene, width, height, samples):
         scene.render.resolution_x, scene.render.resolution_y = width, height

@@ -8,8 +8,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from addon import cli  # noqa: E402
-from addon.core.capture.exr import read_exr  # noqa: E402
-from addon.core.capture.pictures import picture_size  # noqa: E402
+from addon.core.io.exr import read_exr  # noqa: E402
+from addon.core.io.pictures import picture_size  # noqa: E402
 
 QUICK = ("--samples", "4", "--quiet")
 

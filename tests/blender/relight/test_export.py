@@ -18,8 +18,8 @@ from addon.bridge.marks import OBJECT_ID, UV_MAP  # noqa: E402
 from addon.bridge.materials import ior_of, make_material  # noqa: E402
 from addon.bridge.mesh_objects import ATLAS_UV, PARTS_UV, mesh_data  # noqa: E402
 from addon.bridge.world import set_world  # noqa: E402
-from addon.core.capture.exr import write_exr  # noqa: E402
 from addon.core.errors import BadInputError, StorageError  # noqa: E402
+from addon.core.io.exr import write_exr  # noqa: E402
 from addon.core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR, ObjectMaterial  # noqa: E402
 
 COLOUR = (0.5, 0.1, 0.02)

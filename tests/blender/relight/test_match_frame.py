@@ -10,8 +10,8 @@ from mathutils import Vector  # noqa: E402
 
 from addon.bridge.cameras import make_cameras  # noqa: E402
 from addon.bridge.match_frame import current, match_frame  # noqa: E402
-from addon.core.capture.exr import write_exr  # noqa: E402
-from addon.core.capture.model import Camera, Frame  # noqa: E402
+from addon.core.io.exr import write_exr  # noqa: E402
+from addon.core.scene.model import Camera, Frame  # noqa: E402
 
 
 @pytest.fixture

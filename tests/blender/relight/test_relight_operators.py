@@ -81,7 +81,7 @@ def test_lamps_as_properties(ops):
 
 
 def test_new_lights_and_the_way_back(ops, result, tmp_path):
-    from addon.core.capture.exr import write_exr
+    from addon.core.io.exr import write_exr
 
     scene = bpy.context.scene
     world = scene.world

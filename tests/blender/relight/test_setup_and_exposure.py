@@ -115,7 +115,7 @@ def test_measuring_leaves_the_artists_render_alone(scene, tmp_path):
 
 
 def test_a_setup_keeps_colours_and_the_picture_around(room, tmp_path):
-    from addon.core.capture.exr import write_exr
+    from addon.core.io.exr import write_exr
 
     write_exr(tmp_path / "sky.exr", np.ones((8, 16, 3), np.float32))
     lamp = relight_lamps.find_lamps(room)[0]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.capture.conventions import AS_READ, Convention, all_axes, alternatives, matrix, parse, upright
 from addon.core.errors import BadInputError
+from addon.core.io.conventions import AS_READ, Convention, all_axes, alternatives, matrix, parse, upright
 
 
 def rigid(seed: int = 3) -> np.ndarray:

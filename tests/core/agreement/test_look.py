@@ -11,9 +11,9 @@ import pytest
 from addon.benchmark.synthetic import synthetic_capture
 from addon.core.agreement.look import AGREE, look
 from addon.core.agreement.overlay import LINE, overlay
-from addon.core.capture.conventions import Convention, matrix, parse
-from addon.core.capture.model import Capture, Instance, Pixels
 from addon.core.errors import BadInputError
+from addon.core.io.conventions import Convention, matrix, parse
+from addon.core.scene.model import Capture, Instance, Pixels
 
 MENDS = ["opencv", "fipt", "world-to-camera", "world:+x-z+y", "camera:+x-y-z,world:+x+z-y", "scale:100"]
 WIDTH, HEIGHT = 96, 72

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
+from addon.core.io.exr import write_exr
 
 SHARED = Path(__file__).resolve().parents[4] / "shared"
 WIDTH, HEIGHT = 8, 6

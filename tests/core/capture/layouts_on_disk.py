@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from addon.core.capture.model import Capture, Frame, Mesh
+from addon.core.scene.model import Capture, Frame, Mesh
 from tests.core.capture.colmap_files import images_of, write_text
 
 OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.capture.brackets import Exposed, merge
-from addon.core.capture.layout import Reading
-from addon.core.capture.pixels import read_pixels
-from addon.core.capture.read import read_capture
 from addon.core.errors import BadInputError
-from addon.core.png import write_png
+from addon.core.io.brackets import Exposed, merge
+from addon.core.io.layout import Reading
+from addon.core.io.pixels import read_pixels
+from addon.core.io.png import write_png
+from addon.core.io.read import read_capture
 from tests.core.capture.conftest import HEIGHT, WIDTH
 
 TIMES = (1 / 64, 1 / 8, 1.0, 8.0)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.capture.clipping import find_clipping
-from addon.core.capture.exr import HALF_MAX
-from addon.core.capture.model import Camera, Frame
-from addon.core.capture.pixels import read_pixels
-from addon.core.capture.read import describe, read_capture
 from addon.core.errors import BadInputError
+from addon.core.io.clipping import find_clipping
+from addon.core.io.exr import HALF_MAX
+from addon.core.io.pixels import read_pixels
+from addon.core.io.read import describe, read_capture
+from addon.core.scene.model import Camera, Frame
 from tests.core.capture.conftest import HEIGHT, WIDTH
 
 SIZE = 32

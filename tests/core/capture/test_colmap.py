@@ -7,13 +7,13 @@ import struct
 import numpy as np
 import pytest
 
-from addon.core.capture.colmap import frames_of, read
-from addon.core.capture.colmap_model import read_model
-from addon.core.capture.exr import write_exr
-from addon.core.capture.layout import AS_FOUND, Reading
-from addon.core.capture.lenses_polynomial import Polynomial
-from addon.core.capture.read import read_capture
 from addon.core.errors import BadInputError
+from addon.core.io.colmap import frames_of, read
+from addon.core.io.colmap_model import read_model
+from addon.core.io.exr import write_exr
+from addon.core.io.layout import AS_FOUND, Reading
+from addon.core.io.read import read_capture
+from addon.core.scene.lenses_polynomial import Polynomial
 from tests.core.capture.colmap_files import images_of, world_to_camera, write_binary, write_text
 
 CAMERA = {1: ("PINHOLE", 8, 6, (6.0, 6.5, 4.0, 3.0))}

@@ -6,11 +6,11 @@ import struct
 
 import pytest
 
-from addon.core.capture.exif import EXPOSURE_TIME, F_NUMBER, ISO, exif_exposure, exposure_tags
-from addon.core.capture.exposures import Settings, parse_number, relative
-from addon.core.capture.layout import Reading
-from addon.core.capture.read import describe, read_capture
 from addon.core.errors import BadInputError
+from addon.core.io.exif import EXPOSURE_TIME, F_NUMBER, ISO, exif_exposure, exposure_tags
+from addon.core.io.exposures import Settings, parse_number, relative
+from addon.core.io.layout import Reading
+from addon.core.io.read import describe, read_capture
 
 
 def exposures(capture, **reading) -> list[float]:

@@ -13,11 +13,11 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from addon.core.capture import exr_header
-from addon.core.capture.exr import HALF_MAX, exr_note, read_exr, read_header, write_exr
-from addon.core.capture.luma_chroma import to_rgb
-from addon.core.capture.primaries import REC709
 from addon.core.errors import BadInputError, StorageError
+from addon.core.io import exr_header
+from addon.core.io.exr import HALF_MAX, exr_note, read_exr, read_header, write_exr
+from addon.core.io.luma_chroma import to_rgb
+from addon.core.io.primaries import REC709
 
 ROOT = Path(__file__).resolve().parents[3]
 PICTURE = np.random.default_rng(0).random((40, 70, 4), np.float32)
@@ -299,7 +299,7 @@ def test_what_is_no_picture(tmp_path):
 
 DAMAGED = """
 import resource, sys, time
-from addon.core.capture.exr import read_exr
+from addon.core.io.exr import read_exr
 from addon.core.errors import BadInputError
 resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
 for path in sys.argv[1:]:

@@ -7,8 +7,8 @@ import shutil
 
 import pytest
 
-from addon.core.capture import folder as found
-from addon.core.capture.folder import look_into, of_path
+from addon.core.io import folder as found
+from addon.core.io.folder import look_into, of_path
 
 
 @pytest.fixture

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.capture.layout import Reading
-from addon.core.capture.pictures import picture_bits, read_picture
-from addon.core.capture.pixels import read_pixels
-from addon.core.capture.read import describe, read_capture
-from addon.core.capture.transfer import decode, to_linear
 from addon.core.errors import BadInputError
-from addon.core.png import write_png
+from addon.core.io.layout import Reading
+from addon.core.io.pictures import picture_bits, read_picture
+from addon.core.io.pixels import read_pixels
+from addon.core.io.png import write_png
+from addon.core.io.read import describe, read_capture
+from addon.core.io.transfer import decode, to_linear
 from tests.core.capture.conftest import HEIGHT, WIDTH
 
 CODES = (np.arange(HEIGHT * WIDTH * 3) % 256).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)

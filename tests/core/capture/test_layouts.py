@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
-from addon.core.capture.formats import FORMATS
-from addon.core.capture.layout import RawMesh, Reading
-from addon.core.capture.read import read_capture
-from addon.core.capture.readers import READERS
 from addon.core.errors import BadInputError
-from addon.core.png import write_png
+from addon.core.io.exr import write_exr
+from addon.core.io.formats import FORMATS
+from addon.core.io.layout import RawMesh, Reading
+from addon.core.io.png import write_png
+from addon.core.io.read import read_capture
+from addon.core.io.readers import READERS
 from tests.core.capture.layouts_on_disk import as_fipt, as_fipt_real, as_scannetpp, as_traj
 
 NAMES = {i: f"side {i}" for i in range(6)}

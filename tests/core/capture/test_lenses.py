@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 
-from addon.core.capture.lenses import Cropped, Division, EnhancedUnified, Equirectangular, FieldOfView
-from addon.core.capture.lenses_colmap import COUNTS, intrinsics, polynomial
-from addon.core.capture.lenses_told import lens_of, told_lens
-from addon.core.capture.model import Camera
-from addon.core.capture.pixel_rays import pixel_rays, widest_angle
 from addon.core.errors import BadInputError
+from addon.core.scene.lenses import Cropped, Division, EnhancedUnified, Equirectangular, FieldOfView
+from addon.core.scene.lenses_colmap import COUNTS, intrinsics, polynomial
+from addon.core.scene.lenses_told import lens_of, told_lens
+from addon.core.scene.model import Camera
+from addon.core.scene.pixel_rays import pixel_rays, widest_angle
 
 WIDTH, HEIGHT = 1152, 768
 RAYS = np.array([(0.31, -0.22, 1.0), (-0.62, 0.41, 1.0), (0.9, 0.5, 0.8)])

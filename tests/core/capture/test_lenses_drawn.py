@@ -7,7 +7,7 @@ pytest.importorskip("hypothesis")
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from addon.core.capture.lenses_colmap import MODELS, intrinsics
+from addon.core.scene.lenses_colmap import MODELS, intrinsics
 
 WIDTH, HEIGHT = 48, 32
 RANGES = {

@@ -6,13 +6,13 @@ import math
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
-from addon.core.capture.layout import AS_FOUND, Reading
-from addon.core.capture.lenses import Cropped, Equirectangular
-from addon.core.capture.nerfstudio import applied, read_frames
-from addon.core.capture.pixels import read_pixels
-from addon.core.capture.read import read_capture
 from addon.core.errors import BadInputError
+from addon.core.io.exr import write_exr
+from addon.core.io.layout import AS_FOUND, Reading
+from addon.core.io.nerfstudio import applied, read_frames
+from addon.core.io.pixels import read_pixels
+from addon.core.io.read import read_capture
+from addon.core.scene.lenses import Cropped, Equirectangular
 
 TURNED = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0]])
 """What nerfstudio does to COLMAP's world today."""

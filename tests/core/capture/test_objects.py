@@ -10,15 +10,15 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from addon.core.capture.exr import write_exr
-from addon.core.capture.id_pictures import read_ids
-from addon.core.capture.model import Frame
-from addon.core.capture.parts import MOST, connected_parts
-from addon.core.capture.read import read_capture
-from addon.core.capture.vote import vote
 from addon.core.errors import BadInputError
-from addon.core.png import write_png
-from addon.core.surface.rays import RayScene
+from addon.core.io.exr import write_exr
+from addon.core.io.id_pictures import read_ids
+from addon.core.io.png import write_png
+from addon.core.io.read import read_capture
+from addon.core.scene.connected_parts import MOST, connected_parts
+from addon.core.scene.model import Frame
+from addon.core.scene.rays import RayScene
+from addon.core.scene.vote import vote
 from tests.core.rooms import all_round, lit_box, make_room
 
 

@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.capture.exif import EXPOSURE_TIME, ISO, exif_exposure
-from addon.core.capture.layout import Reading
-from addon.core.capture.oiio import coded_header, read_coded
-from addon.core.capture.pictures import read_picture
-from addon.core.capture.pixels import read_pixels
-from addon.core.capture.read import read_capture
 from addon.core.errors import BadInputError
-from addon.core.png import SIGNATURE, write_png
+from addon.core.io.exif import EXPOSURE_TIME, ISO, exif_exposure
+from addon.core.io.layout import Reading
+from addon.core.io.oiio import coded_header, read_coded
+from addon.core.io.pictures import read_picture
+from addon.core.io.pixels import read_pixels
+from addon.core.io.png import SIGNATURE, write_png
+from addon.core.io.read import read_capture
 from tests.core.capture.conftest import HEIGHT, JPEG, WIDTH
 from tests.core.capture.hostile.cases import CODES as FRAME_CODES
 from tests.core.capture.hostile.cases import png_content, tiff_content

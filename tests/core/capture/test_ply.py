@@ -9,9 +9,9 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from addon.core.capture import ply
-from addon.core.capture.ply import read_ply
 from addon.core.errors import BadInputError
+from addon.core.io import ply
+from addon.core.io.ply import read_ply
 
 VERTICES = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 2, 0)]
 FACES = [(0, 1, 2), (0, 1, 2, 3), (0, 1, 2, 4, 3), (2, 4, 3)]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.capture.radiance_hdr import hdr_size, read_hdr
 from addon.core.errors import BadInputError
+from addon.core.io.radiance_hdr import hdr_size, read_hdr
 
 RNG = np.random.default_rng(0)
 RADIANCE = np.exp(RNG.normal(0, 3, (9, 12, 3)))

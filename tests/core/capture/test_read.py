@@ -7,12 +7,12 @@ import os
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
-from addon.core.capture.fingerprint import fingerprint
-from addon.core.capture.pixels import read_pixels
-from addon.core.capture.read import describe, read_capture
 from addon.core.errors import BadInputError
-from addon.core.png import write_png
+from addon.core.io.exr import write_exr
+from addon.core.io.fingerprint import fingerprint
+from addon.core.io.pixels import read_pixels
+from addon.core.io.png import write_png
+from addon.core.io.read import describe, read_capture
 from tests.core.capture.conftest import CORNERS, HEIGHT, SIDES, WIDTH, ply_text
 
 

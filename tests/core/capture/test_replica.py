@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.capture.exr import write_exr
-from addon.core.capture.ptex import morton, std_sort
-from addon.core.capture.read import describe, read_capture
 from addon.core.errors import BadInputError
-from addon.core.lit_diffuse.from_texture import face_edge, lit_from_tiles
-from addon.core.lit_diffuse.visibility import SATURATED
+from addon.core.io.exr import write_exr
+from addon.core.io.ptex import morton, std_sort
+from addon.core.io.read import describe, read_capture
 from addon.core.material import METAL
+from addon.core.passes.lit_diffuse.from_texture import face_edge, lit_from_tiles
+from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
-from addon.core.recover import Recovery
-from addon.core.store import Store
+from addon.core.results.store import Store
+from addon.core.scene.visibility import SATURATED
 from tests.core.on_disk import ALBEDO, CHEAP, LAMP, Finished
 from tests.core.replica_on_disk import ReplicaOnDisk, interleave
 from tests.core.rooms import lit_box, make_room, radiosity

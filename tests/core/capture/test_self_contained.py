@@ -7,8 +7,8 @@ import struct
 
 import pytest
 
-from addon.core.capture.self_contained import copy_gltf, copy_obj
 from addon.core.errors import BadInputError
+from addon.core.io.self_contained import copy_gltf, copy_obj
 
 
 def gltf(**changes):

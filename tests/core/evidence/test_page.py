@@ -8,12 +8,12 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from addon.core.capture.oiio import read_coded
 from addon.core.evidence.colours import HEAT, encoded, heat, photo
 from addon.core.evidence.pictures import BLOCK, worst_blocks
-from addon.core.png import png
-from addon.core.specular.intervals import UNKNOWN, gloss_interval
-from addon.core.specular.models import Choice, choose_model
+from addon.core.io.oiio import read_coded
+from addon.core.io.png import png
+from addon.core.passes.specular.intervals import UNKNOWN, gloss_interval
+from addon.core.passes.specular.models import Choice, choose_model
 from tests.core.glossy_box import Box
 from tests.core.rooms import pixels_of
 
@@ -102,10 +102,10 @@ def check_page(text: str) -> Checker:
 
 
 def test_the_page_of_a_run(tmp_path):
-    from addon.core.capture.read import read_capture
+    from addon.core.io.read import read_capture
+    from addon.core.pipeline.recover import Recovery
     from addon.core.progress import Progress
-    from addon.core.recover import Recovery
-    from addon.core.store import Store
+    from addon.core.results.store import Store
     from tests.core.on_disk import CHEAP, OnDisk
 
     disk = OnDisk(tmp_path / "<cap & ture>")

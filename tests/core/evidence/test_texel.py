@@ -11,11 +11,11 @@ from addon.core.evidence import calibration as c
 from addon.core.evidence.light import LightEvidence, light_evidence, spots
 from addon.core.evidence.objects import object_evidence
 from addon.core.evidence.texel import contrast, texel_evidence, without_light
-from addon.core.lit_diffuse.accumulate import LitDiffuse
-from addon.core.lit_diffuse.visibility import CLEAN, EDGE
+from addon.core.light.lamps import Lamp
 from addon.core.material import EMITTER, LAMBERTIAN, Z90, ObjectMaterial
-from addon.core.shading.albedo import FILLED, MEASURED, Albedo
-from addon.core.shading.lamps import Lamp
+from addon.core.passes.albedo.albedo import FILLED, MEASURED, Albedo
+from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
+from addon.core.scene.visibility import CLEAN, EDGE
 from tests.core.rooms import DARK, box_sides, lit_box, make_room, radiosity
 
 ALBEDO = {i: (0.5, 0.4, 0.3) for i in range(6)}

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.capture.model import Frame
 from addon.core.errors import BadInputError, InterruptedRun
-from addon.core.lit_diffuse.accumulate import LitDiffuse, _choose, accumulate, frame_order
-from addon.core.lit_diffuse.medians import Summary
-from addon.core.lit_diffuse.visibility import CLEAN, EDGE, SATURATED
+from addon.core.passes.lit_diffuse.accumulate import LitDiffuse, _choose, accumulate, frame_order
+from addon.core.passes.lit_diffuse.medians import Summary
 from addon.core.progress import Progress
+from addon.core.scene.model import Frame
+from addon.core.scene.visibility import CLEAN, EDGE, SATURATED
 from tests.core.rooms import all_round, box_sides, look_at, make_room, picture, pixels_of, quad
 
 COLOURS = {i: np.float32([0.1 * (i + 1), 0.5, 2.0 - 0.2 * i]) for i in range(6)}

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.capture.model import Pixels
 from addon.core.errors import InterruptedRun
-from addon.core.lit_diffuse.accumulate import accumulate
-from addon.core.lit_diffuse.poses import LEAST_SHIFT, Poses, Texture, moved, refine_poses
+from addon.core.passes.lit_diffuse.accumulate import accumulate
+from addon.core.passes.pose_refinement.poses import LEAST_SHIFT, Poses, Texture, moved, refine_poses
 from addon.core.progress import Progress
+from addon.core.scene.model import Pixels
 from tests.core.lit_diffuse.test_accumulate import frames_of
 from tests.core.rooms import all_round, box_sides, make_room, patches, picture, quad
 

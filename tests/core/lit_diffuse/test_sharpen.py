@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from addon.core.errors import InterruptedRun
-from addon.core.lit_diffuse.sharpen import sharpened
+from addon.core.passes.sharpening.sharpen import sharpened
 from addon.core.progress import Progress
 from tests.core.lit_diffuse.test_accumulate import frames_of, run
 from tests.core.rooms import look_at, make_room, pixels_of, quad

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.lit_diffuse.groups import ElementGroups
-from addon.core.lit_diffuse.visibility import CLEAN, EDGE, SATURATED, observe, view_frame
+from addon.core.scene.element_groups import ElementGroups
+from addon.core.scene.visibility import CLEAN, EDGE, SATURATED, observe, view_frame
 from tests.core.rooms import all_round, around, box_sides, look_at, make_room, pixels_of, quad
 
 WALL = quad((3, 2, -2), (0, -4, 0), (0, 0, 4), 0)  # at x = 3, seen from the origin

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading.albedo import FILLED, FLOOR, MEASURED, NONE, above_one, fill, quotient, without_emitters
+from addon.core.passes.albedo.albedo import FILLED, FLOOR, MEASURED, NONE, above_one, fill, quotient, without_emitters
 from tests.core.rooms import box_sides, make_room
 
 NAN = np.nan

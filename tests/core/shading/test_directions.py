@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading.directions import cosine_hemisphere, shifted, sobol, tangent_frame, to_world, uniform_hemisphere
+from addon.core.light.directions import cosine_hemisphere, shifted, sobol, tangent_frame, to_world, uniform_hemisphere
 
 COUNT = 4096
 

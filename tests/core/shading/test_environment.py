@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.lit_diffuse.visibility import view_frame
-from addon.core.shading.environment import Environment, EnvironmentAccumulator
+from addon.core.light.environment import Environment, EnvironmentAccumulator
+from addon.core.scene.visibility import view_frame
 from tests.core.rooms import all_round, look_at, make_room, pixels_of, quad
 
 FAR_BELOW = quad((-1, -1, -50), (2, 0, 0), (0, 2, 0), 0)

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from addon.core.capture.model import Pixels
-from addon.core.shading.emitters import LUMINANCE
-from addon.core.shading.fringes import FringeCollector
+from addon.core.light.emitters import LUMINANCE
+from addon.core.passes.clipped_lamps.fringes import FringeCollector
+from addon.core.scene.model import Pixels
 
 LAMP, WALL = 7, 2
 RADIANCE, BEHIND = np.array([28.0, 26.0, 17.0]), np.array([0.3, 0.2, 0.1])

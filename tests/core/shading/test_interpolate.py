@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading import interpolate
-from addon.core.shading.interpolate import CONTRAST, interpolated
+from addon.core.light import interpolate
+from addon.core.light.interpolate import CONTRAST, interpolated
 from tests.core.rooms import box_sides, make_room, quad
 
 FINEST = 0.1

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.shading import emitters
-from addon.core.shading.emitters import bright_triangles
-from addon.core.shading.environment import Environment
-from addon.core.shading.irradiance import direct, gather, uniform
+from addon.core.light import emitters
+from addon.core.light.emitters import bright_triangles
+from addon.core.light.environment import Environment
+from addon.core.light.irradiance import direct, gather, uniform
 from tests.core.rooms import box_sides, lit_box, make_room, polygon_irradiance, quad
 
 LAMP_SIDE, HEIGHT = 0.4, 2.0

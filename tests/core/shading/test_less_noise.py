@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading.less_noise import CELL, less_noise
+from addon.core.light.less_noise import CELL, less_noise
 
 SIDE, TEXEL = 100, 0.01
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from addon.core.lit_diffuse.accumulate import LitDiffuse
-from addon.core.shading.emitters import LUMINANCE, bright_triangles
-from addon.core.shading.lamps import find_seen
-from addon.core.shading.mirrors import Mirror
-from addon.core.shading.shade import shade
+from addon.core.light.emitters import LUMINANCE, bright_triangles
+from addon.core.light.lamps import find_seen
+from addon.core.light.mirrors import Mirror
+from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
+from addon.core.pipeline.shading import shade
 from tests.core.rooms import DARK, Quad, albedo_in, around, box_sides, cut, lit_box, make_room, quad, radiosity, split
 
 ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}

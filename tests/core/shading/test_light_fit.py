@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.capture.model import Instance
-from addon.core.shading.environment import EnvironmentAccumulator
-from addon.core.shading.lamps import Lamp
-from addon.core.shading.light_fit import Sample, kinds_of, on_flat
-from addon.core.shading.refine_light import Sky, refined, shared_by_class
+from addon.core.light.environment import EnvironmentAccumulator
+from addon.core.light.lamps import Lamp
+from addon.core.light.light_fit import Sample, kinds_of, on_flat
+from addon.core.passes.unseen_light.refine_light import Sky, refined, shared_by_class
+from addon.core.scene.model import Instance
 from tests.core.rooms import look_at, make_room, quad
 from tests.core.shading.test_environment import FAR_BELOW, add
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading import neighbourhood
-from addon.core.shading.albedo import fill
-from addon.core.shading.neighbourhood import steadied
+from addon.core.passes.albedo import neighbourhood
+from addon.core.passes.albedo.albedo import fill
+from addon.core.passes.albedo.neighbourhood import steadied
 from tests.core.rooms import make_room, quad
 
 TILE, JOINT = 0.75, 0.5

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.shading.emitters import bright_triangles
-from addon.core.shading.irradiance import direct, gather
-from addon.core.shading.mirrors import Mirror, in_their_planes, reflect
-from addon.core.shading.over_mirrors import direct_over_mirrors
-from addon.core.specular.flat_mirrors import plane_of
+from addon.core.light.emitters import bright_triangles
+from addon.core.light.irradiance import direct, gather
+from addon.core.light.mirrors import Mirror, in_their_planes, reflect
+from addon.core.light.over_mirrors import direct_over_mirrors
+from addon.core.passes.mirrors.flat_mirrors import plane_of
 from tests.core.rooms import box_sides, make_room, polygon_irradiance, quad, split
 
 F0 = np.float32([0.9, 0.8, 0.7])

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading.lamps import Lamp
-from addon.core.shading.light_fit import Sample
-from addon.core.shading.refine_light import Sky
-from addon.core.shading.unseen_lamps import needed
+from addon.core.light.lamps import Lamp
+from addon.core.light.light_fit import Sample
+from addon.core.passes.unseen_light.refine_light import Sky
+from addon.core.passes.unseen_light.unseen_lamps import needed
 
 M, LAMP = 600, 9
 BASE = np.full((M, 3), 0.5)

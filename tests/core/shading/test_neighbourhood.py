@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.lit_diffuse.accumulate import LitDiffuse
-from addon.core.lit_diffuse.visibility import CLEAN, EDGE, SATURATED
-from addon.core.shading import neighbourhood
-from addon.core.shading.albedo import FILLED, MEASURED, fill
-from addon.core.shading.neighbourhood import EDGE_DOUBT, FEW, LEAST_DOUBT, SURE, doubt, steadied
+from addon.core.passes.albedo import neighbourhood
+from addon.core.passes.albedo.albedo import FILLED, MEASURED, fill
+from addon.core.passes.albedo.neighbourhood import EDGE_DOUBT, FEW, LEAST_DOUBT, SURE, doubt, steadied
+from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
+from addon.core.scene.visibility import CLEAN, EDGE, SATURATED
 from tests.core.rooms import make_room, quad
 
 GOOD, POOR, NONE = LEAST_DOUBT, 0.8, np.inf

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading.emitters import bright_triangles
-from addon.core.shading.environment import Environment
-from addon.core.shading.irradiance import from_outside, gather
-from addon.core.shading.portals import find_portals
+from addon.core.light.emitters import bright_triangles
+from addon.core.light.environment import Environment
+from addon.core.light.irradiance import from_outside, gather
+from addon.core.light.portals import find_portals
 from tests.core.rooms import around, box_sides, make_room, polygon_irradiance, quad
 
 WINDOW = ((0.3, 0.6), (0.4, 0.8))

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.capture.model import Frame
-from addon.core.lit_diffuse.accumulate import accumulate
-from addon.core.shading import over_surface
-from addon.core.shading import shade as module
-from addon.core.shading.albedo import MEASURED, NONE
-from addon.core.shading.shade import shade
+from addon.core.light import over_surface
+from addon.core.passes.albedo.albedo import MEASURED, NONE
+from addon.core.passes.lit_diffuse.accumulate import accumulate
+from addon.core.pipeline import shading as module
+from addon.core.pipeline.shading import shade
+from addon.core.scene.model import Frame
 from tests.core.rooms import DARK, albedo_in, all_round, lit_box, make_room, picture, radiosity
 
 ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}

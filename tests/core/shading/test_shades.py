@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading.few_elements import evened, thrown_by_object
-from addon.core.shading.lamps import Lamp
-from addon.core.shading.shades import by_way_of_shade, strongly_lit
+from addon.core.light.few_elements import evened, thrown_by_object
+from addon.core.light.lamps import Lamp
+from addon.core.passes.unseen_light.shades import by_way_of_shade, strongly_lit
 from tests.core.rooms import lit_box, make_room, radiosity
 
 FLOOR, LAMP, PAPER, DIM = 0, 6, 0.4, 1e-3

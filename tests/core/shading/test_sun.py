@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.lit_diffuse.accumulate import LitDiffuse
-from addon.core.shading.emitters import LUMINANCE
-from addon.core.shading.environment import Environment
-from addon.core.shading.shade import shade
-from addon.core.shading.sun import RADIUS, Sun, put_in, sunlight, taken_out
+from addon.core.light.emitters import LUMINANCE
+from addon.core.light.environment import Environment
+from addon.core.light.sun import RADIUS, Sun, put_in, sunlight, taken_out
+from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
+from addon.core.pipeline.shading import shade
 from tests.core import sunny
 from tests.core.rooms import albedo_in, make_room, quad
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from addon.core.shading.texel_blocks import TexelBlocks
+from addon.core.light.texel_blocks import TexelBlocks
 from tests.core.rooms import box_sides, make_room, quad
 
 

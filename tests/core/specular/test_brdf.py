@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.specular import brdf
+from addon.core.brdf import ggx as brdf
 
 PHIS = [0.05, 0.2, 0.5, 1.0]
 

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from addon.core.shading.emitters import bright_triangles
-from addon.core.specular.caustics import Lobes, _over_cells, caustics
+from addon.core.light.emitters import bright_triangles
+from addon.core.passes.glossy_light.caustics import Lobes, _over_cells, caustics
 from tests.core.glossy_box import SIZE, Box
 from tests.core.rooms import Quad, polygon_irradiance
 from tests.core.specular.test_glossy_light import PSI, over_the_floor

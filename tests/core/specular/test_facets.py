@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading.mirrors import Mirror
-from addon.core.specular.facets import facets_of
-from addon.core.specular.samples import Samples
+from addon.core.light.mirrors import Mirror
+from addon.core.passes.mirrors.facets import facets_of
+from addon.core.scene.samples import Samples
 from tests.core.glossy_box import Box
 
 F0 = np.float32([0.9, 0.85, 0.8])

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.specular.fit import between, fit_lobe, huber, robust_scale, solve
-from addon.core.specular.layout import Layout
-from addon.core.specular.lobes import GRID
-from addon.core.specular.models import DIELECTRIC
+from addon.core.light.lobes import GRID
+from addon.core.passes.specular.fit import between, fit_lobe, huber, robust_scale, solve
+from addon.core.passes.specular.layout import Layout
+from addon.core.passes.specular.models import DIELECTRIC
 from tests.core.glossy_box import Box
 
 

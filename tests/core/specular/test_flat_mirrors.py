@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.capture.model import Instance
-from addon.core.shading.lamps import Lamp
-from addon.core.specular.flat_mirrors import find_mirrors
-from addon.core.specular.samples import Samples
+from addon.core.light.lamps import Lamp
+from addon.core.passes.mirrors.flat_mirrors import find_mirrors
+from addon.core.scene.model import Instance
+from addon.core.scene.samples import Samples
 from tests.core.glossy_box import Box
 
 SILVER = np.array([0.9, 0.85, 0.8])

@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.lit_diffuse.accumulate import LitDiffuse
-from addon.core.lit_diffuse.visibility import CLEAN
+from addon.core.light.lamps import Lamp
 from addon.core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR
 from addon.core.overrides import Given
-from addon.core.shading.lamps import Lamp
-from addon.core.specular.given import fit_given
-from addon.core.specular.problems import Problems
-from addon.core.specular.reflect import Held, fit_specular
-from addon.core.specular.samples import Samples
+from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
+from addon.core.passes.specular.given import fit_given
+from addon.core.passes.specular.problems import Problems
+from addon.core.pipeline.specular import Held, fit_specular
+from addon.core.scene.samples import Samples
+from addon.core.scene.visibility import CLEAN
 from tests.core.glossy_box import GLOW, Box
 from tests.core.specular.test_fit import paint, steps
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading.emitters import bright_triangles
-from addon.core.specular import brdf
-from addon.core.specular.lobes import GRID, reflected_light
+from addon.core.brdf import ggx as brdf
+from addon.core.light.emitters import bright_triangles
+from addon.core.light.lobes import GRID, reflected_light
 from tests.core.glossy_box import Box
 from tests.core.rooms import box_sides, make_room, quad
 from tests.core.specular.test_brdf import sphere

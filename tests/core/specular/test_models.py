@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from addon.core.material import LAMBERTIAN, METAL, SPECULAR
-from addon.core.specular import models
-from addon.core.specular.fit import fit_lobe
-from addon.core.specular.models import METAL_PSI, Choice, adopt_from_class, choose_model, metal_f0
+from addon.core.passes.specular import models
+from addon.core.passes.specular.fit import fit_lobe
+from addon.core.passes.specular.models import METAL_PSI, Choice, adopt_from_class, choose_model, metal_f0
 from tests.core.glossy_box import Box
 from tests.core.specular.test_fit import paint, steps
 

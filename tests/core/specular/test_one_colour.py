@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from addon.core.material import LAMBERTIAN, METAL, SPECULAR
-from addon.core.specular.by_looks import coated_by_looks, metal_by_looks
-from addon.core.specular.intervals import gloss_interval
-from addon.core.specular.models import Choice, adopt_from_class
-from addon.core.specular.one_colour import compare, compare_coat
+from addon.core.passes.specular.by_looks import coated_by_looks, metal_by_looks
+from addon.core.passes.specular.intervals import gloss_interval
+from addon.core.passes.specular.models import Choice, adopt_from_class
+from addon.core.passes.specular.one_colour import compare, compare_coat
 from tests.core.glossy_box import WALLS, Box
 from tests.core.specular.test_fit import paint, steps
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.lit_diffuse.accumulate import LitDiffuse
-from addon.core.lit_diffuse.visibility import CLEAN
-from addon.core.specular import problems
-from addon.core.specular.lobes import GRID, LobeLight
-from addon.core.specular.problems import AGAIN, Problems
-from addon.core.specular.samples import Samples
+from addon.core.light.lobes import GRID, LobeLight
+from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
+from addon.core.passes.specular import problems
+from addon.core.passes.specular.problems import AGAIN, Problems
+from addon.core.scene.samples import Samples
+from addon.core.scene.visibility import CLEAN
 from tests.core.rooms import box_sides, make_room
 
 RAYS, COUNT = 32, 12

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.lit_diffuse.visibility import CLEAN, EDGE, SATURATED, Observations
-from addon.core.specular import samples as module
-from addon.core.specular.problems import pick
-from addon.core.specular.samples import SampleCollector, Samples, choose_elements
-from addon.core.specular.separate import grouped_median, specular_in_median, spread_over_object
-from addon.core.specular.targets import MIN_OBSERVATIONS, score_frames, target_frame
+from addon.core.passes.specular.problems import pick
+from addon.core.passes.specular.separate import grouped_median, specular_in_median, spread_over_object
+from addon.core.passes.specular.targets import MIN_OBSERVATIONS, score_frames, target_frame
+from addon.core.scene import samples as module
+from addon.core.scene.samples import SampleCollector, Samples, choose_elements
+from addon.core.scene.visibility import CLEAN, EDGE, SATURATED, Observations
 from tests.core.rooms import box_sides, make_room, quad
 
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.lit_diffuse.accumulate import LitDiffuse
-from addon.core.lit_diffuse.visibility import CLEAN
 from addon.core.material import TRANSPARENT
-from addon.core.specular import reflect
-from addon.core.specular.reflect import fit_specular
-from addon.core.specular.samples import Samples
-from addon.core.specular.see_through import look_behind
+from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
+from addon.core.passes.see_through.see_through import look_behind
+from addon.core.pipeline import specular as reflect
+from addon.core.pipeline.specular import fit_specular
+from addon.core.scene.samples import Samples
+from addon.core.scene.visibility import CLEAN
 from tests.core.rooms import box_sides, make_room, quad
 
 SIZE = np.array([4.0, 3.0, 2.5])

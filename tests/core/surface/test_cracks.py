@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.surface.cracks import border_edges, closed
-from addon.core.surface.denoise import denoised
-from addon.core.surface.mesh_noise import noise_of
-from addon.core.surface.rays import RayScene
+from addon.core.passes.mesh_denoising.cracks import border_edges, closed
+from addon.core.passes.mesh_denoising.denoise import denoised
+from addon.core.scene.mesh_noise import noise_of
+from addon.core.scene.rays import RayScene
 from tests.core.rooms import make_room, quad, split
 from tests.core.surface.test_denoise import noisy
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.capture.model import Mesh
-from addon.core.surface.atlas import Atlas
-from addon.core.surface.creases import DOUBT, REACH, crease_doubt, edge_angles
+from addon.core.scene.atlas import Atlas
+from addon.core.scene.creases import DOUBT, REACH, crease_doubt, edge_angles
+from addon.core.scene.model import Mesh
 
 TEXEL = 0.01
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.capture.model import Mesh
-from addon.core.surface import denoise
-from addon.core.surface.denoise import denoised, dihedral, hinges_of, without_noise
-from addon.core.surface.elements import triangle_geometry
-from addon.core.surface.mesh_noise import noise_of
-from addon.core.surface.weld import point_normals, welded
+from addon.core.passes.mesh_denoising import denoise
+from addon.core.passes.mesh_denoising.denoise import denoised, dihedral, hinges_of, without_noise
+from addon.core.scene.elements import triangle_geometry
+from addon.core.scene.mesh_noise import noise_of
+from addon.core.scene.model import Mesh
+from addon.core.scene.weld import point_normals, welded
 from tests.core.rooms import make_room, quad, split
 
 NOISE = 0.005

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.capture.model import Mesh
-from addon.core.surface.atlas import Atlas
-from addon.core.surface.elements import ElementLookup, make_atlas, triangle_geometry, uv_scale
+from addon.core.scene.atlas import Atlas
+from addon.core.scene.elements import ElementLookup, make_atlas, triangle_geometry, uv_scale
+from addon.core.scene.model import Mesh
 from tests.core.rooms import box_sides, make_room, quad
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.capture.model import Mesh
-from addon.core.surface import denoise, planes
-from addon.core.surface.moran import SLACK, moran, most_alike
-from addon.core.surface.planes import sheets_of
+from addon.core.passes.mesh_denoising import denoise, planes
+from addon.core.passes.mesh_denoising.moran import SLACK, moran, most_alike
+from addon.core.passes.mesh_denoising.planes import sheets_of
+from addon.core.scene.model import Mesh
 from tests.core.surface.test_denoise import NOISE, noisy, sheet
 
 GRID = np.linspace(0, 1, 31)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.surface.orientation import seen_sides
+from addon.core.scene.orientation import seen_sides
 from tests.core.rooms import all_round, box_sides, look_at, make_room, quad
 
 CENTRE = (2, 1.5, 1.25)

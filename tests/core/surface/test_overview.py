@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from addon.core.surface.overview import overview
+from addon.core.scene.overview import overview
 from tests.core.rooms import box_sides, make_room
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.core.surface.pages import OBJECT, UDIM, lay_out
+from addon.core.scene.pages import OBJECT, UDIM, lay_out
 
 SIZE = 64
 BOXES = {3: [(2, 2, 30, 20), (40, 3, 60, 9)], 5: [(2, 30, 12, 60)], 9: [(20, 30, 22, 33), (30, 40, 55, 62)]}

@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from addon.core.capture.model import Mesh
-from addon.core.surface import denoise, planes
-from addon.core.surface.planes import Sheet, neighbours_of, sheet_of, sheets_of
-from addon.core.surface.weld import welded
+from addon.core.passes.mesh_denoising import denoise, planes
+from addon.core.passes.mesh_denoising.planes import Sheet, neighbours_of, sheet_of, sheets_of
+from addon.core.scene.model import Mesh
+from addon.core.scene.weld import welded
 from tests.core.rooms import make_room, quad, split
 from tests.core.surface.test_denoise import NOISE, cube, noisy, rms, sheet, smoothed, sphere, tilted, tube
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.shading.directions import cosine_hemisphere, sobol, to_world
-from addon.core.surface.rays import RayScene
+from addon.core.light.directions import cosine_hemisphere, sobol, to_world
+from addon.core.scene.rays import RayScene
 from tests.core.rooms import box_sides, make_room, quad
 
 UP, DOWN = np.float32([[0, 0, 1]]), np.float32([[0, 0, -1]])

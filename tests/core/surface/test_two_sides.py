@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.capture.model import Mesh
-from addon.core.shading.albedo import FILLED, fill
-from addon.core.shading.emitters import bright_triangles
-from addon.core.shading.field import LightField
-from addon.core.shading.irradiance import direct, gather
-from addon.core.surface.build import build_surface
-from addon.core.surface.creases import edge_angles
-from addon.core.surface.elements import make_atlas, triangle_geometry
-from addon.core.surface.orientation import seen_sides
-from addon.core.surface.rays import RayScene
-from addon.core.surface.two_sides import fronts, laid_apart, two_sided, with_backs, worth_it
+from addon.core.light.emitters import bright_triangles
+from addon.core.light.field import LightField
+from addon.core.light.irradiance import direct, gather
+from addon.core.passes.albedo.albedo import FILLED, fill
+from addon.core.scene.creases import edge_angles
+from addon.core.scene.elements import make_atlas, triangle_geometry
+from addon.core.scene.model import Mesh
+from addon.core.scene.orientation import seen_sides
+from addon.core.scene.rays import RayScene
+from addon.core.scene.surface import build_surface
+from addon.core.scene.two_sides import fronts, laid_apart, two_sided, with_backs, worth_it
 from tests.core.rooms import DARK, box_sides, look_at, make_room, quad
 
 ROUND = 24

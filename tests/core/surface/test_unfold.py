@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from addon.core.capture.model import Mesh
-from addon.core.surface.unfold import unfolded
-from addon.core.surface.weld import point_normals, welded
+from addon.core.passes.mesh_denoising.unfold import unfolded
+from addon.core.scene.model import Mesh
+from addon.core.scene.weld import point_normals, welded
 from tests.core.surface.test_denoise import NOISE, noisy, rms, smoothed, sphere, tilted
 
 

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from addon.core.capture.exr import write_exr
-from addon.core.capture.layout import Reading
-from addon.core.png import write_png
+from addon.core.io.exr import write_exr
+from addon.core.io.layout import Reading
+from addon.core.io.png import write_png
 from tests.core.capture.colmap_files import images_of, write_binary, write_text
 from tests.core.capture.conftest import CORNERS, HEIGHT, JPEG, SIDES, WIDTH, CaptureOnDisk
 from tests.core.replica_on_disk import ReplicaOnDisk

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.png import write_png
+from addon.core.io.png import write_png
 from tests.core.capture.hostile.cases import png_content, tiff_content
 from tests.core.capture.hostile.test_exr_spoiled import COUNT, ROOT, SEED, spoiled
 
@@ -18,8 +18,8 @@ PICTURE = np.random.default_rng(5).integers(0, 256, (33, 41, 3), np.uint8)
 
 CHILD = """
 import resource, signal, sys
-from addon.core.capture.exif import exif_exposure
-from addon.core.capture.oiio import coded_header, read_coded
+from addon.core.io.exif import exif_exposure
+from addon.core.io.oiio import coded_header, read_coded
 from addon.core.errors import BadInputError
 resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
 good = 0

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from addon.core.capture.layout import Reading
-from addon.core.capture.read import read_capture
 from addon.core.errors import BadInputError
+from addon.core.io.layout import Reading
+from addon.core.io.read import read_capture
 from tests.core.capture.colmap_files import write_text
 from tests.core.capture.hostile.cases import COUNT, Case, colmap, fresh, nerfstudio
 

@@ -23,7 +23,7 @@ def planes(prefix: str = "") -> dict[str, np.ndarray]:
 
 CHILD = """
 import resource, signal, sys
-from addon.core.capture.exr import exr_note, read_exr, read_header
+from addon.core.io.exr import exr_note, read_exr, read_header
 from addon.core.errors import BadInputError
 resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
 good = 0

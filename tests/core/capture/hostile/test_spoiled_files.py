@@ -19,10 +19,10 @@ pytest.importorskip("hypothesis", reason="hypothesis is not installed: spoiled f
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from addon.core.capture.layout import Reading
-from addon.core.capture.pixels import read_pixels
-from addon.core.capture.read import describe, read_capture
 from addon.core.errors import BadInputError
+from addon.core.io.layout import Reading
+from addon.core.io.pixels import read_pixels
+from addon.core.io.read import describe, read_capture
 from tests.core.capture.hostile.cases import CASES, fresh
 from tests.core.capture.hostile.spoiling import bytes_spoiled, json_spoiled
 

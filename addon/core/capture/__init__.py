@@ -1,1 +1,0 @@
-"""What was measured: the room's mesh with its instances, and the posed HDR frames."""

@@ -1,0 +1,52 @@
+"""Whether a camera's numbers can be those of one: a slip of the decimal point would overflow far from its cause."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator
+
+from ..errors import BadInputError
+from ..scene.model import Camera
+
+FOCAL = (1e-3, 1e6)
+"""Bounds of a focal length over the frame's longer side; a panorama has 0.16."""
+OFF = 100
+"""How many of the frame's sides the principal point may lie from its corner."""
+STRONGEST = 1e9
+"""Bound of a lens's coefficients; those of a telephoto lens's high powers are large."""
+
+
+def check_camera(camera: Camera, name: str) -> None:
+    """Look at the numbers of frame `name`'s camera.
+
+    Raises
+    ------
+    BadInputError
+        One is not finite or beyond what any camera has.
+    """
+    side = max(camera.width, camera.height)
+    for key, value in (("fx", camera.fx), ("fy", camera.fy)):
+        if not FOCAL[0] * side <= value <= FOCAL[1] * side:
+            raise BadInputError(
+                f"Frame '{name}' has a focal length {key} of {value:.4g} pixels; give pixels, or check "
+                "the camera's angle."
+            )
+    for key, value, extent in (("cx", camera.cx, camera.width), ("cy", camera.cy, camera.height)):
+        if not abs(value) <= OFF * extent:
+            raise BadInputError(f"Frame '{name}' has a principal point with {key} = {value:.4g}; give pixels.")
+    for value in _numbers(camera.lens):
+        if not abs(value) <= STRONGEST:
+            raise BadInputError(f"Frame '{name}' has a lens with the coefficient {value:.4g}; check its distortion.")
+
+
+def _numbers(lens: object) -> Iterator[float]:
+    """All numbers that a lens holds."""
+    if dataclasses.is_dataclass(lens):
+        for field in dataclasses.fields(lens):
+            yield from _numbers(getattr(lens, field.name))
+    elif isinstance(lens, tuple):
+        for one in lens:
+            yield from _numbers(one)
+    elif isinstance(lens, (int, float)) and not isinstance(lens, bool):
+        yield lens if math.isfinite(lens) else math.inf

@@ -1,0 +1,218 @@
+"""Captures as COLMAP leaves them: a sparse model, the pictures beside it, a mesh of the dense workspace.
+
+COLMAP's world has no up and, unless it was given measures, no metres; it is taken as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..scene.lenses_colmap import Intrinsics, intrinsics
+from ..scene.model import Camera, Frame
+from ..scene.pose import MAX_DISTANCE, check_pose
+from . import instances
+from .colmap_model import ColmapImage, ColmapModel, is_pose, model_files, read_model
+from .layout import Layout, RawMesh, Reader, Reading
+from .meshes import IMPORTED, MESH, find_mesh, read_mesh
+from .paths import EscapesError, inside
+
+MODELS = ("", "sparse/0", "sparse", "colmap/sparse/0", "colmap/sparse", "colmap/0", "colmap", "dense/sparse")
+"""Where in a capture a model may lie."""
+PICTURES = "images"
+MASKS = "masks"
+HDR = (".exr", ".hdr")
+"""Tried before a picture's own ending: COLMAP is often run on tone-mapped copies."""
+MESHES = ("dense/meshed-poisson.ply", "dense/meshed-delaunay.ply", "dense/0/meshed-poisson.ply",
+          "dense/0/meshed-delaunay.ply", "meshed-poisson.ply", "meshed-delaunay.ply")  # fmt: skip
+POINTS = ("fused.ply", "dense/fused.ply", "dense/0/fused.ply", "sparse.ply", "points3D.ply")
+"""Clouds of points, which are no mesh."""
+UP = (
+    "COLMAP's world has no up of its own; +Z was taken as up and a unit as a metre. Align the model "
+    "(colmap model_aligner) if the room lies on its side, or name the axis that points up (--convention up:-y)."
+)
+MAX_SIZE = 2**17
+
+
+def find_model(root: Path) -> Path | None:
+    """The folder of the model in the capture `root`, or None."""
+    return next((root / place for place in MODELS if model_files(root / place)), None)
+
+
+def read(root: Path, reading: Reading) -> Layout:
+    """Read the model, the mesh and, where there is one, the list of objects.
+
+    Raises
+    ------
+    BadInputError
+        The model is missing or damaged, or there is no mesh.
+    """
+    folder = find_model(root)
+    if folder is None:
+        raise BadInputError(
+            f"Folder '{root}' holds no COLMAP model; it needs cameras and images (.bin or .txt), there "
+            "or in 'sparse', 'sparse/0' or 'colmap'."
+        )
+    model = read_model(folder)
+    mesh = _mesh(root, reading)
+    names = instances.names_in(root)
+    frames, problems, notes = frames_of(model, root, _pictures(root, folder), reading)
+    others = [path.name for path in sorted(folder.parent.iterdir())
+              if path != folder and folder.name == "0" and model_files(path)]  # fmt: skip
+    if others:
+        notes.append(
+            f"COLMAP left {len(others) + 1} models that don't hang together; '{folder}' was read, not "
+            f"{', '.join(others[:3])}."
+        )
+    return Layout(frames, mesh, names, instances.FILE, problems, [*notes, UP])
+
+
+def frames_of(
+    model: ColmapModel, root: Path, folder: Path, reading: Reading
+) -> tuple[list[Frame], list[str], list[str]]:
+    """Frames of a model whose pictures lie in `folder`, sentences on those that can't be used, and notes.
+
+    In the pictures' order by name, as COLMAP's own are in no order. A model without images raises `BadInputError`.
+    """
+    if not model.images:
+        raise BadInputError(f"'{model.images_file}' lists no images; export the model again.")
+    cameras, wrong = _cameras(model)
+    frames, problems = [], []
+    seen: set[str] = set()
+    for image in sorted(model.images, key=lambda one: one.name):
+        name = image.name.encode("utf-8", "replace").decode()
+        try:
+            if image.name in seen:
+                raise BadInputError(f"Frame '{name}' is listed twice in '{model.images_file}'; keep one of the two.")
+            if image.camera in wrong:
+                raise BadInputError(
+                    f"Frame '{name}' has camera {image.camera}, which can't be used: "
+                    f"{wrong[image.camera]}; mend '{model.cameras_file}'."
+                )
+            if image.camera not in cameras:
+                raise BadInputError(
+                    f"Frame '{name}' has camera {image.camera}, which '{model.cameras_file}' does not "
+                    "list; export cameras and images together."
+                )
+            frames.append(_frame(image, name, *cameras[image.camera], root, folder, reading))
+        except EscapesError:
+            raise
+        except BadInputError as error:
+            problems.append(str(error))
+            continue
+        seen.add(image.name)
+    return frames, problems, _notes(model, frames)
+
+
+def camera_to_world(image: ColmapImage, name: str) -> np.ndarray:
+    """The image's pose in OpenGL axes, (4, 4) float64.
+
+    Raises
+    ------
+    BadInputError
+        Not finite, no direction, or too far off.
+    """
+    if not is_pose(image):
+        raise BadInputError(
+            f"Frame '{name}' has a pose that is not finite or whose quaternion is 0; export the model again."
+        )
+    quaternion = np.array(image.quaternion) / np.abs(image.quaternion).max()  # first: squares of huge numbers are inf
+    w, x, y, z = quaternion / np.linalg.norm(quaternion)
+    rotation = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+    pose = np.eye(4)
+    pose[:3, :3] = rotation.T * (1, -1, -1)
+    if np.abs(image.translation).max() > 10 * MAX_DISTANCE:
+        raise BadInputError(f"Frame '{name}' lies over {MAX_DISTANCE:g} m from the origin; check the model's units.")
+    pose[:3, 3] = -rotation.T @ image.translation
+    return check_pose(pose, name)
+
+
+def _cameras(model: ColmapModel) -> tuple[dict[int, tuple[int, int, Intrinsics]], dict[int, str]]:
+    """Size and intrinsics of each camera, and what is wrong with the others."""
+    good, wrong = {}, {}
+    for number, (name, width, height, parameters) in model.cameras.items():
+        try:
+            if not (0 < width <= MAX_SIZE and 0 < height <= MAX_SIZE):
+                raise BadInputError(f"its size is {width} x {height}")
+            good[number] = width, height, intrinsics(name, parameters, width, height)
+        except BadInputError as error:
+            wrong[number] = str(error)
+    return good, wrong
+
+
+def _frame(
+    image: ColmapImage,
+    name: str,
+    width: int,
+    height: int,
+    values: Intrinsics,
+    root: Path,
+    folder: Path,
+    reading: Reading,
+) -> Frame:
+    named = inside(root, image.name, name, reading.outside, folder)
+    camera = Camera(
+        width, height, values.fx, values.fy, values.cx, values.cy, camera_to_world(image, name), values.lens
+    )
+    path = next((hdr for hdr in (named.with_suffix(ending) for ending in HDR) if hdr.is_file()), named)
+    # COLMAP's own convention: the picture's whole name, and .png after it.
+    masks = folder.parent / MASKS / named.relative_to(folder) if named.is_relative_to(folder) else named
+    mask = next(
+        (
+            p
+            for p in (masks.with_name(masks.name + ".png"), masks.with_suffix(".png"))
+            if p != path and p.is_file() and MASKS in p.parts
+        ),
+        None,
+    )
+    return Frame(name, path, camera, mask)
+
+
+def _notes(model: ColmapModel, frames: list[Frame]) -> list[str]:
+    numbers = {image.number for image in model.images}
+    gaps = [n for n in range(1, min(max(numbers), 10 * len(numbers)) + 1) if n not in numbers]
+    notes = []
+    if gaps:
+        few = ", ".join(map(str, gaps[:5])) + (", ..." if len(gaps) > 5 else "")
+        notes.append(
+            f"'{model.images_file}' has no pose for {len(gaps)} of {len(gaps) + len(numbers)} pictures "
+            f"(numbers {few}): COLMAP could not place them, or they were taken out."
+        )
+    return notes
+
+
+def _pictures(root: Path, model: Path) -> Path:
+    """The folder that the images' names are relative to."""
+    around = [root, *(p for p in (model, *model.parents) if p.is_relative_to(root) and p != root)]
+    return next((p / PICTURES for p in around if (p / PICTURES).is_dir()), root)
+
+
+def _mesh(root: Path, reading: Reading) -> RawMesh:
+    if reading.mesh is not None or (root / MESH).exists():
+        return read_mesh(find_mesh(root, reading), reading)
+    for place in MESHES:
+        if (root / place).is_file():
+            return read_mesh(root / place, reading)
+    clouds = [place for place in POINTS if (root / place).is_file()]
+    if clouds and not any(_meshes(root)):
+        raise BadInputError(
+            f"Capture '{root}' has no mesh, only the points of '{clouds[0]}'; mesh them (colmap "
+            f"poisson_mesher) to '{MESHES[0]}' or name a mesh with --mesh."
+        )
+    return read_mesh(find_mesh(root, reading), reading)
+
+
+def _meshes(root: Path) -> Iterator[Path]:
+    return (p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED) and p.name not in POINTS)
+
+
+READER = Reader(
+    "colmap", "cameras and images of a COLMAP model (.bin or .txt)", lambda root: find_model(root) is not None, read
+)

@@ -1,0 +1,111 @@
+"""Which object each triangle belongs to: names from `info_semantic.json`, and what to do where they don't agree."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..scene.model import Instance
+from .jsonfile import read_json
+
+FILE = "info_semantic.json"
+MAX_ID = 2**31 - 2
+
+
+def read_instances(path: Path | str) -> dict[int, str]:
+    """Class name of each object that the file `path` lists.
+
+    Takes `objects[]{id, class_name}`, and Replica's `objects[]{id, class_id}` with `classes[]{id, name}`. An object
+    without either is called 'object_<id>'.
+
+    Raises
+    ------
+    BadInputError
+        The file is not JSON, or has no list of objects with ids.
+    """
+    path = Path(path)
+    value = read_json(path)
+    objects, classes = value.get("objects"), value.get("classes", [])
+    if not isinstance(objects, list):
+        raise BadInputError(f"'{path}' has no list 'objects'; export it again or take it away.")
+    class_names = (
+        {c["id"]: c.get("name") for c in classes if isinstance(c, dict) and isinstance(c.get("id"), int)}
+        if isinstance(classes, list)
+        else {}
+    )
+    names: dict[int, str] = {}
+    for i, item in enumerate(objects):
+        number = item.get("id") if isinstance(item, dict) else None
+        if not isinstance(number, int) or isinstance(number, bool):
+            raise BadInputError(f"'{path}' has an object (number {i}) without a whole 'id'; export it again.")
+        class_id = item.get("class_id")
+        name = item.get("class_name") or (class_names.get(class_id) if isinstance(class_id, int) else None)
+        if number in names:
+            raise BadInputError(f"'{path}' lists the object {number} twice; give each object an id of its own.")
+        if 0 <= number <= MAX_ID:
+            names[number] = str(name) if name else f"object_{number}"
+    return names
+
+
+def names_in(root: Path) -> dict[int, str] | None:
+    """As `read_instances`, of the file in the capture `root`; None where there is none."""
+    path = root / FILE
+    return read_instances(path) if path.exists() else None
+
+
+def assign(
+    object_id: np.ndarray, names: dict[int, str] | None, names_file: str = FILE
+) -> tuple[np.ndarray, tuple[Instance, ...], list[str]]:
+    """Give every triangle an instance.
+
+    Parameters
+    ----------
+    object_id : (t,) int
+        As the mesh has it, or as it was found.
+    names : dict of int to str, or None
+        As `read_instances` gives it; None where the capture has none.
+    names_file : str
+        Where the names come from, for messages.
+
+    Returns
+    -------
+    object_id : (t,) int32
+        Each value has an instance.
+    instances : tuple of Instance
+        Sorted; each has a triangle.
+    warnings : list of str
+    """
+    warnings = []
+    present = np.unique(object_id)
+    if names is None:
+        warnings.append(f"The capture has no {names_file}; objects are named by their number.")
+        names = {int(i): f"object_{i}" for i in present if 0 <= i <= MAX_ID}
+    known = np.isin(present, np.fromiter(names, np.int64, len(names)))
+    kept = present[known]
+    instances = [Instance(int(i), names[int(i)]) for i in kept]
+    idle = sorted(set(names) - {int(i) for i in kept})
+    if idle:
+        warnings.append(
+            f"{len(idle)} of the objects in {names_file} have no triangles and are left out: "
+            f"{_few([f'{i} ({names[i]})' for i in idle])}."
+        )
+    loose = ~np.isin(object_id, kept)
+    result = object_id.copy()
+    if loose.any():
+        number = int(max([*kept.tolist(), *(i for i in names), -1])) + 1
+        if number > MAX_ID:
+            number = next(i for i in range(MAX_ID) if i not in names)
+        result[loose] = number
+        instances = sorted([*instances, Instance(number, "unlabelled")], key=lambda one: one.object_id)
+        warnings.append(
+            f"{int(loose.sum())} of {len(object_id)} triangles belong to no object; they become one of "
+            f"their own, 'unlabelled' (object_id {number})."
+        )
+    return result.astype(np.int32), tuple(instances), warnings
+
+
+def _few(items: list[str]) -> str:
+    """The first items, and how many more."""
+    return ", ".join(items[:3]) + (f" and {len(items) - 3} more" if len(items) > 3 else "")

@@ -1,0 +1,130 @@
+"""What lies between a format's reader and everything else: how a user wants a capture read, and what was found.
+
+A format is one module with a `Reader`; `readers.py` lists them. A reader looks at files and poses. It neither reads
+pixels through nor checks what is checked for all formats alike (`read.py` does that).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ..scene.model import Frame, KnownMirror, LitTiles
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a capture is to be read: what its folder does not tell, or tells wrongly.
+
+    Attributes
+    ----------
+    format : str
+        Name of a `Reader`; '' finds it from the folder's content.
+    mesh : Path or None
+        The mesh, where it is not the one that the format names.
+    outside : bool
+        Whether paths in the capture may lead out of its folder.
+    transfer : str
+        Curve of 8 and 16-bit pictures ('srgb', 'linear', or a gamma such as '2.2'); '' refuses such pictures.
+    exposures : Path or None
+        CSV of exposures, one line a frame.
+    convention : str
+        Name of a correction of all poses; '' takes them as they are.
+    import_mesh : callable(Path) -> RawMesh, or None
+        Reads what the core has no reader for (glTF, OBJ and others through Blender); None refuses such meshes.
+    """
+
+    format: str = ""
+    mesh: Path | None = None
+    outside: bool = False
+    transfer: str = ""
+    exposures: Path | None = None
+    convention: str = ""
+    import_mesh: Callable[[Path], RawMesh] | None = field(default=None, compare=False)
+
+
+AS_FOUND = Reading()
+
+
+@dataclass(frozen=True)
+class RawMesh:
+    """A mesh as its file holds it, unrepaired; metres, +Z up where the format fixes an axis.
+
+    Attributes
+    ----------
+    vertices : (v, 3) float64
+    triangles : (t, 3) int32
+        Each index is within the vertices.
+    object_id : (t,) int64 or None
+    uv : (t, 3, 2) float32 or None
+    names : dict of int to str, or None
+        Class name of each `object_id`, where the mesh itself tells.
+    name : str
+        The file, for messages.
+    lit : LitTiles or None
+        Light stored on it.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    object_id: np.ndarray | None = None
+    uv: np.ndarray | None = None
+    names: dict[int, str] | None = None
+    name: str = "mesh"
+    lit: LitTiles | None = None
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a reader found in a capture's folder.
+
+    Attributes
+    ----------
+    frames : list of Frame
+        In capture order; only what is usable as far as the poses tell.
+    mesh : RawMesh
+        In the frames' coordinates.
+    names : dict of int to str, or None
+        Class name of each object by what the mesh's faces carry; None where the capture has none.
+    names_file : str
+        Where `names` come from, for messages.
+    problems : list of str
+        One sentence for each frame that can't be used.
+    notes : list of str
+        Sentences on what is used, but may mean something else.
+    mirrors : list of KnownMirror
+        By the mesh's own object ids.
+    """
+
+    frames: list[Frame]
+    mesh: RawMesh
+    names: dict[int, str] | None = None
+    names_file: str = ""
+    problems: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    mirrors: list[KnownMirror] = field(default_factory=list)
+
+
+class Reader(NamedTuple):
+    """One format.
+
+    Attributes
+    ----------
+    name : str
+        As `--format` takes it.
+    wants : str
+        The files by which a user knows the format, for messages.
+    find : callable(root) -> bool
+        Whether the folder has this format; cheap, and never raises for what is in it.
+    read : callable(root, reading) -> Layout
+        Raises `BadInputError` for what is wrong with the whole capture.
+    """
+
+    name: str
+    wants: str
+    find: Callable[[Path], bool]
+    read: Callable[[Path, Reading], Layout]

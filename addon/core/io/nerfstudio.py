@@ -1,0 +1,254 @@
+"""Captures in nerfstudio's layout: `transforms.json`, or the split files of the NeRF-synthetic scenes.
+
+A frame that can't be used becomes a problem in a list, so that one bad frame does not hide the next; what is wrong with
+the whole file is raised.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..scene.model import Frame
+from ..scene.pose import check_pose
+from . import instances
+from .conventions import AS_READ
+from .jsonfile import is_number, read_json
+from .layout import Layout, RawMesh, Reader, Reading
+from .meshes import MESH, find_mesh, read_mesh
+from .nerfstudio_camera import check_model, lens_notes, positive, read_camera
+from .nerfstudio_exposures import ended, read_brackets, with_settings
+from .paths import EscapesError, inside
+
+FILE = "transforms.json"
+SPLITS = ("transforms_train.json", "transforms_val.json")
+"""Read one after the other where `FILE` is absent; the test split is left alone."""
+TEST_SPLIT = "transforms_test.json"
+BEFORE = [[0.0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]]
+"""What nerfstudio did to COLMAP's world before it wrote down `applied_transform`."""
+MOST, FEW = 0.9, 0.1
+"""The mesh counts as one of the original world where, moved to the poses' world, its box holds more than `MOST` of the
+cameras, and else fewer than `FEW`."""
+
+
+def find(root: Path) -> list[Path]:
+    """The files of poses in the capture `root`."""
+    if (root / FILE).is_file():
+        return [root / FILE]
+    return [root / name for name in SPLITS if (root / name).is_file()]
+
+
+def read(root: Path, reading: Reading) -> Layout:
+    """Read the poses, the mesh and the objects' names.
+
+    Raises
+    ------
+    BadInputError
+        A file is not JSON, lists no frames, has an unknown lens, or leads out of the capture's folder; the mesh or the
+        list of objects can't be read.
+    """
+    paths = find(root) or [root / FILE]
+    top = read_json(paths[0])
+    mesh = read_mesh(_mesh_path(root, top, reading), reading)
+    names = instances.names_in(root)
+    frames, problems, notes = read_frames(root, reading)
+    mesh, more = _in_frames_world(mesh, root, top, frames, reading)
+    return Layout(frames, mesh, names, instances.FILE, problems, notes + more)
+
+
+def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], list[str]]:
+    """All frames that the capture `root` lists, sentences on those that can't be used, and on what may mean else."""
+    listed: list[tuple[dict[str, Any], Any, Path]] = []
+    notes: list[str] = []
+    for path in find(root) or [root / FILE]:
+        top = read_json(path)
+        entries = top.get("frames")
+        if not isinstance(entries, list) or not entries:
+            raise BadInputError(f"'{path}' lists no frames; export the capture again.")
+        entries, said = _without_test(top, entries)
+        listed += [(top, entry, path) for entry in entries]
+        notes += said + _unexposed(top, entries) + lens_notes(top, entries) + _orientation(top)
+    if (root / TEST_SPLIT).is_file() and not (root / FILE).is_file():
+        notes.append(f"The frames of '{TEST_SPLIT}' were left out; put those to be used into '{FILE}'.")
+    names = [_name(entry, i) for i, (_, entry, _) in enumerate(listed)]
+    if len(set(names)) < len(names):  # left/0001 and right/0001: tell them apart by their folders
+        names = [
+            str(entry.get("file_path", i)) if isinstance(entry, dict) else str(i)
+            for i, (_, entry, _) in enumerate(listed)
+        ]
+    frames: list[Frame] = []
+    told: list[tuple[dict[str, Any], dict[str, Any]]] = []
+    problems: list[str] = []
+    seen: set[Path] = set()
+    for name, (top, entry, path) in zip(names, listed):
+        if not isinstance(entry, dict):
+            problems.append(f"Frame '{name}' is no JSON object in '{path}'.")
+            continue
+        model = check_model(top, entry, path)
+        try:
+            frame = _frame(root, top, entry, name, model, reading)
+            if frame.path in seen:
+                raise BadInputError(f"Frame '{name}' is listed twice; keep the entry with the right pose.")
+        except EscapesError:
+            raise
+        except BadInputError as error:
+            problems.append(str(error))
+            continue
+        seen.add(frame.path)
+        frames.append(frame)
+        told.append((top, entry))
+    frames, said = with_settings(frames, told)
+    return frames, problems, list(dict.fromkeys(notes + said))
+
+
+def _without_test(top: dict[str, Any], entries: list[Any]) -> tuple[list[Any], list[str]]:
+    """The entries without those that are for testing alone (`test_filenames`), and a sentence on them."""
+
+    def split(key: str) -> set[str]:
+        value = top.get(key)
+        return {_plain(v) for v in value if isinstance(v, str)} if isinstance(value, list) else set()
+
+    test = split("test_filenames") - split("train_filenames")
+    kept = [e for e in entries if not (isinstance(e, dict) and isinstance(e.get("file_path"), str)
+                                       and _plain(e["file_path"]) in test)]  # fmt: skip
+    if not kept or len(kept) == len(entries):
+        return entries, []
+    return kept, [
+        f"{len(entries) - len(kept)} of {len(entries)} frames are listed in 'test_filenames' and were left "
+        "out; take them out of that list to use them."
+    ]
+
+
+def _plain(path: str) -> str:
+    return PurePosixPath(path.replace("\\", "/")).as_posix()
+
+
+def _unexposed(top: dict[str, Any], entries: list[Any]) -> list[str]:
+    """A sentence where some frames state an exposure and others don't."""
+    stated = [isinstance(entry, dict) and entry.get("exposure") is not None for entry in entries]
+    if not any(stated) or all(stated) or top.get("exposure") is not None:
+        return []
+    index = stated.index(False)
+    return [
+        f"{stated.count(False)} of {len(stated)} frames state no exposure (the first: "
+        f"'{_name(entries[index], index)}'); it was taken as 1; give each frame its own."
+    ]
+
+
+def _orientation(top: dict[str, Any]) -> list[str]:
+    """A sentence where nerfstudio itself would turn the world before it uses it."""
+    method = top.get("orientation_override")
+    if method in (None, "none"):
+        return []
+    return [
+        f"The file asks nerfstudio to turn the world upright ('orientation_override' is '{method}'); the poses "
+        "were taken as stored, with +Z up."
+    ]
+
+
+def _name(entry: Any, index: int) -> str:
+    path = entry.get("file_path") if isinstance(entry, dict) else None
+    return (isinstance(path, str) and PurePosixPath(path.replace("\\", "/")).stem) or f"#{index}"
+
+
+def _frame(root: Path, top: dict[str, Any], entry: dict[str, Any], name: str, model: str, reading: Reading) -> Frame:
+    """One frame; raises `BadInputError` where it can't be used."""
+    path = ended(inside(root, entry.get("file_path"), name, reading.outside), name)
+    mask = entry.get("mask_path")
+    pose = check_pose(entry.get("transform_matrix"), name)
+    exposure = positive(top, entry, "exposure", name, 1.0)
+    saturation = positive(top, entry, "saturation", name, math.inf)
+    camera = read_camera(top, entry, name, path, model, pose)
+    mask_path = None if mask in (None, "") else inside(root, mask, name, reading.outside)
+    brackets = read_brackets(root, top, entry, name, reading.outside)
+    return Frame(name, path, camera, mask_path, exposure, saturation, brackets=brackets)
+
+
+# The mesh's world
+
+
+def applied(root: Path, top: dict[str, Any]) -> np.ndarray | None:
+    """From the original world to that of the poses (`applied_transform`, `applied_scale`), (4, 4); None: the same.
+
+    Raises
+    ------
+    BadInputError
+        They are no matrix and no number.
+    """
+    matrix = top.get("applied_transform")
+    if matrix is None and (root / "colmap/sparse/0").is_dir():
+        matrix = BEFORE
+    scale = top.get("applied_scale", 1.0)
+    try:
+        result = np.eye(4)
+        if matrix is not None:
+            rows = np.array(matrix, np.float64)
+            if rows.shape not in ((3, 4), (4, 4)):
+                raise ValueError
+            result[:3] = rows[:3]
+        if not is_number(scale) or not scale > 0 or not np.isfinite(result).all():
+            raise ValueError
+    except (TypeError, ValueError):
+        raise BadInputError(
+            f"'{FILE}' in '{root}' has an applied_transform that is no 3 x 4 matrix, or an "
+            "applied_scale that is no number above 0; mend or remove them."
+        ) from None
+    result[:3] *= scale
+    return None if np.array_equal(result, np.eye(4)) else result
+
+
+def _in_frames_world(
+    mesh: RawMesh, root: Path, top: dict[str, Any], frames: list[Frame], reading: Reading
+) -> tuple[RawMesh, list[str]]:
+    """The mesh in the world of the poses, and a sentence where that is not plain.
+
+    nerfstudio writes its own point cloud in the poses' world, and so a mesh is expected there; one that was made by
+    COLMAP itself is not, and is moved as the file says where the cameras leave no doubt. The convention 'as-read' keeps
+    it where it is; others come on top.
+    """
+    matrix = applied(root, top)
+    if matrix is None or not len(mesh.vertices):
+        return mesh, []
+    moved = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+    if reading.convention != AS_READ and frames:
+        there, here = (_within(vertices, frames) for vertices in (moved, mesh.vertices))
+        if there > MOST and here < FEW:
+            return replace(mesh, vertices=moved), [
+                f"'{mesh.name}' was moved from the original world to the poses' by 'applied_transform': {there:.0%} of "
+                f"the cameras are then within its box, and {here:.0%} else; --convention {AS_READ} leaves it."
+            ]
+    if top.get("applied_transform") is None and top.get("applied_scale") is None:
+        return mesh, []
+    return mesh, [
+        f"The poses were moved by 'applied_transform' or 'applied_scale'; '{mesh.name}' was taken to have "
+        "been moved with them."
+    ]
+
+
+def _within(vertices: np.ndarray, frames: list[Frame]) -> float:
+    """Share of the cameras that are within the vertices' box."""
+    low, high = vertices.min(0), vertices.max(0)
+    centres = np.array([frame.camera.centre for frame in frames])
+    return float(((centres >= low) & (centres <= high)).all(1).mean())
+
+
+def _mesh_path(root: Path, top: dict[str, Any], reading: Reading) -> Path:
+    """As `find_mesh`; where it finds none, the file of `ply_file_path`."""
+    try:
+        path = find_mesh(root, reading)
+    except BadInputError:
+        named = top.get("ply_file_path")
+        if not isinstance(named, str):
+            raise
+        path = inside(root, named, MESH, reading.outside)
+        if not path.is_file():
+            raise
+    return path
+
+
+READER = Reader("nerfstudio", FILE, lambda root: bool(find(root)), read)

@@ -1,0 +1,90 @@
+"""What `transforms.json` tells of exposures: our own keys, and those that cameras' settings go by."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import BadInputError
+from ..scene.model import Frame, Shot
+from .exposures import EXPOSURE, Settings, from_settings, settings_of
+from .nerfstudio_camera import positive
+from .paths import inside
+from .pictures import ENDINGS
+
+Entry = dict[str, Any]
+
+
+def ended(path: Path, name: str) -> Path:
+    """`path`, or with the ending that it lacks, as in the NeRF-synthetic scenes.
+
+    Raises
+    ------
+    BadInputError
+        No file can be called so.
+    """
+    try:
+        if path.is_file():
+            return path
+        found = [full for full in (path.with_name(path.name + ending) for ending in ENDINGS) if full.is_file()]
+    except (OSError, ValueError) as error:  # a name that the system can't even ask for
+        raise BadInputError(f"Frame '{name}' has a file_path that can't be a file; mend it.") from error
+    if found:
+        return found[0]
+    return path if path.suffix else path.with_name(path.name + ENDINGS[0])
+
+
+def read_brackets(root: Path, top: Entry, entry: Entry, name: str, outside: bool) -> tuple[Shot, ...]:
+    """Further exposures of a frame: its `brackets`, a list of {file_path, exposure, saturation}.
+
+    Raises
+    ------
+    BadInputError
+        They are no such list, or lead out of the capture.
+    """
+    listed = entry.get("brackets")
+    if listed in (None, []):
+        return ()
+    if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
+        raise BadInputError(
+            f"Frame '{name}' has brackets that are no list of objects; give file_path and exposure of each."
+        )
+    if any(one.get(EXPOSURE) is None for one in listed):
+        raise BadInputError(f"Frame '{name}' has brackets without an exposure; give each its own.")
+    saturation = {"saturation": entry.get("saturation", top.get("saturation"))}
+    return tuple(
+        Shot(
+            ended(inside(root, one.get("file_path"), name, outside), name),
+            positive({}, one, EXPOSURE, name, None),
+            positive(saturation, one, "saturation", name, math.inf),
+        )
+        for one in listed
+    )
+
+
+def with_settings(frames: Sequence[Frame], told: Sequence[tuple[Entry, Entry]]) -> tuple[list[Frame], list[str]]:
+    """Give the frames exposures by what the camera was set to, unless any of them states an exposure.
+
+    Parameters
+    ----------
+    told : sequence of (top, entry)
+        For each frame.
+
+    Returns
+    -------
+    As `exposures.from_settings`.
+    """
+    if any(one.get(EXPOSURE) is not None for pair in told for one in pair):
+        return list(frames), []
+    settings = [_settings(entry, frame.name) for frame, (_, entry) in zip(frames, told)]
+    return from_settings(frames, settings, "the camera's settings in the poses' file")
+
+
+def _settings(entry: Entry, name: str) -> Settings | None:
+    """What the camera was set to; None also where what is told is no number (`auto`)."""
+    try:
+        return settings_of(entry, name)
+    except BadInputError:
+        return None

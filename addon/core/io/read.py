@@ -1,0 +1,200 @@
+"""From a folder to a checked `Capture`: what all formats have in common."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import BadInputError, one_line
+from ..scene.connected_parts import connected_parts
+from ..scene.model import Capture, Frame, Mesh
+from ..scene.vote import vote
+from . import instances
+from .brackets import fold, group_brackets, unfold
+from .camera_check import check_camera
+from .clipping import find_clipping
+from .conventions import parse, upright
+from .exposures import from_csv, from_exif
+from .frame_codes import with_curves
+from .id_pictures import read_ids
+from .layout import AS_FOUND, Layout, Reading
+from .mesh_repair import repair
+from .paths import EscapesError, check_links
+from .pictures import picture_note, picture_size, read_picture
+from .readers import reader_for
+
+MAX_BAD_SHARE = 0.2
+"""More bad frames than this share, and the capture is taken as broken instead of the frames as bad."""
+LISTED = 3
+"""How many problems are told in full."""
+
+
+def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
+    """Read the mesh, the objects and the frames' cameras of a capture, and check them before any long work.
+
+    A bad frame among good ones is left out with a warning.
+
+    Raises
+    ------
+    BadInputError
+        No capture is there, its mesh is unusable, or more than `MAX_BAD_SHARE` of its frames are.
+    """
+    root = Path(folder)
+    if not root.is_dir():
+        what = "is a file, not a folder" if root.exists() else "does not exist"
+        raise BadInputError(f"Capture '{root}' {what}; give the folder that holds the mesh and the poses.")
+    reader = reader_for(root, reading.format)
+    layout = reader.read(root, reading)
+    convention = parse(reading.convention)
+    layout = replace(layout, frames=convention.frames(layout.frames), mesh=convention.mesh(layout.mesh))
+    frames, more = _usable(root, _exposed(layout, reading), reading.outside)
+    frames, grouped = group_brackets(frames)
+    mesh, objects, warnings = _objects(layout, frames)
+    clipped, notes = find_clipping(unfold(frames), lambda path: read_picture(path).rgb)
+    frames = fold(frames, clipped)
+    notes = [*grouped, *_chosen(frames), *notes]
+    known = {one.object_id for one in objects}
+    turn = upright(convention.up)
+    mirrors = tuple(
+        replace(one, point=turn @ one.point, normal=turn @ one.normal)
+        for one in layout.mirrors
+        if one.object_id in known
+    )
+    warnings = tuple(one_line(text) for text in (*warnings, *more, *notes))
+    return Capture(root, mesh, objects, tuple(frames), warnings, reader.name, mirrors)
+
+
+def _exposed(layout: Layout, reading: Reading) -> Layout:
+    """The layout with each frame's exposure and curve as the user or the pictures themselves tell."""
+    frames, problems, notes = layout.frames, [], []
+    if reading.exposures is not None:
+        frames, problems, notes = from_csv(frames, reading.exposures)
+    else:
+        frames, notes = from_exif(frames)
+    frames, more, curves = with_curves(frames, reading.transfer)
+    return replace(
+        layout, frames=frames, problems=[*layout.problems, *problems, *more], notes=[*layout.notes, *notes, *curves]
+    )
+
+
+def _chosen(frames: list[Frame]) -> list[str]:
+    """A sentence for each way in which one of several pictures in a file was chosen."""
+    counts = Counter(note for note in (picture_note(frame.path) for frame in frames) if note)
+    return [f"Taken in {count} of {len(frames)} frames: {note}." for note, count in counts.items()]
+
+
+def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str]]:
+    """The mesh repaired, with an instance for each of its triangles.
+
+    What tells the objects: the mesh's faces, objects or groups; else pictures of ids; else which parts hang together.
+    """
+    raw, warnings = repair(layout.mesh)
+    names = layout.names if layout.names is not None else raw.names
+    found = raw.object_id
+    if found is None and any(frame.id_path is not None for frame in frames):
+        found, notes = vote(raw.vertices, raw.triangles, frames, read_ids)
+        warnings += notes
+    elif found is None:
+        found = connected_parts(raw.vertices, raw.triangles)
+        count = int(found.max()) + 1
+        names = {i: f"part_{i}" for i in range(count)} if count > 1 else {0: "room"}
+        warnings.append(
+            f"Nothing tells the mesh's objects; each of its {count} connected parts is taken as one."
+            if count > 1
+            else "The mesh has no object_id on its faces and hangs together; the whole room is taken as one object."
+        )
+    ids, objects, more = instances.assign(found, names, layout.names_file or instances.FILE)
+    return Mesh(raw.vertices, raw.triangles, ids, raw.uv, None if frames else raw.lit), objects, warnings + more
+
+
+def _usable(root: Path, layout: Layout, outside: bool) -> tuple[list[Frame], list[str]]:
+    """The frames whose pictures are there and fit their cameras, and sentences on the others."""
+    problems = list(layout.problems)
+    good = []
+    for frame in layout.frames:
+        try:
+            if not outside:
+                check_links(root, frame)
+            _check_frame(frame)
+        except EscapesError:
+            raise
+        except BadInputError as error:
+            problems.append(str(error))
+        else:
+            good.append(frame)
+    total = len(layout.frames) + len(layout.problems)
+    warnings = list(layout.notes)
+    if problems:
+        few = " ".join(problems[:LISTED]) + (f" And {len(problems) - LISTED} more." if len(problems) > LISTED else "")
+        if len(problems) > MAX_BAD_SHARE * total:
+            raise BadInputError(
+                f"Capture '{root}' has {len(problems)} bad frames of {total}, too many to leave out; mend these: {few}"
+            )
+        warnings.append(f"{len(problems)} of {total} frames are left out: {few}")
+    if len(good) == 1:
+        warnings.append(
+            "The capture has a single frame; highlights can't be told from colour, and what it does not "
+            "see stays unknown."
+        )
+    return good, warnings
+
+
+def _check_frame(frame: Frame) -> None:
+    """Look at a frame's camera and at the headers of its pictures; raises `BadInputError`."""
+    check_camera(frame.camera, frame.name)
+    wanted = frame.camera.width, frame.camera.height
+    paths = (*(shot.path for shot in frame.shots), frame.mask_path)
+    sizes = [(path, picture_size(path)) for path in paths if path is not None]
+    for path, (width, height) in sizes:
+        if (width, height) != wanted:
+            raise BadInputError(
+                f"Frame '{frame.name}': '{path}' has {width} x {height} pixels, but its camera has "
+                f"{wanted[0]} x {wanted[1]}; give them one size."
+            )
+
+
+def describe(capture: Capture) -> dict[str, Any]:
+    """What the command `info` tells, ready for JSON: counts, sizes in pixels and metres, objects, warnings."""
+    counts = dict(zip(*(a.tolist() for a in np.unique(capture.mesh.object_id, return_counts=True))))
+    corners = capture.mesh.vertices[capture.mesh.triangles]
+    low, high = corners.min((0, 1)), corners.max((0, 1))
+    area = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
+    sizes: dict[str, int] = {}
+    lenses: dict[str, int] = {}
+    for camera in (frame.camera for frame in capture.frames):
+        for counted, key in (
+            (sizes, f"{camera.width}x{camera.height}"),
+            (lenses, "PINHOLE" if camera.lens is None else camera.lens.name),
+        ):
+            counted[key] = counted.get(key, 0) + 1
+    return {
+        "capture": str(capture.root),
+        "format": capture.format,
+        "triangles": len(capture.mesh.triangles),
+        "vertices": len(capture.mesh.vertices),
+        "area_m2": area / 2,
+        "bounds_m": [low.tolist(), high.tolist()],
+        "extent_m": (high - low).tolist(),
+        "frames": len(capture.frames),
+        "resolutions": sizes,
+        "lenses": lenses,
+        "exposures": _exposures(capture),
+        "bracketed_frames": sum(bool(frame.brackets) for frame in capture.frames),
+        "curve_of_codes": next((frame.transfer for frame in capture.frames if frame.transfer), ""),
+        "masks": sum(frame.mask_path is not None for frame in capture.frames),
+        "instances": [
+            {"object_id": one.object_id, "class_name": one.class_name, "triangles": counts.get(one.object_id, 0)}
+            for one in capture.instances
+        ],
+        "warnings": list(capture.warnings),
+    }
+
+
+def _exposures(capture: Capture) -> list[float]:
+    """The least and the greatest exposure of any picture."""
+    values = [frame.exposure for frame in unfold(capture.frames)]
+    return [min(values), max(values)] if values else []

@@ -1,0 +1,164 @@
+"""The layout of Replica (Straub et al. 2019): a mesh of quads whose light is stored on it, and no frames.
+
+`mesh.ply`; `textures/parameters.json` with `splitSize` and `tileSize`; `textures/N-color-ptex.hdr`, raw half floats (no
+Radiance format); `habitat/mesh_semantic.ply` and `habitat/info_semantic.json` for the objects; `glass.sur` for its
+mirrors. Where the folder also holds frames (`transforms.json`, or `traj.txt` with `results`), those are taken, and the
+stored light is not. The viewer's exposure and gamma are display and are not applied.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..errors import BadInputError
+from ..scene.model import LitTiles
+from . import nerfstudio, traj
+from .instances import FILE, read_instances
+from .jsonfile import is_number, read_json
+from .layout import Layout, RawMesh, Reader, Reading
+from .ply import PlyMesh, read_ply
+from .ptex import read_sorted_faces, split_faces
+from .replica_glass import FILE as GLASS
+from .replica_glass import mirrors_of, read_panes
+
+MESH, TEXTURES, PARAMETERS = "mesh.ply", "textures", "textures/parameters.json"
+SEMANTIC, NAMES, ORDER = "habitat/mesh_semantic.ply", "habitat/info_semantic.json", "habitat/sorted_faces.bin"
+PICTURE, LOW_RANGE = "{}-color-ptex.hdr", ("{}-color-ptex.rgb", "{}-color-ptex.dxt1")
+TEXEL_BYTES = 6
+MAX_TILE = 1 << 12
+CORNERS = np.float32([[0, 0], [1, 0], [1, 1], [0, 1]])
+"""Where a quad's corners lie in its tile."""
+FAR = 3.0
+"""Times the usual edge: a face of the mesh with the objects that is further off is another one."""
+
+
+def read(root: Path, reading: Reading) -> Layout:
+    """Read the mesh, its light or the frames beside it, its objects and mirrors.
+
+    Raises
+    ------
+    BadInputError
+        The mesh, its textures or its objects can't be read.
+    """
+    if reading.mesh is not None:
+        raise BadInputError(f"Capture '{root}' has its light on its own mesh; leave --mesh away.")
+    ply = read_ply(root / MESH)
+    mesh = RawMesh(ply.vertices, ply.triangles, ply.object_id, ply.uv, name=MESH)
+    names, notes, names_file = None, [], NAMES
+    if (root / SEMANTIC).is_file():
+        ids, far = _object_id(root / SEMANTIC, ply)
+        mesh = replace(mesh, object_id=ids)
+        notes += (
+            [f"{far:.1%} of the triangles have no face of '{SEMANTIC}' near; they belong to no object."] if far else []
+        )
+    elif (root / FILE).is_file():
+        names_file = FILE
+    if (root / names_file).is_file():
+        names = read_instances(root / names_file)
+    mirrors = []
+    if (root / GLASS).is_file():
+        panes, wrong = read_panes(root / GLASS)
+        mirrors, more = mirrors_of(panes, mesh, names or {})
+        notes += wrong + more
+    other = next((one for one in (nerfstudio.READER, traj.READER) if one.find(root)), None)
+    if other is not None:
+        layout = other.read(root, replace(reading, mesh=root / MESH))
+        mesh = replace(mesh, vertices=layout.mesh.vertices)  # its reader may have moved it to the poses' world
+        notes.append("The capture has frames; the light stored on its mesh is not used.")
+        return Layout(layout.frames, mesh, names, names_file, layout.problems, layout.notes + notes, mirrors)
+    notes.append(
+        "The capture has no frames; its light is taken from the textures on its mesh, which hold one value "
+        "for all views: highlights can't be told, nor what lies outside."
+    )
+    return Layout([], replace(mesh, lit=_tiles(root, ply)), names, names_file, notes=notes, mirrors=mirrors)
+
+
+def _tiles(root: Path, ply: PlyMesh) -> LitTiles:
+    """Which tile each triangle shows."""
+    split, size = _parameters(root / PARAMETERS)
+    faces = int(ply.face.max(initial=-1)) + 1
+    if len(ply.triangles) != 2 * faces or ply.corner.max(initial=0) > 3:
+        raise BadInputError(
+            f"Mesh '{root / MESH}' is not made of quads alone, as its textures need; use the one that came with them."
+        )
+    quads = np.zeros((faces, 4), np.int64)
+    quads[ply.face[:, None], ply.corner] = ply.triangles
+    if (root / ORDER).is_file():
+        chunks = read_sorted_faces(root / ORDER, faces)
+    else:
+        chunks = split_faces(ply.vertices, quads, split)
+    paths, sides = [], []
+    picture, tile = np.zeros(faces, np.int32), np.zeros(faces, np.int32)
+    for i, chunk in enumerate(chunks):
+        path = root / TEXTURES / PICTURE.format(i)
+        paths.append(path)
+        sides.append(_side(path, size, len(chunk), root, i))
+        picture[chunk], tile[chunk] = i, np.arange(len(chunk))
+    if (root / TEXTURES / PICTURE.format(len(chunks))).exists():
+        raise BadInputError(
+            f"'{root / TEXTURES}' has more pictures than the mesh's {len(chunks)} chunks; use the mesh "
+            "that came with them."
+        )
+    return LitTiles(tuple(paths), tuple(sides), size, picture[ply.face], tile[ply.face], CORNERS[ply.corner])
+
+
+def _parameters(path: Path) -> tuple[float, int]:
+    """Edge of the grid's cells in metres (0: a single chunk), and of a tile in texels."""
+    top = read_json(path)
+    split, size = top.get("splitSize"), top.get("tileSize")
+    if not is_number(split) or not is_number(size) or size != int(size) or not 1 <= size <= MAX_TILE:
+        raise BadInputError(f"'{path}' has splitSize {split!r} and tileSize {size!r}; copy it again.")
+    return float(split), int(size)
+
+
+def _side(path: Path, size: int, faces: int, root: Path, i: int) -> int:
+    """Edge of a picture in texels, by the file's size."""
+    if not path.is_file():
+        low = next((name.format(i) for name in LOW_RANGE if (root / TEXTURES / name.format(i)).is_file()), None)
+        what = f"only '{low}', which is not HDR" if low else "it is missing"
+        raise BadInputError(f"Texture '{path}' is needed for the mesh's light, but {what}; copy all of '{TEXTURES}'.")
+    count = path.stat().st_size
+    side = round((count / TEXEL_BYTES) ** 0.5)
+    if TEXEL_BYTES * side * side != count:
+        raise BadInputError(
+            f"Texture '{path}' has {count} bytes, which is no square of raw half floats; copy it again."
+        )
+    if (side // size) ** 2 < faces:
+        raise BadInputError(
+            f"Texture '{path}' has room for {(side // size) ** 2} faces of {size} x {size} texels, but "
+            f"its chunk has {faces}; use the mesh and parameters that came with it."
+        )
+    return side
+
+
+def _object_id(path: Path, ply: PlyMesh) -> tuple[np.ndarray, float]:
+    """The object of each triangle ((t,) int64, -1: none), and the share of those without.
+
+    The mesh with the objects lists the same faces, but not always in the same order: the nearest one counts.
+    """
+    other = read_ply(path)
+    if other.object_id is None:
+        raise BadInputError(f"Mesh '{path}' has no object_id on its faces; copy it again.")
+    if not len(other.triangles) or not len(ply.triangles):
+        raise BadInputError(f"Mesh '{path}' or '{MESH}' has no triangles; copy them again.")
+    here, there = (mesh.vertices[mesh.triangles].mean(1) for mesh in (ply, other))
+    if here.shape == there.shape and np.allclose(here, there, atol=1e-4):
+        return other.object_id, 0.0
+    if not (np.isfinite(here).all() and np.isfinite(there).all()):
+        raise BadInputError(f"Mesh '{path}' or '{MESH}' has vertices that are not finite; copy them again.")
+    distance, nearest = cKDTree(there).query(here)
+    edge = float(np.median(np.linalg.norm(np.diff(ply.vertices[ply.triangles[:, :2]], axis=1), axis=2)))
+    far = distance > FAR * edge
+    return np.where(far, -1, other.object_id[nearest]), float(far.mean())
+
+
+READER = Reader(
+    "replica",
+    f"{PARAMETERS} beside {MESH}",
+    lambda root: (root / PARAMETERS).is_file() and (root / MESH).is_file(),
+    read,
+)

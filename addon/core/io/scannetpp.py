@@ -1,0 +1,185 @@
+"""The layout of ScanNet++ (Yeshwanth et al., ICCV 2023): a laser scan, its annotation, and the DSLR's pictures.
+
+`scans/mesh_aligned_0.05.ply`; `scans/segments.json` with a segment for each vertex, `scans/segments_anno.json` with the
+objects' segments; `dslr/colmap`, whose world is the scan's; `dslr/resized_images` (fisheye), or undistorted ones with
+the pinhole camera of `dslr/nerfstudio/transforms_undistorted.json`. Its own pictures are 8-bit: their curve has to be
+given, or EXR put beside or in place of them. The views that `dslr/train_test_lists.json` calls 'test' are kept out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..scene.model import Frame
+from . import colmap
+from .colmap_model import model_files, read_model
+from .instances import MAX_ID
+from .jsonfile import is_number, read_json
+from .layout import Layout, RawMesh, Reader, Reading
+from .meshes import read_mesh
+
+MESH, SEGMENTS, OBJECTS = "scans/mesh_aligned_0.05.ply", "scans/segments.json", "scans/segments_anno.json"
+MODEL, LISTS, POSES = "dslr/colmap", "dslr/train_test_lists.json", "dslr/nerfstudio/transforms.json"
+PINHOLE = "dslr/nerfstudio/transforms_undistorted.json"
+
+
+@dataclass(frozen=True)
+class _Pictures:
+    """A folder of pictures, that of their masks, and whether the lens was taken out."""
+
+    folder: str
+    masks: str
+    pinhole: bool
+
+
+PICTURES = (_Pictures("dslr/resized_images", "dslr/resized_anon_masks", False),
+            _Pictures("dslr/resized_undistorted_images", "dslr/resized_undistorted_masks", True),
+            _Pictures("dslr/undistorted_images", "dslr/undistorted_anon_masks", True))  # fmt: skip
+
+
+def read(root: Path, reading: Reading) -> Layout:
+    """Read the mesh with its objects and the frames.
+
+    Raises
+    ------
+    BadInputError
+        The mesh, the poses or the annotation can't be read, or there are no pictures.
+    """
+    mesh = read_mesh(reading.mesh or root / MESH, reading)
+    names = None
+    if reading.mesh is None and (root / SEGMENTS).exists() and (root / OBJECTS).exists():
+        ids, names = objects_of(root, mesh)
+        mesh = replace(mesh, object_id=ids)
+    kind = _pictures(root)
+    frames, problems, notes = colmap.frames_of(read_model(root / MODEL), root, root / kind.folder, reading)
+    if kind.pinhole and frames:
+        frames = _undistorted(frames, root)
+    frames, more = _chosen(frames, root)
+    frames = [_masked(frame, root / kind.folder, root / kind.masks) for frame in frames]
+    return Layout(frames, mesh, names, OBJECTS, problems, notes + more)
+
+
+def _pictures(root: Path) -> _Pictures:
+    """The folder with HDR pictures; else the first that is there."""
+    there = [kind for kind in PICTURES if (root / kind.folder).is_dir()]
+    if not there:
+        raise BadInputError(f"Capture '{root}' has no pictures; put them into '{root / PICTURES[0].folder}'.")
+    for kind in there:
+        if any(path.suffix.lower() in colmap.HDR for path in (root / kind.folder).iterdir()):
+            return kind
+    return there[0]
+
+
+def objects_of(root: Path, mesh: RawMesh) -> tuple[np.ndarray, dict[int, str]]:
+    """The object of each triangle ((t,) int64, -1: none) and the objects' labels.
+
+    A vertex of several objects is taken as the smallest's; a triangle has the object of most of its corners.
+    """
+    values = read_json(root / SEGMENTS).get("segIndices")
+    try:
+        segment = np.array(values if isinstance(values, list) else [], np.int64)
+    except (TypeError, ValueError, OverflowError):
+        segment = np.zeros(0)
+    if segment.shape != (len(mesh.vertices),):
+        raise BadInputError(
+            f"'{root / SEGMENTS}' does not name a segment for each of the {len(mesh.vertices)} vertices"
+            f" of '{mesh.name}'; copy both from the same scan."
+        )
+    groups = read_json(root / OBJECTS).get("segGroups")
+    if not isinstance(groups, list):
+        raise BadInputError(f"'{root / OBJECTS}' has no list 'segGroups'; copy it again.")
+    kinds, place = np.unique(segment, return_inverse=True)
+    size = np.bincount(place)
+    names: dict[int, str] = {}
+    members = []
+    for i, group in enumerate(groups):
+        number, own = _group(group, i, root)
+        if number in names:
+            raise BadInputError(f"'{root / OBJECTS}' lists the object {number} twice; copy it again.")
+        names[number] = str(group.get("label") or f"object_{number}")
+        own = np.flatnonzero(np.isin(kinds, own))
+        members.append((int(size[own].sum()), number, own))
+    of_segment = np.full(len(kinds), -1, np.int64)
+    for _, number, own in sorted(members, key=lambda one: -one[0]):
+        of_segment[own] = number
+    corner = of_segment[place][mesh.triangles]
+    return np.where(corner[:, 1] == corner[:, 2], corner[:, 1], corner[:, 0]), names
+
+
+def _group(group: Any, i: int, root: Path) -> tuple[int, list[int]]:
+    """Id and segments of an object."""
+    number = group.get("objectId", group.get("id")) if isinstance(group, dict) else None
+    own = group.get("segments") if isinstance(group, dict) else None
+    good = isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= MAX_ID
+    if not good or not isinstance(own, list) or not all(isinstance(one, int) and abs(one) < 2**62 for one in own):
+        raise BadInputError(
+            f"'{root / OBJECTS}' has an object (number {i}) without a whole 'objectId' and a list of "
+            "'segments'; copy it again."
+        )
+    return number, own
+
+
+def _undistorted(frames: list[Frame], root: Path) -> list[Frame]:
+    """The frames with the pinhole camera of the undistorted pictures."""
+    top = read_json(root / PINHOLE)
+    found = [top.get(key) for key in ("w", "h", "fl_x", "fl_y", "cx", "cy")]
+    if not all(is_number(value) for value in found) or min(found[:4]) <= 0 or any(v != int(v) for v in found[:2]):
+        raise BadInputError(
+            f"'{root / PINHOLE}' does not give w, h, fl_x, fl_y, cx and cy; undistort the pictures again."
+        )
+    width, height, fx, fy, cx, cy = found
+    pinhole = {
+        "width": int(width),
+        "height": int(height),
+        "fx": float(fx),
+        "fy": float(fy),
+        "cx": float(cx),
+        "cy": float(cy),
+        "lens": None,
+    }
+    return [replace(frame, camera=replace(frame.camera, **pinhole)) for frame in frames]
+
+
+def _chosen(frames: list[Frame], root: Path) -> tuple[list[Frame], list[str]]:
+    """The frames that are neither kept out for tests nor called bad, and sentences on those left out."""
+    notes = []
+    for path, what, names in ((root / LISTS, "are kept out for tests", _tests), (root / POSES, "are blurred", _bad)):
+        if path.is_file():
+            out = names(read_json(path))
+            left = [frame for frame in frames if frame.path.stem not in out]
+            if not left and frames:
+                raise BadInputError(f"'{path}' leaves none of the {len(frames)} frames; copy it again.")
+            if len(left) < len(frames):
+                notes.append(f"{len(frames) - len(left)} of {len(frames)} frames {what}, by {path.name}.")
+            frames = left
+    return frames, notes
+
+
+def _tests(top: dict[str, Any]) -> set[str]:
+    listed = top.get("test")
+    return {Path(name).stem for name in listed if isinstance(name, str)} if isinstance(listed, list) else set()
+
+
+def _bad(top: dict[str, Any]) -> set[str]:
+    listed = top.get("frames")
+    return (
+        {Path(str(one.get("file_path"))).stem for one in listed if isinstance(one, dict) and one.get("is_bad")}
+        if isinstance(listed, list)
+        else set()
+    )
+
+
+def _masked(frame: Frame, folder: Path, masks: Path) -> Frame:
+    """The frame with its mask, where one is there: people and faces made unknown."""
+    path = (masks / frame.path.relative_to(folder)).with_suffix(".png") if frame.path.is_relative_to(folder) else masks
+    return replace(frame, mask_path=path) if path.is_file() else frame
+
+
+READER = Reader(
+    "scannet++", f"{MODEL} and {MESH}", lambda root: (root / MESH).is_file() and bool(model_files(root / MODEL)), read
+)

@@ -1,0 +1,145 @@
+"""The layout of the Replica sequences for SLAM: `traj.txt` with a pose a line, pictures in `results`.
+
+Each line is the 4 x 4 matrix from camera to world, row by row, of a camera with x right, y down and z forward.
+`cam_params.json` and the mesh `<name>_mesh.ply` lie in the folder or, as they are given out, beside it. Depth pictures
+are not looked at. (Sucar et al., iMAP, ICCV 2021; Zhu et al., NICE-SLAM, CVPR 2022.)
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..scene.model import Camera, Frame
+from ..scene.pose import check_pose
+from . import instances
+from .jsonfile import is_number, read_json
+from .layout import Layout, RawMesh, Reader, Reading
+from .meshes import IMPORTED, find_mesh, read_mesh
+from .pictures import ENDINGS
+
+POSES, PARAMETERS, FOLDER = "traj.txt", "cam_params.json", "results"
+TO_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
+"""From x right, y down, z forward to x right, y up, z backward."""
+PICTURE = re.compile(r"^frame(\d+)$", re.IGNORECASE)
+MAX_BYTES = 1 << 28
+
+
+def read(root: Path, reading: Reading) -> Layout:
+    """Read the poses, the camera and the mesh.
+
+    Raises
+    ------
+    BadInputError
+        The poses, the camera, the mesh or the list of objects can't be read, or there are no pictures.
+    """
+    frames, problems, notes = read_frames(root)
+    names = instances.names_in(root)
+    return Layout(frames, _mesh(root, reading), names, instances.FILE, problems, notes)
+
+
+def read_frames(root: Path) -> tuple[list[Frame], list[str], list[str]]:
+    """The frames, sentences on those that can't be used, and on what may mean something else."""
+    camera = _camera(root)
+    lines = _lines(root / POSES)
+    pictures = _pictures(root / FOLDER)
+    if not pictures:
+        raise BadInputError(
+            f"Folder '{root / FOLDER}' has no pictures called frame000000.exr and so on; put the frames there."
+        )
+    frames, problems = [], []
+    for i, path in sorted(pictures.items()):
+        name = path.stem
+        if i >= len(lines):
+            problems.append(f"Frame '{name}' has no line in '{root / POSES}', which has {len(lines)}.")
+            continue
+        try:
+            pose = check_pose(_matrix(lines[i], name), name)
+        except BadInputError as error:
+            problems.append(str(error))
+            continue
+        frames.append(Frame(name, path, replace(camera, camera_to_world=pose @ TO_OPENGL)))
+    idle = len(lines) - len(set(pictures) & set(range(len(lines))))
+    notes = [f"{idle} of {len(lines)} lines of {POSES} have no picture."] if idle else []
+    return frames, problems, notes
+
+
+def _camera(root: Path) -> Camera:
+    """The one camera of all frames, without a pose."""
+    path = next((p for p in (root / PARAMETERS, root.absolute().parent / PARAMETERS) if p.is_file()), None)
+    if path is None:
+        raise BadInputError(
+            f"'{root / PARAMETERS}' does not exist; give the camera there: "
+            '{"camera": {"w": 1200, "h": 680, "fx": 600, "fy": 600, "cx": 599.5, "cy": 339.5}}.'
+        )
+    top = read_json(path)
+    values = top.get("camera", top)
+    names = ("w", "h", "fx", "fy", "cx", "cy")
+    found = [values.get(name) if isinstance(values, dict) else None for name in names]
+    if not all(is_number(value) for value in found) or min(found[:4]) <= 0:
+        raise BadInputError(
+            f"'{path}' lacks a number among {', '.join(names)}, or one of the first four is not above 0; mend it."
+        )
+    if any(value != int(value) for value in found[:2]):
+        raise BadInputError(f"'{path}' has a size of {found[0]} x {found[1]}; give whole pixels as w and h.")
+    return Camera(int(found[0]), int(found[1]), *(float(value) for value in found[2:]), np.eye(4))
+
+
+def _lines(path: Path) -> list[str]:
+    """The lines that hold anything."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise BadInputError(f"'{path}' is too large for a list of poses; export it again.")
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise BadInputError(f"'{path}' can't be read ({error.strerror or error}); check its rights.") from error
+    except ValueError as error:
+        raise BadInputError(f"'{path}' is no text; export it again.") from error
+    lines = [line for line in text.splitlines() if line.strip()]
+    if not lines:
+        raise BadInputError(f"'{path}' holds no poses; export it again.")
+    return lines
+
+
+def _matrix(line: str, name: str) -> np.ndarray:
+    try:
+        values = np.array(line.split(), np.float64)
+    except ValueError:
+        values = np.zeros(0)
+    if values.size not in (12, 16):
+        raise BadInputError(f"Frame '{name}' has no line of 16 numbers in {POSES}; export the poses again.")
+    return values.reshape(-1, 4)
+
+
+def _pictures(folder: Path) -> dict[int, Path]:
+    """The picture of each line; of several kinds the one that holds most: they are listed in that order."""
+    found: dict[int, Path] = {}
+    order = {ending: place for place, ending in enumerate(ENDINGS)}
+    for path in folder.iterdir() if folder.is_dir() else ():
+        match = PICTURE.match(path.stem)
+        if match and path.suffix.lower() in order and path.is_file() and len(match[1]) < 10:
+            other = found.get(int(match[1]))
+            if other is None or order[path.suffix.lower()] < order[other.suffix.lower()]:
+                found[int(match[1])] = path
+    return found
+
+
+def _mesh(root: Path, reading: Reading) -> RawMesh:
+    """The mesh that is named, or in the folder, or beside it under the folder's name."""
+    own = [p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED)]
+    beside = root.absolute().parent / f"{root.absolute().name}_mesh.ply"
+    if reading.mesh is None and not own and beside.is_file():
+        return read_mesh(beside, reading)
+    return read_mesh(find_mesh(root, reading), reading)
+
+
+READER = Reader(
+    "traj",
+    f"{POSES} and {FOLDER}/frame000000.exr",
+    lambda root: (root / POSES).is_file() and (root / FOLDER).is_dir(),
+    read,
+)

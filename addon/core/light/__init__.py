@@ -1,0 +1,1 @@
+"""Transport: the room as a light source, importance sampling, irradiance. Knows nothing of albedo or of fits."""

@@ -1,0 +1,151 @@
+"""Bright triangles: where a share of the rays is aimed. Lamps, and anything else that shines like one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scene.elements import triangle_geometry
+from ..scene.rays import Hits
+from .field import LightField
+
+LUMINANCE = np.float32([0.2126, 0.7152, 0.0722])
+BRIGHT = 8.0
+"""A triangle is bright from this multiple of the surface's mean radiance on. Only the noise depends on it, not the
+expectation: what is not aimed at is still gathered."""
+MAX_TRIANGLES = 1 << 16
+"""Finely meshed lamps have many: 24 of 512 triangles each, cut off at 4096, had an error of 0.74 instead of 0.06."""
+
+
+@dataclass(frozen=True)
+class BrightTriangles:
+    """Triangles that rays are aimed at.
+
+    Attributes
+    ----------
+    corner, edge_u, edge_v : (k, 3) float32
+    normal : (k, 3) float32
+    chance : (k,) float64
+        Of being aimed at; sums to 1. In proportion to area * luminance.
+    density : (t,) float32
+        Chance over area for every triangle of the mesh: density of aimed points per square metre; 0 if not bright.
+    """
+
+    corner: np.ndarray
+    edge_u: np.ndarray
+    edge_v: np.ndarray
+    normal: np.ndarray
+    chance: np.ndarray
+    density: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.chance)
+
+
+def triangle_luminance(field: LightField) -> np.ndarray:
+    """Mean luminance of each triangle over its elements ((t,) float64).
+
+    A triangle too small for elements of its own, as in a finely meshed bulb, shows those of its object beside it.
+    """
+    atlas = field.atlas
+    luminance = field.radiance @ LUMINANCE
+    t = len(field.mesh.triangles)
+    count = np.bincount(atlas.triangle, minlength=t)
+    mean = np.bincount(atlas.triangle, luminance, t) / np.maximum(count, 1)
+    bare = np.flatnonzero(count == 0).astype(np.int32)
+    third = np.full(len(bare), 1 / 3, np.float32)
+    mean[bare] = luminance[field.lookup(bare, third, third)]
+    return mean
+
+
+def bright_triangles(field: LightField) -> BrightTriangles:
+    """The triangles that give most of the light for their size."""
+    normal, area = triangle_geometry(field.mesh)
+    luminance = triangle_luminance(field)
+    mean = (luminance * area).sum() / max(area.sum(), 1e-30)
+    power = np.where(luminance > BRIGHT * mean, luminance * area, 0)
+    bright = np.argsort(-power)[:MAX_TRIANGLES]
+    bright = np.sort(bright[power[bright] > 0])
+    chance = power[bright] / max(power[bright].sum(), 1e-30)
+    density = np.zeros(len(area), np.float32)
+    density[bright] = chance / area[bright]
+    corners = field.mesh.vertices[field.mesh.triangles[bright]].astype(np.float32)
+    return BrightTriangles(
+        corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], normal[bright], chance, density
+    )
+
+
+def aimed_at(
+    bright: BrightTriangles, hits: Hits, directions: np.ndarray, triangle_normal: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which rays met a bright triangle, and the solid-angle density with which aimed rays take their directions.
+
+    Parameters
+    ----------
+    hits : Hits
+        What the n directions met first.
+    directions : (n, 3) float32
+    triangle_normal : (t, 3) float32
+
+    Returns
+    -------
+    (m,) int, (m,) float32
+    """
+    density = bright.density[hits.triangle]  # of an escaped ray that of the last triangle; taken out below
+    on = np.flatnonzero((density > 0) & (hits.triangle >= 0))
+    cosine = np.abs(np.einsum("ij,ij->i", directions[on], triangle_normal[hits.triangle[on]]))
+    return on, density[on] * hits.distance[on] ** 2 / np.maximum(cosine, 1e-6)
+
+
+def aimed_density(
+    bright: BrightTriangles, hits: Hits, directions: np.ndarray, triangle_normal: np.ndarray
+) -> np.ndarray:
+    """The density of `aimed_at` for every ray, (n,) float32; 0 where no bright triangle was met."""
+    density = np.zeros(len(directions), np.float32)
+    if len(bright):
+        on, aimed = aimed_at(bright, hits, directions, triangle_normal)
+        density[on] = aimed
+    return density
+
+
+@dataclass(frozen=True)
+class BrightPoints:
+    """m points drawn on the bright triangles.
+
+    Attributes
+    ----------
+    index : (m,) int
+        Which of the bright triangles.
+    triangle : (m,) int32
+        The same as the mesh's triangle.
+    u, v : (m,) float32
+        Barycentric coordinates.
+    point : (m, 3) float32
+    density : (m,) float32
+        With which the point was drawn, per square metre.
+    """
+
+    index: np.ndarray
+    triangle: np.ndarray
+    u: np.ndarray
+    v: np.ndarray
+    point: np.ndarray
+    density: np.ndarray
+
+
+def sample_bright(bright: BrightTriangles, cube: np.ndarray) -> BrightPoints:
+    """Draw k points for each of n receivers.
+
+    Parameters
+    ----------
+    cube : (n, k, 3) float32
+        In [0, 1): which triangle, and where on it. Well spread in all three together, they spread over each lamp too.
+    """
+    flat = cube.reshape(-1, 3)
+    index = np.minimum(np.searchsorted(np.cumsum(bright.chance), flat[:, 0]), len(bright) - 1)
+    root = np.sqrt(flat[:, 1])
+    u, v = root * (1 - flat[:, 2]), root * flat[:, 2]  # uniform over the triangle
+    point = bright.corner[index] + u[:, None] * bright.edge_u[index] + v[:, None] * bright.edge_v[index]
+    triangle = np.flatnonzero(bright.density > 0).astype(np.int32)[index]
+    return BrightPoints(index, triangle, u, v, point, bright.density[triangle])

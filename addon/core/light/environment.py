@@ -1,0 +1,227 @@
+"""Light from outside: radiance by direction, from the frames' own pixels that see past the mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from ..scene.model import Pixels
+from ..scene.visibility import FrameView
+
+MAX_HEIGHT = 512
+PROFILE, STEEPEST = 3.0, 3.0
+"""Degrees over which the sky's change with the height is smoothed, and how far it may go either way."""
+NEAR = np.radians(8)
+"""Angle over which what was seen of the sky says something of its surroundings."""
+
+
+@dataclass(frozen=True)
+class Zone:
+    """A part of the sky whose radiance is not known but for its pattern.
+
+    Attributes
+    ----------
+    weight : (h, 2h) float32
+        How far each direction belongs to it, 0...1.
+    pattern : (h, 2h) float32
+        Its radiance at a mean of 1, times the weight.
+    told : bool
+        Frames tell radiance on its side of the horizon.
+    """
+
+    weight: np.ndarray
+    pattern: np.ndarray
+    told: bool = False
+
+
+def _solid(weight: np.ndarray) -> np.ndarray:
+    """Weights ((h, 2h)) times what each row covers of the sphere."""
+    height = len(weight)
+    return np.cos((np.arange(height) + 0.5) / height * np.pi - np.pi / 2)[:, None] * weight
+
+
+def _levelled(pattern: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """The pattern, scaled so that its mean over the weights is 1."""
+    return (pattern * (_solid(weight).sum() / max(_solid(pattern).sum(), 1e-20))).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Environment:
+    """A directional map, infinitely far away.
+
+    Attributes
+    ----------
+    radiance : (h, 2h, 3) float32
+        Equirectangular, row 0 at the bottom; u = 0.5 - atan2(y, x) / (2 pi), v = 0.5 + asin(z) / pi. Linear Rec.709.
+    observations : (h, 2h) int32
+        Pixels behind each direction; 0 where `radiance` was filled in from neighbours.
+    clipped : (h, 2h) bool
+        Every one of those was clipped: `radiance` is a lower bound. None: nothing is.
+    """
+
+    radiance: np.ndarray
+    observations: np.ndarray
+    clipped: np.ndarray | None = None
+
+    def __post_init__(self):
+        if self.clipped is None:
+            object.__setattr__(self, "clipped", np.zeros(self.observations.shape, bool))
+
+    @property
+    def seen(self) -> bool:
+        """Whether any frame saw the outside at all."""
+        return bool(self.observations.any())
+
+    @property
+    def told(self) -> np.ndarray:
+        """Directions whose radiance frames tell: seen, and not clipped; (h, 2h) bool."""
+        return (self.observations > 0) & ~self.clipped
+
+    @staticmethod
+    def dark() -> Environment:
+        """No light from outside."""
+        return Environment(np.zeros((1, 2, 3), np.float32), np.zeros((1, 2), np.int32))
+
+    @staticmethod
+    def only(pattern: np.ndarray) -> Environment:
+        """Radiance as `pattern` ((h, 2h) float32) has it, in all channels alike."""
+        return Environment(np.repeat(pattern[..., None], 3, -1).astype(np.float32), np.zeros(pattern.shape, np.int32))
+
+    def unseen_zones(self) -> list[Zone]:
+        """The unseen directions above and below the horizon.
+
+        The weight is 0 where a frame saw the direction, towards 1 the further it lies from those: near them the
+        neighbours' radiance is as good a guess as any. Within a zone radiance goes with the height as it does where the
+        frames saw it: skies change more with the height than around.
+        """
+        unseen = self.observations == 0
+        height, width = unseen.shape
+        wide = np.concatenate([unseen] * 3, 1)  # directions wrap around
+        angle = ndimage.distance_transform_edt(wide)[:, width : 2 * width] * (np.pi / height)
+        weight = (1 - np.exp(-angle / NEAR)).astype(np.float32)
+        above = (np.arange(height) >= height / 2)[:, None]
+        zones = [(np.where(side, weight, np.float32(0)), bool((self.told & side).any())) for side in (above, ~above)]
+        profile = self._profile()[:, None]
+        return [Zone(zone, _levelled(zone * profile, zone), told) for zone, told in zones if zone.any()]
+
+    def _profile(self) -> np.ndarray:
+        """Median luminance of what frames saw at each height, (h,) float32; of the nearest height that they saw."""
+        height = len(self.observations)
+        known = self.told
+        rows = np.flatnonzero(known.any(1))
+        if not len(rows):
+            return np.ones(height, np.float32)
+        level = [np.median(self.radiance[row, known[row]].mean(1)) for row in rows]
+        profile = np.interp(np.arange(height), rows, level)
+        profile = ndimage.gaussian_filter1d(profile, np.radians(PROFILE) / np.pi * height, mode="nearest")
+        middle = max(float(np.median(profile[rows])), 1e-12)
+        return np.clip(profile / middle, 1 / STEEPEST, STEEPEST).astype(np.float32)
+
+    def clipped_zone(self) -> Zone:
+        """The directions of which only a lower bound is known."""
+        weight = self.clipped.astype(np.float32)
+        return Zone(weight, weight)
+
+    def zone_mean(self, zone: Zone) -> np.ndarray:
+        """Mean radiance over a zone, weighted by solid angle: (3,) float32."""
+        share = _solid(zone.weight)
+        return (self.radiance * share[..., None]).sum((0, 1)) / max(share.sum(), 1e-12)
+
+    def with_zone(self, zone: Zone, radiance: np.ndarray) -> Environment:
+        """The same map with a mean `radiance` ((3,)) mixed in by the weights of a zone, in its pattern."""
+        mixed = self.radiance * (1 - zone.weight[..., None]) + zone.pattern[..., None] * radiance
+        return Environment(mixed.astype(np.float32), self.observations, self.clipped)
+
+    def __call__(self, directions: np.ndarray) -> np.ndarray:
+        """Radiance from unit `directions` ((n, 3) float32, away from the room): (n, 3) float32."""
+        return self.radiance.reshape(-1, 3)[_bin(directions, self.radiance.shape[0])]
+
+    def refilled(self, radiance: np.ndarray) -> Environment:
+        """The map with another `radiance` where frames saw it; the rest is filled in from that."""
+        return Environment(_filled(radiance, self.observations), self.observations, self.clipped)
+
+    def known(self, directions: np.ndarray) -> np.ndarray:
+        """Whether frames tell the radiance from unit `directions` ((n, 3)), (n,) bool."""
+        cell = _bin(directions, self.radiance.shape[0])
+        return self.told.ravel()[cell]
+
+
+def _bin(directions: np.ndarray, height: int) -> np.ndarray:
+    """Flat index of the map's cell that each direction falls in."""
+    width = 2 * height
+    u = 0.5 - np.arctan2(directions[:, 1], directions[:, 0]) * np.float32(0.5 / np.pi)
+    v = 0.5 + np.arcsin(np.clip(directions[:, 2], -1, 1)) * np.float32(1 / np.pi)
+    column = np.minimum((u * width).astype(np.int32), width - 1)
+    return np.minimum((v * height).astype(np.int32), height - 1) * width + column
+
+
+def _filled(radiance: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Unseen directions from seen ones; those below the horizon from below it, those above it from above.
+
+    The ground's radiance says nothing of the sky's. Filled in across the horizon, what light told of the ground was
+    .73, .55 and a third (its bound) of the guess in three rooms, and where it could not tell .9 stood for .5.
+    """
+    half = len(weight) // 2
+    if not half or not (weight[:half] > 0).any() or not (weight[half:] > 0).any():
+        return _fill(radiance, weight)
+    return np.concatenate([_fill(radiance[part], weight[part]) for part in (slice(half), slice(half, None))])
+
+
+def _fill(radiance: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Pull-push: unseen cells take the mean of the nearest coarser neighbourhood that has any."""
+    height, width = weight.shape
+    if height == 1 or (weight > 0).all():
+        if not (weight > 0).any():
+            return np.zeros_like(radiance)
+        mean = (radiance * weight[..., None]).sum((0, 1)) / weight.sum()
+        return np.where(weight[..., None] > 0, radiance, mean).astype(np.float32)
+    seen = (weight > 0).astype(np.float32)
+    small_weight = seen.reshape(height // 2, 2, width // 2, 2).sum((1, 3))
+    summed = (radiance * seen[..., None]).reshape(height // 2, 2, width // 2, 2, 3).sum((1, 3))
+    small = _fill(summed / np.maximum(small_weight, 1)[..., None], small_weight)
+    return np.where(seen[..., None] > 0, radiance, small.repeat(2, 0).repeat(2, 1)).astype(np.float32)
+
+
+class EnvironmentAccumulator:
+    """Collects escaped pixels frame by frame; give `add` to `accumulate(also=...)`.
+
+    Parameters
+    ----------
+    pixel_angle : float
+        Radians that one pixel of the frames covers; sets the map's resolution (at most `MAX_HEIGHT` rows).
+    """
+
+    def __init__(self, pixel_angle: float):
+        wanted = np.pi / max(pixel_angle, 1e-6)
+        self._height = int(min(MAX_HEIGHT, 2 ** np.round(np.log2(max(wanted, 16)))))
+        cells = 2 * self._height**2
+        self._sum = np.zeros((cells, 3))
+        self._count = np.zeros(cells, np.int64)
+        self._bound = np.zeros((cells, 3), np.float32)
+        self._bounds = np.zeros(cells, np.int64)
+
+    def add(self, view: FrameView, pixels: Pixels) -> None:
+        """Take the pixels whose whole neighbourhood escapes (an edge mixes in the window frame)."""
+        outside = (view.triangle < 0) & view.clean & pixels.valid
+        if not outside.any():
+            return
+        directions = view.camera.directions(view.camera.pixel_centres()[outside.ravel()])
+        cells = _bin(directions, self._height)
+        radiance, clipped = pixels.radiance[outside], pixels.saturated[outside]
+        np.maximum.at(self._bound, cells[clipped], radiance[clipped])
+        self._bounds += np.bincount(cells[clipped], minlength=len(self._count))
+        cells, radiance = cells[~clipped], radiance[~clipped]
+        for channel in range(3):
+            self._sum[:, channel] += np.bincount(cells, radiance[:, channel], len(self._count))
+        self._count += np.bincount(cells, minlength=len(self._count))
+
+    def result(self) -> Environment:
+        """The map, unseen directions filled in from their neighbours; of clipped ones the greatest lower bound."""
+        shape = (self._height, 2 * self._height)
+        clipped = (self._count == 0) & (self._bounds > 0)
+        mean = self._sum / np.maximum(self._count, 1)[:, None]
+        mean = np.where(clipped[:, None], self._bound, mean).astype(np.float32).reshape(*shape, 3)
+        count = np.where(clipped, self._bounds, self._count).reshape(shape).astype(np.int32)
+        return Environment(_filled(mean, count), count, clipped.reshape(shape))

@@ -1,0 +1,168 @@
+"""The light field of the captured room: along a ray, radiance is L_d where it hits, the environment where it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..scene.atlas import Atlas
+from ..scene.elements import ElementLookup, triangle_geometry
+from ..scene.model import Mesh
+from ..scene.rays import Hits, RayScene
+from .environment import Environment
+from .mirrors import Mirror
+
+if TYPE_CHECKING:
+    from .sun import Sun
+
+FLAT = np.cos(np.radians(2.0))
+"""Triangles turned less than this against a mirror's plane belong to it."""
+
+
+class LightField:
+    """L(x, w) (Haefner et al. 2021, sec. 3.2: "radiance at a hit is L_d there").
+
+    Parameters
+    ----------
+    radiance : (n, 3) float32
+        L_d of each element, no NaN.
+    lamps : iterable of int
+        Objects that give light. They do so on the side that the normals show, which is the side the frames see: a
+        lamp that is a bare rectangle under a ceiling does not light the gap above it. So does each side of a sheet
+        that has two (`Mesh.backs`).
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        atlas: Atlas,
+        scene: RayScene,
+        radiance: np.ndarray,
+        environment: Environment,
+        lamps: Iterable[int] = (),
+    ):
+        self.mesh, self.atlas, self.scene, self.environment = mesh, atlas, scene, environment
+        self.radiance = np.ascontiguousarray(radiance, np.float32)
+        self.normal, _ = triangle_geometry(mesh)
+        self._say_lamps(lamps)
+        self.mirrors: tuple[Mirror, ...] = ()
+        self.sun: Sun | None = None
+        self.mirror_of = np.full(len(mesh.triangles), -1, np.int8)
+        self.lookup = ElementLookup(mesh, atlas)
+
+    def with_light(
+        self, radiance: np.ndarray, environment: Environment | None = None, lamps: Iterable[int] | None = None
+    ) -> LightField:
+        """The same room with another L_d and, if given, another environment and other lamps."""
+        other = object.__new__(LightField)
+        other.__dict__.update(self.__dict__)
+        other.radiance = np.ascontiguousarray(radiance, np.float32)
+        other.environment = environment or self.environment
+        if lamps is not None:
+            other._say_lamps(lamps)
+        return other
+
+    def _say_lamps(self, lamps: Iterable[int]) -> None:
+        self.one_sided = np.isin(self.mesh.object_id, list(lamps))
+        self._lamps = bool(self.one_sided.any())
+        if self.mesh.backs is not None:  # rays meet no side from behind, but are aimed at points on either
+            self.one_sided[self.mesh.backs] = True
+            self.one_sided[len(self.mesh.triangles) - len(self.mesh.backs) :] = True
+
+    def with_mirrors(self, mirrors: tuple[Mirror, ...]) -> LightField:
+        """The same room with flat mirrors that rays go on from."""
+        other = self.with_light(self.radiance)
+        other.mirrors = mirrors
+        other.mirror_of = np.full(len(self.mesh.triangles), -1, np.int8)
+        for i, mirror in enumerate(mirrors):
+            flat = np.abs(self.normal @ mirror.normal) > FLAT
+            other.mirror_of[flat & (self.mesh.object_id == mirror.object_id)] = i
+        return other
+
+    def with_sun(self, sun: Sun | None) -> LightField:
+        """The same room with a sun, or without one. Rays don't meet it: its part of E is `sun.sunlight`."""
+        other = self.with_light(self.radiance)
+        other.sun = sun
+        return other
+
+    def elements(self, hits: Hits) -> np.ndarray:
+        """The element at each hit, (n,) int32; -1 where the ray escaped."""
+        missed = np.flatnonzero(hits.triangle < 0)
+        if len(missed) == len(hits.triangle):
+            return np.full(len(missed), -1, np.int32)
+        # u and v of a miss may be anything.
+        u, v = hits.u, hits.v
+        if len(missed):
+            u, v = u.copy(), v.copy()
+            u[missed] = v[missed] = 0
+        element = self.lookup(hits.triangle, u, v)
+        element[missed] = -1
+        return element
+
+    def along(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Follow rays.
+
+        Parameters
+        ----------
+        origins, directions : (n, 3) float32
+
+        Returns
+        -------
+        radiance : (n, 3) float32
+            Coming back along each ray.
+        distance : (n,) float32
+            inf where it escapes.
+        element : (n,) int32
+            -1 where it escapes.
+        """
+        hits = self.scene.intersect(origins, directions)
+        element = self.elements(hits)
+        return self.arriving(hits, element, directions), hits.distance, element
+
+    def arriving(
+        self, hits: Hits, element: np.ndarray, directions: np.ndarray, dark_in_mirrors: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Radiance that comes back along rays whose hits and `elements` are known, (n, 3) float32.
+
+        Parameters
+        ----------
+        dark_in_mirrors : (t,) float32, optional
+            Triangles with a value above 0 count as dark where they are seen in a mirror.
+        """
+        radiance = self._sent(hits, element, directions)
+        if self.mirrors:
+            seen = np.flatnonzero((self.mirror_of[hits.triangle] >= 0) & (element >= 0))
+            if len(seen):
+                radiance[seen] = self._mirrored(hits.part(seen), directions[seen], dark_in_mirrors)
+        return radiance
+
+    def _sent(self, hits: Hits, element: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """L_d at hits, the environment where rays escape; lamps are dark from behind."""
+        radiance = self.radiance[element]
+        escaped = np.flatnonzero(element < 0)
+        if len(escaped):
+            radiance[escaped] = self.environment(directions[escaped])
+        lamp = np.flatnonzero(self.one_sided[hits.triangle] & (element >= 0)) if self._lamps else ()
+        if len(lamp):
+            behind = np.einsum("ij,ij->i", directions[lamp], self.normal[hits.triangle[lamp]]) > 0
+            radiance[lamp[behind]] = 0
+        return radiance
+
+    def _mirrored(self, hits: Hits, directions: np.ndarray, dark: np.ndarray | None) -> np.ndarray:
+        """What a mirror that was hit shows; a second mirror shows its L_d."""
+        a, b, c = (self.mesh.vertices[self.mesh.triangles[hits.triangle, i]] for i in range(3))
+        u, v = hits.u[:, None], hits.v[:, None]
+        turn = ((1 - u - v) * a + u * b + v * c).astype(np.float32)
+        normal = self.normal[hits.triangle]
+        along = np.einsum("ij,ij->i", directions, normal)[:, None]
+        onward = directions - 2 * along * normal
+        origins = self.scene.off_surface(turn, -np.sign(along) * normal)
+        further = self.scene.intersect(origins, onward)
+        element = self.elements(further)
+        radiance = self._sent(further, element, onward)
+        if dark is not None:
+            radiance[(dark[further.triangle] > 0) & (element >= 0)] = 0
+        f0 = np.stack([mirror.f0 for mirror in self.mirrors]).astype(np.float32)
+        return radiance * f0[self.mirror_of[hits.triangle]]

@@ -1,0 +1,193 @@
+"""The sun: light from one small disc of the sky, whose shadows are followed exactly.
+
+In a map of the sky it fills a texel or two, which rays find by chance; so it is kept apart from the map (`taken_out`),
+its part of E comes from shadow rays at every place (`sunlight`), and it goes back into the map that is written
+(`put_in`). One that no frame saw is solved for (`sun_fit`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..scene.rays import RayScene
+from .directions import shifted, sobol, tangent_frame
+from .emitters import LUMINANCE
+from .environment import Environment
+
+RADIUS = float(np.radians(0.27))
+"""Of the sun's disc, as it is seen from the earth."""
+EDGE = float(np.radians(0.3))
+"""A shadow's edge is told no better than this: the direction that was solved for, the poses, the mesh."""
+SHADOW_RAYS = 16
+ABOVE = 30.0
+"""How often brighter than the sky around it a seen sun must be."""
+WIDE, RING = float(np.radians(2.5)), float(np.radians(7.0))
+"""It and its glare fit into a disc of the first radius; what lies on to the second is the sky around it."""
+LEAST_SHARE = 0.02
+"""Of the irradiance by all the sky: less is left in the map."""
+WRITTEN_ROWS = 512
+"""Least height of a map that a sun is put into: a texel of 0.35 degrees."""
+
+
+@dataclass(frozen=True)
+class Sun:
+    """Attributes
+    ----------
+    direction : (3,) float32
+        Unit, towards it.
+    irradiance : (3,) float32
+        On a surface that faces it, radiance * steradian, linear Rec.709.
+    radius : float
+        Of its disc, radians.
+    seen : bool
+        False: solved for from the light that it throws.
+    note : str
+        How it was found, one sentence.
+    """
+
+    direction: np.ndarray
+    irradiance: np.ndarray
+    radius: float = RADIUS
+    seen: bool = False
+    note: str = ""
+
+    def where(self) -> str:
+        """Its place and strength in words."""
+        x, y, z = (float(v) for v in self.direction)
+        azimuth, elevation = np.degrees(np.arctan2(y, x)) % 360, np.degrees(np.arcsin(np.clip(z, -1, 1)))
+        light = ", ".join(f"{v:.3g}" for v in self.irradiance)
+        return f"azimuth {azimuth:.1f} (from +X towards +Y), elevation {elevation:.1f} degrees, irradiance {light}"
+
+
+def around(direction: np.ndarray, disc: np.ndarray) -> np.ndarray:
+    """Unit directions at offsets `disc` ((..., 2), radians) from one, (..., 3) float32."""
+    across, up = tangent_frame(np.asarray(direction, np.float32)[None])
+    turned = direction + disc[..., :1] * across[0] + disc[..., 1:] * up[0]
+    return (turned / np.linalg.norm(turned, axis=-1, keepdims=True)).astype(np.float32)
+
+
+def _disc(square: np.ndarray, radius: float) -> np.ndarray:
+    """Points of the unit square, area kept in proportion, in a disc."""
+    r, phi = radius * np.sqrt(square[..., 0]), 2 * np.pi * square[..., 1]
+    return np.stack([r * np.cos(phi), r * np.sin(phi)], -1)
+
+
+def shadow(
+    scene: RayScene, sun: Sun, position: np.ndarray, normal: np.ndarray, edge: float, seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """How much of the sun reaches places.
+
+    Parameters
+    ----------
+    position, normal : (n, 3) float32
+    edge : float
+        Of a surface element, metres: E is its mean.
+
+    Returns
+    -------
+    thrown : (n,) float32
+        E at an irradiance of 1: the visible share times the cosine.
+    unsure : (n,) float32
+        Its standard error at a shadow's edge.
+    """
+    cosine = np.maximum(normal @ np.asarray(sun.direction, np.float32), 0)
+    facing = np.flatnonzero(cosine > 0)
+    visible = np.zeros(len(position), np.float32)
+    if len(facing):
+        count = len(facing)
+        rng = np.random.default_rng([seed, 2])
+        points = shifted(sobol(SHADOW_RAYS, seed, 4), min(64, count), rng)[rng.integers(0, min(64, count), count)]
+        way = around(sun.direction, _disc(points[..., :2], float(np.hypot(sun.radius, EDGE))))
+        across, up = tangent_frame(normal[facing])
+        off = np.float32(edge) * (points[..., 2:] - np.float32(0.5))
+        start = scene.off_surface(position[facing], normal[facing])[:, None]
+        start = start + off[..., :1] * across[:, None] + off[..., 1:] * up[:, None]
+        far = np.full(count * SHADOW_RAYS, np.inf, np.float32)
+        hidden = scene.occluded(start.reshape(-1, 3), way.reshape(-1, 3), far)
+        visible[facing] = 1 - hidden.reshape(count, SHADOW_RAYS).mean(1)
+    return cosine * visible, cosine * np.sqrt(visible * (1 - visible))
+
+
+def sunlight(
+    scene: RayScene, sun: Sun, position: np.ndarray, normal: np.ndarray, edge: float, seed: int = 0
+) -> np.ndarray:
+    """The sun's part of E in three channels, and the luminance of its error, (n, 4) float32; see `shadow`."""
+    thrown, unsure = shadow(scene, sun, position, normal, edge, seed)
+    light = np.float32(sun.irradiance)
+    return np.concatenate([thrown[:, None] * light, (unsure * light.mean())[:, None]], 1).astype(np.float32)
+
+
+def _directions(height: int) -> tuple[np.ndarray, np.ndarray]:
+    """Direction ((h, 2h, 3)) and solid angle ((h, 1)) of a map's texels."""
+    latitude = (np.arange(height) + 0.5) / height * np.pi - np.pi / 2
+    longitude = np.pi - (np.arange(2 * height) + 0.5) / height * np.pi
+    flat = np.cos(latitude)[:, None]
+    way = np.stack([flat * np.cos(longitude), flat * np.sin(longitude), np.sin(latitude)[:, None] + 0 * longitude], -1)
+    edges = np.sin(np.arange(height + 1) / height * np.pi - np.pi / 2)
+    return way.astype(np.float32), (np.diff(edges) * np.pi / height)[:, None]
+
+
+def taken_out(environment: Environment) -> tuple[Environment, Sun | None]:
+    """The map without the sun that frames saw in it, and that sun.
+
+    It is what lies within `WIDE` of the middle of the brightest seen texels, if it is more than `ABOVE` times over the
+    sky around (the median from there to `RING`), nothing else in the map is, and it gives `LEAST_SHARE` of the light.
+    A clipped sun is none that was seen: its light is solved for.
+    """
+    luminance = environment.radiance @ LUMINANCE
+    seen = environment.told
+    if not seen.any():
+        return environment, None
+    way, solid = _directions(len(luminance))
+    wide = max(WIDE, 1.5 * np.pi / len(luminance))  # its own texel and those around it, where they are coarse
+    peak = np.unravel_index(np.where(seen, luminance, -1).argmax(), luminance.shape)
+    disc = (way @ way[peak] > np.cos(2 * wide)) & (luminance > luminance[peak] / 4)
+    middle = (way * (solid * disc)[..., None]).sum((0, 1))
+    angle = np.arccos(np.clip(way @ (middle / np.linalg.norm(middle)), -1, 1))
+    near = angle <= wide
+    ring = seen & ~near & (angle < RING)
+    beside = ring if ring.any() else seen & ~near
+    if not beside.any():
+        return environment, None
+    sky = np.median(environment.radiance[beside], 0)
+    level = ABOVE * max(float(sky @ LUMINANCE), 1e-12)
+    bright = (luminance > level) & (environment.observations > 0)
+    if not bright[near & seen].any() or (bright & ~near).any() or (bright & environment.clipped).any():
+        return environment, None
+    own = near & (luminance > 2 * float(sky @ LUMINANCE))
+    flux = ((environment.radiance - sky) * solid[..., None])[own].sum(0)
+    whole = float((luminance * solid).sum() / 4)  # a quarter: the mean over all ways that a surface may face
+    if float(flux @ LUMINANCE) / 4 < LEAST_SHARE * whole:
+        return environment, None
+    middle = (way * (luminance * solid * own)[..., None]).sum((0, 1))
+    direction = (middle / np.linalg.norm(middle)).astype(np.float32)
+    dark = np.where(own[..., None], np.float32(sky), environment.radiance).astype(np.float32)
+    sun = Sun(direction, np.maximum(flux, 0).astype(np.float32), RADIUS, True)
+    return environment.refilled(dark), replace(sun, note=f"The frames see the sun: {sun.where()}.")
+
+
+def put_in(environment: Environment, sun: Sun | None) -> np.ndarray:
+    """Radiance of the map with the sun in it, (h, 2h, 3) float32; of at least `WRITTEN_ROWS` where there is one.
+
+    Points of its disc are shared out bilinearly between texel centres: who looks the map up bilinearly sees the sun at
+    its place, and the irradiance is exact.
+    """
+    if sun is None:
+        return environment.radiance
+    times = max(-(-WRITTEN_ROWS // len(environment.radiance)), 1)
+    radiance = environment.radiance.repeat(times, 0).repeat(times, 1).astype(np.float64)
+    height, width = radiance.shape[:2]
+    way = around(sun.direction, _disc(sobol(256, 0), sun.radius)).astype(np.float64)
+    column = (0.5 - np.arctan2(way[:, 1], way[:, 0]) / (2 * np.pi)) * width - 0.5
+    row = np.clip((0.5 + np.arcsin(np.clip(way[:, 2], -1, 1)) / np.pi) * height - 0.5, 0, height - 1)
+    left, low = np.floor(column), np.minimum(np.floor(row), height - 2)
+    _, solid = _directions(height)
+    for a in (0, 1):
+        for b in (0, 1):
+            share = np.abs(1 - a - (row - low)) * np.abs(1 - b - (column - left)) / len(way)
+            at = (low + a).astype(int), (left + b).astype(int) % width
+            for c in range(3):
+                np.add.at(radiance[..., c], at, share * sun.irradiance[c] / solid[at[0], 0])
+    return radiance.astype(np.float32)

@@ -1,0 +1,130 @@
+"""A quantity over the surface from few texels: evaluated at the corners of texel blocks, bilinear inside them.
+
+Blocks are halved where their corners differ. A block serves only texels that lie where its corners say, with the same
+normal, so neither a chart's border nor a fold of the surface is interpolated across. Unlike a search for the nearest
+points, a texel costs a few array look-ups: fine texels cost little more than coarse ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..parallel import for_blocks
+from ..scene.atlas import Atlas
+
+BENT = np.cos(np.radians(15.0))
+"""A texel turned further than this against a corner of its block is not served by it."""
+OFF_PLACE = 0.15
+"""How far a texel may lie from where its block's corners put it, as a share of the block's edge."""
+STRETCH = 3.0
+"""A block this many times larger on the surface than its texels should be spans a gap."""
+BLOCK = 1 << 16
+
+
+class TexelBlocks:
+    """Blocks over some of the atlas's elements.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    element : (m,) int
+        Those wanted; results are in their order.
+    threads : int
+    """
+
+    def __init__(self, atlas: Atlas, element: np.ndarray, threads: int = 0):
+        self._size, self._threads = atlas.size, threads
+        self._row, self._column = np.divmod(atlas.texel[element].astype(np.int32), np.int32(atlas.size))
+        self._position, self._normal = atlas.position[element], atlas.normal[element]
+        self._edge = atlas.texel_edge
+        self._at = np.full(atlas.size * atlas.size, -1, np.int32)
+        self._at[atlas.texel[element]] = np.arange(len(element), dtype=np.int32)
+
+    def _served(self, index: np.ndarray, step: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Which of `index` blocks of `step` texels serve, with the blocks' corners ((k, 4)) and weights ((k, 4))."""
+        row, column = self._row[index], self._column[index]
+        low, left = row // step * step, column // step * step
+        fits = np.flatnonzero((low + step < self._size) & (left + step < self._size))
+        index, low, left, row, column = index[fits], low[fits], left[fits], row[fits], column[fits]
+        first = low * self._size + left
+        corner = np.stack([self._at[first + a * self._size + b] for a in (0, step) for b in (0, step)], 1)
+        whole = np.flatnonzero((corner >= 0).all(1))
+        index, corner = index[whole], corner[whole]
+        v = ((row - low)[whole] / np.float32(step)).astype(np.float32)
+        u = ((column - left)[whole] / np.float32(step)).astype(np.float32)
+        weight = np.stack([(1 - v) * (1 - u), (1 - v) * u, v * (1 - u), v * u], 1)
+        alike = np.einsum("kcj,kj->kc", self._normal[corner], self._normal[index]).min(1) >= BENT
+        index, corner, weight = index[alike], corner[alike], weight[alike]
+        place = self._position[corner]
+        across = place[:, 3] - place[:, 0]
+        edge = np.sqrt(np.einsum("kj,kj->k", across, across) / 2)
+        off = np.einsum("kc,kcj->kj", weight, place) - self._position[index]
+        right = (np.einsum("kj,kj->k", off, off) <= (OFF_PLACE * edge) ** 2) & (edge <= STRETCH * step * self._edge)
+        return index[right], corner[right], weight[right]
+
+    def evaluate(
+        self, function: Callable[[np.ndarray], np.ndarray], step: int, tolerance: float, base: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Evaluate a quantity where it changes and interpolate it elsewhere.
+
+        Parameters
+        ----------
+        function : callable
+            Takes indices ((k,) int, into the elements wanted), gives values ((k, c) float32). Asked once for each.
+        step : int
+            Edge of the largest blocks in texels, a power of two; below 2 everything is evaluated.
+        tolerance : float
+            Largest deviation of a corner from the corners' mean, relative to that and `base`, at which a block
+            serves; by the mean of the first three channels.
+        base : (m,) float32, optional
+            What is added to the quantity afterwards: deviations count relative to the sum.
+
+        Returns
+        -------
+        (m, c) float32
+        """
+        count = len(self._row)
+        base = np.zeros(count, np.float32) if base is None else base
+        value = None
+        known = np.zeros(count, bool)
+        todo = np.arange(count, dtype=np.int32)
+        while len(todo):
+            wanted = np.zeros(count, bool)
+            served: dict[int, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+            if step >= 2:
+
+                def mark(part: slice, step=step, todo=todo, wanted=wanted, served=served) -> None:
+                    served[part.start] = self._served(todo[part], step)
+                    wanted[served[part.start][1]] = True
+
+                for_blocks(mark, len(todo), BLOCK, self._threads)
+            else:
+                wanted[todo] = True
+            new = np.flatnonzero(wanted & ~known)
+            if len(new):
+                found = function(new)
+                if value is None:
+                    value = np.zeros((count, found.shape[1]), np.float32)
+                value[new], known[new] = found, True
+            if step < 2:
+                break
+            done = known.copy()
+
+            def spread(part: slice, done=done, value=value, served=served) -> None:
+                index, corner, weight = served[part.start]
+                near = value[corner]
+                level = near[..., :3].mean(2)
+                mean = level.mean(1)
+                apart = np.abs(level - mean[:, None]).max(1)
+                flat = np.full(len(index), True) if np.isinf(tolerance) else apart <= tolerance * (mean + base[index])
+                # Corners are known themselves; writing their own value again changes nothing.
+                value[index[flat]] = np.einsum("kc,kcv->kv", weight[flat], near[flat])
+                done[index[flat]] = True
+
+            if value is not None:
+                for_blocks(spread, len(todo), BLOCK, self._threads)
+            todo = todo[~done[todo]]
+            step //= 2
+        return np.zeros((count, 3), np.float32) if value is None else value

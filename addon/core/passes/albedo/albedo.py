@@ -1,0 +1,167 @@
+"""Albedo = pi L_d / E, and what stands in where nothing was seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...groups import by_label
+from ...scene.atlas import Atlas
+from ...scene.model import Instance
+from ..lit_diffuse.accumulate import LitDiffuse
+from .neighbourhood import doubt, steadied
+
+FLOOR = 1e-3
+"""Below this share of the room's median irradiance a quotient says nothing."""
+MAX_ALBEDO = 1.0
+UNKNOWN, LEAST_SPREAD = 0.7, 0.3
+"""Relative error of an albedo that was taken from other objects: where there are too few to tell, and at least."""
+
+MEASURED, FILLED, NONE = 2, 1, 0
+"""How an element's albedo came about: measured; filled in from its object; no reflectance (an emitter, an object
+nobody saw, or one that shows what is behind it)."""
+
+
+@dataclass(frozen=True)
+class Albedo:
+    """Diffuse albedo of n elements.
+
+    Attributes
+    ----------
+    rho : (n, 3) float32
+        Linear Rec.709, 0...1.
+    origin : (n,) int8
+        MEASURED, FILLED or NONE.
+    error : (n,) float32
+        Relative standard error of `rho`, as far as it came of each element's own measurement and of its neighbourhood;
+        what all of an object has in common, such as missing light, is added in `evidence.texel`. 0 on lamps.
+    """
+
+    rho: np.ndarray
+    origin: np.ndarray
+    error: np.ndarray
+
+
+def quotient(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """pi L_d / E, not clamped, and where it holds.
+
+    Parameters
+    ----------
+    lit_diffuse, irradiance : (n, 3) float32
+        L_d may hold NaN.
+
+    Returns
+    -------
+    (n, 3) float32, (n,) bool
+    """
+    known = np.isfinite(lit_diffuse).all(1)
+    lit = irradiance.mean(1)
+    floor = FLOOR * float(np.median(lit[known])) if known.any() else 0.0
+    valid = known & (lit > max(floor, 1e-20))
+    rho = np.full(lit_diffuse.shape, np.nan, np.float32)
+    # A single channel may be dark under coloured light: it gets the floor, not a division by nothing.
+    rho[valid] = np.pi * lit_diffuse[valid] / np.maximum(irradiance[valid], FLOOR * lit[valid, None])
+    return rho, valid
+
+
+def without_emitters(atlas: Atlas, told: np.ndarray, emitters: set[int]) -> np.ndarray:
+    """Those of the elements `told`, (n,) bool, that are no emitter's."""
+    return told & ~np.isin(atlas.object_id, list(emitters))
+
+
+def above_one(rho: np.ndarray, reflecting: np.ndarray) -> float:
+    """Share of the `reflecting` elements, (n,) bool, whose quotient is above 1: an alarm that light is missing."""
+    return float((rho[reflecting].max(1) > MAX_ALBEDO).mean()) if reflecting.any() else 0.0
+
+
+def albedo_of(
+    atlas: Atlas,
+    lit_diffuse: LitDiffuse,
+    irradiance: np.ndarray,
+    unsure: np.ndarray,
+    instances: tuple[Instance, ...],
+    emitters: set[int],
+    specular: np.ndarray | float = 0.0,
+) -> Albedo:
+    """Albedo = L_d / S (Haefner et al. 2021, sec. 3.2), clamped, filled in and steadied (`fill`).
+
+    Parameters
+    ----------
+    irradiance : (n, 3) float32
+        E, radiance * steradian.
+    unsure : (n,) float32
+        Its relative error.
+    emitters : set of int
+        Objects that have no albedo.
+    specular : (n, 3) float32
+        Part of L_d that is not diffuse.
+    """
+    rho, valid = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
+    error = np.hypot(doubt(lit_diffuse, atlas.object_id), unsure)
+    class_of = {i.object_id: i.class_name for i in instances}
+    return fill(atlas, rho, valid & lit_diffuse.seen, class_of, emitters, error)
+
+
+def fill(
+    atlas: Atlas,
+    rho: np.ndarray,
+    valid: np.ndarray,
+    class_of: dict[int, str],
+    emitters: set[int],
+    error: np.ndarray | None = None,
+) -> Albedo:
+    """Clamp, fill in what was not measured, and steady what was measured badly, from the same object.
+
+    An object without any measurement takes the median of its class, else of the room.
+
+    Parameters
+    ----------
+    error : (n,) float32, optional
+        Relative standard error of each quotient (`neighbourhood.doubt`); without it all count as equally good. Where
+        it is inf, the quotient counts as not measured.
+    """
+    if error is not None:
+        valid = valid & np.isfinite(error)
+    result = np.clip(np.nan_to_num(rho), 0, MAX_ALBEDO)
+    origin = np.where(valid, MEASURED, FILLED).astype(np.int8)
+    reflecting = without_emitters(atlas, valid, emitters)
+    everywhere = np.median(result[reflecting], 0) if reflecting.any() else np.full(3, 0.5, np.float32)
+    error = np.where(valid, 0.0 if error is None else error, np.inf).astype(np.float32)
+    left = error.copy()
+    by_class: dict[str, list[np.ndarray]] = {}
+    bare = []
+    for own in by_label(_parts(atlas, valid)):
+        object_id = int(atlas.object_id[own[0]])
+        if object_id in emitters:
+            result[own], origin[own], left[own] = 0, NONE, 0
+            continue
+        if not valid[own].any():
+            bare.append((object_id, own))
+            continue
+        result[own], left[own] = steadied(atlas, own, result[own], error[own], most=MAX_ALBEDO)
+        by_class.setdefault(class_of.get(object_id, ""), []).append(np.median(result[own][valid[own]], 0))
+    known = [middle for alike in by_class.values() for middle in alike]
+    for object_id, own in bare:
+        alike = by_class.get(class_of.get(object_id, ""))
+        result[own] = np.median(alike, 0) if alike else everywhere
+        origin[own] = NONE
+        left[own] = _spread(alike if alike and len(alike) > 2 else known)
+    return Albedo(np.clip(result, 0, MAX_ALBEDO).astype(np.float32), origin, left)
+
+
+def _parts(atlas: Atlas, valid: np.ndarray) -> np.ndarray:
+    """Numbers of what is filled in together: objects, a sheet's second side by itself if it was measured, (n,) int."""
+    if atlas.back is None:
+        return atlas.object_id
+    part = atlas.side
+    measured = np.bincount(part, valid, 2 * int(atlas.object_id.max()) + 2).reshape(-1, 2) > 0
+    return np.where(measured.all(1)[atlas.object_id], part, part - atlas.back)
+
+
+def _spread(albedos: list[np.ndarray]) -> float:
+    """Relative standard deviation of some objects' albedo, (3,) each; that of any two things where there are few."""
+    if len(albedos) < 3:
+        return UNKNOWN
+    level = np.log(np.maximum(np.array(albedos).mean(1), FLOOR))
+    return max(1.4826 * float(np.median(np.abs(level - np.median(level)))), LEAST_SPREAD)

@@ -1,0 +1,1 @@
+"""How bright lamps are that the sensor clipped."""

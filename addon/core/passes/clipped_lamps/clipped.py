@@ -1,0 +1,78 @@
+"""Objects that the sensor clipped in every view: what was measured of them is a lower bound, not a value.
+
+A clipped lamp lights the room with more than its pixels show. So it is solved for from the light that it throws, as a
+lamp that no frame looked at is (`unseen_light`); where that fails, the bound is used and said to be one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ...light.emitters import LUMINANCE
+from ...light.lamps import Lamp
+from ...scene.atlas import Atlas
+from ...scene.visibility import SATURATED
+from ..lit_diffuse.accumulate import LitDiffuse
+
+MOSTLY = 0.5
+"""Share of an object's seen area from which on it counts as clipped."""
+
+
+def clipped_objects(lit: LitDiffuse, atlas: Atlas) -> dict[int, float]:
+    """Objects of which most of what was seen is clipped, with the luminance that they have at least."""
+    bounds = {}
+    for object_id in np.unique(atlas.object_id[lit.tier == SATURATED]):
+        own = lit.seen & (atlas.object_id == object_id)
+        clipped = own & (lit.tier == SATURATED)
+        if atlas.area[clipped].sum() > MOSTLY * atlas.area[own].sum():
+            bounds[int(object_id)] = float(np.median(lit.radiance[clipped] @ LUMINANCE))
+    return bounds
+
+
+def unseen(lit: LitDiffuse, atlas: Atlas, objects: list[int]) -> LitDiffuse:
+    """The same as if no frame had seen these objects."""
+    hidden = np.isin(atlas.object_id, objects)
+    blank = np.where(hidden[:, None], np.float32(np.nan), lit.radiance)
+    return replace(
+        lit, radiance=blank, count=np.where(hidden, 0, lit.count).astype(np.int32),
+        tier=np.where(hidden, -1, lit.tier).astype(np.int8),
+    )  # fmt: skip
+
+
+def shade_clipped(shade: Callable[[LitDiffuse], object], lit: LitDiffuse, atlas: Atlas):
+    """`shade(lit)`, with clipped lamps solved for.
+
+    Parameters
+    ----------
+    shade : callable
+        Gives a Shading for an L_d.
+
+    Returns
+    -------
+    Shading
+        Each lamp that was clipped has a note that says so.
+    """
+    bounds = clipped_objects(lit, atlas)
+    if not bounds:
+        return shade(lit)
+    found = shade(unseen(lit, atlas, list(bounds)))
+    solved = {
+        lamp.object_id for lamp in found.lamps
+        if lamp.object_id in bounds and float(lamp.radiance @ LUMINANCE) >= bounds[lamp.object_id]
+    }  # fmt: skip
+    if len(solved) < len(bounds):
+        # Once more, as the first run had nothing where those that were not solved for are: their bound lights the
+        # others, and has to be there when these are solved for. Where all were solved, the first run stands.
+        found = shade(unseen(lit, atlas, list(solved)) if solved else lit)
+
+    def told(lamp: Lamp) -> Lamp:
+        if lamp.object_id not in bounds:
+            return lamp
+        if lamp.seen:
+            return replace(lamp, note="Clipped in every frame; its radiance is a lower bound.")
+        return replace(lamp, note=lamp.note.replace("No frame sees it", "Clipped in every frame"))
+
+    return replace(found, lamps=tuple(told(lamp) for lamp in found.lamps))

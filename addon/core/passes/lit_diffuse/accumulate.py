@@ -1,0 +1,145 @@
+"""Accumulation: all frames into the lit diffuse texture L_d."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...parallel import ordered_map
+from ...progress import Progress
+from ...scene.atlas import Atlas
+from ...scene.element_groups import ElementGroups
+from ...scene.elements import triangle_geometry
+from ...scene.model import Frame, Mesh, Pixels
+from ...scene.rays import RayScene
+from ...scene.visibility import CLEAN, EDGE, SATURATED, FrameView, Observations, observe, view_frame
+from .medians import Summary, make_estimator
+
+ENOUGH = 3
+"""Clean observations from which on an element does without those at edges."""
+
+
+@dataclass(frozen=True)
+class LitDiffuse:
+    """L_d and its evidence for n elements.
+
+    Attributes
+    ----------
+    radiance : (n, 3) float32
+        L_d, linear Rec.709; NaN where no frame saw the element.
+    lower, upper : (n, 3) float32
+        Quartiles of the observations.
+    count : (n,) int32
+        Observations that `radiance` rests on.
+    tier : (n,) int8
+        CLEAN, EDGE or SATURATED: the kind of observations it rests on; -1 where there is none.
+    clipped : (n,) float32
+        Share of all observations, those that `radiance` does not rest on included, that the sensor clipped.
+    """
+
+    radiance: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    count: np.ndarray
+    tier: np.ndarray
+    clipped: np.ndarray
+
+    @property
+    def seen(self) -> np.ndarray:
+        """(n,) bool"""
+        return self.count > 0
+
+
+def frame_order(count: int, name: str, seed: int) -> np.ndarray:
+    """'capture': as filmed. 'shuffled': fixed pseudo-random, which keeps P-square from following slow drifts."""
+    return np.arange(count) if name == "capture" else np.random.default_rng(seed).permutation(count)
+
+
+def _choose(tiers: dict[int, Summary]) -> LitDiffuse:
+    """For each element the best tier that has enough, else the best that has any."""
+    clean, edge, saturated = tiers[CLEAN], tiers[EDGE], tiers[SATURATED]
+    tier = np.select(
+        [clean.count >= ENOUGH, (edge.count > 0) & (edge.count >= clean.count), clean.count > 0, saturated.count > 0],
+        [CLEAN, EDGE, CLEAN, SATURATED],
+        -1,
+    ).astype(np.int8)
+    parts = {name: getattr(clean, name).copy() for name in ("median", "lower", "upper", "count")}
+    for other in (EDGE, SATURATED):
+        chosen = tier == other
+        for name, values in parts.items():
+            values[chosen] = getattr(tiers[other], name)[chosen]
+    clipped = saturated.count / np.maximum(clean.count + edge.count + saturated.count, 1)
+    return LitDiffuse(*parts.values(), tier, clipped.astype(np.float32))
+
+
+def accumulate(
+    mesh: Mesh,
+    atlas: Atlas,
+    scene: RayScene,
+    frames: Sequence[Frame],
+    read: Callable[[Frame], Pixels],
+    *,
+    median: str = "adaptive",
+    order: str = "shuffled",
+    seed: int = 0,
+    threads: int = 0,
+    folder: Path | None = None,
+    only: np.ndarray | None = None,
+    also: Callable[[int, FrameView, Pixels, Observations], None] | None = None,
+    progress: Progress | None = None,
+) -> LitDiffuse:
+    """Project every frame onto the elements it sees and take the median (Haefner et al. 2021, sec. 3.1).
+
+    Frames are streamed: a handful is in memory at once.
+
+    Parameters
+    ----------
+    read : callable
+        Gives a frame's pixels.
+    median : str
+        'adaptive', 'batched', 'exact', 'p2' or 'mean'; see `medians`.
+    order : str
+        'shuffled' or 'capture'.
+    folder : Path, optional
+        Where the exact median keeps observations meanwhile.
+    only : (n,) bool, optional
+        Elements to ask for; all where not given.
+    also : callable, optional
+        Called with each frame's index, view, pixels and observations, in this thread: others who want to see them.
+
+    Raises
+    ------
+    BadInputError
+        From `read`.
+    InterruptedRun
+        From `progress`.
+    """
+    normal, _ = triangle_geometry(mesh)
+    groups = ElementGroups(atlas)
+    estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
+    wanted = frame_order(len(frames), order, seed)
+
+    def look(index: int) -> tuple[int, FrameView, Pixels, Observations]:
+        frame = frames[index]
+        pixels = read(frame)
+        view = view_frame(frame.camera, mesh, scene, normal)
+        asked = groups.candidates(view)
+        asked = asked if only is None else asked[only[asked]]
+        return int(index), view, pixels, observe(view, pixels, atlas, scene, asked)
+
+    with ExitStack() as stack:
+        for estimator in estimators.values():
+            stack.callback(estimator.close)
+        for done, (index, view, pixels, seen) in enumerate(ordered_map(look, wanted, threads)):
+            for tier, estimator in estimators.items():
+                chosen = np.flatnonzero(seen.tier == tier)
+                estimator.add(seen.element.take(chosen), seen.radiance.take(chosen, 0))
+            if also is not None:
+                also(index, view, pixels, seen)
+            if progress is not None:
+                progress.update(0.9 * (done + 1) / len(wanted))
+        return _choose({tier: estimator.result() for tier, estimator in estimators.items()})

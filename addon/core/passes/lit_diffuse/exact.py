@@ -1,0 +1,116 @@
+"""The exact median: every observation is kept on disk."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ...paper.estimator import QUARTILES, Summary, between
+from ...parallel import ordered_map
+
+
+class Exact:
+    """The exact median and quartiles in bounded memory.
+
+    Observations are held until there are `HELD`, then go to one file, grouped by buckets of `BUCKET` elements; at the
+    end each bucket is read and sorted by itself.
+    """
+
+    BUCKET = 1 << 16
+    HELD = 1 << 22
+    RECORD = np.dtype([("element", "<u4"), ("value", "<f4", 3)])
+
+    def __init__(self, count: int, folder: Path | str | None = None, threads: int = 0):
+        self._count = count
+        self._threads = threads
+        self._buckets = -(-count // self.BUCKET)
+        self._folder = tempfile.TemporaryDirectory(dir=folder, prefix="tmp-observations-")
+        self._path = Path(self._folder.name) / "observations"
+        self._held: list[tuple[np.ndarray, np.ndarray]] = []  # records, and where each bucket starts in them
+        self._flushed: list[np.ndarray] = []  # for each flush where each bucket starts in the file, in records
+
+    def add(self, element: np.ndarray, values: np.ndarray) -> None:
+        if not len(element):
+            return
+        record = np.empty(len(element), self.RECORD)
+        record["element"], record["value"] = element, values
+        self._held.append((record, np.searchsorted(element, np.arange(self._buckets + 1) * self.BUCKET)))
+        if sum(len(held) for held, _ in self._held) >= self.HELD:
+            self._flush()
+
+    @property
+    def observations(self) -> int:
+        """How many there are so far."""
+        return sum(len(record) for record, _ in self._held) + int(self._flushed[-1][-1] if self._flushed else 0)
+
+    def _flush(self) -> None:
+        starts = [self._flushed[-1][-1] if self._flushed else 0]
+        with open(self._path, "ab") as file:
+            for bucket in range(self._buckets):
+                parts = self._held_of(bucket)
+                for part in parts:
+                    part.tofile(file)
+                starts.append(starts[-1] + sum(map(len, parts)))
+        self._flushed.append(np.array(starts, np.int64))
+        self._held.clear()
+
+    def _held_of(self, bucket: int) -> list[np.ndarray]:
+        return [record[start[bucket] : start[bucket + 1]] for record, start in self._held]
+
+    def _records(self, bucket: int) -> np.ndarray:
+        """All observations of one bucket, in the order in which they came."""
+        parts = []
+        if self._flushed:
+            with open(self._path, "rb") as file:
+                for start in self._flushed:
+                    file.seek(int(start[bucket]) * self.RECORD.itemsize)
+                    parts.append(np.fromfile(file, self.RECORD, int(start[bucket + 1] - start[bucket])))
+        parts += self._held_of(bucket)
+        return np.concatenate(parts) if parts else np.zeros(0, self.RECORD)
+
+    def replay(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """All observations anew, in portions as `add` takes them: each element at most once, in the order it had."""
+        for bucket in range(self._buckets):
+            record = self._records(bucket)
+            record = record[np.argsort(record["element"], kind="stable")]
+            element = record["element"]
+            first = np.flatnonzero(np.diff(element, prepend=np.uint32(0xFFFFFFFF)))
+            turn = np.arange(len(element)) - np.repeat(first, np.diff(first, append=len(element)))
+            # Sorted by turn, then element: each turn is one portion.
+            order = np.argsort(turn, kind="stable")
+            for portion in np.split(order, np.cumsum(np.bincount(turn))[:-1]):
+                yield element[portion].astype(np.int32), record["value"][portion]
+
+    def _summarise(self, bucket: int) -> tuple[np.ndarray, np.ndarray]:
+        """Quartiles ((k, 3, 3) float32: element, channel, quartile) and counts of one bucket."""
+        record = self._records(bucket)
+        size = min(self.BUCKET, self._count - bucket * self.BUCKET)
+        local = (record["element"] - np.uint32(bucket * self.BUCKET)).astype(np.uint16)  # BUCKET fits: a radix sort
+        value = record["value"][np.argsort(local, kind="stable")]
+        count = np.bincount(local, minlength=size)
+        start = np.cumsum(count) - count
+        quartiles = np.full((size, 3, len(QUARTILES)), np.nan, np.float32)
+        # Elements with equally many observations make one array, whose rows are sorted at once.
+        by_count = np.argsort(count, kind="stable")
+        for seen in np.unique(count[count > 0]):
+            low, high = np.searchsorted(count, (seen, seen + 1), sorter=by_count)
+            alike = by_count[low:high]
+            rows = value[start[alike, None] + np.arange(seen)].transpose(2, 0, 1).copy()
+            rows.sort(axis=-1)
+            for which, share in enumerate(QUARTILES):
+                quartiles[alike, :, which] = between(rows, share * (seen - 1)).T
+        return quartiles, count
+
+    def result(self) -> Summary:
+        parts = list(ordered_map(self._summarise, range(self._buckets), self._threads))
+        self.close()
+        quartiles = np.concatenate([np.zeros((0, 3, 3), np.float32)] + [q for q, _ in parts])
+        count = np.concatenate([np.zeros(0, np.int64)] + [c for _, c in parts]).astype(np.int32)
+        return Summary(quartiles[..., 1], quartiles[..., 0], quartiles[..., 2], count)
+
+    def close(self) -> None:
+        self._held.clear()
+        self._folder.cleanup()

@@ -1,0 +1,154 @@
+"""L_d from light that the capture stores on its mesh, where there are no frames to take the median of."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import BadInputError
+from ...io.exr import HALF_MAX
+from ...parallel import blocks
+from ...progress import Progress
+from ...scene.atlas import Atlas
+from ...scene.elements import triangle_geometry
+from ...scene.model import LitTiles, Mesh
+from ...scene.visibility import CLEAN, SATURATED
+from .accumulate import ENOUGH, LitDiffuse
+
+TEXELS_AT_ONCE = 1 << 22
+"""Texels of the tiles that are looked at together; 160 bytes each."""
+
+
+def face_edge(mesh: Mesh) -> float:
+    """Edge in metres of the usual face of the stored light's mesh: how large an element should be."""
+    _, area = _tiles(mesh)
+    return float(np.sqrt(np.median(area)))
+
+
+def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -> LitDiffuse:
+    """The mean over the part of its tile that each element stands for.
+
+    A stored value is itself the median or mean of many frames, so that an element counts as seen often enough; the
+    spread of those frames is not known, and the quartiles are the value itself. Texels that are 0 in all channels, or
+    not finite, were never seen. An element most of whose texels are as bright as a half float can be is clipped.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        With `lit`, and its triangles wound as they were read.
+    atlas : Atlas
+        Elements by the same triangles, wound any way.
+
+    Raises
+    ------
+    BadInputError
+        Nothing is stored, or no light; or a texture was changed or taken away since it was read.
+    """
+    lit, n = mesh.lit, len(atlas)
+    if lit is None:
+        raise BadInputError("The capture has no frames, and no light stored on its mesh; give it either.")
+    of_triangle, area = _tiles(mesh)
+    key = of_triangle[atlas.triangle]
+    order = np.argsort(key, kind="stable")
+    place = _place(mesh, atlas)
+    # How many texels of its tile an element covers along an edge.
+    width = np.sqrt(atlas.area / np.maximum(area[key], 1e-30)) * lit.size
+    sums = np.zeros((n, 5))
+    tiles, first = np.unique(key[order], return_index=True)
+    ends = np.append(first[1:], n)
+    picture = np.zeros(len(area), np.int32)
+    number = np.zeros(len(area), np.int64)
+    picture[of_triangle], number[of_triangle] = lit.picture, lit.tile
+    for part in _runs(picture[tiles], max(TEXELS_AT_ONCE // lit.size**2, 1)):
+        texels = _read(lit, int(picture[tiles[part.start]]), number[tiles[part]])
+        own = order[first[part.start] : ends[part.stop - 1]]
+        local = np.searchsorted(tiles[part], key[own])
+        sums[own] = _window_sums(texels, local, place[own] * lit.size, width[own], lit.size)
+        if progress is not None:
+            progress.update(0.9 * part.stop / len(tiles))
+    weight, clipped = sums[:, 3], sums[:, 4]
+    seen = weight > 0
+    if not seen.any():
+        raise BadInputError("The textures on the mesh hold no light at all; copy them again.")
+    radiance = np.full((n, 3), np.nan, np.float32)
+    radiance[seen] = sums[seen, :3] / weight[seen, None]
+    share = np.where(seen, clipped / np.maximum(weight, 1e-30), 0).astype(np.float32)
+    tier = np.where(seen, np.where(share > 0.5, SATURATED, CLEAN), -1).astype(np.int8)
+    return LitDiffuse(radiance, radiance, radiance, np.where(seen, ENOUGH, 0).astype(np.int32), tier, share)
+
+
+def _tiles(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """A number for each triangle's tile, (t,), and the surface that each tile covers, square metres."""
+    lit = mesh.lit
+    _, area = triangle_geometry(mesh)
+    of_triangle = np.unique(lit.picture.astype(np.int64) * (1 << 32) + lit.tile, return_inverse=True)[1].ravel()
+    return of_triangle, np.bincount(of_triangle, area)
+
+
+def _place(mesh: Mesh, atlas: Atlas) -> np.ndarray:
+    """Where in its tile each element lies, (n, 2) float64, 0...1."""
+    result = np.empty((len(atlas), 2))
+    for part in blocks(len(atlas), 1 << 18):
+        triangle = atlas.triangle[part]
+        a, b, c = (mesh.vertices[mesh.triangles[triangle, i]] for i in range(3))
+        e, f, p = b - a, c - a, atlas.position[part] - a
+        ee, ef, ff, pe, pf = (np.einsum("ij,ij->i", x, y) for x, y in ((e, e), (e, f), (f, f), (p, e), (p, f)))
+        scale = np.maximum(ee * ff - ef * ef, 1e-300)
+        u, v = (pe * ff - pf * ef) / scale, (pf * ee - pe * ef) / scale
+        corner = mesh.lit.uv[triangle].astype(np.float64)
+        result[part] = (1 - u - v)[:, None] * corner[:, 0] + u[:, None] * corner[:, 1] + v[:, None] * corner[:, 2]
+    return np.clip(np.nan_to_num(result), 0, 1)
+
+
+def _runs(picture: np.ndarray, most: int) -> list[slice]:
+    """Slices of at most so many tiles, each within one picture."""
+    result, at = [], 0
+    changes = np.append(np.flatnonzero(np.diff(picture)) + 1, len(picture))
+    for end in changes.tolist():
+        while at < end:
+            result.append(slice(at, min(at + most, end)))
+            at = result[-1].stop
+    return result
+
+
+def _read(lit: LitTiles, picture: int, number: np.ndarray) -> np.ndarray:
+    """Tiles of a picture, (k, size, size, 3) float32."""
+    path, side, size = lit.paths[picture], lit.side[picture], lit.size
+    try:
+        stored = np.memmap(path, "<f2", "r", shape=(side, side, 3))
+    except (OSError, ValueError) as error:
+        raise BadInputError(f"Texture '{path}' changed during the run; start again.") from error
+    across = side // size
+    whole = stored[: across * size, : across * size].reshape(across, size, across, size, 3)
+    return whole[number // across, :, number % across].astype(np.float32)
+
+
+def _window_sums(texels: np.ndarray, tile: np.ndarray, centre: np.ndarray, width: np.ndarray, size: int) -> np.ndarray:
+    """Sums of R, G, B, number and number of clipped texels over a square around each place, (n, 5).
+
+    Parameters
+    ----------
+    texels : (k, size, size, 3) float32
+    tile : (n,) int
+    centre : (n, 2) float
+        x and y in texels.
+    width : (n,) float
+        Edge of the square in texels; it is moved to lie within the tile.
+    """
+    known = np.isfinite(texels).all(-1) & (texels >= 0).all(-1) & (texels > 0).any(-1)
+    over = np.isposinf(texels).any(-1)
+    known |= over
+    values = np.concatenate(
+        [
+            np.where(known[..., None], np.minimum(texels, HALF_MAX), 0),
+            known[..., None],
+            (known & (over | (texels >= HALF_MAX).any(-1)))[..., None],
+        ],
+        -1,
+        dtype=np.float64,
+    )
+    table = np.zeros((len(texels), size + 1, size + 1, 5))
+    table[:, 1:, 1:] = values.cumsum(1).cumsum(2)
+    edge = np.clip(np.rint(width), 1, size).astype(np.int64)[:, None]
+    low = np.clip(np.rint(centre - edge / 2).astype(np.int64), 0, size - edge)
+    (x0, y0), (x1, y1) = low.T, (low + edge).T
+    return table[tile, y1, x1] - table[tile, y0, x1] - table[tile, y1, x0] + table[tile, y0, x0]

@@ -1,0 +1,30 @@
+"""Running estimates of a typical value for each of n elements and three channels, by name.
+
+All share one interface (`estimator.Estimator`): `add(element, values)` with each element at most once a call, and
+`result()`. Measured against one another: `scan-relight benchmark medians`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...paper.estimator import Estimator, Summary
+from ...paper.p_square import PSquare
+from .adaptive import Adaptive
+from .batched import Batched
+from .exact import Exact
+from .mean import Mean
+
+__all__ = ["Adaptive", "Batched", "Estimator", "Exact", "Mean", "PSquare", "Summary", "make_estimator"]
+
+
+def make_estimator(name: str, count: int, folder: Path | str | None = None, threads: int = 0) -> Estimator:
+    """'adaptive', 'batched', 'exact', 'p2' (the paper's) or 'mean' for `count` elements.
+
+    `folder` takes what 'exact', and 'adaptive' at first, write to disk.
+    """
+    if name in ("adaptive", "exact"):
+        return {"adaptive": Adaptive, "exact": Exact}[name](count, folder, threads)
+    if name == "batched":
+        return Batched(count, threads)
+    return {"p2": PSquare, "mean": Mean}[name](count)

@@ -1,0 +1,1 @@
+"""Takes a scan's noise out of its mesh."""

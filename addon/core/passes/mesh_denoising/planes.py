@@ -1,0 +1,356 @@
+"""Flat parts of a noisy mesh, found as wholes and made flat.
+
+Dihedral angles alone (`denoise`) leave a crease of a degree across a mirror of two triangles, and where triangles are
+as small as the noise they leave normals that wander. A plane through all the points of a flat part knows better.
+
+Regions grow from triangle to triangle (region growing, Besl and Jain 1988): by the angle to the region's plane, and by
+the points' distance against the prediction interval of the plane fitted so far. What grew is flat if the data say so:
+its points tell well which way it faces, they lie about as far off as the noise takes them, and a bend (quadratic terms)
+explains them no better than chance would. Spheres, cushions and cylinders fail the last and stay as they are. A region
+that ends at creases all around and whose bend explains its points entirely is a sheet too, gently bent: the metal of a
+sconce. Steps and pillows no higher than the noise give themselves away as neighbours share them (`moran`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from ...groups import by_label
+from .moran import SURE, moran, most_alike
+
+NEAR, REACH = 3.0, 4.5
+"""Times the noise (and the plane's own uncertainty), how far denoised points may lie off, of low triangles and of high
+ones: a scan's smooth error shows over large triangles, and a moulding's steps have low ones. Half smooth, half from
+vertex to vertex has 1.4 times what `noise_of` sees; no point goes farther than `REACH`."""
+HIGH = 10.0
+"""Times the noise."""
+TURN = 0.15
+"""Radians by which a large triangle may face another way than its plane, besides what noise tilts it by."""
+MOST_TURN = 0.8
+"""Radians, however low the triangle: front and sides of a thin plate are 1.6 apart."""
+KNOWN = 0.05
+"""Radians, standard error of the way that a plane faces. Known less well, it is no better than what is there: denoised
+triangles of a few times the noise are off by 0.05 to 0.2."""
+FILL = 0.3
+"""Of its extent a region covers as much, unless its own width tells enough: a moulding around a room is a ring that
+lies in a plane, whichever way it faces."""
+SPREAD = 1.6
+"""Times the noise, the points' distance from a plane (root mean square), for a scan's smooth error: 1.4 if half."""
+BENT = 24.0
+"""Chi squared with three degrees of freedom up to which a bend may be noise: twice 12, which chance exceeds once in
+130 times, for the smooth error."""
+GENTLE, UNSURE = 0.015, 0.045
+"""Radians, root mean square, by which a bend turns the normals of what is called flat: where the bend is sure, and
+where it may be noise (together with what the noise makes it by chance). Strips of a cylinder of 6 cm have 0.1 to 0.2
+and too few points to be sure; chamfers of 1.5 cm taken into a sofa's front 0.06."""
+MOST_BENT = 0.2
+"""The same of a bent sheet."""
+ENDS = 0.9
+"""Share of a bent sheet's outline at creases or borders. Sconces: 0.97 to 1.0. Parts of cushions: 0.2 to 0.9."""
+CREASE = 0.6
+"""Radians."""
+DETERMINED = 0.3
+"""Points tell a quadratic term by at least this much of what they would if spread at random."""
+STIFF = 50.0
+"""How much firmer a sheet holds its points than the denoised places do, as a ratio of standard deviations."""
+SHARE = 0.2
+"""Of the area around a point: a sheet with less of it does not hold it."""
+PARALLEL = 0.97
+"""Cosine of the angle from which on two sheets have no line in common: one of 14 degrees, or front and back."""
+AGAIN = 50
+"""Triangles after which a region may be known again."""
+SMOOTH = 3
+"""Rounds of adding up neighbours by which seeds are ordered."""
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A flat or gently bent region: height z = c . (1, x, y, x^2, x y, y^2) over a plane.
+
+    Attributes
+    ----------
+    mean : (3,) float
+        Where x = y = z = 0.
+    axes : (3, 3) float
+        Of z, y and x, in rows.
+    c : (6,) float
+        Per metre and per square metre, as fits; all 0 where flat.
+    faces : (f,) int
+        Its triangles.
+    """
+
+    mean: np.ndarray
+    axes: np.ndarray
+    c: np.ndarray
+    faces: np.ndarray
+
+    def tangent(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Unit normals (p, 3) over or under the points, and how far they are from the planes there (p,)."""
+        z, y, x = ((points - self.mean) @ self.axes.T).T
+        c = self.c
+        way = np.stack([np.ones_like(x), -(c[2] + c[4] * x + 2 * c[5] * y), -(c[1] + 2 * c[3] * x + c[4] * y)], 1)
+        length = np.linalg.norm(way, axis=1)
+        gap = (z - (c[0] + c[1] * x + c[2] * y + c[3] * x * x + c[4] * x * y + c[5] * y * y)) / length
+        return way / length[:, None] @ self.axes, gap
+
+
+class Moments:
+    """Count, sum and scatter of points that come bit by bit, and the plane through them."""
+
+    def __init__(self, origin: np.ndarray):
+        self.origin, self.count, self.sum, self.outer = origin, 0, np.zeros(3), np.zeros((3, 3))
+
+    def add(self, points: np.ndarray) -> None:
+        arm = points - self.origin
+        self.count += len(arm)
+        self.sum += arm.sum(0)
+        self.outer += arm.T @ arm
+
+    def plane(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Mean (3,), axes (3, 3) in rows, the normal first, and the scatter along each (3,)."""
+        mean = self.sum / self.count
+        scatter, axes = np.linalg.eigh(self.outer - self.count * np.outer(mean, mean))
+        return self.origin + mean, axes.T, np.maximum(scatter, 1e-18)
+
+
+def neighbours_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The triangle across each edge, (t, 3), -1 where there is not just one; and 1 or -1: wound alike or not."""
+    count = len(faces)
+    edges = np.stack([faces, faces[:, [1, 2, 0]]], 2).reshape(-1, 2)
+    low, high = edges.min(1), edges.max(1)
+    name = low.astype(np.int64) * (int(faces.max()) + 1) + high
+    order = np.argsort(name, kind="stable")
+    start = np.flatnonzero(np.r_[True, name[order][1:] != name[order][:-1]])
+    start = start[np.diff(np.r_[start, len(order)]) == 2]
+    one, other = order[start], order[start + 1]
+    across, alike = np.full(3 * count, -1), np.ones(3 * count, np.int8)
+    across[one], across[other] = other // 3, one // 3
+    alike[one] = alike[other] = np.where(edges[one, 0] == edges[other, 0], -1, 1)
+    return across.reshape(-1, 3), alike.reshape(-1, 3)
+
+
+class Grower:
+    """Regions of a mesh.
+
+    Parameters
+    ----------
+    points : (p, 3) float
+        Denoised as far as angles can.
+    faces : (t, 3) int
+    noise : float
+        Metres.
+    """
+
+    def __init__(self, points: np.ndarray, faces: np.ndarray, noise: float):
+        self.points, self.faces, self.noise = points, faces, noise
+        self.across, self.alike = neighbours_of(faces)
+        corners = points[faces]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        double = np.linalg.norm(normal, axis=1)
+        self.normal, self.area = normal / np.maximum(double, 1e-30)[:, None], double / 2
+        self.length = np.linalg.norm(np.roll(corners, -1, 1) - corners, axis=2)
+        tilt = noise * self.length.max(1) / np.maximum(double, 1e-30)  # noise / height
+        self.least = np.cos(np.minimum(TURN + tilt, MOST_TURN))
+        self.reach = noise * np.where(tilt < 1 / HIGH, REACH, NEAR)
+        self.free, self.tried = np.ones(len(faces), bool), np.zeros(len(faces), bool)
+        self._seen, self._met, self._run = np.zeros(len(faces), np.int64), np.zeros(len(points), np.int64), 0
+
+    def seeds(self) -> np.ndarray:
+        """Triangles with a neighbour that faces their way, those first that have most area facing one way around."""
+        inner = (self.across >= 0).ravel()
+        row = np.repeat(np.arange(len(self.faces)), 3)[inner]
+        near = sparse.csr_matrix((self.alike.ravel()[inner].astype(float), (row, self.across.ravel()[inner])),
+                                 (len(self.faces),) * 2) + sparse.eye(len(self.faces))  # fmt: skip
+        way = self.normal * self.area[:, None]
+        for _ in range(SMOOTH):
+            way = near @ way
+        alike = (self.normal[:, None] * self.normal[self.across]).sum(2) * self.alike > self.least[self.across]
+        able = np.flatnonzero((alike & (self.across >= 0)).any(1))
+        return able[np.argsort(-np.linalg.norm(way[able], axis=1), kind="stable")]
+
+    def grow(self, seed: int) -> np.ndarray:
+        """The triangles around `seed` that may lie in one plane with it; those of other sheets are not free.
+
+        It ends early where nearly all was tried before: that region comes out again.
+        """
+        self._run += 1
+        size, again = 0, 0
+        self._seen[seed] = self._run
+        side, count = self.normal[seed], 0
+        moments = Moments(self.points[self.faces[seed, 0]])
+        front, sign = np.array([seed]), np.ones(1)
+        region = []
+        while len(front):
+            region.append(front)
+            size, again = size + len(front), again + np.count_nonzero(self.tried[front])
+            if size > AGAIN and again > 0.8 * size:
+                break
+            new = np.unique(self.faces[front])
+            new = new[self._met[new] != self._run]
+            self._met[new] = self._run
+            moments.add(self.points[new])
+            if moments.count > 1.2 * count:
+                mean, axes, scatter = moments.plane()
+                axes[0] *= 1 if axes[0] @ side > 0 else -1
+                count = moments.count
+            near, turn = self.across[front].ravel(), (sign[:, None] * self.alike[front]).ravel()
+            fit = (near >= 0) & self.free[near] & (self._seen[near] != self._run)
+            fit &= turn * (self.normal[near] @ axes[0]) > self.least[near]
+            near, first = np.unique(near[fit], return_index=True)
+            arm = (self.points[self.faces[near]] - mean) @ axes.T
+            variance = 1 + 1 / count + arm[..., 1] ** 2 / scatter[1] + arm[..., 2] ** 2 / scatter[2]
+            fits = (arm[..., 0] ** 2 < self.reach[near, None] ** 2 * variance).all(1)
+            front, sign = near[fits], turn[fit][first][fits]
+            self._seen[front] = self._run
+        region = np.concatenate(region)
+        self.tried[region] = True
+        return region
+
+    def outline(self, region: np.ndarray) -> tuple[float, float]:
+        """Length of a region's outline in metres, and what share of it is at creases or the mesh's borders."""
+        inside = np.zeros(len(self.faces), bool)
+        inside[region] = True
+        across = self.across[region]
+        outer = (across < 0) | ~inside[across]
+        along = (self.normal[region][:, None] * self.normal[across]).sum(2) * self.alike[region]
+        sharp = outer & ((across < 0) | (along < np.cos(CREASE)))
+        length = float(self.length[region][outer].sum())
+        return length, float(self.length[region][sharp].sum()) / max(length, 1e-30)
+
+
+def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: tuple[float, float],
+             noise: float) -> Sheet | None:  # fmt: skip
+    """The sheet that measured points ((p, 3)) of a region lie in; None if it is not sure that they lie in one.
+
+    `area` and `outline` are the region's, in square metres and as `Grower.outline` has it.
+    """
+    n = len(points)
+    moments = Moments(points.mean(0))
+    moments.add(points)
+    mean, axes, scatter = moments.plane()
+    spread = np.sqrt(scatter[1:] / n)  # of y and x, metres
+    if n < 4 or noise > KNOWN * np.sqrt(scatter[1]):
+        return None
+    # A rectangle's sides are sqrt(12) times its standard deviations; a strip's width is twice its area by its outline.
+    if area < FILL * 12 * spread.prod() and noise * outline[0] > KNOWN * 4 * area:
+        return None
+    z, y, x = ((points - mean) @ axes.T).T
+    x, y = x / spread[1], y / spread[0]
+    flat = np.stack([np.ones(n), x, y], 1)
+    bend = np.stack([x * x, x * y, y * y], 1)
+    taken = np.linalg.lstsq(flat, bend, rcond=None)[0]
+    u, s, vt = np.linalg.svd(bend - flat @ taken, full_matrices=False)
+    told = s > DETERMINED * np.sqrt(n)
+    part = (u.T @ z)[told]
+    # One in a row, by the metre: each determined term, alone.
+    terms = np.concatenate([-(taken @ vt[told].T).T, vt[told]], 1)
+    terms /= np.r_[1, spread[1], spread[0], spread[1] ** 2, spread.prod(), spread[0] ** 2]
+    c = (part / s[told]) @ terms
+    x, y = x * spread[1], y * spread[0]
+
+    def slope(c: np.ndarray) -> float:
+        """Radians, root mean square over the points."""
+        along, across = c[1] + 2 * c[3] * x + c[4] * y, c[2] + c[4] * x + 2 * c[5] * y
+        return float(np.sqrt(np.mean(along**2 + across**2)))
+
+    chance = noise * np.sqrt(sum(slope(one) ** 2 for one in terms / s[told, None]))
+    explained = (part**2).sum() / noise**2
+    left, freedom = (z**2).sum() / noise**2 - explained, n - 3 - told.sum()
+
+    def likely(total: float, freedom: int) -> bool:
+        """Whether chi squared is within three standard deviations."""
+        return total < freedom + 3 * np.sqrt(2 * max(freedom, 1))
+
+    bent = explained > BENT * max(1, left / max(freedom, 1))
+    if likely((left + explained) / SPREAD**2, n - 3) and (
+        slope(c) < GENTLE if bent else np.hypot(slope(c), chance) < UNSURE
+    ):
+        return Sheet(mean, axes, np.zeros(6), region)
+    if bent and likely(left, freedom) and slope(c) < MOST_BENT and outline[1] > ENDS:
+        return Sheet(mean, axes, c, region)
+    return None
+
+
+def sheets_of(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise: float) -> tuple[list[Sheet], Grower]:
+    """The flat and gently bent parts of a mesh.
+
+    Parameters
+    ----------
+    measured, smooth : (p, 3) float
+        Points with their noise, and denoised as far as angles can.
+    faces : (t, 3) int
+    noise : float
+        Metres.
+    """
+
+    def found(most: float) -> tuple[list[Sheet], list[float]]:
+        """Sheets whose points' neighbours are off no more alike than that, and how much they are."""
+        grower.free[:], grower.tried[:] = True, False
+        sheets, index = [], []
+        for seed in seeds:
+            if grower.tried[seed] or not grower.free[seed]:
+                continue
+            region = grower.grow(seed)
+            own = np.unique(faces[region])
+            sheet = sheet_of(measured[own], region, float(grower.area[region].sum()), grower.outline(region), noise)
+            if sheet is None:
+                continue
+            off[own] = sheet.tangent(measured[own])[1]
+            alike, error = moran(off, faces[region])
+            if alike <= most + SURE * error:
+                grower.free[region] = False
+                sheets.append(sheet)
+                index.append(alike)
+        return sheets, index
+
+    grower, off = Grower(smooth, faces, noise), np.zeros(len(measured))
+    seeds = grower.seeds()
+    # A scan's smooth error is shared by neighbours, too: most of a room's flat parts tell how much.
+    sheets, index = found(np.inf)
+    sheets, _ = found(most_alike(index, [float(grower.area[sheet.faces].sum()) for sheet in sheets]))
+    return sheets, grower
+
+
+def onto_sheets(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray,
+                noise: float) -> np.ndarray:  # fmt: skip
+    """Points moved onto the sheets of their triangles, and onto lines and corners where sheets meet:
+
+        minimise  |x - smooth|^2 + STIFF^2 sum over sheets (distance of x)^2
+
+    Parameters as of `sheets_of`. A point that would go farther than `REACH` from where it was measured goes to its
+    largest sheet alone; one of no sheet, or too far even from that, is given back `smooth`. (p, 3) float.
+    """
+    sheets, grower = sheets_of(measured, smooth, faces, noise)
+    moved = smooth.copy()
+    if not sheets:
+        return moved
+    of = np.repeat(np.arange(len(sheets)), [len(s.faces) for s in sheets])
+    own = np.concatenate([s.faces for s in sheets])
+    around = sparse.csr_matrix((np.repeat(grower.area[own], 3), (faces[own].ravel(), np.repeat(of, 3))),
+                               (len(measured), len(sheets)))  # fmt: skip
+    around.sum_duplicates()
+    first = np.asarray(around.argmax(1)).ravel()
+    largest = around.max(1).toarray().ravel()
+    whole = np.bincount(faces.ravel(), np.repeat(grower.area, 3), len(measured))
+    pair = around.tocoo()
+    keep = pair.data >= SHARE * whole[pair.row]
+    point, sheet = pair.row[keep], pair.col[keep]
+    normal, gap = np.empty((len(point), 3)), np.empty(len(point))
+    for part in by_label(sheet):
+        normal[part], gap[part] = sheets[sheet[part[0]]].tangent(smooth[point[part]])
+    facing = np.empty((len(measured), 3))
+    main = sheet == first[point]
+    facing[point[main]] = normal[main]
+    crossing = main | (np.abs((normal * facing[point]).sum(1)) < PARALLEL)
+    for some in (main, crossing):  # last what all of a point's sheets ask for, where it may go there
+        p, n, g = point[some], STIFF * normal[some], STIFF * gap[some]
+        right = np.stack([np.bincount(p, -g * n[:, k], len(measured)) for k in range(3)], 1)
+        system = np.stack([np.bincount(p, n[:, i] * n[:, j], len(measured)) for i in range(3) for j in range(3)], 1)
+        way = np.linalg.solve(system.reshape(-1, 3, 3) + np.eye(3), right[..., None])[..., 0]
+        there = smooth + way
+        fits = (largest >= SHARE * whole) & (np.linalg.norm(there - measured, axis=1) <= REACH * noise)
+        moved[fits] = there[fits]
+    return moved

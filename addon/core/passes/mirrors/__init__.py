@@ -1,0 +1,1 @@
+"""Finds flat mirrors by what they show."""

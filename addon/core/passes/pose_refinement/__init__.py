@@ -1,0 +1,1 @@
+"""Puts frames right that lie beside what all of them show together."""

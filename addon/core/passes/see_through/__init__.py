@@ -1,0 +1,1 @@
+"""Objects that show what is behind them."""

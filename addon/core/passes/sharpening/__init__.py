@@ -1,0 +1,1 @@
+"""Gives the lit diffuse texture the detail back that its blur took."""

@@ -1,0 +1,119 @@
+"""A sharper L_d: what the frames show and L_d, looked at through the same cameras, does not, is put back onto it.
+
+An observation is a pixel's mean over its footprint, taken between pixels, and L_d is the median of several of them: a
+tile's joint, a line of a board comes out paler than it is. So L_d is shown as each frame would show it, and the frame
+over that, a ratio, is projected back and multiplied onto L_d (iterative back-projection, Irani and Peleg 1991); its
+median over the frames leaves highlights out, as that of L_d does.
+
+One round. A second and a third changed bathroom, kitchen and living room by -.2 to +.2 dB.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import uniform_filter
+
+from ...scene.atlas import Atlas
+from ...scene.elements import ElementLookup
+from ...scene.model import Camera, Frame, Pixels
+from ...scene.surface import Surface
+from ...scene.visibility import CLEAN
+from ..lit_diffuse.accumulate import ENOUGH, LitDiffuse, accumulate
+
+MIDDLE, CORNER = 2 / 3, 1 / 12
+"""Weights of a pixel's middle and corners: together they give what is quadratic over the pixel its true mean."""
+FLOOR = 0.02
+"""Share of the room's median radiance that is added to both sides of the ratio: in the dark it is all noise."""
+DETAIL = 0.02
+"""Share of its radiance by which an element must differ from the mean of the texels around it: where L_d is even, there
+is nothing to make sharper."""
+MOST = 2.0
+"""Times that L_d may become brighter or darker."""
+
+
+def sharpened(
+    lit: LitDiffuse,
+    surface: Surface,
+    frames: Sequence[Frame],
+    read: Callable[[Frame], Pixels],
+    lookup: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray] | None = None,
+    **how: Any,
+) -> LitDiffuse:
+    """L_d with the detail that its own blur took from it, where `ENOUGH` clean observations tell.
+
+    Parameters
+    ----------
+    frames : sequence of Frame
+        In the poses that `lit` was accumulated with.
+    read : callable
+        Gives a frame's pixels.
+    lookup : callable, optional
+        As `ElementLookup` finds elements, but -1 where the atlas has none; that one over all of it where left out.
+    **how
+        As `accumulate` takes it: median, order, seed, threads, folder, progress.
+
+    Raises
+    ------
+    BadInputError
+        From `read`.
+    InterruptedRun
+        From a progress.
+    """
+    atlas = surface.atlas
+    lookup = lookup or ElementLookup(surface.mesh, atlas)
+    floor = np.float32(max(FLOOR * float(np.median(lit.radiance[lit.seen])), 1e-30))
+    good = (lit.tier == CLEAN) & (lit.count >= ENOUGH) & _detailed(lit, atlas)
+
+    def ratios(frame: Frame) -> Pixels:
+        pixels = read(frame)
+        shown = _shown(frame.camera, surface, lookup, lit)
+        known = np.isfinite(shown).all(-1)
+        ratio = (np.maximum(pixels.radiance, 0) + floor) / (np.where(known[..., None], shown, 0) + floor)
+        return replace(pixels, radiance=ratio.astype(np.float32), valid=pixels.valid & known)
+
+    found = accumulate(surface.mesh, atlas, surface.scene, frames, ratios, only=good, **how)
+    told = good & (found.tier == CLEAN) & (found.count >= ENOUGH)
+    ratio = np.where(told[:, None], np.clip(found.radiance, 1 / MOST, MOST), 1).astype(np.float32)
+    return replace(lit, radiance=lit.radiance * ratio, lower=lit.lower * ratio, upper=lit.upper * ratio)
+
+
+def _detailed(lit: LitDiffuse, atlas: Atlas) -> np.ndarray:
+    """Elements that differ from the texels around them, (n,) bool."""
+    known = np.flatnonzero(lit.seen)
+    level = np.zeros((2, atlas.size**2), np.float32)
+    level[0, atlas.texel[known]] = lit.radiance[known].mean(1)
+    level[1, atlas.texel[known]] = 1
+    total, count = (uniform_filter(part.reshape(atlas.size, -1), 3).ravel()[atlas.texel] for part in level)
+    own = level[0, atlas.texel]
+    return np.abs(own - total / np.maximum(count, 1e-6)) > DETAIL * own
+
+
+def _shown(camera: Camera, surface: Surface, lookup: Callable, lit: LitDiffuse) -> np.ndarray:
+    """L_d as a camera shows it, (height, width, 3) float32; NaN where a pixel shows what has none."""
+    width, height = camera.width, camera.height
+
+    def traced(places: np.ndarray) -> np.ndarray:
+        directions, led = camera.rays(places)
+        origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
+        hits = surface.scene.intersect(origins, directions)
+        met = np.flatnonzero((hits.triangle >= 0) & led)
+        element = lookup(hits.triangle[met], hits.u[met], hits.v[met])
+        found = np.full((len(places), 3), np.nan, np.float32)
+        found[met[element >= 0]] = lit.radiance.take(element[element >= 0], 0)
+        return found
+
+    middle = traced(camera.pixel_centres()).reshape(height, width, 3)
+    # Corners of those pixels alone that show an element: often few, where few objects are asked for.
+    known = np.isfinite(middle).all(-1)
+    wanted = np.zeros((height + 1, width + 1), bool)
+    for down in (slice(None, -1), slice(1, None)):
+        for right in (slice(None, -1), slice(1, None)):
+            wanted[down, right] |= known
+    corner = np.full((height + 1, width + 1, 3), np.nan, np.float32)
+    corner[wanted] = traced(np.argwhere(wanted)[:, ::-1].astype(float))
+    around = corner[1:, 1:] + corner[1:, :-1] + corner[:-1, 1:] + corner[:-1, :-1]
+    return np.float32(MIDDLE) * middle + np.float32(CORNER) * around

@@ -1,0 +1,93 @@
+"""What was found of an object, or given, as its description: `ObjectMaterial`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...light.mirrors import Mirror
+from ...material import EMITTER, LAMBERTIAN, LAMP_ALBEDO, METAL, TRANSPARENT, ObjectMaterial
+from ...overrides import Given
+from ...scene.model import Instance
+from .given import given_interval, given_note
+from .intervals import GlossInterval
+from .layout import Problem
+from .models import Choice, metal_f0
+
+UNRESOLVED = 0.17
+"""Roughness up to which the frames show a mirror: a lobe of phi 0.03 is as wide as a few pixels."""
+
+
+def lamp_material(instance: Instance, radiance: np.ndarray, irradiance: np.ndarray, note: str) -> ObjectMaterial:
+    """The description of a lamp that was seen with `radiance` ((3,)), under the E of its elements, (k, 3)."""
+    here = np.median(irradiance, 0) if len(irradiance) else np.zeros(3)
+    return ObjectMaterial(
+        instance.object_id, instance.class_name, EMITTER, emission=given_off(radiance, here), note=note
+    )
+
+
+def given_off(radiance: np.ndarray, irradiance: np.ndarray) -> tuple[float, float, float]:
+    """What a lamp gives of itself of the `radiance` ((3,)) that it was seen with, under E ((3,)); never all of it."""
+    reflected = np.minimum(LAMP_ALBEDO * irradiance / np.pi, LAMP_ALBEDO * radiance)
+    return tuple(float(x) for x in radiance - reflected)
+
+
+def flat_mirror(instance: Instance, mirror: Mirror, observations: int) -> ObjectMaterial:
+    """The description of a mirror that was found before the shading, or that the capture tells of."""
+    note = "A flat mirror: the frames show the room in it." if observations else "A flat mirror, as the capture tells."
+    return ObjectMaterial(
+        instance.object_id, instance.class_name, METAL, phi=0.0, f0=tuple(float(x) for x in mirror.f0),
+        observations=observations, roughness_low=0.0, roughness_high=UNRESOLVED if observations else 0.0, note=note,
+    )  # fmt: skip
+
+
+def described(
+    instance: Instance, choice: Choice, problem: Problem | None, target: str | None, sure: GlossInterval
+) -> ObjectMaterial:
+    """The description of what was chosen."""
+    fit = choice.fit
+    common = {
+        "object_id": instance.object_id,
+        "class_name": instance.class_name,
+        "model": choice.model,
+        "target_frame": target,
+        "observations": 0 if problem is None else len(problem.element),
+        "residual": None if fit is None else fit.residual,
+        "residual_lambertian": None if fit is None else fit.residual_lambertian,
+        "roughness_low": sure.roughness[0],
+        "roughness_high": sure.roughness[1],
+        "specular_low": sure.specular[0],
+        "specular_high": sure.specular[1],
+        "scores": choice.scores,
+        "note": choice.note,
+    }
+    if choice.model == TRANSPARENT:
+        found = choice.see_through
+        return ObjectMaterial(
+            **common, transmission=found.transmission, surfaces=None if found.cut_out else found.surfaces
+        )
+    if choice.model == LAMBERTIAN:
+        return ObjectMaterial(**(common | {"residual": common["residual_lambertian"]}))
+    if choice.model == METAL:
+        f0 = fit.psi if problem is None else metal_f0(problem, fit.phi)
+        return ObjectMaterial(**common, phi=fit.phi, f0=tuple(float(x) for x in f0))
+    return ObjectMaterial(**common, phi=fit.phi, psi=float(fit.psi.mean()))
+
+
+def as_given(found: ObjectMaterial, given: Given, choice: Choice) -> ObjectMaterial:
+    """The description of an object of which something was given."""
+    note = given_note(given)
+    if choice.model == LAMBERTIAN:  # that there is no highlight is known, and what it would be like does not apply
+        return replace(found, roughness_low=None, roughness_high=None, specular_low=0.0, specular_high=0.0, note=note)
+    sure = given_interval(given, choice, GlossInterval(
+        (found.roughness_low, found.roughness_high), (found.specular_low, found.specular_high)))  # fmt: skip
+    f0 = tuple(float(x) for x in choice.fit.psi) if choice.model == METAL else None
+    psi = found.psi if given.f0 is None or choice.model == METAL else float(np.mean(given.f0))
+    fitted = choice.fit.residual > 0
+    return replace(
+        found, psi=psi, f0=f0, note=note, residual=found.residual if fitted else None,
+        residual_lambertian=found.residual_lambertian if fitted else None,
+        roughness_low=sure.roughness[0], roughness_high=sure.roughness[1],
+        specular_low=sure.specular[0], specular_high=sure.specular[1],
+    )  # fmt: skip

@@ -1,0 +1,152 @@
+"""The observations of one object, and their arrangement by views and elements in which the fit runs quickly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...light.lobes import LobeLight, nearest
+
+
+@dataclass(frozen=True)
+class Problem:
+    """The observations of one object, ready to be fitted.
+
+    Attributes
+    ----------
+    element : (m,) int
+        Group of each observation: those of one surface element.
+    radiance : (m, 3) float
+        I.
+    lit_diffuse : (m, 3) float
+        L_d of the element; what 'target' takes as I_d.
+    light : LobeLight
+        A and B of each observation.
+    cosine : (m,) float32
+        n.wo.
+    """
+
+    element: np.ndarray
+    radiance: np.ndarray
+    lit_diffuse: np.ndarray
+    light: LobeLight
+    cosine: np.ndarray
+
+    def part(self, chosen: np.ndarray) -> Problem:
+        """The observations `chosen` ((m,) bool)."""
+        return Problem(
+            self.element[chosen], self.radiance[chosen], self.lit_diffuse[chosen], self.light.part(chosen),
+            self.cosine[chosen],
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Lobe:
+    """A, B and the products of their noise for h phi, (3, h, views, elements) float32 each, relative to the level."""
+
+    A: np.ndarray
+    B: np.ndarray
+    AA: np.ndarray
+    AB: np.ndarray
+    BB: np.ndarray
+
+
+class Layout:
+    """A problem as dense arrays: channel, phi, view, element; what an element was not seen in has weight 0.
+
+    Sums over an element's views are then sums over an axis, and every loop runs along hundreds of elements: solving
+    for all phi at once takes a fifth of the time that one phi after the other took with `np.bincount`.
+
+    Parameters
+    ----------
+    problem : Problem
+    free : bool
+        Whether each element's diffuse part is solved for; else it is L_d.
+
+    Attributes
+    ----------
+    I : (3, 1, v, g) float32
+        Radiance, less L_d where the diffuse part is not free, over the element's own level: noise and misregistration
+        grow with radiance.
+    there : (v, g) float32
+        1 where there is an observation, else 0.
+    inflate : (g,) float32
+        A mean over n views takes part of the residual with it; this makes up for it.
+    count : int
+        Observations.
+    grid : (p,) float32
+        phi of the lobes.
+    """
+
+    def __init__(self, problem: Problem, free: bool = True):
+        self.free, self.count, self.grid = free, len(problem.element), problem.light.grid
+        order = np.argsort(problem.element, kind="stable")
+        _, start, views = np.unique(problem.element[order], return_index=True, return_counts=True)
+        group = np.repeat(np.arange(len(start)), views)
+        rank = np.arange(self.count) - start[group]
+        shape = (int(views.max()), len(start))
+        self._slot = rank * shape[1] + group
+        self._order, self._shape = order, shape
+        self.there = self._laid(np.ones(self.count, np.float32))
+        mean = np.bincount(group, problem.radiance[order].mean(1), shape[1]) / views
+        # with a floor at a tenth of the object's level
+        self._level = level = np.maximum(mean, 0.1 * np.median(mean) + 1e-12).astype(np.float32)
+        self.inflate = np.ones(shape[1], np.float32)
+        if free:
+            self.inflate = np.sqrt(views / np.maximum(views - 1, 1)).astype(np.float32)
+        diffuse = 0 if free else problem.lit_diffuse
+        self.I = self._laid((problem.radiance - diffuse).T)[:, None] / level
+        self._grazing = (1 - self._laid(problem.cosine)) ** 2
+        light = problem.light
+        A, B, dA, dB = (self._laid(x.T) / level for x in (light.A, light.B, light.A_noise, light.B_noise))
+        self._lobe = Lobe(A, B, dA * dA, dA * dB, dB * dB)
+
+    @property
+    def views(self) -> float:
+        """Of an element, on average."""
+        return self.count / self.there.shape[1]
+
+    def each(self, values: np.ndarray) -> np.ndarray:
+        """Values of the observations ((m, c)) as (c, v, g) float32; 0 where there is none."""
+        return self._laid(values.T)
+
+    def relative(self, radiance: np.ndarray) -> np.ndarray:
+        """The same of a radiance ((m, 3)), over the elements' own levels."""
+        return self._laid(radiance.T) / self._level
+
+    def _laid(self, values: np.ndarray) -> np.ndarray:
+        """(..., m) values as (..., v, g) float32."""
+        result = np.zeros((*values.shape[:-1], self._shape[0] * self._shape[1]), np.float32)
+        result[..., self._slot] = values[..., self._order]
+        return result.reshape(*values.shape[:-1], *self._shape)
+
+    def darkening(self, kappa: float | tuple[float, ...]) -> np.ndarray:
+        """t of the diffuse part for each kappa, (k, v, g); 0 where the diffuse part is not free."""
+        kappa = np.atleast_1d(np.float32(kappa))[:, None, None]
+        return (1 - kappa * self._grazing) * np.float32(self.free)
+
+    def at(self, phi: float) -> slice:
+        """The phi of the grid next to this one."""
+        index = nearest(self.grid, phi)
+        return slice(index, index + 1)
+
+    def lobe(self, phi: slice) -> Lobe:
+        """A, B and their noise for some phi of the grid."""
+        one = self._lobe
+        return Lobe(*(getattr(one, name)[:, phi] for name in ("A", "B", "AA", "AB", "BB")))
+
+    def seen(self, values: np.ndarray) -> np.ndarray:
+        """Of (v, g) values those of observations, (m,)."""
+        return values[self.there > 0]
+
+    def part(self, chosen: np.ndarray) -> Layout:
+        """The same for some elements, (g,) bool."""
+        part = object.__new__(Layout)
+        part.free, part.grid = self.free, self.grid
+        part.there, part.inflate, part.I = self.there[:, chosen], self.inflate[chosen], self.I[..., chosen]
+        part._grazing = self._grazing[:, chosen]
+        part.count = int(part.there.sum())
+        one = self._lobe
+        part._lobe = Lobe(*(getattr(one, name)[..., chosen] for name in ("A", "B", "AA", "AB", "BB")))
+        return part

@@ -1,0 +1,308 @@
+"""Which model an object needs: Lambertian, a dielectric lobe over diffuse, or metal; none richer than the data show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ...light.lobes import nearest
+from ...material import LAMBERTIAN, METAL, SPECULAR, TRANSPARENT
+from ...weighted import weighted_median
+from ..see_through.see_through import SeeThrough, is_sure
+from .fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs, huber, solve
+from .layout import Layout, Problem
+from .one_colour import BROADEST_PHI, DIELECTRIC_PSI, Coated, OneColour
+
+LEAST_PSI = 0.02
+"""No solid dielectric reflects less at normal incidence (n = 1.33); a smaller fitted psi is no lobe at all."""
+DIELECTRIC = Prior(DIELECTRIC_PSI, 0.01)
+"""Plastics, lacquers, glass and woods have n = 1.4 to 1.6, F0 = 0.03 to 0.05. A broad lobe can be a little broader and
+much stronger for nearly the same frames (living room's panels: phi 0.39 with psi 0.05 or 0.45 with 0.1): there this
+decides; where the frames tell, they outweigh it."""
+METAL_PSI = 0.12
+"""No common dielectric reflects more (n = 2.06); what does is a metal or a mirror."""
+BARE = 2.0
+"""A metal has no diffuse part. Its lobe alone, with nothing of each element's own, may cost up to so many times what
+each element's own mean does (errors of the light field and of the mesh): metals in the living room had 0.1 to 1.4,
+dielectrics and matt things whose lobe looked like a metal's 2.4 to 60, there and in four small rooms."""
+BARE_AT_MOST, MUCH = 3.0, 0.2
+"""The same where a metal takes away more than this share of what a matt surface costs, and of what a dielectric does:
+thin legs of steel, 32 elements in 5 views, had 2.4."""
+HOW = {SPECULAR: {"least_psi": LEAST_PSI, "prior": DIELECTRIC}, METAL: {"coloured": True}}
+"""What `fit_lobe` is told of each model."""
+MIN_GAIN = 0.02
+MIN_SIGMAS = 3.0
+"""A lobe must lower the cost on elements that its fit has not seen by this share, and by this many standard errors."""
+LARGE_GAIN, LARGE_SIGMAS, LARGE_ELEMENTS = 0.1, 2.0, 50
+"""A lobe that takes so much off needs fewer standard errors: few elements show a small highlight, but what they show
+nothing else explains (a bathroom's tiles, 38,000 pixels: gain .16, 2.2; of what is truly matt in the living room and
+its perturbed scan nothing gains a tenth with less than 3). Not of a handful of elements (a cord, a pixel wide at most),
+whose standard error is no better known than that."""
+SURELY_METAL = 2.0
+"""Standard errors by which a metal must also beat a dielectric over a diffuse part, once it has beaten a matt surface:
+that alone it does not stand or fall with, as it has to do without a diffuse part besides (`BARE`). Below `MIN_SIGMAS`
+others of its class decide: of 31 true metals in nine rooms two had less, a black keyboard had 1.9 or 2.1."""
+MIN_ELEMENTS = 12
+EXCLUDED = 0.1
+"""Rise of an object's cost from which on the lobe of its class is refused."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The model taken for one object.
+
+    Attributes
+    ----------
+    model : str
+        LAMBERTIAN, SPECULAR, METAL or TRANSPARENT.
+    fit : LobeFit or None
+        The best lobe, also where it was not taken; None if there was too little to fit.
+    gain : float
+        Share of the cost that the lobe takes away on held-out elements.
+    sigmas : float
+        The same in standard errors.
+    note : str
+    scores : dict of str to float
+        Cost on held-out elements relative to the Lambertian's, of each model that was tried.
+    """
+
+    model: str
+    fit: LobeFit | None
+    gain: float = 0.0
+    sigmas: float = 0.0
+    note: str = ""
+    scores: dict[str, float] = field(default_factory=dict)
+    dielectric: LobeFit | None = None
+    """A dielectric's sure lobe that serves nearly as well as the metal's that was taken."""
+    metal: LobeFit | None = None
+    """A metal's lobe that serves better than any other model, but not beyond doubt."""
+    bare: bool = False
+    """Whether a metal's lobe alone, with nothing of each element's own, explains the frames about as well as a metal's
+    does (`BARE`)."""
+    see_through: SeeThrough | None = None
+    """How the object shows what is behind it; it is TRANSPARENT then."""
+    looks: OneColour | Coated | None = None
+    """What said that it is metal or coated, where its views alone did not (`by_looks`)."""
+
+
+def _gain(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
+    """Share of the elements' costs that the lobe takes off, and that in standard errors."""
+    saved = without - with_lobe
+    error = saved.std() / np.sqrt(len(saved))
+    return float(saved.sum() / max(without.sum(), 1e-30)), float(saved.mean() / max(error, 1e-30))
+
+
+def gain_of(fit: LobeFit, held: Problem) -> tuple[float, float]:
+    """Share of the cost that a fit's lobe takes off elements it has not seen, and that in standard errors."""
+    return _gain(*element_costs(Layout(held), fit, max(1.4826 * fit.residual, 1e-4)))
+
+
+def _dielectric(fit: LobeFit) -> bool:
+    """Whether a dielectric can have this lobe, and frames can tell it from a diffuse part."""
+    return fit.psi[0] <= METAL_PSI and fit.phi <= BROADEST_PHI
+
+
+def _metallic(fit: LobeFit) -> bool:
+    """Whether this lobe is too strong for a dielectric, and frames can tell it from a diffuse part."""
+    return float(fit.psi.mean()) > METAL_PSI and fit.phi <= BROADEST_PHI
+
+
+def _bare_metal(problem: Problem, layout: Layout, phi: float, fit: LobeFit, scale: float) -> tuple[LobeFit, np.ndarray]:
+    """A metal's lobe of width phi with no diffuse part at all: `fit` with its F0, and the elements' costs, (g,)."""
+    f0 = metal_f0(problem, phi)
+    lobe = layout.lobe(layout.at(phi))
+    rest = layout.I - f0.astype(np.float32)[:, None, None, None] * lobe.A - lobe.B
+    size = np.sqrt(np.square(rest[:, 0]).mean(0))
+    return replace(fit, phi=float(phi), psi=f0, kappa=0.0), (huber(size, scale) * layout.there).sum(0, dtype=np.float64)
+
+
+def metal_fit(problem: Problem, layout: Layout) -> LobeFit:
+    """The lobe of what is known to be a metal: the one over a diffuse part if it is a metal's, else the lobe alone."""
+    metal = fit_lobe(layout, **HOW[METAL])
+    if _metallic(metal):
+        return metal
+    widths = layout.grid[layout.grid <= BROADEST_PHI] if len(layout.grid) > 1 else layout.grid
+    scale = max(1.4826 * metal.residual, 1e-4)
+    return min((_bare_metal(problem, layout, phi, metal, scale) for phi in widths), key=lambda one: one[1].sum())[0]
+
+
+def _of_class(own: LobeFit, of_class: LobeFit, model: str, problem: Problem | None) -> LobeFit:
+    """An object's own lobe where it explains its frames better than that of its class does, beyond doubt; else that.
+
+    A metal's F0 is its own in either.
+    """
+    shared = replace(own, phi=of_class.phi, psi=own.psi if model == METAL else of_class.psi)
+    if problem is None:
+        return shared
+    layout, scale = Layout(problem), max(1.4826 * own.residual, 1e-4)
+    if model == METAL:
+        shared = replace(shared, psi=solve(layout, layout.at(shared.phi), own.kappa, scale, **HOW[METAL]).psi[:, 0])
+    (with_own, _), (with_shared, _) = (element_costs(layout, fit, scale) for fit in (own, shared))
+    gain, sigmas = _gain(with_own, with_shared)
+    return own if gain > MIN_GAIN and sigmas > MIN_SIGMAS else shared
+
+
+def choose_model(problem: Problem) -> Choice:
+    """The simplest model that the observations support, by two-fold cross-validation over the elements."""
+    if len(np.unique(problem.element)) < MIN_ELEMENTS:
+        return Choice(LAMBERTIAN, None, note="Too few observations to look for a highlight.")
+    layout = Layout(problem)
+    odd = (np.random.default_rng(0).permutation(layout.there.shape[1]) % 2).astype(bool)
+
+    def held_out(fit: LobeFit, model: str) -> tuple[np.ndarray, np.ndarray]:
+        """Costs of the elements with the lobe that the others gave, and without one."""
+        found = [held_out_costs(layout, fit, train, scale, **HOW[model]) for train in (odd, ~odd)]
+        with_lobe, without = (np.concatenate(costs) for costs in zip(*found, strict=True))
+        return with_lobe, without
+
+    fit = fit_lobe(layout, **HOW[SPECULAR])
+    scale = max(1.4826 * fit.residual, 1e-4)
+    with_lobe, without = held_out(fit, SPECULAR)
+    scores = {LAMBERTIAN: 1.0, SPECULAR: float(with_lobe.sum() / max(without.sum(), 1e-30))}
+    gain, sigmas = _gain(with_lobe, without)
+    large = gain > LARGE_GAIN and layout.there.shape[1] >= LARGE_ELEMENTS
+    sure = gain > MIN_GAIN and sigmas > (LARGE_SIGMAS if large else MIN_SIGMAS) and fit.phi <= BROADEST_PHI
+    # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
+    dielectric = replace(fit, psi=np.minimum(fit.psi, METAL_PSI))
+    metal, likely = fit_lobe(layout, **HOW[METAL]), None
+    found = [(metal, *held_out(metal, METAL))] if _metallic(metal) else []
+    # Errors of the light draw psi down where each element has a diffuse part of its own; without one they don't.
+    bare = min(
+        (_bare_metal(problem, layout, phi, metal, scale) for phi in layout.grid[layout.grid <= BROADEST_PHI]),
+        key=lambda one: one[1].sum(),
+    )
+    found += [(*bare, without)] if _metallic(bare[0]) else []
+    no_diffuse = _metallic(bare[0]) and bool(bare[1].sum() <= BARE * without.sum())
+    for fit_of_metal, with_metal, matt in found:
+        scores[METAL] = min(float(with_metal.sum() / max(matt.sum(), 1e-30)), scores.get(METAL, np.inf))
+        # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
+        (less, by), (more, surely) = _gain(with_metal, matt), _gain(with_metal, with_lobe)
+        most = BARE_AT_MOST if min(less, more) > MUCH else BARE
+        if _bare_metal(problem, layout, fit_of_metal.phi, metal, scale)[1].sum() > most * matt.sum():
+            continue
+        if min(less, more) > MIN_GAIN and by > MIN_SIGMAS and surely > SURELY_METAL:
+            other = dielectric if sure and surely < MIN_SIGMAS else None
+            return Choice(METAL, fit_of_metal, less, by, scores=scores, dielectric=other)
+        if min(less, more) > MIN_GAIN and likely is None:
+            likely = fit_of_metal
+    if sure:
+        return Choice(SPECULAR, dielectric, gain, sigmas, scores=scores, metal=likely, bare=no_diffuse)
+    note = "Roughness and specular are not identifiable from these frames."
+    return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores, metal=likely, bare=no_diffuse)
+
+
+def set_apart(choice: Choice, found: SeeThrough | None) -> Choice:
+    """An object's choice, TRANSPARENT where its frames surely show what is behind it."""
+    if found is None:
+        return choice
+    scores = choice.scores | {TRANSPARENT: found.score}
+    if not is_sure(found):
+        return replace(choice, scores=scores)
+    what = (
+        f"cut out, with holes over {found.transmission:.0%} of it"
+        if found.cut_out
+        else (f"transparent: {found.transmission:.0%} of what is behind it passes")
+    )
+    note = f"Set apart as {what}. Its own colour is uncertain."
+    return Choice(TRANSPARENT, None, found.gain, found.sigmas, note, scores, see_through=found)
+
+
+def adopt_from_class(
+    choices: dict[int, Choice], problems: dict[int, Problem], class_of: dict[int, str]
+) -> dict[int, Choice]:
+    """One lobe for each class of objects, unless an object's own frames speak against it.
+
+    The class's model is that of the member with the strongest evidence, its lobe the median over the members of that
+    model, weighted by evidence. Members keep their own lobe where their frames set it apart from that. Objects
+    whose own frames decide nothing take over the class's, but not where it raises their cost by more than `EXCLUDED`.
+    What is set apart neither gives nor takes. Among metals, one whose frames favour metal without being sure of it is
+    one, as rough as the others unless its frames are sure of something else; and one whose frames a metal's lobe
+    explains alone, without any diffuse part, takes over that of the class: a metal on a bumpy mesh shows the room where
+    no ray finds it, and looks like anything, but not like diffuse light. Among dielectrics, one that is a metal no more
+    surely than it is one of them is one of them.
+    """
+    result, choices = dict(choices), {i: choice for i, choice in choices.items() if choice.model != TRANSPARENT}
+    for name in sorted(set(class_of[object_id] for object_id in choices)):
+        members = {i: choice for i, choice in choices.items() if class_of[i] == name}
+        if all(choice.model == LAMBERTIAN for choice in members.values()):
+            together = _together(members)
+            members, result = members | together, result | together
+        found = {i: choice for i, choice in members.items() if choice.model != LAMBERTIAN}
+        if not found:
+            continue
+        # What a metal explains as well says nothing against metals of its class; looks alone judge none with a lobe.
+        views = any(one.model == METAL and one.looks is None for one in found.values())
+        judges = {i: one for i, one in found.items() if not isinstance(one.looks, Coated)} or found
+        clear = {
+            i for i, one in judges.items()
+            if not (one.dielectric if one.model == METAL else one.metal or views and one.bare)
+        }  # fmt: skip
+        source = max(sorted(clear) or judges, key=lambda i: found[i].sigmas)
+        model = _pooled([c for c in judges.values() if c.model == found[source].model], found[source])
+        for i, choice in members.items():
+            if model.model == METAL != choice.model and choice.metal is not None:
+                note = "Not beyond doubt by itself; others of its class are metal."
+                fit = _of_class(choice.metal, model.fit, METAL, problems.get(i))
+                result[i] = replace(choice, model=METAL, fit=fit, note=note)
+            elif model.model == METAL != choice.model and choice.bare and (views or choice.model == LAMBERTIAN):
+                note = f"Needs no diffuse part, like object {source} of its class, which is metal."
+                result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
+            elif model.model == SPECULAR and choice.dielectric is not None:
+                note = "Like a metal, but not beyond doubt; others of its class are not."
+                fit = _of_class(choice.dielectric, model.fit, SPECULAR, problems.get(i))
+                result[i] = replace(choice, model=SPECULAR, fit=fit, note=note)
+            elif choice.model == LAMBERTIAN and not _refused(model.fit, choice.fit, problems.get(i)):
+                note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
+                result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
+            elif choice.model == model.model and len(found) > 1 and i in problems:
+                result[i] = replace(choice, fit=_of_class(choice.fit, model.fit, model.model, problems[i]))
+    return result
+
+
+def _together(members: dict[int, Choice]) -> dict[int, Choice]:
+    """The members of a class that each gain by a lobe, as specular, if they are sure enough of it together.
+
+    None of them is by itself; all that have any evidence count, also those that speak against a lobe. One that gains by
+    what is no dielectric's lobe (matt curtains did by phi .87 and 1, at 3.5 and 6.5 standard errors) speaks for none.
+    """
+    judged = {i: choice for i, choice in members.items() if choice.fit is not None}
+    counted = [c.sigmas if _dielectric(c.fit) else min(c.sigmas, 0) for c in judged.values()]
+    if len(judged) < 2 or sum(counted) / np.sqrt(len(judged)) <= MIN_SIGMAS:
+        return {}
+    return {
+        i: replace(choice, model=SPECULAR, note="Sure of its lobe together with others of its class.")
+        for i, choice in judged.items()
+        if choice.gain > MIN_GAIN and _dielectric(choice.fit)
+    }
+
+
+def _pooled(found: list[Choice], best: Choice) -> Choice:
+    """`best` with the median phi and psi of several choices, weighted by their evidence.
+
+    Of those that views speak for, if any: by looks alone lobes come out too broad (spot rings' roughness .7 for .2).
+    """
+    found = [choice for choice in found if choice.looks is None] or found
+    weight = np.square([choice.sigmas for choice in found])
+    phi = weighted_median(np.array([choice.fit.phi for choice in found]), weight)
+    psi = [weighted_median(values, weight) for values in np.array([choice.fit.psi for choice in found]).T]
+    return replace(best, fit=replace(best.fit, phi=phi, psi=np.array(psi)))
+
+
+def _refused(lobe: LobeFit, own: LobeFit | None, problem: Problem | None) -> bool:
+    """Whether an object's own frames speak against its class's lobe."""
+    if problem is None or len(np.unique(problem.element)) < MIN_ELEMENTS:
+        return False
+    if own is not None:
+        # How its diffuse part darkens is the object's own matter, with the class's lobe as without.
+        lobe = replace(lobe, kappa=own.kappa, kappa_lambertian=own.kappa_lambertian, residual=own.residual)
+    return gain_of(lobe, problem)[0] < -EXCLUDED
+
+
+def metal_f0(problem: Problem, phi: float) -> np.ndarray:
+    """F0 of a metal, (3,): all its light is the lobe's, so I = F0 A + B; the median ratio over the observations."""
+    at = nearest(problem.light.grid, phi)
+    A, B = problem.light.A[:, at].astype(np.float64), problem.light.B[:, at].astype(np.float64)
+    strong = A.mean(1) >= np.median(A.mean(1)) * 0.5
+    ratio = (problem.radiance[strong] - B[strong]) / np.maximum(A[strong], 1e-9)
+    return np.clip(np.median(ratio, 0), 0.02, 1.0)

@@ -1,0 +1,183 @@
+"""Whether an object looks like a metal or coated all over: matt, dielectric and metal compared, each of one colour.
+
+`models` asks what changes with the view while each element has a colour of its own. Thin and small things (taps, legs,
+rings) leave it little: few views of few elements, on a mesh coarser than what they mirror. But a metal shows the room,
+and everything matt the light that arrives: over a whole object of one colour the radiance follows one or the other.
+What is compared is the robust spread of log(I / prediction) over all observations; a factor common to all is free, so
+none of the three has to know its colour. Texture widens all three spreads alike, and so speaks for none.
+
+A coat of no colour of its own over a saturated one shows in the dark channels, too: matt and dielectric are compared by
+channel (`compare_coat`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...light.emitters import LUMINANCE
+from .fit import robust_scale
+from .layout import Problem
+
+DIELECTRIC_PSI = 0.04
+"""What a dielectric of one colour reflects at normal incidence (n = 1.5)."""
+BROADEST_PHI = 0.5
+"""A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface."""
+LEAST_OBSERVATIONS = 40
+TRIMMED = 3.0
+"""Residuals count up to so many spreads."""
+DARKEST = 0.02
+"""Below this share of the median radiance a channel's logarithm is all noise."""
+
+
+@dataclass(frozen=True)
+class OneColour:
+    """How well each kind of matter of one colour explains an object's frames.
+
+    Attributes
+    ----------
+    matt, dielectric, metal : float
+        Robust standard deviation of log(I / prediction).
+    phi : float
+        Width of the metal's lobe.
+    sigmas : float
+        By how many standard errors over the elements the metal explains more than the better of the others.
+    """
+
+    matt: float
+    dielectric: float
+    metal: float
+    phi: float
+    sigmas: float
+
+    @property
+    def other(self) -> float:
+        """Spread of the better one of the others."""
+        return min(self.matt, self.dielectric)
+
+    @property
+    def ratio(self) -> float:
+        """The metal's spread over that; below 1 speaks for metal."""
+        return self.metal / self.other
+
+
+@dataclass(frozen=True)
+class Coated:
+    """How well one colour explains an object's frames in all channels, matt and under a dielectric's coat.
+
+    Attributes
+    ----------
+    matt, coated : float
+        Robust standard deviation of log(I / prediction) over observations and channels.
+    phi : float
+        Width of the coat's lobe.
+    sigmas : float
+        By how many standard errors over the elements the coat explains more.
+    """
+
+    matt: float
+    coated: float
+    phi: float
+    sigmas: float
+
+    @property
+    def ratio(self) -> float:
+        """The coated spread over the matt one; below 1 speaks for a coat."""
+        return self.coated / self.matt
+
+
+def compare(problem: Problem, irradiance: np.ndarray) -> OneColour | None:
+    """Compare the three on an object's observations; None where there are too few.
+
+    Parameters
+    ----------
+    problem : Problem
+    irradiance : (n, 3) float32
+        E of each element of the surface.
+    """
+    told = _told(problem, irradiance)
+    if told is None:
+        return None
+    usable, seen, E, element = told
+    light, log_I = problem.light, np.log(seen @ LUMINANCE)
+    widths = np.flatnonzero(light.grid <= BROADEST_PHI)
+
+    def residual(predicted: np.ndarray) -> np.ndarray:
+        """log(I / predicted) about its median, (k,)."""
+        rest = log_I - np.log(np.maximum(predicted, 1e-3 * np.median(predicted) + 1e-12))
+        return rest - np.median(rest)
+
+    matt = residual(E @ LUMINANCE)
+    coats = (_one_colour(seen, E, _coat(problem, at)[usable]) for at in widths)
+    dielectric = min((residual(predicted @ LUMINANCE) for predicted in coats), key=spread)
+    metals = [residual(light.A[usable, at] @ LUMINANCE) for at in widths]
+    best = int(np.argmin([spread(rest) for rest in metals]))
+    other, metal = min(matt, dielectric, key=spread), metals[best]
+    return OneColour(
+        spread(matt), spread(dielectric), spread(metal), float(light.grid[widths[best]]), _sigmas(metal, other, element)
+    )
+
+
+def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
+    """Compare matt and coated on an object's observations, by channel; None where there are too few.
+
+    Parameters
+    ----------
+    problem : Problem
+    irradiance : (n, 3) float32
+        E of each element of the surface.
+    """
+    told = _told(problem, irradiance)
+    if told is None:
+        return None
+    usable, seen, E, element = told
+    widths = np.flatnonzero(problem.light.grid <= BROADEST_PHI)
+    least = DARKEST * np.median(seen)
+
+    def residual(predicted: np.ndarray) -> np.ndarray:
+        """log(I / predicted), (k, 3); a factor common to all channels is free."""
+        rest = np.log(np.maximum(seen, least) / np.maximum(predicted, least))
+        return rest - np.median(rest.mean(1))
+
+    matt = residual(_one_colour(seen, E, np.float32(0)))
+    coats = [residual(_one_colour(seen, E, _coat(problem, at)[usable])) for at in widths]
+    best = int(np.argmin([spread(rest) for rest in coats]))
+    return Coated(
+        spread(matt), spread(coats[best]), float(problem.light.grid[widths[best]]), _sigmas(coats[best], matt, element)
+    )
+
+
+def _told(problem: Problem, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+    """Which observations tell something, (m,) bool, and their radiance, E (k, 3) and element (k,); None if too few."""
+    bright, E = problem.radiance @ LUMINANCE, irradiance[problem.element]
+    usable = (bright > 1e-3 * np.median(bright)) & (E @ LUMINANCE > 0)
+    if usable.sum() < LEAST_OBSERVATIONS:
+        return None
+    return usable, problem.radiance[usable], E[usable], problem.element[usable]
+
+
+def _coat(problem: Problem, at: int) -> np.ndarray:
+    """Radiance (m, 3) of a dielectric's lobe, of the width at index `at` of the grid."""
+    return DIELECTRIC_PSI * problem.light.A[:, at] + problem.light.B[:, at]
+
+
+def _one_colour(seen: np.ndarray, E: np.ndarray, coat: np.ndarray) -> np.ndarray:
+    """Radiance (k, 3) of the one albedo under a coat that suits most observations."""
+    rho = np.clip(np.median(np.pi * (seen - coat) / np.maximum(E, 1e-9), 0), 0, 1)
+    return rho * E / np.pi + coat
+
+
+def _sigmas(one: np.ndarray, other: np.ndarray, element: np.ndarray) -> float:
+    """By how many standard errors over the elements residuals (k,) or (k, 3) of one kind are less than another's."""
+    most = TRIMMED * spread(other)
+    saved = np.minimum(np.abs(other), most) - np.minimum(np.abs(one), most)
+    _, group, count = np.unique(element, return_inverse=True, return_counts=True)
+    by_element = np.bincount(group, saved.reshape(len(element), -1).mean(1)) / count
+    error = by_element.std() / np.sqrt(len(by_element))
+    return float(by_element.mean() / max(error, 1e-12))
+
+
+def spread(residual: np.ndarray) -> float:
+    """Robust standard deviation of residuals about 0."""
+    return robust_scale(np.abs(residual).ravel())

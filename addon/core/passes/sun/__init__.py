@@ -1,0 +1,1 @@
+"""Finds the sun from the light that it throws through the openings."""

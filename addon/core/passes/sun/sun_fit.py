@@ -1,0 +1,228 @@
+"""A sun that no frame saw, found by the shadows that its light leaves.
+
+Through an opening the sun throws a sharp patch, in which surfaces seem to reflect more than they get. A direction says
+where that patch lies, hence it is looked for among all directions: the right one is that under which albedo varies
+least within the objects (`light_fit`), as for any light that no frame saw. Texture, paper and lamplight are bright too,
+but no direction puts its patch right over them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ...light.emitters import LUMINANCE
+from ...light.environment import Environment
+from ...light.field import LightField
+from ...light.sun import Sun, around
+from .sun_spots import LIT, Edges, Guess, Spots, visible
+
+FEWEST = 12
+"""With fewer in the sample that stand out, no sun is looked for."""
+GRID = float(np.radians(4.0))
+REACHED = 0.05
+"""Least share of what stands out that a direction must reach."""
+KEPT, TRIED = 160, 4
+"""Directions of the grid of which the whole sample is asked, and that are then refined."""
+POOL = 60_000
+NEAR, DENSE = 0.3, 2000
+"""Metres around what stands out; elements from there, and from elsewhere on the same objects, for the refinement."""
+SHARP = np.radians([2.0, 1.0, 0.5])
+"""Steps of the direction, with a point-like sun."""
+EDGES = 2000
+"""Elements that the last refinement looks at: those over which the shadows' edges pass within `ASTRAY` of the
+direction."""
+ASTRAY = float(np.radians(2.5))
+SOFT = np.radians([0.8, 0.4, 0.2])
+RADII = np.radians([0.27, 0.5, 0.75, 1.0])
+"""Discs that are tried: thin clouds, and pictures and meshes that are not sharp, soften the edges."""
+MIN_GAIN = 0.1
+"""The spread of log albedo around the patch, and the differences of neighbours along its edges, must each fall by at
+least this share. A bedroom with a sun: 0.28 to 0.39 and 0.25, with a striped blanket in it; a box with one: 0.63 and
+0.65. A living room without one: 0.01. Bright rectangles on a box's floor: up to 0.45, but no gain along the edges."""
+EXPLAINED = 0.5
+"""Share of the elements short of light within the patch that must not be so with the sun."""
+COLOUR = 1.6
+"""A channel's irradiance differs from the luminance by this factor at most: a low sun's is 1.4 and 0.65."""
+
+
+def _directions() -> np.ndarray:
+    """Unit directions about `GRID` apart, evenly over the sphere (Fibonacci's lattice), (n, 3) float32."""
+    count = int(4 * np.pi / GRID**2)
+    z = 1 - (2 * np.arange(count) + 1) / count
+    angle = np.arange(count) * np.pi * (3 - np.sqrt(5))
+    flat = np.sqrt(1 - z**2)
+    return np.stack([flat * np.cos(angle), flat * np.sin(angle), z], 1).astype(np.float32)
+
+
+def _ring(count: int) -> np.ndarray:
+    angle = np.arange(count) * (2 * np.pi / count)
+    return np.stack([np.cos(angle), np.sin(angle)], 1)
+
+
+def _on_grid(even: Spots, environment: Environment) -> list[Guess]:
+    """Directions of the grid that may be the sun's, the best first."""
+    value = even.log_albedo()
+    excess = value - np.minimum(even.medians(value, np.ones(len(even), bool)), 0)
+    out = np.flatnonzero(even.stands_out())
+    way = _directions()
+    way = way[~environment.known(way)]
+    spot, ray = np.nonzero(even.normal[out] @ way.T > 0)
+    start = even.scene.off_surface(even.position[out], even.normal[out])
+    hidden = even.scene.occluded(start[spot], way[ray], np.full(len(spot), np.inf, np.float32))
+    weight = np.clip(excess[out], 0, 3)
+    reached = np.bincount(ray[~hidden], weight[spot[~hidden]], len(way)) / max(weight.sum(), 1e-9)
+    best = np.argsort(-reached, kind="stable")[:KEPT]
+    guesses = [even.explained(way[k]) for k in best if reached[k] > REACHED]
+    chosen: list[Guess] = []
+    for guess in sorted(guesses, key=lambda one: one.cost):
+        if all(guess.direction @ one.direction < np.cos(1.5 * GRID) for one in chosen):
+            chosen.append(guess)
+    return chosen[:TRIED]
+
+
+def _searched(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np.ndarray) -> Guess:
+    """The direction of least cost near a guess: the best of eight neighbours, again and again, by smaller steps."""
+    for step in steps:
+        for _ in range(4):
+            new = min((cost(way) for way in around(guess.direction, step * _ring(8))), key=lambda one: one.cost)
+            if new.cost >= guess.cost:
+                break
+            guess = new
+    return guess
+
+
+def _along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Elements of the pool that the direction, or one within `ASTRAY` of it, leaves lit and another does not."""
+    ways = around(direction, ASTRAY * np.concatenate([np.zeros((1, 2)), _ring(8), _ring(4) / 2]))
+    position, normal = field.atlas.position[pool], field.atlas.normal[pool]
+    lit = np.stack([visible(field.scene, way, position, normal) > 0.1 for way in ways])
+    mixed = pool[lit.any(0) & ~lit.all(0)]
+    return np.sort(rng.choice(mixed, min(len(mixed), EDGES), replace=False))
+
+
+def _pool(field: LightField, good: np.ndarray, even: Spots, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Elements of the objects on which something stands out ((k,)), and whether they lie `NEAR` that ((k,) bool)."""
+    atlas, out = field.atlas, even.stands_out()
+    pool = np.flatnonzero(good & np.isin(atlas.object_id, even.sample.object_id[out]))
+    pool = np.sort(rng.choice(pool, min(len(pool), POOL), replace=False))
+
+    def key(element: np.ndarray) -> np.ndarray:
+        return np.concatenate([atlas.position[element], 100.0 * atlas.object_id[element][:, None]], 1)
+
+    far, _ = cKDTree(key(even.sample.element[out])).query(key(pool), distance_upper_bound=NEAR)
+    return pool, np.isfinite(far)
+
+
+@dataclass(frozen=True)
+class SolvedSun:
+    """A sun, and the spots that tell its strength, with the spread of log albedo over them with and without it.
+
+    Attributes
+    ----------
+    sun : Sun
+    """
+
+    sun: Sun
+    _spots: Spots
+    _before: float
+    _after: float
+
+    def under(self, element: np.ndarray, factor: np.ndarray) -> Sun:
+        """The sun again, all other light having changed by factors ((m, 3)) at some elements ((m,))."""
+        spots = self._spots
+        group = np.concatenate([spots.atlas.object_id[element], spots.sample.object_id])[:, None] * 100.0
+        place = np.concatenate([spots.atlas.position[element], spots.position])
+        key = np.concatenate([place, group], 1)
+        _, nearest = cKDTree(key[: len(element)]).query(key[len(element) :])
+        spots.sample = replace(spots.sample, received=spots.sample.received * factor[nearest])
+        return _coloured(spots, self.sun.direction, self.sun.radius, self._before, self._after)
+
+
+def find_sun(
+    field: LightField,
+    element: np.ndarray,
+    received: np.ndarray,
+    lamps: list[int],
+    good: np.ndarray,
+    irradiance: Callable[[np.ndarray], np.ndarray],
+    seed: int = 0,
+) -> SolvedSun | None:
+    """The sun that explains a patch of light best; None where nothing is short of light or no sun explains it.
+
+    Parameters
+    ----------
+    field : LightField
+        With L_d, and the outside as it is known.
+    element : (m,) int
+        A sample, evenly over the objects.
+    received : (m, 3) float64
+        E there by all light that is known.
+    lamps : list of int
+    good : (n,) bool
+        Elements that may be asked.
+    irradiance : callable
+        E by all known light at elements, (k,) int -> (k, 3) float64.
+    """
+    free = ~np.isin(field.atlas.object_id[element], lamps)
+    if free.sum() < FEWEST:
+        return None
+    even = Spots(field, element[free], received[free])
+    if even.stands_out().sum() < FEWEST:
+        return None
+    guesses = _on_grid(even, field.environment)
+    if not guesses or guesses[0].cost >= even.spread():
+        return None
+    rng = np.random.default_rng([seed, 3])
+    pool, near = _pool(field, good & ~np.isin(field.atlas.object_id, lamps), even, rng)
+    chosen = [rng.choice(part, min(len(part), count), replace=False)
+              for part, count in ((pool[near], DENSE * 2 // 3), (pool[~near], DENSE // 3))]  # fmt: skip
+    dense = np.sort(np.concatenate(chosen))
+    spots = Spots(field, dense, irradiance(dense))
+    tried = [_searched(spots.explained, spots.explained(one.direction), SHARP) for one in guesses]
+    best, before = min(tried, key=lambda one: one.cost), spots.spread()
+    if best.cost > (1 - MIN_GAIN) * before:
+        return None
+    along = _along_edges(field, pool, best.direction, rng)
+    if len(along) < FEWEST:
+        return None
+    edges = Edges(Spots(field, along, irradiance(along)))
+    found = min((edges.explained(best.direction, best.strength, r) for r in RADII), key=lambda one: one.cost)
+    for steps in (SOFT, SOFT[1:]):
+
+        def cost(way: np.ndarray, now: Guess = found) -> Guess:
+            return edges.explained(way, now.strength, now.radius)
+
+        found = _searched(cost, found, steps)
+        thrown = spots.thrown(found.direction, found.radius)
+        strength = spots.strength(thrown)
+        found = min((edges.explained(found.direction, strength, r) for r in RADII), key=lambda one: one.cost)
+    thrown = spots.thrown(found.direction, found.radius)
+    after = spots.spread(thrown, found.strength)
+    short = spots.over() & (thrown > LIT)
+    left = short & spots.over(thrown, found.strength)
+    if (
+        found.cost > (1 - MIN_GAIN) * edges.differ()
+        or after > (1 - MIN_GAIN) * before
+        or left.sum() > (1 - EXPLAINED) * short.sum()
+    ):
+        return None
+    return SolvedSun(_coloured(spots, found.direction, found.radius, before, after), spots, before, after)
+
+
+def _coloured(spots: Spots, direction: np.ndarray, radius: float, before: float, after: float) -> Sun:
+    """The sun with what each channel says of its irradiance, held near the luminance's."""
+    thrown = spots.thrown(direction, radius)
+    luminance = spots.strength(thrown)
+    channels = np.array([spots.strength(thrown, np.eye(3)[c]) for c in range(3)])
+    channels = np.clip(channels, luminance / COLOUR, luminance * COLOUR)
+    light = np.float32(channels * (luminance / float(channels @ LUMINANCE)))
+    sun = Sun(np.float32(direction), light, radius)
+    note = (
+        f"A sun that no frame sees was solved from the patch of light that it throws: {sun.where()} "
+        f"(spread of log albedo around it {before:.3f} to {after:.3f})."
+    )
+    return replace(sun, note=note)

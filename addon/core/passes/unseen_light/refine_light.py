@@ -1,0 +1,193 @@
+"""All unknown light together: what was found one by one is refined under a tighter cap (`light_fit`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ...light.emitters import LUMINANCE
+from ...light.lamps import AGREES, Lamp, twin
+from ...light.light_fit import Sample
+from ...naming import object_name
+from ...scene.model import Instance
+
+BELIEVED = 3.0
+"""Further than this factor from all that was seen of the sky a solution is not believed: it may stand for something
+else."""
+DARKER = 1.25
+"""Nor one that is darker by more than this, where frames saw some of that side of the horizon: noise in E and G draws
+solutions down. The living room's ground, .22 where it was seen, came out at .08 and took two clipped lamps down with it
+(two perturbed scans: .95 of their luminance; .97 under 1.5, .994 under 1.25, 1.03 under 1.1)."""
+BRIGHTEST = 30.0
+"""The same for a part of the sky that is clipped."""
+
+
+@dataclass
+class Sky:
+    """Parts of the sky whose radiance is not known, and what is known of it so far.
+
+    Attributes
+    ----------
+    thrown : list of (m,) float64
+        E from each part at radiance 1.
+    guess : list of (3,) float64
+        Radiance of the seen neighbours; of a clipped part the lower bound.
+    clipped : bool
+        The last part is what was seen, but clipped.
+    told : list of bool
+        Whether frames tell radiance on a part's side of the horizon.
+    radiance : list of (3,) float64
+    solved : set of int
+        Parts of which the radiance was solved for.
+    """
+
+    thrown: list[np.ndarray]
+    guess: list[np.ndarray]
+    clipped: bool
+    told: list[bool] = field(default_factory=list)
+    radiance: list[np.ndarray] = field(default_factory=list)
+    solved: set[int] = field(default_factory=set)
+
+    def __post_init__(self):
+        self.radiance = [g.copy() for g in self.guess]
+        self.told = self.told or [False] * len(self.guess)
+
+    def _is_clipped(self, i: int) -> bool:
+        return self.clipped and i == len(self.thrown) - 1
+
+    def bounds(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest radiance that is believed, (3,) each."""
+        guess = np.maximum(self.guess[i], 1e-12)
+        if self._is_clipped(i):
+            return guess, BRIGHTEST * guess
+        return guess / (DARKER if self.told[i] else BELIEVED), np.full(3, BELIEVED * guess.max())
+
+    def notes(self) -> list[str]:
+        """One sentence for each part that was solved."""
+        said = []
+        for i in sorted(self.solved):
+            values, guess = (", ".join(f"{x:.3g}" for x in one[i]) for one in (self.radiance, self.guess))
+            if self._is_clipped(i):
+                said.append(
+                    "Part of the sky is clipped in every frame that sees it; it was solved from the light it "
+                    f"throws: radiance {values} (at least {guess})."
+                )
+            else:
+                said.append(
+                    f"Part {i + 1} of the sky that no frame sees was solved from the light it throws: radiance "
+                    f"{values} (its seen neighbours: {guess})."
+                )
+        return said
+
+
+def all_light(
+    base: np.ndarray, lamps: list[Lamp], thrown: dict[int, np.ndarray], sky: Sky, without: int = -1
+) -> np.ndarray:
+    """E from everything, (m, 3): `base`, the lamps, and the sky but for one part."""
+    total = base.copy()
+    for lamp in lamps:
+        total += thrown[lamp.object_id][:, None] * lamp.radiance
+    for i, (G, s) in enumerate(zip(sky.thrown, sky.radiance, strict=True)):
+        if i != without:
+            total += G[:, None] * s
+    return total
+
+
+def shared_by_class(
+    colours: dict[int, np.ndarray], objects: list[int], instances: tuple[Instance, ...]
+) -> dict[int, np.ndarray]:
+    """The known colours, and for those of `objects` without one the mean of their class's."""
+    class_of = {i.object_id: i.class_name for i in instances}
+    result = dict(colours)
+    for one in objects:
+        alike = [colour for i, colour in colours.items() if class_of.get(i) == class_of.get(one)]
+        if one not in result and alike:
+            result[one] = np.mean(alike, 0)
+    return result
+
+
+def refined(
+    sample: Sample,
+    lamps: list[Lamp],
+    thrown: dict[int, np.ndarray],
+    least: dict[int, float],
+    instances: tuple[Instance, ...],
+    seen: list[Lamp],
+    sky: Sky,
+    base: np.ndarray,
+    colours: dict[int, np.ndarray],
+) -> list[Lamp]:
+    """The lamps with refined radiances; those of the sky are refined in place.
+
+    Parameters
+    ----------
+    lamps : list of Lamp
+        Unseen ones, as found one by one. One that took a seen lamp's radiance keeps it.
+    least : dict of float
+        Luminance below which each would be no lamp.
+    base : (m, 3) float64
+        E from all light that the frames show.
+    colours : dict of (3,) float
+        Known colours of lamps: only their luminance is solved for.
+    """
+    fixed = [lamp for lamp in lamps if any(np.array_equal(lamp.radiance, other.radiance) for other in seen)]
+    free = [lamp for lamp in lamps if not any(lamp is other for other in fixed)]
+    parts = sorted(sky.solved)
+    if not free and not parts:
+        return lamps
+    others = Sky(
+        [G for i, G in enumerate(sky.thrown) if i not in parts],
+        [r for i, r in enumerate(sky.radiance) if i not in parts],
+        False,
+    )
+
+    def thrown_by() -> np.ndarray:
+        """E that each of `free` and `parts` throws at radiance 1, (m, k)."""
+        return np.stack([*(thrown[lamp.object_id] for lamp in free), *(sky.thrown[i] for i in parts)], 1)
+
+    def solve(weights: np.ndarray, start: np.ndarray, bright: np.ndarray | None = None) -> np.ndarray:
+        """Radiances of `free` and `parts` in the channel that `weights` ((3,)) makes.
+
+        With the luminance of all E ((m,)), `bright`, those under which the albedo's colour varies least: the texture
+        and the errors of E that all channels share are gone then.
+        """
+        low, high = np.zeros(len(start)), np.full(len(start), np.inf)
+        for k, lamp in enumerate(free):
+            low[k] = least[lamp.object_id] * float(start[k] / max(float(lamp.radiance @ LUMINANCE), 1e-12))
+        for k, i in enumerate(parts, len(free)):
+            low[k], high[k] = (bound @ weights for bound in sky.bounds(i))
+        sent, others_light = sample.radiance @ weights, all_light(base, fixed, thrown, others)
+        if bright is not None:
+            sent = sent * bright / np.maximum(sample.radiance @ LUMINANCE, 1e-12)
+        return sample.refine(sent, others_light @ weights, thrown_by(), start, low, high)
+
+    def now() -> np.ndarray:
+        return np.maximum([*(lamp.radiance for lamp in free), *(sky.radiance[i] for i in parts)], 1e-9)
+
+    luminance = solve(LUMINANCE, now() @ LUMINANCE)
+    class_of = {i.object_id: i.class_name for i in instances}
+    twins = {lamp.object_id: twin(lamp.object_id, s, class_of, seen) for lamp, s in zip(free, luminance)}
+    if any(twins.values()):
+        for lamp in [lamp for lamp in free if twins[lamp.object_id]]:
+            same = twins[lamp.object_id]
+            whose = object_name(class_of.get(same.object_id, ""), same.object_id)
+            note = f"{lamp.note.rstrip('.')}, near that of the seen '{whose}', which it takes."
+            fixed.append(replace(lamp, radiance=same.radiance, note=note))
+        free = [lamp for lamp in free if not twins[lamp.object_id]]
+        luminance = solve(LUMINANCE, now() @ LUMINANCE) if free or parts else luminance[:0]
+    colour = now() * (luminance / (now() @ LUMINANCE))[:, None]
+    bright = all_light(base, fixed, thrown, others) @ LUMINANCE + thrown_by() @ luminance if len(colour) else None
+    told = np.array([lamp.object_id in colours for lamp in free] + [False] * len(parts), bool)
+    fixed += [replace(lamp, radiance=np.float32(colour[k])) for k, lamp in enumerate(free) if told[k]]
+    free = [lamp for lamp in free if lamp.object_id not in colours]
+    colour, luminance = colour[~told], luminance[~told]
+    if len(colour):
+        by_channel = np.stack([solve(np.eye(3)[c], colour[:, c], bright) for c in range(3)], 1)
+        share = by_channel @ LUMINANCE / luminance
+        colour = np.where(np.abs(share - 1)[:, None] < AGREES, by_channel / share[:, None], colour)
+    for k, i in enumerate(parts, len(free)):
+        sky.radiance[i] = np.clip(colour[k], *sky.bounds(i))
+    done = {lamp.object_id: lamp for lamp in fixed}
+    done |= {lamp.object_id: replace(lamp, radiance=np.float32(colour[k])) for k, lamp in enumerate(free)}
+    return [done[lamp.object_id] for lamp in lamps]

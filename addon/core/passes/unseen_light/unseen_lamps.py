@@ -1,0 +1,92 @@
+"""Lamps that nobody saw shine, found one by one from what they throw, and the sky beside them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...light.emitters import LUMINANCE
+from ...light.lamps import AGREES, Lamp, twin
+from ...light.light_fit import Sample
+from ...naming import object_name
+from .refine_light import Sky, all_light
+
+MIN_GAIN = 0.03
+"""A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share."""
+MIN_SKY = 0.01
+"""Part of the received light below which a part of the sky can't be solved for; its neighbours' radiance stays."""
+SWEEPS = 2
+
+
+def solve_lamps(sample: Sample, thrown, least, instances, seen, sky: Sky, base, colours) -> list[Lamp]:
+    """Unseen lamps, the one that explains most first; none once the gain falls below `MIN_GAIN`."""
+    class_of = {i.object_id: i.class_name for i in instances}
+    sent = sample.radiance @ LUMINANCE
+    lamps: list[Lamp] = []
+    left = dict(thrown)
+    while left:
+        received = all_light(base, lamps, thrown, sky) @ LUMINANCE
+        found = {i: sample.best(sent, received, G) for i, G in left.items()}
+        found = {i: f for i, f in found.items() if f is not None and f[2] < (1 - MIN_GAIN) * f[1] and f[0] > least[i]}
+        if not found:
+            break
+        object_id = min(found, key=lambda i: found[i][2])
+        by_channel = [
+            sample.best(sample.radiance[:, c], all_light(base, lamps, thrown, sky)[:, c], left[object_id])
+            for c in range(3)
+        ]
+        known = colours.get(object_id)
+        lamps.append(_coloured(object_id, *found[object_id], class_of, seen, sample.received, by_channel, known))
+        del left[object_id]
+    return lamps
+
+
+def needed(sample: Sample, lamps: list[Lamp], thrown, sky: Sky, base, colours) -> tuple[list[Lamp], Sky]:
+    """The lamps and sky found; lamps that nobody saw shine only where the sky alone, which is there, explains less."""
+    shining = [lamp for lamp in lamps if lamp.object_id in colours]
+    if not sky.thrown or len(shining) == len(lamps):
+        return lamps, sky
+    alone = Sky(sky.thrown, sky.guess, sky.clipped, sky.told)
+    for _ in range(SWEEPS):
+        solve_sky(sample, shining, thrown, alone, base)
+    sent = np.log(np.maximum(sample.radiance @ LUMINANCE, 1e-9))
+    with_lamps, without = (
+        sample.spread(sent - np.log(all_light(base, some, thrown, above) @ LUMINANCE + 1e-12))
+        for some, above in ((lamps, sky), (shining, alone))
+    )
+    return (lamps, sky) if with_lamps < (1 - MIN_GAIN) * without else (shining, alone)
+
+
+def _coloured(object_id, s, before, after, class_of, seen, received, by_channel, known) -> Lamp:
+    """Give a solved luminance its colour.
+
+    A seen lamp's of the same class if they agree; else that which is `known` from its edges; else what each channel
+    says by itself, if together they make that luminance; else that of the lamps, or of the light.
+    """
+    how = f"No frame sees it; solved from the light it throws (spread of log albedo {before:.3f} to {after:.3f})"
+    same = twin(object_id, s, class_of, seen)
+    if same is not None:
+        whose = object_name(class_of.get(same.object_id, ""), same.object_id)
+        note = f"{how}: {s:.3g}, near that of the seen '{whose}', which it takes."
+        return Lamp(int(object_id), same.radiance, False, note)
+    if known is not None:
+        return Lamp(int(object_id), (s * known).astype(np.float32), False, how + "; its colour from its edges.")
+    alike = [lamp for lamp in seen if class_of.get(lamp.object_id) == class_of.get(object_id)]
+    if not alike and all(found is not None for found in by_channel):
+        colour = np.float32([found[0] for found in by_channel])
+        if abs(float(colour @ LUMINANCE) / s - 1) < AGREES:
+            return Lamp(int(object_id), colour, False, how + ".")
+    white = np.mean([lamp.radiance for lamp in alike or seen], 0) if seen else received.mean(0)
+    return Lamp(int(object_id), (s * white / max(float(white @ LUMINANCE), 1e-12)).astype(np.float32), False, how + ".")
+
+
+def solve_sky(sample: Sample, lamps, thrown, sky: Sky, base) -> None:
+    """Radiance of the sky's unknown parts, channel by channel, one after another."""
+    for i, G in enumerate(sky.thrown):
+        others = all_light(base, lamps, thrown, sky, without=i)
+        if (G[:, None] * sky.guess[i]).mean() < MIN_SKY * others.mean():
+            continue
+        solved = [sample.best(sample.radiance[:, c], others[:, c], G) for c in range(3)]
+        if any(found is None for found in solved):
+            continue
+        sky.solved.add(i)
+        sky.radiance[i] = np.clip([found[0] for found in solved], *sky.bounds(i))

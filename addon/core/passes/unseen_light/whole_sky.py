@@ -1,0 +1,58 @@
+"""A sky of which no frame saw anything, solved for as one radiance from what it throws into the room."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...light.emitters import LUMINANCE
+from ...light.environment import Environment
+from ...light.few_elements import LEAST, evened, irradiance_at
+from ...light.field import LightField
+from ...light.lamps import find_seen
+from ...light.light_fit import Sample
+
+MIN_GAIN = 0.1
+"""It is believed in when it lowers the spread of log albedo by at least this share: all albedos hang on it."""
+MIN_OPEN = 0.02
+"""Share of the received directions that must lead outside for such a sky to be looked for."""
+SWEEPS = 2
+
+
+def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[LightField, tuple[str, ...]]:
+    """Solve for one radiance of all the sky where rays leave the mesh but no frame looked there; says so in a note."""
+    if field.environment.seen:
+        return field, ()
+    everywhere = Environment.only(np.ones((1, 2), np.float32))
+    dark = field.with_sun(None).with_light(np.zeros_like(field.radiance), everywhere)
+    thrown = irradiance_at(dark, element, seed)[:, 0]
+    if thrown.mean() < MIN_OPEN * np.pi:
+        return field, ()
+    received = irradiance_at(field.with_light(evened(field)), element, seed)
+    object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
+    left = np.ones(len(element), bool)
+    for _ in range(SWEEPS):
+        sample = Sample(element[left], object_id[left], sent[left], received[left])
+        found = sample.best(sent[left] @ LUMINANCE, received[left] @ LUMINANCE, thrown[left])
+        if found is None or found[2] > (1 - MIN_GAIN) * found[1]:
+            return field, ()
+        # Lamps show themselves once the rest is lit; their albedo says nothing of the sky.
+        lamps = find_seen(object_id, sent, received + found[0] * thrown[:, None])
+        left = ~np.isin(object_id, [lamp.object_id for lamp in lamps])
+        if left.sum() < LEAST:
+            return field, ()
+    radiance = np.full(3, found[0])
+    at = np.searchsorted(element, sample.element)
+    by_channel = [sample.best(sample.radiance[:, c], sample.received[:, c], thrown[at]) for c in range(3)]
+    if all(one is not None for one in by_channel):
+        radiance = np.array([one[0] for one in by_channel])
+    # No object reflects more than it gets.
+    least = (np.pi * sample.radiance - sample.received) / np.maximum(thrown[at], 1e-3 * thrown.mean())[:, None]
+    for one in np.unique(sample.object_id):
+        radiance = np.maximum(radiance, np.median(least[object_id[left] == one], 0))
+    note = (
+        "Part of the light comes from a sky that no frame sees; it was solved from what it throws, as one radiance "
+        f"from all sides: {', '.join(f'{x:.3g}' for x in radiance)} "
+        f"(spread of log albedo {found[1]:.3f} to {found[2]:.3f})."
+    )
+    sky = Environment(np.broadcast_to(np.float32(radiance), (1, 2, 3)).copy(), np.zeros((1, 2), np.int32))
+    return field.with_light(field.radiance, sky), (note,)

@@ -1,0 +1,216 @@
+"""What the artist gives, put onto what was found: a known white, base colours; and what is assumed for want of either.
+
+A known white says by how much E is off, as albedo = pi L_d / E and L_d was measured. So E is scaled, channel by
+channel, and the albedo of the whole room with it. The light that the scene is rendered under has to make up for it:
+what other surfaces send is measured and stays, so all of the difference is laid on lamps, sky and sun (`of_light`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..brdf.compensation import layer_reflectance
+from ..evidence.light import spots
+from ..light.over_surface import irradiance
+from ..light.sun import put_in
+from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, ObjectMaterial
+from ..overrides import Overrides
+from ..passes.albedo.albedo import MEASURED, Albedo
+from ..passes.albedo.albedo import NONE as NO_ALBEDO
+from ..scene.atlas import Atlas
+
+if TYPE_CHECKING:
+    from .recover import Recovery
+
+ROUNDS = 4
+"""Albedo is clamped at 1 and steadied among neighbours, so its mean follows E but roughly."""
+SPOTS = 600
+RAYS = {"rays": 64, "emitter_rays": 32, "portal_rays": 32}
+LEAST_LIGHT = 0.1
+"""Less than this of its light no lamp is left."""
+DOUBTFUL = 1.5
+"""A white that scales E by more than this, or its inverse, is more likely not that white."""
+DARK = 0.02
+"""Texture is kept as variation about its mean; below this a channel has none that could be told from noise."""
+COAT_F0, COAT_ROUGHNESS = 0.04, 0.5
+"""A plausible coat: what dielectrics of n = 1.5 reflect; satin where the room has no dielectric to learn from."""
+
+
+@dataclass(frozen=True)
+class WhiteScale:
+    """What a known white says.
+
+    Attributes
+    ----------
+    of_irradiance : (3,) float32
+        E is to be multiplied by this; albedo is divided by it.
+    of_light : (3,) float32
+        Lamps, sky and sun are to be multiplied by this, so that a render of the room shows L_d as before.
+    warning : str
+        '' if nothing is doubtful.
+    """
+
+    of_irradiance: np.ndarray
+    of_light: np.ndarray
+    warning: str = ""
+
+
+class Corrected:
+    """What is made of the stages' values once they are known: a part of `recover.Recovery`, which computes those."""
+
+    @cached_property
+    def emitters(self) -> set[int]:
+        """Objects that have no albedo, as they are lamps: found, or given."""
+        return {m.object_id for m in self.specular().materials if m.model == EMITTER}
+
+    def materials(self) -> list[ObjectMaterial]:
+        """One description for each instance."""
+        return self._materials
+
+    @cached_property
+    def _materials(self) -> list[ObjectMaterial]:
+        light = np.ones(3) if self.white is None else self.white.of_light
+        known = corrected(self.specular().materials, self.overrides, light)
+        return coated(known, self.albedo, self.surface().atlas) if self.settings.coat else known
+
+    @cached_property
+    def white(self) -> WhiteScale | None:
+        """What a known white says of the light; None if none is given."""
+        return white_scale(self)
+
+    @property
+    def irradiance_found(self) -> np.ndarray:
+        """E before a known white is heeded, (n, 3) float32."""
+        return self.shading().irradiance + self.specular().excess
+
+    @cached_property
+    def irradiance(self) -> np.ndarray:
+        """The final E, (n, 3) float32."""
+        return self.irradiance_found if self.white is None else self.irradiance_found * self.white.of_irradiance
+
+    @cached_property
+    def albedo(self) -> Albedo:
+        """The final albedo: of L_d less its specular part, under all that glossy things throw, and as it was given."""
+        return self.albedo_of_all_but(self.emitters)
+
+    def albedo_of_all_but(self, without: set[int]) -> Albedo:
+        """The same, but with none for some objects."""
+        found = self.specular()
+        apart = [m.object_id for m in found.materials if m.model == TRANSPARENT]
+        albedo = self.albedo_under(self.irradiance, found.specular, without)
+        # What shows its background has no albedo that was measured.
+        origin = np.where(np.isin(self.surface().atlas.object_id, apart), np.int8(NO_ALBEDO), albedo.origin)
+        return with_base_colors(replace(albedo, origin=origin), self.surface().atlas, self.overrides)
+
+    def sky(self) -> np.ndarray:
+        """Radiance from outside with the sun in it, (h, w, 3) float32, row 0 the bottom."""
+        sky = put_in(self.shading().environment, self.shading().sun)
+        return sky if self.white is None else sky * self.white.of_light
+
+
+def white_scale(run: Recovery) -> WhiteScale | None:
+    """What the known white of a run says whose stages are done; None if none is given."""
+    white = run.overrides.white
+    if white is None:
+        return None
+    atlas, ones = run.surface().atlas, np.ones(3, np.float32)
+    name = next(i.name for i in run.capture.instances if i.object_id == white.object_id)
+    before, scale = run.irradiance_found, ones
+    others = {i.object_id for i in run.capture.instances} - {white.object_id}
+    for _ in range(ROUNDS):
+        albedo = run.albedo_under(before * scale, run.specular().specular, others)
+        own = (atlas.object_id == white.object_id) & (albedo.origin == MEASURED)
+        mean = np.average(albedo.rho[own], 0, atlas.area[own]) if own.any() else np.zeros(3)
+        if white.object_id in run.emitters or mean.min() <= 0:
+            told = f"No albedo of {name} was measured, so it can't be the white; it was left out."
+            return WhiteScale(ones, ones, told)
+        scale = np.float32(scale * mean / np.asarray(white.albedo))
+    direct = _direct_share(run)
+    light = np.maximum(1 + (scale - 1) / direct, LEAST_LIGHT).astype(np.float32)
+    warning = ""
+    if scale.max() > DOUBTFUL or scale.min() < 1 / DOUBTFUL:
+        told = ", ".join(f"{one:.2f}" for one in scale)
+        warning = f"The white of {name} scales the light by {told} (red, green, blue); that is much: is it that white?"
+    return WhiteScale(scale, light, warning)
+
+
+def _direct_share(run: Recovery) -> np.ndarray:
+    """Share of E, (3,), that comes from lamps, sky and sun, over what was seen of the room."""
+    field, seen = run.field, run.lit_diffuse().seen
+    chosen, _ = spots(field.atlas, seen, SPOTS, run.settings.seed)
+    chosen = chosen[seen[chosen]]
+    lamps = np.isin(field.atlas.object_id, [lamp.object_id for lamp in run.shading().lamps])
+    direct = field.with_light(np.where(lamps[:, None], field.radiance, np.float32(0)))
+    how = {"sampler": "aimed", "interpolate": False, "finest": 1.0, "threads": run.settings.threads}
+    part = irradiance(direct, chosen, **RAYS, **how, seed=run.settings.seed)[0]
+    whole = run.irradiance_found[chosen]
+    area = field.atlas.area[chosen, None]
+    return np.clip((area * part).sum(0) / np.maximum((area * whole).sum(0), 1e-20), 0.05, 1)
+
+
+def with_base_colors(albedo: Albedo, atlas: Atlas, overrides: Overrides) -> Albedo:
+    """The albedo with the given base colours as means over what was measured; texture is kept as variation about."""
+    given = {i: one.base_color for i, one in overrides.objects.items() if one.base_color is not None}
+    if not given:
+        return albedo
+    rho, error = albedo.rho.copy(), albedo.error.copy()
+    for object_id, colour in given.items():
+        own = np.flatnonzero(atlas.object_id == object_id)
+        if not len(own):
+            continue
+        told = own[albedo.origin[own] == MEASURED]
+        rho[own] = _coloured(rho[own], np.isin(own, told), atlas.area[own], np.float32(colour))
+        error[own] = 0
+    return replace(albedo, rho=rho, error=error)
+
+
+def _coloured(rho: np.ndarray, told: np.ndarray, area: np.ndarray, colour: np.ndarray) -> np.ndarray:
+    """Albedo (k, 3) brought to a mean `colour` over the elements `told`; flat where there is nothing to bring."""
+    if not told.any():
+        return np.broadcast_to(colour, rho.shape)
+    for _ in range(ROUNDS):  # what is clamped at 1 lowers the mean
+        mean = np.average(rho[told], 0, area[told])
+        rho = np.where(mean < DARK, colour, np.minimum(rho * (colour / np.maximum(mean, DARK)), 1))
+    return rho.astype(np.float32)
+
+
+def corrected(materials: tuple[ObjectMaterial, ...], overrides: Overrides, light: np.ndarray) -> list[ObjectMaterial]:
+    """Descriptions with what was given, and lamps under the `light` ((3,)) that a known white asks for."""
+    result = []
+    for m in materials:
+        given = overrides.of(m.object_id)
+        m = replace(m, given=given.as_dict())
+        if m.model == EMITTER and m.emission is not None:
+            m = replace(m, emission=tuple(float(x) for x in np.asarray(m.emission) * light))
+        if m.model == METAL and given.base_color is not None and given.f0 is None:
+            mean = float(np.mean(given.base_color))
+            m = replace(m, f0=given.base_color, specular_low=mean, specular_high=mean)
+        result.append(m)
+    return result
+
+
+def coated(materials: list[ObjectMaterial], albedo: Albedo, atlas: Atlas) -> list[ObjectMaterial]:
+    """Descriptions with a plausible coat on what was seen too little to look for any highlight.
+
+    Not on what was looked at and showed none, or is of a class that did, nor on what is too dark to reflect as much as
+    the coat does. The roughness is the median of the dielectrics that were identified in the class, else in the room.
+    """
+    matt = {m.class_name for m in materials if m.model == LAMBERTIAN and m.scores}
+    rough: dict[str, list[float]] = {}
+    for m in materials:
+        if m.model == SPECULAR and m.phi is not None:
+            rough.setdefault(m.class_name, []).append(float(np.sqrt(m.phi)))
+    everywhere = [one for alike in rough.values() for one in alike]
+    result = []
+    for m in materials:
+        if m.model == LAMBERTIAN and not m.scores and m.class_name not in matt and m.given.keys() <= {"base_color"}:
+            own = atlas.object_id == m.object_id
+            roughness = float(np.median(rough.get(m.class_name) or everywhere or [COAT_ROUGHNESS]))
+            if own.any() and np.median(albedo.rho[own], 0).min() > layer_reflectance(COAT_F0, roughness**2):
+                m = replace(m, coat={"f0": COAT_F0, "roughness": roughness})
+        result.append(m)
+    return result

@@ -1,0 +1,37 @@
+"""All light that no frame tells of by itself: lamps and sky, then a sun, then lamps and sky under that sun."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..light.few_elements import from_sun, irradiance_at
+from ..light.field import LightField
+from ..light.sun import Sun
+from ..passes.sun.sun_fit import find_sun
+from ..passes.unseen_light.unseen_light import Light, find_light, lit_by
+
+
+def find_all_light(
+    field: LightField, good: np.ndarray, unseen_objects: list[int], instances: tuple, seed: int = 0, *more
+) -> tuple[Light, Sun | None]:
+    """`find_light`, and the sun; parameters are those of `find_light`.
+
+    A room without a patch that is short of light has what `find_light` gives, to the last bit. A field that has its
+    sun keeps it.
+    """
+    light = find_light(field, good, unseen_objects, instances, seed, *more)
+    if field.sun is not None or not len(light.received):
+        return light, field.sun
+    lamps = [lamp.object_id for lamp in light.lamps]
+    lit = field.with_light(lit_by(field, list(light.lamps)), light.environment, lamps)
+    solved = find_sun(
+        field, light.element, light.received, lamps, good, lambda element: irradiance_at(lit, element, seed), seed
+    )
+    if solved is None:
+        return light, None
+    again = find_light(field.with_sun(solved.sun), good, unseen_objects, instances, seed, *more, before=light)
+    if not len(again.received):
+        return again, solved.sun
+    # Lamps and sky that stood in for the sun no longer do, so its strength is told anew beside them.
+    others = again.received - from_sun(field.with_sun(solved.sun), light.element)
+    return again, solved.under(light.element, np.maximum(others, 0) / np.maximum(light.received, 1e-12))

@@ -1,0 +1,265 @@
+"""Base colour in parts, for close work: an image for each object, or UDIM tiles, as fine as the frames resolve.
+
+The recovery itself goes on in the room's atlas, whose texels are as large as the frames resolve the room on the whole.
+An object that they resolve finer gets finer texels: the frames are looked at once more for what they show there, and
+base colour is multiplied by what this differs from the room's own lit diffuse texture.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..material import EMITTER, METAL
+from ..parallel import ordered_map
+from ..passes.albedo.albedo import MEASURED
+from ..passes.lit_diffuse.accumulate import ENOUGH, LitDiffuse, accumulate
+from ..passes.sharpening.sharpen import FLOOR, MOST, sharpened
+from ..progress import Rounds
+from ..results.store import key
+from ..scene.atlas import Atlas
+from ..scene.elements import ElementLookup, make_atlas
+from ..scene.model import Camera, Mesh
+from ..scene.pages import OBJECT, Pages, lay_out
+from ..scene.surface import Surface
+from ..scene.visibility import CLEAN
+
+if TYPE_CHECKING:
+    from .recover import Recovery
+
+FINEST = 4.0
+"""Times that an object's texels may be finer than the room's."""
+WORTH = 1.2
+"""Finer by less than this is not worth another look at the frames."""
+MOST_TEXELS = 25_000_000
+"""Of all parts together: one and a half times an atlas of 4096. Memory, a few gigabytes for this, ends there."""
+PIXEL_STEP = 8
+HALF = 0.5
+"""Of what lies around a spot on the room's atlas, this share has to be measured for detail to be told there."""
+STAGE = "detail"
+LOOKED = 0.3
+"""Share of the writing that the look at the frames takes."""
+NO_LIMIT = 1 << 30
+FOLDER = "objects"
+TILE = "base_color.<UDIM>.exr"
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What the scene shows instead of the one image.
+
+    Attributes
+    ----------
+    uv : (t, 3, 2) float32
+        Texture coordinates for the images, as `Atlas.uv` is for the room's.
+    images : dict of int to str
+        By object: the file in the result folder; ``<UDIM>`` stands for the tiles' numbers.
+    tiles : tuple of int
+        Those numbers; () where each object has an image of its own.
+    """
+
+    uv: np.ndarray
+    images: dict[int, str]
+    tiles: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Parting:
+    """How an atlas is parted, and what the frames show of the objects whose texels are finer.
+
+    Attributes
+    ----------
+    pages : Pages
+    sheet : Pages or None
+        Of the finer objects alone; None, like what follows, where no object is finer.
+    atlas : Atlas or None
+        Over that sheet.
+    radiance : (n, 3) float32 or None
+        L_d of its elements; NaN where too little tells.
+    """
+
+    pages: Pages
+    sheet: Pages | None = None
+    atlas: Atlas | None = None
+    radiance: np.ndarray | None = None
+
+
+def footprints(surface: Surface, cameras: list[Camera]) -> dict[int, float]:
+    """Edge in metres of the surface that a pixel covers, by object: the lower quartile over all views of it."""
+    found: dict[int, list[np.ndarray]] = {}
+    for camera in cameras:
+        y, x = np.mgrid[PIXEL_STEP // 2 : camera.height : PIXEL_STEP, PIXEL_STEP // 2 : camera.width : PIXEL_STEP]
+        pixels = np.stack([x.ravel() + 0.5, y.ravel() + 0.5], -1)
+        directions, led = camera.rays(pixels)
+        pixels, directions = pixels[led], directions[led]
+        hits = surface.scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
+        met = np.flatnonzero(hits.triangle >= 0)
+        edge = hits.distance[met] * (
+            camera.pixel_angles(pixels[met]) if camera.lens is not None else 1 / np.sqrt(camera.fx * camera.fy)
+        )
+        owner = surface.mesh.object_id[hits.triangle[met]]
+        for number in np.unique(owner):
+            found.setdefault(int(number), []).append(edge[(owner == number) & (edge > 0)])
+    return {
+        number: float(np.percentile(np.concatenate(all_edges), 25))
+        for number, all_edges in found.items()
+        if sum(map(len, all_edges))
+    }
+
+
+def scales(run: Recovery) -> dict[int, float]:
+    """By object: how much finer than the room's its texels are to be; 1 where left out."""
+    surface, s = run.surface(), run.settings
+    wanted = {
+        number: s.texel_size or edge / s.detail
+        for number, edge in footprints(surface, [frame.camera for frame in run.frames]).items()
+    }
+    finer = {number: float(np.clip(surface.texel_size / texel, 1, FINEST)) for number, texel in wanted.items()}
+    finer = {number: scale for number, scale in finer.items() if scale > WORTH}
+    taken = np.bincount(surface.atlas.object_id) / max(len(surface.atlas), 1) * surface.atlas.size**2
+    while finer and taken.sum() + sum((scale**2 - 1) * taken[i] for i, scale in finer.items()) > MOST_TEXELS:
+        finer = {number: max(0.95 * scale, 1.0) for number, scale in finer.items()}
+    return {number: scale for number, scale in finer.items() if scale > WORTH}
+
+
+def look_closer(run: Recovery) -> Parting:
+    """Part a run's atlas and look at the frames once more for what they show of objects with finer texels.
+
+    What it finds is stored, so that it is done once for a capture: a refit asks for no frame, tiles use what was found
+    for objects. Nothing that was written is touched.
+
+    Raises
+    ------
+    BadInputError
+        Too many frames can't be read any more.
+    InterruptedRun
+        From the run's progress.
+    """
+    surface, own = run.surface(), stored_key(run)
+    stored, meta = run.store.load(STAGE, own), run.store.load_meta(STAGE, own)
+    wanted = scales(run) if stored is None else dict(meta["wanted"])
+    mesh, uv, size = surface.mesh, surface.atlas.uv, surface.atlas.size
+    pages = lay_out(run.settings.atlas, mesh.triangles, uv, mesh.object_id, size, wanted, run.settings.atlas_size)
+    finer = {number: scale for number, scale in pages.scale.items() if scale > 1}
+    if not finer:
+        if stored is None:
+            run.store.save(STAGE, own, {}, {"wanted": [], "finer": []})
+        return Parting(pages)
+    # Their islands alone, on a sheet of their own: the time that this takes is theirs, not the room's.
+    chosen = np.flatnonzero(np.isin(mesh.object_id, list(finer)))
+    part = Mesh(mesh.vertices, mesh.triangles[chosen], mesh.object_id[chosen])
+    sheet = lay_out(OBJECT, part.triangles, uv[chosen], part.object_id, size, finer, NO_LIMIT)
+    atlas = make_atlas(part, sheet.sheet_uv, sheet.size)
+    if stored is None or dict(meta["finer"]) != finer:
+        found = _looked(run, part, atlas, chosen)
+        told = (found.tier == CLEAN) & (found.count >= ENOUGH)
+        stored = {"radiance": np.where(told[:, None], found.radiance, np.nan).astype(np.float32)}
+        run.store.save(STAGE, own, stored, {"wanted": [*wanted.items()], "finer": [*finer.items()]})
+    return Parting(pages, sheet, atlas, stored["radiance"])
+
+
+def stored_key(run: Recovery) -> str:
+    """The key of what `look_closer` stores, of a run whose passes over the frames are done."""
+    return key(STAGE, run.store.stored_key("lit_diffuse"))
+
+
+def _looked(run: Recovery, part: Mesh, atlas: Atlas, chosen: np.ndarray) -> LitDiffuse:
+    """L_d of the elements of an atlas over a `part` of the room's mesh: its triangles `chosen`."""
+    s, surface = run.settings, run.surface()
+    place = np.full(len(surface.mesh.triangles), -1)
+    place[chosen] = np.arange(len(chosen))
+    find = ElementLookup(part, atlas)
+
+    def lookup(triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        own = place[triangle]
+        element = np.full(len(own), -1, np.int32)
+        there = own >= 0
+        element[there] = find(own[there], u[there], v[there])
+        return element
+
+    rounds = Rounds(run.progress, 0, LOOKED)
+    how = {
+        "median": s.median,
+        "order": s.frame_order,
+        "seed": s.seed,
+        "threads": s.threads,
+        "folder": run.store.folder,
+        "progress": rounds,
+    }
+    finer = replace(surface, atlas=atlas)
+    found = accumulate(surface.mesh, atlas, surface.scene, run.frames, run.read, **how)
+    rounds.next()
+    return sharpened(found, finer, run.frames, run.read, lookup, **how) if s.sharpen and found.seen.any() else found
+
+
+def write_parts(run: Recovery, parting: Parting, base_color: np.ndarray) -> Parts:
+    """Write the images into the result folder; those of an earlier run that are not written again are removed.
+
+    Parameters
+    ----------
+    parting : Parting
+        What `look_closer` gave.
+    base_color : (s, s, 3) float32
+        Over the room's atlas, row 0 at the bottom.
+    """
+    pages = parting.pages
+    sheet = pages.image(base_color, _owner(run))
+    if parting.atlas is not None:
+        pages.multiply(sheet, parting.sheet, finer_detail(run, parting))
+    materials = {m.object_id: m for m in run.materials()}
+    shown = {number: m for number, m in materials.items() if m.model not in (EMITTER, METAL)}
+    if run.settings.atlas == OBJECT:
+        images = {
+            page.number: f"{FOLDER}/{file_name(shown[page.number].name)} base_color.exr"
+            for page in pages.pages
+            if page.number in shown
+        }
+        files = {images[page.number]: page for page in pages.pages if page.number in images}
+        tiles = ()
+    else:
+        images = dict.fromkeys(shown, TILE)
+        files = {TILE.replace("<UDIM>", str(page.number)): page for page in pages.pages}
+        tiles = tuple(page.number for page in pages.pages)
+    remove_parts(run, set(files))
+
+    def write(name: str) -> None:
+        run.store.write_exr(name, pages.of(sheet, files[name])[::-1], half=True)
+
+    for done, _ in enumerate(ordered_map(write, files, run.settings.threads)):
+        run.progress.update(0.5 + 0.1 * (done + 1) / len(files))
+    return Parts(pages.uv, images, tiles)
+
+
+def finer_detail(run: Recovery, parting: Parting) -> np.ndarray:
+    """What base colour is multiplied by on the finer objects' sheet, (size, size, 3) float32."""
+    surface, lit, atlas = run.surface(), run.lit_diffuse(), parting.atlas
+    good = (lit.tier == CLEAN) & (lit.count >= ENOUGH) & (run.albedo.origin == MEASURED)
+    known = np.concatenate([np.where(good[:, None], lit.radiance, 0), good[:, None]], 1).astype(np.float32)
+    room = parting.sheet.image(surface.atlas.image(known), _owner(run)).reshape(-1, 4)[atlas.texel]
+    floor = np.float32(max(FLOOR * run.median_radiance(), 1e-30))
+    level = room[:, :3] / np.maximum(room[:, 3:], 1e-6)
+    ratio = np.clip((parting.radiance + floor) / (level + floor), 1 / MOST, MOST)
+    ratio[(room[:, 3] < HALF) | ~np.isfinite(ratio).all(1)] = 1
+    return atlas.image(ratio, 1.0)
+
+
+def _owner(run: Recovery) -> np.ndarray:
+    """The object that each texel of the room's images shows, (s, s) int32."""
+    atlas = run.surface().atlas
+    return atlas.image(atlas.object_id, -1)
+
+
+def remove_parts(run: Recovery, kept: set[str] = frozenset()) -> None:
+    """Take away the parts that an earlier run left, but for the files `kept`."""
+    folder = run.store.folder
+    for path in [*folder.glob(f"{FOLDER}/* base_color.exr"), *folder.glob(TILE.replace("<UDIM>", "[0-9]" * 4))]:
+        if path.relative_to(folder).as_posix() not in kept:
+            path.unlink()
+
+
+def file_name(name: str) -> str:
+    """An object's name as a file may have it anywhere."""
+    return re.sub(r"[^\w\- ]", "_", name)

@@ -1,0 +1,144 @@
+"""What report.json holds: how the run went, what it found, and what to be wary of, one sentence each."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..passes.albedo.albedo import MEASURED, above_one, quotient, without_emitters
+from ..scene.elements import triangle_geometry
+from ..scene.visibility import SATURATED
+
+if TYPE_CHECKING:
+    from .recover import Recovery
+
+
+def make_report(run: Recovery) -> dict[str, Any]:
+    """Stages, settings, figures and warnings of what has been computed so far."""
+    result: dict[str, Any] = {
+        "capture": run.capture.root.name,
+        "settings": dataclasses.asdict(run.settings),
+        "stages": run.log,
+        "warnings": list(run.capture.warnings) + run.bad_frames,
+    }
+    figures: dict[str, Any] = {"frames": len(run.capture.frames), "triangles": len(run.capture.mesh.triangles)}
+    if "surface" in run.done:
+        surface = run.surface()
+        figures |= {"atlas_size": surface.atlas.size, "elements": len(surface.atlas)}
+        figures["texel_metres"] = surface.texel_size
+        _report_surface(run, figures, result["warnings"])
+    if "lit_diffuse" in run.done:
+        _report_lit(run, figures, result["warnings"])
+    if "shading" in run.done:
+        _report_shading(run, figures, result["warnings"])
+    if "specular" in run.done:
+        models = [m.model for m in run.materials()]
+        figures["models"] = {model: models.count(model) for model in sorted(set(models))}
+        figures["coats"] = sum(bool(m.coat) for m in run.materials())
+        figures["evidence"] = _evidence_figures(run)
+        if run.white is not None:
+            figures["white_scale"] = [float(x) for x in run.white.of_irradiance]
+            figures["white_light"] = [float(x) for x in run.white.of_light]
+            result["warnings"] += [run.white.warning] if run.white.warning else []
+    result["figures"] = figures
+    return result
+
+
+def _evidence_figures(run: Recovery) -> dict[str, float]:
+    """How sure the room is as a whole; medians and means over the elements, lamps left out."""
+    evidence, albedo = run.evidence, run.albedo
+    relative = evidence.texels.albedo.mean(1) / np.maximum(albedo.rho.mean(1), 1e-3)
+    reflecting = ~np.isin(run.surface().atlas.object_id, list(run.emitters))
+    measured, filled = reflecting & (albedo.origin == MEASURED), reflecting & (albedo.origin != MEASURED)
+    kinds = {"": measured, "filled_": filled}
+    figures = {f"albedo_error_{name}median": float(np.median(relative[k])) for name, k in kinds.items() if k.any()}
+    if measured.any():
+        figures["shading_error_median"] = float(np.median(evidence.texels.shading[measured]))
+        figures["unseen_light_mean"] = float(evidence.texels.unseen[measured].mean())
+    return figures | {"spots_checked": evidence.light.spots}
+
+
+def _report_surface(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:
+    surface = run.surface()
+    _, area = triangle_geometry(surface.mesh)
+    figures["two_sided_share"] = float(area[surface.backs].sum() / area.sum())
+    figures["mesh_noise_metres"] = surface.noise
+    if surface.noise:
+        captured = run.capture.mesh.vertices
+        moved = np.linalg.norm(run.room_mesh().vertices[: len(captured)] - captured, axis=1)
+        warnings.append(
+            f"The mesh has noise of {1000 * surface.noise:.1f} mm along its normals; it was smoothed, edges kept, its "
+            f"vertices moved by {1000 * np.sqrt(np.mean(moved**2)):.1f} mm; turn off denoise_mesh to use it as it is."
+        )
+
+
+def _report_lit(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:
+    lit, atlas = run.lit_diffuse(), run.surface().atlas
+    if run.blind_frames:
+        count, first = len(run.blind_frames), run.blind_frames[0]
+        warnings.append(f"{count} frames have no valid pixel (the first: {first}); all are NaN, inf or masked.")
+    if not lit.radiance[lit.seen].any():
+        warnings.append("Every frame is black; nothing can be said of any albedo.")
+    poses = run.poses()
+    if np.isfinite(poses.shift):
+        figures |= {"pose_shift_pixels": float(poses.shift), "poses_refined": int(poses.moved.sum())}
+    if poses.moved.any():
+        warnings.append(
+            f"Frames lay {poses.shift:.1f} pixels beside what all of them show together; the poses of "
+            f"{poses.moved.sum()} of {len(poses.moved)} were put right; turn off refine_poses to use them as read."
+        )
+    area = atlas.area.sum()
+    figures["unseen_share"] = float(atlas.area[~lit.seen].sum() / area)
+    figures["observations_median"] = float(np.median(lit.count[lit.seen])) if run.capture.frames else 0.0
+    figures["lit_from"] = "frames" if run.capture.frames else "textures on the mesh"
+    seen = np.bincount(atlas.object_id, lit.seen, int(atlas.object_id.max()) + 1)
+    unseen = [i for i in run.capture.instances if i.object_id >= len(seen) or seen[i.object_id] == 0]
+    if unseen:
+        names = ", ".join(i.name for i in unseen[:5])
+        more = f" and {len(unseen) - 5} more" if len(unseen) > 5 else ""
+        warnings.append(f"No frame sees {names}{more}; their materials are taken from their class or the room.")
+    clipped = float(atlas.area[lit.tier == SATURATED].sum() / area)
+    if clipped > 0:
+        figures["clipped_share"] = clipped
+        warnings.append(f"{clipped:.1%} of the surface is clipped in every frame that sees it; no albedo is had of it.")
+    if not run.environment().seen:
+        figures["outside"] = "no frame sees past the mesh"
+
+
+def _report_shading(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:
+    shading, lit = run.shading(), run.lit_diffuse()
+    escaped = float(shading.escaped[lit.seen].mean())
+    # Before the specular part is known; a clipped element has no quotient.
+    rho, valid = quotient(lit.radiance, shading.irradiance)
+    told = without_emitters(run.surface().atlas, lit.seen & (lit.tier != SATURATED), shading.emitters)
+    above = above_one(rho, told & valid)
+    figures |= {
+        "escaped_share": escaped,
+        "albedo_above_one_share": above,
+        "shading_points": shading.points,
+        "lamps": [lamp.object_id for lamp in shading.lamps],
+        "mirrors": [mirror.object_id for mirror in shading.mirrors],
+    }
+    if shading.sun is not None:
+        sun = shading.sun
+        figures["sun"] = {"direction": [float(x) for x in sun.direction], "seen": sun.seen,
+                          "irradiance": [float(x) for x in sun.irradiance]}  # fmt: skip
+    names = {one.object_id: one.name for one in run.capture.instances}
+    warnings += [f"Lamp '{names[lamp.object_id]}': {lamp.note}" for lamp in shading.lamps if lamp.note]
+    warnings += shading.notes
+    if above > 0.05:
+        warnings.append(
+            f"{above:.0%} of the seen surface would need an albedo above 1: light is missing "
+            "(an unseen lamp, a clipped one, or a hole that was no window)."
+        )
+    figures["unlit_share"] = float((told & ~valid).sum() / max(lit.seen.sum(), 1))
+    if figures["unlit_share"] > 0.001:
+        warnings.append(
+            f"{figures['unlit_share']:.1%} of the seen surface gets too little light for an albedo; it was filled in."
+        )
+    if escaped > 0.02 and not run.environment().seen and not shading.environment.radiance.any():
+        warnings.append(
+            f"{escaped:.0%} of the rays leave the mesh, but no frame sees what lies there; it was taken as dark."
+        )

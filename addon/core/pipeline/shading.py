@@ -1,0 +1,195 @@
+"""The shading stage: from the lit diffuse texture to lamps, irradiance and albedo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..light.environment import Environment
+from ..light.few_elements import evened
+from ..light.field import LightField
+from ..light.lamps import Lamp
+from ..light.mirrors import Mirror
+from ..light.over_surface import finest_spacing, irradiance
+from ..light.sun import Sun, taken_out
+from ..passes.albedo.albedo import MAX_ALBEDO, fill, quotient
+from ..passes.lit_diffuse.accumulate import ENOUGH, LitDiffuse
+from ..passes.unseen_light.shades import BOUNCES, strongly_lit
+from ..progress import Progress
+from ..scene.atlas import Atlas
+from ..scene.creases import crease_doubt
+from ..scene.mesh_noise import tilt
+from ..scene.model import Instance, Mesh
+from ..scene.rays import RayScene
+from ..scene.two_sides import fronts
+from ..scene.visibility import CLEAN, SATURATED
+from .find_light import find_all_light
+
+
+@dataclass(frozen=True)
+class Shading:
+    """What the shading stage finds, for n elements.
+
+    Attributes
+    ----------
+    irradiance : (n, 3) float32
+        E, radiance * steradian.
+    escaped : (n,) float32
+        Share of the hemisphere's rays that left the mesh.
+    doubt : (n,) float32
+        Relative error of `irradiance` by interpolation and by the mesh's noise.
+    radiance : (n, 3) float32
+        L_d with everything filled in: what the light field shows at each element. Lamps have their own radiance.
+    lamps : tuple of Lamp
+    environment : Environment
+        With the unseen sky solved for where it could be, without the sun.
+    notes : tuple of str
+        What was solved for, one sentence each.
+    mirrors : tuple of Mirror
+        Flat mirrors that light was followed over.
+    points : int
+        Places at which the hemisphere was gathered.
+    sun : Sun or None
+        Its part is in `irradiance`.
+    """
+
+    irradiance: np.ndarray
+    escaped: np.ndarray
+    doubt: np.ndarray
+    radiance: np.ndarray
+    lamps: tuple[Lamp, ...]
+    environment: Environment
+    notes: tuple[str, ...]
+    mirrors: tuple[Mirror, ...]
+    points: int
+    sun: Sun | None = None
+
+    @property
+    def emitters(self) -> set[int]:
+        """The lamps' objects."""
+        return {lamp.object_id for lamp in self.lamps}
+
+
+def fill_unseen(radiance: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """L_d with the unseen elements dark, as (n, 3) float32 without NaN."""
+    return np.where(seen[:, None], radiance, np.float32(0)).astype(np.float32)
+
+
+def shade(
+    mesh: Mesh,
+    instances: tuple[Instance, ...],
+    atlas: Atlas,
+    scene: RayScene,
+    lit_diffuse: LitDiffuse,
+    environment: Environment,
+    *,
+    sampler: str = "aimed",
+    rays: int = 128,
+    emitter_rays: int = 32,
+    portal_rays: int = 32,
+    interpolate: bool = True,
+    threads: int = 0,
+    seed: int = 0,
+    progress: Progress | None = None,
+    find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None = None,
+    noise: float = 0.0,
+    colours: dict[int, np.ndarray] | None = None,
+) -> Shading:
+    """Lamps and irradiance (Haefner et al. 2021, sec. 3.2, with aimed rays and interpolation by default).
+
+    Parameters
+    ----------
+    find_mirrors : callable, optional
+        Tells the flat mirrors, as light is followed over them: with None for the lamps before those are known, and
+        again with them.
+    noise : float
+        Metres, what was taken out of the mesh's vertices.
+    colours : dict of (3,) float, optional
+        Colour of light of objects that were clipped (`fringes`).
+
+    Raises
+    ------
+    InterruptedRun
+        From `progress`.
+    """
+    class_of = {i.object_id: i.class_name for i in instances}
+    seen = lit_diffuse.seen
+    objects = int(atlas.object_id.max()) + 1
+    surface = np.bincount(atlas.object_id, atlas.area, objects)
+    seen_surface = np.bincount(atlas.object_id, atlas.area * seen, objects)
+    seen_share = {i: float(seen_surface[i] / surface[i]) for i in np.unique(atlas.object_id) if surface[i] > 0}
+    finest = finest_spacing(atlas)
+    how = {"sampler": sampler, "threads": threads, "seed": seed}
+
+    # 1. All light. What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
+    environment, sun = taken_out(environment)
+    field = LightField(mesh, atlas, scene, fill_unseen(lit_diffuse.radiance, seen), environment).with_sun(sun)
+    good = seen & (((lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= ENOUGH)) | (lit_diffuse.tier == SATURATED))
+    unseen = [object_id for object_id, share in seen_share.items() if share == 0]
+    single, sheet = fronts(mesh)
+    tilted = tilt(single, noise)[sheet[atlas.triangle]]
+    # Mirrors first: what hangs opposite or over one gets light over it, which lamps would have to answer for.
+    field = field.with_mirrors(find_mirrors(field, None) if find_mirrors else ())
+    light, sun = find_all_light(field, good if good.any() else seen, unseen, instances, seed, tilted, colours)
+    field = field.with_mirrors(()).with_sun(sun)
+    notes = light.notes if sun is None else (*light.notes, sun.note)
+    lamps = light.lamps
+    radiance = field.radiance.copy()
+    for lamp in lamps:
+        own = atlas.object_id == lamp.object_id
+        # At its edges the surroundings are mixed in.
+        radiance[own & (lit_diffuse.tier != CLEAN) if lamp.seen else own] = lamp.radiance
+    emitters = {lamp.object_id for lamp in lamps}
+    field = field.with_light(radiance, light.environment, emitters)
+
+    mirrors = find_mirrors(field, lamps) if find_mirrors else ()
+    field = field.with_mirrors(mirrors)
+
+    # 2. What nobody saw reflects like the rest of its object under the light that reaches it: a rough first pass.
+    unseen_lamp = ~seen & np.isin(atlas.object_id, list(emitters))
+    dark = np.flatnonzero(~seen & ~unseen_lamp)
+    lit = np.flatnonzero(seen | unseen_lamp)
+    if len(dark):
+        rough = how | {"sampler": "aimed", "rays": 64, "emitter_rays": 4, "portal_rays": 8}
+        rough |= {"interpolate": True, "finest": 8 * finest}
+        coarse_lit, _, _, _ = irradiance(field, lit, **rough)
+        coarse_dark, escaped_dark, _, _ = irradiance(field, dark, **rough)
+        everywhere = np.zeros((len(atlas), 3), np.float32)
+        everywhere[lit], everywhere[dark] = coarse_lit, coarse_dark
+        rho, valid = quotient(lit_diffuse.radiance, everywhere)
+        guess = fill(atlas, rho, valid, class_of, emitters)
+        radiance[dark] = guess.rho[dark] * everywhere[dark] / np.float32(np.pi)
+        seen_as = evened(field)[dark]
+        field = field.with_light(radiance)
+        # Inside a shade light goes to and fro.
+        for _ in range(BOUNCES - 1):
+            shades = strongly_lit(atlas, dark, radiance[dark], seen_as)
+            if not shades:
+                break
+            radiance = field.radiance.copy()
+            for own in shades:
+                everywhere[own] = irradiance(field, own, **(rough | {"finest": finest}))[0]
+                rho, valid = quotient(lit_diffuse.radiance[own], everywhere[own])
+                told = valid & seen[own]
+                paint = np.clip(np.median(rho[told], 0), 0, MAX_ALBEDO) if told.any() else guess.rho[own]
+                radiance[own] = np.where(seen[own, None], radiance[own], paint * everywhere[own] / np.float32(np.pi))
+            field = field.with_light(radiance)
+        coarse_dark = everywhere[dark]
+
+    # 3. The real thing, where there is an L_d to divide; elsewhere the rough values do.
+    E = np.zeros((len(atlas), 3), np.float32)
+    escaped, unsure = np.zeros(len(atlas), np.float32), np.zeros(len(atlas), np.float32)
+    if len(dark):
+        E[dark], escaped[dark] = coarse_dark, escaped_dark
+    E[lit], escaped[lit], points, unsure[lit] = irradiance(
+        field, lit, rays=rays, emitter_rays=emitter_rays, portal_rays=portal_rays,
+        interpolate=interpolate, finest=finest, progress=progress, **how,
+    )  # fmt: skip
+    # A noisy mesh faces elsewhere than the surface did.
+    unsure = np.hypot(unsure, tilted)
+    if sampler != "uniform":  # the paper's way, whose rays alone leave more noise than creases do
+        # Near a crease the light of two sides is mixed.
+        unsure = np.hypot(unsure, crease_doubt(mesh, atlas, atlas.texel_edge))
+    return Shading(E, escaped, unsure, field.radiance, lamps, light.environment, notes, mirrors, points, sun)

@@ -1,0 +1,317 @@
+"""The specular stage: target frames, phi and psi of each object, and what of its median was no diffuse light."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..light.field import LightField
+from ..light.lamps import Lamp
+from ..light.lobes import GRID
+from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, ObjectMaterial, from_json
+from ..overrides import NOTHING, Given
+from ..parallel import ordered_map
+from ..passes.glossy_light.glossy_light import Excess, glossy_light
+from ..passes.lit_diffuse.accumulate import LitDiffuse
+from ..passes.see_through.see_through import judge, look_behind
+from ..passes.specular.by_looks import coated_by_looks, metal_by_looks
+from ..passes.specular.describe import as_given, described, flat_mirror, lamp_material
+from ..passes.specular.fit import fit_lobe
+from ..passes.specular.given import fit_given, given_note, same_material
+from ..passes.specular.intervals import gloss_interval
+from ..passes.specular.layout import Problem
+from ..passes.specular.models import MIN_ELEMENTS, Choice, adopt_from_class, choose_model, set_apart
+from ..passes.specular.one_colour import compare, compare_coat
+from ..passes.specular.problems import Problems
+from ..passes.specular.separate import specular_in_median, spread_over_object
+from ..passes.specular.targets import score_frames, target_frame
+from ..progress import Progress
+from ..scene.model import Instance
+from ..scene.samples import Samples
+
+FIT_ELEMENTS = 350
+FIT_VIEWS = 12
+"""Elements of an object that the fit looks at, and views of each."""
+SCREEN_ELEMENTS = 200
+SCREEN_RAYS = 4
+"""The first look is at fewer elements and with so many times fewer rays; it drops what a lobe makes much worse."""
+HOPELESS = 1.15
+"""A lobe that raises the cost by this factor in the first look needs no second."""
+LOOKS_VIEWS = 4
+"""Views of each element for the question whether an object looks like a metal or coated all over (`by_looks`)."""
+LOOKS_LIKE_NONE = 1.5
+"""A metal whose spread is so many times the other's in the first look needs no second."""
+SEPARATE_ELEMENTS = 2500
+SEPARATE_VIEWS = 9
+SEPARATE_RAYS = 8
+"""Taking the lobe out of a median averages over views, and its width is known; so many times fewer rays do."""
+TARGET_PHI = 7
+"""Index into the grid of the middle width with which highlights are foreseen (A1)."""
+
+
+@dataclass(frozen=True)
+class Specular:
+    """What the specular stage finds.
+
+    Attributes
+    ----------
+    materials : tuple of ObjectMaterial
+        One for each instance, by object_id.
+    specular : (n, 3) float32
+        Part of each element's L_d that is specular, or came through it from behind.
+    excess : (n, 3) float32
+        What is to be added to E, as glossy things throw more on each element than their L_d says.
+    """
+
+    materials: tuple[ObjectMaterial, ...]
+    specular: np.ndarray
+    excess: np.ndarray
+
+    @staticmethod
+    def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Specular:
+        """From the stage's arrays, and the descriptions as JSON has them."""
+        return Specular(tuple(from_json(one) for one in meta["materials"]), arrays["specular"], arrays["excess"])
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a fit of a few objects leaves as it is: all that was found, but of these objects."""
+
+    found: Specular
+    only: Collection[int]
+
+
+def fit_specular(
+    instances: tuple[Instance, ...],
+    field: LightField,
+    lit_diffuse: LitDiffuse,
+    irradiance: np.ndarray,
+    lamps: tuple[Lamp, ...],
+    samples: Samples,
+    frame_names: list[str],
+    *,
+    way: str = "frames",
+    rays: int = 256,
+    refine: int = 2,
+    threads: int = 0,
+    seed: int = 0,
+    noise: float = 0.0,
+    given: Mapping[int, Given] | None = None,
+    held: Held | None = None,
+    progress: Progress | None = None,
+) -> Specular:
+    """Fit every object (Haefner et al. 2021, sec. 3.3 and 3.4) and find the specular part of L_d.
+
+    Parameters
+    ----------
+    way : str
+        'target': the paper's single target frame and always a lobe. 'frames': many views and a choice of model.
+    irradiance : (n, 3) float32
+        E of each element, from L_d.
+    refine : int
+        0 leaves L_d as the median gave it; 1 takes the lobes out of it; 2 also corrects E for what they really throw.
+    noise : float
+        What was taken out of the mesh, in metres.
+    given : dict of int to Given
+        What the artist gives of objects, by object_id.
+    held : Held, optional
+        Fit a few objects only.
+
+    Raises
+    ------
+    InterruptedRun
+        From `progress`.
+    """
+    given = given or {}
+    glowing, mirrors = {lamp.object_id: lamp for lamp in lamps}, {mirror.object_id: mirror for mirror in field.mirrors}
+    # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
+    maker = Problems(field, lit_diffuse, samples, threads=1, seed=seed)
+    # What is given goes before what the shading stage found.
+    taken = {i for i, one in given.items() if one.same_as is not None}
+    settled = {i for i in (*glowing, *mirrors) if i not in given} | taken
+    wanted = [i.object_id for i in instances if i.object_id not in settled]
+    if held is not None:
+        # Where nothing is given of an object, others of its class have their say.
+        alike = {i.class_name for i in instances if i.object_id in held.only and i.object_id not in given}
+        class_of = {i.object_id: i.class_name for i in instances}
+        wanted = [i for i in wanted if i in held.only or i not in given and class_of[i] in alike]
+
+    def look(object_id: int) -> tuple[Choice, Problem | None, int]:
+        if object_id in given:
+            return *fit_given(given[object_id], maker, object_id, irradiance, rays), -1
+        choice, problem, target, index = _look(maker, object_id, samples, len(frame_names), way, rays)
+        if way == "frames" and choice.fit is not None:
+            element, direction = samples.element[index], samples.direction[index]
+            behind = look_behind(field, lit_diffuse.seen, element, direction, object_id, noise)
+            lobe = None if choice.model == LAMBERTIAN else choice.fit
+            scale = max(1.4826 * choice.fit.residual, 1e-4)
+            choice = set_apart(choice, judge(problem, behind, lobe, scale))
+        if way == "frames" and choice.model not in (METAL, TRANSPARENT):
+            choice, problem = _by_looks(maker, object_id, choice, problem, irradiance, rays)
+        return choice, problem, target
+
+    problems, choices, targets = {}, {}, {}
+    for object_id, found in zip(wanted, ordered_map(look, wanted, threads, ahead=len(wanted)), strict=True):
+        choices[object_id], problem, targets[object_id] = found
+        if problem is not None:
+            problems[object_id] = problem
+        if progress is not None:
+            progress.update(0.7 * len(choices) / len(wanted))
+    if way == "frames":
+        reflecting = {i: choice for i, choice in choices.items() if choice.model != EMITTER}
+        adopted = adopt_from_class(reflecting, problems, {i.object_id: i.class_name for i in instances})
+        choices |= {i: choice for i, choice in adopted.items() if i not in given}
+
+    # Where the target frame alone was fitted, elements have one view: the jackknife has nothing to work on.
+    told = problems if way == "frames" else {}
+    intervals = ordered_map(lambda i: gloss_interval(choices[i], told.get(i)), wanted, threads)
+    sure = dict(zip(wanted, intervals, strict=True))
+
+    def describe(i: Instance) -> ObjectMaterial:
+        own, choice = field.atlas.object_id == i.object_id, choices.get(i.object_id)
+        if choice is not None and choice.model == EMITTER:
+            seen = np.median(field.radiance[own], 0) if own.any() else np.zeros(3)
+            return lamp_material(i, seen, irradiance[own], given_note(given[i.object_id]))
+        if choice is not None:
+            target, problem = targets[i.object_id], problems.get(i.object_id)
+            name = frame_names[target] if target >= 0 else None
+            found = described(i, choice, problem, name, sure[i.object_id])
+            return as_given(found, given[i.object_id], choice) if i.object_id in given else found
+        if i.object_id in glowing and i.object_id not in given:
+            known = glowing[i.object_id]
+            return lamp_material(i, known.radiance, irradiance[own], known.note)
+        if i.object_id in mirrors and i.object_id not in given:
+            seen = int((field.atlas.object_id[samples.element] == i.object_id).sum())
+            return flat_mirror(i, mirrors[i.object_id], seen)
+        return ObjectMaterial(i.object_id, i.class_name, LAMBERTIAN)  # the same as another, which is described first
+
+    kept = {} if held is None else {m.object_id: m for m in held.found.materials if m.object_id not in held.only}
+    by_id = {i.object_id: kept.get(i.object_id) or describe(i) for i in instances}
+    for i in by_id:
+        if i not in kept and given.get(i, NOTHING).same_as is not None:
+            source = given[i].same_as
+            while (further := given.get(source, NOTHING).same_as) is not None:
+                source = further
+            by_id[i] = same_material(by_id[source], by_id[i])
+    materials = list(by_id.values())
+
+    specular = np.zeros((len(field.atlas), 3), np.float32)
+    if held is not None:
+        specular = np.where(np.isin(field.atlas.object_id, list(held.only))[:, None], specular, held.found.specular)
+    glass = [m for m in materials if m.model == TRANSPARENT and m.surfaces is not None]
+    glossy = [m for m in materials if m.model == SPECULAR] + glass if refine else []
+    glossy = [m for m in glossy if m.object_id not in kept]
+
+    def separate(material: ObjectMaterial) -> tuple[np.ndarray, np.ndarray]:
+        if material.model == TRANSPARENT:
+            return _without_background(material, field, lit_diffuse.seen, maker, samples)
+        return _separate(material, field, maker, samples, max(rays // SEPARATE_RAYS, 16))
+
+    for done, (own, part) in enumerate(ordered_map(separate, glossy, threads)):
+        specular[own] = part
+        if progress is not None:
+            progress.update(0.7 + 0.15 * (done + 1) / len(glossy))
+
+    excess = np.zeros_like(specular) if held is None else held.found.excess
+    if refine > 1 and held is None:
+        seen = np.flatnonzero(lit_diffuse.seen)
+        sent = Excess(field, tuple(materials), specular, seed)
+        excess[seen] = glossy_light(
+            sent, seen, irradiance[seen], threads=threads, seed=seed, progress=progress, share=(0.85, 1.0)
+        )
+    return Specular(tuple(materials), specular, excess)
+
+
+def _look(
+    maker: Problems, object_id: int, samples: Samples, frames: int, way: str, rays: int
+) -> tuple[Choice, Problem | None, int, np.ndarray]:
+    """Model, observations, target frame (-1: none) of one object, and which of the samples the observations are."""
+    index = maker.pick(object_id, SCREEN_ELEMENTS, FIT_VIEWS)
+    if not len(index):
+        return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, -1, index
+    problem = maker.problem(index, max(rays // SCREEN_RAYS, 16), rough=True)
+    target = target_frame(
+        score_frames(samples.frame[index], problem.light.A[:, TARGET_PHI], problem.lit_diffuse, frames)
+    )
+    if way == "frames":
+        choice, problem, index = _by_frames(maker, object_id, index, problem, rays)
+    else:
+        choice, problem = _by_target(maker, object_id, samples.frame, target, rays)
+    return choice, problem, target, index
+
+
+def _by_frames(
+    maker: Problems, object_id: int, index: np.ndarray, screen: Problem, rays: int
+) -> tuple[Choice, Problem, np.ndarray]:
+    """Choose a model; in two looks, as only some objects deserve the second."""
+    first = choose_model(screen)
+    fit = first.fit
+    hopeless = fit is None or fit.cost > HOPELESS * fit.cost_lambertian
+    if hopeless and first.model != METAL:
+        return first, screen, index
+    index = maker.pick(object_id, FIT_ELEMENTS, FIT_VIEWS, seed=1)
+    problem = maker.problem(index, rays)
+    return choose_model(problem), problem, index
+
+
+def _by_looks(
+    maker: Problems, object_id: int, choice: Choice, problem: Problem | None, irradiance: np.ndarray, rays: int
+) -> tuple[Choice, Problem | None]:
+    """Ask whether an object looks like a metal or coated all over; choice and observations stay as they were if not."""
+    if problem is not None and len(np.unique(problem.element)) >= MIN_ELEMENTS:
+        first = compare(problem, irradiance)
+        if first is None:
+            return choice, problem
+        like_metal = first.ratio <= LOOKS_LIKE_NONE
+        if not like_metal and (choice.model != LAMBERTIAN or compare_coat(problem, irradiance).ratio > 1):
+            return choice, problem
+    index = maker.pick(object_id, FIT_ELEMENTS, LOOKS_VIEWS, least=1, seed=1)
+    whole = maker.problem(index, rays) if len(index) else None
+    looks = compare(whole, irradiance) if whole is not None else None
+    if looks is None:
+        return choice, problem
+    found = metal_by_looks(choice, looks, whole)
+    if found.model == LAMBERTIAN:
+        found = coated_by_looks(found, compare_coat(whole, irradiance))
+    return found, whole if found.looks is not None else problem
+
+
+def _by_target(maker: Problems, object_id: int, frame: np.ndarray, target: int, rays: int) -> tuple[Choice, Problem]:
+    """The paper's fit: one frame, one lobe; no choice of model."""
+    index = maker.pick(object_id, 10**9, 10**9, least=1)
+    problem = maker.problem(index[frame[index] == target][: FIT_ELEMENTS * FIT_VIEWS], rays)
+    if len(problem.element) < 3:
+        return Choice(LAMBERTIAN, None, note="No frame shows enough of it."), problem
+    return Choice(SPECULAR, fit_lobe(problem, "target")), problem
+
+
+def _separate(
+    material: ObjectMaterial, field: LightField, maker: Problems, samples: Samples, rays: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """A glossy object's elements (n,), and the specular part of their L_d, (n, 3)."""
+    own = np.flatnonzero(field.atlas.object_id == material.object_id)
+    index = maker.pick(material.object_id, SEPARATE_ELEMENTS, SEPARATE_VIEWS, least=1, seed=2)
+    if not len(index):
+        return own, np.zeros((len(own), 3), np.float32)
+    light = maker.light(index, rays, max(material.phi, float(GRID[0])))
+    element, part = specular_in_median(samples, index, material.psi * light.A[:, 0] + light.B[:, 0])
+    return own, spread_over_object(field.atlas, own, element, part)
+
+
+def _without_background(
+    material: ObjectMaterial, field: LightField, seen: np.ndarray, maker: Problems, samples: Samples
+) -> tuple[np.ndarray, np.ndarray]:
+    """A glass object's elements (n,), and the part of their L_d that came from behind, (n, 3)."""
+    own = np.flatnonzero(field.atlas.object_id == material.object_id)
+    index = maker.pick(material.object_id, SEPARATE_ELEMENTS, SEPARATE_VIEWS, least=1, seed=2)
+    if not len(index):
+        return own, np.zeros((len(own), 3), np.float32)
+    behind = look_behind(field, seen, samples.element[index], samples.direction[index], material.object_id)
+    index, passed = index[behind.known], np.float32(material.transmission) * behind.radiance[behind.known]
+    if not len(index):
+        return own, np.zeros((len(own), 3), np.float32)
+    element, part = specular_in_median(samples, index, passed)
+    return own, spread_over_object(field.atlas, own, element, part)

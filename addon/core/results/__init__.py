@@ -1,0 +1,1 @@
+"""The result folder: what is finished, what an interface needs of it."""

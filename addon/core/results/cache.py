@@ -1,0 +1,74 @@
+"""Result folders: how much they take, and clearing what can be made again: the finished stages, and nothing else."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import ScanRelightError
+from .store import LOCK, STAGES, Store
+
+
+@dataclass(frozen=True)
+class Cleared:
+    """What was cleared: bytes that are free again, how many results were touched, sentences on those that were left."""
+
+    freed: int
+    results: int
+    left: tuple[str, ...]
+
+
+def is_result(folder: Path) -> bool:
+    """Whether a run wrote a folder: it has a store's lock file and its folder of stages; no links."""
+    return (
+        folder.is_dir()
+        and not folder.is_symlink()
+        and (folder / LOCK).is_file()
+        and (folder / STAGES).is_dir()
+        and not (folder / STAGES).is_symlink()
+    )
+
+
+def results(parent: Path | str) -> list[Path]:
+    """The result folders right below `parent`."""
+    parent = Path(parent)
+    return sorted(filter(is_result, parent.iterdir())) if parent.is_dir() else []
+
+
+def size(folder: Path | str) -> int:
+    """Bytes of all files in `folder`, links not followed; what vanishes meanwhile counts nothing."""
+    total = 0
+    for where, _, names in os.walk(folder):
+        for name in names:
+            try:
+                total += os.lstat(os.path.join(where, name)).st_size
+            except OSError:
+                continue
+    return total
+
+
+def clear(folders: Iterable[Path]) -> Cleared:
+    """Clear the stages of result folders; what is no result is passed over.
+
+    Without its stages a result shows as before; only a further run begins anew. A folder that a run is writing is left
+    as it is.
+    """
+    freed, touched, left = 0, 0, []
+    for folder in filter(is_result, dict.fromkeys(folders)):
+        try:
+            with Store(folder):
+                before = size(folder / STAGES)
+                shutil.rmtree(folder / STAGES)
+                (folder / STAGES).mkdir()  # by which the folder is known
+            freed += before
+            touched += 1
+        except (ScanRelightError, OSError) as error:
+            left.append(
+                str(error)
+                if isinstance(error, ScanRelightError)
+                else f"'{folder.name}' can't be cleared ({error.strerror or error})."
+            )
+    return Cleared(freed, touched, tuple(left))

@@ -1,0 +1,203 @@
+"""The room as a finished run knew it, in one file of the result folder: what an interface needs to show it again.
+
+Reading it asks for neither the capture's pictures nor the stages, and takes a blink.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import zipfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..atomic import replacing
+from ..errors import BadInputError, MissingStageError
+from ..material import ObjectMaterial
+from ..material import from_json as material
+from ..scene.lenses_told import lens_of, told_lens
+from ..scene.model import Camera, Capture, Frame, Instance, Mesh, Shot
+
+ROOM = "room.npz"
+MATERIALS = "materials.json"
+CAMERA = ("width", "height", "fx", "fy", "cx", "cy")
+DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, NotImplementedError)
+
+
+@dataclass(frozen=True)
+class Room:
+    """A finished run.
+
+    Attributes
+    ----------
+    capture : Capture
+        Its frames' pictures may be gone.
+    atlas_uv : (t, 3, 2) float32
+        Atlas coordinates of each triangle's corners.
+    materials : tuple of ObjectMaterial
+    folder : Path
+        The result folder.
+    run : str
+        The run's key, see `run_of`.
+    """
+
+    capture: Capture
+    atlas_uv: np.ndarray
+    materials: tuple[ObjectMaterial, ...]
+    folder: Path
+    run: str = ""
+
+
+def run_of(folder: Path | str) -> str:
+    """The key of the run that a result folder holds; '' where there is none, or it is older than such keys.
+
+    Objects that were made by this run carry the same (`marks.RUN`): nothing else in the folder is about any other.
+    """
+    try:
+        key = json.loads((Path(folder) / MATERIALS).read_text(encoding="utf-8")).get("run")
+    except (OSError, ValueError, AttributeError):
+        return ""
+    return key if isinstance(key, str) else ""
+
+
+def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = None) -> None:
+    """Write `ROOM` into a folder; `atlas_uv` as in `Room`, all 0 where there is no atlas. Raises `StorageError`."""
+    mesh = capture.mesh
+    if atlas_uv is None:
+        atlas_uv = np.zeros((len(mesh.triangles), 3, 2), np.float32)
+    told = {
+        "root": str(capture.root.absolute()),
+        "format": capture.format,
+        "instances": [[one.object_id, one.class_name] for one in capture.instances],
+        "frames": [
+            [
+                frame.name,
+                str(frame.path.absolute()),
+                [getattr(frame.camera, name) for name in CAMERA],
+                told_lens(frame.camera.lens),
+            ]
+            for frame in capture.frames
+        ],
+        "pictures": [_told_picture(frame) for frame in capture.frames],
+    }
+    arrays = {
+        "told": np.frombuffer(json.dumps(told).encode(), np.uint8),
+        "vertices": mesh.vertices,
+        "triangles": mesh.triangles,
+        "object_id": mesh.object_id,
+        "atlas_uv": np.asarray(atlas_uv, np.float32),
+        "poses": np.reshape([frame.camera.camera_to_world for frame in capture.frames], (-1, 4, 4)),
+    }
+    if mesh.uv is not None:
+        arrays["uv"] = mesh.uv
+    with replacing(folder / ROOM) as temporary, open(temporary, "wb") as file:
+        np.savez(file, **arrays)
+
+
+def read_room(folder: Path | str) -> Room:
+    """The finished run in a result folder.
+
+    Raises
+    ------
+    MissingStageError
+        No run was finished there.
+    BadInputError
+        A file is damaged.
+    """
+    folder = Path(folder).absolute()
+    for name in (ROOM, MATERIALS):
+        if not (folder / name).is_file():
+            raise MissingStageError(
+                f"Folder '{folder}' holds no finished result ('{name}' is missing); run the recovery to its end first."
+            )
+    capture, atlas_uv = read_capture_file(folder)
+    try:
+        told = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))
+        return Room(capture, atlas_uv, tuple(material(one) for one in told["objects"]), folder, told.get("run", ""))
+    except DAMAGE as error:
+        raise _damaged(folder, error) from error
+
+
+def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
+    """The capture in `ROOM`, and its `atlas_uv`; raises `BadInputError` where the file is absent or damaged."""
+    folder = Path(folder)
+    try:
+        with open(folder / ROOM, "rb") as file, np.load(file, allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        told = json.loads(arrays["told"].tobytes())
+        frames = tuple(
+            Frame(name, Path(path), Camera(*camera, pose, lens_of(lens)))
+            for (name, path, camera, lens), pose in zip(told["frames"], arrays["poses"], strict=True)
+        )
+        pictures = told.get("pictures") or [{}] * len(frames)
+        frames = tuple(replace(frame, **_picture(one)) for frame, one in zip(frames, pictures, strict=True))
+        mesh = Mesh(*(arrays[name] for name in ("vertices", "triangles", "object_id")), arrays.get("uv"))
+        instances = tuple(Instance(int(number), name) for number, name in told["instances"])
+        return Capture(Path(told["root"]), mesh, instances, frames, format=told["format"]), arrays["atlas_uv"]
+    except DAMAGE as error:
+        raise _damaged(folder, error) from error
+
+
+def _told_picture(frame: Frame) -> dict[str, Any]:
+    """How a frame's pictures are to be read, as JSON; JSON has no inf, so null stands for it."""
+
+    def told(path: Path | None) -> str | None:
+        return path and str(path.absolute())
+
+    def finite(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    return {
+        "mask_path": told(frame.mask_path),
+        "id_path": told(frame.id_path),
+        "exposure": frame.exposure,
+        "saturation": finite(frame.saturation),
+        "transfer": frame.transfer,
+        "brackets": [[told(shot.path), shot.exposure, finite(shot.saturation)] for shot in frame.brackets],
+    }
+
+
+def _picture(told: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a `Frame` that `_told_picture` tells; none where it is of an older result."""
+    if not told:
+        return {}
+
+    def level(value: float | None) -> float:
+        return math.inf if value is None else value
+
+    paths = {name: told[name] and Path(told[name]) for name in ("mask_path", "id_path")}
+    brackets = tuple(Shot(Path(path), exposure, level(value)) for path, exposure, value in told["brackets"])
+    return paths | {
+        "exposure": told["exposure"],
+        "saturation": level(told["saturation"]),
+        "transfer": told["transfer"],
+        "brackets": brackets,
+    }
+
+
+def capture_name(folder: Path | str) -> str:
+    """Name of the room that a result is of: its capture's folder, or the result's own where that is not told."""
+    folder = Path(folder)
+    try:
+        told = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))["capture"]
+    except DAMAGE:
+        told = ""
+    return told if told and isinstance(told, str) else folder.name
+
+
+def root_of(folder: Path | str) -> Path | None:
+    """Folder of the capture that `ROOM` tells of, and nothing else of it; None where the file is absent or damaged."""
+    try:
+        with open(Path(folder) / ROOM, "rb") as file, np.load(file, allow_pickle=False) as archive:
+            return Path(json.loads(archive["told"].tobytes())["root"])
+    except DAMAGE:
+        return None
+
+
+def _damaged(folder: Path, error: Exception) -> BadInputError:
+    return BadInputError(
+        f"The result in '{folder}' is damaged ({type(error).__name__}: {error}); run the recovery again."
+    )

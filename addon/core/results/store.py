@@ -1,0 +1,269 @@
+"""The result folder: which stages are finished, under which key, and files that are there whole or not at all.
+
+A stage's key is made of the key of the stage before it and of the settings that it heeds. So a changed setting makes
+its own stage and all later ones anew, and nothing else.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import errno
+import hashlib
+import json
+import math
+import os
+import re
+import shutil
+import zipfile
+import zlib
+from collections.abc import Iterable
+from pathlib import Path, PurePath
+from typing import Any
+
+import numpy as np
+
+from ..atomic import TEMPORARY, replacing, write_bytes
+from ..errors import BadInputError, StorageError
+
+STAGES = "stages"
+SPILLED = "tmp-observations-"
+"""How folders begin that an exact median keeps its observations in (`lit_diffuse.medians`)."""
+LOCK = ".lock"
+META = "__meta__"
+FULL = (errno.ENOSPC, errno.EDQUOT if hasattr(errno, "EDQUOT") else errno.ENOSPC)
+DAMAGE = (
+    OSError,
+    ValueError,
+    KeyError,
+    EOFError,
+    zipfile.BadZipFile,
+    zlib.error,
+    NotImplementedError,
+    TypeError,
+    AttributeError,
+)
+"""What reading a damaged archive raises."""
+
+
+class Store:
+    """The folder that a run writes its stages and results to. One run at a time; close it, or use `with`.
+
+    Parameters
+    ----------
+    folder : path
+        Made where absent.
+
+    Raises
+    ------
+    BadInputError
+        The folder can't be made or written, or another run is writing it.
+    StorageError
+        The disk is full.
+    """
+
+    def __init__(self, folder: Path | str):
+        self.folder = Path(folder)
+        self._lock = None
+        try:
+            (self.folder / STAGES).mkdir(parents=True, exist_ok=True)
+            self._lock = _take_lock(self.folder)
+            # With the lock held, whoever wrote these is dead.
+            for where in (self.folder, self.folder / STAGES):
+                for remains in where.glob(f"{TEMPORARY}*"):
+                    remains.unlink()
+            for remains in self.folder.glob(f"{SPILLED}*"):
+                shutil.rmtree(remains, ignore_errors=True)
+            probe = self.folder / f"{TEMPORARY}{os.getpid()}-probe"
+            probe.write_bytes(b"probe")
+            probe.unlink()
+        except OSError as error:
+            self.close()
+            reason = error.strerror or error
+            if error.errno in FULL:
+                raise StorageError(
+                    f"Result folder '{self.folder}' can't be written ({reason}); free some space or choose another."
+                ) from error
+            if isinstance(error, (FileExistsError, NotADirectoryError)):
+                raise BadInputError(
+                    f"Result folder '{self.folder}' can't be made: a file is in its way; choose another."
+                ) from error
+            raise BadInputError(
+                f"Result folder '{self.folder}' can't be written ({reason}); choose one that you may write."
+            ) from error
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let other runs have the folder."""
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+    def path(self, name: str) -> Path:
+        """Where the result `name` (which may hold '/') lies."""
+        if PurePath(name).is_absolute() or ".." in PurePath(name).parts:
+            raise ValueError(f"'{name}' leads out of the result folder")
+        return self.folder / name
+
+    def finished(self) -> list[str]:
+        """Names of the stages that are stored whole, oldest first; their keys may be out of date."""
+        paths = [path for path in (self.folder / STAGES).glob("*.npz") if _read_meta(path) is not None]
+        return [path.stem for path in sorted(paths, key=lambda path: (path.stat().st_mtime_ns, path.stem))]
+
+    def load(self, name: str, key: str) -> dict[str, np.ndarray] | None:
+        """The arrays of stage `name`; None where it is absent, was made under another key, or is damaged."""
+        path = self._stage(name)
+        meta = _read_meta(path)
+        if meta is None or meta.get("key") != key:
+            return None
+        try:
+            # Opened here: given a path, np.load leaves a damaged file open. Reading checks each array's CRC.
+            with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
+                return {array: archive[array] for array in archive.files if array != META}
+        except DAMAGE:
+            return None
+
+    def load_meta(self, name: str, key: str) -> dict[str, Any] | None:
+        """What `save` was given as `meta`; None as for `load`."""
+        meta = _read_meta(self._stage(name))
+        return None if meta is None or meta.get("key") != key else meta.get("meta", {})
+
+    def stored_key(self, name: str) -> str | None:
+        """The key under which the stage `name` is stored; None where it is absent or damaged."""
+        return (_read_meta(self._stage(name)) or {}).get("key")
+
+    def save(self, name: str, key: str, arrays: dict[str, np.ndarray], meta: dict[str, Any] | None = None) -> None:
+        """Store the finished stage `name`, in whole or not at all.
+
+        Uncompressed: compressing costs more time than it saves, as these are mostly noise in their low bits.
+
+        Raises
+        ------
+        StorageError
+            The disk is full or can't be written; what was stored before is still there.
+        ValueError
+            An array holds Python objects.
+        """
+        content = json.dumps({"key": key, "meta": _plain(meta or {})}).encode()
+        arrays = {META: np.frombuffer(content, np.uint8), **arrays}
+        if any(np.asarray(array).dtype.hasobject for array in arrays.values()):
+            raise ValueError(f"stage '{name}' holds an array of objects")
+        # Not np.savez: it takes the array names as keywords, so 'file' could not be one, and stamps the time of day.
+        with replacing(self._stage(name)) as temporary, open(temporary, "wb") as file:
+            with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
+                for array_name, array in arrays.items():
+                    with archive.open(zipfile.ZipInfo(f"{array_name}.npy"), "w", force_zip64=True) as entry:
+                        np.lib.format.write_array(entry, np.asarray(array), allow_pickle=False)
+            file.flush()
+            os.fsync(file.fileno())
+
+    def drop(self, names: Iterable[str]) -> None:
+        """Forget the stages `names`, so that they are done again; one that is not stored is no error."""
+        for name in names:
+            self._stage(name).unlink(missing_ok=True)
+
+    def write_json(self, name: str, value: Any) -> Path:
+        """Write the result `name`; NaN and inf, which JSON lacks, become null. Raises `StorageError`."""
+        path = self._parent(name)
+        write_bytes(path, json.dumps(_plain(value), indent=1, ensure_ascii=False).encode() + b"\n")
+        return path
+
+    def write_exr(self, name: str, array: np.ndarray, half: bool = False) -> Path:
+        """Write the picture `name` (row 0 = top); see `capture.exr.write_exr`. Raises `StorageError`."""
+        from ..io.exr import write_exr  # not earlier: Blender's start, which knows the store, waits for no library
+
+        path = self._parent(name)
+        write_exr(path, array, half)
+        return path
+
+    def _parent(self, name: str) -> Path:
+        path = self.path(name)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise StorageError(
+                f"'{path.parent}' can't be made ({error.strerror or error}); choose another result folder."
+            ) from error
+        return path
+
+    def _stage(self, name: str) -> Path:
+        if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+            raise ValueError(f"'{name}' is no name for a stage")
+        return self.folder / STAGES / f"{name}.npz"
+
+
+def key(*parts: Any) -> str:
+    """A stage's key: a hash of the key of the stage before it and of the settings that it heeds.
+
+    Parts may be anything that JSON holds, frozen values (dataclasses), paths, and small arrays.
+    """
+    return hashlib.sha256(json.dumps(_plain(list(parts)), sort_keys=True).encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """`value` in what JSON knows."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(name): _plain(one) for name, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(one) for one in value]
+    if isinstance(value, (set, frozenset)):
+        return sorted(_plain(one) for one in value)
+    if isinstance(value, PurePath):
+        return value.as_posix()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    raise TypeError(f"{type(value).__name__} is nothing that can be stored")
+
+
+def _read_meta(path: Path) -> dict[str, Any] | None:
+    """The key and the meta of a stage's file; None where it is absent or damaged."""
+    try:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
+            meta = json.loads(archive[META].tobytes())
+    except DAMAGE:
+        return None
+    return meta if isinstance(meta, dict) else None
+
+
+def _take_lock(folder: Path):
+    """Lock `folder` and return the open lock file; the system frees it when it is closed or its process dies.
+
+    So a run that was killed leaves no lock behind, and no process id has to be asked whether it still lives.
+    """
+    file = open(folder / LOCK, "a+b")
+    try:
+        if os.name == "nt":
+            import msvcrt
+
+            file.seek(1 << 20)  # far behind the content: Windows won't let others read what is locked
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        if error.errno in (errno.EAGAIN, errno.EACCES, errno.EDEADLK):
+            file.seek(0)
+            owner = file.read(20).decode("ascii", "replace")
+            file.close()
+            raise BadInputError(
+                f"Result folder '{folder}' is being written by another run (process {owner}); "
+                "wait for it or choose another folder."
+            ) from error
+        # Some network disks know no locks; a run there is worth more than the protection.
+    with contextlib.suppress(OSError):
+        file.truncate(0)
+        file.write(str(os.getpid()).encode())
+        file.flush()
+    return file

@@ -1,0 +1,56 @@
+"""Objects for a mesh that tells of none: its connected parts."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from .weld import same_place
+
+WELD = 1e-6
+"""Share of the room's diagonal within which vertices are one: at seams and between triangles they are listed twice."""
+TINY = 1e-3
+"""A part of less than this share of the surface is a crumb of a scan, no object."""
+MOST = 64
+"""More parts are not told apart: the greatest remain."""
+
+
+def weld(vertices: np.ndarray) -> np.ndarray:
+    """A number for each place that vertices ((v, 3), finite) lie at, (v,) int64."""
+    low, high = vertices.min(0), vertices.max(0)
+    return same_place(vertices - low, max(WELD * float(np.linalg.norm(high - low)), 1e-12))[1]
+
+
+def connected_parts(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The part that each triangle belongs to, (t,) int64 from 0, the greatest surface first.
+
+    Triangles that share a vertex are of one part. Crumbs, and what goes beyond `MOST`, join the nearest other part.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float
+    triangles : (t, 3) int
+        At least one; vertices used are finite.
+    """
+    used, corners = np.unique(triangles.ravel(), return_inverse=True)
+    faces = weld(vertices[used])[corners.ravel()].reshape(-1, 3)
+    count = int(faces.max()) + 1
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
+    graph = sparse.coo_matrix((np.ones(len(edges), np.int8), edges.T), (count, count))
+    part = connected_components(graph, directed=False)[1][faces[:, 0]]
+    a, b, c = (vertices[triangles[:, i]] for i in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    surface = np.bincount(part, area)
+    order = np.argsort(-surface, kind="stable")
+    kept = order[: max(int((surface[order[:MOST]] >= TINY * surface.sum()).sum()), 1)]
+    number = np.full(len(surface), -1)
+    number[kept] = np.arange(len(kept))
+    part = number[part]
+    loose = np.flatnonzero(part < 0)
+    if len(loose):
+        known = np.flatnonzero(part >= 0)
+        centre = (a + b + c) / 3
+        part[loose] = part[known[cKDTree(centre[known]).query(centre[loose])[1]]]
+    return part

@@ -1,0 +1,77 @@
+"""Near a crease an element's irradiance is in doubt: texel, pixels and facets mix the light of both sides."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .atlas import Atlas
+from .elements import triangle_geometry
+from .model import Mesh
+from .two_sides import fronts, other_way
+from .weld import welded
+
+WELD = 1e-5
+"""Metres."""
+REACH = 1.5
+"""Texels from the edge up to which it is felt, less and less."""
+KNEE = 0.1
+"""Radians from which on a crease has its full effect: a facet of a curved moulding is no smoother than a corner."""
+THIN = 1e-3
+"""A triangle of less height, relative to its longest edge, faces no sure way: an edge with it tells of no bend."""
+DOUBT = 0.3
+"""Relative standard error of the irradiance right at a crease. Living room, white panelling: 0.25 to 0.4 there and
+0.07 to 0.12 on flat parts."""
+
+
+def edge_angles(mesh: Mesh) -> np.ndarray:
+    """Angle in radians, 0...pi/2, by which the surface bends at each triangle's edges, (t, 3); edge k lies opposite
+    corner k. Windings don't matter. Where an edge has no other triangle, pi/2: what goes on there is not known. 0 at a
+    sliver's edges. A sheet's second side bends as its first one does."""
+    if mesh.backs is not None:
+        angle = edge_angles(fronts(mesh)[0])
+        return np.concatenate([angle, other_way(angle[mesh.backs])])
+    points, faces, _ = welded(mesh, WELD)
+    normal, area = triangle_geometry(mesh)
+    corners = mesh.vertices[mesh.triangles]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
+    sliver = np.repeat(2 * area < THIN * longest**2, 3)
+    ends = np.sort(np.stack([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]], 1), 2).reshape(-1, 2)
+    _, edge, count = np.unique(ends[:, 0] * len(points) + ends[:, 1], return_inverse=True, return_counts=True)
+    edge = edge.ravel()
+    own = np.repeat(normal, 3, 0).astype(np.float64)
+    # Each triangle against the next one at its edge, in a circle: of two, that is the other one.
+    order = np.argsort(edge, kind="stable")
+    start = np.cumsum(count) - count
+    rank = np.arange(len(edge)) - start[edge[order]]
+    following = order[start[edge[order]] + (rank + 1) % count[edge[order]]]
+    cosine = np.empty(len(edge))
+    cosine[order] = np.abs((own[order] * own[following]).sum(1))
+    angle = np.arccos(np.clip(cosine, 0, 1))
+    angle[count[edge] == 1] = np.pi / 2
+    angle[np.bincount(edge, sliver, len(count))[edge] > 0] = 0
+    return angle.reshape(-1, 3)
+
+
+def crease_doubt(mesh: Mesh, atlas: Atlas, texel: float) -> np.ndarray:
+    """Relative standard error of the irradiance for nearby creases, (n,) float32.
+
+    Parameters
+    ----------
+    texel : float
+        Edge of an element in metres.
+    """
+    angles = edge_angles(mesh)
+    doubt = np.zeros(len(atlas), np.float32)
+    corners = mesh.vertices[mesh.triangles].astype(np.float32)
+    bent = np.flatnonzero((angles[atlas.triangle] > 0.01 * KNEE).any(1))
+    triangle, position = atlas.triangle[bent], atlas.position[bent]
+    for k in range(3):
+        a, b = corners[triangle, (k + 1) % 3], corners[triangle, (k + 2) % 3]
+        way = b - a
+        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
+        off = position - a
+        off -= (off * way).sum(1, keepdims=True) * way
+        near = np.maximum(1 - np.linalg.norm(off, axis=1) / (REACH * texel), 0)
+        felt = DOUBT * np.minimum(angles[triangle, k] * near / KNEE, 1)
+        doubt[bent] = np.maximum(doubt[bent], felt)
+    return doubt

@@ -1,0 +1,87 @@
+"""Groups of neighbouring elements: which of them a frame can't see is found for the whole group at once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .atlas import Atlas
+from .model import Camera
+from .pixel_rays import widest_angle
+from .visibility import MIN_COSINE, FrameView
+
+CELL = 16
+"""Edge of a group in elements."""
+SLACK = 1e-4
+"""What rounding may add to a sine or, as a share of the scene, to a length: a group that touches a limit stays in."""
+
+
+class ElementGroups:
+    """Elements of one object in one cell of space that face roughly one way: a ball, and a cone of normals.
+
+    A group is left out only where no element of it could pass `visibility.observe`: nothing changes but the time.
+    """
+
+    def __init__(self, atlas: Atlas):
+        spacing = CELL * atlas.texel_edge if len(atlas) else 1.0
+        cell = np.floor(atlas.position / max(spacing, 1e-12)).astype(np.int64)
+        cell -= cell.min(0, initial=0)
+        side = 2 * np.abs(atlas.normal).argmax(1)
+        side += np.take_along_axis(atlas.normal, (side // 2)[:, None], 1)[:, 0] > 0
+        extent = cell.max(0, initial=0) + 1
+        key = ((cell[:, 0] * extent[1] + cell[:, 1]) * extent[2] + cell[:, 2]) * 6 + side
+        order = np.lexsort((atlas.object_id, key))
+        key, object_id = key[order], atlas.object_id[order]
+        new = np.concatenate([[True], (np.diff(key) != 0) | (np.diff(object_id) != 0)])[: len(key)]
+        start = np.flatnonzero(new)
+        group = np.cumsum(new) - 1
+        self._group = np.empty(len(key), np.int32)
+        self._group[order] = group
+        self._object_id = object_id[start]
+
+        position, normal = atlas.position[order], atlas.normal[order]
+        low, high = (f.reduceat(position, start) if len(key) else position for f in (np.minimum, np.maximum))
+        self._centre = ((low + high) / 2).astype(np.float64)
+        size = float(np.abs(position).max(initial=0))
+        self._radius = np.linalg.norm(high - low, axis=1) / 2 + SLACK * (size + spacing)
+        axis = np.add.reduceat(normal, start) if len(key) else normal
+        self._axis = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-12)
+        cosine = np.einsum("ij,ij->i", normal, self._axis[group])
+        widest = np.minimum.reduceat(cosine, start) if len(key) else cosine
+        self._opening = np.arccos(np.clip(widest - SLACK, -1, 1))
+
+    def candidates(self, view: FrameView) -> np.ndarray:
+        """Elements that the frame may see, sorted: (k,) int32."""
+        camera = view.camera
+        shown = np.zeros(max(self._object_id.max(initial=0), view.object_id.max()) + 2, bool)
+        shown[view.object_id.ravel()] = True  # -1 marks the last
+        keep = shown[self._object_id]
+        keep &= self._in_frustum(camera) if camera.lens is None else self._in_cone(camera)
+        to_camera = camera.centre - self._centre
+        distance = np.maximum(np.linalg.norm(to_camera, axis=1), 1e-12)
+        cosine = np.einsum("ij,ij->i", to_camera, self._axis) / distance
+        # The smallest angle that any normal of the cone can make with the way from any point of the ball.
+        least = np.arccos(np.clip(cosine, -1, 1)) - self._opening - np.arcsin(np.minimum(self._radius / distance, 1))
+        keep &= (least < np.arccos(MIN_COSINE) + SLACK) | (distance <= self._radius)
+        return np.flatnonzero(keep[self._group]).astype(np.int32)
+
+    def _in_frustum(self, camera: Camera) -> np.ndarray:
+        """Groups that a pinhole's frustum may reach."""
+        local = (self._centre - camera.centre) @ camera.camera_to_world[:3, :3]
+        depth = -local[:, 2]
+        keep = depth > -self._radius
+        for along, f, c, extent in (
+            (local[:, 0], camera.fx, camera.cx, camera.width),
+            (-local[:, 1], camera.fy, camera.cy, camera.height),
+        ):
+            # Signed distance to the frustum's two planes: f * along + c * depth is 0 at the frame's first column.
+            keep &= f * along + c * depth > -self._radius * np.hypot(f, c)
+            keep &= f * along + (c - extent) * depth < self._radius * np.hypot(f, c - extent)
+        return keep
+
+    def _in_cone(self, camera: Camera) -> np.ndarray:
+        """Groups that the cone around a lens's widest ray may reach."""
+        away = self._centre - camera.centre
+        distance = np.maximum(np.linalg.norm(away, axis=1), 1e-12)
+        angle = np.arccos(np.clip(-(away @ camera.camera_to_world[:3, 2]) / distance, -1, 1))
+        ball = np.arcsin(np.minimum(self._radius / distance, 1))
+        return (angle - ball < widest_angle(camera) + SLACK) | (distance <= self._radius)

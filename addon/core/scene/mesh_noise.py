@@ -1,0 +1,55 @@
+"""How noisy a scanned mesh is, and by how much its triangles are tilted for it."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from .model import Mesh
+from .weld import point_normals, ring_of, welded
+
+LEAST_NOISE = 0.001
+"""Metres. Below, what is measured may be shape: a modelled living room has 0.13 mm."""
+LEAST_VERTICES = 100
+TILT = 1.2
+"""Radians by which a triangle of height 1 is tilted by vertices off by 1: each of three vertices adds its share."""
+MOST = 3.0
+LEFT = 0.5
+"""Share of a tilt that is left once the noise is taken out (`denoise`): in the living room 0.2 to 0.3 in the median,
+0.6 to 0.9 in the root mean square, as triangles lower than the noise stay wrong."""
+
+
+def noise_of(mesh: Mesh) -> float:
+    """Standard deviation along the normal, in metres, of what is independent from vertex to vertex.
+
+    From each vertex's height over its neighbours, less those neighbours' own: curvature, which neighbours share, is
+    gone. The median over the vertices, so that creases don't count. (The living room with 3.5 mm: 3.8 mm.)
+    """
+    points, faces, _ = welded(mesh)
+    ring = ring_of(faces, len(points))
+    degree = np.asarray(ring.sum(1))[:, 0]
+    inner = degree >= 4
+    if inner.sum() < LEAST_VERTICES:
+        return 0.0
+    share = sparse.diags(1 / np.maximum(degree, 1)) @ ring
+    normal = point_normals(points, faces)
+    height = ((points - share @ points) * normal).sum(1)
+    second = height - share @ height
+    # Of independent noise of 1: a vertex less the mean of d neighbours, twice.
+    d = float(np.median(degree[inner]))
+    return float(np.median(np.abs(second[inner])) / 0.6745 / np.sqrt((1 + 1 / d) ** 2 + 1 / d))
+
+
+def tilt(mesh: Mesh, taken_out: float = 0.0) -> np.ndarray:
+    """Standard deviation in radians by which noise tilts each triangle, (t,) float32; 0 for a mesh without noise.
+
+    `taken_out` is the noise in metres that the mesh had before it was denoised; 0: it was not.
+    That is about the relative error of the irradiance there: of light from one side, E changes with the cosine.
+    """
+    noise = LEFT * taken_out if taken_out else noise_of(mesh)
+    if not taken_out and noise < LEAST_NOISE:
+        return np.zeros(len(mesh.triangles), np.float32)
+    corners = mesh.vertices[mesh.triangles]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return np.minimum(TILT * noise * longest / np.maximum(area, 1e-30), MOST).astype(np.float32)

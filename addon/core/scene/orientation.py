@@ -1,0 +1,78 @@
+"""Which side of a triangle is the front: the one that the frames see. A scan's winding can't be relied on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .model import Camera, Mesh
+from .rays import RayScene
+from .two_sides import two_sided, worth_it
+
+PIXEL_STEP = 4
+"""Every fourth pixel in x and y votes."""
+LEAST_SHARE, LEAST_VOTES = 0.1, 4
+"""A triangle is seen from both sides if this share of its votes, and so many, are for the other one."""
+
+
+class Sides(NamedTuple):
+    """Which sides of the t triangles the frames see.
+
+    Attributes
+    ----------
+    sign : (t,) float32
+        +1 keep the winding, -1 turn it.
+    footprint : float
+        Edge in metres of the surface that a pixel covers: the lower quartile over all rays that hit.
+    both : (t,) bool
+        Triangles whose two sides are seen, each alone or as parts of a sheet (`two_sides.two_sided`).
+    """
+
+    sign: np.ndarray
+    footprint: float
+    both: np.ndarray
+
+
+def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequence[Camera]) -> Sides:
+    """Turn normals towards the cameras that see them.
+
+    Triangles that no ray meets follow the majority of their object.
+
+    Parameters
+    ----------
+    normal : (t, 3) float32
+        By the winding.
+    """
+    votes = np.zeros(len(mesh.triangles))
+    sides = np.zeros((2, len(votes)), np.int64)  # rays that met the front, and the back
+    footprints = []
+    for camera in cameras:
+        y, x = np.mgrid[PIXEL_STEP // 2 : camera.height : PIXEL_STEP, PIXEL_STEP // 2 : camera.width : PIXEL_STEP]
+        pixels = np.stack([x.ravel() + 0.5, y.ravel() + 0.5], -1)
+        directions, seen = camera.rays(pixels)
+        if not seen.all():
+            pixels, directions = pixels[seen], directions[seen]
+        hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
+        hit = hits.triangle >= 0
+        triangle = hits.triangle[hit]
+        cosine = -np.einsum("ij,ij->i", directions[hit], normal[triangle])
+        votes += np.bincount(triangle, weights=cosine, minlength=len(votes))
+        for side, met in zip(sides, (cosine > 0, cosine < 0), strict=True):
+            side += np.bincount(triangle[met], minlength=len(votes))
+        if camera.lens is None:
+            footprints.append(hits.distance[hit] / np.float32(np.sqrt(camera.fx * camera.fy)))
+        else:
+            edges = hits.distance[hit] * camera.pixel_angles(pixels[hit])
+            footprints.append(edges[edges > 0])
+    by_object = np.bincount(mesh.object_id, weights=np.sign(votes), minlength=int(mesh.object_id.max()) + 1)
+    sign = np.where(votes != 0, np.sign(votes), np.where(by_object[mesh.object_id] < 0, -1.0, 1.0))
+    together = np.concatenate(footprints) if footprints else np.zeros(0, np.float32)
+    footprint = float(np.percentile(together, 25)) if len(together) else 0.0
+    both = sides.min(0) >= np.maximum(LEAST_SHARE * sides.sum(0), LEAST_VOTES)
+    if sides[0].any() and sides[1].any():
+        sheets, turned = two_sided(mesh, sides)
+        both = worth_it(mesh, both | sheets)
+        sign = np.where(both & sheets, turned, sign)
+    return Sides(sign.astype(np.float32), footprint, both)

@@ -1,0 +1,94 @@
+"""Observations kept one by one: for a spread-out choice of elements, what every frame saw of them.
+
+The lit diffuse texture keeps order statistics only; the specular fit needs to know which view saw what.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .atlas import Atlas
+from .visibility import CLEAN, SATURATED, Observations
+
+ELEMENTS_AN_OBJECT = 4000
+ELEMENTS_IN_ALL = 150_000
+FRAMES_IN_FULL = 200
+"""With more frames, each observation is kept with the chance that this many frames would leave of it."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """m observations of chosen elements.
+
+    Attributes
+    ----------
+    element : (m,) int32
+    frame : (m,) int32
+        Index into the capture's frames.
+    radiance : (m, 3) float32
+    direction : (m, 3) float32
+        Unit, from the element to the camera.
+    saturated : (m,) bool
+    """
+
+    element: np.ndarray
+    frame: np.ndarray
+    radiance: np.ndarray
+    direction: np.ndarray
+    saturated: np.ndarray
+
+    @staticmethod
+    def none() -> Samples:
+        """Where there are no frames."""
+        whole, values = np.zeros(0, np.int32), np.zeros((0, 3), np.float32)
+        return Samples(whole, whole, values, values, np.zeros(0, bool))
+
+
+def choose_elements(atlas: Atlas, seed: int) -> np.ndarray:
+    """Elements to keep observations of: up to `ELEMENTS_AN_OBJECT` for each object, at random, sorted."""
+    rng = np.random.default_rng(seed)
+    key = rng.random(len(atlas))
+    order = np.lexsort((key, atlas.object_id))
+    objects = atlas.object_id[order]
+    start = np.concatenate([[0], np.flatnonzero(np.diff(objects)) + 1])
+    rank = np.arange(len(order)) - np.repeat(start, np.diff(np.concatenate([start, [len(order)]])))
+    limit = ELEMENTS_AN_OBJECT
+    while limit > 16 and np.minimum(np.diff(np.concatenate([start, [len(order)]])), limit).sum() > ELEMENTS_IN_ALL:
+        limit //= 2
+    return np.sort(order[rank < limit])
+
+
+class SampleCollector:
+    """Takes a frame's observations, keeps those of the chosen elements."""
+
+    def __init__(self, atlas: Atlas, frames: int, seed: int):
+        self._chosen = np.zeros(len(atlas), bool)
+        self._chosen[choose_elements(atlas, seed)] = True
+        self._keep = min(1.0, FRAMES_IN_FULL / max(frames, 1))
+        self._seed = seed
+        self._parts: list[Samples] = []
+
+    def add(self, frame: int, seen: Observations) -> None:
+        """Take what `frame` saw; observations at depth edges show something else and are left out."""
+        keep = self._chosen[seen.element] & ((seen.tier == CLEAN) | (seen.tier == SATURATED))
+        if self._keep < 1:
+            keep &= np.random.default_rng([self._seed, frame]).random(len(keep)) < self._keep
+        count = int(keep.sum())
+        self._parts.append(
+            Samples(
+                seen.element[keep],
+                np.full(count, frame, np.int32),
+                seen.radiance[keep],
+                seen.direction[keep],
+                seen.tier[keep] == SATURATED,
+            )  # fmt: skip
+        )
+
+    def result(self) -> Samples:
+        """All of it, ordered by element, then frame."""
+        names = ("element", "frame", "radiance", "direction", "saturated")
+        together = {name: np.concatenate([getattr(part, name) for part in self._parts]) for name in names}
+        order = np.lexsort((together["frame"], together["element"]))
+        return Samples(**{name: values[order] for name, values in together.items()})

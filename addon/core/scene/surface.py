@@ -1,0 +1,147 @@
+"""The surface stage: normals towards the cameras, the atlas's resolution, the surface elements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import BadInputError
+from .atlas import Atlas
+from .elements import Covered, make_atlas, triangle_geometry, uv_scale
+from .model import Camera, Mesh
+from .orientation import Sides, seen_sides
+from .rays import RayScene
+from .two_sides import with_backs
+
+EXPECTED_FILL = 0.55
+"""Share of the atlas that islands usually cover; only the unwrapping's margin depends on it."""
+SMALLEST, STEP = 64, 64
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The room's surface, ready for the stages.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The capture's, with windings turned so that normals face the cameras; then the second sides of the sheets that
+        these see both sides of (`Mesh.backs`).
+    atlas : Atlas
+    scene : RayScene
+    uv : (t, 3, 2) float32
+        The atlas coordinates in the corner order of the capture's own mesh; then those of the second sides, turned
+        alike.
+    texel_size : float
+        Edge of a surface element in metres.
+    noise : float
+        What was taken out of the capture's vertices: standard deviation along the normals, in metres.
+    """
+
+    mesh: Mesh
+    atlas: Atlas
+    scene: RayScene
+    uv: np.ndarray
+    texel_size: float
+    noise: float = 0.0
+
+    @property
+    def first_uv(self) -> np.ndarray:
+        """`uv` of the capture's own triangles. Where a mesh must stay as it is, its sheets show the side seen more."""
+        return self.uv[: len(self.uv) - len(self.backs)]
+
+    @property
+    def backs(self) -> np.ndarray:
+        """The triangles that have a second side, (s,) int32."""
+        return np.zeros(0, np.int32) if self.mesh.backs is None else self.mesh.backs
+
+
+def turned(corners: np.ndarray, sign: np.ndarray) -> np.ndarray:
+    """Per-corner data ((t, 3, ...)) with the winding turned where `sign` is negative."""
+    result = corners.copy()
+    result[sign < 0] = corners[sign < 0][:, [0, 2, 1]]
+    return result
+
+
+def oriented(mesh: Mesh, cameras: Sequence[Camera]) -> Sides:
+    """What the cameras see of each triangle."""
+    normal, _ = triangle_geometry(mesh)
+    return seen_sides(mesh, normal, RayScene(mesh.vertices, mesh.triangles), cameras)
+
+
+def _every(mesh: Mesh, sign: np.ndarray) -> np.ndarray:
+    """The signs of a mesh's first sides, and the same for its second ones."""
+    return sign if mesh.backs is None else np.concatenate([sign, sign[mesh.backs]])
+
+
+def facing(mesh: Mesh, sign: np.ndarray) -> Mesh:
+    """The mesh with its windings turned where `sign` is negative, second sides ((s,) `Mesh.backs`) like their first."""
+    sign = _every(mesh, sign)
+    uv = None if mesh.uv is None else turned(mesh.uv, sign)
+    return replace(mesh, triangles=turned(mesh.triangles, sign), uv=uv)
+
+
+def atlas_size(area: float, texel: float, largest: int) -> int:
+    """Edge of an atlas whose texels measure `texel` metres on `area` square metres, within bounds."""
+    wanted = np.sqrt(area / EXPECTED_FILL) / max(texel, 1e-12)
+    return int(np.clip(np.ceil(wanted / STEP) * STEP, SMALLEST, largest // STEP * STEP))
+
+
+def build_surface(
+    mesh: Mesh,
+    cameras: Sequence[Camera],
+    unwrap: Callable[[Mesh, int], np.ndarray],
+    texel_size: float = 0.0,
+    detail: float = 1.0,
+    largest: int = 4096,
+) -> Surface:
+    """Lay out the surface elements.
+
+    Parameters
+    ----------
+    unwrap : callable
+        Gives atlas coordinates ((t, 3, 2) float32 in [0, 1], no overlap) for a mesh and an atlas size in texels.
+    cameras : sequence of Camera
+        None: normals stay as the mesh has them, and `texel_size` has to be given.
+    texel_size : float
+        Edge of an element in metres; 0 takes it from the frames' footprint.
+    detail : float
+        Texels along one pixel of that footprint.
+    largest : int
+        Upper bound of the atlas's edge.
+
+    Raises
+    ------
+    BadInputError
+        No camera looks at the mesh.
+    """
+    sides = oriented(mesh, cameras)
+    if sides.footprint <= 0 and (cameras or not texel_size):
+        raise BadInputError(
+            "No camera of the capture looks at the mesh; check that transforms.json and mesh.ply share one frame."
+        )
+    mesh = with_backs(mesh, np.flatnonzero(sides.both))
+    _, area = triangle_geometry(mesh)
+    texel = texel_size or sides.footprint / detail
+    size = atlas_size(float(area.sum()), texel, largest)
+    uv = unwrap(mesh, size)
+    # The islands' true scale sets the size that makes a texel as large as wished.
+    scale = uv_scale(mesh, uv)
+    size = int(np.clip(np.ceil(1 / max(texel * scale, 1e-12) / STEP) * STEP, SMALLEST, largest // STEP * STEP))
+    return from_uv(mesh, sides.sign, uv, size)
+
+
+def from_uv(
+    mesh: Mesh, sign: np.ndarray, uv: np.ndarray, size: int, noise: float = 0.0, known: Covered | None = None
+) -> Surface:
+    """The surface for a known layout of a mesh `with_backs`, and the sign of each of its first sides.
+
+    `known`, if given, is what was found of the elements before.
+    """
+    towards = facing(mesh, sign)
+    atlas = make_atlas(towards, turned(uv, _every(mesh, sign)), size, known)
+    scale = uv_scale(mesh, uv)
+    scene = RayScene(towards.vertices, towards.triangles, towards.backs)
+    return Surface(towards, atlas, scene, uv, 1 / max(scale * size, 1e-12), noise)

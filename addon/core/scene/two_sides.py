@@ -1,0 +1,173 @@
+"""Sheets of which the frames see both sides: each triangle of theirs becomes two, one for either side.
+
+A lamp shade, a curtain or a sheet of paper is often one layer of triangles. Its two sides have light and colour of
+their own, so they need elements of their own. The second triangle is the first one turned over, in the same place: rays
+are traced against the first alone and credited to the side that they come from (`rays.RayScene`), so that no gap
+between the two has to be larger than some other distance. Renderers need one: `laid_apart`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from .elements import triangle_geometry
+from .model import Mesh
+from .weld import point_normals, welded
+
+LEAST_SHARE, LEAST_RAYS = 0.05, 4
+"""A sheet is given two sides if this share of the rays that met it, and so many, met the side that is seen less."""
+LESS_SHARE, MORE_RAYS = 0.025, 12
+"""Or this share, where they are so many: a floor lamp's shade had 17 of 590, and threw its inner side's light at the
+wall behind it. Bent tubes have 4 to 10 of some hundred at their ends, and second sides would halve what shows them."""
+LEAST_OF_OBJECT, LEAST_OF_ROOM = 0.1, 0.01
+"""Sheets that are less of their object's surface, and of the room's, are left as they are: single leaves of a plant,
+whose two sides are alike, only cost elements, and views that its other elements would be judged by."""
+GAP = 4e-5
+"""Between a sheet's two sides where it is rendered, as a share of the room's diagonal: 0.3 mm in a room of 7 m."""
+UPRIGHT = 0.3
+"""A triangle's corners go along the sheet's normals where these agree with its own at least by this cosine."""
+
+
+def other_way(corners: np.ndarray) -> np.ndarray:
+    """Per-corner data ((t, 3, ...)) with the winding turned."""
+    return corners[:, [0, 2, 1]]
+
+
+def two_sided(mesh: Mesh, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles of the sheets that are seen from both sides.
+
+    A sheet is what hangs together within an object, has a border, and has two sides at all. It is told as a whole:
+    of a shade, each triangle alone may be seen from one side only, these from within and those from without.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    rays : (2, t) int
+        How many rays of the frames met the front, by the winding, and the back of each triangle.
+
+    Returns
+    -------
+    both : (t,) bool
+    sign : (t,) float32
+        There +1 or -1, so that the windings turned by it agree all over the sheet and show the side that is seen more.
+    """
+    count = len(mesh.triangles)
+    points, faces, _ = welded(mesh)
+    corner = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    owner = np.tile(np.arange(count), 3)
+    low, high = np.sort(corner, 1).T
+    name = (mesh.object_id[owner].astype(np.int64) * len(points) + low) * len(points) + high
+    order = np.argsort(name, kind="stable")
+    begin = np.flatnonzero(np.r_[True, np.diff(name[order]) != 0])
+    met = np.diff(np.r_[begin, len(order)])
+    border = np.zeros(count, bool)
+    border[owner[order[begin[met == 1]]]] = True
+    one, two = order[begin[met == 2]], order[begin[met == 2] + 1]
+    # Either way round of each triangle is a node; neighbours run along their common edge in opposite directions.
+    alike = (corner[one, 0] != corner[two, 0]).astype(np.int64)
+    one, two = owner[one], owner[two]
+    rows, columns = np.r_[one, one + count], np.r_[two + count * (1 - alike), two + count * alike]
+    graph = sparse.coo_matrix((np.ones(len(rows), np.int8), (rows, columns)), (2 * count, 2 * count))
+    part = connected_components(graph, directed=False)[1]
+    up, down = part[:count], part[count:]
+    sheet = np.minimum(up, down)
+    ways = np.where(up == sheet, 1, -1)
+    front = np.bincount(sheet, np.where(ways > 0, rays[0], rays[1]), 2 * count)
+    back = np.bincount(sheet, np.where(ways > 0, rays[1], rays[0]), 2 * count)
+    bordered = np.bincount(sheet, border, 2 * count) > 0
+    one_surface = np.ones(2 * count, bool)
+    one_surface[sheet[up == down]] = False  # such as Moebius' strip
+    less, rays_on = np.minimum(front, back), front + back
+    seen = less >= np.maximum(LEAST_SHARE * rays_on, LEAST_RAYS)
+    seen |= less >= np.maximum(LESS_SHARE * rays_on, MORE_RAYS)
+    both = (seen & bordered & one_surface)[sheet]
+    return both, np.where(front >= back, 1, -1)[sheet] * ways.astype(np.float32)
+
+
+def worth_it(mesh: Mesh, both: np.ndarray) -> np.ndarray:
+    """Those of the triangles `both` that are a substantial part of their object or of the room, (t,) bool."""
+    _, area = triangle_geometry(mesh)
+    count = int(mesh.object_id.max()) + 1
+    own, sheets = (np.bincount(mesh.object_id, weight, count) for weight in (area, area * both))
+    large = (sheets >= LEAST_OF_OBJECT * own) | (sheets >= LEAST_OF_ROOM * area.sum())
+    return both & large[mesh.object_id]
+
+
+def with_backs(mesh: Mesh, which: np.ndarray) -> Mesh:
+    """The mesh with a second side for some of its triangles; itself for none.
+
+    Parameters
+    ----------
+    which : (s,) int
+        Sorted.
+
+    Returns
+    -------
+    Mesh
+        Its last s triangles are those of `which` turned over, on vertices of their own in the same places.
+    """
+    if not len(which):
+        return mesh
+    used, corners = np.unique(mesh.triangles[which], return_inverse=True)
+    backs = other_way(corners.reshape(-1, 3) + len(mesh.vertices)).astype(mesh.triangles.dtype)
+    return replace(
+        mesh,
+        vertices=np.concatenate([mesh.vertices, mesh.vertices[used]]),
+        triangles=np.concatenate([mesh.triangles, backs]),
+        object_id=np.concatenate([mesh.object_id, mesh.object_id[which]]),
+        uv=None if mesh.uv is None else np.concatenate([mesh.uv, other_way(mesh.uv[which])]),
+        backs=np.asarray(which, np.int32),
+    )
+
+
+def fronts(mesh: Mesh) -> tuple[Mesh, np.ndarray]:
+    """The mesh without second sides, and the triangle of it that each of the t triangles lies in, (t,) int."""
+    if mesh.backs is None:
+        return mesh, np.arange(len(mesh.triangles))
+    count = len(mesh.triangles) - len(mesh.backs)
+    uv = None if mesh.uv is None else mesh.uv[:count]
+    single = replace(mesh, triangles=mesh.triangles[:count], object_id=mesh.object_id[:count], uv=uv, backs=None)
+    return single, np.r_[np.arange(count), mesh.backs]
+
+
+def laid_apart(mesh: Mesh, vertices: np.ndarray) -> Mesh:
+    """The mesh with a gap between its sheets' two sides, as a renderer needs it.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        See `with_backs`.
+    vertices : (v, 3) float64
+        Where the vertices of its first sides are wanted.
+
+    Returns
+    -------
+    Mesh
+        First sides lie where they lay; each second one has three vertices of its own.
+    """
+    single, _ = fronts(mesh)
+    if mesh.backs is None:
+        return replace(mesh, vertices=vertices)
+    single = replace(single, vertices=vertices, triangles=single.triangles[mesh.backs], uv=None)
+    points, faces, _ = welded(single)
+    corners = points[faces]
+    own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    own /= np.maximum(np.linalg.norm(own, axis=1, keepdims=True), 1e-30)
+    way = point_normals(points, faces)[faces]
+    upright = (np.einsum("tkj,tj->tk", way, own) >= UPRIGHT).all(1)
+    way[~upright] = own[~upright, None]
+    low, high = vertices.min(0), vertices.max(0)
+    # Far from the origin float32, which renderers work in, is coarser than that.
+    coarse = float(np.spacing(np.float32(np.abs([low, high]).max())))
+    gap = max(GAP * float(np.linalg.norm(high - low)), 8 * coarse)
+    count = len(mesh.triangles) - len(mesh.backs)
+    backs = np.arange(len(vertices), len(vertices) + 3 * len(mesh.backs)).reshape(-1, 3)
+    return replace(
+        mesh,
+        vertices=np.concatenate([vertices, other_way(corners - gap * way).reshape(-1, 3)]),
+        triangles=np.concatenate([mesh.triangles[:count], backs]).astype(mesh.triangles.dtype),
+    )

@@ -1,1 +1,0 @@
-"""The room's surface: texel atlas, surface elements, and rays against it."""
