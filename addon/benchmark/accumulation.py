@@ -16,8 +16,9 @@ from ..core.io.pixels import read_pixels
 from ..core.io.read import read_capture
 from ..core.memory import peak_memory
 from ..core.parallel import ordered_map
-from ..core.passes.lit_diffuse.accumulate import LitDiffuse, accumulate
+from ..core.passes.lit_diffuse.accumulate import accumulate
 from ..core.scene.atlas import Atlas
+from ..core.scene.lit_diffuse import LitDiffuse
 from ..core.scene.model import Frame, Mesh, Pixels
 from ..core.scene.rays import RayScene
 from ..core.scene.surface import build_surface

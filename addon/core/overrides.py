@@ -17,9 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from .errors import BadInputError
-from .io.jsonfile import is_number
+from .json_values import is_number, key
 from .material import EMITTER, LAMBERTIAN, METAL, SPECULAR
-from .results.store import key
 
 OVERRIDES = "overrides.json"
 MODELS = (LAMBERTIAN, SPECULAR, METAL, EMITTER)

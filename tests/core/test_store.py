@@ -15,8 +15,9 @@ import pytest
 
 from addon.core.errors import BadInputError, StorageError
 from addon.core.io.exr import read_exr
+from addon.core.json_values import key
 from addon.core.results import store as module
-from addon.core.results.store import Store, key
+from addon.core.results.store import Store
 from addon.core.settings import PAPER, Settings
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..evidence.colours import photo
 from ..io.conventions import Convention
+from ..photo import photo
 from ..scene.elements import triangle_geometry
 from ..scene.model import Capture, Frame, Pixels
 from ..scene.rays import RayScene

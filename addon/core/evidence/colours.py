@@ -1,4 +1,4 @@
-"""Values as colours: radiance, albedo, and quantities as heat."""
+"""Colours of the page: quantities as heat, models."""
 
 from __future__ import annotations
 
@@ -19,18 +19,6 @@ MODEL = {
     TRANSPARENT: (120, 200, 190),
 }
 NOTHING = (40, 40, 46)
-
-
-def encoded(linear: np.ndarray) -> np.ndarray:
-    """Linear Rec.709 in 0...1 as sRGB bytes."""
-    x = np.clip(np.nan_to_num(linear), 0, 1)
-    curve = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(np.maximum(x, 1e-9), 1 / 2.4) - 0.055)
-    return (255 * curve + 0.5).astype(np.uint8)
-
-
-def photo(radiance: np.ndarray, middle: float) -> np.ndarray:
-    """Radiance as a photo whose grey lies at `middle`; bright light levels off instead of being cut."""
-    return encoded(1 - np.exp(-0.2 / max(middle, 1e-30) * np.maximum(np.nan_to_num(radiance), 0)))
 
 
 def heat(values: np.ndarray, top: float) -> np.ndarray:

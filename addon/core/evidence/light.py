@@ -14,9 +14,9 @@ from ..light.emitters import LUMINANCE
 from ..light.environment import Environment
 from ..light.field import LightField
 from ..light.over_surface import irradiance
-from ..passes.lit_diffuse.accumulate import LitDiffuse
-from ..pipeline.shading import Shading
+from ..light.shading import Shading
 from ..scene.atlas import Atlas
+from ..scene.lit_diffuse import LitDiffuse
 from ..scene.visibility import SATURATED
 from .calibration import CLIPPED_UNSURE, LAMP_UNSURE, ROUGH_LIGHT, SKY_UNSURE, SUN_UNSURE, SURFACES
 

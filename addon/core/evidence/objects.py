@@ -9,8 +9,8 @@ import numpy as np
 from ..groups import by_label
 from ..material import Z90
 from ..passes.albedo.albedo import MEASURED, Albedo
-from ..passes.lit_diffuse.accumulate import LitDiffuse
 from ..scene.atlas import Atlas
+from ..scene.lit_diffuse import LitDiffuse
 from .calibration import OF_OBJECT
 from .texel import TexelEvidence
 

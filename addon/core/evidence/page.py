@@ -10,7 +10,8 @@ import numpy as np
 from ..errors import BadInputError
 from ..io.png import data_address
 from ..material import EMITTER, METAL, SPECULAR, Z90, ObjectMaterial
-from .colours import MODEL, encoded, heat_css
+from ..photo import encoded
+from .colours import MODEL, heat_css
 from .objects import ObjectEvidence
 from .pictures import Picture, pictures_of
 from .style import STYLE

@@ -9,7 +9,8 @@ import numpy as np
 from scipy import ndimage
 
 from ..material import METAL
-from .colours import NOTHING, encoded, gloss, heat, photo
+from ..photo import encoded, photo
+from .colours import NOTHING, gloss, heat
 from .views import View
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from scipy import ndimage
 from ..groups import by_label
 from ..material import EMITTER, SPECULAR, ObjectMaterial
 from ..passes.albedo.albedo import MEASURED, Albedo
-from ..passes.lit_diffuse.accumulate import LitDiffuse
 from ..scene.atlas import Atlas
+from ..scene.lit_diffuse import LitDiffuse
 from ..scene.visibility import EDGE
 from . import calibration as c
 from .light import LightEvidence

@@ -1,9 +1,8 @@
-"""JSON as captures bring it: read with care, and asked for numbers with care."""
+"""JSON as captures bring it, read with care."""
 
 from __future__ import annotations
 
 import json
-import math
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +23,3 @@ def read_json(path: Path) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise BadInputError(f"'{path}' holds no JSON object; export it again.")
     return value
-
-
-def is_number(value: Any) -> bool:
-    """Whether `value` is a finite number (true and false are none)."""
-    return (
-        isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300 and math.isfinite(value)
-    )

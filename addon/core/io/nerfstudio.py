@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError
+from ..json_values import is_number
 from ..scene.model import Frame
 from ..scene.pose import check_pose
 from . import instances
 from .conventions import AS_READ
-from .jsonfile import is_number, read_json
+from .jsonfile import read_json
 from .layout import Layout, RawMesh, Reader, Reading
 from .meshes import MESH, find_mesh, read_mesh
 from .nerfstudio_camera import check_model, lens_notes, positive, read_camera

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError
+from ..json_values import is_number
 from ..scene.lens import Lens
 from ..scene.lenses import Cropped, Equirectangular
 from ..scene.lenses_colmap import polynomial
 from ..scene.lenses_told import lens_of
 from ..scene.model import Camera
-from .jsonfile import is_number
 from .pictures import picture_size
 
 PERSPECTIVE = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV")

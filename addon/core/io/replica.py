@@ -15,10 +15,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import BadInputError
+from ..json_values import is_number
 from ..scene.model import LitTiles
 from . import nerfstudio, traj
 from .instances import FILE, read_instances
-from .jsonfile import is_number, read_json
+from .jsonfile import read_json
 from .layout import Layout, RawMesh, Reader, Reading
 from .ply import PlyMesh, read_ply
 from .ptex import read_sorted_faces, split_faces

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError
+from ..json_values import is_number
 from ..scene.model import Frame
 from . import colmap
 from .colmap_model import model_files, read_model
 from .instances import MAX_ID
-from .jsonfile import is_number, read_json
+from .jsonfile import read_json
 from .layout import Layout, RawMesh, Reader, Reading
 from .meshes import read_mesh
 

@@ -14,10 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
+from ..json_values import is_number
 from ..scene.model import Camera, Frame
 from ..scene.pose import check_pose
 from . import instances
-from .jsonfile import is_number, read_json
+from .jsonfile import read_json
 from .layout import Layout, RawMesh, Reader, Reading
 from .meshes import IMPORTED, find_mesh, read_mesh
 from .pictures import ENDINGS

@@ -14,10 +14,11 @@ from ..errors import BadInputError
 from ..light.environment import Environment, EnvironmentAccumulator
 from ..light.field import LightField
 from ..passes.clipped_lamps.fringes import FringeCollector, Fringes
-from ..passes.lit_diffuse.accumulate import LitDiffuse, accumulate
+from ..passes.lit_diffuse.accumulate import accumulate
 from ..passes.pose_refinement.poses import Poses, Texture, refine_poses
 from ..passes.sharpening.sharpen import sharpened
 from ..progress import Progress, Rounds
+from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Frame, Pixels
 from ..scene.samples import SampleCollector, Samples
 from ..scene.surface import Surface

@@ -13,15 +13,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..json_values import key
 from ..material import EMITTER, METAL
 from ..parallel import ordered_map
 from ..passes.albedo.albedo import MEASURED
-from ..passes.lit_diffuse.accumulate import ENOUGH, LitDiffuse, accumulate
+from ..passes.lit_diffuse.accumulate import accumulate
 from ..passes.sharpening.sharpen import FLOOR, MOST, sharpened
 from ..progress import Rounds
-from ..results.store import key
 from ..scene.atlas import Atlas
 from ..scene.elements import ElementLookup, make_atlas
+from ..scene.lit_diffuse import ENOUGH, LitDiffuse
 from ..scene.model import Camera, Mesh
 from ..scene.pages import OBJECT, Pages, lay_out
 from ..scene.surface import Surface

@@ -18,9 +18,11 @@ from ..evidence.page import make_page
 from ..io.fingerprint import fingerprint
 from ..io.pixels import read_pixels
 from ..io.read import MAX_BAD_SHARE
+from ..json_values import key
 from ..light.environment import Environment
 from ..light.field import LightField
 from ..light.mirrors import Mirror, in_their_planes, known_mirror
+from ..light.shading import Shading
 from ..memory import peak_memory
 from ..overrides import NONE as NO_OVERRIDES
 from ..overrides import Overrides
@@ -28,13 +30,13 @@ from ..parallel import ordered_map
 from ..passes.albedo.albedo import Albedo, albedo_of
 from ..passes.clipped_lamps.clipped import shade_clipped
 from ..passes.clipped_lamps.fringes import Fringes
-from ..passes.lit_diffuse.accumulate import LitDiffuse
 from ..passes.lit_diffuse.from_texture import face_edge, lit_from_tiles
 from ..passes.mesh_denoising.denoise import without_noise
 from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.pose_refinement.poses import Poses
 from ..progress import Progress
-from ..results.store import Store, key
+from ..results.store import Store
+from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Capture, Frame, Mesh, Pixels
 from ..scene.recentre import near_origin
 from ..scene.samples import Samples
@@ -45,7 +47,7 @@ from .corrected import Corrected
 from .frames import all_passes
 from .parts import LOOKED, Parting, Parts, look_closer, remove_parts, write_parts
 from .report import make_report
-from .shading import Shading, shade
+from .shading import shade
 from .shading_store import from_store, to_store
 from .specular import Held, Specular, fit_specular
 

@@ -23,12 +23,13 @@ from ..evidence.light import LightEvidence
 from ..evidence.objects import object_evidence
 from ..evidence.texel import TexelEvidence, gloss_error
 from ..io.exr import read_exr
+from ..json_values import key
 from ..material import EMITTER, ObjectMaterial
 from ..overrides import Given, Overrides, heeded, parse
 from ..passes.albedo.albedo import MEASURED, Albedo
 from ..progress import Progress
 from ..results.room_file import MATERIALS, Room, read_room
-from ..results.store import Store, key
+from ..results.store import Store
 from ..settings import ROOM, Settings
 from .parts import STAGE as DETAIL
 from .parts import stored_key as detail_key

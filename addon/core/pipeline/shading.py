@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,63 +12,20 @@ from ..light.field import LightField
 from ..light.lamps import Lamp
 from ..light.mirrors import Mirror
 from ..light.over_surface import finest_spacing, irradiance
-from ..light.sun import Sun, taken_out
+from ..light.shading import Shading
+from ..light.sun import taken_out
 from ..passes.albedo.albedo import MAX_ALBEDO, fill, quotient
-from ..passes.lit_diffuse.accumulate import ENOUGH, LitDiffuse
 from ..passes.unseen_light.shades import BOUNCES, strongly_lit
 from ..progress import Progress
 from ..scene.atlas import Atlas
 from ..scene.creases import crease_doubt
+from ..scene.lit_diffuse import ENOUGH, LitDiffuse
 from ..scene.mesh_noise import tilt
 from ..scene.model import Instance, Mesh
 from ..scene.rays import RayScene
 from ..scene.two_sides import fronts
 from ..scene.visibility import CLEAN, SATURATED
 from .find_light import find_all_light
-
-
-@dataclass(frozen=True)
-class Shading:
-    """What the shading stage finds, for n elements.
-
-    Attributes
-    ----------
-    irradiance : (n, 3) float32
-        E, radiance * steradian.
-    escaped : (n,) float32
-        Share of the hemisphere's rays that left the mesh.
-    doubt : (n,) float32
-        Relative error of `irradiance` by interpolation and by the mesh's noise.
-    radiance : (n, 3) float32
-        L_d with everything filled in: what the light field shows at each element. Lamps have their own radiance.
-    lamps : tuple of Lamp
-    environment : Environment
-        With the unseen sky solved for where it could be, without the sun.
-    notes : tuple of str
-        What was solved for, one sentence each.
-    mirrors : tuple of Mirror
-        Flat mirrors that light was followed over.
-    points : int
-        Places at which the hemisphere was gathered.
-    sun : Sun or None
-        Its part is in `irradiance`.
-    """
-
-    irradiance: np.ndarray
-    escaped: np.ndarray
-    doubt: np.ndarray
-    radiance: np.ndarray
-    lamps: tuple[Lamp, ...]
-    environment: Environment
-    notes: tuple[str, ...]
-    mirrors: tuple[Mirror, ...]
-    points: int
-    sun: Sun | None = None
-
-    @property
-    def emitters(self) -> set[int]:
-        """The lamps' objects."""
-        return {lamp.object_id for lamp in self.lamps}
 
 
 def fill_unseen(radiance: np.ndarray, seen: np.ndarray) -> np.ndarray:

@@ -10,8 +10,8 @@ import numpy as np
 from ..light.environment import Environment
 from ..light.lamps import Lamp
 from ..light.mirrors import Mirror
+from ..light.shading import Shading
 from ..light.sun import Sun
-from .shading import Shading
 
 
 def to_store(found: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:

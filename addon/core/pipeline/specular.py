@@ -15,7 +15,6 @@ from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, Object
 from ..overrides import NOTHING, Given
 from ..parallel import ordered_map
 from ..passes.glossy_light.glossy_light import Excess, glossy_light
-from ..passes.lit_diffuse.accumulate import LitDiffuse
 from ..passes.see_through.see_through import judge, look_behind
 from ..passes.specular.by_looks import coated_by_looks, metal_by_looks
 from ..passes.specular.describe import as_given, described, flat_mirror, lamp_material
@@ -29,6 +28,7 @@ from ..passes.specular.problems import Problems
 from ..passes.specular.separate import specular_in_median, spread_over_object
 from ..passes.specular.targets import score_frames, target_frame
 from ..progress import Progress
+from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance
 from ..scene.samples import Samples
 

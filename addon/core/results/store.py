@@ -7,11 +7,8 @@ its own stage and all later ones anew, and nothing else.
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import errno
-import hashlib
 import json
-import math
 import os
 import re
 import shutil
@@ -25,6 +22,7 @@ import numpy as np
 
 from ..atomic import TEMPORARY, replacing, write_bytes
 from ..errors import BadInputError, StorageError
+from ..json_values import plain
 
 STAGES = "stages"
 SPILLED = "tmp-observations-"
@@ -149,7 +147,7 @@ class Store:
         ValueError
             An array holds Python objects.
         """
-        content = json.dumps({"key": key, "meta": _plain(meta or {})}).encode()
+        content = json.dumps({"key": key, "meta": plain(meta or {})}).encode()
         arrays = {META: np.frombuffer(content, np.uint8), **arrays}
         if any(np.asarray(array).dtype.hasobject for array in arrays.values()):
             raise ValueError(f"stage '{name}' holds an array of objects")
@@ -170,7 +168,7 @@ class Store:
     def write_json(self, name: str, value: Any) -> Path:
         """Write the result `name`; NaN and inf, which JSON lacks, become null. Raises `StorageError`."""
         path = self._parent(name)
-        write_bytes(path, json.dumps(_plain(value), indent=1, ensure_ascii=False).encode() + b"\n")
+        write_bytes(path, json.dumps(plain(value), indent=1, ensure_ascii=False).encode() + b"\n")
         return path
 
     def write_exr(self, name: str, array: np.ndarray, half: bool = False) -> Path:
@@ -195,35 +193,6 @@ class Store:
         if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
             raise ValueError(f"'{name}' is no name for a stage")
         return self.folder / STAGES / f"{name}.npz"
-
-
-def key(*parts: Any) -> str:
-    """A stage's key: a hash of the key of the stage before it and of the settings that it heeds.
-
-    Parts may be anything that JSON holds, frozen values (dataclasses), paths, and small arrays.
-    """
-    return hashlib.sha256(json.dumps(_plain(list(parts)), sort_keys=True).encode()).hexdigest()
-
-
-def _plain(value: Any) -> Any:
-    """`value` in what JSON knows."""
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
-    if isinstance(value, (np.ndarray, np.generic)):
-        value = value.tolist()
-    if isinstance(value, dict):
-        return {str(name): _plain(one) for name, one in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(one) for one in value]
-    if isinstance(value, (set, frozenset)):
-        return sorted(_plain(one) for one in value)
-    if isinstance(value, PurePath):
-        return value.as_posix()
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    if value is None or isinstance(value, (bool, int, float, str)):
-        return value
-    raise TypeError(f"{type(value).__name__} is nothing that can be stored")
 
 
 def _read_meta(path: Path) -> dict[str, Any] | None:

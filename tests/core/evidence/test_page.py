@@ -8,12 +8,13 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from addon.core.evidence.colours import HEAT, encoded, heat, photo
+from addon.core.evidence.colours import HEAT, heat
 from addon.core.evidence.pictures import BLOCK, worst_blocks
 from addon.core.io.oiio import read_coded
 from addon.core.io.png import png
 from addon.core.passes.specular.intervals import UNKNOWN, gloss_interval
 from addon.core.passes.specular.models import Choice, choose_model
+from addon.core.photo import encoded, photo
 from tests.core.glossy_box import Box
 from tests.core.rooms import pixels_of
 

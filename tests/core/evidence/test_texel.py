@@ -14,7 +14,7 @@ from addon.core.evidence.texel import contrast, texel_evidence, without_light
 from addon.core.light.lamps import Lamp
 from addon.core.material import EMITTER, LAMBERTIAN, Z90, ObjectMaterial
 from addon.core.passes.albedo.albedo import FILLED, MEASURED, Albedo
-from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
+from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.visibility import CLEAN, EDGE
 from tests.core.rooms import DARK, box_sides, lit_box, make_room, radiosity
 

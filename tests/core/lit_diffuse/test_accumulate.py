@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from addon.core.errors import BadInputError, InterruptedRun
-from addon.core.passes.lit_diffuse.accumulate import LitDiffuse, _choose, accumulate, frame_order
+from addon.core.passes.lit_diffuse.accumulate import _choose, accumulate, frame_order
 from addon.core.passes.lit_diffuse.medians import Summary
 from addon.core.progress import Progress
+from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.model import Frame
 from addon.core.scene.visibility import CLEAN, EDGE, SATURATED
 from tests.core.rooms import all_round, box_sides, look_at, make_room, picture, pixels_of, quad

@@ -9,8 +9,8 @@ from scipy.spatial import cKDTree
 from addon.core.light.emitters import LUMINANCE, bright_triangles
 from addon.core.light.lamps import find_seen
 from addon.core.light.mirrors import Mirror
-from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
 from addon.core.pipeline.shading import shade
+from addon.core.scene.lit_diffuse import LitDiffuse
 from tests.core.rooms import DARK, Quad, albedo_in, around, box_sides, cut, lit_box, make_room, quad, radiosity, split
 
 ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}

@@ -8,7 +8,7 @@ import pytest
 from addon.core.passes.albedo import neighbourhood
 from addon.core.passes.albedo.albedo import FILLED, MEASURED, fill
 from addon.core.passes.albedo.neighbourhood import EDGE_DOUBT, FEW, LEAST_DOUBT, SURE, doubt, steadied
-from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
+from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.visibility import CLEAN, EDGE, SATURATED
 from tests.core.rooms import make_room, quad
 

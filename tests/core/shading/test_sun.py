@@ -8,8 +8,8 @@ import pytest
 from addon.core.light.emitters import LUMINANCE
 from addon.core.light.environment import Environment
 from addon.core.light.sun import RADIUS, Sun, put_in, sunlight, taken_out
-from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
 from addon.core.pipeline.shading import shade
+from addon.core.scene.lit_diffuse import LitDiffuse
 from tests.core import sunny
 from tests.core.rooms import albedo_in, make_room, quad
 

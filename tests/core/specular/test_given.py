@@ -8,10 +8,10 @@ import pytest
 from addon.core.light.lamps import Lamp
 from addon.core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR
 from addon.core.overrides import Given
-from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
 from addon.core.passes.specular.given import fit_given
 from addon.core.passes.specular.problems import Problems
 from addon.core.pipeline.specular import Held, fit_specular
+from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.samples import Samples
 from addon.core.scene.visibility import CLEAN
 from tests.core.glossy_box import GLOW, Box

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from addon.core.light.lobes import GRID, LobeLight
-from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
 from addon.core.passes.specular import problems
 from addon.core.passes.specular.problems import AGAIN, Problems
+from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.samples import Samples
 from addon.core.scene.visibility import CLEAN
 from tests.core.rooms import box_sides, make_room

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from addon.core.material import TRANSPARENT
-from addon.core.passes.lit_diffuse.accumulate import LitDiffuse
 from addon.core.passes.see_through.see_through import look_behind
 from addon.core.pipeline import specular as reflect
 from addon.core.pipeline.specular import fit_specular
+from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.samples import Samples
 from addon.core.scene.visibility import CLEAN
 from tests.core.rooms import box_sides, make_room, quad

@@ -8,8 +8,8 @@ import numpy as np
 
 from ...groups import by_label
 from ...scene.atlas import Atlas
+from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Instance
-from ..lit_diffuse.accumulate import LitDiffuse
 from .neighbourhood import doubt, steadied
 
 FLOOR = 1e-3

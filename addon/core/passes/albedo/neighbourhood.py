@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 from ...groups import by_label
 from ...parallel import for_blocks
 from ...scene.atlas import Atlas
+from ...scene.lit_diffuse import LitDiffuse
 from ...scene.visibility import CLEAN, SATURATED
-from ..lit_diffuse.accumulate import LitDiffuse
 from .minority import Surroundings, drawn_to_minority
 
 NEIGHBOURS = 128

@@ -14,8 +14,8 @@ import numpy as np
 from ...light.emitters import LUMINANCE
 from ...light.lamps import Lamp
 from ...scene.atlas import Atlas
+from ...scene.lit_diffuse import LitDiffuse
 from ...scene.visibility import SATURATED
-from ..lit_diffuse.accumulate import LitDiffuse
 
 MOSTLY = 0.5
 """Share of an object's seen area from which on it counts as clipped."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,44 +13,11 @@ from ...progress import Progress
 from ...scene.atlas import Atlas
 from ...scene.element_groups import ElementGroups
 from ...scene.elements import triangle_geometry
+from ...scene.lit_diffuse import ENOUGH, LitDiffuse
 from ...scene.model import Frame, Mesh, Pixels
 from ...scene.rays import RayScene
 from ...scene.visibility import CLEAN, EDGE, SATURATED, FrameView, Observations, observe, view_frame
 from .medians import Summary, make_estimator
-
-ENOUGH = 3
-"""Clean observations from which on an element does without those at edges."""
-
-
-@dataclass(frozen=True)
-class LitDiffuse:
-    """L_d and its evidence for n elements.
-
-    Attributes
-    ----------
-    radiance : (n, 3) float32
-        L_d, linear Rec.709; NaN where no frame saw the element.
-    lower, upper : (n, 3) float32
-        Quartiles of the observations.
-    count : (n,) int32
-        Observations that `radiance` rests on.
-    tier : (n,) int8
-        CLEAN, EDGE or SATURATED: the kind of observations it rests on; -1 where there is none.
-    clipped : (n,) float32
-        Share of all observations, those that `radiance` does not rest on included, that the sensor clipped.
-    """
-
-    radiance: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-    count: np.ndarray
-    tier: np.ndarray
-    clipped: np.ndarray
-
-    @property
-    def seen(self) -> np.ndarray:
-        """(n,) bool"""
-        return self.count > 0
 
 
 def frame_order(count: int, name: str, seed: int) -> np.ndarray:

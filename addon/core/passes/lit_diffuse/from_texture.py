@@ -10,9 +10,9 @@ from ...parallel import blocks
 from ...progress import Progress
 from ...scene.atlas import Atlas
 from ...scene.elements import triangle_geometry
+from ...scene.lit_diffuse import ENOUGH, LitDiffuse
 from ...scene.model import LitTiles, Mesh
 from ...scene.visibility import CLEAN, SATURATED
-from .accumulate import ENOUGH, LitDiffuse
 
 TEXELS_AT_ONCE = 1 << 22
 """Texels of the tiles that are looked at together; 160 bytes each."""

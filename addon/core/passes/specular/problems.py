@@ -7,8 +7,8 @@ import numpy as np
 from ...light.emitters import bright_triangles
 from ...light.field import LightField
 from ...light.lobes import LobeLight, reflected_light
+from ...scene.lit_diffuse import LitDiffuse
 from ...scene.samples import Samples
-from ..lit_diffuse.accumulate import LitDiffuse
 from .layout import Problem
 from .one_colour import BROADEST_PHI, DIELECTRIC_PSI
 

@@ -1,0 +1,48 @@
+"""Values in what JSON knows, and a digest of them."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+
+
+def key(*parts: Any) -> str:
+    """A stage's key: a hash of the key of the stage before it and of the settings that it heeds.
+
+    Parts may be anything that JSON holds, frozen values (dataclasses), paths, and small arrays.
+    """
+    return hashlib.sha256(json.dumps(plain(list(parts)), sort_keys=True).encode()).hexdigest()
+
+
+def plain(value: Any) -> Any:
+    """`value` in what JSON knows."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(name): plain(one) for name, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(one) for one in value]
+    if isinstance(value, (set, frozenset)):
+        return sorted(plain(one) for one in value)
+    if isinstance(value, PurePath):
+        return value.as_posix()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    raise TypeError(f"{type(value).__name__} is nothing that can be stored")
+
+
+def is_number(value: Any) -> bool:
+    """Whether `value` is a finite number (true and false are none)."""
+    return (
+        isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300 and math.isfinite(value)
+    )

@@ -1,0 +1,17 @@
+"""Radiance and reflectance as pictures that a screen shows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def encoded(linear: np.ndarray) -> np.ndarray:
+    """Linear Rec.709 in 0...1 as sRGB bytes."""
+    x = np.clip(np.nan_to_num(linear), 0, 1)
+    curve = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(np.maximum(x, 1e-9), 1 / 2.4) - 0.055)
+    return (255 * curve + 0.5).astype(np.uint8)
+
+
+def photo(radiance: np.ndarray, middle: float) -> np.ndarray:
+    """Radiance as a photo whose grey lies at `middle`; bright light levels off instead of being cut."""
+    return encoded(1 - np.exp(-0.2 / max(middle, 1e-30) * np.maximum(np.nan_to_num(radiance), 0)))

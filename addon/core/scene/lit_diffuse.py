@@ -1,0 +1,41 @@
+"""The lit diffuse texture L_d: what the frames show of every element, and how much it rests on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+ENOUGH = 3
+"""Clean observations from which on an element does without those at edges."""
+
+
+@dataclass(frozen=True)
+class LitDiffuse:
+    """L_d and its evidence for n elements.
+
+    Attributes
+    ----------
+    radiance : (n, 3) float32
+        L_d, linear Rec.709; NaN where no frame saw the element.
+    lower, upper : (n, 3) float32
+        Quartiles of the observations.
+    count : (n,) int32
+        Observations that `radiance` rests on.
+    tier : (n,) int8
+        CLEAN, EDGE or SATURATED: the kind of observations it rests on; -1 where there is none.
+    clipped : (n,) float32
+        Share of all observations, those that `radiance` does not rest on included, that the sensor clipped.
+    """
+
+    radiance: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    count: np.ndarray
+    tier: np.ndarray
+    clipped: np.ndarray
+
+    @property
+    def seen(self) -> np.ndarray:
+        """(n,) bool"""
+        return self.count > 0
