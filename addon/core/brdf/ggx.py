@@ -1,43 +1,15 @@
-"""The seed's microfacet model, f_nd = G D F (Haefner et al. 2021, eq. 6 to 9).
+"""Sampling of the published lobe (`paper.brdf`), and its value for many widths at once.
 
-phi is GGX's alpha (Blender's Roughness is its square root), psi the reflectance at normal incidence. All arguments are
-cosines, arrays of one shape. Reflected radiance is linear in psi:
-
-    I_nd(phi, psi) = psi * A(phi) + B(phi),   A = sum L G D (1 - s) <n,w>,   B = sum L G D s <n,w>,   s = (1 - w.h)^5
+phi is GGX's alpha (Blender's Roughness is its square root). All arguments are cosines, arrays of one shape.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from ..paper.brdf import G1, D, F, G, f_nd
 
-def G1(x: np.ndarray, y: float) -> np.ndarray:
-    """Smith's masking for GGX with 1 / (2 x) already in it: 1 / (x + sqrt(x^2 + y^2 - x^2 y^2)), y = phi."""
-    return 1 / (x + np.sqrt(y * y + (1 - y * y) * (x * x)))
-
-
-def G(n_w: np.ndarray, n_wo: np.ndarray, phi: float) -> np.ndarray:
-    """Masking and shadowing over 4 (n.w) (n.wo), 1 / steradian-free: G1(n.w) G1(n.wo)."""
-    return G1(n_w, phi) * G1(n_wo, phi)
-
-
-def D(n_h: np.ndarray, phi: float) -> np.ndarray:
-    """GGX's distribution of normals, per steradian: phi^2 / (pi (1 + (phi^2 - 1) (n.h)^2)^2)."""
-    a = np.float32(phi * phi)
-    # 1 - (n.h)^2 is formed first: at phi = 0.01 the sum above would lose all its digits in float32.
-    square = n_h * n_h
-    base = (1 - n_h) * (1 + n_h) + a * square
-    return a / (np.float32(np.pi) * base * base)
-
-
-def F(w_h: np.ndarray, psi: float) -> np.ndarray:
-    """Schlick's Fresnel term: psi + (1 - psi) (1 - w.h)^5."""
-    return psi + (1 - psi) * (1 - w_h) ** 5
-
-
-def f_nd(n_w: np.ndarray, n_wo: np.ndarray, n_h: np.ndarray, w_h: np.ndarray, phi: float, psi: float) -> np.ndarray:
-    """The non-diffuse BRDF, 1 / steradian."""
-    return G(n_w, n_wo, phi) * D(n_h, phi) * F(w_h, psi)
+__all__ = ["D", "F", "G", "G1", "f_nd", "lobes", "sample_visible_normal", "visible_normal_density"]
 
 
 def visible_normal_density(n_wo: np.ndarray, n_h: np.ndarray, phi: float) -> np.ndarray:
