@@ -1,6 +1,10 @@
-"""Build the installable zip of each platform from the locked wheels, with Blender's own extension builder.
+"""Build the installable zips, one for each platform and Python, with Blender's own extension builder.
 
-    .venv/bin/python scripts/build_extension.py [--platform linux-x64 ...] [--python 3.11 ...] [--out dist]
+    .venv/bin/python scripts/build_extension.py [--platform linux-x64 ...] [--python 3.11 ...] [--together] [--out dist]
+
+The names of its wheels tell Blender which Python a zip is for: Blender refuses the others, and one repository may offer
+them all under one id (`blender --command extension server-generate` takes them as they are). `--together` puts the
+wheels of all Pythons into one zip for each platform, for places that take one archive for a platform.
 
 Fetches into wheels/ exactly the wheels that blender_manifest.toml lists and requirements/ pins by hash; a wheel that
 is there already is checked, not fetched again.
@@ -44,45 +48,41 @@ WHEEL_PLATFORMS = {
 def main() -> int:
     """Fetch, stage, build."""
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    pythons = sorted({python_of(wheel) for wheel in manifest["wheels"]})
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--platform", action="append", choices=manifest["platforms"], help="default: all")
-    parser.add_argument("--python", action="append", metavar="X.Y", help="default: all that have wheels")
+    parser.add_argument("--python", action="append", choices=pythons, help="default: all")
+    parser.add_argument("--together", action="store_true", help="one zip for all these Pythons")
     parser.add_argument("--out", type=Path, default=ROOT / "dist")
     arguments = parser.parse_args()
-    platforms = arguments.platform or manifest["platforms"]
     builder = blender_ext()
     hashes = locked_hashes({Path(wheel).name.split("-")[0].lower() for wheel in manifest["wheels"]})
-    tags = {f"cp{version.replace('.', '')}" for version in arguments.python or ()}
-    wanted = {
-        platform: [
-            Path(wheel).name
-            for wheel in manifest["wheels"]
-            if re.search(WHEEL_PLATFORMS[platform] + r"\.whl$", wheel) and (not tags or wheel.split("-")[2] in tags)
-        ]
-        for platform in platforms
-    }
-    for platform, names in wanted.items():
-        fetch(platform, names, hashes)
     arguments.out.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as scratch:
-        stage(Path(scratch), platforms, {name for names in wanted.values() for name in names})
-        subprocess.run(
-            [
-                sys.executable,
-                builder,
-                "build",
-                "--split-platforms",
-                "--source-dir",
-                scratch,
-                "--output-dir",
-                arguments.out.resolve(),
-            ],
-            check=True,
-        )
-    for platform in platforms:
-        made = arguments.out / f"{manifest['id']}-{manifest['version']}-{platform.replace('-', '_')}.zip"
-        print(f"{made}  {made.stat().st_size / 1e6:.1f} MB")
+    chosen = sorted(set(arguments.python or pythons))
+    for platform in arguments.platform or manifest["platforms"]:
+        for versions in [chosen] if arguments.together else [[version] for version in chosen]:
+            wheels = [
+                Path(wheel).name
+                for wheel in manifest["wheels"]
+                if re.search(WHEEL_PLATFORMS[platform] + r"\.whl$", wheel) and python_of(wheel) in versions
+            ]
+            fetch(platform, wheels, hashes)
+            name = f"{manifest['id']}-{manifest['version']}-{platform.replace('-', '_')}"
+            if not arguments.together:
+                name += f"-py{versions[0].replace('.', '')}"
+            made = arguments.out / f"{name}.zip"
+            with tempfile.TemporaryDirectory() as scratch:
+                stage(Path(scratch), platform, set(wheels))
+                command = [sys.executable, builder, "build", "--source-dir", scratch]
+                subprocess.run([*command, "--output-filepath", made.resolve()], check=True)
+            print(f"{made}  {made.stat().st_size / 1e6:.1f} MB")
     return 0
+
+
+def python_of(wheel: str) -> str:
+    """Python that a wheel of the manifest is for, such as "3.11"."""
+    tag = Path(wheel).name.split("-")[2]
+    return f"{tag[2]}.{tag[3:]}"
 
 
 def blender_ext() -> Path:
@@ -115,7 +115,7 @@ def fetch(platform: str, names: list[str], hashes: dict[str, tuple[str, set[str]
     """Have every wheel of `names` in wheels/, with an allowed hash."""
     WHEELS.mkdir(exist_ok=True)
     for name in names:
-        package, _, tag = name.split("-")[:3]
+        package = name.split("-")[0]
         requirement, allowed = hashes[package]
         wheel = WHEELS / name
         if not (wheel.is_file() and sha256(wheel) in allowed):
@@ -140,7 +140,7 @@ def fetch(platform: str, names: list[str], hashes: dict[str, tuple[str, set[str]
                         "--platform",
                         PIP_PLATFORMS[platform],
                         "--python-version",
-                        f"{tag[2]}.{tag[3:]}",
+                        python_of(name),
                         "-r",
                         Path(scratch) / "wheel.txt",
                     ],
@@ -156,8 +156,8 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def stage(folder: Path, platforms: list[str], wheels: set[str]) -> None:
-    """Put what belongs into the zips into `folder`, with a manifest that names only `platforms` and `wheels`."""
+def stage(folder: Path, platform: str, wheels: set[str]) -> None:
+    """Put what belongs into the zip into `folder`, with a manifest that names only `platform` and `wheels`."""
     leave = shutil.ignore_patterns("__pycache__", "*.pyc", ".*")
     for name in CONTENT:
         source = ROOT / name
@@ -174,8 +174,7 @@ def stage(folder: Path, platforms: list[str], wheels: set[str]) -> None:
             shutil.copy2(WHEELS / name, folder / "wheels" / name)
     text = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if ".whl" not in line or line.strip(' ",').split("/")[-1] in wheels]
-    listed = ", ".join(f'"{platform}"' for platform in platforms)
-    text = re.sub(r"^platforms = .*$", f"platforms = [{listed}]", "\n".join(lines), flags=re.MULTILINE)
+    text = re.sub(r"^platforms = .*$", f'platforms = ["{platform}"]', "\n".join(lines), flags=re.MULTILINE)
     (folder / "blender_manifest.toml").write_text(text + "\n", encoding="utf-8")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import subprocess
@@ -58,31 +59,53 @@ addon_utils.enable(name)
 assert hasattr(bpy.types, "SCAN_RELIGHT_OT_recover")
 print("INSTALLED AND RUN")
 """
+REFUSED = """
+import sys
+import bpy
+try:
+    bpy.ops.extensions.package_install_files(filepath=sys.argv[-1], repo="user_default", enable_on_install=True)
+except RuntimeError as error:
+    print("REFUSED:", error)
+"""
+
+
+PYTHON = f"{sys.version_info[0]}.{sys.version_info[1]}"
 
 
 @pytest.fixture(scope="module")
-def archive(root, tmp_path_factory) -> Path:
-    """The zip for this machine: the one that SCAN_RELIGHT_ZIP names, or a fresh one with this Python's wheels."""
-    if given := os.environ.get("SCAN_RELIGHT_ZIP"):
+def dist(root, tmp_path_factory) -> Path:
+    """Where the zips lie: the folder that SCAN_RELIGHT_DIST names, or a fresh one with the zip of this Python."""
+    if given := os.environ.get("SCAN_RELIGHT_DIST"):
         return Path(given).resolve()
     key = platform.system(), platform.machine()
     if key not in PLATFORMS:
         pytest.skip(f"no wheels for {' '.join(key)}")
     out = tmp_path_factory.mktemp("dist")
-    subprocess.run(
-        [
-            sys.executable,
-            root / "scripts" / "build_extension.py",
-            "--platform",
-            PLATFORMS[key],
-            "--python",
-            f"{sys.version_info[0]}.{sys.version_info[1]}",
-            "--out",
-            out,
-        ],
-        check=True,
-    )
-    return next(out.glob("*.zip"))
+    command = [sys.executable, root / "scripts" / "build_extension.py", "--platform", PLATFORMS[key]]
+    subprocess.run([*command, "--python", PYTHON, "--out", out], check=True)
+    return out
+
+
+@pytest.fixture(scope="module")
+def archive(dist) -> Path:
+    """The zip for this Python."""
+    return next(dist.glob(f"*-py{PYTHON.replace('.', '')}.zip"))
+
+
+@pytest.fixture(scope="module")
+def cli() -> Path:
+    """Blender's own command for extensions."""
+    import bpy
+
+    return next(Path(bpy.utils.system_resource("SCRIPTS")).glob("addons_core/bl_pkg/cli/blender_ext.py"))
+
+
+def install(script: str, tmp_path: Path, *arguments) -> subprocess.CompletedProcess:
+    """Runs `script` in a Blender whose user has no folder yet."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith(("BLENDER_", "PYTHONPATH"))}
+    environment["BLENDER_USER_RESOURCES"] = str(tmp_path)
+    command = [sys.executable, "-c", script, *arguments]
+    return subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True)
 
 
 def test_content(archive, root):
@@ -102,7 +125,8 @@ def test_content(archive, root):
         "docs",
     }
     wheels = {name for name in names if name.endswith(".whl")}
-    assert wheels == {wheel.removeprefix("./") for wheel in manifest["build"]["generated"]["wheels"]}
+    assert wheels == {wheel.removeprefix("./") for wheel in manifest["wheels"]}
+    assert {name.split("-")[2] for name in wheels} == {f"cp{PYTHON.replace('.', '')}"}
     assert not any("numpy" in name for name in wheels)
     assert not any("__pycache__" in name for name in names)
     assert {"docs/panel.html", "docs/guide.html", "docs/images/guide/recovered.jpg"} <= set(names)
@@ -112,22 +136,33 @@ def test_content(archive, root):
     assert tracked <= set(code)
 
 
-def test_blender_takes_it_as_valid(archive):
-    import bpy
-
-    cli = next(Path(bpy.utils.system_resource("SCRIPTS")).glob("addons_core/bl_pkg/cli/blender_ext.py"))
+def test_blender_takes_it_as_valid(archive, cli):
     done = subprocess.run([sys.executable, cli, "validate", archive], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_installs_enables_and_runs(archive, grey_capture, tmp_path):
-    environment = {key: value for key, value in os.environ.items() if not key.startswith(("BLENDER_", "PYTHONPATH"))}
-    environment["BLENDER_USER_RESOURCES"] = str(tmp_path)
-    done = subprocess.run(
-        [sys.executable, "-c", INSTALLED, archive, grey_capture],
-        env=environment,
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-    )
+    done = install(INSTALLED, tmp_path, archive, grey_capture)
     assert done.returncode == 0 and "INSTALLED AND RUN" in done.stdout, done.stdout + done.stderr
+
+
+def test_the_zip_for_another_python_is_refused(dist, archive, tmp_path):
+    others = sorted(set(dist.glob("*.zip")) - {archive})
+    if not others:
+        pytest.skip("no other zip was built")
+    done = install(REFUSED, tmp_path, others[0])
+    assert "REFUSED: Error: Extension bl_ext.user_default.scan_relight is incompatible" in done.stdout, done.stdout
+    assert f"This Python version ({PYTHON}) isn't compatible" in done.stdout
+
+
+def test_one_repository_offers_all_of_them(dist, cli, tmp_path):
+    for archive in dist.glob("*.zip"):
+        (tmp_path / archive.name).symlink_to(archive)
+    done = subprocess.run(
+        [sys.executable, cli, "server-generate", "--repo-dir", tmp_path], capture_output=True, text=True
+    )
+    assert done.returncode == 0 and "WARN" not in done.stdout.upper(), done.stdout + done.stderr
+    offered = json.loads((tmp_path / "index.json").read_text())["data"]
+    named = [(*one["platforms"], *one["python_versions"]) for one in offered]
+    assert len(set(named)) == len(named) == len(list(dist.glob("*.zip")))
+    assert all(len(name) == 2 for name in named) and PYTHON in {python for _, python in named}

@@ -42,38 +42,21 @@ def figures(pictures):
 
 @pytest.fixture(scope="session")
 def archive(blender, tmp_path_factory) -> Path:
-    """The zip: the one that SCAN_RELIGHT_ZIP names, or a fresh one with the wheels for this Blender's Python."""
-    if given := os.environ.get("SCAN_RELIGHT_ZIP"):
-        return Path(given).resolve()
+    """The zip for this Blender's Python: from the folder that SCAN_RELIGHT_DIST names, or a fresh one."""
+    asked = "import sys; print('PYTHON', *sys.version_info[:2])"
     told = subprocess.run(
-        [
-            blender,
-            "--background",
-            "--factory-startup",
-            "--python-expr",
-            "import sys; print('PYTHON', *sys.version_info[:2])",
-        ],
+        [blender, "--background", "--factory-startup", "--python-expr", asked],
         env=environment(tmp_path_factory.mktemp("bare")),
         capture_output=True,
         text=True,
         check=True,
     )
     version = next(line for line in told.stdout.splitlines() if line.startswith("PYTHON")).split()[1:]
+    if given := os.environ.get("SCAN_RELIGHT_DIST"):
+        return next(Path(given).resolve().glob(f"*-linux_x64-py{''.join(version)}.zip"))
     out = tmp_path_factory.mktemp("dist")
-    subprocess.run(
-        [
-            sys.executable,
-            ROOT / "scripts" / "build_extension.py",
-            "--platform",
-            "linux-x64",
-            "--python",
-            ".".join(version),
-            "--out",
-            out,
-        ],
-        check=True,
-        capture_output=True,
-    )
+    command = [sys.executable, ROOT / "scripts" / "build_extension.py", "--platform", "linux-x64"]
+    subprocess.run([*command, "--python", ".".join(version), "--out", out], check=True, capture_output=True)
     return next(out.glob("*.zip"))
 
 

@@ -7,15 +7,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from tests.blender.artist.artist_room import bridge  # noqa: E402
-from tests.blender.artist.corrected_room import (  # noqa: E402
-    BOARD,
-    LAMP,
-    TABLE,
-    TAP,
-    build,
-    select,
-    sockets,
-)
+from tests.blender.artist.corrected_room import BOARD, LAMP, TABLE, TAP, build, select, sockets  # noqa: E402
 
 
 @pytest.fixture
