@@ -14,9 +14,9 @@ import numpy as np
 
 from ..core.io.pixels import read_pixels
 from ..core.io.read import read_capture
+from ..core.lit_diffuse.accumulate import accumulate
 from ..core.memory import peak_memory
 from ..core.parallel import ordered_map
-from ..core.passes.lit_diffuse.accumulate import accumulate
 from ..core.scene.atlas import Atlas
 from ..core.scene.lit_diffuse import LitDiffuse
 from ..core.scene.model import Frame, Mesh, Pixels

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.lit_diffuse.accumulate import frame_order
+from ..core.lit_diffuse.adaptive import Adaptive
+from ..core.lit_diffuse.exact import Exact
+from ..core.lit_diffuse.medians import make_estimator
 from ..core.paper.estimator import Estimator
-from ..core.passes.lit_diffuse.accumulate import frame_order
-from ..core.passes.lit_diffuse.adaptive import Adaptive
-from ..core.passes.lit_diffuse.exact import Exact
-from ..core.passes.lit_diffuse.medians import make_estimator
 from ..core.settings import PAPER, Settings
 from .median_rivals import LogPSquare, TwoPasses
 from .run import Options

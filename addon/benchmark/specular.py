@@ -13,12 +13,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core.brdf import ggx as brdf
+from ..core.fit.layout import Problem
 from ..core.light.directions import shifted, sobol, to_world, uniform_hemisphere
 from ..core.light.emitters import bright_triangles
 from ..core.light.environment import Environment
 from ..core.light.field import LightField
 from ..core.light.lobes import GRID, LobeLight, reflected_light
-from ..core.passes.specular.layout import Problem
 from ..core.passes.specular.models import choose_model
 from .run import Options
 from .synthetic import ROOM, synthetic_capture

@@ -392,7 +392,7 @@ def test_a_disk_that_gets_full(full_at, done, recover, tmp_path, monkeypatch):
 
 
 def test_a_disk_that_is_full_of_observations(recover, tmp_path, monkeypatch):
-    from addon.core.passes.lit_diffuse.medians import Exact
+    from addon.core.lit_diffuse.medians import Exact
 
     def full(self):
         raise OSError("1000 requested and 12 written")  # numpy's words for a full disk

@@ -6,9 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
+from addon.core.fit.lobe_fit import Problem
 from addon.core.light.emitters import bright_triangles
 from addon.core.light.lobes import reflected_light
-from addon.core.passes.specular.fit import Problem
 from tests.core.rooms import lit_box, make_room, polygon_irradiance
 
 SIZE = np.array([4.0, 3.0, 2.5])

@@ -9,8 +9,8 @@ import pytest
 
 from addon.core.io.exr import write_exr
 from addon.core.io.pixels import read_pixels
-from addon.core.passes.lit_diffuse.accumulate import accumulate, frame_order
-from addon.core.passes.lit_diffuse.medians import make_estimator
+from addon.core.lit_diffuse.accumulate import accumulate, frame_order
+from addon.core.lit_diffuse.medians import make_estimator
 from addon.core.scene.model import Frame
 from tests.core.rooms import all_round, look_at, picture, pixels_of
 from tests.hard_cases.rooms import CLOSE, GREY, NOISY, PAPERS, QUICK, cameras, closed_room, lamp_light, lamp_room

@@ -13,8 +13,8 @@ import numpy as np
 from ..errors import BadInputError
 from ..light.environment import Environment, EnvironmentAccumulator
 from ..light.field import LightField
+from ..lit_diffuse.accumulate import accumulate
 from ..passes.clipped_lamps.fringes import FringeCollector, Fringes
-from ..passes.lit_diffuse.accumulate import accumulate
 from ..passes.pose_refinement.poses import Poses, Texture, refine_poses
 from ..passes.sharpening.sharpen import sharpened
 from ..progress import Progress, Rounds

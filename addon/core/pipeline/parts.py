@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..json_values import key
+from ..lit_diffuse.accumulate import accumulate
 from ..material import EMITTER, METAL
 from ..parallel import ordered_map
 from ..passes.albedo.albedo import MEASURED
-from ..passes.lit_diffuse.accumulate import accumulate
 from ..passes.sharpening.sharpen import FLOOR, MOST, sharpened
 from ..progress import Rounds
 from ..scene.atlas import Atlas

@@ -23,6 +23,7 @@ from ..light.environment import Environment
 from ..light.field import LightField
 from ..light.mirrors import Mirror, in_their_planes, known_mirror
 from ..light.shading import Shading
+from ..lit_diffuse.from_texture import face_edge, lit_from_tiles
 from ..memory import peak_memory
 from ..overrides import NONE as NO_OVERRIDES
 from ..overrides import Overrides
@@ -30,7 +31,6 @@ from ..parallel import ordered_map
 from ..passes.albedo.albedo import Albedo, albedo_of
 from ..passes.clipped_lamps.clipped import shade_clipped
 from ..passes.clipped_lamps.fringes import Fringes
-from ..passes.lit_diffuse.from_texture import face_edge, lit_from_tiles
 from ..passes.mesh_denoising.denoise import without_noise
 from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.pose_refinement.poses import Poses

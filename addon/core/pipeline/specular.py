@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..fit.layout import Problem
+from ..fit.lobe_fit import fit_lobe
 from ..light.field import LightField
 from ..light.lamps import Lamp
 from ..light.lobes import GRID
@@ -15,13 +17,11 @@ from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, Object
 from ..overrides import NOTHING, Given
 from ..parallel import ordered_map
 from ..passes.glossy_light.glossy_light import Excess, glossy_light
-from ..passes.see_through.see_through import judge, look_behind
+from ..passes.see_through.see_through import is_sure, judge, look_behind
 from ..passes.specular.by_looks import coated_by_looks, metal_by_looks
 from ..passes.specular.describe import as_given, described, flat_mirror, lamp_material
-from ..passes.specular.fit import fit_lobe
 from ..passes.specular.given import fit_given, given_note, same_material
 from ..passes.specular.intervals import gloss_interval
-from ..passes.specular.layout import Problem
 from ..passes.specular.models import MIN_ELEMENTS, Choice, adopt_from_class, choose_model, set_apart
 from ..passes.specular.one_colour import compare, compare_coat
 from ..passes.specular.problems import Problems
@@ -148,7 +148,9 @@ def fit_specular(
             behind = look_behind(field, lit_diffuse.seen, element, direction, object_id, noise)
             lobe = None if choice.model == LAMBERTIAN else choice.fit
             scale = max(1.4826 * choice.fit.residual, 1e-4)
-            choice = set_apart(choice, judge(problem, behind, lobe, scale))
+            shown = judge(problem, behind, lobe, scale)
+            if shown is not None:
+                choice = set_apart(choice, shown, is_sure(shown))
         if way == "frames" and choice.model not in (METAL, TRANSPARENT):
             choice, problem = _by_looks(maker, object_id, choice, problem, irradiance, rays)
         return choice, problem, target

@@ -12,8 +12,8 @@ from addon.core.errors import BadInputError
 from addon.core.io.exr import write_exr
 from addon.core.io.ptex import morton, std_sort
 from addon.core.io.read import describe, read_capture
+from addon.core.lit_diffuse.from_texture import face_edge, lit_from_tiles
 from addon.core.material import METAL
-from addon.core.passes.lit_diffuse.from_texture import face_edge, lit_from_tiles
 from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
 from addon.core.results.store import Store

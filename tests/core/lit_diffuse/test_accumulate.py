@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from addon.core.errors import BadInputError, InterruptedRun
-from addon.core.passes.lit_diffuse.accumulate import _choose, accumulate, frame_order
-from addon.core.passes.lit_diffuse.medians import Summary
+from addon.core.lit_diffuse.accumulate import _choose, accumulate, frame_order
+from addon.core.lit_diffuse.medians import Summary
 from addon.core.progress import Progress
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.model import Frame

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.passes.lit_diffuse.batched import KNOTS, SLOTS, knot_ranks
-from addon.core.passes.lit_diffuse.medians import Adaptive, Batched, Exact, Mean, PSquare, make_estimator
-from addon.core.passes.lit_diffuse.sorting import comparators, sort_planes
+from addon.core.lit_diffuse.batched import KNOTS, SLOTS, knot_ranks
+from addon.core.lit_diffuse.medians import Adaptive, Batched, Exact, Mean, PSquare, make_estimator
+from addon.core.lit_diffuse.sorting import comparators, sort_planes
 
 ARTICLE = [0.02, 0.15, 0.74, 3.39, 0.83, 22.37, 10.15, 15.43, 38.62, 15.92,
            34.60, 10.28, 1.47, 0.40, 0.05, 11.39, 0.27, 0.42, 0.09, 11.37]  # fmt: skip

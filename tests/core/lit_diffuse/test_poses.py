@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from addon.core.errors import InterruptedRun
-from addon.core.passes.lit_diffuse.accumulate import accumulate
+from addon.core.lit_diffuse.accumulate import accumulate
 from addon.core.passes.pose_refinement.poses import LEAST_SHIFT, Poses, Texture, moved, refine_poses
 from addon.core.progress import Progress
 from addon.core.scene.model import Pixels

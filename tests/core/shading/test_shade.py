@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from addon.core.light import over_surface
+from addon.core.lit_diffuse.accumulate import accumulate
 from addon.core.passes.albedo.albedo import MEASURED, NONE
-from addon.core.passes.lit_diffuse.accumulate import accumulate
 from addon.core.pipeline import shading as module
 from addon.core.pipeline.shading import shade
 from addon.core.scene.model import Frame

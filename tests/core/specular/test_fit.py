@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from addon.core.fit.layout import Layout
+from addon.core.fit.lobe_fit import between, fit_lobe, huber, robust_scale, solve
 from addon.core.light.lobes import GRID
-from addon.core.passes.specular.fit import between, fit_lobe, huber, robust_scale, solve
-from addon.core.passes.specular.layout import Layout
 from addon.core.passes.specular.models import DIELECTRIC
 from tests.core.glossy_box import Box
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from addon.core.fit.lobe_fit import fit_lobe
 from addon.core.material import LAMBERTIAN, METAL, SPECULAR
 from addon.core.passes.specular import models
-from addon.core.passes.specular.fit import fit_lobe
 from addon.core.passes.specular.models import METAL_PSI, Choice, adopt_from_class, choose_model, metal_f0
 from tests.core.glossy_box import Box
 from tests.core.specular.test_fit import paint, steps

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...fit.layout import Layout, Problem
+from ...fit.lobe_fit import HUBER, ROUNDS, LobeFit, huber
+from ...fit.transmission import SeeThrough
 from ...light.field import LightField
-from ..specular.fit import HUBER, ROUNDS, LobeFit, huber
-from ..specular.layout import Layout, Problem
 
 SURFACES = 8
 """Of one object, crossed by a ray, at most."""
@@ -36,31 +37,6 @@ INSIDE = 3.0
 """Times the mesh's noise that a ray must be from an object's outline, to tell whether the object lets through what is
 behind it. A bottle cap of 4 cm, inflated by a scan's error, passed for glass: its outermost centimetre truly showed
 the room behind."""
-
-
-@dataclass(frozen=True)
-class SeeThrough:
-    """How an object lets through what is behind it.
-
-    Attributes
-    ----------
-    transmission : float
-        Share tau of the background's radiance that passes the whole object; of a cut-out, the share of holes.
-    surfaces : float
-        How many of the object's surfaces a ray crosses, in the mean.
-    cut_out : bool
-    score : float
-        Held-out cost relative to that of the Lambertian model.
-    gain, sigmas : float
-        Share of the best opaque model's held-out cost that is saved, and that in standard errors.
-    """
-
-    transmission: float
-    surfaces: float
-    cut_out: bool
-    score: float
-    gain: float
-    sigmas: float
 
 
 @dataclass(frozen=True)
@@ -190,11 +166,9 @@ def judge(problem: Problem, behind: Behind, lobe: LobeFit | None, scale: float) 
     )
 
 
-def is_sure(found: SeeThrough | None) -> bool:
+def is_sure(found: SeeThrough) -> bool:
     """Whether the object is to be set apart."""
-    return found is not None and (
-        found.transmission >= LEAST_PASSED and found.gain > MIN_GAIN and found.sigmas > MIN_SIGMAS
-    )
+    return found.transmission >= LEAST_PASSED and found.gain > MIN_GAIN and found.sigmas > MIN_SIGMAS
 
 
 def _less_own(values: np.ndarray, train: np.ndarray) -> np.ndarray:

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import uniform_filter
 
+from ...lit_diffuse.accumulate import accumulate
 from ...scene.atlas import Atlas
 from ...scene.elements import ElementLookup
 from ...scene.lit_diffuse import ENOUGH, LitDiffuse
 from ...scene.model import Camera, Frame, Pixels
 from ...scene.surface import Surface
 from ...scene.visibility import CLEAN
-from ..lit_diffuse.accumulate import accumulate
 
 MIDDLE, CORNER = 2 / 3, 1 / 12
 """Weights of a pixel's middle and corners: together they give what is quadratic over the pixel its true mean."""

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...fit.layout import Problem
+from ...fit.lobe_fit import LobeFit
 from ...material import METAL, SPECULAR
-from .fit import LobeFit
-from .layout import Problem
 from .models import METAL_PSI, Choice, metal_f0
 from .one_colour import DIELECTRIC_PSI, Coated, OneColour
 

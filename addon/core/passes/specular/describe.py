@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...fit.layout import Problem
 from ...light.mirrors import Mirror
 from ...material import EMITTER, LAMBERTIAN, LAMP_ALBEDO, METAL, TRANSPARENT, ObjectMaterial
 from ...overrides import Given
 from ...scene.model import Instance
 from .given import given_interval, given_note
 from .intervals import GlossInterval
-from .layout import Problem
 from .models import Choice, metal_f0
 
 UNRESOLVED = 0.17

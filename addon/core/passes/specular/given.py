@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...fit.layout import Layout, Problem
+from ...fit.lobe_fit import LobeFit, fit_lobe
 from ...light.lobes import GRID
 from ...material import EMITTER, LAMBERTIAN, METAL, SPECULAR, ObjectMaterial
 from ...overrides import Given
-from .fit import LobeFit, fit_lobe
 from .intervals import UNKNOWN, GlossInterval
-from .layout import Layout, Problem
 from .models import HOW, METAL_PSI, MIN_ELEMENTS, Choice, choose_model, metal_f0, metal_fit
 from .one_colour import DIELECTRIC_PSI, compare, compare_coat
 from .problems import Problems

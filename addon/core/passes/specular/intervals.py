@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...fit.layout import Layout, Problem
+from ...fit.lobe_fit import fit_lobe
 from ...material import METAL, SPECULAR, Z90
-from .fit import fit_lobe
-from .layout import Layout, Problem
 from .models import HOW, METAL_PSI, Choice
 
 GROUPS = 6

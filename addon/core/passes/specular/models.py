@@ -6,12 +6,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...fit.layout import Layout, Problem
+from ...fit.lobe_fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs, huber, solve
+from ...fit.transmission import SeeThrough
 from ...light.lobes import nearest
 from ...material import LAMBERTIAN, METAL, SPECULAR, TRANSPARENT
 from ...weighted import weighted_median
-from ..see_through.see_through import SeeThrough, is_sure
-from .fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs, huber, solve
-from .layout import Layout, Problem
 from .one_colour import BROADEST_PHI, DIELECTRIC_PSI, Coated, OneColour
 
 LEAST_PSI = 0.02
@@ -192,12 +192,10 @@ def choose_model(problem: Problem) -> Choice:
     return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores, metal=likely, bare=no_diffuse)
 
 
-def set_apart(choice: Choice, found: SeeThrough | None) -> Choice:
-    """An object's choice, TRANSPARENT where its frames surely show what is behind it."""
-    if found is None:
-        return choice
+def set_apart(choice: Choice, found: SeeThrough, sure: bool) -> Choice:
+    """An object's choice, TRANSPARENT where its frames `sure`ly show what is behind it."""
     scores = choice.scores | {TRANSPARENT: found.score}
-    if not is_sure(found):
+    if not sure:
         return replace(choice, scores=scores)
     what = (
         f"cut out, with holes over {found.transmission:.0%} of it"

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...fit.layout import Problem
+from ...fit.lobe_fit import robust_scale
 from ...light.emitters import LUMINANCE
-from .fit import robust_scale
-from .layout import Problem
 
 DIELECTRIC_PSI = 0.04
 """What a dielectric of one colour reflects at normal incidence (n = 1.5)."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...fit.layout import Problem
 from ...light.emitters import bright_triangles
 from ...light.field import LightField
 from ...light.lobes import LobeLight, reflected_light
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.samples import Samples
-from .layout import Problem
 from .one_colour import BROADEST_PHI, DIELECTRIC_PSI
 
 NOISY, AGAIN, NARROWEST_PHI = 0.2, 8, 0.02

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...paper.estimator import Estimator, Summary
-from ...paper.p_square import PSquare
+from ..paper.estimator import Estimator, Summary
+from ..paper.p_square import PSquare
 from .adaptive import Adaptive
 from .batched import Batched
 from .exact import Exact

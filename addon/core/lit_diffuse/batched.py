@@ -17,8 +17,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...paper.estimator import QUARTILES, Summary
-from ...parallel import blocks, ordered_map
+from ..paper.estimator import QUARTILES, Summary
+from ..parallel import blocks, ordered_map
 from .sorting import sort_planes
 
 SLOTS, KNOTS = 20, 12

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ...parallel import ordered_map
-from ...progress import Progress
-from ...scene.atlas import Atlas
-from ...scene.element_groups import ElementGroups
-from ...scene.elements import triangle_geometry
-from ...scene.lit_diffuse import ENOUGH, LitDiffuse
-from ...scene.model import Frame, Mesh, Pixels
-from ...scene.rays import RayScene
-from ...scene.visibility import CLEAN, EDGE, SATURATED, FrameView, Observations, observe, view_frame
+from ..parallel import ordered_map
+from ..progress import Progress
+from ..scene.atlas import Atlas
+from ..scene.element_groups import ElementGroups
+from ..scene.elements import triangle_geometry
+from ..scene.lit_diffuse import ENOUGH, LitDiffuse
+from ..scene.model import Frame, Mesh, Pixels
+from ..scene.rays import RayScene
+from ..scene.visibility import CLEAN, EDGE, SATURATED, FrameView, Observations, observe, view_frame
 from .medians import Summary, make_estimator
 
 

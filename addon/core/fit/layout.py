@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...light.lobes import LobeLight, nearest
+from ..light.lobes import LobeLight, nearest
 
 
 @dataclass(frozen=True)

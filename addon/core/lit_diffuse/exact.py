@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...paper.estimator import QUARTILES, Summary, between
-from ...parallel import ordered_map
+from ..paper.estimator import QUARTILES, Summary, between
+from ..parallel import ordered_map
 
 
 class Exact:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...errors import BadInputError
-from ...io.exr import HALF_MAX
-from ...parallel import blocks
-from ...progress import Progress
-from ...scene.atlas import Atlas
-from ...scene.elements import triangle_geometry
-from ...scene.lit_diffuse import ENOUGH, LitDiffuse
-from ...scene.model import LitTiles, Mesh
-from ...scene.visibility import CLEAN, SATURATED
+from ..errors import BadInputError
+from ..io.exr import HALF_MAX
+from ..parallel import blocks
+from ..progress import Progress
+from ..scene.atlas import Atlas
+from ..scene.elements import triangle_geometry
+from ..scene.lit_diffuse import ENOUGH, LitDiffuse
+from ..scene.model import LitTiles, Mesh
+from ..scene.visibility import CLEAN, SATURATED
 
 TEXELS_AT_ONCE = 1 << 22
 """Texels of the tiles that are looked at together; 160 bytes each."""
