@@ -239,6 +239,8 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
             group.add_argument(option, choices=info.choices, help=text)
         else:
             group.add_argument(option, type=info.kind, metavar=info.kind.__name__.upper(), help=text)
+    text = "leave a pass out, to see what it does; can be repeated (names: benchmark ablation --list)"
+    group.add_argument("--without", metavar="PASS", action="append", help=text)
 
 
 def add_leash(parser: argparse.ArgumentParser) -> None:
@@ -275,6 +277,7 @@ def add_common(parser: argparse.ArgumentParser, function) -> None:
 def settings_from(arguments: argparse.Namespace) -> Settings:
     """The preset with everything that was given."""
     given = {info.name: getattr(arguments, info.name) for info in setting_infos()}
+    given["without"] = None if arguments.without is None else tuple(arguments.without)
     return replace(PRESETS[arguments.preset], **{name: value for name, value in given.items() if value is not None})
 
 

@@ -34,12 +34,13 @@ class SettingInfo:
 
 
 def setting_infos() -> tuple[SettingInfo, ...]:
-    """All settings in the dataclass's order."""
+    """All settings of one value, in the dataclass's order; `Settings.without` is the command line's alone."""
     helps = _helps(inspect.getdoc(Settings) or "")
     kinds = typing.get_type_hints(Settings)
     return tuple(
         SettingInfo(f.name, kinds[f.name], f.default, helps.get(f.name, ""), Settings.CHOICES.get(f.name, ()))
         for f in fields(Settings)
+        if f.name != "without"
     )
 
 

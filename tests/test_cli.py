@@ -45,9 +45,13 @@ def test_help_names_every_setting_with_its_default(capsys):
 
 def test_every_setting_is_described():
     infos = setting_infos()
-    assert [info.name for info in infos] == [field.name for field in fields(Settings)]
+    assert [info.name for info in infos] == [field.name for field in fields(Settings) if field.name != "without"]
     assert all(info.help and not info.help.endswith(".") for info in infos)
     assert all(info.kind in (bool, int, float, str) for info in infos)
+
+
+def test_passes_to_leave_out_are_collected():
+    assert cli.settings_from(parse("--without", "sun", "--without", "caustics")).without == ("sun", "caustics")
 
 
 def test_no_option_gives_the_defaults():

@@ -63,6 +63,8 @@ class Settings:
         0 takes all cores.
     seed : int
         Of every pseudo-random choice.
+    without : tuple of str
+        Passes that are left out, by name (`passes.registry`); what each gains: docs/ablation.md.
     """
 
     texel_size: float = 0.0
@@ -86,6 +88,7 @@ class Settings:
     coat: bool = True
     threads: int = 0
     seed: int = 0
+    without: tuple[str, ...] = ()
 
     CHOICES = {
         "atlas": (ROOM, "object", "udim"),
@@ -96,6 +99,7 @@ class Settings:
     }
 
     def __post_init__(self):
+        object.__setattr__(self, "without", tuple(self.without))  # JSON has lists
         for name, allowed in self.CHOICES.items():
             if getattr(self, name) not in allowed:
                 raise BadInputError(f"Setting '{name}' is '{getattr(self, name)}'; choose one of {', '.join(allowed)}.")

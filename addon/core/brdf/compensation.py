@@ -76,6 +76,15 @@ def base_color(albedo: np.ndarray, psi: float | np.ndarray, phi: float | np.ndar
     return (albedo / kept[:, None]).astype(albedo.dtype)
 
 
+def with_metals(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[ObjectMaterial]) -> np.ndarray:
+    """Albedo, and F0 of metals: Base Color that makes up for nothing. Parameters as of `base_colors`."""
+    color = albedo.copy()
+    for m in materials:
+        if m.model == METAL:
+            color[object_id == m.object_id] = m.f0
+    return color
+
+
 def base_colors(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[ObjectMaterial]) -> np.ndarray:
     """Base Color of every element, (n, 3) float32, 0...1.
 

@@ -25,6 +25,8 @@ class Problem:
         A and B of each observation.
     cosine : (m,) float32
         n.wo.
+    without : frozenset of str
+        Passes left out of the fit.
     """
 
     element: np.ndarray
@@ -32,12 +34,13 @@ class Problem:
     lit_diffuse: np.ndarray
     light: LobeLight
     cosine: np.ndarray
+    without: frozenset[str] = frozenset()
 
     def part(self, chosen: np.ndarray) -> Problem:
         """The observations `chosen` ((m,) bool)."""
         return Problem(
             self.element[chosen], self.radiance[chosen], self.lit_diffuse[chosen], self.light.part(chosen),
-            self.cosine[chosen],
+            self.cosine[chosen], self.without,
         )  # fmt: skip
 
 
@@ -81,6 +84,7 @@ class Layout:
 
     def __init__(self, problem: Problem, free: bool = True):
         self.free, self.count, self.grid = free, len(problem.element), problem.light.grid
+        self.without = problem.without
         order = np.argsort(problem.element, kind="stable")
         _, start, views = np.unique(problem.element[order], return_index=True, return_counts=True)
         group = np.repeat(np.arange(len(start)), views)
@@ -143,7 +147,7 @@ class Layout:
     def part(self, chosen: np.ndarray) -> Layout:
         """The same for some elements, (g,) bool."""
         part = object.__new__(Layout)
-        part.free, part.grid = self.free, self.grid
+        part.free, part.grid, part.without = self.free, self.grid, self.without
         part.there, part.inflate, part.I = self.there[:, chosen], self.inflate[chosen], self.I[..., chosen]
         part._grazing = self._grazing[:, chosen]
         part.count = int(part.there.sum())

@@ -111,6 +111,7 @@ def solve(
         Given: nothing is solved for but the diffuse part.
     """
     t = layout.darkening(kappa)
+    prior = None if "dielectric-prior" in layout.without else prior
     if phi is None:
         lobe, R = None, layout.I
     else:
@@ -196,7 +197,7 @@ def fit_lobe(
     """
     layout = problem if isinstance(problem, Layout) else Layout(problem, way == "frames")
     how = {"coloured": coloured, "least_psi": least_psi, "prior": prior, "psi": psi}
-    kappas = KAPPAS if layout.free else (0.0,)
+    kappas = KAPPAS if layout.free and "grazing" not in layout.without else (0.0,)
     flat = solve(layout, None, kappas, 1.0).size
     scale = robust_scale(layout.seen(flat[0]))
     kappa = kappas[len(kappas) // 2]

@@ -56,6 +56,10 @@ class LobeLight:
         """Those of the observations `chosen` ((m,) bool or indices)."""
         return LobeLight(self.A[chosen], self.B[chosen], self.A_noise[chosen], self.B_noise[chosen], self.grid)
 
+    def as_exact(self) -> LobeLight:
+        """The same, taken to have no noise."""
+        return LobeLight(self.A, self.B, 0 * self.A_noise, 0 * self.B_noise, self.grid)
+
     def replaced(self, at: np.ndarray, other: LobeLight) -> LobeLight:
         """With another's values for the observations `at` ((k,) indices), in its order."""
         values = {}

@@ -48,6 +48,7 @@ def irradiance(
     finest: float,
     threads: int,
     seed: int,
+    smooth: bool = True,
     progress: Progress | None = None,
 ) -> tuple[np.ndarray, np.ndarray, int, np.ndarray]:
     """E at chosen elements.
@@ -60,6 +61,8 @@ def irradiance(
         'aimed' or 'uniform' (the paper's).
     finest : float
         Least distance of two gathering points in metres.
+    smooth : bool
+        Take the aimed rays' noise out (`less_noise`).
 
     Returns
     -------
@@ -143,7 +146,9 @@ def irradiance(
     noise = np.zeros(len(total), np.float32)
     if lamp_rays:
         lamps = blocks.evaluate(aim, step, SMOOTH, total.mean(1))
-        shown, noise = less_noise(position, normal, lamps[:, :3], lamps[:, 3])
+        shown, noise = lamps[:, :3], lamps[:, 3]
+        if smooth:
+            shown, noise = less_noise(position, normal, shown, noise)
         total += shown
     unsure = np.hypot(contrast * value[:, :3].mean(1), noise)
     if field.sun is not None:

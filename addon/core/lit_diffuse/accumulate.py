@@ -54,6 +54,7 @@ def accumulate(
     seed: int = 0,
     threads: int = 0,
     folder: Path | None = None,
+    edge_tier: bool = True,
     only: np.ndarray | None = None,
     also: Callable[[int, FrameView, Pixels, Observations], None] | None = None,
     progress: Progress | None = None,
@@ -72,6 +73,8 @@ def accumulate(
         'shuffled' or 'capture'.
     folder : Path, optional
         Where the exact median keeps observations meanwhile.
+    edge_tier : bool
+        Observations at depth edges count only where there are too few others.
     only : (n,) bool, optional
         Elements to ask for; all where not given.
     also : callable, optional
@@ -101,8 +104,9 @@ def accumulate(
         for estimator in estimators.values():
             stack.callback(estimator.close)
         for done, (index, view, pixels, seen) in enumerate(ordered_map(look, wanted, threads)):
+            tiers = seen.tier if edge_tier else np.where(seen.tier == EDGE, CLEAN, seen.tier)
             for tier, estimator in estimators.items():
-                chosen = np.flatnonzero(seen.tier == tier)
+                chosen = np.flatnonzero(tiers == tier)
                 estimator.add(seen.element.take(chosen), seen.radiance.take(chosen, 0))
             if also is not None:
                 also(index, view, pixels, seen)

@@ -75,7 +75,8 @@ class Corrected:
     def _materials(self) -> list[ObjectMaterial]:
         light = np.ones(3) if self.white is None else self.white.of_light
         known = corrected(self.specular().materials, self.overrides, light)
-        return coated(known, self.albedo, self.surface().atlas) if self.settings.coat else known
+        wanted = self.settings.coat and "coat" not in self.settings.without
+        return coated(known, self.albedo, self.surface().atlas) if wanted else known
 
     @cached_property
     def white(self) -> WhiteScale | None:

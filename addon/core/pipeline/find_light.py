@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from ..light.few_elements import from_sun, irradiance_at
@@ -12,15 +14,21 @@ from ..passes.unseen_light.unseen_light import Light, find_light, lit_by
 
 
 def find_all_light(
-    field: LightField, good: np.ndarray, unseen_objects: list[int], instances: tuple, seed: int = 0, *more
+    field: LightField,
+    good: np.ndarray,
+    unseen_objects: list[int],
+    instances: tuple,
+    seed: int = 0,
+    *more,
+    without: Collection[str] = (),
 ) -> tuple[Light, Sun | None]:
     """`find_light`, and the sun; parameters are those of `find_light`.
 
     A room without a patch that is short of light has what `find_light` gives, to the last bit. A field that has its
     sun keeps it.
     """
-    light = find_light(field, good, unseen_objects, instances, seed, *more)
-    if field.sun is not None or not len(light.received):
+    light = find_light(field, good, unseen_objects, instances, seed, *more, without=without)
+    if field.sun is not None or not len(light.received) or "sun" in without:
         return light, field.sun
     lamps = [lamp.object_id for lamp in light.lamps]
     lit = field.with_light(lit_by(field, list(light.lamps)), light.environment, lamps)
@@ -29,7 +37,8 @@ def find_all_light(
     )
     if solved is None:
         return light, None
-    again = find_light(field.with_sun(solved.sun), good, unseen_objects, instances, seed, *more, before=light)
+    lit_by_sun = field.with_sun(solved.sun)
+    again = find_light(lit_by_sun, good, unseen_objects, instances, seed, *more, before=light, without=without)
     if not len(again.received):
         return again, solved.sun
     # Lamps and sky that stood in for the sun no longer do, so its strength is told anew beside them.

@@ -52,6 +52,7 @@ def one_pass(
     sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
     kept = SampleCollector(surface.atlas, len(frames), settings.seed)
     fringes = FringeCollector()
+    median = "batched" if settings.median == "adaptive" and "exact-median" in settings.without else settings.median
 
     def also(index, view, pixels, seen):
         sky.add(view, pixels)
@@ -59,8 +60,9 @@ def one_pass(
         fringes.add(view, pixels)
 
     lit = accumulate(
-        surface.mesh, surface.atlas, surface.scene, frames, read, median=settings.median, order=settings.frame_order,
-        seed=settings.seed, threads=settings.threads, folder=folder, also=also, progress=progress,
+        surface.mesh, surface.atlas, surface.scene, frames, read, median=median, order=settings.frame_order,
+        edge_tier="edge-tier" not in settings.without, seed=settings.seed, threads=settings.threads, folder=folder,
+        also=also, progress=progress,
     )  # fmt: skip
     if not lit.seen.any():
         raise BadInputError(
@@ -80,7 +82,7 @@ def all_passes(
     """What `one_pass` finds, and the poses it is found with: as read, or put right. Parameters and errors are its."""
     rounds = Rounds(progress, 0, 1)
     found, poses = one_pass(surface, frames, read, settings, folder, rounds), Poses.as_read(frames)
-    if settings.refine_poses:
+    if settings.refine_poses and "pose-refinement" not in settings.without:
         lit, sky = found[:2]
         room = LightField(surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), sky)
         rounds.next()
@@ -88,7 +90,7 @@ def all_passes(
         if poses.moved.any():
             rounds.next()
             found = one_pass(surface, poses.of(frames), read, settings, folder, rounds)
-    if settings.sharpen:
+    if settings.sharpen and "sharpening" not in settings.without:
         rounds.next()
         lit = sharpened(
             found[0], surface, poses.of(frames), read, median=settings.median, order=settings.frame_order,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..atomic import write_bytes
-from ..brdf.compensation import base_colors
+from ..brdf.compensation import base_colors, with_metals
 from ..errors import BadInputError
 from ..evidence.collect import Evidence, collect
 from ..evidence.page import make_page
@@ -34,6 +34,7 @@ from ..passes.clipped_lamps.fringes import Fringes
 from ..passes.mesh_denoising.denoise import without_noise
 from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.pose_refinement.poses import Poses
+from ..passes.registry import check, left_out_of
 from ..progress import Progress
 from ..results.store import Store
 from ..scene.lit_diffuse import LitDiffuse
@@ -43,6 +44,7 @@ from ..scene.samples import Samples
 from ..scene.surface import Surface, build_surface, from_uv
 from ..scene.two_sides import laid_apart, with_backs
 from ..settings import ROOM, Settings
+from ..stages import STAGES, WRITE
 from .corrected import Corrected
 from .frames import all_passes
 from .parts import LOOKED, Parting, Parts, look_closer, remove_parts, write_parts
@@ -92,6 +94,7 @@ class Recovery(Corrected):
         unwrap: Callable[[Mesh, int], np.ndarray],
         overrides: Overrides = NO_OVERRIDES,
     ):
+        check(settings.without)
         self.capture, self.store, self.settings, self.progress = capture, store, settings, progress
         self.overrides = overrides
         self._near = near_origin(capture)
@@ -113,16 +116,20 @@ class Recovery(Corrected):
     @cached_property
     def _surface_key(self) -> str:
         s = self.settings
-        return key("surface", CODE, fingerprint(self.capture), s.texel_size, s.detail, s.atlas_size, s.denoise_mesh)
+        of_mesh = (fingerprint(self.capture), s.texel_size, s.detail, s.atlas_size, s.denoise_mesh)
+        return key("surface", CODE, *of_mesh, *left_out_of("surface", s.without))
 
     @cached_property
     def _keys(self) -> dict[str, str]:
         s, surface = self.settings, self._surface_key
-        lit = key("lit_diffuse", surface, s.refine_poses, s.median, s.sharpen, s.frame_order, s.seed)
-        shading = key(
-            "shading", lit, s.shading, s.shading_rays, s.emitter_rays, s.portal_rays, s.interpolate, s.mirrors, s.seed
+        out = {stage: left_out_of(stage, s.without) for stage in STAGES}
+        lit = key(
+            "lit_diffuse", surface, s.refine_poses, s.median, s.sharpen, s.frame_order, s.seed, *out["lit_diffuse"]
         )
-        specular = key("specular", shading, s.specular, s.specular_rays, s.refine, *self.overrides.lobes_key())
+        of_light = (s.shading, s.shading_rays, s.emitter_rays, s.portal_rays, s.interpolate, s.mirrors, s.seed)
+        shading = key("shading", lit, *of_light, *out["shading"])
+        of_lobes = (s.specular, s.specular_rays, s.refine, *self.overrides.lobes_key())
+        specular = key("specular", shading, *of_lobes, *out["specular"])
         return {"surface": surface, "lit_diffuse": lit, "shading": shading, "specular": specular}
 
     @property
@@ -131,6 +138,7 @@ class Recovery(Corrected):
         told = (self.overrides.as_dict(),) if self.overrides.any else ()
         told += () if self.settings.coat else ("no coat",)
         told += () if self.settings.atlas == ROOM else (self.settings.atlas,)
+        told += left_out_of(WRITE, self.settings.without)
         return key("run", self._keys["specular"], *told)[:16]
 
     def _stage(
@@ -160,7 +168,9 @@ class Recovery(Corrected):
         capture = self._near
 
         def compute():
-            mesh, noise = without_noise(capture.mesh) if self.settings.denoise_mesh else (capture.mesh, 0.0)
+            out = self.settings.without
+            noisy = self.settings.denoise_mesh and "mesh-denoising" not in out
+            mesh, noise = without_noise(capture.mesh, out) if noisy else (capture.mesh, 0.0)
             texel = self.settings.texel_size
             if mesh.lit is not None:
                 texel = texel or face_edge(mesh) / self.settings.detail
@@ -171,6 +181,7 @@ class Recovery(Corrected):
                 texel,
                 self.settings.detail,
                 self.settings.atlas_size,
+                two_sides="two-sides" not in out,
             )
             first = found.mesh.triangles[: len(mesh.triangles)]
             sign = np.where((first == mesh.triangles).all(1), 1, -1).astype(np.int8)
@@ -285,16 +296,16 @@ class Recovery(Corrected):
                     sampler=s.shading, rays=s.shading_rays, emitter_rays=s.emitter_rays, portal_rays=s.portal_rays,
                     interpolate=s.interpolate, threads=s.threads, seed=s.seed, progress=self.progress,
                     find_mirrors=self._find_mirrors if s.mirrors else None, noise=surface.noise,
-                    colours=self._accumulated()[3].colours(),
+                    colours=self._accumulated()[3].colours(), without=s.without,
                 )  # fmt: skip
 
-            found = shade_clipped(shaded, lit, surface.atlas)
+            found = shaded(lit) if "clipped-lamps" in s.without else shade_clipped(shaded, lit, surface.atlas)
             return found, *to_store(found)
 
         return self._stage("shading", from_store, compute)
 
     def _find_mirrors(self, field: LightField, lamps: tuple | None) -> tuple[Mirror, ...]:
-        noisy = lamps is not None and self.surface().noise > 0
+        noisy = lamps is not None and self.surface().noise > 0 and "facets" not in self.settings.without
         found = find_mirrors(field, lamps or (), self.samples(), self.capture.instances, self.settings.seed, noisy)
         told = [known_mirror(mirror, field) for mirror in self._near.mirrors]
         return (*found, *(one for one in told if one.object_id not in {mirror.object_id for mirror in found}))
@@ -320,7 +331,8 @@ class Recovery(Corrected):
             self.capture.instances, self.field, lit, shading.irradiance, shading.lamps, self.samples(),
             [frame.name for frame in self.capture.frames],
             way=s.specular, rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
-            noise=self.surface().noise, given=self.overrides.lobes(), held=held, progress=self.progress,
+            noise=self.surface().noise, given=self.overrides.lobes(), held=held, without=s.without,
+            progress=self.progress,
         )  # fmt: skip
         meta = {"materials": [dataclasses.asdict(m) for m in found.materials], "overrides": self.overrides.as_dict()}
         return found, {"specular": found.specular, "excess": found.excess}, meta
@@ -334,10 +346,14 @@ class Recovery(Corrected):
         """
         atlas, lit, shading = self.surface().atlas, self.lit_diffuse(), self.shading()
         without = shading.emitters if without is None else without
-        return albedo_of(atlas, lit, irradiance, shading.doubt, self.capture.instances, without, specular)
+        return albedo_of(
+            atlas, lit, irradiance, shading.doubt, self.capture.instances, without, specular, self.settings.without
+        )
 
     def base_color(self) -> np.ndarray:
         """Base Color of each element for Cycles' Principled, (n, 3) float32."""
+        if "compensation" in self.settings.without:
+            return with_metals(self.albedo.rho, self.surface().atlas.object_id, self.materials())
         return base_colors(self.albedo.rho, self.surface().atlas.object_id, self.materials())
 
     @cached_property

@@ -27,6 +27,7 @@ from ..json_values import key
 from ..material import EMITTER, ObjectMaterial
 from ..overrides import Given, Overrides, heeded, parse
 from ..passes.albedo.albedo import MEASURED, Albedo
+from ..passes.registry import left_out_of
 from ..progress import Progress
 from ..results.room_file import MATERIALS, Room, read_room
 from ..results.store import Store
@@ -173,7 +174,8 @@ class Refit(Recovery):
         known = [one.object_id for one in self.capture.instances]
         was = parse((meta or {}).get("overrides", {}), "specular", known)
         s = self.settings
-        wanted = key("specular", self._keys["shading"], s.specular, s.specular_rays, s.refine, *was.lobes_key())
+        of_lobes = (s.specular, s.specular_rays, s.refine, *was.lobes_key())
+        wanted = key("specular", self._keys["shading"], *of_lobes, *left_out_of("specular", s.without))
         arrays = self.store.load("specular", wanted) if stored == wanted else None
         if arrays is None:
             raise _again(self.store.folder, "its stages were cleared or are another run's")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 import numpy as np
 
@@ -52,6 +52,7 @@ def shade(
     find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None = None,
     noise: float = 0.0,
     colours: dict[int, np.ndarray] | None = None,
+    without: Collection[str] = (),
 ) -> Shading:
     """Lamps and irradiance (Haefner et al. 2021, sec. 3.2, with aimed rays and interpolation by default).
 
@@ -64,6 +65,8 @@ def shade(
         Metres, what was taken out of the mesh's vertices.
     colours : dict of (3,) float, optional
         Colour of light of objects that were clipped (`fringes`).
+    without : collection of str
+        Passes left out.
 
     Raises
     ------
@@ -77,18 +80,24 @@ def shade(
     seen_surface = np.bincount(atlas.object_id, atlas.area * seen, objects)
     seen_share = {i: float(seen_surface[i] / surface[i]) for i in np.unique(atlas.object_id) if surface[i] > 0}
     finest = finest_spacing(atlas)
-    how = {"sampler": sampler, "threads": threads, "seed": seed}
+    how = {"sampler": sampler, "threads": threads, "seed": seed, "smooth": "lamp-noise" not in without}
+    emitter_rays = 0 if "emitter-rays" in without else emitter_rays
+    portal_rays = 0 if "portal-rays" in without else portal_rays
+    interpolate = interpolate and "interpolation" not in without
+    find_mirrors = None if "mirrors" in without else find_mirrors
+    colours = None if "fringe-colours" in without else colours
 
     # 1. All light. What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
-    environment, sun = taken_out(environment)
+    environment, sun = (environment, None) if "seen-sun" in without else taken_out(environment)
     field = LightField(mesh, atlas, scene, fill_unseen(lit_diffuse.radiance, seen), environment).with_sun(sun)
     good = seen & (((lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= ENOUGH)) | (lit_diffuse.tier == SATURATED))
-    unseen = [object_id for object_id, share in seen_share.items() if share == 0]
+    unseen = [object_id for object_id, share in seen_share.items() if share == 0 and "unseen-lamps" not in without]
     single, sheet = fronts(mesh)
-    tilted = tilt(single, noise)[sheet[atlas.triangle]]
+    tilted = tilt(single, 0.0 if "tilt-error" in without else noise)[sheet[atlas.triangle]]
     # Mirrors first: what hangs opposite or over one gets light over it, which lamps would have to answer for.
     field = field.with_mirrors(find_mirrors(field, None) if find_mirrors else ())
-    light, sun = find_all_light(field, good if good.any() else seen, unseen, instances, seed, tilted, colours)
+    good = good if good.any() else seen
+    light, sun = find_all_light(field, good, unseen, instances, seed, tilted, colours, without=without)
     field = field.with_mirrors(()).with_sun(sun)
     notes = light.notes if sun is None else (*light.notes, sun.note)
     lamps = light.lamps
@@ -107,6 +116,8 @@ def shade(
     unseen_lamp = ~seen & np.isin(atlas.object_id, list(emitters))
     dark = np.flatnonzero(~seen & ~unseen_lamp)
     lit = np.flatnonzero(seen | unseen_lamp)
+    if len(dark) and "unseen-surfaces" in without:
+        dark = dark[:0]
     if len(dark):
         rough = how | {"sampler": "aimed", "rays": 64, "emitter_rays": 4, "portal_rays": 8}
         rough |= {"interpolate": True, "finest": 8 * finest}
@@ -120,7 +131,7 @@ def shade(
         seen_as = evened(field)[dark]
         field = field.with_light(radiance)
         # Inside a shade light goes to and fro.
-        for _ in range(BOUNCES - 1):
+        for _ in range(0 if "shades" in without else BOUNCES - 1):
             shades = strongly_lit(atlas, dark, radiance[dark], seen_as)
             if not shades:
                 break
@@ -145,7 +156,9 @@ def shade(
     )  # fmt: skip
     # A noisy mesh faces elsewhere than the surface did.
     unsure = np.hypot(unsure, tilted)
-    if sampler != "uniform":  # the paper's way, whose rays alone leave more noise than creases do
+    if (
+        sampler != "uniform" and "crease-error" not in without
+    ):  # the paper's way, whose rays alone leave more noise than creases do
         # Near a crease the light of two sides is mixed.
         unsure = np.hypot(unsure, crease_doubt(mesh, atlas, atlas.texel_edge))
     return Shading(E, escaped, unsure, field.radiance, lamps, light.environment, notes, mirrors, points, sun)

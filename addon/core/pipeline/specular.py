@@ -101,6 +101,7 @@ def fit_specular(
     noise: float = 0.0,
     given: Mapping[int, Given] | None = None,
     held: Held | None = None,
+    without: Collection[str] = (),
     progress: Progress | None = None,
 ) -> Specular:
     """Fit every object (Haefner et al. 2021, sec. 3.3 and 3.4) and find the specular part of L_d.
@@ -119,6 +120,8 @@ def fit_specular(
         What the artist gives of objects, by object_id.
     held : Held, optional
         Fit a few objects only.
+    without : collection of str
+        Passes left out.
 
     Raises
     ------
@@ -128,7 +131,8 @@ def fit_specular(
     given = given or {}
     glowing, mirrors = {lamp.object_id: lamp for lamp in lamps}, {mirror.object_id: mirror for mirror in field.mirrors}
     # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
-    maker = Problems(field, lit_diffuse, samples, threads=1, seed=seed)
+    maker = Problems(field, lit_diffuse, samples, threads=1, seed=seed, without=without)
+    refine = 0 if "specular-in-median" in without else min(refine, 1) if "glossy-light" in without else refine
     # What is given goes before what the shading stage found.
     taken = {i for i, one in given.items() if one.same_as is not None}
     settled = {i for i in (*glowing, *mirrors) if i not in given} | taken
@@ -142,8 +146,8 @@ def fit_specular(
     def look(object_id: int) -> tuple[Choice, Problem | None, int]:
         if object_id in given:
             return *fit_given(given[object_id], maker, object_id, irradiance, rays), -1
-        choice, problem, target, index = _look(maker, object_id, samples, len(frame_names), way, rays)
-        if way == "frames" and choice.fit is not None:
+        choice, problem, target, index = _look(maker, object_id, samples, len(frame_names), way, rays, without)
+        if way == "frames" and choice.fit is not None and "see-through" not in without:
             element, direction = samples.element[index], samples.direction[index]
             behind = look_behind(field, lit_diffuse.seen, element, direction, object_id, noise)
             lobe = None if choice.model == LAMBERTIAN else choice.fit
@@ -152,7 +156,7 @@ def fit_specular(
             if shown is not None:
                 choice = set_apart(choice, shown, is_sure(shown))
         if way == "frames" and choice.model not in (METAL, TRANSPARENT):
-            choice, problem = _by_looks(maker, object_id, choice, problem, irradiance, rays)
+            choice, problem = _by_looks(maker, object_id, choice, problem, irradiance, rays, without)
         return choice, problem, target
 
     problems, choices, targets = {}, {}, {}
@@ -162,7 +166,7 @@ def fit_specular(
             problems[object_id] = problem
         if progress is not None:
             progress.update(0.7 * len(choices) / len(wanted))
-    if way == "frames":
+    if way == "frames" and "class-lobes" not in without:
         reflecting = {i: choice for i, choice in choices.items() if choice.model != EMITTER}
         adopted = adopt_from_class(reflecting, problems, {i.object_id: i.class_name for i in instances})
         choices |= {i: choice for i, choice in adopted.items() if i not in given}
@@ -222,13 +226,14 @@ def fit_specular(
         seen = np.flatnonzero(lit_diffuse.seen)
         sent = Excess(field, tuple(materials), specular, seed)
         excess[seen] = glossy_light(
-            sent, seen, irradiance[seen], threads=threads, seed=seed, progress=progress, share=(0.85, 1.0)
-        )
+            sent, seen, irradiance[seen], threads=threads, seed=seed, progress=progress, share=(0.85, 1.0),
+            without=without,
+        )  # fmt: skip
     return Specular(tuple(materials), specular, excess)
 
 
 def _look(
-    maker: Problems, object_id: int, samples: Samples, frames: int, way: str, rays: int
+    maker: Problems, object_id: int, samples: Samples, frames: int, way: str, rays: int, without: Collection[str]
 ) -> tuple[Choice, Problem | None, int, np.ndarray]:
     """Model, observations, target frame (-1: none) of one object, and which of the samples the observations are."""
     index = maker.pick(object_id, SCREEN_ELEMENTS, FIT_VIEWS)
@@ -239,20 +244,20 @@ def _look(
         score_frames(samples.frame[index], problem.light.A[:, TARGET_PHI], problem.lit_diffuse, frames)
     )
     if way == "frames":
-        choice, problem, index = _by_frames(maker, object_id, index, problem, rays)
+        choice, problem, index = _by_frames(maker, object_id, index, problem, rays, "first-look" not in without)
     else:
         choice, problem = _by_target(maker, object_id, samples.frame, target, rays)
     return choice, problem, target, index
 
 
 def _by_frames(
-    maker: Problems, object_id: int, index: np.ndarray, screen: Problem, rays: int
+    maker: Problems, object_id: int, index: np.ndarray, screen: Problem, rays: int, first_look: bool
 ) -> tuple[Choice, Problem, np.ndarray]:
     """Choose a model; in two looks, as only some objects deserve the second."""
     first = choose_model(screen)
     fit = first.fit
     hopeless = fit is None or fit.cost > HOPELESS * fit.cost_lambertian
-    if hopeless and first.model != METAL:
+    if hopeless and first.model != METAL and first_look:
         return first, screen, index
     index = maker.pick(object_id, FIT_ELEMENTS, FIT_VIEWS, seed=1)
     problem = maker.problem(index, rays)
@@ -260,7 +265,13 @@ def _by_frames(
 
 
 def _by_looks(
-    maker: Problems, object_id: int, choice: Choice, problem: Problem | None, irradiance: np.ndarray, rays: int
+    maker: Problems,
+    object_id: int,
+    choice: Choice,
+    problem: Problem | None,
+    irradiance: np.ndarray,
+    rays: int,
+    without: Collection[str],
 ) -> tuple[Choice, Problem | None]:
     """Ask whether an object looks like a metal or coated all over; choice and observations stay as they were if not."""
     if problem is not None and len(np.unique(problem.element)) >= MIN_ELEMENTS:
@@ -275,8 +286,8 @@ def _by_looks(
     looks = compare(whole, irradiance) if whole is not None else None
     if looks is None:
         return choice, problem
-    found = metal_by_looks(choice, looks, whole)
-    if found.model == LAMBERTIAN:
+    found = choice if "metal-by-looks" in without else metal_by_looks(choice, looks, whole)
+    if found.model == LAMBERTIAN and "coat-by-looks" not in without:
         found = coated_by_looks(found, compare_coat(whole, irradiance))
     return found, whole if found.looks is not None else problem
 

@@ -96,6 +96,7 @@ def build_surface(
     texel_size: float = 0.0,
     detail: float = 1.0,
     largest: int = 4096,
+    two_sides: bool = True,
 ) -> Surface:
     """Lay out the surface elements.
 
@@ -111,6 +112,8 @@ def build_surface(
         Texels along one pixel of that footprint.
     largest : int
         Upper bound of the atlas's edge.
+    two_sides : bool
+        Give triangles that are seen from both sides a second side of its own.
 
     Raises
     ------
@@ -122,7 +125,7 @@ def build_surface(
         raise BadInputError(
             "No camera of the capture looks at the mesh; check that transforms.json and mesh.ply share one frame."
         )
-    mesh = with_backs(mesh, np.flatnonzero(sides.both))
+    mesh = with_backs(mesh, np.flatnonzero(sides.both & two_sides))
     _, area = triangle_geometry(mesh)
     texel = texel_size or sides.footprint / detail
     size = atlas_size(float(area.sum()), texel, largest)

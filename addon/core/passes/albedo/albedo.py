@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,6 +84,7 @@ def albedo_of(
     instances: tuple[Instance, ...],
     emitters: set[int],
     specular: np.ndarray | float = 0.0,
+    without: Collection[str] = (),
 ) -> Albedo:
     """Albedo = L_d / S (Haefner et al. 2021, sec. 3.2), clamped, filled in and steadied (`fill`).
 
@@ -96,11 +98,13 @@ def albedo_of(
         Objects that have no albedo.
     specular : (n, 3) float32
         Part of L_d that is not diffuse.
+    without : collection of str
+        Passes left out.
     """
     rho, valid = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
-    error = np.hypot(doubt(lit_diffuse, atlas.object_id), unsure)
+    error = np.hypot(doubt(lit_diffuse, atlas.object_id, "object-spread" not in without), unsure)
     class_of = {i.object_id: i.class_name for i in instances}
-    return fill(atlas, rho, valid & lit_diffuse.seen, class_of, emitters, error)
+    return fill(atlas, rho, valid & lit_diffuse.seen, class_of, emitters, error, without)
 
 
 def fill(
@@ -110,6 +114,7 @@ def fill(
     class_of: dict[int, str],
     emitters: set[int],
     error: np.ndarray | None = None,
+    without: Collection[str] = (),
 ) -> Albedo:
     """Clamp, fill in what was not measured, and steady what was measured badly, from the same object.
 
@@ -139,7 +144,7 @@ def fill(
         if not valid[own].any():
             bare.append((object_id, own))
             continue
-        result[own], left[own] = steadied(atlas, own, result[own], error[own], most=MAX_ALBEDO)
+        result[own], left[own] = steadied(atlas, own, result[own], error[own], most=MAX_ALBEDO, without=without)
         by_class.setdefault(class_of.get(object_id, ""), []).append(np.median(result[own][valid[own]], 0))
     known = [middle for alike in by_class.values() for middle in alike]
     for object_id, own in bare:

@@ -7,6 +7,8 @@ log albedo, with the spread of the neighbours as the prior's width; a second col
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -51,7 +53,7 @@ DARK = 1e-3
 BLOCK = 1 << 11
 
 
-def doubt(lit: LitDiffuse, object_id: np.ndarray) -> np.ndarray:
+def doubt(lit: LitDiffuse, object_id: np.ndarray, of_object: bool = True) -> np.ndarray:
     """Relative standard error of each element's L_d, from its observations: (n,) float32.
 
     inf where there are none, or none but clipped ones: a lower bound may be off by any factor.
@@ -61,12 +63,16 @@ def doubt(lit: LitDiffuse, object_id: np.ndarray) -> np.ndarray:
     lit : LitDiffuse
     object_id : (n,) int
         Of each element: one seen once or twice is as unsure as others of its object.
+    of_object : bool
+        If not, all that was seen once or twice is equally unsure.
     """
     middle = np.maximum(np.nan_to_num(lit.radiance).mean(1), 1e-12)
     spread = (np.nan_to_num(lit.upper) - np.nan_to_num(lit.lower)).mean(1) / 1.35 / middle
     n = np.maximum(lit.count, 1)
     # The median of n values of standard deviation s has the error 1.25 s / sqrt(n); few values hide their spread.
-    few = _single(spread, lit.seen & (lit.count >= 3) & (lit.tier == CLEAN), object_id)
+    few = FEW
+    if of_object:
+        few = _single(spread, lit.seen & (lit.count >= 3) & (lit.tier == CLEAN), object_id)
     error = np.hypot(1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, few)) / np.sqrt(n), LEAST_DOUBT)
     error = np.where(lit.tier == CLEAN, error, error + EDGE_DOUBT)
     return np.where(lit.seen & (lit.tier != SATURATED), error, np.inf).astype(np.float32)
@@ -82,7 +88,7 @@ def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray) -> np.
     return few[object_id]
 
 
-def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> Surroundings:
+def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, outer: bool) -> Surroundings:
     """The nearest references of m places."""
     # At most an eighth of the object: a small object's ends are not each other's surroundings.
     k = min(NEIGHBOURS, max(len(references) // 8, 3), len(references))
@@ -95,7 +101,9 @@ def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -
         around = channels[:, near[part]]
         middle[part] = _quantile(np.sort(around), 0.5).T
         off = np.sort(np.abs(around - middle[part].T[..., None]).mean(0))
-        width[part] = np.maximum(1.4826 * _quantile(off, 0.5), _quantile(off, OUTER) / OUTER_OF_NORMAL)
+        width[part] = 1.4826 * _quantile(off, 0.5)
+        if outer:
+            width[part] = np.maximum(width[part], _quantile(off, OUTER) / OUTER_OF_NORMAL)
 
     for_blocks(gather, len(position), BLOCK, 0)
     return Surroundings(middle, np.maximum(width, np.float32(0.02)), near)
@@ -108,16 +116,19 @@ def _quantile(ordered: np.ndarray, share: float) -> np.ndarray:
     return (1 - rest) * ordered[..., int(low)] + rest * ordered[..., min(int(low) + 1, ordered.shape[-1] - 1)]
 
 
-def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> Surroundings:
+def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, without: Collection[str]) -> Surroundings:
     """As `_around`, from as far around each place as it stays the same.
 
     `references` are in random order: half of them reach twice as far (in area) with as many neighbours.
     """
-    found = _around(position, references, log_rho)
+    outer = "outer-width" not in without
+    found = _around(position, references, log_rho, outer)
+    if "wide-prior" in without:
+        return found
     first, allowed = found.middle.copy(), ALIKE * found.width
     todo, count = np.arange(len(position)), len(references) // 2
     while count >= 8 * NEIGHBOURS and len(todo):
-        wider = _around(position[todo], references[:count], log_rho[:count])
+        wider = _around(position[todo], references[:count], log_rho[:count], outer)
         alike = np.abs(wider.middle - first[todo]).mean(1) <= allowed[todo]
         todo = todo[alike]
         for kept, new in zip(found, wider, strict=True):
@@ -127,7 +138,13 @@ def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) ->
 
 
 def steadied(
-    atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, seed: int = 0, most: float = np.inf
+    atlas: Atlas,
+    own: np.ndarray,
+    rho: np.ndarray,
+    error: np.ndarray,
+    seed: int = 0,
+    most: float = np.inf,
+    without: Collection[str] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Albedo of one object's elements, each drawn towards its neighbourhood as far as it is in doubt.
 
@@ -141,6 +158,8 @@ def steadied(
         Relative standard error; 0: stays as it is; inf: not measured. At least one is finite.
     most : float
         Albedo that `rho` was clamped to.
+    without : collection of str
+        Passes left out.
 
     Returns
     -------
@@ -167,7 +186,7 @@ def steadied(
     asked, index = np.unique(index[todo], return_inverse=True)
     rho = np.maximum(rho, DARK)
     reference, reference_error = rho[sure], error[sure]
-    around = _prior(centre[asked], position[sure], np.log(reference))
+    around = _prior(centre[asked], position[sure], np.log(reference), without)
     steady, left = rho.astype(np.float32), error.astype(np.float32)
     rho, error = rho[todo], error[todo]
     measured = np.isfinite(error)
@@ -181,11 +200,13 @@ def steadied(
     surprise = off**2 - (SURPRISE * error) ** 2
     wide = np.maximum(width**2, surprise)
     trust = (wide / (wide + error**2)).astype(np.float32)
+    if "albedo-prior" in without:
+        trust[:] = 1
     trust[~measured] = 0
     left[todo] = np.where(measured, np.sqrt(trust[:, 0]) * error[:, 0], width[:, 0])
     result = trust * log_rho + (1 - trust) * middle
-    result[measured] = drawn_to_minority(
-        result[measured], rho[measured], error[measured, 0], around, index[measured], reference, reference_error, most
-    )
+    if not {"second-colour", "albedo-prior"} & set(without):
+        near = around, index[measured], reference, reference_error
+        result[measured] = drawn_to_minority(result[measured], rho[measured], error[measured, 0], *near, most)
     steady[todo] = np.exp(result)
     return steady, left

@@ -71,7 +71,7 @@ class _Light:
 
 
 def caustics(
-    room: LightField, bright: BrightTriangles, lobes: Lobes, seed: int = 0, photons: int = PHOTONS
+    room: LightField, bright: BrightTriangles, lobes: Lobes, seed: int = 0, photons: int = PHOTONS, finer: bool = True
 ) -> np.ndarray:
     """E by way of glossy reflections of what bright triangles send, less what was taken for it.
 
@@ -81,6 +81,8 @@ def caustics(
         With its lamps. Mirrors stop photons.
     lobes : Lobes
     photons : int
+    finer : bool
+        Look in finer cells where there are many.
 
     Returns
     -------
@@ -112,7 +114,7 @@ def caustics(
                 break
             element, place, at = _met(room, sent)
             _let_fall(fallen, element, sent.power[at])
-    return _over_cells(room.atlas, halves)
+    return _over_cells(room.atlas, halves, FINER if finer else ())
 
 
 def _let_fall(fallen: np.ndarray, element: np.ndarray, power: np.ndarray) -> None:
@@ -156,12 +158,12 @@ def _sent_on(room: LightField, lobes: Lobes, element: np.ndarray, light: _Light,
     return _Light(origin, ways, light.power[alive] * share[alive])
 
 
-def _over_cells(atlas: Atlas, halves: np.ndarray) -> np.ndarray:
+def _over_cells(atlas: Atlas, halves: np.ndarray, sizes: tuple[float, ...] = FINER) -> np.ndarray:
     """Power over area in cells of the surface and its noise, (n, 6) float32; in finer ones where enough photons lie."""
     (a, b), everything = halves, np.arange(halves.shape[2])
     fallen = np.concatenate([a[:3] + b[:3], a[:3] - b[:3], a[3:] + b[3:]])
     result, count = _density(atlas, fallen, everything, CELL)
-    for size in FINER:
+    for size in sizes:
         many = np.flatnonzero(count > ENOUGH)
         if not len(many):
             break

@@ -9,6 +9,8 @@ towards where the ray came from. The rest of E stays as it was.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from ...light.emitters import bright_triangles
@@ -81,9 +83,9 @@ class Excess(LightField):
         """Whether there is anything glossy at all."""
         return bool(self._width.any())
 
-    def from_bright(self) -> np.ndarray:
+    def from_bright(self, finer: bool = True) -> np.ndarray:
         """The part of the excess that starts at bright triangles, and its noise, at every element (`caustics`)."""
-        return caustics(self._lit, self._sources, Lobes(self._width, self._f0, self._inside), self._seed)
+        return caustics(self._lit, self._sources, Lobes(self._width, self._f0, self._inside), self._seed, finer=finer)
 
     def arriving(
         self, hits: Hits, element: np.ndarray, directions: np.ndarray, dark_in_mirrors: np.ndarray | None = None
@@ -115,6 +117,7 @@ def glossy_light(
     seed: int = 0,
     progress: Progress | None = None,
     share: tuple[float, float] = (0.0, 1.0),
+    without: Collection[str] = (),
 ) -> np.ndarray:
     """What is to be added to E, radiance * steradian, (m, 3) float32.
 
@@ -125,6 +128,8 @@ def glossy_light(
         E without it.
     share : (float, float)
         From where to where the stage's progress goes.
+    without : collection of str
+        Passes left out.
     """
     if not excess.any or not len(element):
         return np.zeros((len(element), 3), np.float32)
@@ -159,7 +164,10 @@ def glossy_light(
         return interpolated(position[index], normal[index], lambda i: gathered(index[i]), finest, threads)[0]
 
     found = TexelBlocks(atlas, element, threads).evaluate(around, block_step(atlas), np.inf)
-    found += excess.from_bright()[element]
+    if "caustics" not in without:
+        found += excess.from_bright("fine-photons" not in without)[element]
     # Spread like the light itself, the halves' difference has the noise that is left in it.
-    found, _ = less_noise(position, normal, found[:, :3] - level, found[:, 3:].mean(1), SMOOTH)
+    found, noise = found[:, :3] - level, found[:, 3:].mean(1)
+    if "glossy-smoothing" not in without:
+        found, _ = less_noise(position, normal, found, noise, SMOOTH)
     return np.maximum(found, -MOST_TAKEN * irradiance).astype(np.float32)

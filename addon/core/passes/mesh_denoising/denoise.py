@@ -24,6 +24,7 @@ noise opened are closed (`cracks`).
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -171,15 +172,15 @@ def _large(points: np.ndarray, faces: np.ndarray, least: float) -> np.ndarray:
     return (np.linalg.norm(high - low, axis=1) >= least)[part[faces[:, 0]]]
 
 
-def without_noise(mesh: Mesh) -> tuple[Mesh, float]:
+def without_noise(mesh: Mesh, without: Collection[str] = ()) -> tuple[Mesh, float]:
     """The mesh denoised, and the noise that was found; one with too little to tell from shape is given back itself."""
     noise = noise_of(mesh)
     if noise < LEAST_NOISE:
         return mesh, 0.0
-    return replace(mesh, vertices=denoised(mesh, noise)), noise
+    return replace(mesh, vertices=denoised(mesh, noise, without)), noise
 
 
-def denoised(mesh: Mesh, noise: float) -> np.ndarray:
+def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndarray:
     """The mesh's vertices without their noise, (v, 3) float64.
 
     Parameters
@@ -189,6 +190,8 @@ def denoised(mesh: Mesh, noise: float) -> np.ndarray:
     noise : float
         Standard deviation along the normal, in metres, of what is independent from vertex to vertex
         (`mesh_noise.noise_of`); 0 gives the vertices back as they are.
+    without : collection of str
+        Passes left out.
     """
     if not noise > 0:
         return mesh.vertices
@@ -200,7 +203,9 @@ def denoised(mesh: Mesh, noise: float) -> np.ndarray:
     if not len(faces):
         return mesh.vertices
     hinges = hinges_of(faces)
-    points, crowded = unfolded(measured, faces, noise)
+    points, crowded = measured, np.zeros(len(measured))
+    if "unfolding" not in without:
+        points, crowded = unfolded(measured, faces, noise)
     points = _within(points, measured, FARTHEST * noise)
     told, held = measured + crowded[:, None] * (points - measured), (1 + HELD * crowded) / noise**2
     variance, rng = np.zeros(len(hinges.a)), np.random.default_rng(0)
@@ -212,7 +217,10 @@ def denoised(mesh: Mesh, noise: float) -> np.ndarray:
         # The angles are linear over small steps only.
         points = points + np.clip(step, -noise, noise)[:, None] * normal
         points = _within(points, measured, FARTHEST * noise)
-        if scale != SCALES[-1]:
+        if scale != SCALES[-1] and "angle-variance" not in without:
             variance = _variance(held, weight, change, system, rng)
-    points = closed(onto_sheets(measured, points, faces, noise), faces, noise)
+    if "sheets" not in without:
+        points = onto_sheets(measured, points, faces, noise, "shared-error" not in without)
+    if "cracks" not in without:
+        points = closed(points, faces, noise)
     return mesh.vertices + (points - measured)[place]

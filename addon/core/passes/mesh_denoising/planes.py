@@ -274,7 +274,9 @@ def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: tuple
     return None
 
 
-def sheets_of(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise: float) -> tuple[list[Sheet], Grower]:
+def sheets_of(
+    measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise: float, shared_error: bool = True
+) -> tuple[list[Sheet], Grower]:
     """The flat and gently bent parts of a mesh.
 
     Parameters
@@ -284,6 +286,8 @@ def sheets_of(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise
     faces : (t, 3) int
     noise : float
         Metres.
+    shared_error : bool
+        Leave out what neighbouring points' residuals tell from a sheet (`moran`).
     """
 
     def found(most: float) -> tuple[list[Sheet], list[float]]:
@@ -310,12 +314,14 @@ def sheets_of(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise
     seeds = grower.seeds()
     # A scan's smooth error is shared by neighbours, too: most of a room's flat parts tell how much.
     sheets, index = found(np.inf)
-    sheets, _ = found(most_alike(index, [float(grower.area[sheet.faces].sum()) for sheet in sheets]))
+    if shared_error:
+        sheets, _ = found(most_alike(index, [float(grower.area[sheet.faces].sum()) for sheet in sheets]))
     return sheets, grower
 
 
-def onto_sheets(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray,
-                noise: float) -> np.ndarray:  # fmt: skip
+def onto_sheets(
+    measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise: float, shared_error: bool = True
+) -> np.ndarray:
     """Points moved onto the sheets of their triangles, and onto lines and corners where sheets meet:
 
         minimise  |x - smooth|^2 + STIFF^2 sum over sheets (distance of x)^2
@@ -323,7 +329,7 @@ def onto_sheets(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray,
     Parameters as of `sheets_of`. A point that would go farther than `REACH` from where it was measured goes to its
     largest sheet alone; one of no sheet, or too far even from that, is given back `smooth`. (p, 3) float.
     """
-    sheets, grower = sheets_of(measured, smooth, faces, noise)
+    sheets, grower = sheets_of(measured, smooth, faces, noise, shared_error)
     moved = smooth.copy()
     if not sheets:
         return moved

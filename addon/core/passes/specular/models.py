@@ -172,8 +172,9 @@ def choose_model(problem: Problem) -> Choice:
         (_bare_metal(problem, layout, phi, metal, scale) for phi in layout.grid[layout.grid <= BROADEST_PHI]),
         key=lambda one: one[1].sum(),
     )
-    found += [(*bare, without)] if _metallic(bare[0]) else []
-    no_diffuse = _metallic(bare[0]) and bool(bare[1].sum() <= BARE * without.sum())
+    with_bare = _metallic(bare[0]) and "bare-metal" not in problem.without
+    found += [(*bare, without)] if with_bare else []
+    no_diffuse = with_bare and bool(bare[1].sum() <= BARE * without.sum())
     for fit_of_metal, with_metal, matt in found:
         scores[METAL] = min(float(with_metal.sum() / max(matt.sum(), 1e-30)), scores.get(METAL, np.inf))
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from ...fit.layout import Problem
@@ -55,11 +57,21 @@ class Problems:
     field : LightField
     lit_diffuse : LitDiffuse
     samples : Samples
+    without : collection of str
+        Passes left out.
     """
 
-    def __init__(self, field: LightField, lit_diffuse: LitDiffuse, samples: Samples, threads: int = 0, seed: int = 0):
+    def __init__(
+        self,
+        field: LightField,
+        lit_diffuse: LitDiffuse,
+        samples: Samples,
+        threads: int = 0,
+        seed: int = 0,
+        without: Collection[str] = (),
+    ):
         self._field, self._lit, self._samples = field, lit_diffuse, samples
-        self._threads, self._seed = threads, seed
+        self._threads, self._seed, self._without = threads, seed, without
         self._bright = bright_triangles(field)
         # A clipped pixel is no value; what is left is sorted by object, so that each object's lies together.
         usable = np.flatnonzero(~samples.saturated)
@@ -85,7 +97,7 @@ class Problems:
             return reflected_light(self._field, self._bright, element, direction, rays=count, **how)
 
         found = light(index, rays)
-        if rough:
+        if rough or "more-rays" in self._without:
             return found
         noisy = np.flatnonzero(_noise(found, self._samples.radiance[index]) > NOISY)
         return found.replaced(noisy, light(index[noisy], AGAIN * rays)) if len(noisy) else found
@@ -99,7 +111,9 @@ class Problems:
         element = self._samples.element[index]
         cosine = np.einsum("ij,ij->i", self._field.atlas.normal[element], self._samples.direction[index])
         radiance = self._samples.radiance[index]
-        return Problem(element, radiance, self._lit.radiance[element], self.light(index, rays, phi, rough), cosine)
+        light = self.light(index, rays, phi, rough)
+        light = light.as_exact() if "ray-noise" in self._without else light
+        return Problem(element, radiance, self._lit.radiance[element], light, cosine, frozenset(self._without))
 
 
 def _noise(light: LobeLight, radiance: np.ndarray) -> np.ndarray:

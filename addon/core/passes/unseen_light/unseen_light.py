@@ -7,6 +7,7 @@ by one, then all that was solved is refined together.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -106,6 +107,7 @@ def find_light(
     tilted: np.ndarray | None = None,
     colours: dict[int, np.ndarray] | None = None,
     before: Light | None = None,
+    without: Collection[str] = (),
 ) -> Light:
     """Lamps seen and unseen, and the sky.
 
@@ -124,6 +126,8 @@ def find_light(
         Colour of light that is known of unseen objects, of luminance 1.
     before : Light, optional
         What was found in the same room without its sun.
+    without : collection of str
+        Passes left out.
     """
     flat = on_flat(field.atlas)
     if tilted is not None:
@@ -136,10 +140,11 @@ def find_light(
     if not len(element):
         return Light((), field.environment, (), element, np.zeros((0, 3)))
     old = before.thrown if before is not None and field.environment.seen else None
-    field, found = with_whole_sky(field, element, seed)
+    field, found = (field, ()) if "whole-sky" in without else with_whole_sky(field, element, seed)
     environment, atlas = field.environment, field.atlas
-    zones = environment.unseen_zones() if environment.seen else []
-    if environment.clipped.any():
+    solve_zones = environment.seen and "unseen-sky" not in without
+    zones = environment.unseen_zones() if solve_zones else []
+    if environment.clipped.any() and "unseen-sky" not in without:
         zones.append(environment.clipped_zone())
     known = environment
     for zone in zones:
@@ -177,7 +182,8 @@ def find_light(
         lit_room = field.with_light(even, environment)
         least = {i: most_reflected(lit_room, i, seed) for i in unseen_objects}
 
-    sky = Sky([G[lit] for G in thrown_sky], guess, bool(environment.clipped.any()), [zone.told for zone in zones])
+    clipped_sky = bool(zones) and bool(environment.clipped.any())
+    sky = Sky([G[lit] for G in thrown_sky], guess, clipped_sky, [zone.told for zone in zones])
     colours = shared_by_class(colours or {}, unseen_objects, instances)
 
     def solve(thrown: dict[int, np.ndarray], sky: Sky) -> tuple[list[Lamp], Sky, np.ndarray]:
@@ -190,13 +196,14 @@ def find_light(
         return lamps, sky, np.log(np.maximum(sent, 1e-9) / np.maximum(E, 1e-12))
 
     lamps, sky, log_albedo = solve(thrown, sky)
-    if lamps and not known_thrown:
+    if lamps and not known_thrown and "shades" not in without:
         thrown |= _by_shades(field, lamps, even, sample, log_albedo, thrown, seed)
         lamps, sky, log_albedo = solve(thrown, sky)
     class_of = {i.object_id: i.class_name for i in instances}
     kind = kinds_of(sample.object_id, log_albedo, class_of)
     sample = replace(sample, kind=kind, cap=CLIPPED_CAP if clipped else CAP)
-    lamps = refined(sample, lamps, thrown, least, instances, seen, sky, received[lit], colours)
+    if "joint-light" not in without:
+        lamps = refined(sample, lamps, thrown, least, instances, seen, sky, received[lit], colours)
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))
     # With all light known, what looked like a lamp for want of it does so no more.
