@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .findings import Findings
 from .light import LightEvidence, light_evidence
 from .objects import ObjectEvidence, object_evidence
 from .texel import TexelEvidence, texel_evidence, without_light
-
-if TYPE_CHECKING:
-    from ..pipeline.recover import Recovery
 
 
 @dataclass(frozen=True)
@@ -36,14 +33,11 @@ class Evidence:
         return {"albedo_error": t.albedo, "evidence": np.stack([t.shading, t.clipped, t.unseen], -1)}
 
 
-def collect(run: Recovery) -> Evidence:
-    """The evidence of a run whose stages are done; a few thousand spots are gathered at again."""
-    atlas, lit, shading, specular = run.surface().atlas, run.lit_diffuse(), run.shading(), run.specular()
-    own = without_light(atlas, lit, run.albedo)
-    light = light_evidence(run.field, shading, lit, own, threads=run.settings.threads, seed=run.settings.seed)
-    texels = texel_evidence(
-        atlas, lit, run.albedo, own, light, list(specular.materials), specular.specular, run.irradiance
-    )
-    given = [i for i, one in run.overrides.objects.items() if one.base_color is not None]
-    texels.albedo[np.isin(atlas.object_id, given)] = 0
-    return Evidence(light, texels, object_evidence(atlas, lit, run.albedo, texels))
+def collect(found: Findings) -> Evidence:
+    """The evidence of a finished recovery; a few thousand spots are gathered at again."""
+    atlas, lit, albedo = found.surface.atlas, found.lit_diffuse, found.albedo
+    own = without_light(atlas, lit, albedo)
+    light = light_evidence(found.field, found.shading, lit, own, threads=found.threads, seed=found.seed)
+    texels = texel_evidence(atlas, lit, albedo, own, light, found.materials, found.specular, found.irradiance)
+    texels.albedo[np.isin(atlas.object_id, list(found.coloured))] = 0
+    return Evidence(light, texels, object_evidence(atlas, lit, albedo, texels))

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..light.emitters import LUMINANCE
 from ..light.environment import Environment
 from ..light.field import LightField
 from ..light.over_surface import irradiance
 from ..light.shading import Shading
+from ..luminance import LUMINANCE
 from ..scene.atlas import Atlas
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.visibility import SATURATED

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,36 +11,35 @@ from ..errors import BadInputError
 from ..io.png import data_address
 from ..material import EMITTER, METAL, SPECULAR, Z90, ObjectMaterial
 from ..photo import encoded
+from .collect import Evidence
 from .colours import MODEL, heat_css
+from .findings import Findings
 from .objects import ObjectEvidence
 from .pictures import Picture, pictures_of
 from .style import STYLE
 from .views import choose_frames, view
-
-if TYPE_CHECKING:
-    from ..pipeline.recover import Recovery
 
 FRAMES = 3
 ROWS = 80
 """Objects in the table; materials.json lists them all."""
 
 
-def make_page(run: Recovery, report: dict[str, Any]) -> str:
-    """The page of a run whose stages are done.
+def make_page(found: Findings, evidence: Evidence, report: dict[str, Any]) -> str:
+    """The page of a finished recovery.
 
     Parameters
     ----------
     report : dict
         What report.json will hold.
     """
-    name = escape(run.capture.root.name)
+    name = escape(found.name)
     parts = [
         f"<h1>{name} <small>recovered by Scan Relight</small></h1>",
-        _facts(run, report),
+        _facts(found, report),
         _warnings(report["warnings"]),
-        _pictures(run),
-        _objects(run),
-        _lamps(run),
+        _pictures(found, evidence),
+        _objects(found, evidence),
+        _lamps(found),
         "<footer>Intervals are meant to hold the truth nine times out of ten; docs/evidence.md says how that was "
         "measured. The numbers behind this page: report.json, materials.json, coverage.exr, albedo_error.exr, "
         "evidence.exr.</footer>",
@@ -52,16 +51,16 @@ def make_page(run: Recovery, report: dict[str, Any]) -> str:
     return head + "\n".join(parts) + "</body></html>\n"
 
 
-def _facts(run: Recovery, report: dict[str, Any]) -> str:
+def _facts(found: Findings, report: dict[str, Any]) -> str:
     figures, sure = report["figures"], report["figures"]["evidence"]
-    lamps = run.shading().lamps
+    lamps = found.shading.lamps
     hidden = sum(not lamp.seen for lamp in lamps)
-    glossy = sum(m.model in (SPECULAR, METAL) for m in run.materials())
+    glossy = sum(m.model in (SPECULAR, METAL) for m in found.materials)
     tiles = [
         (f"{1 - figures['unseen_share']:.0%}", "of the surface seen by a frame; the rest is filled in"),
         (f"&plusmn;{Z90 * sure.get('albedo_error_median', 1):.0%}", "of an albedo that was measured, in the median"),
         (f"{sure.get('unseen_light_mean', 0):.0%}", "of the light comes from what no frame saw"),
-        (f"{glossy} of {len(run.materials())}", "objects with a highlight"),
+        (f"{glossy} of {len(found.materials)}", "objects with a highlight"),
         (f"{len(lamps)}", "lamps" + (f", {hidden} of them solved for" if hidden else "")),
         (
             f"{figures['frames']}",
@@ -79,19 +78,19 @@ def _warnings(warnings: list[str]) -> str:
     return '<ul class="warnings">' + "".join(f"<li>{escape(one)}</li>" for one in warnings) + "</ul>"
 
 
-def _pictures(run: Recovery) -> str:
-    names = {i.object_id: i.name for i in run.capture.instances}
-    if not run.capture.frames:
+def _pictures(found: Findings, evidence: Evidence) -> str:
+    names = {i.object_id: i.name for i in found.instances}
+    if not found.frames:
         return "<h2>Frames</h2><p>None; the light is the one stored on the capture's mesh.</p>"
     result = ["<h2>Frames</h2>"]
-    for index in choose_frames(run, FRAMES):
+    for index in choose_frames(found, FRAMES):
         try:
-            seen = view(run, index)
+            seen = view(found, index)
         except BadInputError:  # it was readable before; the page is not what to stop for
             continue
-        pictures, worst = pictures_of(run, seen)
+        pictures, worst = pictures_of(found, evidence.texels, seen)
         told = ", ".join(f"{escape(names.get(i, 'outside'))} {size:.0%}" for i, size in worst)
-        result.append(f"<h3>{escape(run.frames[index].name)} <small>worst residuals: {told or 'none'}</small></h3>")
+        result.append(f"<h3>{escape(found.frames[index].name)} <small>worst residuals: {told or 'none'}</small></h3>")
         result.append('<div class="frames">' + "".join(map(_figure, pictures)) + "</div>")
     chips = "".join(f'<span><i style="background:rgb{colour}"></i>{model}</span>' for model, colour in MODEL.items())
     return "\n".join(result) + f'<p class="chips">{chips}<span>lighter: glossier</span></p>'
@@ -105,10 +104,10 @@ def _figure(picture: Picture) -> str:
     )
 
 
-def _objects(run: Recovery) -> str:
+def _objects(found: Findings, evidence: Evidence) -> str:
     """A table of the objects, the least certain first."""
-    evidence = {one.object_id: one for one in run.evidence.objects}
-    known = [(m, evidence[m.object_id]) for m in run.materials() if m.object_id in evidence and m.model != EMITTER]
+    sure = {one.object_id: one for one in evidence.objects}
+    known = [(m, sure[m.object_id]) for m in found.materials if m.object_id in sure and m.model != EMITTER]
     known.sort(key=lambda pair: -_doubt(pair[1]))
     rows = "".join(_row(m, e) for m, e in known[:ROWS])
     more = f"<p>{len(known) - ROWS} more are in materials.json.</p>" if len(known) > ROWS else ""
@@ -150,9 +149,9 @@ def _interval(value: float | None, low: float | None, high: float | None) -> str
     return ("unknown" if between else "") + between if value is None else f"{value:.2f}{between}"
 
 
-def _lamps(run: Recovery) -> str:
-    names = {i.object_id: i.name for i in run.capture.instances}
-    lamps = run.shading().lamps
+def _lamps(found: Findings) -> str:
+    names = {i.object_id: i.name for i in found.instances}
+    lamps = found.shading.lamps
     if not lamps:
         return "<h2>Lamps</h2><p>None; all light comes from outside.</p>"
     rows = "".join(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
@@ -11,10 +10,9 @@ from scipy import ndimage
 from ..material import METAL
 from ..photo import encoded, photo
 from .colours import NOTHING, gloss, heat
+from .findings import Findings
+from .texel import TexelEvidence
 from .views import View
-
-if TYPE_CHECKING:
-    from ..pipeline.recover import Recovery
 
 ERROR_TOP, RESIDUAL_TOP, VIEWS_TOP = 0.5, 0.5, 20
 """What lies at the bright end of the heat maps: relative errors, and the number of views."""
@@ -41,25 +39,25 @@ class Picture:
     legend: str = ""
 
 
-def pictures_of(run: Recovery, view: View) -> tuple[list[Picture], list[tuple[int, float]]]:
+def pictures_of(found: Findings, errors: TexelEvidence, view: View) -> tuple[list[Picture], list[tuple[int, float]]]:
     """Pictures of a frame, and its worst residuals: (object_id, mean relative residual) from the worst on."""
     element, nothing = view.element, view.element < 0
     shown = np.maximum(element, 0)
-    albedo, errors, shading = run.albedo.rho, run.evidence.texels, run.irradiance
+    albedo, shading = found.albedo.rho, found.irradiance
     middle = float(np.median(view.radiance[view.valid])) if view.valid.any() else 1.0
-    emitters = np.isin(view.object_id, list(run.emitters))
+    emitters = np.isin(view.object_id, list(found.emitters))
 
     relative = errors.albedo[shown].mean(-1) / np.maximum(albedo[shown].mean(-1), 0.02)
     residual = view.residual
     worst = worst_blocks(residual, view.object_id)
     light = shading[shown]
     grey = float(np.median(light[~nothing].mean(-1))) if not nothing.all() else 1.0
-    metals = {m.object_id: m.f0 for m in run.materials() if m.model == METAL}
+    metals = {m.object_id: m.f0 for m in found.materials if m.model == METAL}
     bare = nothing | emitters | np.isin(view.object_id, list(metals))
     colour = _where(nothing | emitters, encoded(albedo[shown]))
     for object_id, f0 in metals.items():
         colour[view.object_id == object_id] = encoded(np.array(f0))
-    views = _where(nothing, heat(run.lit_diffuse().count[shown], VIEWS_TOP))
+    views = _where(nothing, heat(found.lit_diffuse.count[shown], VIEWS_TOP))
     residual = _boxed(heat(residual, RESIDUAL_TOP), worst)
     unsure = _where(bare, heat(relative, ERROR_TOP))
     pictures = [
@@ -70,7 +68,7 @@ def pictures_of(run: Recovery, view: View) -> tuple[list[Picture], list[tuple[in
         Picture("Albedo's standard error, relative", unsure, _up_to(f"{ERROR_TOP:.0%}")),
         Picture("Light that arrives (shading)", _where(nothing, photo(light, grey))),
         Picture("Views of each spot", views, _up_to(VIEWS_TOP)),
-        Picture("Model, lighter the glossier", _models(run, view)),
+        Picture("Model, lighter the glossier", _models(found, view)),
     ]
     told = [(int(view.object_id[y + BLOCK // 2, x + BLOCK // 2]), size) for y, x, size in worst]
     return pictures, told
@@ -113,9 +111,9 @@ def _where(nothing: np.ndarray, image: np.ndarray) -> np.ndarray:
     return image
 
 
-def _models(run: Recovery, view: View) -> np.ndarray:
+def _models(found: Findings, view: View) -> np.ndarray:
     image = np.empty((*view.object_id.shape, 3), np.uint8)
     image[:] = NOTHING
-    for m in run.materials():
+    for m in found.materials:
         image[view.object_id == m.object_id] = gloss(m.model, m.phi)
     return image

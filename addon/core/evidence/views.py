@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +10,7 @@ from ..io.pixels import read_pixels
 from ..light.emitters import bright_triangles
 from ..light.lobes import GRID, reflected_light
 from ..material import METAL, SPECULAR
-
-if TYPE_CHECKING:
-    from ..pipeline.recover import Recovery
+from .findings import Findings
 
 WIDTH = 240
 """Pictures are this wide at most."""
@@ -64,13 +61,13 @@ class View:
         return np.where(inner, np.abs(told - seen) / np.maximum(level, 1e-30), 0)
 
 
-def choose_frames(run: Recovery, count: int) -> list[int]:
+def choose_frames(found: Findings, count: int) -> list[int]:
     """Frames that together show the most surface, the one that shows most first."""
-    samples, atlas = run.samples(), run.surface().atlas
+    samples, atlas = found.samples, found.surface.atlas
     area, chosen = atlas.area[samples.element].astype(np.float64), []
     left = np.ones(len(atlas), bool)
-    while len(chosen) < min(count, len(run.capture.frames)):
-        gain = np.bincount(samples.frame, area * left[samples.element], len(run.capture.frames))
+    while len(chosen) < min(count, len(found.frames)):
+        gain = np.bincount(samples.frame, area * left[samples.element], len(found.frames))
         gain[chosen] = -1
         best = int(np.argmax(gain))
         if gain[best] <= 0:
@@ -80,21 +77,21 @@ def choose_frames(run: Recovery, count: int) -> list[int]:
     return chosen
 
 
-def view(run: Recovery, index: int) -> View:
+def view(found: Findings, index: int) -> View:
     """Frame `index` made small, and predicted."""
-    frame = run.frames[index]
+    frame = found.frames[index]
     step = -(-frame.camera.width // WIDTH)
     pixels, camera = read_pixels(frame).coarser(step), frame.camera.coarser(step)
     directions, seen = camera.rays(camera.pixel_centres())
     origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
-    room, surface = run.field, run.surface()
+    room, surface = found.field, found.surface
     hits = surface.scene.intersect(np.ascontiguousarray(origins), directions)
     element = np.where(seen, room.elements(hits), -1)
     predicted = room.arriving(hits, element, directions)
     predicted[~seen] = 0
     hit = np.flatnonzero(element >= 0)
-    predicted[hit] -= run.specular().specular[element[hit]]
-    _add_lobes(run, predicted, element, directions)
+    predicted[hit] -= found.specular[element[hit]]
+    _add_lobes(found, predicted, element, directions)
     shape = (camera.height, camera.width)
     ids = np.where(element >= 0, surface.atlas.object_id[element], -1)
     return View(
@@ -103,20 +100,20 @@ def view(run: Recovery, index: int) -> View:
     )  # fmt: skip
 
 
-def _add_lobes(run: Recovery, predicted: np.ndarray, element: np.ndarray, directions: np.ndarray) -> None:
+def _add_lobes(found: Findings, predicted: np.ndarray, element: np.ndarray, directions: np.ndarray) -> None:
     """Highlights of what has one; a metal has nothing else, and a flat mirror was followed already."""
-    room = run.field
+    room = found.field
     bright = bright_triangles(room)
     mirrors = {mirror.object_id for mirror in room.mirrors}
     owner = np.where(element >= 0, room.atlas.object_id[element], -1)
-    for m in run.materials():
+    for m in found.materials:
         at = np.flatnonzero(owner == m.object_id)
         if m.model not in (SPECULAR, METAL) or m.object_id in mirrors or not len(at):
             continue
         phi = max(float(m.phi), float(GRID[0]))
         light = reflected_light(
             room, bright, element[at], -directions[at], rays=LOBE_RAYS, grid=np.float32([phi]), proposals=(phi,),
-            threads=run.settings.threads, seed=run.settings.seed,
+            threads=found.threads, seed=found.seed,
         )  # fmt: skip
         f0 = np.float32(m.f0 if m.model == METAL else m.psi)
         if m.model == METAL:

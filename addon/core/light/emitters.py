@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..luminance import LUMINANCE
 from ..scene.elements import triangle_geometry
 from ..scene.rays import Hits
 from .field import LightField
 
-LUMINANCE = np.float32([0.2126, 0.7152, 0.0722])
 BRIGHT = 8.0
 """A triangle is bright from this multiple of the surface's mean radiance on. Only the noise depends on it, not the
 expectation: what is not aimed at is still gathered."""

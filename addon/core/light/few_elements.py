@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..luminance import LUMINANCE
 from ..parallel import for_blocks
-from .emitters import BRIGHT, LUMINANCE, bright_triangles
+from .emitters import BRIGHT, bright_triangles
 from .environment import Environment
 from .field import LightField
 from .irradiance import direct, gather

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,7 @@ from ..scene.model import Mesh
 from ..scene.rays import Hits, RayScene
 from .environment import Environment
 from .mirrors import Mirror
-
-if TYPE_CHECKING:
-    from .sun import Sun
+from .sun import Sun
 
 FLAT = np.cos(np.radians(2.0))
 """Triangles turned less than this against a mirror's plane belong to it."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .emitters import LUMINANCE
+from ..luminance import LUMINANCE
 
 EMITTER_ALBEDO = 2.0
 """An object whose median albedo would have to be above this gives light of its own. 1 is the physical bound; the rest

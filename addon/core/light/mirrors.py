@@ -8,7 +8,7 @@ through it (`over_mirrors`). On the living room that took the albedo from 28.0 t
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -17,10 +17,6 @@ from scipy.sparse.linalg import spsolve
 from ..scene.elements import triangle_geometry
 from ..scene.model import KnownMirror, Mesh
 from ..scene.weld import same_place
-
-if TYPE_CHECKING:
-    from .field import LightField
-
 
 SAME = np.cos(np.radians(5.0))
 """Triangles turned less than this against a mirror's plane are put into it: a scan's are off by a degree or two, bevels
@@ -67,10 +63,10 @@ class Mirror:
         return Mirror(known["object_id"], point, normal, f0, np.int32(known["facets"]), facing)
 
 
-def known_mirror(known: KnownMirror, field: LightField) -> Mirror:
+def known_mirror(known: KnownMirror, mesh: Mesh) -> Mirror:
     """The mirror that a capture tells of, its normal turned to its object's front."""
-    own = field.mesh.object_id == known.object_id
-    turn = -1.0 if (field.normal[own] @ known.normal).sum() < 0 else 1.0
+    normal, _ = triangle_geometry(mesh)
+    turn = -1.0 if (normal[mesh.object_id == known.object_id] @ known.normal).sum() < 0 else 1.0
     return Mirror(
         known.object_id,
         np.float32(known.point),

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..luminance import LUMINANCE
 from .directions import cosine_hemisphere, shifted, sobol, to_world
-from .emitters import LUMINANCE
 from .field import LightField
 
 CELLS = 24

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..luminance import LUMINANCE
 from ..scene.rays import RayScene
 from .directions import shifted, sobol, tangent_frame
-from .emitters import LUMINANCE
 from .environment import Environment
 
 RADIUS = float(np.radians(0.27))

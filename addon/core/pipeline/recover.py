@@ -14,6 +14,7 @@ from ..atomic import write_bytes
 from ..brdf.compensation import base_colors, with_metals
 from ..errors import BadInputError
 from ..evidence.collect import Evidence, collect
+from ..evidence.findings import Findings
 from ..evidence.page import make_page
 from ..io.fingerprint import fingerprint
 from ..io.pixels import read_pixels
@@ -307,7 +308,7 @@ class Recovery(Corrected):
     def _find_mirrors(self, field: LightField, lamps: tuple | None) -> tuple[Mirror, ...]:
         noisy = lamps is not None and self.surface().noise > 0 and "facets" not in self.settings.without
         found = find_mirrors(field, lamps or (), self.samples(), self.capture.instances, self.settings.seed, noisy)
-        told = [known_mirror(mirror, field) for mirror in self._near.mirrors]
+        told = [known_mirror(mirror, field.mesh) for mirror in self._near.mirrors]
         return (*found, *(one for one in told if one.object_id not in {mirror.object_id for mirror in found}))
 
     @cached_property
@@ -356,10 +357,31 @@ class Recovery(Corrected):
             return with_metals(self.albedo.rho, self.surface().atlas.object_id, self.materials())
         return base_colors(self.albedo.rho, self.surface().atlas.object_id, self.materials())
 
+    @property
+    def findings(self) -> Findings:
+        """All that was found; asks for every stage."""
+        return Findings(
+            name=self.capture.root.name,
+            instances=self.capture.instances,
+            frames=self.frames,
+            surface=self.surface(),
+            lit_diffuse=self.lit_diffuse(),
+            samples=self.samples(),
+            shading=self.shading(),
+            field=self.field,
+            specular=self.specular().specular,
+            irradiance=self.irradiance,
+            albedo=self.albedo,
+            materials=self.materials(),
+            coloured=frozenset(i for i, one in self.overrides.objects.items() if one.base_color is not None),
+            threads=self.settings.threads,
+            seed=self.settings.seed,
+        )
+
     @cached_property
     def evidence(self) -> Evidence:
         """How sure all of it is."""
-        return collect(self)
+        return collect(self.findings)
 
     def median_radiance(self) -> float:
         """Median of L_d over all that was seen: what a picture's exposure is set by."""
@@ -408,7 +430,7 @@ class Recovery(Corrected):
         told |= {name: value for name, value in self.overrides.as_dict().items() if name == "white"}
         self.store.write_json("materials.json", told)
         self.progress.update(0.6)
-        write_bytes(self.store.path("report.html"), make_page(self, self.report()).encode())
+        write_bytes(self.store.path("report.html"), make_page(self.findings, self.evidence, self.report()).encode())
 
     def report(self) -> dict[str, Any]:
         """What report.json holds so far: stages, settings, figures and warnings."""

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from addon.core.light.emitters import LUMINANCE
+from addon.core.luminance import LUMINANCE
 from addon.core.passes.clipped_lamps.fringes import FringeCollector
 from addon.core.scene.model import Pixels
 

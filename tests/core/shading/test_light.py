@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from addon.core.light.emitters import LUMINANCE, bright_triangles
+from addon.core.light.emitters import bright_triangles
 from addon.core.light.lamps import find_seen
 from addon.core.light.mirrors import Mirror
+from addon.core.luminance import LUMINANCE
 from addon.core.pipeline.shading import shade
 from addon.core.scene.lit_diffuse import LitDiffuse
 from tests.core.rooms import DARK, Quad, albedo_in, around, box_sides, cut, lit_box, make_room, quad, radiosity, split

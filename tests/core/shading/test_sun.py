@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.light.emitters import LUMINANCE
 from addon.core.light.environment import Environment
 from addon.core.light.sun import RADIUS, Sun, put_in, sunlight, taken_out
+from addon.core.luminance import LUMINANCE
 from addon.core.pipeline.shading import shade
 from addon.core.scene.lit_diffuse import LitDiffuse
 from tests.core import sunny

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...light.emitters import LUMINANCE
 from ...light.lamps import Lamp
+from ...luminance import LUMINANCE
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.visibility import SATURATED

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from ...light.emitters import LUMINANCE
+from ...luminance import LUMINANCE
 from ...scene.model import Pixels
 from ...scene.visibility import FrameView
 

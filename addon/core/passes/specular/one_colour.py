@@ -18,7 +18,7 @@ import numpy as np
 
 from ...fit.layout import Problem
 from ...fit.lobe_fit import robust_scale
-from ...light.emitters import LUMINANCE
+from ...luminance import LUMINANCE
 
 DIELECTRIC_PSI = 0.04
 """What a dielectric of one colour reflects at normal incidence (n = 1.5)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...light.emitters import LUMINANCE
+from ...luminance import LUMINANCE
 
 MIN_OBSERVATIONS = 12
 """A frame that shows fewer of the object's sampled elements says too little."""

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...light.emitters import LUMINANCE
 from ...light.environment import Environment
 from ...light.field import LightField
 from ...light.sun import Sun, around
+from ...luminance import LUMINANCE
 from .sun_spots import LIT, Edges, Guess, Spots, visible
 
 FEWEST = 12

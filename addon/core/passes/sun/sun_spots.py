@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...light.emitters import LUMINANCE
 from ...light.field import LightField
 from ...light.light_fit import COARSE, Sample
 from ...light.sun import Sun, shadow
+from ...luminance import LUMINANCE
 from ...scene.rays import RayScene
 
 OVER = 1.2

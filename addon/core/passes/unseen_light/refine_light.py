@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...light.emitters import LUMINANCE
 from ...light.lamps import AGREES, Lamp, twin
 from ...light.light_fit import Sample
+from ...luminance import LUMINANCE
 from ...naming import object_name
 from ...scene.model import Instance
 

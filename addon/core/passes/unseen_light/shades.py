@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...light.emitters import LUMINANCE
 from ...light.environment import Environment
 from ...light.few_elements import irradiance_at, thrown_by_object
 from ...light.field import LightField
 from ...light.lamps import Lamp
+from ...luminance import LUMINANCE
 from ...scene.atlas import Atlas
 
 STRONGLY = 3.0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...light.emitters import LUMINANCE
 from ...light.lamps import AGREES, Lamp, twin
 from ...light.light_fit import Sample
+from ...luminance import LUMINANCE
 from ...naming import object_name
 from .refine_light import Sky, all_light
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...light.emitters import LUMINANCE
 from ...light.environment import Environment
 from ...light.few_elements import LEAST, evened, irradiance_at
 from ...light.field import LightField
 from ...light.lamps import find_seen
 from ...light.light_fit import Sample
+from ...luminance import LUMINANCE
 
 MIN_GAIN = 0.1
 """It is believed in when it lowers the spread of log albedo by at least this share: all albedos hang on it."""
