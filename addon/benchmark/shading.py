@@ -6,12 +6,14 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ..core.light.directions import cosine_hemisphere, shifted, sobol, to_world, uniform_hemisphere
+from ..core.light.directions import cosine_hemisphere, shifted, sobol
 from ..core.light.emitters import bright_triangles
 from ..core.light.field import LightField
 from ..core.light.irradiance import direct, gather, uniform
 from ..core.light.portals import find_portals
+from ..core.paper.irradiance import uniform_hemisphere
 from ..core.parallel import for_blocks
+from ..core.scene.tangent_frame import to_world
 from .lit_rooms import ROOMS, LitRoom, make_room
 from .run import Options
 from .shading_surface import surface_tables

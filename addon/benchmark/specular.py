@@ -14,12 +14,14 @@ import numpy as np
 
 from ..core.brdf import ggx as brdf
 from ..core.fit.layout import Problem
-from ..core.light.directions import shifted, sobol, to_world, uniform_hemisphere
+from ..core.light.directions import shifted, sobol
 from ..core.light.emitters import bright_triangles
 from ..core.light.environment import Environment
 from ..core.light.field import LightField
 from ..core.light.lobes import GRID, LobeLight, reflected_light
+from ..core.paper.irradiance import uniform_hemisphere
 from ..core.passes.specular.models import choose_model
+from ..core.scene.tangent_frame import to_world
 from .run import Options
 from .synthetic import ROOM, synthetic_capture
 from .table import BASELINE, Curves, Table

@@ -1,39 +1,11 @@
-"""Directions over the hemisphere: the paper's uniform ones, cosine-distributed ones, and frames to turn them by."""
+"""Cosine-distributed directions over the hemisphere, and well-spread points to make them of."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.stats import qmc
 
-
-def tangent_frame(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors at right angles to each unit normal ((n, 3) float32), without branches.
-
-    Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017.
-    """
-    x, y, z = normal[:, 0], normal[:, 1], normal[:, 2]
-    sign = np.copysign(np.float32(1), z)
-    a = -1 / (sign + z)
-    b = x * y * a
-    tangent = np.stack([1 + sign * x * x * a, sign * b, -sign * x], -1)
-    bitangent = np.stack([b, sign + y * y * a, -y], -1)
-    return tangent.astype(np.float32), bitangent.astype(np.float32)
-
-
-def to_world(local: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Turn local directions so that +Z becomes the normal.
-
-    Parameters
-    ----------
-    local : (n, k, 3) or (1, k, 3) float32
-    normal : (n, 3) float32
-
-    Returns
-    -------
-    (n, k, 3) float32
-    """
-    tangent, bitangent = tangent_frame(normal)
-    return local[..., 0:1] * tangent[:, None] + local[..., 1:2] * bitangent[:, None] + local[..., 2:3] * normal[:, None]
+from ..scene.tangent_frame import tangent_frame
 
 
 def sobol(count: int, seed: int, axes: int = 2) -> np.ndarray:
@@ -51,13 +23,6 @@ def cosine_hemisphere(square: np.ndarray) -> np.ndarray:
     """Points of the unit square to directions with density cos / pi about +Z; (..., 2) -> (..., 3) float32."""
     radius, angle = np.sqrt(square[..., 0]), np.float32(2 * np.pi) * square[..., 1]
     height = np.sqrt(np.maximum(1 - square[..., 0], 0))
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], -1).astype(np.float32)
-
-
-def uniform_hemisphere(square: np.ndarray) -> np.ndarray:
-    """Points of the unit square to directions with density 1 / (2 pi) about +Z; (..., 2) -> (..., 3) float32."""
-    height = square[..., 0]
-    radius, angle = np.sqrt(np.maximum(1 - height * height, 0)), np.float32(2 * np.pi) * square[..., 1]
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], -1).astype(np.float32)
 
 

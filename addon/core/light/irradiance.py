@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .directions import PATTERNS, cosine_patterns, shifted, sobol, to_world, turned, uniform_hemisphere
+from ..paper.irradiance import uniform_hemisphere
+from ..scene.tangent_frame import to_world
+from .directions import PATTERNS, cosine_patterns, shifted, sobol, turned
 from .emitters import BrightTriangles, aimed_at, sample_bright
 from .field import LightField
 from .over_mirrors import direct_over_mirrors

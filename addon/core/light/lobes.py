@@ -19,7 +19,7 @@ import numpy as np
 from ..brdf import ggx as brdf
 from ..parallel import for_blocks
 from ..progress import Progress
-from .directions import tangent_frame
+from ..scene.tangent_frame import tangent_frame
 from .emitters import BrightTriangles, aimed_density, sample_bright
 from .field import LightField
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..luminance import LUMINANCE
-from .directions import cosine_hemisphere, shifted, sobol, to_world
+from ..scene.tangent_frame import to_world
+from .directions import cosine_hemisphere, shifted, sobol
 from .field import LightField
 
 CELLS = 24

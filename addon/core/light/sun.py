@@ -13,7 +13,8 @@ import numpy as np
 
 from ..luminance import LUMINANCE
 from ..scene.rays import RayScene
-from .directions import shifted, sobol, tangent_frame
+from ..scene.tangent_frame import tangent_frame
+from .directions import shifted, sobol
 from .environment import Environment
 
 RADIUS = float(np.radians(0.27))

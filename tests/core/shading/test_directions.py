@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.light.directions import cosine_hemisphere, shifted, sobol, tangent_frame, to_world, uniform_hemisphere
+from addon.core.light.directions import cosine_hemisphere, shifted, sobol
+from addon.core.paper.irradiance import uniform_hemisphere
+from addon.core.scene.tangent_frame import tangent_frame, to_world
 
 COUNT = 4096
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.light.directions import tangent_frame
 from addon.core.material import METAL, SPECULAR, ObjectMaterial
 from addon.core.passes.glossy_light import glossy_light as glossy_light_module
 from addon.core.passes.glossy_light.glossy_light import Excess, glossy_light
+from addon.core.scene.tangent_frame import tangent_frame
 from tests.core.glossy_box import Box
 from tests.core.rooms import polygon_irradiance
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.light.directions import cosine_hemisphere, sobol, to_world
+from addon.core.light.directions import cosine_hemisphere, sobol
 from addon.core.scene.rays import RayScene
+from addon.core.scene.tangent_frame import to_world
 from tests.core.rooms import box_sides, make_room, quad
 
 UP, DOWN = np.float32([[0, 0, 1]]), np.float32([[0, 0, -1]])

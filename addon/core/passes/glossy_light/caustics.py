@@ -17,11 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...brdf import ggx as brdf
-from ...light.directions import cosine_hemisphere, sobol, tangent_frame, to_world
+from ...light.directions import cosine_hemisphere, sobol
 from ...light.emitters import BrightTriangles, sample_bright
 from ...light.field import LightField
 from ...light.less_noise import CELL, GRIDS, cells
 from ...scene.atlas import Atlas
+from ...scene.tangent_frame import tangent_frame, to_world
 
 PHOTONS = 1 << 18
 """Kitchen with seven small lamps: 26.37 dB of albedo with half as many, 26.43 with these and with four times these."""
