@@ -6,8 +6,9 @@ import dataclasses
 import hashlib
 import json
 import math
+from collections.abc import Sequence
 from pathlib import PurePath
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -41,8 +42,15 @@ def plain(value: Any) -> Any:
     raise TypeError(f"{type(value).__name__} is nothing that can be stored")
 
 
-def is_number(value: Any) -> bool:
+def is_number(value: Any) -> TypeGuard[float]:
     """Whether `value` is a finite number (true and false are none)."""
     return (
         isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < 1e300 and math.isfinite(value)
     )
+
+
+def numbers(told: Any, names: Sequence[str]) -> list[float] | None:
+    """The finite numbers that a JSON object has under all of `names`; None where one is absent or something else."""
+    found = [told.get(name) for name in names] if isinstance(told, dict) else [None]
+    known = [value for value in found if is_number(value)]
+    return known if len(known) == len(found) else None

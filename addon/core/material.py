@@ -110,7 +110,7 @@ def undescribed(object_id: int, class_name: str) -> ObjectMaterial:
 
 def from_json(told: dict[str, Any]) -> ObjectMaterial:
     """A description as materials.json or a stored stage has it; further keys are left out."""
-    known = {
+    known: dict[str, Any] = {
         name: tuple(value) if isinstance(value, list) else value
         for name, value in told.items()
         if name in ObjectMaterial.__dataclass_fields__

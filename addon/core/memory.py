@@ -28,6 +28,8 @@ def peak_memory() -> int | None:
 
 def _windows_peak() -> int | None:
     """PeakWorkingSetSize of GetProcessMemoryInfo (psapi.h)."""
+    if sys.platform != "win32":
+        return None
     import ctypes
     from ctypes import wintypes
 

@@ -25,7 +25,10 @@ MODELS = (LAMBERTIAN, SPECULAR, METAL, EMITTER)
 """Those that can be given."""
 LOBE = ("model", "roughness", "f0")
 """What describes a highlight, and `same_as` takes from another object."""
-HAS_NO = {LAMBERTIAN: ("roughness", "f0"), EMITTER: ("roughness", "f0", "base_color")}
+HAS_NO: dict[str | None, tuple[str, ...]] = {
+    LAMBERTIAN: ("roughness", "f0"),
+    EMITTER: ("roughness", "f0", "base_color"),
+}
 """What some models do not have."""
 Colour = tuple[float, float, float]
 
@@ -120,9 +123,11 @@ class Overrides:
 
     def chain(self, object_id: int) -> tuple[int, ...]:
         """The objects that this one is the same as, one after the other; the last is described by itself."""
-        found = []
-        while (object_id := self.of(object_id).same_as) is not None:
-            found.append(object_id)
+        found: list[int] = []
+        other = self.of(object_id).same_as
+        while other is not None:
+            found.append(other)
+            other = self.of(other).same_as
         return tuple(found)
 
     def as_dict(self) -> dict[str, Any]:
@@ -155,7 +160,7 @@ def merge(older: Overrides, newer: Overrides) -> Overrides:
             objects[object_id] = replace(objects[object_id], **{name: None})
     for object_id, one in newer.objects.items():
         given = one.as_dict()
-        outdated = LOBE if "same_as" in given else ("same_as",) if given.keys() & set(LOBE) else ()
+        outdated: tuple[str, ...] = LOBE if "same_as" in given else ("same_as",) if given.keys() & set(LOBE) else ()
         if "model" in given:
             outdated += HAS_NO.get(given["model"], ())
         elif given.keys() & set(HAS_NO.get(objects.get(object_id, NOTHING).model, ())):
@@ -231,7 +236,8 @@ def parse(told: Any, name: str, known: Iterable[int]) -> Overrides:
     """Overrides from what JSON holds; `name` is what errors call it. Parameters and errors as of `read_overrides`."""
     known = set(known)
     _keys(told, ("objects", "white"), name)
-    objects, back = {}, set()
+    objects: dict[int, Given] = {}
+    back: set[tuple[int | str, str]] = set()
     entries = told.get("objects") or {}
     if not isinstance(entries, dict):
         raise BadInputError(

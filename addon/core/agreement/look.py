@@ -178,9 +178,10 @@ def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True)
     if not search or len(scene.views) < LEAST_VIEWS:
         return Agreement(plain, None, np.zeros(0), False, _up(scene.views, Convention()))
     best = _search(scene)
-    better = best is not None and best.quality >= max(AGREE, plain.quality + BETTER)
-    chosen = best.convention if better else Convention()
-    return Agreement(plain, best if better else None, np.zeros(0), True, _up(scene.views, chosen))
+    if best is not None and best.quality < max(AGREE, plain.quality + BETTER):
+        best = None
+    chosen = Convention() if best is None else best.convention
+    return Agreement(plain, best, np.zeros(0), True, _up(scene.views, chosen))
 
 
 def _up(views: Sequence[SmallView], convention: Convention) -> str:

@@ -75,7 +75,7 @@ def sees(camera: Camera, points: np.ndarray, scene: RayScene, margin: float = 0.
     distance = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
     away /= distance
     origins = points[which] + away * (4 * scene.offset)
-    free = ~scene.occluded(np.float32(origins), np.float32(away), np.float32(distance[:, 0] - 8 * scene.offset))
+    free = ~scene.occluded(*(np.asarray(a, np.float32) for a in (origins, away, distance[:, 0] - 8 * scene.offset)))
     return which[free], pixels[which[free]]
 
 

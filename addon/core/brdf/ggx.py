@@ -71,8 +71,8 @@ def sample_visible_normal(wo: np.ndarray, square: np.ndarray, phi: float) -> np.
     -------
     (3, m, k) float32
     """
-    stretched = wo * np.float32([[phi], [phi], [1]])
-    stretched /= np.sqrt((stretched * stretched).sum(0))
+    stretched = wo * np.array([[phi], [phi], [1]], np.float32)
+    stretched = stretched / np.sqrt((stretched * stretched).sum(0))
     x, y, z = stretched
     across = np.sqrt(x * x + y * y)
     upright = across < 1e-6
@@ -87,10 +87,10 @@ def sample_visible_normal(wo: np.ndarray, square: np.ndarray, phi: float) -> np.
     s = (1 + z) / 2
     p2 = (1 - s) * np.sqrt(rest) + s * p2
     up = np.sqrt(np.maximum(rest - p2 * p2, 0))
-    phi = np.float32(phi)
+    alpha = np.float32(phi)
     h = np.stack([
-        phi * (p1 * t1x + p2 * t2x + up * x),
-        phi * (p1 * t1y + p2 * t2y + up * y),
+        alpha * (p1 * t1x + p2 * t2x + up * x),
+        alpha * (p1 * t1y + p2 * t2y + up * y),
         np.maximum(p2 * t2z + up * z, 1e-6),
     ])  # fmt: skip
     h /= np.sqrt(np.einsum("imk,imk->mk", h, h))

@@ -8,6 +8,7 @@ clip, where a value is a mixture of clipped ones, so that no seam shows where an
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -58,13 +59,12 @@ def merge(shots: Iterable[Exposed]) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     saturated : (h, w) bool
         All that say something are clipped.
     """
-    total = time = radiance = valid = exact = None
-    for shot in shots:
-        if total is None:
-            total = np.zeros(shot.rgb.shape, np.float32)
-            time = np.zeros(shot.usable.shape, np.float32)
-            radiance = np.zeros_like(total)
-            valid, exact = np.zeros_like(shot.usable), np.zeros_like(shot.usable)
+    shots = iter(shots)
+    first = next(shots)
+    total, radiance = np.zeros(first.rgb.shape, np.float32), np.zeros(first.rgb.shape, np.float32)
+    time = np.zeros(first.usable.shape, np.float32)
+    valid, exact = np.zeros_like(first.usable), np.zeros_like(first.usable)
+    for shot in itertools.chain((first,), shots):
         good = shot.usable & ~shot.clipped
         with np.errstate(over="ignore", invalid="ignore"):
             own = shot.rgb / np.float32(shot.exposure)

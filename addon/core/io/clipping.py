@@ -85,15 +85,15 @@ def find_clipping(frames: Sequence[Frame], read: Callable[[Path], np.ndarray]) -
     frames = tuple(frames)
     if any(np.isfinite(frame.saturation) for frame in frames):
         return frames, []
-    pictures, exposure = [], []
+    pictures, exposures = [], []
     for i in np.unique(np.linspace(0, len(frames) - 1, min(LOOK, len(frames))).astype(int)) if frames else ():
         try:
             values = read(frames[i].path).reshape(-1, 3)
         except BadInputError:
             continue  # told when the frame is read for what it shows
         pictures.append(values[(np.isfinite(values) & (values < HALF_MAX)).all(1)])
-        exposure.append(frames[i].exposure)
-    exposure = np.array(exposure)
+        exposures.append(frames[i].exposure)
+    exposure = np.array(exposures)
     if not sum(len(values) for values in pictures):
         return frames, []
     top = np.array([values.max(initial=0) for values in pictures])

@@ -122,7 +122,7 @@ def parse(text: str) -> Convention:
         if part == "world-to-camera":
             found = replace(found, world_to_camera=True)
         elif kind in ("camera", "world") and re.fullmatch(r"([+-][xyz]){3}", value) and value in all_axes():
-            found = replace(found, **{kind: value})
+            found = replace(found, camera=value) if kind == "camera" else replace(found, world=value)
         elif kind == "up" and re.fullmatch(r"[+-][xyz]", value):
             found = replace(found, up=value)
         elif kind == "scale" and _positive(value):

@@ -143,7 +143,7 @@ def from_exif(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
     """
     if any(frame.exposure != 1 or frame.brackets for frame in frames):
         return list(frames), []
-    settings = []
+    settings: list[Settings | None] = []
     for frame in frames:
         try:
             if picture_kind(frame.path) not in (JPEG, TIFF):

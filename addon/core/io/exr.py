@@ -59,13 +59,14 @@ def read_exr(path: Path | str) -> Picture:
     planes = [plane.astype(np.float32, copy=False) for plane in _planes(path, layer.part, names)]
     width, height = window_size(header.data_window)
     for name, plane in zip(names, planes):
-        x, y = header.channels[name]
-        if plane.shape != (-(-height // y), -(-width // x)):
+        across, down = header.channels[name]
+        if plane.shape != (-(-height // down), -(-width // across)):
             raise BadInputError(f"Picture '{path}' is damaged (its channels differ in size); write or copy it again.")
     alpha = planes.pop() if layer.alpha else None
     chromaticities = header.chromaticities or REC709
     if layer.has_chroma:
-        rgb = to_rgb(*planes, chromaticities)
+        y, ry, by = planes
+        rgb = to_rgb(y, ry, by, chromaticities)
     else:
         rgb = np.stack(planes if len(planes) == 3 else planes * 3, -1)
     if len(planes) == 3:

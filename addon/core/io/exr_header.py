@@ -12,7 +12,7 @@ import math
 import struct
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import BinaryIO
 
 from ..errors import BadInputError
 from .paths import absence
@@ -74,7 +74,8 @@ class _Damaged(Exception):
     """The header contradicts itself; the text says how, as the second half of a sentence."""
 
 
-class _Chunks(NamedTuple):
+@dataclass(frozen=True)
+class _Chunks:
     """How many chunks a part has, how many of them (the first) its largest level, and the bytes each has before its
     pixels; the last four of those are the pixels' number.
     """
@@ -160,7 +161,7 @@ def _parse(head: bytes, size: int) -> tuple[tuple[ExrHeader, ...], int, list[_Ch
 
 def _part(attributes: dict[str, bytes]) -> tuple[ExrHeader, int]:
     """The header that `attributes` make up, and the bytes of a pixel."""
-    windows = []
+    windows: list[tuple[int, int, int, int]] = []
     for name in ("dataWindow", "displayWindow"):
         if len(attributes.get(name, b"")) != 16:
             raise _Damaged(f"has no {name}")
@@ -178,7 +179,8 @@ def _part(attributes: dict[str, bytes]) -> tuple[ExrHeader, int]:
     name, view = (attributes.get(key, b"").decode("latin-1") for key in ("name", "view"))
     views = _strings(attributes.get("multiView", b""))
     chromaticities = struct.unpack("<8f", chroma) if chroma else None
-    return ExrHeader(channels, *windows, chromaticities, name, view, views), pixel_bytes
+    data, display = windows
+    return ExrHeader(channels, data, display, chromaticities, name, view, views), pixel_bytes
 
 
 def _strip_count(attributes: dict[str, bytes], height: int) -> tuple[int, int]:

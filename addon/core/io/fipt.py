@@ -92,10 +92,11 @@ def read_real(root: Path, reading: Reading) -> Layout:
     def camera(pose: np.ndarray, k: np.ndarray) -> Callable[[Path, str], Camera]:
         def make(picture: Path, name: str) -> Camera:
             width, height = picture_size(picture)
+            origin, target, up = pose
             fx, fy, cx, cy = (float(k[i]) for i in ((0, 0), (1, 1), (0, 2), (1, 2)))
             if not (np.isfinite(k).all() and fx > 0 and fy > 0):
                 raise BadInputError(f"Frame '{name}' has no focal length above 0 in {INTRINSICS}; export it again.")
-            return Camera(width, height, fx, fy, cx, cy, _look_at(*pose, name))
+            return Camera(width, height, fx, fy, cx, cy, _look_at(origin, target, up, name))
 
         return make
 

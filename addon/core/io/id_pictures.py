@@ -29,6 +29,8 @@ def read_ids(frame: Frame) -> np.ndarray:
     BadInputError
         The picture can't be read, or holds no ids.
     """
+    if frame.id_path is None:
+        raise BadInputError(f"Frame '{frame.name}' has no picture of ids; give it one.")
     path = Path(frame.id_path)
     if picture_kind(path) == EXR:
         return _whole(read_numbers(path), path)

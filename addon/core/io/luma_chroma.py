@@ -27,7 +27,8 @@ def to_rgb(y: np.ndarray, ry: np.ndarray, by: np.ndarray, chromaticities: tuple[
     (h, w, 3) float32
     """
     weights = luminance_weights(chromaticities)
-    red, blue = ((_full(chroma, y.shape) + 1) * y for chroma in (ry, by))
+    height, width = y.shape
+    red, blue = ((_full(chroma, (height, width)) + 1) * y for chroma in (ry, by))
     green = (y - weights[0] * red - weights[2] * blue) / weights[1]
     return np.stack([red, green, blue], -1).astype(np.float32)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -27,6 +27,7 @@ MODELS = (*PERSPECTIVE, FISHEYE, FISHEYE624, PANORAMA)
 RADIAL, TANGENTIAL = ("k1", "k2", "k3", "k4", "k5", "k6"), ("p1", "p2")
 LISTED = "distortion_params"
 CROP = "fisheye_crop_radius"
+D = TypeVar("D", float, None)
 OWN_LENS = "scan_relight_lens"
 """A frame's lens as `lenses_told` writes it; stands in captures of a scene, which know more lenses than nerfstudio."""
 
@@ -46,12 +47,12 @@ def read_camera(
     top: dict[str, Any], entry: dict[str, Any], name: str, picture: Path, model: str, pose: np.ndarray
 ) -> Camera:
     """The camera of a frame; raises `BadInputError` where a number is missing or impossible."""
-    size = [positive(top, entry, key, name, None) for key in ("w", "h")]
-    if None in size:
-        size = list(picture_size(picture))
-    if any(value != int(value) for value in size):
-        raise BadInputError(f"Frame '{name}' has a size of {size[0]} x {size[1]}; give whole pixels as w and h.")
-    width, height = (int(value) for value in size)
+    wide, high = (positive(top, entry, key, name, None) for key in ("w", "h"))
+    if wide is None or high is None:
+        wide, high = picture_size(picture)
+    if wide != int(wide) or high != int(high):
+        raise BadInputError(f"Frame '{name}' has a size of {wide} x {high}; give whole pixels as w and h.")
+    width, height = int(wide), int(high)
     fx, fy = _focal_lengths(top, entry, name, width, height, model)
     centre = [entry.get(key, top.get(key, half)) for key, half in (("cx", width / 2), ("cy", height / 2))]
     if not all(is_number(value) for value in centre):
@@ -60,7 +61,7 @@ def read_camera(
     lens = _lens(top, entry, name, model) if told is None else _own_lens(told, name)
     if model in (FISHEYE, FISHEYE624):
         radius = positive(top, entry, CROP, name, None)
-        if radius is not None:
+        if radius is not None and lens is not None:
             lens = Cropped(lens, radius / fx, radius / fy)
     return Camera(width, height, fx, fy, float(centre[0]), float(centre[1]), pose, lens)
 
@@ -72,7 +73,7 @@ def _own_lens(told: Any, name: str) -> Lens | None:
         raise BadInputError(f"Frame '{name}' has a {OWN_LENS} that is none; capture the scene again.") from error
 
 
-def positive(top: dict[str, Any], entry: dict[str, Any], key: str, name: str, default: float | None) -> float | None:
+def positive(top: dict[str, Any], entry: dict[str, Any], key: str, name: str, default: D) -> float | D:
     """The number `key` of the frame, else of the file, else `default`; raises `BadInputError` unless above 0."""
     value = entry.get(key, top.get(key))
     if value is None or value == math.inf and default == math.inf:
@@ -120,10 +121,11 @@ def _focal_lengths(
             fx = fx or extent / 2 / math.tan(angle / 2)
         else:
             fy = fy or extent / 2 / math.tan(angle / 2)
-    if fx is None and fy is None:
+    fx, fy = fx or fy, fy or fx
+    if fx is None or fy is None:
         wanted = "fl_x" if model in (FISHEYE, FISHEYE624) else "fl_x or camera_angle_x"
         raise BadInputError(f"Frame '{name}' has no focal length; give {wanted}.")
-    return fx or fy, fy or fx
+    return fx, fy
 
 
 def _lens(top: dict[str, Any], entry: dict[str, Any], name: str, model: str) -> Lens | None:

@@ -57,7 +57,7 @@ def read_brackets(root: Path, top: Entry, entry: Entry, name: str, outside: bool
     return tuple(
         Shot(
             ended(inside(root, one.get("file_path"), name, outside), name),
-            positive({}, one, EXPOSURE, name, None),
+            positive({}, one, EXPOSURE, name, 1.0),
             positive(saturation, one, "saturation", name, math.inf),
         )
         for one in listed

@@ -17,7 +17,11 @@ from ..errors import BadInputError
 from .picture import MAX_PIXELS
 
 PNG, JPEG, TIFF = "PNG", "JPEG", "TIFF"
-CODED = {PNG: b"\x89PNG\r\n\x1a\n", JPEG: b"\xff\xd8\xff", TIFF: (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")}
+CODED: dict[str, bytes | tuple[bytes, ...]] = {
+    PNG: b"\x89PNG\r\n\x1a\n",
+    JPEG: b"\xff\xd8\xff",
+    TIFF: (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"),
+}
 """How files of each kind begin; TIFF's last two are those of more than 4 GiB."""
 READERS = {"png", "jpeg", "tiff"}
 """The library's names of them: it goes by a file's name first, and so might take it for something else."""
@@ -163,7 +167,8 @@ def _checked(file: Any, path: Path) -> Header:
 def _png_kind(path: Path) -> tuple[int, int]:
     """Bits and kind of colour of a PNG as it is stored; the library tells what it makes of them."""
     with open(path, "rb") as file:
-        return tuple(file.read(26)[24:])
+        bits, colour = file.read(26)[24:]
+    return bits, colour
 
 
 def _check_palette(colour: np.ndarray, path: Path) -> None:

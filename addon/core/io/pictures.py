@@ -39,7 +39,8 @@ def picture_kind(path: Path | str) -> str:
         raise BadInputError(f"Picture '{path}' can't be read ({reason}); check the file and its rights.") from error
     if not head:
         raise BadInputError(f"Picture '{path}' is empty; write or copy it again.")
-    for kind, magic in {EXR: exr_header.MAGIC, HDR: radiance_hdr.MAGIC, **CODED}.items():
+    kinds: dict[str, bytes | tuple[bytes, ...]] = {EXR: exr_header.MAGIC, HDR: radiance_hdr.MAGIC, **CODED}
+    for kind, magic in kinds.items():
         if head.startswith(magic):
             return kind
     raise BadInputError(

@@ -106,10 +106,10 @@ def _parse(content: bytes) -> PlyMesh:
     if "vertex" not in found:
         raise _Damaged("holds no vertices")
     element, starts, lists = found["vertex"]
-    values = {name: _scalars(body, element, starts, lists, name) for name in ("x", "y", "z", *sum(UV_NAMES, ()))}
-    if any(values[axis] is None for axis in "xyz"):
+    place, *pairs = (_columns(body, element, starts, lists, names) for names in (("x", "y", "z"), *UV_NAMES))
+    if place is None:
         raise _Damaged("has vertices without x, y and z")
-    vertices = np.stack([values[axis] for axis in "xyz"], -1).astype(np.float64)
+    vertices = place.astype(np.float64)
     if "face" not in found:
         return PlyMesh(
             vertices, np.zeros((0, 3), np.int32), None, None, np.zeros(0, np.int64), np.zeros((0, 3), np.int32)
@@ -125,8 +125,8 @@ def _parse(content: bytes) -> PlyMesh:
     if ids is not None:
         whole = np.nan_to_num(ids, nan=-1.0, posinf=-1.0, neginf=-1.0) if ids.dtype.kind == "f" else ids
         ids = whole.astype(np.int64)[source]
-    pair = next((pair for pair in UV_NAMES if all(values[n] is not None for n in pair)), None)
-    uv = None if pair is None else np.stack([values[n] for n in pair], -1).astype(np.float32)[triangles]
+    pair = next((pair for pair in pairs if pair is not None), None)
+    uv = None if pair is None else pair.astype(np.float32)[triangles]
     return PlyMesh(vertices, triangles, ids, uv, source, corner)
 
 
@@ -250,6 +250,15 @@ def _scalars(
         else:
             at = at + body.size(p.kind)
     return None
+
+
+def _columns(
+    body: _Body, element: Element, starts: np.ndarray, lists: dict[str, np.ndarray], names: tuple[str, ...]
+) -> np.ndarray | None:
+    """Several scalar properties side by side, (n, k); None where one is absent."""
+    found = [_scalars(body, element, starts, lists, name) for name in names]
+    known = [values for values in found if values is not None]
+    return np.stack(known, -1) if len(known) == len(found) else None
 
 
 def _triangles(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 MAX_HEADER = 1 << 20
@@ -21,7 +22,8 @@ class Property(NamedTuple):
     count_kind: str = ""
 
 
-class Element(NamedTuple):
+@dataclass(frozen=True)
+class Element:
     """One element: `count` records, each with all `properties` in their order."""
 
     name: str

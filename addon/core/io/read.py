@@ -64,13 +64,14 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
         for one in layout.mirrors
         if one.object_id in known
     )
-    warnings = tuple(one_line(text) for text in (*warnings, *more, *notes))
-    return Capture(root, mesh, objects, tuple(frames), warnings, reader.name, mirrors)
+    told = tuple(one_line(text) for text in (*warnings, *more, *notes))
+    return Capture(root, mesh, objects, tuple(frames), told, reader.name, mirrors)
 
 
 def _exposed(layout: Layout, reading: Reading) -> Layout:
     """The layout with each frame's exposure and curve as the user or the pictures themselves tell."""
-    frames, problems, notes = layout.frames, [], []
+    frames = layout.frames
+    problems: list[str] = []
     if reading.exposures is not None:
         frames, problems, notes = from_csv(frames, reading.exposures)
     else:

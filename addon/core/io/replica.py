@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import BadInputError
 from ..json_values import is_number
-from ..scene.model import LitTiles
+from ..scene.model import KnownMirror, LitTiles
 from . import nerfstudio, traj
 from .instances import FILE, read_instances
 from .jsonfile import read_json
@@ -31,7 +31,7 @@ SEMANTIC, NAMES, ORDER = "habitat/mesh_semantic.ply", "habitat/info_semantic.jso
 PICTURE, LOW_RANGE = "{}-color-ptex.hdr", ("{}-color-ptex.rgb", "{}-color-ptex.dxt1")
 TEXEL_BYTES = 6
 MAX_TILE = 1 << 12
-CORNERS = np.float32([[0, 0], [1, 0], [1, 1], [0, 1]])
+CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
 """Where a quad's corners lie in its tile."""
 FAR = 3.0
 """Times the usual edge: a face of the mesh with the objects that is further off is another one."""
@@ -60,7 +60,7 @@ def read(root: Path, reading: Reading) -> Layout:
         names_file = FILE
     if (root / names_file).is_file():
         names = read_instances(root / names_file)
-    mirrors = []
+    mirrors: list[KnownMirror] = []
     if (root / GLASS).is_file():
         panes, wrong = read_panes(root / GLASS)
         mirrors, more = mirrors_of(panes, mesh, names or {})

@@ -78,10 +78,12 @@ def mirrors_of(panes: list[Pane], mesh: RawMesh, names: dict[int, str]) -> tuple
     for pane in panes:
         if pane.reflectivity < MIRROR:
             continue
-        object_id, point = _object(pane, mesh)
-        if object_id is None:
+        own = _object(pane, mesh)
+        if own is None:
             lost += 1
-        elif object_id not in found or found[object_id].reflectivity < pane.reflectivity:
+            continue
+        object_id, point = own
+        if object_id not in found or found[object_id].reflectivity < pane.reflectivity:
             found[object_id] = KnownMirror(object_id, point, pane.normal, pane.reflectivity)
     glass = sum(pane.reflectivity < MIRROR for pane in panes)
     notes = []
@@ -99,10 +101,10 @@ def mirrors_of(panes: list[Pane], mesh: RawMesh, names: dict[int, str]) -> tuple
     return list(found.values()), notes
 
 
-def _object(pane: Pane, mesh: RawMesh) -> tuple[int | None, np.ndarray | None]:
+def _object(pane: Pane, mesh: RawMesh) -> tuple[int, np.ndarray] | None:
     """The object that is the pane, and a point of its surface; None where it is no object of its own."""
     if mesh.object_id is None or not len(mesh.triangles):
-        return None, None
+        return None
     a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
     cross = np.cross(b - a, c - a)
     area = np.linalg.norm(cross, axis=1) / 2
@@ -110,12 +112,12 @@ def _object(pane: Pane, mesh: RawMesh) -> tuple[int | None, np.ndarray | None]:
     off = np.abs(centre @ pane.normal - pane.offset)
     within = (off < NEAR) & (np.abs(cross @ pane.normal) > ALONG * 2 * area) & _inside(centre, pane)
     if not within.any():
-        return None, None
+        return None
     ids, place = np.unique(mesh.object_id, return_inverse=True)
     covered, whole = np.bincount(place, area * within), np.bincount(place, area)
     best = int(np.argmax(covered))
     if ids[best] < 0 or covered[best] < OWN_SHARE * whole[best]:
-        return None, None
+        return None
     return int(ids[best]), np.median(centre[within & (place == best)], 0)
 
 

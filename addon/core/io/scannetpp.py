@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError
-from ..json_values import is_number
-from ..scene.model import Frame
+from ..json_values import numbers
+from ..scene.model import Camera, Frame
 from . import colmap
 from .colmap_model import model_files, read_model
 from .instances import MAX_ID
@@ -85,7 +85,7 @@ def objects_of(root: Path, mesh: RawMesh) -> tuple[np.ndarray, dict[int, str]]:
     try:
         segment = np.array(values if isinstance(values, list) else [], np.int64)
     except (TypeError, ValueError, OverflowError):
-        segment = np.zeros(0)
+        segment = np.zeros(0, np.int64)
     if segment.shape != (len(mesh.vertices),):
         raise BadInputError(
             f"'{root / SEGMENTS}' does not name a segment for each of the {len(mesh.vertices)} vertices"
@@ -99,11 +99,11 @@ def objects_of(root: Path, mesh: RawMesh) -> tuple[np.ndarray, dict[int, str]]:
     names: dict[int, str] = {}
     members = []
     for i, group in enumerate(groups):
-        number, own = _group(group, i, root)
+        number, segments = _group(group, i, root)
         if number in names:
             raise BadInputError(f"'{root / OBJECTS}' lists the object {number} twice; copy it again.")
         names[number] = str(group.get("label") or f"object_{number}")
-        own = np.flatnonzero(np.isin(kinds, own))
+        own = np.flatnonzero(np.isin(kinds, segments))
         members.append((int(size[own].sum()), number, own))
     of_segment = np.full(len(kinds), -1, np.int64)
     for _, number, own in sorted(members, key=lambda one: -one[0]):
@@ -116,34 +116,25 @@ def _group(group: Any, i: int, root: Path) -> tuple[int, list[int]]:
     """Id and segments of an object."""
     number = group.get("objectId", group.get("id")) if isinstance(group, dict) else None
     own = group.get("segments") if isinstance(group, dict) else None
-    good = isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= MAX_ID
-    if not good or not isinstance(own, list) or not all(isinstance(one, int) and abs(one) < 2**62 for one in own):
+    good = isinstance(own, list) and all(isinstance(one, int) and abs(one) < 2**62 for one in own)
+    if not isinstance(number, int) or isinstance(number, bool) or not 0 <= number <= MAX_ID or not good:
         raise BadInputError(
             f"'{root / OBJECTS}' has an object (number {i}) without a whole 'objectId' and a list of "
             "'segments'; copy it again."
         )
-    return number, own
+    return number, list(own or ())
 
 
 def _undistorted(frames: list[Frame], root: Path) -> list[Frame]:
     """The frames with the pinhole camera of the undistorted pictures."""
-    top = read_json(root / PINHOLE)
-    found = [top.get(key) for key in ("w", "h", "fl_x", "fl_y", "cx", "cy")]
-    if not all(is_number(value) for value in found) or min(found[:4]) <= 0 or any(v != int(v) for v in found[:2]):
+    found = numbers(read_json(root / PINHOLE), ("w", "h", "fl_x", "fl_y", "cx", "cy"))
+    if found is None or min(found[:4]) <= 0 or any(v != int(v) for v in found[:2]):
         raise BadInputError(
             f"'{root / PINHOLE}' does not give w, h, fl_x, fl_y, cx and cy; undistort the pictures again."
         )
     width, height, fx, fy, cx, cy = found
-    pinhole = {
-        "width": int(width),
-        "height": int(height),
-        "fx": float(fx),
-        "fy": float(fy),
-        "cx": float(cx),
-        "cy": float(cy),
-        "lens": None,
-    }
-    return [replace(frame, camera=replace(frame.camera, **pinhole)) for frame in frames]
+    pinhole = Camera(int(width), int(height), float(fx), float(fy), float(cx), float(cy), np.eye(4))
+    return [replace(frame, camera=replace(pinhole, camera_to_world=frame.camera.camera_to_world)) for frame in frames]
 
 
 def _chosen(frames: list[Frame], root: Path) -> tuple[list[Frame], list[str]]:

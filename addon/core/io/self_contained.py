@@ -183,7 +183,7 @@ def _check_sizes(top: dict[str, Any], sizes: list[int], path: Path) -> None:
     for view in _list(top, "bufferViews", path):
         buffer = view.get("buffer")
         end = _count(view.get("byteOffset", 0)) + _count(view.get("byteLength"))
-        if _count(buffer) >= len(sizes) or end > sizes[buffer]:
+        if not isinstance(buffer, int) or _count(buffer) >= len(sizes) or end > sizes[buffer]:
             raise BadInputError(f"Mesh '{path}' points beyond its buffers: it is damaged; export it again.")
     for accessor in _list(top, "accessors", path):
         if not _count(accessor.get("count")) <= (MAX_BARE if "bufferView" not in accessor else sum(sizes)):

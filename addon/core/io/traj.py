@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
-from ..json_values import is_number
+from ..json_values import numbers
 from ..scene.model import Camera, Frame
 from ..scene.pose import check_pose
 from . import instances
@@ -80,14 +80,15 @@ def _camera(root: Path) -> Camera:
     top = read_json(path)
     values = top.get("camera", top)
     names = ("w", "h", "fx", "fy", "cx", "cy")
-    found = [values.get(name) if isinstance(values, dict) else None for name in names]
-    if not all(is_number(value) for value in found) or min(found[:4]) <= 0:
+    found = numbers(values, names)
+    if found is None or min(found[:4]) <= 0:
         raise BadInputError(
             f"'{path}' lacks a number among {', '.join(names)}, or one of the first four is not above 0; mend it."
         )
     if any(value != int(value) for value in found[:2]):
         raise BadInputError(f"'{path}' has a size of {found[0]} x {found[1]}; give whole pixels as w and h.")
-    return Camera(int(found[0]), int(found[1]), *(float(value) for value in found[2:]), np.eye(4))
+    width, height, fx, fy, cx, cy = found
+    return Camera(int(width), int(height), float(fx), float(fy), float(cx), float(cy), np.eye(4))
 
 
 def _lines(path: Path) -> list[str]:

@@ -58,12 +58,12 @@ class Environment:
     observations : (h, 2h) int32
         Pixels behind each direction; 0 where `radiance` was filled in from neighbours.
     clipped : (h, 2h) bool
-        Every one of those was clipped: `radiance` is a lower bound. None: nothing is.
+        Every one of those was clipped: `radiance` is a lower bound. Nothing, unless given.
     """
 
     radiance: np.ndarray
     observations: np.ndarray
-    clipped: np.ndarray | None = None
+    clipped: np.ndarray = None  # type: ignore[assignment]  # put right below
 
     def __post_init__(self):
         if self.clipped is None:

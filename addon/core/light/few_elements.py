@@ -78,12 +78,14 @@ def irradiance_at(field: LightField, element: np.ndarray, seed: int) -> np.ndarr
         E[part] = around + direct(field, bright, p, n, RAYS, EMITTER_RAYS, own + 1)[0]
 
     for_blocks(run, len(element), ELEMENTS_AT_ONCE, 0)
-    return E if field.sun is None else E + from_sun(field, element)
+    return E + from_sun(field, element)
 
 
 def from_sun(field: LightField, element: np.ndarray) -> np.ndarray:
     """The sun's part of E, (m, 3) float32."""
     atlas = field.atlas
+    if field.sun is None:
+        return np.zeros((len(element), 3), np.float32)
     return sunlight(field.scene, field.sun, atlas.position[element], atlas.normal[element], atlas.texel_edge)[:, :3]
 
 

@@ -93,8 +93,8 @@ def interpolated(
     spacing = max(COARSEST * float(np.sqrt(extent[1] * extent[2])), finest)
     todo = np.arange(len(position))
     chosen = np.zeros(0, np.int64)
-    points = None
-    result = None
+    points: _Points | None = None
+    result: np.ndarray | None = None
     contrast = np.zeros(len(position), np.float32)
     while len(todo):
         new = todo[_one_per_cell(position[todo], normal[todo], spacing)]
@@ -115,6 +115,7 @@ def interpolated(
             break
         todo = todo[~covered]
         spacing = max(spacing / 2, finest)
+    assert result is not None  # there is an element
     return result, chosen, contrast
 
 

@@ -77,14 +77,14 @@ def gather(
         if emitter_rays and len(bright):
             on, aimed = aimed_at(bright, hits, directions, field.normal)
             radiance[on] *= _share(rays * cosine[on], emitter_rays * aimed)
-        if portal_rays:
+        if portals is not None and portal_rays:
             on = np.flatnonzero(out)
             radiance[on] *= _share(rays * cosine[on], portal_rays * portals.aimed_density(origins[on], directions[on]))
         total[part] = np.float32(np.pi / rays) * np.einsum("nkc->nc", radiance.reshape(len(p), rays, 3))
         near = np.einsum("nk->n", 1 / np.maximum(hits.distance, 1e-9).reshape(len(p), rays))
         radius[part] = rays / np.maximum(near, 1e-20)
         escaped[part] = out.reshape(len(p), rays).mean(1)
-    if portal_rays:
+    if portals is not None and portal_rays:
         total += from_outside(field, portals, position, normal, rays, portal_rays, seed)
     if emitter_rays and field.mirrors:
         total += direct_over_mirrors(field, bright, position, normal, emitter_rays, seed)

@@ -25,7 +25,9 @@ from .field import LightField
 
 PROPOSALS = (0.015, 0.06, 0.2, 0.6)
 """Widths (phi) of the lobes that rays are drawn from."""
-GRID = np.float32([0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15, 0.2, 0.26, 0.33, 0.41, 0.5, 0.6, 0.72, 0.85, 1.0])
+GRID = np.array(
+    [0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15, 0.2, 0.26, 0.33, 0.41, 0.5, 0.6, 0.72, 0.85, 1], np.float32
+)
 """phi of the grid search: close to equal steps in its square root, which is what Blender's users see."""
 RAYS_AT_ONCE = 1 << 16
 ANY = -2

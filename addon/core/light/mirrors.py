@@ -58,9 +58,9 @@ class Mirror:
     @staticmethod
     def from_lists(known: dict[str, Any]) -> Mirror:
         """What `as_lists` gave."""
-        point, normal, f0 = (np.float32(known[name]) for name in ("point", "normal", "f0"))
-        facing = np.float32(known["facing"]).reshape(-1, 3)
-        return Mirror(known["object_id"], point, normal, f0, np.int32(known["facets"]), facing)
+        point, normal, f0 = (np.asarray(known[name], np.float32) for name in ("point", "normal", "f0"))
+        facing = np.asarray(known["facing"], np.float32).reshape(-1, 3)
+        return Mirror(known["object_id"], point, normal, f0, np.asarray(known["facets"], np.int32), facing)
 
 
 def known_mirror(known: KnownMirror, mesh: Mesh) -> Mirror:
@@ -69,8 +69,8 @@ def known_mirror(known: KnownMirror, mesh: Mesh) -> Mirror:
     turn = -1.0 if (normal[mesh.object_id == known.object_id] @ known.normal).sum() < 0 else 1.0
     return Mirror(
         known.object_id,
-        np.float32(known.point),
-        np.float32(turn * known.normal),
+        known.point.astype(np.float32),
+        (turn * known.normal).astype(np.float32),
         np.full(3, known.reflectivity, np.float32),
     )
 

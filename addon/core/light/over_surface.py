@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from ..parallel import for_blocks
@@ -13,7 +15,7 @@ from .interpolate import interpolated
 from .irradiance import direct, gather, uniform
 from .less_noise import less_noise
 from .portals import find_portals
-from .sun import sunlight
+from .sun import Sun, sunlight
 from .texel_blocks import TexelBlocks
 
 ELEMENTS_AT_ONCE = 1 << 13
@@ -130,13 +132,13 @@ def irradiance(
         aiming.next()
         return found
 
-    def shine(index: np.ndarray) -> np.ndarray:
+    def shine(sun: Sun, index: np.ndarray) -> np.ndarray:
         """The sun's part of E and its error, (k, 4) float32."""
         found, edge = np.empty((len(index), 4), np.float32), atlas.texel_edge
 
         def run(part: slice) -> None:
             at = index[part]
-            found[part] = sunlight(field.scene, field.sun, position[at], normal[at], edge, seed + 2 + part.start)
+            found[part] = sunlight(field.scene, sun, position[at], normal[at], edge, seed + 2 + part.start)
 
         for_blocks(run, len(index), ELEMENTS_AT_ONCE, threads)
         return found
@@ -152,7 +154,7 @@ def irradiance(
         total += shown
     unsure = np.hypot(contrast * value[:, :3].mean(1), noise)
     if field.sun is not None:
-        shone = blocks.evaluate(shine, step, SMOOTH, total.mean(1))
+        shone = blocks.evaluate(functools.partial(shine, field.sun), step, SMOOTH, total.mean(1))
         total += shone[:, :3]
         unsure = np.hypot(unsure, shone[:, 3])
     return total, escaped, points, unsure / np.maximum(total.mean(1), 1e-20)

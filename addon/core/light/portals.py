@@ -139,5 +139,5 @@ def find_portals(field: LightField, seed: int = 0) -> Portals | None:
     side = np.repeat(np.arange(3), 2 * CELLS**2)
     area = (size[(side + 1) % 3] * size[(side + 2) % 3] / CELLS**2).astype(np.float32)
     found = np.flatnonzero(chance > 0)
-    chance /= chance.sum()
+    chance = chance / chance.sum()
     return Portals(low, size, found, chance[found], (chance / area).astype(np.float32))

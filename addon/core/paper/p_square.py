@@ -14,7 +14,7 @@ class PSquare:
     than incremented: increments drift.
     """
 
-    SHARE = np.float32([0, 0.25, 0.5, 0.75, 1])
+    SHARE = np.array([0, 0.25, 0.5, 0.75, 1], np.float32)
 
     def __init__(self, count: int):
         self._n = np.zeros(count, np.int32)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import sys
 from itertools import count
 from pathlib import Path
 
@@ -103,7 +104,7 @@ def _xdg(home: Path) -> Path | None:
 
 def _known_folder() -> Path | None:
     """What Windows' registry says: the folder may lie on another drive or in a synchronised one."""
-    if os.name != "nt":
+    if sys.platform != "win32":
         return None
     import winreg
 

@@ -129,12 +129,14 @@ def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
             arrays = {name: archive[name] for name in archive.files}
         told = json.loads(arrays["told"].tobytes())
         frames = tuple(
-            Frame(name, Path(path), Camera(*camera, pose, lens_of(lens)))
-            for (name, path, camera, lens), pose in zip(told["frames"], arrays["poses"], strict=True)
+            Frame(name, Path(path), Camera(width, height, fx, fy, cx, cy, pose, lens_of(lens)))
+            for (name, path, (width, height, fx, fy, cx, cy), lens), pose in zip(
+                told["frames"], arrays["poses"], strict=True
+            )
         )
         pictures = told.get("pictures") or [{}] * len(frames)
         frames = tuple(replace(frame, **_picture(one)) for frame, one in zip(frames, pictures, strict=True))
-        mesh = Mesh(*(arrays[name] for name in ("vertices", "triangles", "object_id")), arrays.get("uv"))
+        mesh = Mesh(arrays["vertices"], arrays["triangles"], arrays["object_id"], arrays.get("uv"))
         instances = tuple(Instance(int(number), name) for number, name in told["instances"])
         return Capture(Path(told["root"]), mesh, instances, frames, format=told["format"]), arrays["atlas_uv"]
     except DAMAGE as error:
@@ -145,7 +147,7 @@ def _told_picture(frame: Frame) -> dict[str, Any]:
     """How a frame's pictures are to be read, as JSON; JSON has no inf, so null stands for it."""
 
     def told(path: Path | None) -> str | None:
-        return path and str(path.absolute())
+        return None if path is None else str(path.absolute())
 
     def finite(value: float) -> float | None:
         return value if math.isfinite(value) else None

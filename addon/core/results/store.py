@@ -12,6 +12,7 @@ import json
 import os
 import re
 import shutil
+import sys
 import zipfile
 import zlib
 from collections.abc import Iterable
@@ -212,7 +213,7 @@ def _take_lock(folder: Path):
     """
     file = open(folder / LOCK, "a+b")
     try:
-        if os.name == "nt":
+        if sys.platform == "win32":
             import msvcrt
 
             file.seek(1 << 20)  # far behind the content: Windows won't let others read what is locked

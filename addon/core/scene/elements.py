@@ -12,9 +12,10 @@ from .rays import RayScene
 
 # Where in a texel it is asked which triangle covers it: the centre first, so that a texel which only touches a
 # triangle still gets an element at its border, and thin triangles are not lost.
-SUBSAMPLES = np.float32(
+SUBSAMPLES = np.array(
     [[0, 0], [-0.25, -0.25], [0.25, 0.25], [-0.25, 0.25], [0.25, -0.25],
-     [-0.45, -0.45], [0.45, 0.45], [-0.45, 0.45], [0.45, -0.45], [0, 0.45], [0, -0.45], [0.45, 0], [-0.45, 0]]
+     [-0.45, -0.45], [0.45, 0.45], [-0.45, 0.45], [0.45, -0.45], [0, 0.45], [0, -0.45], [0.45, 0], [-0.45, 0]],
+    np.float32,
 )  # fmt: skip
 ROWS_AT_ONCE = 128
 
@@ -48,7 +49,7 @@ def _cover(uv: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
         origins[:, 0] = texels % size + 0.5 + shift[0]
         origins[:, 1] = texels // size + 0.5 + shift[1]
         origins[:, 2] = 1.0
-        down = np.broadcast_to(np.float32([0, 0, -1]), origins.shape)
+        down = np.broadcast_to(np.array([0, 0, -1], np.float32), origins.shape)
         hits = plane.intersect(origins, down)
         found = hits.triangle >= 0
         at = texels[found]
@@ -68,8 +69,8 @@ def _cover(uv: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
         unasked[wanted] = False
         for shift in SUBSAMPLES[1:]:
             ask(wanted[triangle[wanted] < 0], shift)
-        row, column = np.divmod(wanted[triangle[wanted] >= 0], size)
-        rows, columns = (np.clip(at + np.array([-1, 0, 1])[:, None], 0, size - 1) for at in (row, column))
+        covered = np.divmod(wanted[triangle[wanted] >= 0], size)
+        rows, columns = (np.clip(at + np.array([-1, 0, 1])[:, None], 0, size - 1) for at in covered)
         around = np.unique(rows[:, None] * size + columns[None])
         wanted = around[unasked[around]]
     return triangle, u, v

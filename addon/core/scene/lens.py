@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
@@ -11,7 +11,7 @@ class Lens(Protocol):
     """A camera model without its focal lengths and principal point.
 
     Axes are COLMAP's and OpenCV's: x right, y down, z forward. Image points (u, v) are such that
-    pixel = (fx u + cx, fy v + cy). Instances are frozen and hashable, and hold nothing but numbers, strings, tuples of
+    pixel = (fx u + cx, fy v + cy). Instances are frozen dataclasses, and hold nothing but numbers, strings, tuples of
     them and lenses.
 
     Attributes
@@ -22,7 +22,12 @@ class Lens(Protocol):
         No ray further than this angle (radians) from z is seen.
     """
 
-    name: str
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def __hash__(self) -> int: ...
+
+    @property
+    def name(self) -> str: ...
 
     @property
     def widest(self) -> float: ...

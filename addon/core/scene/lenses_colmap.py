@@ -135,4 +135,4 @@ def intrinsics(name: str, parameters: Sequence[float], width: int, height: int) 
     cx, cy, *extra = values[1 if model.single else 2 :]
     if not min(focal) > 0:
         raise BadInputError("its focal length must be above 0")
-    return Intrinsics(*focal, cx, cy, model.lens(extra))
+    return Intrinsics(focal[0], focal[1], cx, cy, model.lens(extra))

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 from .lens import Lens
 from .lenses import Cropped, Division, EnhancedUnified, Equirectangular, FieldOfView
 from .lenses_polynomial import Polynomial
 
-KINDS = {kind.__name__: kind for kind in (Cropped, Division, EnhancedUnified, Equirectangular, FieldOfView, Polynomial)}
+_CLASSES: tuple[type[Lens], ...] = (Cropped, Division, EnhancedUnified, Equirectangular, FieldOfView, Polynomial)
+KINDS: dict[str, Callable[..., Lens]] = {kind.__name__: kind for kind in _CLASSES}
 
 
 def told_lens(lens: Lens | None) -> list[Any] | None:
@@ -17,7 +19,7 @@ def told_lens(lens: Lens | None) -> list[Any] | None:
     if lens is None:
         return None
     values = [getattr(lens, field.name) for field in dataclasses.fields(lens)]
-    return [type(lens).__name__, [told_lens(v) if dataclasses.is_dataclass(v) else v for v in values]]
+    return [type(lens).__name__, [told_lens(v) if type(v).__name__ in KINDS else v for v in values]]
 
 
 def lens_of(told: list[Any] | None) -> Lens | None:
@@ -26,5 +28,8 @@ def lens_of(told: list[Any] | None) -> Lens | None:
         return None
     kind, values = told
     if kind == Cropped.__name__:
-        return Cropped(lens_of(values[0]), *values[1:])
+        inner = lens_of(values[0])
+        if inner is None:
+            raise TypeError("a crop of no lens")
+        return Cropped(inner, *values[1:])
     return KINDS[kind](*(tuple(v) if isinstance(v, list) else v for v in values))

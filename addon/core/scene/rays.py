@@ -56,18 +56,18 @@ class RayScene:
         coarse = float(np.spacing(np.float32(np.abs([low, high]).max())))
         self.offset = max(RELATIVE_OFFSET * self.diagonal, 4 * coarse)
         self.triangle_count = len(triangles)
-        self._back = None
+        self._sides: tuple[np.ndarray, np.ndarray] | None = None  # of each triangle: its second side, and its normal
         if backs is not None and len(backs):
             triangles = triangles[: len(triangles) - len(backs)]
-            self._back = np.full(len(triangles), -1, np.int32)
-            self._back[backs] = np.arange(len(triangles), self.triangle_count)
+            back = np.full(len(triangles), -1, np.int32)
+            back[backs] = np.arange(len(triangles), self.triangle_count)
             a, b, c = (vertices[triangles[:, i]] for i in range(3))
-            self._normal = np.cross(b - a, c - a).astype(np.float32)
+            self._sides = back, np.cross(b - a, c - a).astype(np.float32)
         self._scene = EmbreeScene()
         self._mesh = TriangleMesh(
             self._scene, np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(triangles, np.int32)
         )
-        self._run(np.zeros((1, 3), np.float32), np.float32([[0, 0, 1]]))  # builds the tree now, in one thread
+        self._run(np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32))  # builds the tree now, in one thread
 
     def _run(self, origins, directions, **options):
         return self._scene.run(
@@ -88,15 +88,16 @@ class RayScene:
         found = self._run(origins, directions, output=True)
         triangle = found["primID"]
         hits = Hits(triangle, found["u"], found["v"], np.where(triangle < 0, np.float32(np.inf), found["tfar"]))
-        return hits if self._back is None else self._by_side(hits, directions)
+        return hits if self._sides is None else self._by_side(hits, directions, *self._sides)
 
-    def _by_side(self, hits: Hits, directions: np.ndarray) -> Hits:
+    @staticmethod
+    def _by_side(hits: Hits, directions: np.ndarray, back: np.ndarray, normal: np.ndarray) -> Hits:
         """The hits credited to the side of a sheet that the rays came from."""
-        sheet = np.flatnonzero((hits.triangle >= 0) & (self._back[hits.triangle] >= 0))
+        sheet = np.flatnonzero((hits.triangle >= 0) & (back[hits.triangle] >= 0))
         met = hits.triangle[sheet]
-        at = sheet[np.einsum("ij,ij->i", directions[sheet], self._normal[met]) > 0]
+        at = sheet[np.einsum("ij,ij->i", directions[sheet], normal[met]) > 0]
         triangle, u, v = hits.triangle.copy(), hits.u.copy(), hits.v.copy()
-        triangle[at] = self._back[triangle[at]]
+        triangle[at] = back[triangle[at]]
         u[at], v[at] = hits.v[at], hits.u[at]  # the other winding
         return Hits(triangle, u, v, hits.distance)
 

@@ -49,7 +49,9 @@ def vote(
     scene = RayScene(vertices, triangles)
     total = sum(frame.camera.width * frame.camera.height for frame in frames)
     step = max(int(np.ceil(np.sqrt(total / MAX_RAYS))), 1)
-    problems, votes, packed = [], [], []
+    problems: list[str] = []
+    votes: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    packed: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for frame in frames:
         try:
             votes.append(_votes(scene, frame, read(frame), step))
