@@ -9,22 +9,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..brdf.compensation import layer_reflectance
+from ..brdf.compensation import base_colors, layer_reflectance, with_metals
+from ..evidence.collect import Evidence, collect
+from ..evidence.findings import Findings
 from ..evidence.light import spots
 from ..light.over_surface import irradiance
 from ..light.sun import put_in
 from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, ObjectMaterial
 from ..overrides import Overrides
-from ..passes.albedo.albedo import MEASURED, Albedo
+from ..passes.albedo.albedo import MEASURED, Albedo, albedo_of
 from ..passes.albedo.albedo import NONE as NO_ALBEDO
 from ..scene.atlas import Atlas
-
-if TYPE_CHECKING:
-    from .recover import Recovery
+from .stages import Stages
 
 ROUNDS = 4
 """Albedo is clamped at 1 and steadied among neighbours, so its mean follows E but roughly."""
@@ -59,8 +58,8 @@ class WhiteScale:
     warning: str = ""
 
 
-class Corrected:
-    """What is made of the stages' values once they are known: a part of `recover.Recovery`, which computes those."""
+class Corrected(Stages):
+    """What is made of the stages' results: the final E, albedo and materials, and how sure they are."""
 
     @cached_property
     def emitters(self) -> set[int]:
@@ -107,13 +106,58 @@ class Corrected:
         origin = np.where(np.isin(self.surface().atlas.object_id, apart), np.int8(NO_ALBEDO), albedo.origin)
         return with_base_colors(replace(albedo, origin=origin), self.surface().atlas, self.overrides)
 
+    def albedo_under(
+        self, irradiance: np.ndarray, specular: np.ndarray | float = 0.0, without: set[int] | None = None
+    ) -> Albedo:
+        """The albedo that L_d less a `specular` part has under an E, both (n, 3) float32.
+
+        The objects `without` get none; by default the lamps that were found.
+        """
+        atlas, lit, shading = self.surface().atlas, self.lit_diffuse(), self.shading()
+        without = shading.emitters if without is None else without
+        return albedo_of(
+            atlas, lit, irradiance, shading.doubt, self.capture.instances, without, specular, self.settings.without
+        )
+
+    def base_color(self) -> np.ndarray:
+        """Base Color of each element for Cycles' Principled, (n, 3) float32."""
+        if "compensation" in self.settings.without:
+            return with_metals(self.albedo.rho, self.surface().atlas.object_id, self.materials())
+        return base_colors(self.albedo.rho, self.surface().atlas.object_id, self.materials())
+
+    @property
+    def findings(self) -> Findings:
+        """All that was found; asks for every stage."""
+        return Findings(
+            name=self.capture.root.name,
+            instances=self.capture.instances,
+            frames=self.frames,
+            surface=self.surface(),
+            lit_diffuse=self.lit_diffuse(),
+            samples=self.samples(),
+            shading=self.shading(),
+            field=self.field,
+            specular=self.specular().specular,
+            irradiance=self.irradiance,
+            albedo=self.albedo,
+            materials=self.materials(),
+            coloured=frozenset(i for i, one in self.overrides.objects.items() if one.base_color is not None),
+            threads=self.settings.threads,
+            seed=self.settings.seed,
+        )
+
+    @cached_property
+    def evidence(self) -> Evidence:
+        """How sure all of it is."""
+        return collect(self.findings)
+
     def sky(self) -> np.ndarray:
         """Radiance from outside with the sun in it, (h, w, 3) float32, row 0 the bottom."""
         sky = put_in(self.shading().environment, self.shading().sun)
         return sky if self.white is None else sky * self.white.of_light
 
 
-def white_scale(run: Recovery) -> WhiteScale | None:
+def white_scale(run: Corrected) -> WhiteScale | None:
     """What the known white of a run says whose stages are done; None if none is given."""
     white = run.overrides.white
     if white is None:
@@ -139,7 +183,7 @@ def white_scale(run: Recovery) -> WhiteScale | None:
     return WhiteScale(scale, light, warning)
 
 
-def _direct_share(run: Recovery) -> np.ndarray:
+def _direct_share(run: Corrected) -> np.ndarray:
     """Share of E, (3,), that comes from lamps, sky and sun, over what was seen of the room."""
     field, seen = run.field, run.lit_diffuse().seen
     chosen, _ = spots(field.atlas, seen, SPOTS, run.settings.seed)

@@ -6,39 +6,139 @@ One pass, a second where the first tells that poses are off, and one more that m
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import BadInputError
+from ..io.pixels import read_pixels
+from ..io.read import MAX_BAD_SHARE
 from ..light.environment import Environment, EnvironmentAccumulator
 from ..light.field import LightField
 from ..lit_diffuse.accumulate import accumulate
+from ..lit_diffuse.from_texture import lit_from_tiles
 from ..passes.clipped_lamps.fringes import FringeCollector, Fringes
 from ..passes.pose_refinement.poses import Poses, Texture, refine_poses
 from ..passes.sharpening.sharpen import sharpened
 from ..progress import Progress, Rounds
 from ..scene.lit_diffuse import LitDiffuse
-from ..scene.model import Frame, Pixels
+from ..scene.model import Capture, Frame, Pixels
 from ..scene.samples import SampleCollector, Samples
 from ..scene.surface import Surface
 from ..settings import Settings
+from .stage import Stage
+from .surface import STAGE as SURFACE
 
-Seen = tuple[LitDiffuse, Environment, Samples, Fringes]
+STAGE = Stage("lit_diffuse", Path(__file__), (SURFACE,), ("refine_poses", "median", "sharpen", "frame_order", "seed"))
+
+
+@dataclass(frozen=True)
+class Observed:
+    """What the passes over all frames give.
+
+    Attributes
+    ----------
+    lit_diffuse : LitDiffuse
+    environment : Environment
+        Light from outside, as the frames saw it.
+    samples : Samples
+        Observations kept one by one for the specular fit.
+    fringes : Fringes
+        Colours along the edges of what was clipped.
+    poses : Poses
+        Where the frames were found to be.
+    """
+
+    lit_diffuse: LitDiffuse
+    environment: Environment
+    samples: Samples
+    fringes: Fringes
+    poses: Poses
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What is stored of it."""
+        parts = {one.name: getattr(self, one.name) for one in fields(self)}
+        return {f"{name}.{one.name}": getattr(part, one.name) for name, part in parts.items() for one in fields(part)}
+
+    @staticmethod
+    def from_arrays(arrays: dict[str, np.ndarray]) -> Observed:
+        """The inverse of `arrays`."""
+        kinds = (LitDiffuse, Environment, Samples, Fringes, Poses)
+        return Observed(*(
+            kind(**{one.name: arrays[f"{part.name}.{one.name}"] for one in fields(kind)})
+            for part, kind in zip(fields(Observed), kinds, strict=True)
+        ))  # fmt: skip
+
+
+class FrameReader:
+    """Reads frames' pixels. One that turns out damaged counts as blind, unless too many are.
+
+    Parameters
+    ----------
+    count : int
+        Of the capture's frames.
+
+    Attributes
+    ----------
+    bad, blind : list of str
+        Sentences on frames that turned out damaged; names of those without a valid pixel.
+    """
+
+    def __init__(self, count: int):
+        self._count = count
+        self.bad: list[str] = []
+        self.blind: list[str] = []
+
+    def __call__(self, frame: Frame) -> Pixels:
+        """A frame's pixels. Raises `BadInputError`: too many are damaged."""
+        try:
+            pixels = read_pixels(frame)
+            if not pixels.valid.any() and frame.name not in self.blind:
+                self.blind.append(frame.name)
+            return pixels
+        except BadInputError as error:
+            if (told := f"{error} It was left out.") not in self.bad:
+                self.bad.append(told)
+            if len(self.bad) > MAX_BAD_SHARE * self._count:
+                raise BadInputError(
+                    f"{len(self.bad)} of {self._count} frames can't be read; the first: {error}"
+                ) from error
+            shape = (frame.camera.height, frame.camera.width)
+            return Pixels(np.zeros((*shape, 3), np.float32), np.zeros(shape, bool), np.zeros(shape, bool))
+
+
+def observe(
+    surface: Surface,
+    capture: Capture,
+    read: Callable[[Frame], Pixels],
+    settings: Settings,
+    folder: Path,
+    progress: Progress,
+) -> Observed:
+    """What the frames of a capture show, or the light stored on its mesh; parameters and errors are `one_pass`'s."""
+    if capture.frames:
+        return all_passes(surface, capture.frames, read, settings, folder, progress)
+    mesh = replace(capture.mesh, vertices=surface.mesh.vertices)
+    lit = lit_from_tiles(mesh, surface.atlas, progress)
+    return Observed(lit, Environment.dark(), Samples.none(), Fringes.none(), Poses.as_read(()))
 
 
 def one_pass(
     surface: Surface,
     frames: Sequence[Frame],
+    poses: Poses,
     read: Callable[[Frame], Pixels],
     settings: Settings,
     folder: Path,
     progress: Progress | Rounds,
-) -> Seen:
+) -> Observed:
     """Read every frame once.
 
     Parameters
     ----------
+    poses : Poses
+        Where the frames are taken to be.
     folder : Path
         Where the exact median keeps observations meanwhile.
 
@@ -49,6 +149,7 @@ def one_pass(
     InterruptedRun
         From `progress`.
     """
+    frames = poses.of(frames)
     sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
     kept = SampleCollector(surface.atlas, len(frames), settings.seed)
     fringes = FringeCollector()
@@ -68,7 +169,7 @@ def one_pass(
         raise BadInputError(
             "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; check the frames."
         )
-    return lit, sky.result(), kept.result(), fringes.result()
+    return Observed(lit, sky.result(), kept.result(), fringes.result(), poses)
 
 
 def all_passes(
@@ -78,23 +179,24 @@ def all_passes(
     settings: Settings,
     folder: Path,
     progress: Progress,
-) -> tuple[LitDiffuse, Environment, Samples, Fringes, Poses]:
-    """What `one_pass` finds, and the poses it is found with: as read, or put right. Parameters and errors are its."""
+) -> Observed:
+    """What `one_pass` finds with the poses as read, or put right. Parameters and errors are its."""
     rounds = Rounds(progress, 0, 1)
-    found, poses = one_pass(surface, frames, read, settings, folder, rounds), Poses.as_read(frames)
+    found = one_pass(surface, frames, Poses.as_read(frames), read, settings, folder, rounds)
     if settings.refine_poses and "pose-refinement" not in settings.without:
-        lit, sky = found[:2]
-        room = LightField(surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), sky)
+        lit = found.lit_diffuse
+        room = LightField(surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), found.environment)
         rounds.next()
         poses = refine_poses(frames, read, Texture(room, lit.seen), threads=settings.threads, progress=rounds)
+        found = replace(found, poses=poses)
         if poses.moved.any():
             rounds.next()
-            found = one_pass(surface, poses.of(frames), read, settings, folder, rounds)
+            found = one_pass(surface, frames, poses, read, settings, folder, rounds)
     if settings.sharpen and "sharpening" not in settings.without:
         rounds.next()
         lit = sharpened(
-            found[0], surface, poses.of(frames), read, median=settings.median, order=settings.frame_order,
-            seed=settings.seed, threads=settings.threads, folder=folder, progress=rounds,
+            found.lit_diffuse, surface, found.poses.of(frames), read, median=settings.median,
+            order=settings.frame_order, seed=settings.seed, threads=settings.threads, folder=folder, progress=rounds,
         )  # fmt: skip
-        found = (lit, *found[1:])
-    return *found, poses
+        found = replace(found, lit_diffuse=lit)
+    return found

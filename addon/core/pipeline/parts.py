@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,9 +26,7 @@ from ..scene.model import Camera, Mesh
 from ..scene.pages import OBJECT, Pages, lay_out
 from ..scene.surface import Surface
 from ..scene.visibility import CLEAN
-
-if TYPE_CHECKING:
-    from .recover import Recovery
+from .corrected import Corrected
 
 FINEST = 4.0
 """Times that an object's texels may be finer than the room's."""
@@ -111,7 +108,7 @@ def footprints(surface: Surface, cameras: list[Camera]) -> dict[int, float]:
     }
 
 
-def scales(run: Recovery) -> dict[int, float]:
+def scales(run: Corrected) -> dict[int, float]:
     """By object: how much finer than the room's its texels are to be; 1 where left out."""
     surface, s = run.surface(), run.settings
     wanted = {
@@ -126,7 +123,7 @@ def scales(run: Recovery) -> dict[int, float]:
     return {number: scale for number, scale in finer.items() if scale > WORTH}
 
 
-def look_closer(run: Recovery) -> Parting:
+def look_closer(run: Corrected) -> Parting:
     """Part a run's atlas and look at the frames once more for what they show of objects with finer texels.
 
     What it finds is stored, so that it is done once for a capture: a refit asks for no frame, tiles use what was found
@@ -162,12 +159,12 @@ def look_closer(run: Recovery) -> Parting:
     return Parting(pages, sheet, atlas, stored["radiance"])
 
 
-def stored_key(run: Recovery) -> str:
+def stored_key(run: Corrected) -> str:
     """The key of what `look_closer` stores, of a run whose passes over the frames are done."""
     return key(STAGE, run.store.stored_key("lit_diffuse"))
 
 
-def _looked(run: Recovery, part: Mesh, atlas: Atlas, chosen: np.ndarray) -> LitDiffuse:
+def _looked(run: Corrected, part: Mesh, atlas: Atlas, chosen: np.ndarray) -> LitDiffuse:
     """L_d of the elements of an atlas over a `part` of the room's mesh: its triangles `chosen`."""
     s, surface = run.settings, run.surface()
     place = np.full(len(surface.mesh.triangles), -1)
@@ -196,7 +193,7 @@ def _looked(run: Recovery, part: Mesh, atlas: Atlas, chosen: np.ndarray) -> LitD
     return sharpened(found, finer, run.frames, run.read, lookup, **how) if s.sharpen and found.seen.any() else found
 
 
-def write_parts(run: Recovery, parting: Parting, base_color: np.ndarray) -> Parts:
+def write_parts(run: Corrected, parting: Parting, base_color: np.ndarray) -> Parts:
     """Write the images into the result folder; those of an earlier run that are not written again are removed.
 
     Parameters
@@ -234,7 +231,7 @@ def write_parts(run: Recovery, parting: Parting, base_color: np.ndarray) -> Part
     return Parts(pages.uv, images, tiles)
 
 
-def finer_detail(run: Recovery, parting: Parting) -> np.ndarray:
+def finer_detail(run: Corrected, parting: Parting) -> np.ndarray:
     """What base colour is multiplied by on the finer objects' sheet, (size, size, 3) float32."""
     surface, lit, atlas = run.surface(), run.lit_diffuse(), parting.atlas
     good = (lit.tier == CLEAN) & (lit.count >= ENOUGH) & (run.albedo.origin == MEASURED)
@@ -247,13 +244,13 @@ def finer_detail(run: Recovery, parting: Parting) -> np.ndarray:
     return atlas.image(ratio, 1.0)
 
 
-def _owner(run: Recovery) -> np.ndarray:
+def _owner(run: Corrected) -> np.ndarray:
     """The object that each texel of the room's images shows, (s, s) int32."""
     atlas = run.surface().atlas
     return atlas.image(atlas.object_id, -1)
 
 
-def remove_parts(run: Recovery, kept: set[str] = frozenset()) -> None:
+def remove_parts(run: Corrected, kept: set[str] = frozenset()) -> None:
     """Take away the parts that an earlier run left, but for the files `kept`."""
     folder = run.store.folder
     for path in [*folder.glob(f"{FOLDER}/* base_color.exr"), *folder.glob(TILE.replace("<UDIM>", "[0-9]" * 4))]:

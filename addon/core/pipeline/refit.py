@@ -23,19 +23,21 @@ from ..evidence.light import LightEvidence
 from ..evidence.objects import object_evidence
 from ..evidence.texel import TexelEvidence, gloss_error
 from ..io.exr import read_exr
-from ..json_values import key
 from ..material import EMITTER, ObjectMaterial
 from ..overrides import Given, Overrides, heeded, parse
 from ..passes.albedo.albedo import MEASURED, Albedo
-from ..passes.registry import left_out_of
 from ..progress import Progress
 from ..results.room_file import MATERIALS, Room, read_room
 from ..results.store import Store
 from ..settings import ROOM, Settings
+from .corrected import Corrected
 from .parts import STAGE as DETAIL
 from .parts import stored_key as detail_key
-from .recover import CODE, Corrected, Recovery
+from .recover import Recovery
+from .specular import STAGE as SPECULAR
 from .specular import Held, Specular
+from .stage import Stage
+from .stages import code
 
 REPORT = "report.json"
 IMAGES = ("albedo", "base_color", "coverage", "albedo_error")
@@ -151,10 +153,10 @@ class Refit(Recovery):
         self.result = result
         self._before = {m.object_id: m for m in result.room.materials}
         self.whole = self.overrides.as_dict().get("white") != result.materials.get("white") or not self._has_images()
-        if result.report.get("code", CODE) != CODE:
+        if result.report.get("code", code()) != code():
             raise _again(store.folder, "another version of Scan Relight made it")
         for name in ("surface", "lit_diffuse", "shading"):
-            if store.stored_key(name) is None or store.stored_key(name) != self._keys[name]:
+            if store.stored_key(name) is None or store.stored_key(name) != self.keys[name]:
                 raise _again(store.folder, "its stages were cleared or are another run's")
         if self.settings.atlas != ROOM and store.stored_key(DETAIL) != detail_key(self):
             raise _again(store.folder, "what its frames show of finer texels was cleared")
@@ -163,9 +165,8 @@ class Refit(Recovery):
     def _has_images(self) -> bool:
         return all(self.store.path(f"{name}.exr").is_file() for name in (*IMAGES, "evidence"))
 
-    @cached_property
-    def _surface_key(self) -> str:
-        return self.store.stored_key("surface") or ""
+    def _first_key(self, stage: Stage) -> str:
+        return self.store.stored_key(stage.name) or ""
 
     def _load_specular(self) -> tuple[Specular, dict[int, Given]]:
         """The specular stage as it is stored, and what was given to it."""
@@ -173,10 +174,7 @@ class Refit(Recovery):
         meta = self.store.load_meta("specular", stored) if stored else None
         known = [one.object_id for one in self.capture.instances]
         was = parse((meta or {}).get("overrides", {}), "specular", known)
-        s = self.settings
-        of_lobes = (s.specular, s.specular_rays, s.refine, *was.lobes_key())
-        wanted = key("specular", self._keys["shading"], *of_lobes, *left_out_of("specular", s.without))
-        arrays = self.store.load("specular", wanted) if stored == wanted else None
+        arrays = self.store.load("specular", stored) if stored and stored == self.keys_under(was)["specular"] else None
         if arrays is None:
             raise _again(self.store.folder, "its stages were cleared or are another run's")
         return Specular.from_store(arrays, meta), was.lobes()
@@ -204,8 +202,8 @@ class Refit(Recovery):
             getattr(self, stage)()
         self.progress.stage("specular")
         if again:
-            found, arrays, meta = self.fitted(Held(found, again))
-            self.store.save("specular", self._keys["specular"], arrays, meta)
+            found = self.fitted(SPECULAR.settings(self.settings), Held(found, again))
+            self.store.save("specular", self.keys["specular"], *found.to_store(self.overrides))
         self.done["specular"] = found
         self.progress.done()
 
@@ -308,4 +306,4 @@ class Refit(Recovery):
         warnings = [one for one in old["warnings"] if one != old.get("white_warning")]
         told = {"white_warning": self.white.warning} if self.white is not None and self.white.warning else {}
         result = {name: value for name, value in old.items() if name != "white_warning"} | told
-        return result | {"figures": figures, "warnings": [*warnings, *told.values()], "code": CODE}
+        return result | {"figures": figures, "warnings": [*warnings, *told.values()], "code": code()}

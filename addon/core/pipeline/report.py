@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..passes.albedo.albedo import MEASURED, above_one, quotient, without_emitters
 from ..scene.elements import triangle_geometry
 from ..scene.visibility import SATURATED
-
-if TYPE_CHECKING:
-    from .recover import Recovery
+from .corrected import Corrected
 
 
-def make_report(run: Recovery) -> dict[str, Any]:
+def make_report(run: Corrected) -> dict[str, Any]:
     """Stages, settings, figures and warnings of what has been computed so far."""
     result: dict[str, Any] = {
         "capture": run.capture.root.name,
         "settings": dataclasses.asdict(run.settings),
         "stages": run.log,
-        "warnings": list(run.capture.warnings) + run.bad_frames,
+        "warnings": list(run.capture.warnings) + run.read.bad,
     }
     figures: dict[str, Any] = {"frames": len(run.capture.frames), "triangles": len(run.capture.mesh.triangles)}
     if "surface" in run.done:
@@ -46,7 +44,7 @@ def make_report(run: Recovery) -> dict[str, Any]:
     return result
 
 
-def _evidence_figures(run: Recovery) -> dict[str, float]:
+def _evidence_figures(run: Corrected) -> dict[str, float]:
     """How sure the room is as a whole; medians and means over the elements, lamps left out."""
     evidence, albedo = run.evidence, run.albedo
     relative = evidence.texels.albedo.mean(1) / np.maximum(albedo.rho.mean(1), 1e-3)
@@ -60,7 +58,7 @@ def _evidence_figures(run: Recovery) -> dict[str, float]:
     return figures | {"spots_checked": evidence.light.spots}
 
 
-def _report_surface(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:
+def _report_surface(run: Corrected, figures: dict[str, Any], warnings: list[str]) -> None:
     surface = run.surface()
     _, area = triangle_geometry(surface.mesh)
     figures["two_sided_share"] = float(area[surface.backs].sum() / area.sum())
@@ -74,10 +72,10 @@ def _report_surface(run: Recovery, figures: dict[str, Any], warnings: list[str])
         )
 
 
-def _report_lit(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:
+def _report_lit(run: Corrected, figures: dict[str, Any], warnings: list[str]) -> None:
     lit, atlas = run.lit_diffuse(), run.surface().atlas
-    if run.blind_frames:
-        count, first = len(run.blind_frames), run.blind_frames[0]
+    if run.read.blind:
+        count, first = len(run.read.blind), run.read.blind[0]
         warnings.append(f"{count} frames have no valid pixel (the first: {first}); all are NaN, inf or masked.")
     if not lit.radiance[lit.seen].any():
         warnings.append("Every frame is black; nothing can be said of any albedo.")
@@ -107,7 +105,7 @@ def _report_lit(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> 
         figures["outside"] = "no frame sees past the mesh"
 
 
-def _report_shading(run: Recovery, figures: dict[str, Any], warnings: list[str]) -> None:
+def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]) -> None:
     shading, lit = run.shading(), run.lit_diffuse()
     escaped = float(shading.escaped[lit.seen].mean())
     # Before the specular part is known; a clipped element has no quotient.

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,22 +13,69 @@ from ..light.environment import Environment
 from ..light.few_elements import evened
 from ..light.field import LightField
 from ..light.lamps import Lamp
-from ..light.mirrors import Mirror
+from ..light.mirrors import Mirror, known_mirror
 from ..light.over_surface import finest_spacing, irradiance
 from ..light.shading import Shading
-from ..light.sun import taken_out
+from ..light.sun import Sun, taken_out
 from ..passes.albedo.albedo import MAX_ALBEDO, fill, quotient
+from ..passes.clipped_lamps.clipped import shade_clipped
+from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.unseen_light.shades import BOUNCES, strongly_lit
 from ..progress import Progress
 from ..scene.atlas import Atlas
 from ..scene.creases import crease_doubt
 from ..scene.lit_diffuse import ENOUGH, LitDiffuse
 from ..scene.mesh_noise import tilt
-from ..scene.model import Instance, Mesh
+from ..scene.model import Capture, Instance, Mesh
 from ..scene.rays import RayScene
+from ..scene.surface import Surface
 from ..scene.two_sides import fronts
 from ..scene.visibility import CLEAN, SATURATED
+from ..settings import Settings
 from .find_light import find_all_light
+from .frames import STAGE as FRAMES
+from .frames import Observed
+from .stage import Stage
+from .surface import STAGE as SURFACE
+
+STAGE = Stage(
+    "shading",
+    Path(__file__),
+    (SURFACE, FRAMES),
+    ("shading", "shading_rays", "emitter_rays", "portal_rays", "interpolate", "mirrors", "seed"),
+)
+
+
+def find_shading(
+    capture: Capture, surface: Surface, observed: Observed, settings: Settings, progress: Progress
+) -> Shading:
+    """The light of a capture: `shade` with what the frames show of mirrors, and of lamps that they clip."""
+    s = settings
+
+    def mirrors(field: LightField, lamps: tuple[Lamp, ...] | None) -> tuple[Mirror, ...]:
+        noisy = lamps is not None and surface.noise > 0 and "facets" not in s.without
+        found = find_mirrors(field, lamps or (), observed.samples, capture.instances, s.seed, noisy)
+        told = [known_mirror(mirror, field.mesh) for mirror in capture.mirrors]
+        return (*found, *(one for one in told if one.object_id not in {mirror.object_id for mirror in found}))
+
+    def shaded(lit: LitDiffuse) -> Shading:
+        return shade(
+            surface.mesh, capture.instances, surface.atlas, surface.scene, lit, observed.environment,
+            sampler=s.shading, rays=s.shading_rays, emitter_rays=s.emitter_rays, portal_rays=s.portal_rays,
+            interpolate=s.interpolate, threads=s.threads, seed=s.seed, progress=progress,
+            find_mirrors=mirrors if s.mirrors else None, noise=surface.noise,
+            colours=observed.fringes.colours(), without=s.without,
+        )  # fmt: skip
+
+    lit = observed.lit_diffuse
+    return shaded(lit) if "clipped-lamps" in s.without else shade_clipped(shaded, lit, surface.atlas)
+
+
+def lit_room(surface: Surface, shading: Shading) -> LightField:
+    """The room as a light source, with all that was found of its light."""
+    lamps = [lamp.object_id for lamp in shading.lamps]
+    room = LightField(surface.mesh, surface.atlas, surface.scene, shading.radiance, shading.environment, lamps)
+    return room.with_mirrors(shading.mirrors).with_sun(shading.sun)
 
 
 def fill_unseen(radiance: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -162,3 +212,28 @@ def shade(
         # Near a crease the light of two sides is mixed.
         unsure = np.hypot(unsure, crease_doubt(mesh, atlas, atlas.texel_edge))
     return Shading(E, escaped, unsure, field.radiance, lamps, light.environment, notes, mirrors, points, sun)
+
+
+def to_store(found: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """What is stored of a `Shading`: arrays, and what JSON holds."""
+    arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "doubt", "radiance")}
+    arrays |= {"sky": found.environment.radiance, "sky_seen": found.environment.observations}
+    meta = {
+        "sun": found.sun and {k: np.asarray(v).tolist() for k, v in asdict(found.sun).items()},
+        "points": found.points,
+        "mirrors": [mirror.as_lists() for mirror in found.mirrors],
+        "notes": list(found.notes),
+        "lamps": [asdict(lamp) | {"radiance": lamp.radiance.tolist()} for lamp in found.lamps],
+    }
+    return arrays, meta
+
+
+def from_store(a: dict[str, np.ndarray], meta: dict[str, Any]) -> Shading:
+    """The inverse of `to_store`."""
+    lamps = tuple(Lamp(**(d | {"radiance": np.float32(d["radiance"])})) for d in meta["lamps"])
+    mirrors = tuple(Mirror.from_lists(d) for d in meta["mirrors"])
+    return Shading(
+        a["irradiance"], a["escaped"], a["doubt"], a["radiance"], lamps,
+        Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
+        meta["sun"] and Sun(**{k: np.float32(v) if isinstance(v, list) else v for k, v in meta["sun"].items()}),
+    )  # fmt: skip

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from ..light.field import LightField
 from ..light.lamps import Lamp
 from ..light.lobes import GRID
 from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, ObjectMaterial, from_json
-from ..overrides import NOTHING, Given
+from ..overrides import NOTHING, Given, Overrides
 from ..parallel import ordered_map
 from ..passes.glossy_light.glossy_light import Excess, glossy_light
 from ..passes.see_through.see_through import is_sure, judge, look_behind
@@ -31,7 +32,12 @@ from ..progress import Progress
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance
 from ..scene.samples import Samples
+from .frames import STAGE as FRAMES
+from .shading import STAGE as SHADING
+from .stage import Stage
+from .surface import STAGE as SURFACE
 
+STAGE = Stage("specular", Path(__file__), (SURFACE, FRAMES, SHADING), ("specular", "specular_rays", "refine", "seed"))
 FIT_ELEMENTS = 350
 FIT_VIEWS = 12
 """Elements of an object that the fit looks at, and views of each."""
@@ -69,6 +75,11 @@ class Specular:
     materials: tuple[ObjectMaterial, ...]
     specular: np.ndarray
     excess: np.ndarray
+
+    def to_store(self, overrides: Overrides) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """What is stored of it: arrays, and what JSON holds."""
+        meta = {"materials": [asdict(m) for m in self.materials], "overrides": overrides.as_dict()}
+        return {"specular": self.specular, "excess": self.excess}, meta
 
     @staticmethod
     def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Specular:

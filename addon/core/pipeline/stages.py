@@ -1,0 +1,248 @@
+"""The stages in their order: each is computed when it is first asked for, or taken from the result folder."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, TypeVar
+
+import numpy as np
+
+from ..io.fingerprint import fingerprint
+from ..json_values import key
+from ..light.environment import Environment
+from ..light.field import LightField
+from ..light.mirrors import in_their_planes
+from ..light.shading import Shading
+from ..memory import peak_memory
+from ..overrides import NONE as NO_OVERRIDES
+from ..overrides import Overrides
+from ..passes.pose_refinement.poses import Poses
+from ..passes.registry import check, left_out_of
+from ..progress import Progress
+from ..results.store import Store
+from ..scene.lit_diffuse import LitDiffuse
+from ..scene.model import Capture, Frame, Mesh
+from ..scene.samples import Samples
+from ..scene.surface import Surface
+from ..scene.two_sides import laid_apart
+from ..settings import ROOM, Settings
+from ..stages import WRITE
+from . import frames, shading, specular, surface
+from .frames import FrameReader, Observed
+from .source import digest
+from .specular import Held, Specular, fit_specular
+from .stage import Stage
+
+STAGES = (surface.STAGE, frames.STAGE, shading.STAGE, specular.STAGE)
+"""Those that are stored, in their order."""
+Arrays = dict[str, np.ndarray]
+Stored = tuple[Arrays, dict[str, Any]]
+T = TypeVar("T")
+
+
+def code() -> str:
+    """16 hex digits that tell the source of the stages from any other."""
+    return key(*(digest(stage.source) for stage in STAGES))[:16]
+
+
+class Stages:
+    """One run over one capture.
+
+    Parameters
+    ----------
+    capture : Capture
+    store : Store
+    settings : Settings
+    progress : Progress
+    unwrap : callable(Mesh, int) -> (t, 3, 2) float32
+        Lays the mesh out in an atlas of so many texels; Blender's, in the extension.
+    overrides : Overrides
+        What the artist gives.
+
+    Attributes
+    ----------
+    done : dict
+        Values of the stages so far.
+    log : dict
+        Time, memory and whether it was stored, of each.
+    read : FrameReader
+        Gives a frame's pixels, and knows the damaged ones.
+    """
+
+    def __init__(
+        self,
+        capture: Capture,
+        store: Store,
+        settings: Settings,
+        progress: Progress,
+        unwrap: Callable[[Mesh, int], np.ndarray],
+        overrides: Overrides = NO_OVERRIDES,
+    ):
+        check(settings.without)
+        self.capture, self.store, self.settings, self.progress = capture, store, settings, progress
+        self.overrides = overrides
+        self.read = FrameReader(len(capture.frames))
+        self._near = surface.taken_in(capture)
+        self._unwrap = unwrap
+        self.done: dict[str, Any] = {}
+        self.log: dict[str, dict[str, Any]] = {}
+
+    @property
+    def frames(self) -> tuple[Frame, ...]:
+        """The capture's, in the coordinates that the stages work in, where they were found to be."""
+        return self.poses().of(self._near.frames)
+
+    @cached_property
+    def keys(self) -> dict[str, str]:
+        """The key of each stage, by name."""
+        return self.keys_under(self.overrides)
+
+    def keys_under(self, overrides: Overrides) -> dict[str, str]:
+        """What they are under other overrides."""
+        keys: dict[str, str] = {}
+        for stage in STAGES:
+            given = overrides.lobes_key() if stage is specular.STAGE else ()
+            keys[stage.name] = stage.key(self.settings, keys, *given) if stage.takes else self._first_key(stage)
+        return keys
+
+    def _first_key(self, stage: Stage) -> str:
+        return stage.key(self.settings, {}, fingerprint(self.capture))
+
+    @property
+    def run_key(self) -> str:
+        """16 hex digits that are the same where a capture and all that was asked of it are, and else differ."""
+        told = (self.overrides.as_dict(),) if self.overrides.any else ()
+        told += () if self.settings.coat else ("no coat",)
+        told += () if self.settings.atlas == ROOM else (self.settings.atlas,)
+        told += left_out_of(WRITE, self.settings.without)
+        return key("run", self.keys[specular.STAGE.name], *told)[:16]
+
+    def _stage(
+        self,
+        stage: Stage,
+        compute: Callable[[Settings], T],
+        to_store: Callable[[T], Stored],
+        from_store: Callable[[Arrays, dict[str, Any]], T],
+    ) -> T:
+        """The value of a stage: kept, stored, or computed now and stored."""
+        name = stage.name
+        if name in self.done:
+            return self.done[name]
+        started = time.monotonic()
+        stored = self.store.load(name, self.keys[name])
+        self.progress.stage(name)
+        if stored is not None:
+            value = from_store(stored, self.store.load_meta(name, self.keys[name]) or {})
+        else:
+            value = compute(stage.settings(self.settings))
+            self.store.save(name, self.keys[name], *to_store(value))
+        self.log[name] = {"seconds": round(time.monotonic() - started, 2), "stored": stored is not None}
+        self.log[name]["peak_memory_bytes"] = peak_memory()
+        self.progress.done(stored=stored is not None)
+        self.done[name] = value
+        return value
+
+    def surface(self) -> Surface:
+        """Surface elements over the room; around the origin where the room lies far from it."""
+        capture = self._near
+        return self._stage(
+            surface.STAGE,
+            lambda settings: surface.make_surface(capture, self._unwrap, settings),
+            lambda found: surface.to_store(found, capture.mesh),
+            lambda arrays, meta: surface.from_store(arrays, meta, capture.mesh),
+        )
+
+    def room_mesh(self) -> Mesh:
+        """The mesh that the stages worked on, where the capture has it: normals face the frames, noise is out of it.
+
+        A sheet's second side is a little apart from the first.
+        """
+        mesh, before = self.surface().mesh, self._near.mesh.vertices
+        moved = mesh.vertices[: len(before)] - before  # by itself, so that what did not move is exact
+        return laid_apart(mesh, self.capture.mesh.vertices + moved)
+
+    def written_mesh(self) -> Mesh:
+        """`room_mesh` as the scene gets it. Mirrors of a noisy mesh lie in the planes that what they show tells."""
+        mesh = self.room_mesh()
+        if not self.surface().noise:
+            return mesh
+        return replace(mesh, vertices=in_their_planes(mesh, self.shading().mirrors))
+
+    def room_poses(self) -> Poses:
+        """Where the frames were found to be, in the capture's coordinates."""
+        poses = self.poses().camera_to_world.copy()
+        for pose, was, near in zip(poses, self.capture.frames, self._near.frames, strict=True):
+            pose[:3, 3] += was.camera.centre - near.camera.centre
+        return replace(self.poses(), camera_to_world=poses)
+
+    def observed(self) -> Observed:
+        """What the frames show."""
+        room = self.surface()
+
+        def from_store(arrays: Arrays, meta: dict[str, Any]) -> Observed:
+            self.read.bad, self.read.blind = list(meta.get("bad_frames", ())), list(meta.get("blind_frames", ()))
+            return Observed.from_arrays(arrays)
+
+        return self._stage(
+            frames.STAGE,
+            lambda s: frames.observe(room, self._near, self.read, s, self.store.folder, self.progress),
+            lambda found: (found.arrays(), {"bad_frames": self.read.bad, "blind_frames": self.read.blind}),
+            from_store,
+        )
+
+    def lit_diffuse(self) -> LitDiffuse:
+        """L_d of every element."""
+        return self.observed().lit_diffuse
+
+    def environment(self) -> Environment:
+        """Light from outside, as the frames saw it."""
+        return self.observed().environment
+
+    def samples(self) -> Samples:
+        """Observations kept one by one for the specular fit."""
+        return self.observed().samples
+
+    def poses(self) -> Poses:
+        """Where the frames were found to be."""
+        return self.observed().poses
+
+    def shading(self) -> Shading:
+        """Lamps and irradiance."""
+        room, observed = self.surface(), self.observed()
+        return self._stage(
+            shading.STAGE,
+            lambda settings: shading.find_shading(self._near, room, observed, settings, self.progress),
+            shading.to_store,
+            shading.from_store,
+        )
+
+    @cached_property
+    def field(self) -> LightField:
+        """The room as a light source, with all that was found of its light."""
+        return shading.lit_room(self.surface(), self.shading())
+
+    def specular(self) -> Specular:
+        """phi, psi and the model of every object."""
+        self.shading()
+        return self._stage(
+            specular.STAGE, self.fitted, lambda found: found.to_store(self.overrides), Specular.from_store
+        )
+
+    def fitted(self, settings: Settings, held: Held | None = None) -> Specular:
+        """The specular stage as it is computed, of all objects or with some `held`."""
+        s, light = settings, self.shading()
+        return fit_specular(
+            self.capture.instances, self.field, self.lit_diffuse(), light.irradiance, light.lamps, self.samples(),
+            [frame.name for frame in self.capture.frames],
+            way=s.specular, rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
+            noise=self.surface().noise, given=self.overrides.lobes(), held=held, without=s.without,
+            progress=self.progress,
+        )  # fmt: skip
+
+    def median_radiance(self) -> float:
+        """Median of L_d over all that was seen: what a picture's exposure is set by."""
+        lit = self.lit_diffuse()
+        return float(np.median(lit.radiance[lit.seen]))

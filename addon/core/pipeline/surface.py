@@ -1,0 +1,59 @@
+"""The surface stage: surface elements over the mesh, whose noise is taken out first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..lit_diffuse.from_texture import face_edge
+from ..passes.mesh_denoising.denoise import without_noise
+from ..scene.model import Capture, Mesh
+from ..scene.recentre import near_origin
+from ..scene.surface import Surface, build_surface, from_uv
+from ..scene.two_sides import with_backs
+from ..settings import Settings
+from .stage import Stage
+
+STAGE = Stage("surface", Path(__file__), (), ("texel_size", "detail", "atlas_size", "denoise_mesh"))
+ELEMENTS = ("texel", "triangle", "position")
+"""What is stored of the elements, as finding it takes seconds; older stages lack it."""
+
+
+def taken_in(capture: Capture) -> Capture:
+    """A capture as the stages take it: around the origin, where it lies far from it."""
+    return near_origin(capture)
+
+
+def make_surface(capture: Capture, unwrap: Callable[[Mesh, int], np.ndarray], settings: Settings) -> Surface:
+    """Lay surface elements out over the mesh of a capture `taken_in`. Raises `BadInputError`: no camera looks at it."""
+    noisy = settings.denoise_mesh and "mesh-denoising" not in settings.without
+    mesh, noise = without_noise(capture.mesh, settings.without) if noisy else (capture.mesh, 0.0)
+    texel = settings.texel_size
+    if mesh.lit is not None:
+        texel = texel or face_edge(mesh) / settings.detail
+    cameras, two_sides = [frame.camera for frame in capture.frames], "two-sides" not in settings.without
+    found = build_surface(mesh, cameras, unwrap, texel, settings.detail, settings.atlas_size, two_sides)
+    return replace(found, noise=noise)
+
+
+def to_store(found: Surface, captured: Mesh) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """What is stored of a surface: arrays, and what JSON holds. Of the captured mesh it holds what is different."""
+    first = found.mesh.triangles[: len(captured.triangles)]
+    sign = np.where((first == captured.triangles).all(1), 1, -1).astype(np.int8)
+    arrays = {"uv": found.uv, "sign": sign, "backs": found.backs}
+    if found.noise:
+        arrays["vertices"] = found.mesh.vertices[: len(captured.vertices)]
+    arrays |= {name: getattr(found.atlas, name) for name in ELEMENTS}
+    return arrays, {"size": found.atlas.size, "noise": found.noise}
+
+
+def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any], captured: Mesh) -> Surface:
+    """The inverse of `to_store`."""
+    mesh = replace(captured, vertices=arrays["vertices"]) if "vertices" in arrays else captured
+    mesh = with_backs(mesh, arrays["backs"])
+    known = tuple(arrays[name] for name in ELEMENTS) if "texel" in arrays else None
+    return from_uv(mesh, arrays["sign"], arrays["uv"], int(meta["size"]), float(meta["noise"]), known)
