@@ -18,6 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
+from .cli_ablation import ablation_command, add_ablation, joined
 from .cli_refit import add_override, add_refit, refit_command
 from .cli_relight import add_relight, relight_command
 from .console import ConsoleProgress, StopWish, duration, own_console, unexpected
@@ -49,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code: 0 done, 1 failure, 2 bad input, 130 interrupted.
     """
     try:
-        arguments = make_parser().parse_args(argv)
+        arguments = make_parser().parse_args(joined(argv))
     except SystemExit as end:  # argparse has printed help, the version, or what is wrong
         return end.code if isinstance(end.code, int) else EXIT_BAD_INPUT
     try:
@@ -166,17 +167,17 @@ def make_parser() -> argparse.ArgumentParser:
         description="Run each stage over its alternatives, the paper's setting among them, and write a table (CSV and "
         "Markdown) and a plot for each. Errors are the same from run to run; seconds are the machine's.",
     )
-    benchmark.add_argument(
-        "stages", metavar="STAGE", nargs="*", help="medians, accumulation, shading, specular or pipeline (default all)"
+    stages = (
+        "medians, accumulation, shading, specular or pipeline (default all); or 'ablation ROOM ...', which has --help"
     )
+    benchmark.add_argument("stages", metavar="STAGE", nargs="*", help=stages)
     benchmark.add_argument("--capture", metavar="DIR", type=Path, help="also measure on this capture")
     benchmark.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder to write, made if missing")
     benchmark.add_argument("--large", action="store_true", help="the real size; takes much longer")
-    benchmark.add_argument(
-        "--seed", type=int, metavar="INT", default=0, help="of every pseudo-random choice (default 0)"
-    )
+    benchmark.add_argument("--seed", type=int, metavar="INT", default=0, help="of every random choice (default 0)")
     benchmark.add_argument("--threads", type=int, metavar="INT", default=0, help="0 takes all cores (default 0)")
     add_common(benchmark, benchmark_command)
+    add_common(add_ablation(commands, EXIT_CODES), ablation_command)
     return parser
 
 

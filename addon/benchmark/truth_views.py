@@ -20,7 +20,11 @@ SHIFTS = ((-0.25, -0.25), (0.25, 0.25), (-0.25, 0.25), (0.25, -0.25))
 
 
 def views(capture: Path, recovery: Recovery) -> list[dict]:
-    """For each held-out view: the element under each of four points a pixel, truth, and the pixels that count."""
+    """For each held-out view: the element under each of four points a pixel, truth, and the pixels that count.
+
+    'truth' is the albedo, 'image' the radiance, 'id' the object; 'counts' are the pixels of one object with an albedo,
+    'inside' those of any one object; 'directions' lead to the camera.
+    """
     surface = recovery.surface()
     lookup = ElementLookup(surface.mesh, surface.atlas)
     spec = json.loads((capture / "truth" / "transforms.json").read_text())
@@ -40,12 +44,18 @@ def views(capture: Path, recovery: Recovery) -> list[dict]:
             element[hit] = lookup(hits.triangle[hit], hits.u[hit], hits.v[hit])
             elements.append(element)
         ids = np.rint(read_exr(capture / "truth" / "object_id" / name).rgb[..., 0]).astype(int)
-        counts = np.isin(ids, list(plain))
-        counts[1:] &= ids[1:] == ids[:-1]
-        counts[:, 1:] &= ids[:, 1:] == ids[:, :-1]
+        inside = np.ones(ids.shape, bool)
+        inside[1:] &= ids[1:] == ids[:-1]
+        inside[:, 1:] &= ids[:, 1:] == ids[:, :-1]
         truth = read_exr(capture / "truth" / "albedo" / name).rgb.reshape(-1, 3)
         element = np.stack(elements)
-        found.append({"element": element, "truth": truth, "counts": counts.ravel() & (element >= 0).all(0)})
+        inside = inside.ravel() & (element >= 0).all(0)
+        found.append({
+            "element": element, "truth": truth, "counts": inside & np.isin(ids.ravel(), list(plain)),
+            "id": ids.ravel(), "inside": inside,
+            "image": read_exr(capture / "truth" / "image" / name).rgb.reshape(-1, 3),
+            "directions": -camera.directions(camera.pixel_centres()),
+        })  # fmt: skip
     return found
 
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from addon.benchmark.truth_materials import found_kind, found_roughness, score_materials, true_kind, true_roughness
 from addon.benchmark.truth_views import projected_truth, psnr, views
 from addon.core.io.exr import read_exr
 from addon.core.io.read import read_capture
-from addon.core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR
 from addon.core.passes.albedo.albedo import MEASURED
 from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
@@ -23,10 +23,6 @@ from addon.core.settings import Settings
 
 from .held import held
 
-LEAST_PIXELS = 100
-UNTOLD = 0.5
-"""Blender's Roughness where the result says none."""
-KINDS = {LAMBERTIAN: "diffuse", SPECULAR: "specular", METAL: "metal", EMITTER: "emitter"}
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -106,36 +102,20 @@ def compare(capture: Path, result: Path) -> dict:
                 if ratio.get(kind) is not None:
                     fixed[own] *= np.asarray(ratio[kind]) if kind == "E" else 1 / np.maximum(ratio[kind], 0.05)
         scores[f"Base Color with each object's {name} put right (one factor a channel)"] = psnr(seen, fixed)
-    rows, errors, models = [], [], {}
+    rows, scored = [], score_materials(materials.values(), truth, pixels)
     for i, true in truth.items():
         mine = materials[i]
-        rough = None if mine.phi is None else float(np.sqrt(mine.phi))
-        kind = KINDS.get(mine.model, mine.model)
-        true_kind = (
-            "emitter"
-            if true["emission"]
-            else "metal"
-            if true["metallic"]
-            else "diffuse"
-            if true["bsdf"] == "diffuse"
-            else "specular"
-        )
-        true_rough = None if true["alpha"] is None or true["emission"] else float(np.sqrt(true["alpha"]))
         own = np.isin(ids_of, [i])
         rows.append({
             "id": i, "class_name": true["class_name"], "pixels": pixels[i], "share": share.get(i, 0.0),
             **{k: ratios.get(i, {}).get(k) for k in split},
             "measured": float(measured[own].mean()) if own.any() else 0.0,
-            "model": kind, "true_model": true_kind, "roughness": rough, "true_roughness": true_rough,
+            "model": found_kind(mine), "true_model": true_kind(true),
+            "roughness": found_roughness(mine), "true_roughness": true_roughness(true),
             "psi": mine.psi, "f0": mine.f0,
             "true_f0": true["base_color"] if true["metallic"] and "base_color" in true else None,
             "scores": mine.scores, "note": mine.note,
         })  # fmt: skip
-        if pixels[i] < LEAST_PIXELS or true["masked"] or true["bsdf"] == "dielectric":
-            continue
-        if true_rough is not None:
-            errors.append((abs((UNTOLD if rough is None else rough) - true_rough), pixels[i]))
-        models[f"{true_kind} as {kind}"] = models.get(f"{true_kind} as {kind}", 0) + 1
     lamps = {lamp.object_id: lamp for lamp in shading.lamps}
     lamp_rows = [
         {
@@ -149,15 +129,14 @@ def compare(capture: Path, result: Path) -> dict:
         for i in truth
         if truth[i]["emission"] or i in lamps
     ]
-    by_object, by_pixel = np.array([e for e, _ in errors] or [np.nan]), np.array([n for _, n in errors] or [1])
     return {
         "psnr": scores,
-        "roughness_by_pixel": float(np.average(by_object, weights=by_pixel)),
-        "roughness_by_object": float(by_object.mean()),
+        "roughness_by_pixel": scored.roughness_by_pixel,
+        "roughness_by_object": scored.roughness_by_object,
         "held": shares,
-        "models": models,
-        "of": sum(models.values()),
-        "right": sum(n for k, n in models.items() if len(set(k.split(" as "))) == 1),
+        "models": scored.models,
+        "of": scored.objects,
+        "right": scored.right,
         "lamps": lamp_rows,
         "notes": list(shading.notes),
         "warnings": list(warnings),

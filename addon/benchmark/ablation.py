@@ -1,0 +1,260 @@
+"""Every pass taken out, one at a time, over rooms with truth and several seeds: what each gains, and what it costs.
+
+For each room and seed the whole method, then the method without each pass. Stages before the first that a pass changes
+are taken from the whole run's store; where that stage comes out the same without the pass, the rest does, too. One line
+of JSON for each run goes to `LINES`: what is there is not done again, and files of several machines can be joined.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.errors import BadInputError
+from ..core.io.read import read_capture
+from ..core.memory import peak_memory
+from ..core.passes.registry import PASSES, STAGE_OF, check
+from ..core.pipeline.recover import Recovery
+from ..core.progress import Progress
+from ..core.results.store import Store
+from ..core.settings import PRESETS, Settings
+from ..core.stages import RUN_STAGES, STAGES, WRITE
+from .rerender import rerender_psnr
+from .truth_materials import score_materials
+from .truth_views import psnr, views
+
+LINES = "ablation.jsonl"
+WHOLE = ""
+"""The name of no pass: the run that has all of them."""
+SURFACE = "surface"
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """What is to be run.
+
+    Attributes
+    ----------
+    rooms : sequence of Path
+        Captures with truth beside them.
+    out : Path
+        Folder for the lines and the stages.
+    seeds : sequence of int
+    passes : sequence of str
+        Empty for all.
+    preset : str
+    threads : int
+    limit : float
+        Seconds after which no further run is begun; 0 for none.
+    unwrap : callable, optional
+        Lays meshes out; Blender's where not given.
+    """
+
+    rooms: Sequence[Path]
+    out: Path
+    seeds: Sequence[int] = (0, 1)
+    passes: Sequence[str] = ()
+    preset: str = "normal"
+    threads: int = 1
+    limit: float = 0.0
+    unwrap: Callable | None = None
+    started: float = field(default_factory=time.monotonic)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The passes to take out, in the registry's order."""
+        check(self.passes)
+        return tuple(one.name for one in PASSES if not self.passes or one.name in self.passes)
+
+    @property
+    def over(self) -> bool:
+        return bool(self.limit) and time.monotonic() - self.started > self.limit
+
+    def settings(self, seed: int, name: str = WHOLE) -> Settings:
+        """Of one run."""
+        without = () if name == WHOLE else (name,)
+        return replace(PRESETS[self.preset], seed=seed, threads=self.threads, without=without)
+
+
+def read_lines(paths: Sequence[Path]) -> list[dict[str, Any]]:
+    """The runs in some files of lines; one that is there twice counts once, as it came last."""
+    found = {}
+    for path in paths:
+        try:
+            lines = path.read_text(encoding="utf-8").splitlines()
+        except OSError as error:
+            raise BadInputError(f"'{path}' can't be read ({error.strerror or error}).") from error
+        for number, line in enumerate(lines, 1):
+            try:
+                one = json.loads(line)
+                found[one["room"], one["preset"], one["seed"], one["without"]] = one
+            except (ValueError, KeyError, TypeError) as error:
+                if number == len(lines):  # a run was stopped as it wrote
+                    continue
+                raise BadInputError(f"Line {number} of '{path}' is no run of the ablation.") from error
+    return list(found.values())
+
+
+def run_ablation(asked: Ablation, tell: Callable[[str], None] = lambda text: None) -> Path:
+    """Do what is not done yet; the file of lines.
+
+    Parameters
+    ----------
+    tell : callable
+        Gets a line for each finished run.
+
+    Raises
+    ------
+    BadInputError
+        A room without truth, an unknown pass, a folder that can't be written.
+    """
+    for room in asked.rooms:
+        if not (room / "truth" / "transforms.json").is_file():
+            raise BadInputError(f"Room '{room}' has no truth/transforms.json; the ablation needs rooms with truth.")
+    names = asked.names
+    try:
+        asked.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInputError(
+            f"Folder '{asked.out}' can't be made ({error.strerror or error}); choose another."
+        ) from error
+    path = asked.out / LINES
+    lines = read_lines([path]) if path.exists() else []
+    done = {(one["room"], one["preset"], one["seed"], one["without"]) for one in lines}
+    for seed in asked.seeds:
+        for room in asked.rooms:
+            todo = [name for name in (WHOLE, *names) if (room.name, asked.preset, seed, name) not in done]
+            if not todo or asked.over:
+                continue
+            bench = Bench(asked, room, seed)
+            for name in todo:
+                if asked.over:
+                    break
+                line = bench.run(name)
+                with open(path, "a", encoding="utf-8") as file:
+                    file.write(json.dumps(line) + "\n")
+                tell(_told(line))
+    return path
+
+
+def _told(line: dict[str, Any]) -> str:
+    what = f"without {line['without']}" if line["without"] else "whole"
+    same = " (no difference)" if line["same"] else ""
+    figures = ", ".join(f"{name} {value:.3f}" for name, value in line["figures"].items() if value is not None)
+    return f"{line['room']} seed {line['seed']} {what}: {figures}; {sum(line['seconds'].values()):.1f} s{same}"
+
+
+class Bench:
+    """One room under one seed: the whole run is done or taken from the store, the others start from its stages."""
+
+    def __init__(self, asked: Ablation, room: Path, seed: int):
+        self._asked, self._seed, self.room = asked, seed, room
+        self._capture = read_capture(room)
+        self._folder = asked.out / "stages" / f"{room.name}-{asked.preset}-{seed}"
+        self._truth = {o["id"]: o for o in json.loads((room / "truth" / "materials.json").read_text())}
+        self._views: dict[str, list[dict]] = {}
+        self._whole: dict[str, Any] | None = None
+
+    def run(self, name: str) -> dict[str, Any]:
+        """The line of one run: the whole (`WHOLE`), or without a pass."""
+        if name == WHOLE:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            self._whole = self._run(WHOLE, self._folder, SURFACE)
+            return self._whole
+        if self._whole is None:
+            self._whole = self._run(WHOLE, self._folder, SURFACE)
+        other = self._folder.with_name(f"{self._folder.name}-without")
+        shutil.rmtree(other, ignore_errors=True)
+        try:
+            return self._run(name, other, STAGE_OF[name])
+        finally:
+            shutil.rmtree(other, ignore_errors=True)
+
+    def _run(self, name: str, folder: Path, first: str) -> dict[str, Any]:
+        before = RUN_STAGES[: RUN_STAGES.index(first)]
+        (folder / "stages").mkdir(parents=True, exist_ok=True)
+        for stage in before:
+            (folder / "stages" / f"{stage}.npz").symlink_to((self._folder / "stages" / f"{stage}.npz").resolve())
+        forget_peak_memory()
+        seconds, same = {}, False
+        with Store(folder) as store:
+            settings = self._asked.settings(self._seed, name)
+            recovery = Recovery(self._capture, store, settings, Progress(), self._asked.unwrap or _unwrap())
+            for stage in STAGES:
+                started = time.process_time()
+                getattr(recovery, stage)()
+                if stage not in before:
+                    seconds[stage] = round(time.process_time() - started, 2)
+                if name != WHOLE and stage not in before and self._same(stage, store):
+                    same = True
+                    break
+            figures = dict(self._whole["figures"]) if same else {}
+            if not same:
+                started = time.process_time()
+                recovery.base_color()
+                seconds[WRITE] = round(time.process_time() - started, 2)
+                memory = peak_memory()
+                figures = self._figures(recovery, store)
+                same = name != WHOLE and figures == self._whole["figures"]
+            else:
+                memory = peak_memory()
+        return {
+            "room": self.room.name, "preset": self._asked.preset, "seed": self._seed, "without": name, "same": same,
+            "figures": figures, "seconds": seconds, "peak_mib": None if memory is None else round(memory / 2**20),
+        }  # fmt: skip
+
+    def _same(self, stage: str, store: Store) -> bool:
+        """Whether a stage holds what the whole run's does."""
+        with Store(self._folder) as whole:
+            (mine, told), (theirs, known) = (_stored(one, stage) for one in (store, whole))
+        return told == known and mine.keys() == theirs.keys() and all(_equal(mine[key], theirs[key]) for key in mine)
+
+    def _figures(self, recovery: Recovery, store: Store) -> dict[str, float | None]:
+        surface = store.stored_key(SURFACE) or ""
+        if surface not in self._views:
+            self._views = {surface: views(self.room, recovery)}
+        seen = self._views[surface]
+        ids = np.concatenate([view["id"] for view in seen])
+        pixels = dict(zip(*(x.tolist() for x in np.unique(ids, return_counts=True)), strict=True))
+        found = score_materials(recovery.materials(), self._truth, pixels)
+        figures = {
+            "albedo": psnr(seen, recovery.base_color()),
+            "rerender": rerender_psnr(recovery, seen),
+            "roughness_by_pixel": found.roughness_by_pixel,
+            "roughness_by_object": found.roughness_by_object,
+            "right": found.right,
+            "objects": found.objects,
+        }
+        return {key: None if np.isnan(value) else round(float(value), 5) for key, value in figures.items()}
+
+
+def _unwrap() -> Callable:
+    try:
+        from ..bridge.unwrap import unwrap
+    except ImportError as error:
+        raise BadInputError("The ablation lays meshes out with Blender; run it where bpy can be imported.") from error
+    return unwrap
+
+
+def _stored(store: Store, stage: str) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Arrays and meta of a stage."""
+    key = store.stored_key(stage) or ""
+    return store.load(stage, key) or {}, store.load_meta(stage, key) or {}
+
+
+def _equal(a: np.ndarray, b: np.ndarray) -> bool:
+    return a.dtype == b.dtype and np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
+
+
+def forget_peak_memory() -> None:
+    """Measure the peak of this process from now on, where the system can (Linux)."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5")
