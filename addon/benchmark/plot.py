@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -57,6 +58,23 @@ def write_plot(table: Table, path: Path | str) -> None:
     figure.legend(handles=list(handles.values()), loc="outside lower center", ncols=min(3, max(len(handles), 1)))
     with replacing(path) as temporary:
         # No date or version in the file: the same figures give the same bytes.
+        figure.savefig(temporary, format="png", dpi=110, metadata={"Software": None})
+
+
+def write_points(points: Sequence[tuple[str, float, float, float]], x: str, y: str, path: Path | str) -> None:
+    """Named points (name, x, y, error of y) with the names beside them; linear within 1 and logarithmic beyond."""
+    figure = Figure(figsize=(2.2 * PANEL, 1.6 * PANEL), layout="constrained")
+    panel = figure.subplots()
+    panel.axhline(0, color=COLOURS[6], linewidth=0.8)
+    panel.axvline(0, color=COLOURS[6], linewidth=0.8)
+    panel.set(xlabel=x, ylabel=y)
+    panel.set_xscale("symlog", linthresh=1)
+    panel.set_yscale("symlog", linthresh=1)
+    panel.grid(alpha=0.3)
+    for name, at, value, error in points:
+        panel.errorbar(at, value, error, fmt="o", color=COLOURS[0], markersize=4, linewidth=0.8)
+        panel.annotate(name, (at, value), xytext=(4, 3), textcoords="offset points", fontsize=6)
+    with replacing(path) as temporary:
         figure.savefig(temporary, format="png", dpi=110, metadata={"Software": None})
 
 

@@ -1,0 +1,233 @@
+"""docs/ablation.md: what each pass gains and costs, from the ablation's lines of JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.atomic import write_bytes
+from ..core.errors import BadInputError
+from ..core.passes.registry import PASSES, Pass
+from .ablation import WHOLE, read_lines
+from .run import plots_are_possible
+
+Line = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One figure: its name in the lines, its column, and what makes it comparable.
+
+    Attributes
+    ----------
+    name, column : str
+    sign : int
+        1 where more is better, -1 where less is.
+    scale : float
+    digits : int
+    """
+
+    name: str
+    column: str
+    sign: int = 1
+    scale: float = 1.0
+    digits: int = 2
+
+
+ALBEDO = Figure("albedo", "albedo, dB")
+FIGURES = (
+    ALBEDO,
+    Figure("rerender", "re-render, dB"),
+    Figure("roughness_by_pixel", "roughness by pixel, 1/1000", -1, 1000.0, 1),
+    Figure("roughness_by_object", "by object, 1/1000", -1, 1000.0, 1),
+    Figure("right", "right models", 1, 1.0, 1),
+)
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What a pass gains in one figure over r rooms.
+
+    Attributes
+    ----------
+    by_room : dict of str to float
+        Mean over the seeds.
+    mean : float
+    error : float or None
+        Standard error of the mean by the seeds alone; None where no room has two seeds.
+    """
+
+    by_room: dict[str, float]
+    mean: float
+    error: float | None
+
+
+def gain_of(figure: Figure, name: str, runs: Mapping[tuple, Line]) -> Gain | None:
+    """The gain of a pass, each run compared with the whole method's of the same room and seed; None without any.
+
+    Parameters
+    ----------
+    runs : mapping
+        Lines by (room, preset), seed and what is left out.
+    """
+    pairs: dict[tuple, list[float]] = {}
+    for (room, seed, left_out), line in runs.items():
+        whole = runs.get((room, seed, WHOLE))
+        if left_out != name or whole is None:
+            continue
+        with_it, without = (one["figures"].get(figure.name) for one in (whole, line))
+        if with_it is not None and without is not None:
+            pairs.setdefault(room, []).append(figure.sign * figure.scale * (with_it - without))
+    if not pairs:
+        return None
+    by_room = {room: float(np.mean(gains)) for room, gains in pairs.items()}
+    repeated = [gains for gains in pairs.values() if len(gains) > 1]
+    error = None
+    if repeated:
+        variance = float(np.mean([np.var(gains, ddof=1) for gains in repeated]))
+        error = float(np.sqrt(variance * sum(1 / len(gains) for gains in pairs.values()))) / len(pairs)
+    return Gain(by_room, float(np.mean(list(by_room.values()))), error)
+
+
+def seconds_of(name: str, runs: Mapping[tuple, Line]) -> float | None:
+    """Processor seconds that a pass takes, mean over its runs: of the stages that were done again without it."""
+    taken = []
+    for (room, seed, left_out), line in runs.items():
+        whole = runs.get((room, seed, WHOLE))
+        if left_out == name and whole is not None:
+            shared = [stage for stage in line["seconds"] if stage in whole["seconds"]]
+            taken.append(sum(whole["seconds"][stage] - line["seconds"][stage] for stage in shared))
+    return float(np.mean(taken)) if taken else None
+
+
+def write_report(folder: Path, path: Path) -> None:
+    """Write the table of all lines in a folder as Markdown, and the plot of gain against seconds to images/ beside it.
+
+    Raises
+    ------
+    BadInputError
+        There are no lines.
+    """
+    lines = read_lines(sorted(folder.glob("*.jsonl")))
+    runs = {((one["room"], one["preset"]), one["seed"], one["without"]): one for one in lines}
+    if not any(left_out == WHOLE for _, _, left_out in runs):
+        raise BadInputError(f"Folder '{folder}' holds no runs of the whole method (*.jsonl).")
+    image = path.parent / "images" / f"{path.stem}.png"
+    plotted = plots_are_possible()
+    if plotted:
+        image.parent.mkdir(parents=True, exist_ok=True)
+        _plot(runs, image)
+    write_bytes(path, _markdown(runs, f"images/{image.name}" if plotted else None).encode())
+
+
+def _markdown(runs: Mapping[tuple, Line], image: str | None) -> str:
+    rooms = sorted({room for room, _, _ in runs})
+    acting = [one for one in PASSES if _acts(one.name, runs)]
+    idle = [one for one in PASSES if _was_run(one.name, runs) and not _acts(one.name, runs)]
+    missing = [one for one in PASSES if not _was_run(one.name, runs)]
+    presets = sorted({preset for _, preset in rooms})
+    lines = [
+        "# What each pass gains",
+        "",
+        "Every pass is left out by itself (`--without PASS`) and the room is recovered again, by `scan-relight "
+        "benchmark ablation ROOM ... --out DIR`; this page is `scan-relight benchmark ablation --out DIR --table "
+        "docs/ablation.md`.",
+        "A gain is the whole method's figure less the figure without the pass, under the same seed: above 0 the pass "
+        "helps. After the sign ± is the standard error of the mean over the rooms by the seeds alone; rooms differ by "
+        "more, as worst and best room show. Albedo: PSNR of Base Color over held-out views. Re-render: PSNR of those "
+        "views in display values, predicted from albedo, irradiance and lobes without a renderer. Roughness: mean "
+        "absolute error of the square root of alpha. Seconds: processor time of the stages that were done again.",
+        "",
+        f"Rooms ({', '.join(presets)} preset): {', '.join(_room(one) for one in rooms)}. "
+        f"Seeds: {', '.join(str(seed) for seed in sorted({seed for _, seed, _ in runs}))}.",
+        "",
+    ]
+    if image:
+        lines += [f"![Gain of albedo against seconds]({image})", ""]
+    head = ["pass", "rooms", *(f.column for f in FIGURES), "worst room, dB", "best room, dB", "seconds"]
+    lines += ["## All rooms together", "", *_table(head, [_summary(one, runs) for one in acting]), ""]
+    head = ["pass", *(_room(room) for room in rooms)]
+    lines += ["## Albedo by room, dB", "", *_table(head, [_by_room(one, rooms, runs) for one in acting]), ""]
+    whole = [["whole method", *(_whole(room, runs) for room in rooms)]]
+    lines += ["## The whole method's albedo, dB", "", *_table(head, whole), ""]
+    if idle:
+        lines += ["## Without effect in these rooms", "", "What these look for is in none of them.", ""]
+        lines += _table(["pass", "does", "seconds"], [[one.name, one.does, _seconds(one, runs)] for one in idle]) + [""]
+    if missing:
+        lines += ["## Not measured", "", ", ".join(one.name for one in missing) + ".", ""]
+    lines += ["## What they do", "", *_table(["pass", "first stage", "does"], [_does(one) for one in acting]), ""]
+    return "\n".join(lines)
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows)]
+
+
+def _room(room: tuple[str, str]) -> str:
+    name, preset = room
+    return name if preset == "normal" else f"{name} ({preset})"
+
+
+def _was_run(name: str, runs: Mapping[tuple, Line]) -> bool:
+    return any(left_out == name for _, _, left_out in runs)
+
+
+def _acts(name: str, runs: Mapping[tuple, Line]) -> bool:
+    """Whether leaving a pass out changed anything anywhere."""
+    return any(left_out == name and not line["same"] for (_, _, left_out), line in runs.items())
+
+
+def _seconds(one: Pass, runs: Mapping[tuple, Line]) -> str:
+    found = seconds_of(one.name, runs)
+    return "" if found is None else f"{found:.1f}"
+
+
+def _summary(one: Pass, runs: Mapping[tuple, Line]) -> list[str]:
+    cells = []
+    for figure in FIGURES:
+        gain = gain_of(figure, one.name, runs)
+        cells.append("" if gain is None else _signed(gain.mean, figure.digits, gain.error))
+    of = {room for room, _, left_out in runs if left_out == one.name}
+    acts = {room for (room, _, left_out), line in runs.items() if left_out == one.name and not line["same"]}
+    by_room = getattr(gain_of(ALBEDO, one.name, runs), "by_room", None) or {}
+    ends: list[Callable] = [min, max]
+    extremes = [f"{_signed(end(by_room.values()))} {_room(end(by_room, key=by_room.get))}" for end in ends if by_room]
+    return [one.name, f"{len(acts)} of {len(of)}", *cells, *(extremes or ["", ""]), _seconds(one, runs)]
+
+
+def _by_room(one: Pass, rooms: Sequence[tuple[str, str]], runs: Mapping[tuple, Line]) -> list[str]:
+    gain = gain_of(ALBEDO, one.name, runs)
+    by_room = gain.by_room if gain is not None else {}
+    return [one.name, *(_signed(by_room[room]) if room in by_room else "" for room in rooms)]
+
+
+def _whole(room: tuple[str, str], runs: Mapping[tuple, Line]) -> str:
+    found = [line["figures"]["albedo"] for (r, _, name), line in runs.items() if r == room and name == WHOLE]
+    return f"{np.mean(found):.2f}" if found else ""
+
+
+def _does(one: Pass) -> list[str]:
+    return [one.name, one.stage, one.does]
+
+
+def _signed(value: float, digits: int = 2, error: float | None = None) -> str:
+    text = f"{value:+.{digits}f}"
+    if float(text) == 0:
+        text = f"{0:.{digits}f}"
+    return text if error is None else f"{text} ± {error:.{digits}f}"
+
+
+def _plot(runs: Mapping[tuple, Line], path: Path) -> None:
+    """Gain of albedo over seconds, a point a pass."""
+    from .plot import write_points
+
+    points = []
+    for one in PASSES:
+        gain, seconds = gain_of(ALBEDO, one.name, runs), seconds_of(one.name, runs)
+        if gain is not None and seconds is not None and _acts(one.name, runs):
+            points.append((one.name, seconds, gain.mean, gain.error or 0.0))
+    write_points(points, "processor seconds a room", "gain of albedo, dB", path)
