@@ -51,6 +51,90 @@ def test_imports_of_our_own_code_are_relative(path):
     assert not {name.split(".")[0] for level, name in imports(path) if level == 0} & ours
 
 
+LAYERS = (
+    ("",),
+    ("scene",),
+    ("io", "paper"),
+    ("brdf", "results"),
+    ("light",),
+    ("lit_diffuse", "agreement"),
+    ("fit",),
+    ("passes",),
+    ("evidence",),
+    ("pipeline",),
+)
+"""Folders of addon/core from the bottom up; '' are the modules at its root. Each may import from lower ones alone."""
+Graph = dict[tuple[str, ...], set[tuple[str, ...]]]
+
+
+def graph(root: Path) -> Graph:
+    """Which module below `root` imports which, those for type checkers alone included; names relative to `root`."""
+    modules = {path.relative_to(root).with_suffix("").parts: path for path in root.rglob("*.py")}
+    modules = {name[:-1] if name[-1] == "__init__" else name: path for name, path in modules.items()}
+    result: Graph = {}
+    for name, path in modules.items():
+        package = name if path.name == "__init__.py" else name[:-1]
+        result[name] = set()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and 0 < node.level <= len(package) + 1:
+                base = package[: len(package) - (node.level - 1)] + tuple(filter(None, (node.module or "").split(".")))
+                inner = [base + (alias.name,) for alias in node.names]
+                result[name] |= {one for one in inner if one in modules} or {base}
+    return result
+
+
+def circle(imports: Graph) -> list[tuple[str, ...]]:
+    """The modules of a circle of imports; [] where there is none."""
+    state: dict[tuple[str, ...], bool] = {}  # True: done, False: on the way
+
+    def follow(one: tuple[str, ...], way: list[tuple[str, ...]]) -> list[tuple[str, ...]]:
+        if one in state:
+            return [] if state[one] else [*way[way.index(one) :], one]
+        state[one] = False
+        for other in sorted(imports.get(one, ())):
+            if found := follow(other, [*way, one]):
+                return found
+        state[one] = True
+        return []
+
+    return next((found for one in sorted(imports) if (found := follow(one, []))), [])
+
+
+def test_a_circle_is_found():
+    assert circle({("a",): {("b",)}, ("b",): {("c",)}, ("c",): {("b",)}}) == [("b",), ("c",), ("b",)]
+    assert circle({("a",): {("b",), ("c",)}, ("b",): {("c",)}, ("c",): set()}) == []
+
+
+def test_the_core_has_no_circle_of_imports():
+    assert not circle(graph(ROOT / "addon" / "core"))
+
+
+def test_dependencies_in_the_core_point_down():
+    level = {folder: i for i, folders in enumerate(LAYERS) for folder in folders}
+    assert {path.name for path in (ROOT / "addon" / "core").iterdir() if (path / "__init__.py").is_file()} < set(level)
+
+    def folder(name: tuple[str, ...]) -> str:
+        return name[0] if name and (len(name) > 1 or name[0] in level) else ""
+
+    wrong = [
+        f"{'.'.join(one)} imports {'.'.join(other)}"
+        for one, others in graph(ROOT / "addon" / "core").items()
+        for other in others
+        if folder(one) != folder(other) and level[folder(one)] <= level[folder(other)]
+    ]
+    assert not wrong
+
+
+def test_no_pass_imports_another():
+    wrong = [
+        f"{'.'.join(one)} imports {'.'.join(other)}"
+        for one, others in graph(ROOT / "addon" / "core" / "passes").items()
+        for other in others
+        if len(one) > 1 and other[:1] != one[:1]
+    ]
+    assert not wrong
+
+
 def test_nothing_under_addon_reaches_above_it():
     for path in sorted((ROOT / "addon").rglob("*.py")):
         depth = len(path.relative_to(ROOT).parts) - 1

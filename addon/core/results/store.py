@@ -1,7 +1,7 @@
 """The result folder: which stages are finished, under which key, and files that are there whole or not at all.
 
-A stage's key is made of the key of the stage before it and of the settings that it heeds. So a changed setting makes
-its own stage and all later ones anew, and nothing else.
+A stage's key is made of those of the stages that it takes, of the settings that it heeds and of its source
+(`pipeline.stage`). So a changed setting makes its own stage and all later ones anew, and nothing else.
 """
 
 from __future__ import annotations
