@@ -6,14 +6,14 @@ from pathlib import Path
 import bpy
 
 from ..addon.bridge import result_home
-from ..addon.core.errors import ScanRelightError
 from . import poll, preferences
+from .at_once import AtOnce
 from .settings_props import can_start
 
 FOLDER = "scene_capture"
 
 
-class SCAN_RELIGHT_OT_capture_from_scene(bpy.types.Operator):
+class SCAN_RELIGHT_OT_capture_from_scene(AtOnce, bpy.types.Operator):
     """Make a capture of the open scene."""
 
     bl_idname = "scan_relight.capture_from_scene"
@@ -82,7 +82,7 @@ class SCAN_RELIGHT_OT_capture_from_scene(bpy.types.Operator):
                 layout.prop(self, "frame_end")
             layout.prop(self, "frame_step")
 
-    def execute(self, context):
+    def work(self, context):
         """Write the folder and choose it in the panel."""
         from ..addon.bridge.scene_capture import capture_scene
 
@@ -94,15 +94,8 @@ class SCAN_RELIGHT_OT_capture_from_scene(bpy.types.Operator):
             else result_home.capture_folder(preferences.results_folder(), choices.capture_folder)
         )
         first, last = (None, None) if self.whole_range else (self.frame_start, self.frame_end)
-        try:
-            result_home.check(str(folder))
-            for sentence in capture_scene(
-                context, folder, context.selected_objects, self.cameras, first, last, self.frame_step
-            ):
-                self.report({"WARNING"}, sentence)
-        except ScanRelightError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        result_home.check(str(folder))
+        told = capture_scene(context, folder, context.selected_objects, self.cameras, first, last, self.frame_step)
         choices.capture_folder = str(folder)
         self.report({"INFO"}, f"Captured into {folder}")
-        return {"FINISHED"}
+        return told

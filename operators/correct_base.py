@@ -6,10 +6,8 @@ import bpy
 
 from ..addon.bridge import corrections, refitted
 from ..addon.bridge import job as jobs
-from ..addon.console import unexpected
-from ..addon.core.errors import ScanRelightError
 from . import poll, results
-from .at_once import AtOnce
+from .at_once import AtOnce, OneSentence
 from .job_operator import JobOperator
 
 
@@ -42,7 +40,7 @@ class CorrectOperator(AtOnce):
         return self.work(context, chosen(context))
 
 
-class RefitOperator(JobOperator):
+class RefitOperator(OneSentence, JobOperator):
     """States something of the selected objects (`state`) and fits them again, all in one undo step."""
 
     bl_options = {"REGISTER", "UNDO"}
@@ -68,17 +66,15 @@ class RefitOperator(JobOperator):
     def execute(self, context):
         """State it, then refit behind the window, or here in the background."""
         self._stated = False
-        try:
+
+        def work() -> set[str]:
             things = self.state(context, chosen(context))
             self._stated = True
             if not self.always and not context.scene.scan_relight_correct.refit_automatically:
                 return {"FINISHED"}
             return self.refit(context, things)
-        except ScanRelightError as error:
-            self.report({"ERROR"}, str(error))
-        except Exception as error:  # the last line of defence: a sentence, never a bare traceback
-            self.report({"ERROR"}, unexpected(error, bpy.app.tempdir))
-        return self._verdict({"CANCELLED"})
+
+        return self._verdict(self.attempt(work))
 
     def refit(self, context, things):
         """Fit `things` again; what `execute` returns."""
@@ -93,7 +89,7 @@ class RefitOperator(JobOperator):
         job.facts["phase"] = "end"
         if job.state != jobs.DONE:
             self.report({"ERROR"}, job.sentence)
-            return self._verdict({"CANCELLED"})
+            return {"CANCELLED"}
         slices = self.change(context.scene, self.load(job))
         while True:
             try:

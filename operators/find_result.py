@@ -5,16 +5,21 @@ from pathlib import Path
 
 import bpy
 
-from ..addon.bridge import find_result
-from ..addon.core.errors import BadInputError, ScanRelightError
+from ..addon.bridge import find_result, result_images
+from ..addon.core.errors import BadInputError
 from . import preferences
+from .at_once import AtOnce
 from .panel import SidebarPanel
 
+OVERTAKEN = (
+    "'{name}' was recovered anew with other textures since this file was saved: its objects show wrong colours "
+    "here until the new result is brought in."
+)
 _found: list[str] = []
 """What was found again when the open file was loaded."""
 
 
-class SCAN_RELIGHT_OT_find_result(bpy.types.Operator):
+class SCAN_RELIGHT_OT_find_result(AtOnce, bpy.types.Operator):
     """Point to a result that was moved."""
 
     bl_idname = "scan_relight.find_result"
@@ -45,26 +50,20 @@ class SCAN_RELIGHT_OT_find_result(bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, context):
+    def work(self, context):
         """Point everything there."""
-        try:
-            one = self.wanted()
-            if not self.directory:
-                raise BadInputError("Choose the folder that the result lies in now.")
-            new = find_result.find(one, Path(bpy.path.abspath(self.directory)).absolute())
-            count = find_result.repoint(one.folder, new)
-        except ScanRelightError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        one = self.wanted()
+        if not self.directory:
+            raise BadInputError("Choose the folder that the result lies in now.")
+        new = find_result.find(one, Path(bpy.path.abspath(self.directory)).absolute())
+        count = find_result.repoint(one.folder, new)
         for scene in bpy.data.scenes:
             choices = scene.scan_relight
             if choices.result_folder and Path(bpy.path.abspath(choices.result_folder)) == one.folder:
                 choices.result_folder = str(new)
         left = next((other for other in find_result.missing() if other.folder == new), None)
-        if left is not None:
-            self.report({"WARNING"}, left.sentence)
         self.report({"INFO"}, f"{count} picture{'s' * (count != 1)} found in '{new}'.")
-        return {"FINISHED"}
+        return [left.sentence] if left is not None else []
 
     def wanted(self) -> find_result.Missing:
         """The missing result in question."""
@@ -88,7 +87,9 @@ class SCAN_RELIGHT_PT_missing(SidebarPanel, bpy.types.Panel):
     @classmethod
     def poll(cls, context):
         """Only where there is something to say."""
-        return context.scene is not None and bool(_found or find_result.known_missing())
+        return context.scene is not None and bool(
+            _found or find_result.known_missing() or find_result.known_overtaken()
+        )
 
     def draw(self, context):
         """Each missing result with its button; what was found again."""
@@ -96,6 +97,9 @@ class SCAN_RELIGHT_PT_missing(SidebarPanel, bpy.types.Panel):
         for one in find_result.known_missing():
             self.say(layout, context, one.sentence, "ERROR")
             layout.operator("scan_relight.find_result", icon="FILE_FOLDER").missing = str(one.folder)
+        for folder in find_result.known_overtaken():
+            self.say(layout, context, OVERTAKEN.format(name=folder.name), "ERROR")
+            layout.operator("scan_relight.open_result", text="Bring In", icon="IMPORT").folder = str(folder)
         for sentence in _found:
             self.say(layout, context, sentence, "INFO")
 
@@ -104,6 +108,14 @@ class SCAN_RELIGHT_PT_missing(SidebarPanel, bpy.types.Panel):
 def look_for_results(*_) -> None:
     """A file was opened: find what was moved along with it."""
     _found[:] = find_result.search(preferences.results_folder())
+
+
+@bpy.app.handlers.persistent
+def keep_images(*told) -> None:
+    """The file is about to be saved: what it refers to of results is kept from later runs."""
+    path = next((one for one in told if isinstance(one, str) and one), bpy.data.filepath)
+    if path:
+        result_images.keep(Path(path))
 
 
 @bpy.app.handlers.persistent

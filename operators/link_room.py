@@ -4,7 +4,9 @@
 import bpy
 
 from ..addon.bridge.room_parts import rooms
+from ..addon.core.errors import BadInputError
 from . import poll
+from .at_once import AtOnce
 
 _items: list[tuple[str, str, str]] = []  # Blender keeps no reference of its own
 
@@ -19,7 +21,7 @@ def others(operator, context) -> list[tuple[str, str, str]]:
     return _items
 
 
-class SCAN_RELIGHT_OT_link_room(bpy.types.Operator):
+class SCAN_RELIGHT_OT_link_room(AtOnce, bpy.types.Operator):
     """Show the room in another scene."""
 
     bl_idname = "scan_relight.link_room"
@@ -29,6 +31,7 @@ class SCAN_RELIGHT_OT_link_room(bpy.types.Operator):
         "what is changed in one is changed in the other"
     )
     bl_options = {"REGISTER", "UNDO"}
+    remarks = "INFO"
 
     scene: bpy.props.EnumProperty(name="Scene", description="Where the room is linked", items=others)
     outside: bpy.props.BoolProperty(
@@ -44,15 +47,13 @@ class SCAN_RELIGHT_OT_link_room(bpy.types.Operator):
             and poll.check(cls, len(bpy.data.scenes) > 1, "This file has no other scene to link the room into.")
         )
 
-    def execute(self, context):
+    def work(self, context):
         """Link all rooms of this scene."""
         from ..addon.bridge.room import link_room
 
         target = bpy.data.scenes.get(self.scene)
         if target is None:
-            self.report({"ERROR"}, "Choose the scene to link the room into.")
-            return {"CANCELLED"}
+            raise BadInputError("Choose the scene to link the room into.")
         for top in rooms(context.scene):
             link_room(top, target, context.scene if self.outside else None)
-        self.report({"INFO"}, f"The room is in scene '{target.name}' as well.")
-        return {"FINISHED"}
+        return [f"The room is in scene '{target.name}' as well."]

@@ -4,8 +4,8 @@
 import bpy
 
 from ..addon.bridge import look
-from ..addon.core.errors import ScanRelightError
 from . import poll
+from .at_once import AtOnce
 
 
 def look_items() -> list[tuple[str, str, str]]:
@@ -13,7 +13,7 @@ def look_items() -> list[tuple[str, str, str]]:
     return [(name, one.label, one.text) for name, one in look.LOOKS.items()]
 
 
-class SCAN_RELIGHT_OT_look(bpy.types.Operator):
+class SCAN_RELIGHT_OT_look(AtOnce, bpy.types.Operator):
     """Show another look of the recovered objects."""
 
     bl_idname = "scan_relight.look"
@@ -43,15 +43,10 @@ class SCAN_RELIGHT_OT_look(bpy.types.Operator):
             "No object of this scene wears recovered materials; run the recovery first.",
         ) and poll.object_mode(cls, context)
 
-    def execute(self, context):
+    def work(self, context):
         """Switch."""
-        try:
-            look.set_look(context.scene, self.look)
-        except ScanRelightError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        look.set_look(context.scene, self.look)
         if self.switch_view and context.screen is not None:
             for area in context.screen.areas:
                 if area.type == "VIEW_3D" and area.spaces.active.shading.type in ("SOLID", "WIREFRAME"):
                     area.spaces.active.shading.type = "MATERIAL"
-        return {"FINISHED"}

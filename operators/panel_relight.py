@@ -12,6 +12,8 @@ from .panel import NamedRows, SidebarPanel, places
 from .relight_base import has_room
 from .relight_exposure import look_soon
 
+NAME = 0.5
+"""Share of a row of the lamps that their names have."""
 ICONS = {"WINDOW": "LIGHT_AREA", "SOFTBOX": "MESH_PLANE", "SPOT": "LIGHT_SPOT", "SUN": "LIGHT_SUN"}
 
 
@@ -30,18 +32,17 @@ class SCAN_RELIGHT_UL_lamps(NamedRows, bpy.types.UIList):
         column = layout.column(align=True)
         for material in self.lamps.get(item.name, ()):
             lamp = material.scan_relight_lamp
-            row = column.row(align=True)
-            row.prop(lamp, "on", text="", icon="OUTLINER_OB_LIGHT" if lamp.on else "LIGHT", emboss=False)
-            self.name(row, material.name)
+            row = column.split(factor=NAME, align=True)
+            name = row.row(align=True)
+            name.prop(lamp, "on", text="", icon="OUTLINER_OB_LIGHT" if lamp.on else "LIGHT", emboss=False)
+            self.name(name, material.name)
             value = row.row(align=True)
             value.enabled = lamp.on
             colour = value.row(align=True)
             colour.scale_x = 0.4
             colour.enabled = relight_lamps.colour(material) is not None
             colour.prop(lamp, "colour", text="")
-            strength = value.row(align=True)
-            strength.scale_x = 0.7
-            strength.prop(lamp, "factor", text="")
+            value.prop(lamp, "factor", text="")
 
     def filter_items(self, context, data, name):
         """Of all objects, one for each lamp; sorted by the lamps' names."""
@@ -77,11 +78,9 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
             return
         studio, lamps = scene.scan_relight_studio, relight_lamps.lamps_by_object(scene)
         if lamps:
-            head = layout.split(factor=0.56)
+            head = layout.split(factor=NAME)
             head.label(text="Lamp")
-            row = head.row()
-            row.label(text="Colour")
-            row.label(text="Strength x")
+            head.label(text="Strength x")  # the swatch before it needs no word
             layout.template_list("SCAN_RELIGHT_UL_lamps", "", scene, "objects", studio, "lamp", rows=3)
             row = layout.row(align=True)
             row.operator("scan_relight.switch_lamps", text="All On", icon="OUTLINER_OB_LIGHT").on = True
@@ -164,12 +163,12 @@ class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):
             button.preset, button.aim, button.strength = name, studio.aim, getattr(studio, field)
             button.unit, button.kelvin = studio.unit, studio.kelvin
         for light in relight_lights.added_lights(context.scene):
-            row = layout.row(align=True)
+            column = layout.column(align=True)
+            row = column.row(align=True)
             row.prop(light, "hide_render", text="", icon_only=True, emboss=False)
             row.label(text=light.name)
-            colour = row.row(align=True)
-            colour.scale_x = 0.8
-            colour.prop(light.data, "temperature" if light.data.use_temperature else "color", text="")
+            row = column.row(align=True)
+            row.prop(light.data, "temperature" if light.data.use_temperature else "color", text="")
             if studio.unit == "LUMEN":
                 row.prop(light.data.scan_relight_light, "lumens", text="lx" if light.data.type == "SUN" else "lm")
             else:
@@ -192,10 +191,11 @@ class SCAN_RELIGHT_PT_exposure(RelightPanel, bpy.types.Panel):
         """The exposure, what there is to say of it, the preview's light."""
         layout, scene = self.layout, context.scene
         layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop(scene.view_settings, "exposure", text="Exposure (stops)")
-        row = layout.row(align=True)
-        row.operator("scan_relight.expose", icon="LIGHT_SUN")
-        row.prop(scene.scan_relight_studio, "follow", toggle=True)
+        column = layout.column(align=True)
+        column.use_property_split = False  # half of a narrow sidebar is too little for these words
+        column.prop(scene.view_settings, "exposure", text="Exposure (stops)")
+        column.operator("scan_relight.expose", icon="LIGHT_SUN")
+        column.prop(scene.scan_relight_studio, "follow", toggle=True)
         look_soon(scene)
         said = relight_exposure.darkness(scene)
         if said:

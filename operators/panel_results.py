@@ -13,6 +13,8 @@ from . import preferences, results
 from .panel import NamedRows, SidebarPanel, places
 from .select_result_object import select
 
+NAME = 0.62
+"""Share of a row that the name has where there are figures beside it."""
 ICONS = {
     "lambertian": "SHADING_SOLID",
     "specular": "SHADING_TEXTURE",
@@ -49,7 +51,7 @@ class SCAN_RELIGHT_UL_results(NamedRows, bpy.types.UIList):
         """Name, roughness, specular, certainty."""
         one = self.known.get(item.name, {})
         text = "  ".join(filter(None, columns(one)))
-        split = layout.split(factor=0.52 if text else 0.9)  # long names may use what stays empty
+        split = layout.split(factor=NAME if text else 0.9)  # long names may use what stays empty
         self.name(split, item.name, ICONS.get(one.get("model"), "BLANK1"))
         row = split.row()
         if text:
@@ -88,11 +90,15 @@ def order_key(name: str, one: dict, order: str) -> tuple:
 
 
 def columns(one: dict) -> tuple[str, str]:
-    """Roughness and specular F0 of a row; empty where it has no highlight."""
+    """Roughness and specular F0 of a row, as short as can be; empty where it has no highlight."""
     if one.get("phi") is None:
         return "", ""
     value = results.specular(one)
-    return f"{max(one['phi'], 0) ** 0.5:.2f}", "" if value is None else f"{value:.2f}"
+    return _short(max(one["phi"], 0) ** 0.5), "" if value is None else _short(value)
+
+
+def _short(value: float) -> str:
+    return f"{value:.2f}".removeprefix("0")
 
 
 def active_row(scene) -> int:
@@ -143,11 +149,9 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
             )
             return
         if rows:
-            head = layout.split(factor=0.52)
+            head = layout.split(factor=NAME)
             head.label(text="Object")
-            row = head.row()
-            row.label(text="Rough")
-            row.label(text="F0")
+            head.label(text="Rough  F0")
             layout.template_list("SCAN_RELIGHT_UL_results", "", scene, "objects", scene, "scan_relight_row", rows=6)
         elif not refused:
             self.say(

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from functools import partial
+
 import bpy
 
 from ..addon.bridge import relight_probe
+from ..addon.core.errors import ScanRelightError
 from . import poll
 from .relight_base import RelightOperator
 
@@ -31,6 +35,22 @@ class SCAN_RELIGHT_OT_bake_preview(RelightOperator, bpy.types.Operator):
     def work(self, context):
         """Renew the volume."""
         relight_probe.bake(context.scene, self._wait)
+        if self._wait:
+            relight_probe.fit(context.scene)
+        else:
+            bpy.app.timers.register(partial(_fit_when_baked, context.scene.name), first_interval=0.5)
+
+
+def _fit_when_baked(name: str) -> float | None:
+    """A timer: once Blender's own bake has ended, bring it to Cycles' brightness."""
+    baking = {one.bl_idname for window in bpy.context.window_manager.windows for one in window.modal_operators}
+    if "OBJECT_OT_lightprobe_cache_bake" in baking:
+        return 0.5
+    scene = bpy.data.scenes.get(name)
+    if scene is not None:
+        with suppress(ScanRelightError):  # then the light stays as it was baked
+            relight_probe.fit(scene)
+    return None
 
 
 class SCAN_RELIGHT_OT_remove_preview(RelightOperator, bpy.types.Operator):

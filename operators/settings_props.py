@@ -10,13 +10,13 @@ from functools import cache
 import bpy
 
 from ..addon.bridge import result_home
-from ..addon.console import unexpected
-from ..addon.core.errors import BadInputError, ScanRelightError
+from ..addon.core.errors import BadInputError
 from ..addon.core.settings import PRESETS, Settings
 from ..addon.core.stages import LABELS, RUN_STAGES, WRITE
 from ..addon.leash import MemoryGuard
 from ..addon.settings_info import SettingInfo, setting_infos
 from . import poll, preferences, reading_props, room_window
+from .at_once import OneSentence
 from .job_operator import JobOperator
 from .reading_props import with_reading
 from .settings_words import words
@@ -120,7 +120,7 @@ def preset_items() -> list[tuple[str, str, str]]:
 
 
 @with_reading
-class CaptureOperator(JobOperator):
+class CaptureOperator(OneSentence, JobOperator):
     """What every operator has: a capture folder, and errors that become one sentence.
 
     With a window the work is a job of its own that `modal` follows; in the background `execute` does it itself.
@@ -151,22 +151,16 @@ class CaptureOperator(JobOperator):
         return context.window_manager.invoke_props_dialog(self, width=420)
 
     def execute(self, context):
-        """Do the work, or start it; every error that is foreseen becomes one sentence."""
-        try:
+        """Do the work, or start it."""
+
+        def work() -> set[str]:
             if not bpy.app.background:
                 return self.begin(context)
             for sentence in self.work(context):
                 self.report({"WARNING"}, sentence)
-        except ScanRelightError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        except MemoryError:
-            self.report({"ERROR"}, "The memory is used up; a greater texel size or a smaller atlas size takes less.")
-            return {"CANCELLED"}
-        except Exception as error:  # the last line of defence: a sentence, never a bare traceback
-            self.report({"ERROR"}, unexpected(error, bpy.path.abspath(getattr(self, "result_folder", ""))))
-            return {"CANCELLED"}
-        return {"FINISHED"}
+            return {"FINISHED"}
+
+        return self.attempt(work, bpy.path.abspath(getattr(self, "result_folder", "")))
 
     def folder(self, name: str):
         """The absolute path in the property `name`; raises where it is empty."""

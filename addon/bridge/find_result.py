@@ -18,13 +18,13 @@ import bpy
 
 from ..core.errors import BadInputError, StorageError
 from ..core.results.place import BESIDE, captures, free_folder, write_capture
-from ..core.results.room_file import MATERIALS, run_of
+from ..core.results.room_file import MATERIALS, layout_of, run_of
 from ..core.results.store import Store
 from . import result_file
-from .images import relative_to
-from .marks import IMAGE, OBJECT_ID, RESULT, RUN
+from .images import relative_to, result_of
+from .marks import IMAGE, LAYOUT, OBJECT_ID, RESULT, RUN
 from .result_home import shown
-from .result_images import is_there
+from .result_images import KEPT, is_there, kept_path, of_results, path_of
 
 NAMED = 3
 """Images that a sentence names before it counts the rest."""
@@ -70,7 +70,7 @@ class Missing:
         )
 
 
-_known: dict = {"time": -FRESH, "found": []}
+_known: dict = {"time": -FRESH, "found": [], "overtaken": []}
 
 
 def forget() -> None:
@@ -82,7 +82,7 @@ def known_missing() -> list[Missing]:
     """`missing`, looked up every `FRESH` seconds at most."""
     if time.monotonic() - _known["time"] >= FRESH:
         before, now = _known["found"], missing()
-        _known.update(found=now, time=time.monotonic())
+        _known.update(found=now, overtaken=overtaken(), time=time.monotonic())
         left = {one.folder for one in now}
         for one in before:
             if one.folder not in left and not bpy.app.background:  # put back by hand; not now: a panel may be drawing
@@ -90,9 +90,35 @@ def known_missing() -> list[Missing]:
     return _known["found"]
 
 
+def known_overtaken() -> list[Path]:
+    """`overtaken`, looked up along with `known_missing`."""
+    known_missing()
+    return _known["overtaken"]
+
+
+def overtaken() -> list[Path]:
+    """Results that were recovered anew with their images laid out otherwise than the open file's objects ask for.
+
+    Of files that no Blender with the extension saved: else the images of their layout were kept (`result_images.keep`).
+    """
+    return sorted({result_of(Path(one[IMAGE])) for one in _overtaken()})
+
+
+def _overtaken() -> list[bpy.types.Image]:
+    """Images that show a picture of another layout than theirs."""
+    found = []
+    for one in of_results():
+        source = Path(one[IMAGE])
+        if LAYOUT in one and not one.packed_file and path_of(one) == source:
+            result = result_file.read(result_of(source))
+            if result is not None and result.layout not in ("", one[LAYOUT]):
+                found.append(one)
+    return found
+
+
 def reload(folder: Path) -> None:
     """Read those images of a result again that could not be read before."""
-    for one in _images():
+    for one in of_results():
         if Path(one[IMAGE]).is_relative_to(folder) and not one.packed_file and not one.has_data:
             one.reload()
 
@@ -103,9 +129,9 @@ def missing() -> list[Missing]:
     for owner in _owners():
         runs.setdefault(Path(owner[RESULT]), set()).add(owner.get(RUN, ""))
     lost: dict[Path, list[str]] = {}
-    for one in _images():
+    for one in of_results():
         source = Path(one[IMAGE])
-        if not one.packed_file and not is_there(_path(one)):
+        if not one.packed_file and not is_there(path_of(one)):
             lost.setdefault(_result_of(source, runs), []).append(source.name)
     found = []
     for folder in sorted({*runs, *lost}):
@@ -125,6 +151,10 @@ def search(home: Path) -> list[str]:
     walked through.
     """
     told = []
+    for image in _overtaken():
+        kept = kept_path(Path(image[IMAGE]), image[LAYOUT])
+        if is_there(kept):
+            _show(image, kept)
     for one in missing():
         if not one.gone:
             count = repoint(one.folder, one.folder)
@@ -141,7 +171,7 @@ def search(home: Path) -> list[str]:
             *(folder / part / one.folder.name for folder in beside for part in ("", BESIDE)),
             home / one.folder.name,
         ]
-        new = next((place for place in places if one.run and run_of(place) == one.run), None)
+        new = next((place for place in places if one.run and run_of(place) == one.run or _keeps(place, one)), None)
         if new is not None:
             repoint(one.folder, new)
             told.append(
@@ -166,7 +196,7 @@ def find(one: Missing, chosen: Path) -> Path:
         raise BadInputError(f"'{chosen}' can't be opened ({error.strerror or error}); choose a folder.") from error
     results = [place for place in (chosen, *below, chosen.parent) if (place / MATERIALS).is_file()]
     for place in results:
-        if (run_of(place) == one.run) if one.run else _holds(place, one.folder):
+        if ((run_of(place) == one.run) if one.run else _holds(place, one.folder)) or _keeps(place, one):
             return place
     if not results:
         raise BadInputError(
@@ -189,21 +219,22 @@ def repoint(old: Path, new: Path) -> int:
         How many images are shown from `new`.
     """
     count = 0
-    for one in _images():
+    for one in of_results():
         source = Path(one[IMAGE])
         if not source.is_relative_to(old):
             continue
+        path = path_of(one)
         there = new / source.relative_to(old)
         one[IMAGE] = str(there)
-        path = _path(one)
+        if path.is_relative_to(old / KEPT) and is_there(new / path.relative_to(old)):
+            there = new / path.relative_to(old)
+        elif LAYOUT in one and layout_of(new) not in ("", one[LAYOUT]):
+            continue  # a picture that is missing is better than a wrong one
         if one.packed_file or not is_there(there) or (is_there(path) and not path.is_relative_to(old)):
             continue
         if old == new and is_there(path):
             continue
-        one.filepath = str(there)
-        if bpy.data.filepath:
-            relative_to(one, Path(bpy.data.filepath).parent)
-        one.reload()
+        _show(one, there)
         count += 1
     for owner in _owners():
         if Path(owner[RESULT]) == old:
@@ -211,6 +242,14 @@ def repoint(old: Path, new: Path) -> int:
     forget()
     result_file.forget()
     return count
+
+
+def _show(image: bpy.types.Image, path: Path) -> None:
+    """Let an image show another file."""
+    image.filepath = str(path)
+    if bpy.data.filepath:
+        relative_to(image, Path(bpy.data.filepath).parent)
+    image.reload()
 
 
 def move(folder: Path, home: Path) -> Path:
@@ -262,13 +301,11 @@ def _owners() -> Iterable[bpy.types.ID]:
     ]
 
 
-def _images() -> list[bpy.types.Image]:
-    """The open file's own images that came from a result."""
-    return [one for one in bpy.data.images if one.get(IMAGE) and not one.library and one.source in ("FILE", "TILED")]
-
-
-def _path(image: bpy.types.Image) -> Path:
-    return Path(os.path.normpath(bpy.path.abspath(image.filepath)))
+def _keeps(place: Path, one: Missing) -> bool:
+    """Whether a folder keeps the very images that an open file misses, whatever run it holds now."""
+    kept = [path_of(image) for image in of_results()]
+    kept = [path.relative_to(one.folder) for path in kept if path.is_relative_to(one.folder / KEPT)]
+    return bool(kept) and all(is_there(place / path) for path in kept)
 
 
 def _result_of(source: Path, folders: Iterable[Path]) -> Path:

@@ -11,7 +11,8 @@ import numpy as np
 from ..core.errors import BadInputError
 from ..core.material import ObjectMaterial
 from ..core.naming import LONGEST, cut
-from .marks import IMAGE, UV_MAP
+from ..core.results.room_file import MATERIALS, layout_of
+from .marks import IMAGE, LAYOUT, UV_MAP
 from .mesh_objects import PARTS_UV
 
 RADIANCE = "Linear Rec.709"
@@ -64,9 +65,17 @@ def load_image(
     image.alpha_mode = "NONE"
     image.use_fake_user = keep
     image[IMAGE] = str(path)
+    layout = layout_of(result_of(path))
+    if layout:
+        image[LAYOUT] = layout
     if packed:
         image.pack()
     return image
+
+
+def result_of(path: Path) -> Path:
+    """The result folder that an image's file is of: where it lies, or the folder above for an object's own."""
+    return path.parent if (path.parent / MATERIALS).is_file() else path.parent.parent
 
 
 def tiles_of(path: Path) -> list[Path]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from ..core.atomic import replacing
 from ..core.errors import BadInputError, InterruptedRun, StorageError
 from ..core.progress import Progress
 from .images import image_array
+from .relight_kelvin import LUMINANCE
 
 FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32"), ".jpg": ("JPEG", "8"), ".jpeg": ("JPEG", "8")}
 """By ending: Blender's name of the format and its depth."""
@@ -153,6 +155,29 @@ def shoot(scene: bpy.types.Scene, path: Path | str) -> None:
             raise BadInputError(
                 "EEVEE gave a black picture: it needs a graphics card, which Blender has none of here; take Cycles."
             )
+
+
+def small_median(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 16, width: int = 64) -> float:
+    """Median luminance of a small picture through the scene's camera, linear; nothing of the scene's settings changes.
+
+    Raises
+    ------
+    BadInputError
+        EEVEE finds no graphics card.
+    StorageError
+        The picture can't be written.
+    """
+    from ..core.io.exr import read_exr  # not earlier: Blender's start should not wait for OpenEXR
+
+    with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, result_kept(), settings_kept(scene):
+        prepare(scene, engine, samples)
+        render = scene.render
+        render.resolution_y = max(round(width * render.resolution_y / render.resolution_x), 8)
+        render.resolution_x, render.resolution_percentage = width, 100
+        if engine == CYCLES:
+            scene.cycles.use_denoising = False
+        shoot(scene, Path(folder) / "small.exr")
+        return float(np.median(read_exr(Path(folder) / "small.exr").rgb @ LUMINANCE))
 
 
 def seconds_expected(scene: bpy.types.Scene) -> float:

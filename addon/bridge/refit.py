@@ -29,7 +29,7 @@ def refit(
     heed_kept: bool = True,
     scene: bool = True,
 ) -> dict:
-    """Fit objects of a result again with all else held.
+    """Fit objects of a result again with all else held; `progress`, `override`, `heed_kept` and errors as in `run`.
 
     Parameters
     ----------
@@ -37,11 +37,6 @@ def refit(
         The result folder.
     objects : collection of int
         Those to fit; those of which something new is given are fitted besides.
-    progress : Progress
-    override : Path, optional
-        File of what the artist gives, merged into what the folder keeps.
-    heed_kept : bool
-        False leaves out what the folder keeps.
     scene : bool
         Also write scene.blend, from an empty file: what is open in this process is lost.
 
@@ -49,11 +44,6 @@ def refit(
     -------
     dict
         What report.json holds.
-
-    Raises
-    ------
-    ScanRelightError
-        One sentence for the user.
     """
     started = time.monotonic()
     progress.stage(READ)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Generator, Iterable
 from pathlib import Path
@@ -140,7 +139,7 @@ def _renew_images(folder: Path) -> bpy.types.Image | None:
     for one in bpy.data.images:
         if one.library or one.source not in ("FILE", "TILED"):
             continue
-        shown = Path(os.path.normpath(bpy.path.abspath(one.filepath)))
+        shown = result_images.path_of(one)
         source = Path(one.get(IMAGE) or shown)
         if not source.is_relative_to(folder) or not result_images.is_there(source):
             continue
@@ -151,7 +150,9 @@ def _renew_images(folder: Path) -> bpy.types.Image | None:
             one.pack()
         else:
             for part in tiles_of(source) or [source]:
-                if shown != source:
+                if shown.is_relative_to(folder / result_images.KEPT):
+                    result_images.link(part, shown.parent / part.name)
+                elif shown != source:
                     _copy(part, shown.parent / part.name if part != source else shown)
             one.reload()
         one[IMAGE] = str(source)

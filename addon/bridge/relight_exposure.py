@@ -6,16 +6,12 @@ As `scene.py` does with the median of the frames, so that the captured light ask
 from __future__ import annotations
 
 import math
-import tempfile
-from pathlib import Path
 
 import bpy
-import numpy as np
 
 from ..core.errors import BadInputError
 from . import relight_estimate
-from .pictures import prepare, result_kept, settings_kept, shoot
-from .relight_kelvin import LUMINANCE
+from .pictures import small_median
 from .room_scene import EXPOSURE
 
 CAPTURED = "scan_relight_captured_exposure"
@@ -23,7 +19,6 @@ CAPTURED = "scan_relight_captured_exposure"
 ASKED = "scan_relight_asked_exposure"
 """Custom property of a scene: the exposure that its light asked for when it was last measured, in stops."""
 _GREY, _MOST = 0.18, 32.0
-_WIDTH, _SAMPLES = 64, 16
 
 
 def measure(scene: bpy.types.Scene) -> float:
@@ -36,18 +31,9 @@ def measure(scene: bpy.types.Scene) -> float:
     StorageError
         The small picture can't be written.
     """
-    from ..core.io.exr import read_exr  # not earlier: Blender's start should not wait for OpenEXR
-
     if scene.camera is None:
         raise BadInputError("The scene has no camera to measure the light through; choose a frame first.")
-    with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, result_kept(), settings_kept(scene):
-        prepare(scene, samples=_SAMPLES)
-        render = scene.render
-        render.resolution_y = max(round(_WIDTH * render.resolution_y / render.resolution_x), 8)
-        render.resolution_x, render.resolution_percentage = _WIDTH, 100
-        scene.cycles.use_denoising = False
-        shoot(scene, Path(folder) / "light.exr")
-        median = float(np.median(read_exr(Path(folder) / "light.exr").rgb @ LUMINANCE))
+    median = small_median(scene)
     if not median > 0:
         raise BadInputError("No light reaches what the camera looks at; switch a lamp on or add a light.")
     asked = min(max(math.log2(_GREY / median), -_MOST), _MOST)

@@ -11,14 +11,17 @@ from __future__ import annotations
 
 import math
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
+import numpy as np
 from mathutils import Matrix
 
 from ..core.errors import BadInputError, ScanRelightError
+from .cameras import frame_cameras
 from .own_collection import own_collection
-from .pictures import EEVEE, prepare, settings_kept, shoot
+from .pictures import CYCLES, EEVEE, prepare, settings_kept, shoot, small_median
 from .relight_room import bounds, room_objects
 
 COLLECTION = "Preview Light"
@@ -27,6 +30,10 @@ PROBE = "scan_relight_probe"
 _NO_CARD = "EEVEE has no graphics card to bake the preview's light on here; use a Blender with a window, or Cycles."
 _STEP, _MOST = 0.3, 24
 """Metres between two places where the light is kept, and how many of them a side has at most."""
+_VIEWS = 4
+"""Cameras through which the baked light is compared with Cycles: the active one and some of the capture's."""
+_LEAST, _GREATEST = 0.05, 20.0
+"""Between these the volume's intensity may lie."""
 _BEYOND = 0.4
 """Metres by which the volume goes beyond the room: at its rim it fades into the world, whose light is no wall's."""
 
@@ -114,6 +121,67 @@ def bake(scene: bpy.types.Scene, wait: bool = True) -> bpy.types.Object:
         remove(scene)
         raise BadInputError(f"Blender can't bake the preview's light here: {reason}." if reason else _NO_CARD)
     return thing
+
+
+def fit(scene: bpy.types.Scene) -> float:
+    """Set the intensity of the baked volume so that EEVEE is as bright as Cycles; returns it, 1 where nothing tells.
+
+    EEVEE's median luminance through a camera is about a + b * intensity, which two small pictures tell, and a third one
+    by Cycles what it should be. Of several cameras the logarithms of the ratios count, squared.
+
+    Raises
+    ------
+    StorageError
+        A small picture can't be written.
+    """
+    volumes, cameras = probes(scene), _views(scene)
+    if not volumes or not cameras:
+        return 1.0
+    data = volumes[0].data
+    seen = np.zeros((len(cameras), 3))
+    before = scene.camera
+    try:
+        for column, (engine, intensity, samples) in enumerate(((CYCLES, 1.0, 16), (EEVEE, 1.0, 4), (EEVEE, 2.0, 4))):
+            data.intensity = intensity
+            for row, camera in enumerate(cameras):
+                scene.camera = camera
+                with suppress(BadInputError):  # EEVEE's is black
+                    seen[row, column] = small_median(scene, engine, samples)
+    finally:
+        scene.camera, data.intensity = before, 1.0
+    wanted, once, twice = seen.T
+    data.intensity = fitted_intensity(wanted, once, twice)
+    return data.intensity
+
+
+def fitted_intensity(wanted: np.ndarray, once: np.ndarray, twice: np.ndarray) -> float:
+    """The intensity whose luminances come nearest to those wanted, in the mean square of stops.
+
+    Parameters
+    ----------
+    wanted, once, twice : (n,) float
+        Median luminances by view: by Cycles, and by EEVEE at intensities of 1 and 2. Views that are black by either
+        engine tell nothing.
+
+    Returns
+    -------
+    float
+        1 where no view tells anything.
+    """
+    tells = (wanted > 0) & (once > 0) & (twice > once)
+    if not tells.any():
+        return 1.0
+    wanted, once, twice = wanted[tells], once[tells], twice[tells]
+    intensities = np.geomspace(_LEAST, _GREATEST, 241)
+    got = np.maximum(once + (twice - once) * (intensities[:, None] - 1), 1e-3 * once)
+    return float(intensities[np.argmin((np.log2(got / wanted) ** 2).sum(1))])
+
+
+def _views(scene) -> list[bpy.types.Object]:
+    """The scene's camera, and some of the capture's, spread over its track."""
+    others = frame_cameras(scene)
+    chosen = [others[int(place)] for place in np.linspace(0, len(others) - 1, min(_VIEWS, len(others)))]
+    return list(dict.fromkeys([*filter(None, (scene.camera,)), *chosen]))
 
 
 def _try_eevee(scene) -> None:

@@ -31,6 +31,8 @@ class Result:
     folder : Path
     run : str
         Key of the run; '' where it is older than such keys.
+    layout : str
+        Key of how its images are laid out; '' likewise.
     objects : dict of int to dict
         Entries of materials.json by `object_id`.
     stages : dict of str to dict
@@ -41,6 +43,7 @@ class Result:
 
     folder: Path
     run: str
+    layout: str
     objects: dict[int, dict[str, Any]]
     stages: dict[str, dict[str, Any]]
     figures: dict[str, Any]
@@ -58,7 +61,8 @@ def read(folder: Path) -> Result | None:
         if len(_read) > 8:
             _read.clear()
         report, told = _json(folder / REPORT), _json(folder / MATERIALS)
-        run, listed = told.get("run"), told.get("objects")
+        run, layout = (one if isinstance(one := told.get(name), str) else "" for name in ("run", "layout"))
+        listed = told.get("objects")
         objects = (
             {one["object_id"]: one for one in listed if isinstance(one, dict) and "object_id" in one}
             if isinstance(listed, list)
@@ -68,7 +72,8 @@ def read(folder: Path) -> Result | None:
             stamp,
             Result(
                 folder,
-                run if isinstance(run, str) else "",
+                run,
+                layout,
                 objects,
                 *(report[key] if isinstance(report.get(key), dict) else {} for key in ("stages", "figures")),
             ),

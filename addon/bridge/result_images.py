@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import filecmp
+import os
 import shutil
 from collections.abc import Iterable
 from itertools import count
@@ -9,14 +11,17 @@ from pathlib import Path
 
 import bpy
 
+from ..core.atomic import replacing
 from ..core.errors import BadInputError, StorageError
-from ..core.results.room_file import capture_name
-from .images import DATA, RADIANCE, image_name, load_image, relative_to, tiles_of
-from .marks import IMAGE
-from .scene import ALBEDO, BASE_COLOR, SHADING
+from ..core.results.room_file import capture_name, layout_of
+from .images import DATA, RADIANCE, image_name, load_image, relative_to, result_of, tiles_of
+from .marks import IMAGE, LAYOUT
+from .scene import ALBEDO, BASE_COLOR, SCENE_FILES, SHADING
 
 RESULT, FOLDER, PACK = "RESULT", "FOLDER", "PACK"
 """Refer to the result folder; copy into a folder beside the saved .blend; pack into it."""
+KEPT = "kept"
+"""Folder of a result with the images, by layout, that saved files refer to."""
 COLOUR_SPACES = {
     BASE_COLOR: RADIANCE,
     ALBEDO: RADIANCE,
@@ -144,6 +149,67 @@ def replace(earlier: bpy.types.Image, one: bpy.types.Image) -> None:
     one.name, one.use_fake_user = label, one.use_fake_user or kept
 
 
+def keep(saved: Path) -> None:
+    """Let the open file, before it is saved, refer to images that no run overwrites which lays its images out anew.
+
+    They are further names (hard links) of the result's own files, so they take no space until a run writes those anew;
+    copies where the disk knows no such links. What can't be kept stays referred to as it was.
+
+    Parameters
+    ----------
+    saved : Path
+        Where the file will be. A result's own scene.blend is overwritten along with its images and refers to those.
+    """
+    for one in of_results():
+        source = Path(one[IMAGE])
+        folder = result_of(source)
+        shown = path_of(one)
+        if one.packed_file or shown != source or saved.parent == folder and saved.name in SCENE_FILES:
+            continue
+        layout = one.get(LAYOUT)
+        if not layout or layout_of(folder) != layout:
+            continue
+        target = kept_path(source, layout)
+        try:
+            for part in tiles_of(source) or [source]:
+                link(part, target.parent / part.name)
+        except StorageError:
+            continue
+        relative = one.filepath.startswith("//")
+        one.filepath_raw = bpy.path.relpath(str(target)) if relative else str(target)  # the picture is the same
+
+
+def link(source: Path, target: Path) -> None:
+    """Make `target` a further name of a file, or a copy where that can't be; raises `StorageError`."""
+    if target.exists() and filecmp.cmp(source, target):
+        return
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"'{target.parent}' can't be made ({error.strerror or error}).") from error
+    with replacing(target) as temporary:
+        try:
+            os.link(source, temporary)
+        except OSError:
+            shutil.copy2(source, temporary)
+
+
+def kept_path(source: Path, layout: str) -> Path:
+    """Where an image of a result folder is kept for saved files."""
+    folder = result_of(source)
+    return folder / KEPT / layout / source.relative_to(folder)
+
+
+def of_results() -> list[bpy.types.Image]:
+    """The open file's own images that came from a result."""
+    return [one for one in bpy.data.images if one.get(IMAGE) and not one.library and one.source in ("FILE", "TILED")]
+
+
+def path_of(image: bpy.types.Image) -> Path:
+    """The file that an image shows."""
+    return Path(os.path.normpath(bpy.path.abspath(image.filepath)))
+
+
 def is_there(path: Path) -> bool:
     """Whether an image's file exists; of tiles (``<UDIM>``) any."""
     return path.is_file() or bool(tiles_of(path))
@@ -155,18 +221,18 @@ def _of_one_result(one: Path, other: Path) -> bool:
 
 
 def _beside(source: Path) -> Path:
-    """A copy of `source` in the folder of images beside the saved file; each result has a folder of its own."""
+    """A copy of `source` in the folder of images beside the saved file; each result and layout has one of its own."""
     check(FOLDER)
-    saved = Path(bpy.data.filepath)
+    saved, layout = Path(bpy.data.filepath), layout_of(result_of(source))
     theirs = {
-        Path(bpy.path.abspath(one.filepath)).parent
+        path_of(one).parent
         for one in bpy.data.images
         if one.get(IMAGE) and not _of_one_result(Path(one[IMAGE]).parent, source.parent)
     }
     names = (f"{saved.stem} images{f' {number}' if number > 1 else ''}" for number in count(1))
-    target = next(one for one in (saved.parent / name for name in names) if one not in theirs) / source.name
+    target = next(one for one in (saved.parent / name / layout for name in names) if one not in theirs) / source.name
     try:
-        target.parent.mkdir(exist_ok=True)
+        target.parent.mkdir(parents=True, exist_ok=True)
         for one in tiles_of(source) or [source]:
             shutil.copyfile(one, target.parent / one.name)
     except OSError as error:

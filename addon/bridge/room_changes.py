@@ -10,11 +10,8 @@ from typing import Any
 import bpy
 
 from ..core.results.room_file import DAMAGE, MATERIALS
+from .marks import CHANGES, LAST_FOUND
 
-FOUND = "scan_relight_found"
-"""Of a room's collection: what its last run found of each object, as JSON."""
-CHANGES = "scan_relight_changes"
-"""Of a scene: what differs since the run before, as JSON: a list of objects with `object_id`, `name` and `text`."""
 ROUGHNESS, ALBEDO = 0.1, 0.05
 """Differences from which on they can be seen: of Blender's roughness, and of the mean albedo."""
 
@@ -41,7 +38,7 @@ def _facts(one: dict) -> dict[str, Any]:
 
 def keep(top: bpy.types.Collection, now: dict[str, dict[str, Any]]) -> None:
     """Keep what was found with the room."""
-    top[FOUND] = json.dumps(now)
+    top[LAST_FOUND] = json.dumps(now)
 
 
 def compare(before: dict[str, dict[str, Any]], now: dict[str, dict[str, Any]]) -> tuple[dict[str, Any], ...]:
@@ -67,7 +64,7 @@ def compare(before: dict[str, dict[str, Any]], now: dict[str, dict[str, Any]]) -
 
 def kept(top: bpy.types.Collection) -> dict[str, dict[str, Any]]:
     """What the room's last run found; empty where it had none."""
-    return json.loads(top.get(FOUND, "{}"))
+    return json.loads(top.get(LAST_FOUND, "{}"))
 
 
 def show(scene: bpy.types.Scene, changes: tuple[dict[str, Any], ...]) -> None:

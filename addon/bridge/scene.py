@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 BASE_COLOR, ALBEDO, SHADING, ENVIRONMENT = "base_color.exr", "albedo.exr", "shading.exr", "environment.exr"
 """Files of the result folder that the scene shows; a missing one is left out."""
 _WRITING = ".scene-being-written.blend"
+SCENE_FILES = "scene.blend", _WRITING
+"""A result's own file of its room; what it is called while it is written."""
 _GREY = 0.18
 
 

@@ -211,6 +211,15 @@ class Window:
         )
         self.ask("None")  # it is back from whatever that was
 
+    def turn_wheel(self, x: int, y: int, notches: int) -> None:
+        """Turn the mouse's wheel there, down for more than 0."""
+        if notches:
+            self.actions.append(f"wheel at {x}, {y}")
+            self._xdotool("mousemove", str(x), str(y), "sleep", "0.2", "mousemove_relative", "1", "0", "sleep", "0.2")
+            for _ in range(abs(notches)):
+                self._xdotool("click", "5" if notches > 0 else "4", "sleep", "0.1")
+            self.ask("None")
+
     def key(self, *names: str, region: str = "WINDOW") -> float:
         """Press keys with the mouse in the middle of the 3D view; returns when that was (seconds since 1970)."""
         left, top, width, height = self.ask(f"rectangle({region!r})")

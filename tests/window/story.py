@@ -36,6 +36,10 @@ if found:
 """
 
 
+VISIBLE = 6
+"""Rows of the results that are seen at once."""
+
+
 class Story:
     """What an artist does, in a window that shows Blender's startup file.
 
@@ -49,6 +53,7 @@ class Story:
 
     def __init__(self, window: Window, patience: float = 400.0):
         self.window, self.patience = window, patience
+        self._scrolled = 0
 
     def install(self, archive: Path) -> None:
         """Drag the zip in and agree."""
@@ -122,9 +127,12 @@ for extra in bpy.context.window_manager.windows[1:]:
 """)
 
     def choose(self, row: int = 1) -> str:
-        """Click on a row of the results; the chosen object's name."""
+        """Click on a row of the results, which are scrolled to where it shows; the chosen object's name."""
         x, y = self.window.ask("find(('scan_relight_row',), across=(0.3,))")
-        self.window.click_at(x, y + 23 * row)
+        scrolled = min(self._scrolled, row) if row < self._scrolled + VISIBLE else row - VISIBLE + 1
+        self.window.turn_wheel(x, y, scrolled - self._scrolled)
+        self._scrolled = scrolled
+        self.window.click_at(x, y + 23 * (row - scrolled))
         return self.window.wait_for("getattr(bpy.context.view_layer.objects.active, 'name', '')")
 
     def choose_in_view(self, name: str) -> None:

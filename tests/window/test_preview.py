@@ -7,17 +7,15 @@ import shutil
 
 import pytest
 
-MEDIAN = """
-import importlib
-import numpy as np
+MEDIANS = """
+pictures, cameras = module("addon.bridge.pictures"), module("addon.bridge.cameras")
 scene = bpy.context.scene
-pictures = module("addon.bridge.pictures")
-exr = importlib.import_module(pictures.__name__.replace("bridge.pictures", "core.io.exr"))
-with pictures.settings_kept(scene):
-    pictures.prepare(scene, {engine!r}, {samples})
-    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 64, 48, 100
-    pictures.shoot(scene, Path({out!r}))
-answer = float(np.median(exr.read_exr(Path({out!r})).rgb @ np.array((0.2126, 0.7152, 0.0722))))
+found, answer = cameras.frame_cameras(scene), []
+before = scene.camera
+for one in (before, *found[1::3])[:{views}]:  # the fit looks through the first, the last and two between
+    scene.camera = one
+    answer.append(pictures.small_median(scene, {engine!r}, {samples}))
+scene.camera = before
 """
 
 
@@ -30,20 +28,27 @@ def window(open_window, recovered, tmp_path_factory):
     found.close()
 
 
-@pytest.mark.xfail(strict=True, reason="measured 1.8 stops darker in this view; see docs/relighting.md")
-def test_eevee_is_within_a_stop_of_cycles(window, tmp_path, figures):
-    def median(engine, samples):
-        out = str(tmp_path / f"{engine}.exr")
-        return window.ask(MEDIAN.format(engine=engine, samples=samples, out=out), patience=300)
+def test_eevee_is_within_a_stop_of_cycles(window, figures):
+    def medians(engine, samples, views=4):
+        return window.ask(MEDIANS.format(engine=engine, samples=samples, views=views), patience=600)
 
-    traced, before = median("CYCLES", 64), median("EEVEE", 4)
+    traced, [before] = medians("CYCLES", 64), medians("EEVEE", 4, 1)
     window.ask(
         """
 with bpy.context.temp_override(**place()):
     answer = list(bpy.ops.scan_relight.bake_preview())
 """,
-        patience=300,
+        patience=600,
     )
-    after = median("EEVEE", 4)
-    figures["preview"] = {"cycles": traced, "eevee before": before, "eevee after": after}
-    assert abs(math.log2(after / traced)) < 1 and after > 1.5 * before, figures["preview"]
+    after = medians("EEVEE", 4)
+    intensity = window.ask("module('addon.bridge.relight_probe').probes(bpy.context.scene)[0].data.intensity")
+    stops = [math.log2(max(got, 1e-6) / wanted) for got, wanted in zip(after, traced, strict=True)]
+    figures["preview"] = {
+        "cycles": traced,
+        "eevee before": before,
+        "eevee after": after,
+        "stops": stops,
+        "intensity": intensity,
+    }
+    print(figures["preview"])
+    assert max(map(abs, stops)) < 1 and after[0] > 1.5 * before, stops

@@ -7,6 +7,8 @@ import shutil
 import pytest
 from PIL import Image
 
+from tests.window.story import VISIBLE, Story
+
 LAMPS = "module('addon.bridge.relight_lamps')"
 ACTIVE = "module('operators.job_operator').active()"
 LOOK = "module('addon.bridge.look').current(bpy.context.scene)"
@@ -48,6 +50,17 @@ bpy.context.view_layer.objects.active = None
     window.ask("scroll(-100000)")
     window.picture(pictures / "09-results.png")
     window.picture(pictures / "09-results-sidebar.png", sidebar=True)
+
+
+def test_rows_further_down_are_scrolled_to(window):
+    story = Story(window)
+    rows = window.ask(
+        "sorted((one.name for one in module('addon.bridge.result_file').rows(bpy.context.scene.objects)),"
+        "key=module('addon.core.naming').in_order)"
+    )
+    for row in (len(rows) - 1, 1, VISIBLE):
+        window.ask("setattr(bpy.context.view_layer.objects, 'active', None)")
+        assert story.choose(row) == rows[row]
 
 
 def test_lamps_are_switched_off(window, pictures):

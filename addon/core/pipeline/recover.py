@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 from collections.abc import Container
 from typing import Any
 
@@ -34,6 +35,15 @@ class Recovery(Corrected):
         """All that writing asks of the frames. It may fail and be stopped: done before what was written is touched."""
         if self.settings.atlas != ROOM and self._parting is None:
             self._parting = look_closer(self)
+
+    @property
+    def layout_key(self) -> str:
+        """16 hex digits that are the same where the images are laid out alike: pictures of another layout fit nothing.
+
+        Only after `write_images` has made the parts.
+        """
+        coordinates = [self.surface().atlas.uv, *([self.parts.uv] if self.parts else [])]
+        return hashlib.sha256(b"".join(np.ascontiguousarray(uv).tobytes() for uv in coordinates)).hexdigest()[:16]
 
     def write_images(self, wanted: Container[str] | None = None) -> None:
         """The result folder's images, all or the `wanted` ones by name, materials.json and report.html."""
@@ -68,7 +78,12 @@ class Recovery(Corrected):
         for number, name in (self.parts.images if self.parts else {}).items():
             known.setdefault(number, {})["image"] = name
         objects = [{"name": m.name} | dataclasses.asdict(m) | known.get(m.object_id, {}) for m in self.materials()]
-        told = {"run": self.run_key, "capture": self.capture.root.name, "objects": objects}
+        told = {
+            "run": self.run_key,
+            "layout": self.layout_key,
+            "capture": self.capture.root.name,
+            "objects": objects,
+        }
         told |= {name: value for name, value in self.overrides.as_dict().items() if name == "white"}
         self.store.write_json("materials.json", told)
         self.progress.update(0.6)

@@ -56,8 +56,17 @@ def run_of(folder: Path | str) -> str:
 
     Objects that were made by this run carry the same (`marks.RUN`): nothing else in the folder is about any other.
     """
+    return _told(folder, "run")
+
+
+def layout_of(folder: Path | str) -> str:
+    """The key of how a result folder's images are laid out; '' as for `run_of`."""
+    return _told(folder, "layout")
+
+
+def _told(folder: Path | str, name: str) -> str:
     try:
-        key = json.loads((Path(folder) / MATERIALS).read_text(encoding="utf-8")).get("run")
+        key = json.loads((Path(folder) / MATERIALS).read_text(encoding="utf-8")).get(name)
     except (OSError, ValueError, AttributeError):
         return ""
     return key if isinstance(key, str) else ""

@@ -1,4 +1,4 @@
-"""A result that was moved: found again by itself where it lies near, else told and pointed to; never another run's."""
+"""A result that was moved or overwritten: found again by itself, else told and pointed to; never another run's."""
 
 import importlib
 import json
@@ -19,9 +19,10 @@ FILES = {"base_color.exr": 0.25, "environment.exr": 0.5}
 
 
 def result(folder, run=RUN, shift=0.0):
-    """A result folder: two images and one object."""
-    folder.mkdir(parents=True)
-    (folder / "materials.json").write_text(json.dumps({"run": run, "objects": [{"object_id": 0, "model": "metal"}]}))
+    """A result folder: two images and one object; another run's takes the place of one that is there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    told = {"run": run, "layout": run[::-1], "objects": [{"object_id": 0, "model": "metal"}]}
+    (folder / "materials.json").write_text(json.dumps(told))
     for name, value in FILES.items():
         write_exr(folder / name, np.full((2, 2, 3), value + shift, np.float32))
     return folder
@@ -71,6 +72,7 @@ def said():
     context = SimpleNamespace(scene=bpy.context.scene, preferences=bpy.context.preferences, region=None)
     panel.draw(SimpleNamespace(layout=layout, say=panel.say), context)
     assert ("scan_relight.find_result" in layout.buttons) == bool(bridge("find_result").missing())
+    assert ("scan_relight.open_result" in layout.buttons) == bool(bridge("find_result").overtaken())
     return layout.text
 
 
@@ -143,11 +145,13 @@ def test_another_run_is_refused(blend, tmp_path):
 
 
 def test_only_some_images_are_missing(blend, tmp_path):
-    (tmp_path / "hall" / "environment.exr").rename(tmp_path / "kept.exr")
+    (tmp_path / "hall" / "environment.exr").unlink()
+    kept = tmp_path / "hall" / "kept" / RUN[::-1] / "environment.exr"
+    kept.rename(tmp_path / "put away.exr")
     words = opened(blend)
     assert "'environment.exr' is missing in '" in words and "is gone" not in words
     assert shown() == {"base_color.exr": 0.25}
-    (tmp_path / "kept.exr").rename(tmp_path / "hall" / "environment.exr")
+    (tmp_path / "put away.exr").rename(kept)
     assert said() == ""
     bridge("find_result").reload(tmp_path / "hall")
     assert shown() == FILES
@@ -170,3 +174,77 @@ def test_copies_beside_the_file_that_are_gone_show_the_result_s_again(blend, tmp
     assert opened(blend) == "" and shown() == FILES
     shutil.rmtree(blend.parent / "file images")
     assert "2 pictures are shown from" in opened(blend) and shown() == FILES
+
+
+def without_the_extension(file):
+    """Open a file as a Blender without the extension does."""
+    handlers = list(bpy.app.handlers.load_post)
+    bpy.app.handlers.load_post.clear()
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(file))
+    finally:
+        bpy.app.handlers.load_post.extend(handlers)
+
+
+def test_an_older_copy_keeps_its_own_pictures(blend, tmp_path):
+    older = shutil.copy(blend, blend.with_name("older.blend"))
+    kept = tmp_path / "hall" / "kept" / RUN[::-1] / "base_color.exr"
+    assert kept.samefile(tmp_path / "hall" / "base_color.exr")  # a further name: no space is taken
+    result(tmp_path / "hall", OTHER, shift=0.25)
+    without_the_extension(older)
+    assert shown() == FILES
+    assert opened(older) == "" and shown() == FILES
+    bpy.ops.wm.save_mainfile()
+    without_the_extension(older)
+    assert shown() == FILES and kept.is_file()
+
+
+def test_an_older_copy_finds_its_own_pictures_where_they_were_moved(blend, tmp_path):
+    result(tmp_path / "hall", OTHER, shift=0.25)
+    shutil.move(tmp_path / "hall", tmp_path / "home" / "hall")
+    assert "found again" in opened(blend) and shown() == FILES
+    shutil.rmtree(tmp_path / "home" / "hall" / "kept")
+    assert "found again" not in opened(blend) and shown() == {}  # never the other layout's
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_a_file_whose_pictures_were_overwritten_says_so(blend, tmp_path, kept):
+    """As Blender leaves it that saves by itself, or without the extension."""
+    for one in bpy.data.images:
+        if "scan_relight_image" in one:
+            one.filepath = one["scan_relight_image"]
+    handlers = list(bpy.app.handlers.save_pre)
+    bpy.app.handlers.save_pre.clear()
+    bpy.ops.wm.save_mainfile()
+    bpy.app.handlers.save_pre.extend(handlers)
+    if not kept:
+        shutil.rmtree(tmp_path / "hall" / "kept")
+    result(tmp_path / "hall", OTHER, shift=0.25)
+    words = opened(blend)
+    if kept:
+        assert words == "" and shown() == FILES
+    else:
+        assert "'hall' was recovered anew with other textures" in words and "Bring In" in words
+
+
+def test_scene_blend_in_its_own_result_refers_to_what_is_beside_it(blend, tmp_path):
+    shutil.rmtree(tmp_path / "hall" / "kept")
+    for one in bpy.data.images:
+        if "scan_relight_image" in one:
+            one.filepath = one["scan_relight_image"]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "hall" / "scene.blend"))
+    assert not (tmp_path / "hall" / "kept").exists()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "mine.blend"))  # the artist goes on in a file of her own
+    result(tmp_path / "hall", OTHER, shift=0.25)
+    assert opened(tmp_path / "mine.blend") == "" and shown() == FILES
+
+
+def test_copies_beside_the_file_are_not_overwritten_by_another_layout(blend, tmp_path):
+    bridge("result_images").settle(list(bpy.data.images), "FOLDER")
+    bpy.ops.wm.save_mainfile()
+    older = shutil.copy(blend, blend.with_name("older.blend"))
+    result(tmp_path / "hall", OTHER, shift=0.25)
+    bridge("result_images").settle([bridge("images").load_image(tmp_path / "hall" / name) for name in FILES], "FOLDER")
+    assert shown() == {name: value + 0.25 for name, value in FILES.items()}
+    without_the_extension(older)
+    assert shown() == FILES

@@ -200,7 +200,8 @@ def test_images_and_their_colour_spaces(ops, room, tmp_path, where):
     for image in found.values():
         assert image.colorspace_settings.name == "Linear Rec.709"
         assert bool(image.packed_file) == (where == "PACK")
-        folder = {"RESULT": "//result/", "FOLDER": "//file images/"}.get(where)
+        layout = json.loads((tmp_path / "result" / "materials.json").read_text())["layout"]
+        folder = {"RESULT": "//result/", "FOLDER": f"//file images/{layout}/"}.get(where)
         assert folder is None or image.filepath == folder + files[image.name]
     again(ops, tmp_path, images=where)
     assert {image.name for image in bpy.data.images if "scan_relight_image" in image} == set(found)
