@@ -11,10 +11,6 @@ from . import preferences
 from .at_once import AtOnce
 from .panel import SidebarPanel
 
-OVERTAKEN = (
-    "'{name}' was recovered anew with other textures since this file was saved: its objects show wrong colours "
-    "here until the new result is brought in."
-)
 _found: list[str] = []
 """What was found again when the open file was loaded."""
 
@@ -98,7 +94,13 @@ class SCAN_RELIGHT_PT_missing(SidebarPanel, bpy.types.Panel):
             self.say(layout, context, one.sentence, "ERROR")
             layout.operator("scan_relight.find_result", icon="FILE_FOLDER").missing = str(one.folder)
         for folder in find_result.known_overtaken():
-            self.say(layout, context, OVERTAKEN.format(name=folder.name), "ERROR")
+            self.say(
+                layout,
+                context,
+                f"'{folder.name}' was recovered anew with other textures since this file was saved: its objects show "
+                "wrong colours here until the new result is brought in.",
+                "ERROR",
+            )
             layout.operator("scan_relight.open_result", text="Bring In", icon="IMPORT").folder = str(folder)
         for sentence in _found:
             self.say(layout, context, sentence, "INFO")

@@ -192,7 +192,8 @@ class SCAN_RELIGHT_PT_exposure(RelightPanel, bpy.types.Panel):
         layout, scene = self.layout, context.scene
         layout.use_property_split, layout.use_property_decorate = True, False
         column = layout.column(align=True)
-        column.use_property_split = False  # half of a narrow sidebar is too little for these words
+        # Half of a narrow sidebar is too little for these words.
+        column.use_property_split = column.use_property_decorate = False
         column.prop(scene.view_settings, "exposure", text="Exposure (stops)")
         column.operator("scan_relight.expose", icon="LIGHT_SUN")
         column.prop(scene.scan_relight_studio, "follow", toggle=True)

@@ -19,9 +19,8 @@ class SCAN_RELIGHT_OT_bake_preview(RelightOperator, bpy.types.Operator):
     bl_idname = "scan_relight.bake_preview"
     bl_label = "Bake Preview Light"
     bl_description = (
-        "Bake how light bounces through the room for EEVEE, so that its preview comes nearer to the "
-        "picture by Cycles; it may stay up to two stops darker. Bake again after the "
-        "light has changed. The status bar shows how far "
+        "Bake how light bounces through the room for EEVEE, and make its preview about as bright as the picture by "
+        "Cycles through several of the cameras. Bake again after the light has changed. The status bar shows how far "
         "it is, ESC ends it"
     )
 
