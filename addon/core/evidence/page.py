@@ -158,7 +158,7 @@ def _lamps(found: Findings) -> str:
         f"<tr><td>{_swatch(lamp.radiance / max(lamp.radiance.max(), 1e-9))}</td>"
         f"<td>{escape(names.get(lamp.object_id, ''))}</td>"
         f"<td>{', '.join(f'{x:.3g}' for x in lamp.radiance)}</td><td>{'seen' if lamp.seen else 'solved for'}</td>"
-        f"<td>{escape(lamp.note)}</td></tr>"
+        f"<td>{escape(lamp.note(names))}</td></tr>"
         for lamp in lamps
     )
     return (

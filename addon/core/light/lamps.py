@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,14 +27,40 @@ class Lamp:
         Median over its elements, or solved for.
     seen : bool
         False: solved for from the light that it throws.
-    note : str
-        How the radiance was found, where that needs saying.
+    clipped : bool
+        The sensor clipped it in every frame. If it is `seen` all the same, `radiance` is a lower bound.
+    spread : (2,) tuple of float or None
+        Standard deviation of log albedo before and after the lamp was solved for.
+    from_edges : bool
+        Its colour is that of the pixels along its edges.
+    twin : int or None
+        The seen lamp whose radiance it takes, as `solved`, the luminance that was solved for, is near that lamp's.
+    solved : float or None
     """
 
     object_id: int
     radiance: np.ndarray
     seen: bool
-    note: str = ""
+    clipped: bool = False
+    spread: tuple[float, float] | None = None
+    from_edges: bool = False
+    twin: int | None = None
+    solved: float | None = None
+
+    def note(self, names: Mapping[int, str]) -> str:
+        """How the radiance was found, where that needs saying; `names` are those of all objects."""
+        if self.seen:
+            return "Clipped in every frame; its radiance is a lower bound." if self.clipped else ""
+        told = "Clipped in every frame" if self.clipped else "No frame sees it"
+        told += "; solved from the light it throws"
+        if self.spread is not None:
+            before, after = self.spread
+            told += f" (spread of log albedo {before:.3f} to {after:.3f})"
+        if self.from_edges:
+            told += "; its colour from its edges"
+        if self.twin is not None:
+            told += f": {self.solved:.3g}, near that of the seen '{names[self.twin]}', which it takes"
+        return f"{told}."
 
 
 def find_seen(object_id: np.ndarray, radiance: np.ndarray, irradiance: np.ndarray) -> list[Lamp]:

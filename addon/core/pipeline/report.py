@@ -124,7 +124,7 @@ def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]
         figures["sun"] = {"direction": [float(x) for x in sun.direction], "seen": sun.seen,
                           "irradiance": [float(x) for x in sun.irradiance]}  # fmt: skip
     names = {one.object_id: one.name for one in run.capture.instances}
-    warnings += [f"Lamp '{names[lamp.object_id]}': {lamp.note}" for lamp in shading.lamps if lamp.note]
+    warnings += [f"Lamp '{names[lamp.object_id]}': {note}" for lamp in shading.lamps if (note := lamp.note(names))]
     warnings += shading.notes
     if above > 0.05:
         warnings.append(

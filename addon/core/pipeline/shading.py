@@ -230,7 +230,10 @@ def to_store(found: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
 
 def from_store(a: dict[str, np.ndarray], meta: dict[str, Any]) -> Shading:
     """The inverse of `to_store`."""
-    lamps = tuple(Lamp(**(d | {"radiance": np.float32(d["radiance"])})) for d in meta["lamps"])
+    lamps = tuple(
+        Lamp(**(d | {"radiance": np.float32(d["radiance"]), "spread": d["spread"] and tuple(d["spread"])}))
+        for d in meta["lamps"]
+    )
     mirrors = tuple(Mirror.from_lists(d) for d in meta["mirrors"])
     return Shading(
         a["irradiance"], a["escaped"], a["doubt"], a["radiance"], lamps,

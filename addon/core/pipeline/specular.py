@@ -187,6 +187,8 @@ def fit_specular(
     intervals = ordered_map(lambda i: gloss_interval(choices[i], told.get(i)), wanted, threads)
     sure = dict(zip(wanted, intervals, strict=True))
 
+    names = {i.object_id: i.name for i in instances}
+
     def describe(i: Instance) -> ObjectMaterial:
         own, choice = field.atlas.object_id == i.object_id, choices.get(i.object_id)
         if choice is not None and choice.model == EMITTER:
@@ -199,7 +201,9 @@ def fit_specular(
             return as_given(found, given[i.object_id], choice) if i.object_id in given else found
         if i.object_id in glowing and i.object_id not in given:
             known = glowing[i.object_id]
-            return lamp_material(i, known.radiance, irradiance[own], known.note)
+            return lamp_material(
+                i, known.radiance, irradiance[own], known.note({one.object_id: one.name for one in instances})
+            )
         if i.object_id in mirrors and i.object_id not in given:
             seen = int((field.atlas.object_id[samples.element] == i.object_id).sum())
             return flat_mirror(i, mirrors[i.object_id], seen)

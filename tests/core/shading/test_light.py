@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from addon.core.light.emitters import bright_triangles
-from addon.core.light.lamps import find_seen
+from addon.core.light.lamps import Lamp, find_seen
 from addon.core.light.mirrors import Mirror
 from addon.core.luminance import LUMINANCE
 from addon.core.pipeline.shading import shade
@@ -61,7 +61,8 @@ def test_a_lamp_that_no_frame_sees_is_solved_for(two_lamps, hidden, radiance):
     assert set(found) == {6, 7} and not found[hidden].seen and found[13 - hidden].seen
     off = found[hidden].radiance @ LUMINANCE / (np.float32(radiance) @ LUMINANCE)
     assert off == pytest.approx(1, abs=0.15)
-    assert found[hidden].note
+    before, after = found[hidden].spread
+    assert after < before and found[hidden].note({}).startswith("No frame sees it; solved from the light it throws")
     albedo = albedo_in(room, lit, result)
     for object_id, rho in ALBEDO.items():
         own = room.atlas.object_id == object_id
@@ -153,3 +154,19 @@ def test_a_finely_meshed_lamp_is_aimed_at_as_a_whole():
     bright = bright_triangles(room.field(room.by_object({0: 0.1, 1: 50})))
     assert np.flatnonzero(bright.density > 0).tolist() == list(range(2, 2 + 128))
     assert np.allclose(bright.chance, 1 / 128, rtol=1e-3)
+
+
+def test_a_lamp_says_how_it_was_found():
+    names, radiance = {3: "lamp 3"}, np.ones(3, np.float32)
+    told = {
+        "": Lamp(1, radiance, True),
+        "Clipped in every frame; its radiance is a lower bound.": Lamp(1, radiance, True, clipped=True),
+        "No frame sees it; solved from the light it throws (spread of log albedo 0.500 to 0.400).": Lamp(
+            1, radiance, False, spread=(0.5, 0.4)
+        ),
+        "Clipped in every frame; solved from the light it throws (spread of log albedo 0.500 to 0.400); its colour "
+        "from its edges.": Lamp(1, radiance, False, clipped=True, spread=(0.5, 0.4), from_edges=True),
+        "No frame sees it; solved from the light it throws (spread of log albedo 0.500 to 0.400): 2.5, near that of "
+        "the seen 'lamp 3', which it takes.": Lamp(1, radiance, False, spread=(0.5, 0.4), twin=3, solved=2.5),
+    }
+    assert all(lamp.note(names) == sentence for sentence, lamp in told.items())

@@ -37,9 +37,9 @@ def test_a_lamp_and_the_sky_are_refined_together(bound):
     found, base, (lamp_light, sky_light) = sample()
     sky = Sky([sky_light], [TRUE[1] * (0.8 if bound else 2)], bound)
     sky.solved.add(0)
-    start = Lamp(7, np.float32([12, 12, 12]), False, "How.")
+    start = Lamp(7, np.float32([12, 12, 12]), False, spread=(0.5, 0.4))
     lamps = refined(found, [start], {7: lamp_light}, {7: 0.1}, (), [], sky, base, {})
-    assert np.allclose(lamps[0].radiance, TRUE[0], rtol=0.08) and lamps[0].note == "How."
+    assert np.allclose(lamps[0].radiance, TRUE[0], rtol=0.08) and lamps[0].spread == (0.5, 0.4)
     assert np.allclose(sky.radiance[0], TRUE[1], rtol=0.1)
     assert ("clipped" in sky.notes()[0]) == bound
 
@@ -50,7 +50,7 @@ def test_a_known_colour_is_kept():
     sky = Sky([sky_light], [TRUE[1] * 2], False)
     sky.solved.add(0)
     told = TRUE[0] / (TRUE[0] @ LUMINANCE)
-    start = Lamp(7, np.float32(12 * told), False, "How.")
+    start = Lamp(7, np.float32(12 * told), False, spread=(0.5, 0.4))
     (lamp,) = refined(found, [start], {7: lamp_light}, {7: 0.1}, (), [], sky, base, {7: told})
     np.testing.assert_allclose(lamp.radiance / (lamp.radiance @ LUMINANCE), told, rtol=1e-5)
     assert lamp.radiance @ LUMINANCE == pytest.approx(TRUE[0] @ LUMINANCE, rel=0.08)

@@ -48,7 +48,7 @@ class Seen:
         return fit_given(given, self.maker, FLOOR, self.irradiance, RAYS)[0]
 
     def all(self, given=None, held=None):
-        lamp = Lamp(LAMP, np.float32(GLOW), True, "")
+        lamp = Lamp(LAMP, np.float32(GLOW), True)
         return fit_specular(
             self.box.room.instances,
             self.field,

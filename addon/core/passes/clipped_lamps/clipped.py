@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...light.lamps import Lamp
 from ...luminance import LUMINANCE
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
@@ -53,7 +52,7 @@ def shade_clipped(shade: Callable[[LitDiffuse], object], lit: LitDiffuse, atlas:
     Returns
     -------
     Shading
-        Each lamp that was clipped has a note that says so.
+        Each lamp that was clipped says so.
     """
     bounds = clipped_objects(lit, atlas)
     if not bounds:
@@ -68,11 +67,4 @@ def shade_clipped(shade: Callable[[LitDiffuse], object], lit: LitDiffuse, atlas:
         # others, and has to be there when these are solved for. Where all were solved, the first run stands.
         found = shade(unseen(lit, atlas, list(solved)) if solved else lit)
 
-    def told(lamp: Lamp) -> Lamp:
-        if lamp.object_id not in bounds:
-            return lamp
-        if lamp.seen:
-            return replace(lamp, note="Clipped in every frame; its radiance is a lower bound.")
-        return replace(lamp, note=lamp.note.replace("No frame sees it", "Clipped in every frame"))
-
-    return replace(found, lamps=tuple(told(lamp) for lamp in found.lamps))
+    return replace(found, lamps=tuple(replace(lamp, clipped=lamp.object_id in bounds) for lamp in found.lamps))

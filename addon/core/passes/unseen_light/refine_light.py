@@ -9,7 +9,6 @@ import numpy as np
 from ...light.lamps import AGREES, Lamp, twin
 from ...light.light_fit import Sample
 from ...luminance import LUMINANCE
-from ...naming import object_name
 from ...scene.model import Instance
 
 BELIEVED = 3.0
@@ -131,8 +130,8 @@ def refined(
     colours : dict of (3,) float
         Known colours of lamps: only their luminance is solved for.
     """
-    fixed = [lamp for lamp in lamps if any(np.array_equal(lamp.radiance, other.radiance) for other in seen)]
-    free = [lamp for lamp in lamps if not any(lamp is other for other in fixed)]
+    fixed = [lamp for lamp in lamps if lamp.twin is not None]
+    free = [lamp for lamp in lamps if lamp.twin is None]
     parts = sorted(sky.solved)
     if not free and not parts:
         return lamps
@@ -167,14 +166,14 @@ def refined(
 
     luminance = solve(LUMINANCE, now() @ LUMINANCE)
     class_of = {i.object_id: i.class_name for i in instances}
-    twins = {lamp.object_id: twin(lamp.object_id, s, class_of, seen) for lamp, s in zip(free, luminance)}
-    if any(twins.values()):
-        for lamp in [lamp for lamp in free if twins[lamp.object_id]]:
-            same = twins[lamp.object_id]
-            whose = object_name(class_of.get(same.object_id, ""), same.object_id)
-            note = f"{lamp.note.rstrip('.')}, near that of the seen '{whose}', which it takes."
-            fixed.append(replace(lamp, radiance=same.radiance, note=note))
-        free = [lamp for lamp in free if not twins[lamp.object_id]]
+    twins = {
+        lamp.object_id: replace(lamp, radiance=same.radiance, twin=same.object_id, solved=float(s))
+        for lamp, s in zip(free, luminance, strict=False)
+        if (same := twin(lamp.object_id, s, class_of, seen)) is not None
+    }
+    if twins:
+        fixed += twins.values()
+        free = [lamp for lamp in free if lamp.object_id not in twins]
         luminance = solve(LUMINANCE, now() @ LUMINANCE) if free or parts else luminance[:0]
     colour = now() * (luminance / (now() @ LUMINANCE))[:, None]
     bright = all_light(base, fixed, thrown, others) @ LUMINANCE + thrown_by() @ luminance if len(colour) else None

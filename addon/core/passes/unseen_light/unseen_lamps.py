@@ -7,7 +7,6 @@ import numpy as np
 from ...light.lamps import AGREES, Lamp, twin
 from ...light.light_fit import Sample
 from ...luminance import LUMINANCE
-from ...naming import object_name
 from .refine_light import Sky, all_light
 
 MIN_GAIN = 0.03
@@ -62,21 +61,20 @@ def _coloured(object_id, s, before, after, class_of, seen, received, by_channel,
     A seen lamp's of the same class if they agree; else that which is `known` from its edges; else what each channel
     says by itself, if together they make that luminance; else that of the lamps, or of the light.
     """
-    how = f"No frame sees it; solved from the light it throws (spread of log albedo {before:.3f} to {after:.3f})"
+    spread = float(before), float(after)
     same = twin(object_id, s, class_of, seen)
     if same is not None:
-        whose = object_name(class_of.get(same.object_id, ""), same.object_id)
-        note = f"{how}: {s:.3g}, near that of the seen '{whose}', which it takes."
-        return Lamp(int(object_id), same.radiance, False, note)
+        return Lamp(int(object_id), same.radiance, False, spread=spread, twin=same.object_id, solved=float(s))
     if known is not None:
-        return Lamp(int(object_id), (s * known).astype(np.float32), False, how + "; its colour from its edges.")
+        return Lamp(int(object_id), (s * known).astype(np.float32), False, spread=spread, from_edges=True)
     alike = [lamp for lamp in seen if class_of.get(lamp.object_id) == class_of.get(object_id)]
     if not alike and all(found is not None for found in by_channel):
         colour = np.float32([found[0] for found in by_channel])
         if abs(float(colour @ LUMINANCE) / s - 1) < AGREES:
-            return Lamp(int(object_id), colour, False, how + ".")
+            return Lamp(int(object_id), colour, False, spread=spread)
     white = np.mean([lamp.radiance for lamp in alike or seen], 0) if seen else received.mean(0)
-    return Lamp(int(object_id), (s * white / max(float(white @ LUMINANCE), 1e-12)).astype(np.float32), False, how + ".")
+    radiance = (s * white / max(float(white @ LUMINANCE), 1e-12)).astype(np.float32)
+    return Lamp(int(object_id), radiance, False, spread=spread)
 
 
 def solve_sky(sample: Sample, lamps, thrown, sky: Sky, base) -> None:
