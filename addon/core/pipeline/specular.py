@@ -201,9 +201,7 @@ def fit_specular(
             return as_given(found, given[i.object_id], choice) if i.object_id in given else found
         if i.object_id in glowing and i.object_id not in given:
             known = glowing[i.object_id]
-            return lamp_material(
-                i, known.radiance, irradiance[own], known.note({one.object_id: one.name for one in instances})
-            )
+            return lamp_material(i, known.radiance, irradiance[own], known.note(names))
         if i.object_id in mirrors and i.object_id not in given:
             seen = int((field.atlas.object_id[samples.element] == i.object_id).sum())
             return flat_mirror(i, mirrors[i.object_id], seen)
