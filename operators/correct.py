@@ -8,7 +8,7 @@ from ..addon.bridge.marks import OBJECT_ID
 from ..addon.core.errors import BadInputError
 from . import poll
 from .correct_base import CorrectOperator, RefitOperator, chosen
-from .correct_props import LABELS, SMOOTH_ANGLE, STATEMENTS
+from .correct_props import SMOOTH_ANGLE, STATEMENTS
 
 _KEYS = {"model": "model", "roughness": "roughness", "f0": "F0", "base_color": "colour", "same_as": "likeness"}
 
@@ -38,8 +38,8 @@ class SCAN_RELIGHT_OT_this_is(RefitOperator, bpy.types.Operator):
     @classmethod
     def description(cls, context, properties):
         """The tooltip."""
-        text = next(item[2] for item in STATEMENTS if item[0] == properties.model)
-        return f"The selected objects are: {LABELS[properties.model].lower()}. {text}"
+        item = next(item for item in STATEMENTS if item[0] == properties.model)
+        return f"The selected objects are: {item[1].lower()}. {item[2]}"
 
     def state(self, context, things):
         """Give the model."""

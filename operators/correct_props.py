@@ -9,20 +9,17 @@ from math import radians
 import bpy
 
 from ..addon.bridge import corrections
+from ..addon.core.brdf.lambertian import LAMBERTIAN
+from ..addon.core.brdf.registry import find, models
 from ..addon.core.errors import ScanRelightError
-from ..addon.core.material import TRANSPARENT
-from ..addon.core.overrides import MODELS
 
-LABELS = {"lambertian": "Matt", "specular": "Glossy", "metal": "Metal", "emitter": "Lamp", "transparent": "Glass"}
-TEXTS = {
-    "lambertian": "Reflects the same to all sides, as chalk and plain wall paint",
-    "specular": "Colour under a clear highlight, as plastic, lacquer, varnished wood, tiles",
-    "metal": "Bare metal: all that it reflects is its highlight, in the metal's colour",
-    "emitter": "Gives light of itself",
-    "transparent": "Shows what is behind it; found by a run, it can't be given",
-}
-STATEMENTS = [(model, LABELS[model], TEXTS[model]) for model in ("metal", "specular", "lambertian", "emitter")]
-_ITEMS = [(model, LABELS[model], TEXTS[model], number) for number, model in enumerate((*MODELS, TRANSPARENT))]
+_GIVEN = [one for one in models() if one.can_be_given]
+_SHOWN = sorted(_GIVEN, key=lambda one: (one.gives_light, one.has_diffuse, not one.has_lobe))
+STATEMENTS = [(one.name, one.label, one.text) for one in _SHOWN]
+_ITEMS = [
+    (one.name, one.label, one.text, number)
+    for number, one in enumerate((*_GIVEN, *(one for one in models() if not one.can_be_given)))
+]
 SMOOTH_ANGLE = bpy.props.FloatProperty(
     name="Angle",
     description="Edges where faces meet at a greater angle stay sharp",
@@ -71,16 +68,17 @@ def _f0(group) -> float:
 
 
 def _colour(group):
-    value = _value(group, "f0" if _value(group, "model", "") == "metal" else "base_color", (0.5, 0.5, 0.5))
+    bare = (find(_value(group, "model", "")) or LAMBERTIAN).lobe_alone
+    value = _value(group, "f0" if bare else "base_color", (0.5, 0.5, 0.5))
     return tuple(value) if hasattr(value, "__len__") else (value,) * 3
 
 
 def _give_colour(group, value) -> None:
     colour = list(value)
     for thing in targets(bpy.context, group.id_data):
-        metal = corrections.correctable(thing) and corrections.effective(thing)["model"] == "metal"
         if corrections.correctable(thing):
-            corrections.give(thing, **({"f0": colour} if metal else {"base_color": colour}))
+            brdf = find(corrections.effective(thing)["model"]) or LAMBERTIAN
+            corrections.give(thing, **{"f0" if brdf.lobe_alone else "base_color": colour})
 
 
 class ScanRelightCorrection(bpy.types.PropertyGroup):
@@ -90,8 +88,8 @@ class ScanRelightCorrection(bpy.types.PropertyGroup):
         name="Model",
         description="How the surface reflects",
         items=_ITEMS,
-        get=lambda self: next(item[3] for item in _ITEMS if item[0] == _value(self, "model", "lambertian")),
-        set=lambda self, value: value < len(MODELS) and _give(self, model=_ITEMS[value][0]),
+        get=lambda self: next(item[3] for item in _ITEMS if item[0] == _value(self, "model", LAMBERTIAN.name)),
+        set=lambda self, value: value < len(_GIVEN) and _give(self, model=_ITEMS[value][0]),
     )
     roughness: bpy.props.FloatProperty(
         name="Roughness",

@@ -5,17 +5,13 @@ from __future__ import annotations
 import bpy
 
 from ..addon.bridge import corrections, unseen
+from ..addon.core.brdf.lambertian import LAMBERTIAN
+from ..addon.core.brdf.registry import find, named
 from .correct_base import chosen
 from .correct_props import STATEMENTS
 from .job_operator import active, bar
 from .panel import SidebarPanel
 
-ICONS = {
-    "metal": "SHADING_RENDERED",
-    "specular": "SHADING_TEXTURE",
-    "lambertian": "SHADING_SOLID",
-    "emitter": "LIGHT_AREA",
-}
 GREY_CARD = 0.18
 
 
@@ -57,11 +53,11 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
         column = layout.column(align=True)
         column.label(text="This is:")
         said = corrections.given(thing)
-        for pair in (STATEMENTS[:2], STATEMENTS[2:]):
+        for pair in (STATEMENTS[at : at + 2] for at in range(0, len(STATEMENTS), 2)):
             row = column.row(align=True)
             for model, label, _ in pair:
                 row.operator(
-                    "scan_relight.this_is", text=label, icon=ICONS[model], depress=said.get("model") == model
+                    "scan_relight.this_is", text=label, icon=named(model).icon, depress=said.get("model") == model
                 ).model = model
         row = column.row(align=True)
         row.prop(choices, "like", text="", icon="OBJECT_DATA")
@@ -74,13 +70,13 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
 
     def values(self, layout, thing) -> None:
         """Each value with a pin where it is given, and the way back."""
-        said, model = corrections.given(thing), corrections.effective(thing)["model"]
-        values, metal = thing.scan_relight_correct, model == "metal"
+        said, brdf = corrections.given(thing), find(corrections.effective(thing)["model"]) or LAMBERTIAN
+        values, metal = thing.scan_relight_correct, brdf.lobe_alone
         rows = [("model", "model")]
-        if model in ("specular", "metal"):
+        if brdf.has_lobe:
             rows += [("roughness", "roughness")]
             rows += [("f0", "colour")] if metal else [("f0", "f0")]
-        if model in ("lambertian", "specular", "transparent"):
+        if brdf.has_diffuse:
             rows += [("base_color", "colour")]
         column = layout.column(align=True)
         column.use_property_split, column.use_property_decorate = True, False

@@ -7,6 +7,7 @@ import bpy
 
 from ..addon.bridge import result_file
 from ..addon.console import duration
+from ..addon.core.brdf.registry import find, models
 from ..addon.core.naming import in_order
 from ..addon.core.stages import LABELS, RUN_STAGES
 from . import preferences, results
@@ -15,21 +16,10 @@ from .select_result_object import select
 
 NAME = 0.62
 """Share of a row that the name has where there are figures beside it."""
-ICONS = {
-    "lambertian": "SHADING_SOLID",
-    "specular": "SHADING_TEXTURE",
-    "metal": "SHADING_RENDERED",
-    "emitter": "LIGHT_AREA",
-    "transparent": "MOD_OPACITY",
-}
 SIGNS = {"sure": "CHECKMARK", "fair": "DOT", "unsure": "QUESTION", "unknown": "BLANK1"}
 MODELS = [
     ("ALL", "All models", "Show every object"),
-    ("lambertian", "Lambertian", "Only objects without a highlight"),
-    ("specular", "Specular", "Only objects with a highlight over their colour"),
-    ("metal", "Metal", "Only metals"),
-    ("emitter", "Lamps", "Only objects that give light"),
-    ("transparent", "Transparent", "Only glass and objects with holes that the mesh does not have"),
+    *((one.name, one.label, f"Only these: {one.text[0].lower()}{one.text[1:]}") for one in models()),
 ]
 ORDERS = [
     ("NAME", "Name", "By name"),
@@ -52,7 +42,7 @@ class SCAN_RELIGHT_UL_results(NamedRows, bpy.types.UIList):
         one = self.known.get(item.name, {})
         text = "  ".join(filter(None, columns(one)))
         split = layout.split(factor=NAME if text else 0.9)  # long names may use what stays empty
-        self.name(split, item.name, ICONS.get(one.get("model"), "BLANK1"))
+        self.name(split, item.name, getattr(find(one.get("model")), "icon", "BLANK1"))
         row = split.row()
         if text:
             row.label(text=text, translate=False)  # one label: the margins of two would leave no room for figures
@@ -183,7 +173,7 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
     def details(self, layout, context, name: str, one: dict) -> None:
         """Everything of one object."""
         column = layout.column(align=True)
-        column.label(text=name, icon=ICONS.get(one.get("model"), "BLANK1"), translate=False)
+        column.label(text=name, icon=getattr(find(one.get("model")), "icon", "BLANK1"), translate=False)
         for label, text in results.facts(one):
             split = column.split(factor=0.38)
             split.label(text=label)

@@ -9,18 +9,13 @@ import bpy
 
 from ..addon.bridge import look, result_file
 from ..addon.bridge.result_file import EARLIER, FITS, MATERIALS, UNTOLD, Result, standing, standings
+from ..addon.core.brdf.lambertian import LAMBERTIAN
+from ..addon.core.brdf.registry import find
 from . import preferences
 
 PAGE = "report.html"
 SURE, FAIR = 0.15, 0.4
 """Doubt (`doubt`) up to which an object counts as sure, and as fairly sure."""
-MODELS = {
-    "lambertian": "Lambertian (matt)",
-    "specular": "Specular",
-    "metal": "Metal",
-    "emitter": "Lamp",
-    "transparent": "Transparent",
-}
 GIVEN = {"model": "model", "roughness": "roughness", "f0": "F0", "base_color": "colour", "same_as": "same as object"}
 
 
@@ -87,6 +82,12 @@ def refused(things) -> list[tuple[str, Path | None]]:
 forget = result_file.forget
 
 
+def label(model: str) -> str:
+    """What the panel calls a model."""
+    brdf = find(model)
+    return brdf.label if brdf else model
+
+
 def doubt(one: dict[str, Any]) -> float | None:
     """How unsure an object's material is, 0...1: the greater of two widths of 90 % intervals.
 
@@ -95,10 +96,11 @@ def doubt(one: dict[str, Any]) -> float | None:
     """
     found = []
     low, high = one.get("roughness_low"), one.get("roughness_high")
-    if one.get("model") in ("specular", "metal") and None not in (low, high):
+    brdf = find(one.get("model")) or LAMBERTIAN
+    if brdf.has_lobe and None not in (low, high):
         found.append(high - low)
     evidence = one.get("evidence") or {}
-    if one.get("model") in ("lambertian", "specular"):
+    if brdf.has_albedo:
         mean, low, high = (_mean(evidence.get(key)) for key in ("albedo", "albedo_low", "albedo_high"))
         if None not in (mean, low, high):
             found.append((high - low) / 2 / max(mean, 1e-3))
@@ -115,7 +117,7 @@ def certainty(one: dict[str, Any]) -> str:
 
 def specular(one: dict[str, Any]) -> float | None:
     """An object's reflectance at normal incidence; a metal's is the mean of its colours'."""
-    return one["psi"] if one.get("psi") is not None else _mean(one.get("f0"))
+    return _mean(one.get("f0"))
 
 
 def _mean(value) -> float | None:
@@ -126,18 +128,19 @@ def _mean(value) -> float | None:
 
 def facts(one: dict[str, Any]) -> list[tuple[str, str]]:
     """Label and text of everything that the panel tells of an object."""
-    model, evidence = one.get("model", ""), one.get("evidence") or {}
-    found = [("Model", MODELS.get(model, model))]
-    phi = one.get("phi")
-    if phi is not None:
-        found.append(("Roughness", _between(max(phi, 0) ** 0.5, one.get("roughness_low"), one.get("roughness_high"))))
+    name, evidence = one.get("model", ""), one.get("evidence") or {}
+    brdf = find(name) or LAMBERTIAN
+    found = [("Model", label(name))]
+    alpha = one.get("alpha")
+    if alpha is not None:
+        found.append(("Roughness", _between(max(alpha, 0) ** 0.5, one.get("roughness_low"), one.get("roughness_high"))))
     value = specular(one)
     if value is not None:
         found.append(("Specular F0", _between(value, one.get("specular_low"), one.get("specular_high"))))
-    if model == "emitter" and one.get("emission") is not None:
+    if brdf.gives_light and one.get("emission") is not None:
         found.append(("Radiance", ", ".join(f"{part:.3g}" for part in one["emission"])))
     albedo = _mean(evidence.get("albedo"))
-    if albedo is not None and model != "emitter":
+    if albedo is not None and not brdf.gives_light:
         found.append(("Albedo", _between(albedo, *(_mean(evidence.get(k)) for k in ("albedo_low", "albedo_high")))))
     if evidence.get("seen_share") is not None:
         found.append(("Seen", f"{evidence['seen_share']:.0%} of {evidence.get('area', 0):.3g} m\u00b2"))
@@ -156,7 +159,7 @@ def _told(value) -> str:
     """A given value in words."""
     if isinstance(value, (list, tuple)):
         return " ".join(map(_told, value))
-    return f"{value:.2f}" if isinstance(value, float) else MODELS.get(value, str(value))
+    return f"{value:.2f}" if isinstance(value, float) else label(str(value))
 
 
 def _between(value: float, low: float | None, high: float | None) -> str:

@@ -20,7 +20,8 @@ import bpy
 import numpy as np
 
 from addon.bridge.materials import make_material
-from addon.core.material import SPECULAR, ObjectMaterial
+from addon.core.brdf.dielectric import DIELECTRIC
+from addon.core.brdf.material import ObjectMaterial
 
 PHI = np.linspace(0.1, 1.0, 10) ** 2
 PSI = np.array([0.0025, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.6, 0.9])
@@ -54,7 +55,7 @@ def furnace(samples):
 
 def reflectance(sphere, phi, psi, base):
     """Mean over the sphere's disc."""
-    material = make_material(ObjectMaterial(0, "sphere", SPECULAR, phi=float(phi), psi=float(psi)))
+    material = make_material(ObjectMaterial(0, "sphere", DIELECTRIC, alpha=float(phi), f0=float(psi)))
     node = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
     node.inputs["Base Color"].default_value = (base, base, base, 1)
     sphere.data.materials.clear()

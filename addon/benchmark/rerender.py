@@ -10,7 +10,6 @@ import numpy as np
 
 from ..core.light.emitters import bright_triangles
 from ..core.light.lobes import GRID, reflected_light
-from ..core.material import EMITTER, METAL, SPECULAR, TRANSPARENT
 from ..core.pipeline.recover import Recovery
 
 PIXELS = 1500
@@ -25,7 +24,7 @@ def rerender_psnr(recovery: Recovery, seen: list[dict], seed: int = 0) -> float:
     The exposure puts each view's median luminance to middle grey. Lamps, glass and pixels at edges are left out.
     """
     materials = {m.object_id: m for m in recovery.materials()}
-    left_out = [i for i, m in materials.items() if m.model in (EMITTER, TRANSPARENT)]
+    left_out = [i for i, m in materials.items() if m.model.gives_light or m.model.see_through]
     rng = np.random.default_rng(seed)
     element, direction, true, view = [], [], [], []
     for number, one in enumerate(seen):
@@ -55,16 +54,16 @@ def _shown(recovery: Recovery, materials: dict, element: np.ndarray, direction: 
     bright = bright_triangles(field)
     for i in np.unique(object_id):
         m = materials[i]
-        if m.model not in (SPECULAR, METAL):
+        if not m.model.has_lobe:
             continue
         own = np.flatnonzero(object_id == i)
-        phi = max(float(m.phi), float(GRID[0]))
+        alpha = max(float(m.alpha), float(GRID[0]))
         light = reflected_light(
-            field, bright, element[own], direction[own], rays=RAYS, grid=np.float32([phi]), proposals=(phi,),
-            threads=recovery.settings.threads, seed=seed,
+            field, bright, element[own], direction[own], rays=RAYS, grid=np.float32([alpha]), proposals=(alpha,),
+            microfacets=m.model.microfacets, threads=recovery.settings.threads, seed=seed,
         )  # fmt: skip
-        lobe = np.float32(m.f0 if m.model == METAL else m.psi) * light.A[:, 0] + light.B[:, 0]
-        shown[own] = lobe if m.model == METAL else shown[own] + lobe
+        lobe = np.float32(m.f0) * light.A[:, 0] + light.B[:, 0]
+        shown[own] = shown[own] + lobe if m.model.has_diffuse else lobe
     return shown
 
 

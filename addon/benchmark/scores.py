@@ -15,9 +15,13 @@ from ..bridge.demo_compare import describe, seen_albedo
 from ..bridge.demo_render import build, set_up_cycles
 from ..bridge.demo_room import room
 from ..bridge.marks import OBJECT_ID
+from ..core.brdf.dielectric import DIELECTRIC
+from ..core.brdf.emitter import EMITTER
+from ..core.brdf.lambertian import LAMBERTIAN
+from ..core.brdf.metal import METAL
+from ..core.brdf.model import Brdf
 from ..core.io.exr import read_exr
 from ..core.io.read import read_capture
-from ..core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR
 from ..core.passes.albedo.albedo import MEASURED
 from .truth_views import albedo_psnr
 
@@ -65,7 +69,7 @@ def score(capture: Path, result: Path) -> Scores:
               if i in found and o["alpha"] is not None and found[i]["roughness"] is not None]  # fmt: skip
     rough = [abs(f["roughness"] - o["alpha"] ** 0.5) for f, o in glossy]
     f0 = [abs(f["f0"] - o["f0"]) for f, o in glossy if f["f0"] is not None]
-    right = sum(f["model"] == _true_model(objects[i]) for i, f in found.items() if i in objects)
+    right = sum(f["model"] == _true_model(objects[i]).name for i, f in found.items() if i in objects)
     error = 10 ** (-psnr / 20) if psnr is not None else None
     relight = None
     if is_demo:
@@ -81,13 +85,13 @@ def score(capture: Path, result: Path) -> Scores:
     )  # fmt: skip
 
 
-def _true_model(known: dict) -> str:
+def _true_model(known: dict) -> Brdf:
     """The model that would be right for an object."""
     if known["emission"]:
         return EMITTER
     if known["metallic"]:
         return METAL
-    return SPECULAR if known["alpha"] is not None else LAMBERTIAN
+    return DIELECTRIC if known["alpha"] is not None else LAMBERTIAN
 
 
 def _relit(blend: Path | None, path: Path) -> np.ndarray:

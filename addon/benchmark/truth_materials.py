@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR, ObjectMaterial
+from ..core.brdf.material import ObjectMaterial
 
 LEAST_PIXELS = 100
 """In the held-out views, that an object is judged by."""
 UNTOLD = 0.5
 """Blender's Roughness where the result says none."""
-KINDS = {LAMBERTIAN: "diffuse", SPECULAR: "specular", METAL: "metal", EMITTER: "emitter"}
 
 
 @dataclass(frozen=True)
@@ -43,8 +42,8 @@ class MaterialScores:
 
 
 def found_kind(material: ObjectMaterial) -> str:
-    """'diffuse', 'specular', 'metal', 'emitter', or the model's own name."""
-    return KINDS.get(material.model, material.model)
+    """The model's name."""
+    return material.model.name
 
 
 def true_kind(known: Mapping[str, Any]) -> str:
@@ -53,12 +52,12 @@ def true_kind(known: Mapping[str, Any]) -> str:
         return "emitter"
     if known["metallic"]:
         return "metal"
-    return "diffuse" if known["bsdf"] == "diffuse" else "specular"
+    return "lambertian" if known["bsdf"] == "diffuse" else "specular"
 
 
 def found_roughness(material: ObjectMaterial) -> float | None:
     """sqrt(alpha) as found."""
-    return None if material.phi is None else float(np.sqrt(material.phi))
+    return None if material.alpha is None else float(np.sqrt(material.alpha))
 
 
 def true_roughness(known: Mapping[str, Any]) -> float | None:

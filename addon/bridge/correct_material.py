@@ -11,8 +11,10 @@ from typing import Any
 
 import bpy
 
-from ..core.material import EMITTER, METAL, SPECULAR
-from ..core.overrides import LOBE
+from ..core.brdf.compensation import ior_of
+from ..core.brdf.lambertian import LAMBERTIAN
+from ..core.brdf.registry import find
+from ..core.results.overrides import LOBE
 from .marks import FOUND
 from .materials import (
     BASE_COLOR,
@@ -22,7 +24,8 @@ from .materials import (
     MODEL,
     ROUGHNESS,
     SPECULAR_LEVEL,
-    ior_of,
+    brdf_of,
+    f0_of,
     mix_node,
     principled,
 )
@@ -97,35 +100,32 @@ def show(thing: bpy.types.Object, wanted: dict[str, Any], entry: dict[str, Any])
     if wanted == made:
         del material[WORN]
         return
-    inputs, model = principled(material).inputs, wanted["model"]
-    if model != made["model"]:
-        inputs[METALLIC].default_value = float(model == METAL)
-        inputs[SPECULAR_LEVEL].default_value = 0.5 if model in (SPECULAR, METAL) else 0.0
-        if made["model"] == EMITTER:
-            inputs[EMISSION_STRENGTH].default_value = 0.0
+    inputs, model = principled(material).inputs, find(wanted["model"]) or LAMBERTIAN
+    if wanted["model"] != made["model"]:
+        inputs[METALLIC].default_value = float(model.lobe_alone)
+        inputs[SPECULAR_LEVEL].default_value = 0.5 if model.has_lobe else 0.0
+        inputs[EMISSION_STRENGTH].default_value = 0.0
     if wanted["roughness"] is not None and wanted["roughness"] != made["roughness"]:
         inputs[ROUGHNESS].default_value = wanted["roughness"]
-    if model == SPECULAR and wanted["f0"] != made["f0"]:
+    if model.layered and wanted["f0"] != made["f0"]:
         inputs[IOR].default_value = ior_of(wanted["f0"])
-    if model == METAL and wanted["f0"] != made["f0"]:
+    if model.lobe_alone and wanted["f0"] != made["f0"]:
         _plain_colour(material, wanted["f0"])
-    elif model != METAL and wanted["base_color"] and wanted["base_color"] != made["base_color"]:
+    elif not model.lobe_alone and wanted["base_color"] and wanted["base_color"] != made["base_color"]:
         _tint(material, wanted["base_color"], made["base_color"])
 
 
 def _shown(material, entry: dict) -> dict[str, Any]:
     """What a material that nobody has changed shows, in the terms of an override."""
-    inputs, model = principled(material).inputs, material[MODEL]
+    inputs, model = principled(material).inputs, brdf_of(material) or LAMBERTIAN
     colour = [round(one, 6) for one in inputs[BASE_COLOR].default_value[:3]]
-    shiny = model in (SPECULAR, METAL)
-    f0 = {METAL: colour, SPECULAR: material.get("scan_relight_psi", 0.0)}.get(model)
+    f0 = colour if model.lobe_alone else (f0_of(material) or 0.0) if model.has_lobe else None
     albedo = (entry.get("evidence") or {}).get("albedo")
-    base = None if model == METAL else list(albedo) if albedo else colour
     return {
-        "model": model,
-        "roughness": inputs[ROUGHNESS].default_value if shiny else None,
+        "model": material[MODEL],
+        "roughness": inputs[ROUGHNESS].default_value if model.has_lobe else None,
         "f0": f0,
-        "base_color": base if model != EMITTER else None,
+        "base_color": (list(albedo) if albedo else colour) if model.has_diffuse else None,
     }
 
 

@@ -14,15 +14,17 @@ from typing import Any
 import bpy
 
 from ..core.atomic import write_bytes
+from ..core.brdf.dielectric import DIELECTRIC
+from ..core.brdf.lambertian import LAMBERTIAN
+from ..core.brdf.registry import find
 from ..core.errors import BadInputError
-from ..core.material import LAMBERTIAN, METAL, SPECULAR
-from ..core.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
+from ..core.results.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
 from ..core.results.place import write_capture
 from . import correct_material, look, result_file, smoothing, unseen
 from .as_made import is_corrected, our_own
 from .marks import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, WHITE
 
-F0_COATED, F0_METAL, ROUGHNESS = 0.04, 0.6, 0.3
+ROUGHNESS = 0.3
 """What is shown until a refit, where nothing better is known."""
 
 _written: dict[Path, set[int | str]] = {}
@@ -78,7 +80,7 @@ def give(thing: bpy.types.Object, **values) -> None:
         `correctable`.
     **values
         As in an override: `model`, `roughness`, `f0`, `base_color`, `same_as`; None takes one back. What contradicts
-        them and was given before goes (`core.overrides.merge`).
+        them and was given before goes (`core.results.overrides.merge`).
 
     Raises
     ------
@@ -162,21 +164,20 @@ def effective(thing: bpy.types.Object, seen: frozenset = frozenset()) -> dict[st
     before = values["model"]
     values |= theirs
     values |= {key: said[key] for key in (*LOBE, "base_color") if key in said}
-    if "model" not in said and {"f0", "roughness"} & said.keys() and values["model"] == LAMBERTIAN:
-        values["model"] = SPECULAR
-    if values["model"] == METAL and "base_color" in said and "f0" not in said:
+    model = find(values["model"]) or LAMBERTIAN
+    if "model" not in said and {"f0", "roughness"} & said.keys() and model.has_albedo and not model.has_lobe:
+        model = DIELECTRIC
+        values["model"] = model.name
+    if model.lobe_alone and "base_color" in said and "f0" not in said:
         values["f0"] = said["base_color"]
-    if values["model"] in (SPECULAR, METAL):
+    if model.has_lobe:
         if values["roughness"] is None:
             values["roughness"] = ROUGHNESS
-        coloured = isinstance(values["f0"], (list, tuple))
         new_model = values["model"] != before and other is None and not {"f0", "base_color"} & said.keys()
         if values["f0"] is None or new_model:
-            values["f0"] = F0_COATED if values["model"] == SPECULAR else values["base_color"] or [F0_METAL] * 3
-        elif values["model"] == METAL and not coloured:
-            values["f0"] = [values["f0"]] * 3
-        elif values["model"] == SPECULAR and coloured:
-            values["f0"] = sum(values["f0"]) / 3
+            values["f0"] = model.plausible_f0(values["base_color"])
+        f0 = model.as_f0(values["f0"])
+        values["f0"] = list(f0) if isinstance(f0, tuple) else f0
     return values
 
 

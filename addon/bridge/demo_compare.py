@@ -10,14 +10,13 @@ import numpy as np
 
 from ..core.io.exr import read_exr
 from ..core.io.read import read_capture
-from ..core.material import EMITTER
 from ..core.passes.albedo.albedo import MEASURED
 from ..core.scene.model import Capture
 from ..core.scene.rays import RayScene
 from .demo_room import room
 from .images import image_array
 from .marks import OBJECT_ID
-from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, METALLIC, MODEL, ROUGHNESS
+from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, METALLIC, ROUGHNESS, alpha_of, brdf_of, f0_of
 from .mesh_objects import ATLAS_UV
 
 MIN_COSINE = 0.2
@@ -80,16 +79,16 @@ def describe(thing, measured: np.ndarray) -> dict:
     """What the material of a recovered object says: model, mean base colour, roughness, F0, radiance."""
     material = thing.data.materials[0]
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    model = material[MODEL]
-    glossy = material.get("scan_relight_phi") is not None
+    brdf = brdf_of(material)
+    glossy = alpha_of(material) is not None
     emission = shader.inputs[EMISSION_COLOR].default_value[:3]
     strength = shader.inputs[EMISSION_STRENGTH].default_value
     return {
-        "model": model,
-        "base_color": None if model == EMITTER else mean_base_color(thing, shader.inputs[BASE_COLOR], measured),
+        "model": brdf.name,
+        "base_color": None if brdf.gives_light else mean_base_color(thing, shader.inputs[BASE_COLOR], measured),
         "roughness": shader.inputs[ROUGHNESS].default_value if glossy else None,
-        "f0": material.get("scan_relight_psi") if not shader.inputs[METALLIC].default_value else None,
-        "emission": tuple(c * strength for c in emission) if model == EMITTER else None,
+        "f0": f0_of(material) if not shader.inputs[METALLIC].default_value else None,
+        "emission": tuple(c * strength for c in emission) if brdf.gives_light else None,
     }
 
 

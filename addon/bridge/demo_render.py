@@ -11,13 +11,14 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..core.brdf.compensation import ior_of
 from ..core.errors import BadInputError, StorageError
 from ..core.io.exr import read_header
 from ..core.progress import Progress
 from .demo_capture import FIELD_OF_VIEW, frame_path, write_all_but_frames
 from .demo_room import Paint, Thing, room, tour
 from .images import array_image
-from .materials import BASE_COLOR, IOR, ROUGHNESS, SPECULAR_LEVEL, ior_of
+from .materials import BASE_COLOR, IOR, ROUGHNESS, SPECULAR_LEVEL
 from .pictures import can_denoise
 
 SIZES = {"tiny": (10, 64, 48, 24), "small": (36, 160, 120, 24), "large": (64, 320, 240, 128)}

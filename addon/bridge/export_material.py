@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..core.brdf.compensation import ior_of
 from ..core.io.png import write_png
 from . import relight_lamps
 from .images import UDIM, image_array, load_image
@@ -22,7 +23,6 @@ from .materials import (
     REPEATS,
     ROUGHNESS,
     SPECULAR_LEVEL,
-    ior_of,
     plain_material,
 )
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..core.brdf.material import ObjectMaterial
 from ..core.errors import BadInputError
-from ..core.material import ObjectMaterial
 from ..core.naming import LONGEST, cut
 from ..core.results.room_file import MATERIALS, layout_of
 from .marks import IMAGE, LAYOUT, UV_MAP

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import math
-
 import bpy
 
-from ..core.material import EMITTER, LAMP_ALBEDO, METAL, SPECULAR, ObjectMaterial
+from ..core.brdf.material import ObjectMaterial
+from ..core.brdf.model import Brdf
+from ..core.brdf.registry import find
 from .marks import UV_MAP
 from .mesh_objects import ATLAS_UV
 
 MODEL = "scan_relight_model"
-"""Custom property of each recovered material: its description's model."""
+"""Custom property of each recovered material: the name of its description's model."""
 REPEATS = "scan_relight_repeats"
 """Custom property of a picture: it goes on beyond its edges, as one tile does for coordinates on that tile."""
-MAX_F0 = 0.9
-"""The index of refraction grows without bound as F0 nears 1; this is an index of 38."""
+_ALPHA, _F0, _TRANSMISSION = "scan_relight_alpha", "scan_relight_f0", "scan_relight_transmission"
+_BEFORE = {_ALPHA: "scan_relight_phi", _F0: "scan_relight_psi"}
+"""What version 0.1 called them."""
 
 BASE_COLOR = "Base Color"
 METALLIC = "Metallic"
@@ -27,10 +28,19 @@ EMISSION_COLOR = "Emission Color"
 EMISSION_STRENGTH = "Emission Strength"
 
 
-def ior_of(f0: float) -> float:
-    """Index of refraction whose reflectance at normal incidence is `f0` (clamped to 0...`MAX_F0`)."""
-    root = math.sqrt(min(max(f0, 0.0), MAX_F0))
-    return (1 + root) / (1 - root)
+def brdf_of(material: bpy.types.Material | None) -> Brdf | None:
+    """The model that a recovered material is of; None of any other material."""
+    return find(material.get(MODEL)) if material else None
+
+
+def alpha_of(material: bpy.types.Material) -> float | None:
+    """GGX's alpha as it was fitted; None where there is no lobe."""
+    return material.get(_ALPHA, material.get(_BEFORE[_ALPHA]))
+
+
+def f0_of(material: bpy.types.Material) -> float | None:
+    """F0 as it was fitted; None where there is no lobe, or a coloured one: that is the material's colour."""
+    return material.get(_F0, material.get(_BEFORE[_F0]))
 
 
 def make_material(
@@ -45,8 +55,8 @@ def make_material(
     ----------
     description : ObjectMaterial
     base_color : bpy.types.Image, optional
-        Lambertian and specular: Base Color over the atlas, linear Rec.709; for specular objects already compensated
-        (see `core.brdf.compensation`). Without it the colour is mid-grey.
+        Of what has a diffuse part: Base Color over the atlas, linear Rec.709 (`core.brdf.material.base_colors`).
+        Without it the colour is mid-grey.
     emission : bpy.types.Image, optional
         Emitter: radiance over the atlas; without it the description's one radiance.
     one_sided : bool
@@ -55,7 +65,7 @@ def make_material(
     Returns
     -------
     bpy.types.Material
-        Its custom properties ``scan_relight_model``, ``_phi``, ``_psi``, ``_transmission`` tell what was fitted.
+        Its custom properties ``scan_relight_model``, ``_alpha``, ``_f0``, ``_transmission`` tell what was fitted.
     """
     return dress(bpy.data.materials.new(description.name), description, base_color, emission, one_sided)
 
@@ -69,46 +79,32 @@ def dress(
 ) -> bpy.types.Material:
     """`make_material` with a material that is there: its nodes go, its name and whoever wears it stay."""
     nodes, links, principled = _fresh_tree(material)
-    value = {
-        name: principled.inputs[name]
-        for name in (BASE_COLOR, METALLIC, ROUGHNESS, IOR, SPECULAR_LEVEL, EMISSION_COLOR, EMISSION_STRENGTH, ALPHA)
-    }
+    value, shown = principled.inputs, description.model.principled(description)
     # The fitted lobe is single scattering.
     principled.distribution = "GGX"
-    if description.phi is not None:  # else Blender's default, which shows nowhere while there is no specular lobe
-        value[ROUGHNESS].default_value = math.sqrt(min(max(description.phi, 0.0), 1.0))
-    value[SPECULAR_LEVEL].default_value = 0.0
-    value[IOR].default_value = 1.5
-    value[BASE_COLOR].default_value = (0.5, 0.5, 0.5, 1)
-    if description.model == SPECULAR:
-        value[SPECULAR_LEVEL].default_value = 0.5
-        value[IOR].default_value = ior_of(description.psi or 0.0)
-    if description.coat:
-        value[SPECULAR_LEVEL].default_value = 0.5
-        value[IOR].default_value = ior_of(description.coat["f0"])
-        value[ROUGHNESS].default_value = description.coat["roughness"]
-    if description.model == METAL:
-        value[METALLIC].default_value = 1.0
-        value[SPECULAR_LEVEL].default_value = 0.5
-        value[BASE_COLOR].default_value = (*(min(max(c, 0.0), 1.0) for c in description.f0 or (0.5,) * 3), 1)
-    elif description.model == EMITTER:
-        # An image holds all that was seen; of a description's radiance what the lamp reflects has been taken off.
-        grey = LAMP_ALBEDO if emission is None else 0.0
-        value[BASE_COLOR].default_value = (grey, grey, grey, 1)
-        _emit(nodes, links, value, description.emission or (0.0, 0.0, 0.0), emission)
+    if shown.roughness is not None:
+        value[ROUGHNESS].default_value = shown.roughness
+    value[METALLIC].default_value, value[ALPHA].default_value = shown.metallic, shown.alpha
+    value[SPECULAR_LEVEL].default_value, value[IOR].default_value = shown.specular_level, shown.ior
+    value[BASE_COLOR].default_value = (*(shown.base_color or (0.5,) * 3), 1)
+    for name, number in shown.further.items():
+        if name in value:
+            value[name].default_value = number
+    if shown.base_color is None and base_color is not None:
+        links.new(_texture(nodes, links, base_color, (-400, 200)), value[BASE_COLOR])
+    if shown.emission is not None:
+        if emission is not None:  # it holds all that was seen, with what the lamp reflects
+            value[BASE_COLOR].default_value = (0, 0, 0, 1)
+        _emit(nodes, links, value, shown.emission, emission)
         if one_sided:
             _front_only(nodes, links, value[EMISSION_COLOR])
-    elif base_color is not None:
-        # Glass lets a share of the light through straight on: no bending, as frames say nothing of it.
-        value[ALPHA].default_value = description.opacity
-        links.new(_texture(nodes, links, base_color, (-400, 200)), value[BASE_COLOR])
-    material[MODEL] = description.model
-    for name in ("phi", "psi", "transmission"):
-        number = getattr(description, name)
-        if number is not None:
-            material[f"scan_relight_{name}"] = float(number)
-        elif f"scan_relight_{name}" in material:
-            del material[f"scan_relight_{name}"]
+    material[MODEL] = description.model.name
+    told = {_ALPHA: description.alpha, _F0: description.f0, _TRANSMISSION: description.transmission}
+    for name in (*told, *_BEFORE.values()):
+        material.pop(name, None)
+    for name, number in told.items():
+        if isinstance(number, (int, float)):
+            material[name] = float(number)
     return material
 
 

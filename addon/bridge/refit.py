@@ -7,9 +7,9 @@ from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
-from ..core.overrides import OVERRIDES
 from ..core.pipeline.refit import REPORT, Refit, open_result
 from ..core.progress import Progress
+from ..core.results.overrides import OVERRIDES
 from ..core.results.store import Store
 from ..core.stages import READ, WRITE
 from .run import told_in_a_sentence, versions

@@ -9,18 +9,17 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import MissingStageError, StorageError
-from ..core.material import EMITTER
 from ..core.results.room_file import material
 from . import corrections, relight_lamps, result_file, result_images, room_changes, unseen
 from .as_made import is_corrected, stamp_tree
 from .correct_material import worn_material
 from .images import tiles_of
 from .marks import IMAGE, OBJECT_ID, RESULT, UV_MAP, mark
-from .materials import MODEL, dress
+from .materials import dress
 from .mesh_objects import is_open
 from .scene import BASE_COLOR
 
-_WORN = ("model", "phi", "psi", "f0", "emission", "transmission", "surfaces", "coat", "given")
+_WORN = ("model", "alpha", "f0", "emission", "transmission", "surfaces", "coat", "given")
 """Of an entry of materials.json, what its object's material is made of."""
 
 
@@ -127,9 +126,9 @@ def _dress(thing: bpy.types.Object, entry: dict, image: bpy.types.Image | None) 
     state = relight_lamps.snapshot(worn) if relight_lamps.is_lamp(worn) else None
     if state is not None:
         relight_lamps.restore(worn)
-    dress(worn, description, image, one_sided=description.model == EMITTER and is_open(thing.data))
+    dress(worn, description, image, one_sided=description.model.gives_light and is_open(thing.data))
     stamp_tree(worn, anew=True)
-    if state is not None and worn[MODEL] == EMITTER:
+    if state is not None and description.model.gives_light:
         relight_lamps.put_back(worn, state)
 
 

@@ -1,6 +1,6 @@
 """The lamps that were found in the scan: on or off, stronger or weaker, of another colour, and back again.
 
-A lamp is a material whose model is EMITTER. Its state is kept with the material as custom properties, so that it is
+A lamp is a material whose model gives light. Its state is kept with the material as custom properties, so that it is
 saved with the file and needs no registered add-on; the node tree always shows it.
 """
 
@@ -9,9 +9,8 @@ from __future__ import annotations
 import bpy
 
 from ..core.errors import BadInputError
-from ..core.material import EMITTER
 from ..core.naming import in_order, numbered
-from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, MODEL
+from .materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, brdf_of
 from .relight_kelvin import HIGHEST, LOWEST, kelvin_of, luminance, rgb_of
 
 _STRENGTH, _COLOUR, _BASE = (f"scan_relight_recovered_{name}" for name in ("strength", "colour", "base"))
@@ -26,7 +25,8 @@ _DARK = ("window", "screen", "monitor", "tv", "television", "display", "laptop")
 
 def is_lamp(material: bpy.types.Material | None) -> bool:
     """Whether a material is a recovered lamp's."""
-    return bool(material and material.get(MODEL) == EMITTER and _principled(material))
+    brdf = brdf_of(material)
+    return brdf is not None and brdf.gives_light and _principled(material) is not None
 
 
 def find_lamps(scene: bpy.types.Scene) -> list[bpy.types.Material]:

@@ -13,6 +13,7 @@ from typing import Any
 
 import bpy
 
+from ..core.brdf.material import renamed
 from .marks import OBJECT_ID, RESULT, RUN
 from .materials import MODEL
 
@@ -64,7 +65,7 @@ def read(folder: Path) -> Result | None:
         run, layout = (one if isinstance(one := told.get(name), str) else "" for name in ("run", "layout"))
         listed = told.get("objects")
         objects = (
-            {one["object_id"]: one for one in listed if isinstance(one, dict) and "object_id" in one}
+            {one["object_id"]: renamed(one) for one in listed if isinstance(one, dict) and "object_id" in one}
             if isinstance(listed, list)
             else {}
         )

@@ -9,6 +9,7 @@ from typing import Any
 
 import bpy
 
+from ..core.brdf.material import renamed
 from ..core.results.room_file import DAMAGE, MATERIALS
 from .marks import CHANGES, LAST_FOUND
 
@@ -20,18 +21,18 @@ def found(folder: Path) -> dict[str, dict[str, Any]]:
     """What a result says of each object, by `object_id`; empty where it can't be read."""
     try:
         listed = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))["objects"]
-        return {str(one["object_id"]): _facts(one) for one in listed}
+        return {str(one["object_id"]): _facts(renamed(one)) for one in listed}
     except DAMAGE:
         return {}
 
 
 def _facts(one: dict) -> dict[str, Any]:
     albedo = (one.get("evidence") or {}).get("albedo")
-    phi = one.get("phi")
+    alpha = one.get("alpha")
     return {
         "name": one.get("name") or f"{one.get('class_name') or 'Object'} {one['object_id']}",
         "model": one["model"],
-        "roughness": None if phi is None else round(math.sqrt(max(phi, 0.0)), 3),
+        "roughness": None if alpha is None else round(math.sqrt(max(alpha, 0.0)), 3),
         "albedo": None if albedo is None else round(sum(albedo) / 3, 3),
     }
 

@@ -20,9 +20,9 @@ from ..core.io.layout import AS_FOUND, Reading
 from ..core.io.pixels import read_pixels
 from ..core.io.read import read_capture
 from ..core.memory import peak_memory
-from ..core.overrides import OVERRIDES, heeded
 from ..core.pipeline.recover import Recovery
 from ..core.progress import Progress, ProgressEvent
+from ..core.results.overrides import OVERRIDES, heeded
 from ..core.results.place import write_capture
 from ..core.results.room_file import ROOM, write_room
 from ..core.results.store import Store
@@ -96,7 +96,7 @@ def run(
         With `scene`: what the materials go onto, see `write_back.is_own`, and where their images go, see
         `result_images`. No room comes where they go onto the artist's own objects.
     override : Path, optional
-        File of what the artist gives (`core.overrides`), merged into what the result folder keeps.
+        File of what the artist gives (`core.results.overrides`), merged into what the result folder keeps.
     heed_kept : bool
         False leaves out, for this run, what the result folder keeps.
     into : str

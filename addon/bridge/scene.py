@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
+from ..core.brdf.material import ObjectMaterial, undescribed
 from ..core.errors import StorageError
-from ..core.material import EMITTER, ObjectMaterial, undescribed
 from ..core.results.room_file import run_of
 from ..core.scene.model import Capture
 from .as_made import stamp, stamp_tree
@@ -127,10 +127,10 @@ def build_scene(
             continue
         thing = objects[instance.object_id]
         description = descriptions.get(instance.object_id) or undescribed(instance.object_id, instance.class_name)
-        one_sided = facing and description.model == EMITTER and is_open(thing.data)
+        one_sided = facing and description.model.gives_light and is_open(thing.data)
         base_color = own_images.get(instance.object_id, images.get(BASE_COLOR))
         thing.data.materials.append(make_material(description, base_color, one_sided=one_sided))
-        if description.model == EMITTER:
+        if description.model.gives_light:
             room.objects.unlink(thing)
             lamps.objects.link(thing)
         stamp(thing, instance.name)

@@ -14,8 +14,8 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ..core.brdf.material import ObjectMaterial, undescribed
 from ..core.errors import BadInputError, MissingStageError
-from ..core.material import ObjectMaterial, undescribed
 from ..core.results.room_file import run_of
 from ..core.scene.model import Capture
 from . import result_images

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from addon.benchmark.truth_views import projected_truth
-from addon.core.material import LAMBERTIAN, METAL, SPECULAR, Z90
+from addon.core.brdf.material import Z90
 from addon.core.passes.albedo.albedo import MEASURED
 from addon.core.pipeline.recover import Recovery
 
@@ -30,7 +30,7 @@ def held(recovery: Recovery, seen: list[dict], truth: dict[int, dict]) -> dict[s
     base = recovery.base_color()
     true = projected_truth(seen, len(atlas), np.full_like(base, np.nan))
     points = sum(np.bincount(v["element"][:, v["counts"]].ravel(), minlength=len(atlas)) for v in seen)
-    plain = [i for i, m in materials.items() if m.model in (LAMBERTIAN, SPECULAR)]
+    plain = [i for i, m in materials.items() if m.model.has_albedo]
     known = np.isfinite(true).all(1) & (points >= LEAST_POINTS) & np.isin(atlas.object_id, plain)
     # The errors are those of the diffuse albedo, Base Color is more by what the specular layer takes.
     scale = np.maximum(base / np.maximum(albedo.rho, 1e-3), 1)
@@ -46,7 +46,7 @@ def held(recovery: Recovery, seen: list[dict], truth: dict[int, dict]) -> dict[s
     rough = [
         m.roughness_low <= np.sqrt(truth[i]["alpha"]) <= m.roughness_high
         for i, m in materials.items()
-        if m.model in (SPECULAR, METAL) and m.roughness_low is not None and truth[i]["alpha"] is not None
+        if m.model.has_lobe and m.roughness_low is not None and truth[i]["alpha"] is not None
     ]
 
     def share(chosen: np.ndarray) -> float:

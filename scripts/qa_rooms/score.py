@@ -46,14 +46,14 @@ def table(capture: Path, result: Path) -> str:
     lines += [f"  note: {note}" for note in found["notes"] + found["warnings"]]
     lines.append(
         "  objects, worst first: pixels, share of the squared error; estimate / truth of albedo | of L_d less its "
-        "specular part | of the median itself | of E; measured share; model found/true, roughness found/true, psi"
+        "specular part | of the median itself | of E; measured share; model found/true, roughness found/true, F0"
     )
     for row in found["objects"]:
         lines.append(
             f"  {row['id']:3d} {row['class_name'][:15]:15s} {row['pixels']:6d} {row['share']:6.1%}  "
             f"{' | '.join(_three(row[kind]) for kind in ('albedo', 'L_d', 'median', 'E'))}  {row['measured']:4.0%}  "
             f"{row['model']}/{row['true_model']} {_one(row['roughness'])}/{_one(row['true_roughness'])} "
-            f"{_one(row['psi'])}"
+            f"{_one(row['f0'])}"
         )
     return "\n".join(lines) + "\n"
 
@@ -63,7 +63,7 @@ def _three(x) -> str:
 
 
 def _one(x) -> str:
-    return "-" if x is None else f"{x:.2f}"
+    return "-" if x is None else f"{np.mean(x):.2f}"
 
 
 def compare(capture: Path, result: Path) -> dict:
@@ -112,7 +112,7 @@ def compare(capture: Path, result: Path) -> dict:
             "measured": float(measured[own].mean()) if own.any() else 0.0,
             "model": found_kind(mine), "true_model": true_kind(true),
             "roughness": found_roughness(mine), "true_roughness": true_roughness(true),
-            "psi": mine.psi, "f0": mine.f0,
+            "f0": mine.f0,
             "true_f0": true["base_color"] if true["metallic"] and "base_color" in true else None,
             "scores": mine.scores, "note": mine.note,
         })  # fmt: skip

@@ -10,9 +10,9 @@ import numpy as np
 
 from addon.core.io.exr import write_exr
 from addon.core.io.read import read_capture
-from addon.core.overrides import NONE
 from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
+from addon.core.results.overrides import NONE
 from addon.core.results.store import Store
 from addon.core.settings import Settings
 from tests.core.rooms import all_round, lit_box, make_room, picture, radiosity

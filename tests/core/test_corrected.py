@@ -7,10 +7,13 @@ import json
 import numpy as np
 import pytest
 
-from addon.core.material import EMITTER, LAMBERTIAN, SPECULAR, ObjectMaterial
-from addon.core.overrides import parse
+from addon.core.brdf.dielectric import DIELECTRIC
+from addon.core.brdf.emitter import EMITTER
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.material import ObjectMaterial
 from addon.core.passes.albedo.albedo import MEASURED, NONE, Albedo
 from addon.core.pipeline.corrected import coated
+from addon.core.results.overrides import parse
 from tests.core.on_disk import ALBEDO, CHEAP, LAMP
 from tests.core.rooms import lit_box, make_room, radiosity
 
@@ -126,7 +129,7 @@ def test_a_coat_is_for_what_nothing_is_known_of():
     looked = {"scores": {"lambertian": 1.0, "specular": 1.001}}
     found = coated(
         [
-            ObjectMaterial(0, "wood", SPECULAR, phi=0.09, psi=0.05),
+            ObjectMaterial(0, "wood", DIELECTRIC, alpha=0.09, f0=0.05),
             ObjectMaterial(1, "wood", LAMBERTIAN),
             ObjectMaterial(2, "wall", LAMBERTIAN, **looked),
             ObjectMaterial(3, "wood", LAMBERTIAN),

@@ -2,7 +2,8 @@
 
 import pytest
 
-from addon.core.material import LAMBERTIAN, ObjectMaterial
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.material import ObjectMaterial
 from addon.core.naming import in_order, numbered
 from addon.core.scene.model import Instance
 

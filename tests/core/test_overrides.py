@@ -7,7 +7,7 @@ import json
 import pytest
 
 from addon.core.errors import BadInputError
-from addon.core.overrides import NONE, Given, Overrides, White, heeded, merge, parse, read_overrides
+from addon.core.results.overrides import NONE, Given, Overrides, White, heeded, merge, parse, read_overrides
 
 KNOWN = range(5)
 

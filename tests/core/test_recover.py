@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from addon.core.brdf.emitter import EMITTER
+from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.errors import BadInputError, InterruptedRun
 from addon.core.io.exr import read_exr, write_exr
 from addon.core.io.read import read_capture
-from addon.core.material import EMITTER, LAMBERTIAN
 from addon.core.passes.albedo.albedo import NONE
 from addon.core.progress import Progress
 from addon.core.settings import PAPER
@@ -54,7 +55,7 @@ def test_albedo_lamp_and_report(disk, finished):
     assert run.stored == dict.fromkeys(STAGES, False)
     figures = run.report["figures"]
     assert figures["lamps"] == [6] and figures["frames"] == 24 and figures["elements"] == len(run.atlas)
-    assert figures["models"] == {EMITTER: 1, LAMBERTIAN: 6}
+    assert figures["models"] == {EMITTER.name: 1, LAMBERTIAN.name: 6}
     assert figures["unseen_share"] < 0.01 and figures["escaped_share"] == 0
     assert figures["albedo_above_one_share"] < 0.005  # the lamp's quotient does not count
     assert figures["outside"] and run.report["warnings"] == []
@@ -64,7 +65,7 @@ def test_albedo_lamp_and_report(disk, finished):
     objects = told["objects"]
     assert told["capture"] == disk.root.name and re.fullmatch("[0-9a-f]{16}", told["run"])
     assert {one["object_id"]: one["name"] for one in objects} == {i: f"thing {i} {i}" for i in range(7)}
-    assert [o["model"] for o in objects] == [m.model for m in run.materials]
+    assert [o["model"] for o in objects] == [m.model.name for m in run.materials]
 
 
 def test_a_second_run_computes_nothing(disk, finished):

@@ -9,14 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from addon.core.brdf.dielectric import DIELECTRIC
+from addon.core.brdf.metal import METAL
 from addon.core.errors import BadInputError, MissingStageError
 from addon.core.io.exr import read_exr
 from addon.core.io.read import read_capture
-from addon.core.material import METAL, SPECULAR
-from addon.core.overrides import parse
 from addon.core.pipeline.recover import Recovery
 from addon.core.pipeline.refit import Refit, open_result
 from addon.core.progress import Progress
+from addon.core.results.overrides import parse
 from addon.core.results.room_file import write_room
 from addon.core.results.store import Store
 from tests.core.on_disk import QUICK
@@ -79,12 +80,11 @@ def test_as_a_whole_run_with_the_same_corrections(disk, finished, result, tmp_pa
     whole = recover(disk, tmp_path / "whole", GIVEN)
     assert not whole.log["specular"]["stored"]
     ours, theirs, before = materials(result), materials(tmp_path / "whole"), materials(finished)
-    assert ours[3]["model"] == SPECULAR and ours[3]["given"] == GIVEN["objects"]["3"]
+    assert ours[3]["model"] == DIELECTRIC.name and ours[3]["given"] == GIVEN["objects"]["3"]
     for i in (3, 5):
         for name in (
             "model",
-            "phi",
-            "psi",
+            "alpha",
             "roughness_low",
             "roughness_high",
             "specular_low",
@@ -132,7 +132,7 @@ def test_a_later_run_keeps_it(disk, result):
     again = recover(disk, result, kept)
     assert all(one["stored"] for one in again.log.values())
     found = materials(result)[4]
-    assert found["model"] == METAL and found["f0"] == [0.9, 0.6, 0.3] and found["phi"] == pytest.approx(0.04)
+    assert found["model"] == METAL.name and found["f0"] == [0.9, 0.6, 0.3] and found["alpha"] == pytest.approx(0.04)
     color = again.base_color()[again.surface().atlas.object_id == 4]
     assert np.allclose(color, (0.9, 0.6, 0.3))
 
@@ -155,7 +155,7 @@ def test_what_is_the_same_follows(result):
     run = refit(result, told={"objects": {"3": {"roughness": 0.1}}})
     assert run.touched == {2, 3}
     found = materials(result)
-    assert found[2]["phi"] == found[3]["phi"] == pytest.approx(0.01) and found[2]["model"] == METAL
+    assert found[2]["alpha"] == found[3]["alpha"] == pytest.approx(0.01) and found[2]["model"] == METAL.name
 
 
 def test_a_lamp_given_and_taken_back(finished, result):

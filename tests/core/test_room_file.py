@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from addon.core.brdf.dielectric import DIELECTRIC
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.material import ObjectMaterial
+from addon.core.brdf.metal import METAL
 from addon.core.errors import BadInputError, MissingStageError
-from addon.core.material import METAL, ObjectMaterial
 from addon.core.results.room_file import read_capture_file, read_room, run_of, write_room
 from addon.core.scene.lenses import Cropped
 from addon.core.scene.lenses_colmap import polynomial
@@ -49,14 +51,41 @@ def test_there_and_back(tmp_path, with_uv):
 
 def test_materials_come_from_their_file(tmp_path):
     write_room(tmp_path, a_capture())
-    metal = ObjectMaterial(4, "sofa", METAL, phi=0.25, f0=(0.9, 0.8, 0.7), note="shiny")
-    told = json.loads(json.dumps(asdict(metal))) | {"evidence": {"area": 1.0}}
+    metal = ObjectMaterial(4, "sofa", METAL, alpha=0.25, f0=(0.9, 0.8, 0.7), note="shiny")
+    told = json.loads(json.dumps(metal.as_dict())) | {"evidence": {"area": 1.0}}
     (tmp_path / "materials.json").write_text(json.dumps({"objects": [told]}))
     room = read_room(tmp_path)
     assert room.materials == (metal,) and room.folder == tmp_path and not room.atlas_uv.any()
     assert room.run == "" == run_of(tmp_path)  # of an older version
     (tmp_path / "materials.json").write_text(json.dumps({"run": "0123456789abcdef", "objects": [told]}))
     assert read_room(tmp_path).run == run_of(tmp_path) == "0123456789abcdef"
+
+
+OLD = {
+    "objects": [
+        {"object_id": 4, "class_name": "sofa", "model": "specular", "phi": 0.25, "psi": 0.05, "f0": None},
+        {"object_id": 5, "class_name": "tap", "model": "metal", "phi": 0.04, "psi": None, "f0": [0.9, 0.8, 0.7]},
+        {"object_id": 6, "class_name": "wall", "model": "lambertian", "phi": None, "psi": None, "f0": None},
+    ]
+}
+"""As version 0.1 wrote it."""
+
+
+def test_results_of_version_0_1_open(tmp_path):
+    write_room(tmp_path, a_capture())
+    (tmp_path / "materials.json").write_text(json.dumps(OLD))
+    glossy, metal, matt = read_room(tmp_path).materials
+    assert (glossy.model, glossy.alpha, glossy.f0) == (DIELECTRIC, 0.25, 0.05)
+    assert (metal.model, metal.alpha, metal.f0) == (METAL, 0.04, (0.9, 0.8, 0.7))
+    assert (matt.model, matt.alpha, matt.f0) == (LAMBERTIAN, None, None)
+
+
+def test_a_model_that_is_not_there_is_told(tmp_path):
+    write_room(tmp_path, a_capture())
+    told = {"objects": [{"object_id": 4, "class_name": "sofa", "model": "velvet"}]}
+    (tmp_path / "materials.json").write_text(json.dumps(told))
+    with pytest.raises(BadInputError, match="no reflectance model 'velvet'"):
+        read_room(tmp_path)
 
 
 @pytest.mark.parametrize("text", [None, "", "[1]", '{"run": 3}'])

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from addon.core.overrides import parse
 from addon.core.pipeline import stage as stage_module
 from addon.core.pipeline import stages
 from addon.core.pipeline.source import CORE, digest
 from addon.core.pipeline.stages import STAGES, Stages
 from addon.core.progress import Progress
+from addon.core.results.overrides import parse
 from addon.core.settings import Settings
 from tests.core.on_disk import CHEAP, OnDisk
 

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from addon.core.brdf.material import ObjectMaterial
 from addon.core.io.exr import read_exr, write_exr
 from addon.core.io.read import read_capture
-from addon.core.material import ObjectMaterial
 from addon.core.passes.albedo.albedo import MEASURED
 from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
@@ -214,10 +214,10 @@ class Result:
         assert shading.irradiance.min() >= 0 and shading.radiance.min() >= 0
         assert not (self.albedo.origin[~self.lit.seen] == MEASURED).any(), "what nobody saw counts as measured"
         written = json.loads((self.folder / "materials.json").read_text())["objects"]
-        assert [m["model"] for m in written] == [m.model for m in self.materials.values()]
+        assert [m["model"] for m in written] == [m.model.name for m in self.materials.values()]
         for material in self.materials.values():
-            numbers = [material.phi, material.psi, material.residual, material.residual_lambertian]
-            numbers += [*(material.f0 or ()), *(material.emission or ())]
+            numbers = [material.alpha, material.residual, material.residual_lambertian]
+            numbers += [*np.ravel(material.f0 if material.f0 is not None else []), *(material.emission or ())]
             assert all(np.isfinite(x) and x >= 0 for x in numbers if x is not None), material
         assert all(np.isfinite(x) for x in self.figures.values() if isinstance(x, float)), self.figures
         for path in self.folder.glob("*.exr"):

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from addon.core.brdf.emitter import EMITTER
+from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.io.read import read_capture
-from addon.core.material import EMITTER
 from addon.core.passes.albedo.albedo import MEASURED
 from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
@@ -163,7 +164,7 @@ def test_cavity_without_light(capture, expect):
     inside = run.atlas.object_id >= 10
     assert run.lit.seen[inside].any()
     expect("elements of it that count as measured", int((run.albedo.origin[inside] == MEASURED).sum()), 0)
-    assert all(run.materials[i].model == "lambertian" and run.materials[i].note for i in range(10, 16))
+    assert all(run.materials[i].model is LAMBERTIAN and run.materials[i].note for i in range(10, 16))
     assert "light" in run.text, "no warning of what could not be lit"
 
 

@@ -10,9 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from addon.core.brdf.dielectric import DIELECTRIC
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.metal import METAL
 from addon.core.light.emitters import bright_triangles
 from addon.core.light.lobes import reflected_light
-from addon.core.material import LAMBERTIAN, METAL, SPECULAR
 from tests.core.glossy_box import GLOW, WALLS, Box
 from tests.core.rooms import box_sides, look_at, make_room, picture
 from tests.hard_cases.rooms import DEFAULT, PAPERS
@@ -109,7 +111,7 @@ def test_f0_of_0(capture, expect):
     floor = run.materials[0]
     expect("a Lambertian floor", float(floor.model != LAMBERTIAN), 0)
     expect("its albedo", float(np.abs(floor_albedo(run) / RHO - 1).max()), 0.02)
-    assert floor.psi is None and floor.phi is None
+    assert floor.f0 is None and floor.alpha is None
 
 
 @pytest.mark.parametrize("phi", [0.01, 0.1, 1.0], ids=["alpha 0.01", "alpha 0.1", "alpha 1"])
@@ -123,9 +125,9 @@ def test_dielectric_over_diffuse(capture, expect, phi):
         assert "not identifiable" in floor.note
         expect("albedo, the lobe's 0.012 on top", off, 0.1)
         return
-    expect("a lobe is found", float(floor.model != SPECULAR), 0)
-    expect("roughness (root of alpha), absolute", abs(np.sqrt(floor.phi) - np.sqrt(phi)), 0.06)
-    expect("F0 0.04, absolute", abs(floor.psi - 0.04), 0.015)
+    expect("a lobe is found", float(floor.model != DIELECTRIC), 0)
+    expect("roughness (root of alpha), absolute", abs(np.sqrt(floor.alpha) - np.sqrt(phi)), 0.06)
+    expect("F0 0.04, absolute", abs(floor.f0 - 0.04), 0.015)
     expect("albedo", off, 0.05)
 
 
@@ -140,7 +142,7 @@ def test_f0_of_1(capture, expect, phi):
         return
     expect("a metal is found", float(floor.model != METAL), 0)
     expect("F0 of 1", float(np.abs(np.array(floor.f0) - 1).max()), 0.1)
-    expect("roughness (root of alpha), absolute: 0 for what is sharper than the frames", np.sqrt(floor.phi), 0.1)
+    expect("roughness (root of alpha), absolute: 0 for what is sharper than the frames", np.sqrt(floor.alpha), 0.1)
 
 
 @pytest.mark.parametrize("phi", [0.01, 1.0], ids=["alpha 0.01", "alpha 1"])
@@ -148,9 +150,9 @@ def test_the_papers_single_frame_gives_numbers(capture, expect, phi):
     """One target frame, always a lobe: right or not, phi and psi lie within their bounds."""
     run = GlossyFloor(phi, 0.04).recover(capture, replace(PAPERS, shading_rays=256, specular_rays=64))
     floor = run.materials[0]
-    assert floor.model == SPECULAR and floor.target_frame
-    expect("psi in 0...1", float(max(-floor.psi, floor.psi - 1, 0)), 0)
-    expect("phi in 0...1", float(max(-floor.phi, floor.phi - 1, 0)), 0)
+    assert floor.model == DIELECTRIC and floor.target_frame
+    expect("F0 in 0...1", float(max(-floor.f0, floor.f0 - 1, 0)), 0)
+    expect("alpha in 0...1", float(max(-floor.alpha, floor.alpha - 1, 0)), 0)
 
 
 def test_black_glossy_plastic(capture, expect):
@@ -158,7 +160,7 @@ def test_black_glossy_plastic(capture, expect):
     black = np.full(3, 0.02)
     run = GlossyFloor(0.09, 0.04, rho=black).recover(capture)
     floor = run.materials[0]
-    expect("a lobe is found", float(floor.model != SPECULAR), 0)
+    expect("a lobe is found", float(floor.model != DIELECTRIC), 0)
     expect("albedo 0.02, absolute", float(np.abs(floor_albedo(run) - black).max()), 0.01)
     plain = GlossyFloor(0.09, 0.04, rho=black).recover(capture, replace(SETTINGS, refine=0))
     left = float(np.abs(floor_albedo(plain) - black).max())

@@ -6,13 +6,13 @@ layer reflects, E(psi, phi). Base Color must be the albedo / (1 - E) for the dif
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
 
 import numpy as np
 
-from ..material import METAL, SPECULAR, TRANSPARENT, ObjectMaterial
-
-_PSI = np.array([0.0, 0.0025, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.6, 0.9])
+MAX_F0 = 0.9
+"""The index of refraction grows without bound as F0 nears 1; this is an index of 38."""
+_PSI = np.array([0.0, 0.0025, 0.01, 0.02, 0.04, 0.08, 0.15, 0.25, 0.4, 0.6, MAX_F0])
 _ROUGHNESS = np.linspace(0.1, 1.0, 10)
 # (E - psi) / (1 - psi) as Cycles 4.5 and 5.2 have it (they agree to 1e-8): a row for each psi, a column for each
 # roughness. Made by scripts/measure_cycles_layering.py. Cycles leaves out the light that masking takes from the
@@ -32,6 +32,12 @@ _BEYOND_PSI = np.array(
         (0.0001, 0.0005, 0.0006, 0.0000, 0.0000, 0.0000, 0.0000, 0.0000, 0.0000, 0.0000),
     ]
 )
+
+
+def ior_of(f0: float) -> float:
+    """Index of refraction whose reflectance at normal incidence is `f0` (clamped to 0...`MAX_F0`)."""
+    root = math.sqrt(min(max(f0, 0.0), MAX_F0))
+    return (1 + root) / (1 - root)
 
 
 def layer_reflectance(psi: float | np.ndarray, phi: float | np.ndarray) -> np.ndarray:
@@ -74,42 +80,6 @@ def base_color(albedo: np.ndarray, psi: float | np.ndarray, phi: float | np.ndar
     """
     kept = np.broadcast_to(1 - layer_reflectance(psi, phi), albedo.shape[:1])
     return (albedo / kept[:, None]).astype(albedo.dtype)
-
-
-def with_metals(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[ObjectMaterial]) -> np.ndarray:
-    """Albedo, and F0 of metals: Base Color that makes up for nothing. Parameters as of `base_colors`."""
-    color = albedo.copy()
-    for m in materials:
-        if m.model == METAL:
-            color[object_id == m.object_id] = m.f0
-    return color
-
-
-def base_colors(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[ObjectMaterial]) -> np.ndarray:
-    """Base Color of every element, (n, 3) float32, 0...1.
-
-    Parameters
-    ----------
-    albedo : (n, 3) float32
-    object_id : (n,) int
-    materials : iterable of ObjectMaterial
-    """
-    color = albedo.copy()
-    for m in materials:
-        own = object_id == m.object_id
-        if m.model == METAL:
-            color[own] = m.f0
-        elif m.model == SPECULAR:
-            # Above 1 the object would reflect more than all light, and a room of it would never grow dark.
-            color[own] = np.minimum(base_color(color[own], m.psi, m.phi), 1)
-        elif m.coat:
-            # The frames' albedo is all that it reflects, so what the coat does is no longer the diffuse part's.
-            coat = float(layer_reflectance(m.coat["f0"], m.coat["roughness"] ** 2))
-            color[own] = np.maximum(color[own] - coat, 0) / (1 - coat)
-        elif m.model == TRANSPARENT and m.opacity < 1:
-            # Each surface reflects as much less as it lets pass.
-            color[own] = np.minimum(color[own] / max(1 - m.transmission, 0.01), 1)
-    return color
 
 
 def _between(knots, x):

@@ -9,7 +9,11 @@ import numpy as np
 
 from ..paper.brdf import G1, D, F, G, f_nd
 
-__all__ = ["D", "F", "G", "G1", "f_nd", "lobes", "sample_visible_normal", "visible_normal_density"]
+__all__ = ["GGX", "D", "F", "G", "G1", "f_nd", "lobes", "sample_visible_normal", "visible_normal_density"]
+
+
+LEAST = 1e-4
+"""Cosine below which a direction runs along the surface."""
 
 
 def visible_normal_density(n_wo: np.ndarray, n_h: np.ndarray, phi: float) -> np.ndarray:
@@ -95,3 +99,28 @@ def sample_visible_normal(wo: np.ndarray, square: np.ndarray, phi: float) -> np.
     ])  # fmt: skip
     h /= np.sqrt(np.einsum("imk,imk->mk", h, h))
     return h
+
+
+class _GGX:
+    """GGX's distribution of normals under Smith's masking, as `model.Microfacets` has it."""
+
+    def lobes(self, n_w: np.ndarray, n_wo: np.ndarray, sin2_h: np.ndarray, grid: np.ndarray) -> np.ndarray:
+        return lobes(n_w, n_wo, sin2_h, grid)
+
+    def reflect(self, wi: np.ndarray, square: np.ndarray, alpha: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        wo, w_h, _ = reflected(wi, square, alpha)
+        cosine = np.maximum(wo[2], LEAST)
+        return wo, w_h, 2 * cosine * G1(cosine, alpha) * (wo[2] > LEAST)
+
+
+def reflected(wi: np.ndarray, square: np.ndarray, phi: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Directions wo (3, m) by GGX's visible normals h (3, m), and the cosines w.h (m,): wo, w.h, h.
+
+    Their density is `visible_normal_density` of wi and h, also for distributions that draw none of their own.
+    """
+    h = sample_visible_normal(wi, square[..., None], phi)[..., 0]
+    w_h = np.clip((wi * h).sum(0), 0, 1)
+    return 2 * w_h * h - wi, w_h, h
+
+
+GGX = _GGX()

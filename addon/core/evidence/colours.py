@@ -4,20 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT
-
 HEAT = np.array(
     [(12, 8, 38), (75, 12, 107), (145, 38, 103), (207, 68, 70), (246, 125, 21), (251, 200, 60), (252, 255, 200)],
     np.float32,
 )
 """Dark to light, also in grey (anchors of the inferno map of matplotlib, CC0, rounded)."""
-MODEL = {
-    LAMBERTIAN: (150, 150, 150),
-    SPECULAR: (60, 130, 220),
-    METAL: (225, 150, 40),
-    EMITTER: (255, 240, 150),
-    TRANSPARENT: (120, 200, 190),
-}
 NOTHING = (40, 40, 46)
 
 
@@ -35,7 +26,7 @@ def heat_css() -> str:
     return f"linear-gradient(to right, {stops})"
 
 
-def gloss(model: str, phi: float | None) -> tuple[int, int, int]:
+def gloss(colour: tuple[int, int, int], alpha: float | None) -> tuple[int, int, int]:
     """A model's colour, lighter the glossier."""
-    polish = 0.0 if phi is None else 1 - float(np.sqrt(phi))
-    return tuple(int(c + (255 - c) * 0.7 * polish) for c in MODEL[model])
+    polish = 0.0 if alpha is None else 1 - float(np.sqrt(alpha))
+    return tuple(int(c + (255 - c) * 0.7 * polish) for c in colour)

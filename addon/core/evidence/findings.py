@@ -7,9 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
+from ..brdf.material import ObjectMaterial
 from ..light.field import LightField
 from ..light.shading import Shading
-from ..material import EMITTER, ObjectMaterial
 from ..passes.albedo.albedo import Albedo
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Frame, Instance
@@ -65,4 +65,4 @@ class Findings:
     @cached_property
     def emitters(self) -> set[int]:
         """Objects that have no albedo, as they are lamps."""
-        return {m.object_id for m in self.materials if m.model == EMITTER}
+        return {m.object_id for m in self.materials if m.model.gives_light}

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..brdf.material import Z90
 from ..groups import by_label
-from ..material import Z90
 from ..passes.albedo.albedo import MEASURED, Albedo
 from ..scene.atlas import Atlas
 from ..scene.lit_diffuse import LitDiffuse

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from ..brdf.material import Z90, ObjectMaterial
+from ..brdf.registry import models
 from ..errors import BadInputError
 from ..io.png import data_address
-from ..material import EMITTER, METAL, SPECULAR, Z90, ObjectMaterial
 from ..photo import encoded
 from .collect import Evidence
-from .colours import MODEL, heat_css
+from .colours import heat_css
 from .findings import Findings
 from .objects import ObjectEvidence
 from .pictures import Picture, pictures_of
@@ -55,7 +56,7 @@ def _facts(found: Findings, report: dict[str, Any]) -> str:
     figures, sure = report["figures"], report["figures"]["evidence"]
     lamps = found.shading.lamps
     hidden = sum(not lamp.seen for lamp in lamps)
-    glossy = sum(m.model in (SPECULAR, METAL) for m in found.materials)
+    glossy = sum(m.model.has_lobe for m in found.materials)
     tiles = [
         (f"{1 - figures['unseen_share']:.0%}", "of the surface seen by a frame; the rest is filled in"),
         (f"&plusmn;{Z90 * sure.get('albedo_error_median', 1):.0%}", "of an albedo that was measured, in the median"),
@@ -92,7 +93,7 @@ def _pictures(found: Findings, evidence: Evidence) -> str:
         told = ", ".join(f"{escape(names.get(i, 'outside'))} {size:.0%}" for i, size in worst)
         result.append(f"<h3>{escape(found.frames[index].name)} <small>worst residuals: {told or 'none'}</small></h3>")
         result.append('<div class="frames">' + "".join(map(_figure, pictures)) + "</div>")
-    chips = "".join(f'<span><i style="background:rgb{colour}"></i>{model}</span>' for model, colour in MODEL.items())
+    chips = "".join(f'<span><i style="background:rgb{one.colour}"></i>{escape(one.name)}</span>' for one in models())
     return "\n".join(result) + f'<p class="chips">{chips}<span>lighter: glossier</span></p>'
 
 
@@ -107,7 +108,7 @@ def _figure(picture: Picture) -> str:
 def _objects(found: Findings, evidence: Evidence) -> str:
     """A table of the objects, the least certain first."""
     sure = {one.object_id: one for one in evidence.objects}
-    known = [(m, sure[m.object_id]) for m in found.materials if m.object_id in sure and m.model != EMITTER]
+    known = [(m, sure[m.object_id]) for m in found.materials if m.object_id in sure and not m.model.gives_light]
     known.sort(key=lambda pair: -_doubt(pair[1]))
     rows = "".join(_row(m, e) for m, e in known[:ROWS])
     more = f"<p>{len(known) - ROWS} more are in materials.json.</p>" if len(known) > ROWS else ""
@@ -125,13 +126,14 @@ def _doubt(one: ObjectEvidence) -> float:
 
 
 def _row(m: ObjectMaterial, e: ObjectEvidence) -> str:
-    colour = m.f0 if m.model == METAL and m.f0 else e.albedo
-    albedo = "" if m.model == METAL else f"{np.mean(e.albedo):.2f} &plusmn; {_doubt(e):.0%}"
-    specular = "coloured" if m.model == METAL else _interval(m.psi, *_range(m, "specular"))
-    roughness = None if m.phi is None else float(np.sqrt(m.phi))
+    bare = m.model.lobe_alone
+    colour = m.f0 if bare and m.f0 else e.albedo
+    albedo = "" if bare else f"{np.mean(e.albedo):.2f} &plusmn; {_doubt(e):.0%}"
+    specular = "coloured" if isinstance(m.f0, tuple) else _interval(m.f0, *_range(m, "specular"))
+    roughness = None if m.alpha is None else float(np.sqrt(m.alpha))
     return (
         f"<tr><td>{_swatch(colour)}</td><td>{escape(m.name)}</td>"
-        f"<td>{m.model}</td><td>{albedo}</td><td>{_interval(roughness, *_range(m, 'roughness'))}</td>"
+        f"<td>{escape(m.model.name)}</td><td>{albedo}</td><td>{_interval(roughness, *_range(m, 'roughness'))}</td>"
         f"<td>{specular}</td><td>{e.seen_share:.0%}</td><td>{escape(m.note)}</td></tr>"
     )
 

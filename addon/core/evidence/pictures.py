@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from ..material import METAL
 from ..photo import encoded, photo
 from .colours import NOTHING, gloss, heat
 from .findings import Findings
@@ -52,7 +51,7 @@ def pictures_of(found: Findings, errors: TexelEvidence, view: View) -> tuple[lis
     worst = worst_blocks(residual, view.object_id)
     light = shading[shown]
     grey = float(np.median(light[~nothing].mean(-1))) if not nothing.all() else 1.0
-    metals = {m.object_id: m.f0 for m in found.materials if m.model == METAL}
+    metals = {m.object_id: m.f0 for m in found.materials if m.model.lobe_alone}
     bare = nothing | emitters | np.isin(view.object_id, list(metals))
     colour = _where(nothing | emitters, encoded(albedo[shown]))
     for object_id, f0 in metals.items():
@@ -115,5 +114,5 @@ def _models(found: Findings, view: View) -> np.ndarray:
     image = np.empty((*view.object_id.shape, 3), np.uint8)
     image[:] = NOTHING
     for m in found.materials:
-        image[view.object_id == m.object_id] = gloss(m.model, m.phi)
+        image[view.object_id == m.object_id] = gloss(m.model.colour, m.alpha)
     return image

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from ..brdf.material import ObjectMaterial
 from ..groups import by_label
-from ..material import EMITTER, SPECULAR, ObjectMaterial
 from ..passes.albedo.albedo import MEASURED, Albedo
 from ..scene.atlas import Atlas
 from ..scene.lit_diffuse import LitDiffuse
@@ -101,7 +101,7 @@ def texel_evidence(
     error = np.sqrt(relative[:, None] * np.square(albedo.rho) + np.square(gloss)[:, None])
     # Of an albedo between 0 and 1 nothing worse can be said than that nothing is known.
     error = np.minimum(error, c.NOTHING_KNOWN)
-    error[np.isin(atlas.object_id, [m.object_id for m in materials if m.model == EMITTER])] = 0
+    error[np.isin(atlas.object_id, [m.object_id for m in materials if m.model.gives_light])] = 0
     return TexelEvidence(shading.astype(np.float32), error.astype(np.float32), light.unseen, lit.clipped)
 
 
@@ -130,7 +130,7 @@ def gloss_error(
     """Error of albedo by what a highlight left in the median, or by taking too much out, (n,) float32, absolute."""
     result = np.full(len(atlas), c.LEFT, np.float32)
     for m in materials:
-        if m.model == SPECULAR:
+        if m.model.layered:
             own = np.flatnonzero(atlas.object_id == m.object_id)
             taken = np.pi * specular[own].mean(1) / np.maximum(irradiance[own].mean(1), 1e-20)
             known = albedo.origin[own] == MEASURED

@@ -9,7 +9,6 @@ import numpy as np
 from ..io.pixels import read_pixels
 from ..light.emitters import bright_triangles
 from ..light.lobes import GRID, reflected_light
-from ..material import METAL, SPECULAR
 from .findings import Findings
 
 WIDTH = 240
@@ -108,14 +107,13 @@ def _add_lobes(found: Findings, predicted: np.ndarray, element: np.ndarray, dire
     owner = np.where(element >= 0, room.atlas.object_id[element], -1)
     for m in found.materials:
         at = np.flatnonzero(owner == m.object_id)
-        if m.model not in (SPECULAR, METAL) or m.object_id in mirrors or not len(at):
+        if not m.model.has_lobe or m.object_id in mirrors or not len(at):
             continue
-        phi = max(float(m.phi), float(GRID[0]))
+        alpha = max(float(m.alpha), float(GRID[0]))
         light = reflected_light(
-            room, bright, element[at], -directions[at], rays=LOBE_RAYS, grid=np.float32([phi]), proposals=(phi,),
-            threads=found.threads, seed=found.seed,
+            room, bright, element[at], -directions[at], rays=LOBE_RAYS, grid=np.float32([alpha]), proposals=(alpha,),
+            microfacets=m.model.microfacets, threads=found.threads, seed=found.seed,
         )  # fmt: skip
-        f0 = np.float32(m.f0 if m.model == METAL else m.psi)
-        if m.model == METAL:
+        if not m.model.has_diffuse:
             predicted[at] = 0
-        predicted[at] += f0 * light.A[:, 0] + light.B[:, 0]
+        predicted[at] += np.float32(m.f0) * light.A[:, 0] + light.B[:, 0]

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..brdf.model import Constraints
 from .layout import Layout, Problem
 
 HUBER = 2.0
@@ -26,14 +27,7 @@ KAPPAS = (0.0, 0.15, 0.3, 0.45, 0.6)
 LEAST_SIGNAL = 0.1
 """Share of <A, A> that must be left once the noise's is taken out; where less is, psi rests on nothing, and is only
 prevented from growing without bound."""
-
-
-@dataclass(frozen=True)
-class Prior:
-    """What is known of psi before any frame: its mean and standard deviation."""
-
-    psi: float
-    sigma: float
+FREE = Constraints()
 
 
 @dataclass(frozen=True)
@@ -44,7 +38,7 @@ class LobeFit:
     ----------
     phi : float
     psi : (3,) float64
-        Equal in all channels unless `coloured`.
+        Equal in all channels unless the model is coloured.
     kappa : float
         How much the diffuse part darkens towards grazing views.
     kappa_lambertian : float
@@ -95,9 +89,7 @@ def solve(
     scale: float,
     *,
     psi: np.ndarray | None = None,
-    coloured: bool = False,
-    least_psi: float = 0.0,
-    prior: Prior | None = None,
+    constraints: Constraints = FREE,
     rounds: int = ROUNDS,
 ) -> Solution:
     """psi, robust cost and residuals for some phi, or one phi and several kappa: iteratively reweighted least squares.
@@ -109,7 +101,10 @@ def solve(
     kappa : float or tuple of float
     psi : (3,) float, optional
         Given: nothing is solved for but the diffuse part.
+    constraints : Constraints
+        Of psi.
     """
+    prior, least_psi = constraints.prior, constraints.least_psi
     t = layout.darkening(kappa)
     prior = None if "dielectric-prior" in layout.without else prior
     if phi is None:
@@ -138,7 +133,7 @@ def solve(
                 down = np.einsum("chvg,chvg->ch", wA, A) - np.einsum("chg,chg->ch", SA / below, SA)
                 up += np.einsum("hvg,chvg->ch", left, np.broadcast_to(lobe.AB, R.shape))
                 clean = down - np.einsum("hvg,chvg->ch", left, np.broadcast_to(lobe.AA, R.shape))
-                if not coloured:
+                if not constraints.coloured:
                     up, down, clean = (np.broadcast_to(x.sum(0), x.shape) for x in (up, down, clean))
                 if prior is not None:
                     # errors of one element's channels and views go together: they count once
@@ -174,12 +169,7 @@ def robust_scale(size: np.ndarray) -> float:
 
 
 def fit_lobe(
-    problem: Problem | Layout,
-    way: str = "frames",
-    coloured: bool = False,
-    least_psi: float = 0.0,
-    prior: Prior | None = None,
-    psi: np.ndarray | None = None,
+    problem: Problem | Layout, way: str = "frames", constraints: Constraints = FREE, psi: np.ndarray | None = None
 ) -> LobeFit:
     """Best phi, with its psi.
 
@@ -188,15 +178,13 @@ def fit_lobe(
     problem : Problem, or its Layout where several fits are made
     way : str
         'frames' or 'target'.
-    coloured : bool
-        psi for each channel (a metal's F0); otherwise one for all.
-    least_psi : float
-        Lower bound of psi.
+    constraints : Constraints
+        Of psi, as the model has them.
     psi : (3,) float, optional
         Given: phi alone is sought.
     """
     layout = problem if isinstance(problem, Layout) else Layout(problem, way == "frames")
-    how = {"coloured": coloured, "least_psi": least_psi, "prior": prior, "psi": psi}
+    how = {"constraints": constraints, "psi": psi}
     kappas = KAPPAS if layout.free and "grazing" not in layout.without else (0.0,)
     flat = solve(layout, None, kappas, 1.0).size
     scale = robust_scale(layout.seen(flat[0]))
@@ -261,15 +249,15 @@ def between(x: np.ndarray, cost: np.ndarray, psi: np.ndarray, middle: int) -> tu
 
 
 def held_out_costs(
-    layout: Layout, fit: LobeFit, train: np.ndarray, scale: float, **how
+    layout: Layout, fit: LobeFit, train: np.ndarray, scale: float, constraints: Constraints
 ) -> tuple[np.ndarray, np.ndarray]:
     """Costs of the elements that `train` ((g,) bool) leaves, with and without a lobe whose psi the others gave.
 
     phi and kappa are those of the fit over all: two numbers of hundreds of elements, whose optimism is far below
-    what a lobe must gain. `how` is that of `solve`.
+    what a lobe must gain.
     """
     at = layout.at(fit.phi)
-    psi = solve(layout.part(train), at, fit.kappa, scale, **how).psi[:, 0]
+    psi = solve(layout.part(train), at, fit.kappa, scale, constraints=constraints).psi[:, 0]
     return element_costs(layout.part(~train), replace(fit, psi=psi), scale)
 
 

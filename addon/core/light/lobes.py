@@ -16,7 +16,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..brdf import ggx as brdf
+from ..brdf import ggx
+from ..brdf.model import Microfacets
 from ..parallel import for_blocks
 from ..progress import Progress
 from ..scene.tangent_frame import tangent_frame
@@ -85,6 +86,7 @@ def reflected_light(
     rays: int,
     grid: np.ndarray = GRID,
     proposals: Sequence[float] = PROPOSALS,
+    microfacets: Microfacets = ggx.GGX,
     threads: int = 0,
     seed: int = 0,
     progress: Progress | None = None,
@@ -100,6 +102,8 @@ def reflected_light(
         For each observation, in two halves; shared evenly between the lobes and the bright triangles.
     proposals : sequence of float
         Widths of the lobes that rays are drawn from: those of the grid, where that is known to be short.
+    microfacets : Microfacets
+        Whose lobes; rays are drawn from GGX's for any of them.
     """
     m, p = len(element), len(grid)
     both = np.zeros((m, 2, p, 6), np.float32)
@@ -116,7 +120,7 @@ def reflected_light(
         origin = room.scene.off_surface(room.atlas.position[at], n)
         drawn, aims = [], []  # aims: the triangle that a ray must meet, or `ANY`
         for phi in proposals:
-            h = brdf.sample_visible_normal(local_wo, _stratified(len(at), each, rng), phi)
+            h = ggx.sample_visible_normal(local_wo, _stratified(len(at), each, rng), phi)
             drawn.append(2 * np.einsum("amk,am->mk", h, local_wo) * h - local_wo[..., None])
             aims.append(np.full((len(at), each), ANY, np.int32))
         if len(bright):
@@ -138,14 +142,14 @@ def reflected_light(
         away = 1 - np.sqrt(np.clip((1 + along) / 2, 0, 1))
         s = away * away
         s *= s * away
-        # G1(n.wo) D / 2 is the density of `brdf.visible_normal_density`
+        # G1(n.wo) D / 2 is the density of `ggx.visible_normal_density`
         for phi in proposals:
             a = np.float32(phi * phi)
             base = sin2_h + a * (1 - sin2_h)
-            density += each * a / (2 * np.float32(np.pi)) * brdf.G1(n_wo, phi) / (base * base)
+            density += each * a / (2 * np.float32(np.pi)) * ggx.G1(n_wo, phi) / (base * base)
         L *= (n_w / np.maximum(density, 1e-12))[..., None]
         weighted = np.concatenate([L * (1 - s)[..., None], L * s[..., None]], -1)
-        both[part] = (brdf.lobes(n_w, n_wo, sin2_h, grid) @ weighted).reshape(-1, 2, p, 6)
+        both[part] = (microfacets.lobes(n_w, n_wo, sin2_h, grid) @ weighted).reshape(-1, 2, p, 6)
 
     for_blocks(run, m, max(RAYS_AT_ONCE // max(rays, 1), 1), threads, progress)
     mean, noise = both.mean(1), (both[:, 0] - both[:, 1]) / 2

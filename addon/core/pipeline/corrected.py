@@ -12,16 +12,16 @@ from functools import cached_property
 
 import numpy as np
 
-from ..brdf.compensation import base_colors, layer_reflectance, with_metals
+from ..brdf.compensation import layer_reflectance
+from ..brdf.material import ObjectMaterial, base_colors, with_metals
 from ..evidence.collect import Evidence, collect
 from ..evidence.findings import Findings
 from ..evidence.light import spots
 from ..light.over_surface import irradiance
 from ..light.sun import put_in
-from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, ObjectMaterial
-from ..overrides import Overrides
 from ..passes.albedo.albedo import MEASURED, Albedo, albedo_of
 from ..passes.albedo.albedo import NONE as NO_ALBEDO
+from ..results.overrides import Overrides
 from ..scene.atlas import Atlas
 from .stages import Stages
 
@@ -64,7 +64,7 @@ class Corrected(Stages):
     @cached_property
     def emitters(self) -> set[int]:
         """Objects that have no albedo, as they are lamps: found, or given."""
-        return {m.object_id for m in self.specular().materials if m.model == EMITTER}
+        return {m.object_id for m in self.specular().materials if m.model.gives_light}
 
     def materials(self) -> list[ObjectMaterial]:
         """One description for each instance."""
@@ -100,7 +100,7 @@ class Corrected(Stages):
     def albedo_of_all_but(self, without: set[int]) -> Albedo:
         """The same, but with none for some objects."""
         found = self.specular()
-        apart = [m.object_id for m in found.materials if m.model == TRANSPARENT]
+        apart = [m.object_id for m in found.materials if m.model.see_through]
         albedo = self.albedo_under(self.irradiance, found.specular, without)
         # What shows its background has no albedo that was measured.
         origin = np.where(np.isin(self.surface().atlas.object_id, apart), np.int8(NO_ALBEDO), albedo.origin)
@@ -229,11 +229,11 @@ def corrected(materials: tuple[ObjectMaterial, ...], overrides: Overrides, light
     for m in materials:
         given = overrides.of(m.object_id)
         m = replace(m, given=given.as_dict())
-        if m.model == EMITTER and m.emission is not None:
+        if m.emission is not None:
             m = replace(m, emission=tuple(float(x) for x in np.asarray(m.emission) * light))
-        if m.model == METAL and given.base_color is not None and given.f0 is None:
+        if m.model.lobe_alone and given.base_color is not None and given.f0 is None:
             mean = float(np.mean(given.base_color))
-            m = replace(m, f0=given.base_color, specular_low=mean, specular_high=mean)
+            m = replace(m, f0=m.model.as_f0(given.base_color), specular_low=mean, specular_high=mean)
         result.append(m)
     return result
 
@@ -244,15 +244,16 @@ def coated(materials: list[ObjectMaterial], albedo: Albedo, atlas: Atlas) -> lis
     Not on what was looked at and showed none, or is of a class that did, nor on what is too dark to reflect as much as
     the coat does. The roughness is the median of the dielectrics that were identified in the class, else in the room.
     """
-    matt = {m.class_name for m in materials if m.model == LAMBERTIAN and m.scores}
+    matt = {m.class_name for m in materials if not m.model.has_lobe and m.model.has_albedo and m.scores}
     rough: dict[str, list[float]] = {}
     for m in materials:
-        if m.model == SPECULAR and m.phi is not None:
-            rough.setdefault(m.class_name, []).append(float(np.sqrt(m.phi)))
+        if m.model.layered and m.alpha is not None:
+            rough.setdefault(m.class_name, []).append(float(np.sqrt(m.alpha)))
     everywhere = [one for alike in rough.values() for one in alike]
     result = []
     for m in materials:
-        if m.model == LAMBERTIAN and not m.scores and m.class_name not in matt and m.given.keys() <= {"base_color"}:
+        plain = not m.model.has_lobe and m.model.has_albedo and not m.scores
+        if plain and m.class_name not in matt and m.given.keys() <= {"base_color"}:
             own = atlas.object_id == m.object_id
             roughness = float(np.median(rough.get(m.class_name) or everywhere or [COAT_ROUGHNESS]))
             if own.any() and np.median(albedo.rho[own], 0).min() > layer_reflectance(COAT_F0, roughness**2):

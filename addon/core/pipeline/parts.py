@@ -14,7 +14,6 @@ import numpy as np
 
 from ..json_values import key
 from ..lit_diffuse.accumulate import accumulate
-from ..material import EMITTER, METAL
 from ..parallel import ordered_map
 from ..passes.albedo.albedo import MEASURED
 from ..passes.sharpening.sharpen import FLOOR, MOST, sharpened
@@ -208,7 +207,7 @@ def write_parts(run: Corrected, parting: Parting, base_color: np.ndarray) -> Par
     if parting.atlas is not None:
         pages.multiply(sheet, parting.sheet, finer_detail(run, parting))
     materials = {m.object_id: m for m in run.materials()}
-    shown = {number: m for number, m in materials.items() if m.model not in (EMITTER, METAL)}
+    shown = {number: m for number, m in materials.items() if m.model.has_diffuse}
     if run.settings.atlas == OBJECT:
         images = {
             page.number: f"{FOLDER}/{file_name(shown[page.number].name)} base_color.exr"

@@ -77,7 +77,7 @@ class Recovery(Corrected):
         known = {one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects}
         for number, name in (self.parts.images if self.parts else {}).items():
             known.setdefault(number, {})["image"] = name
-        objects = [{"name": m.name} | dataclasses.asdict(m) | known.get(m.object_id, {}) for m in self.materials()]
+        objects = [{"name": m.name} | m.as_dict() | known.get(m.object_id, {}) for m in self.materials()]
         told = {"run": self.run_key, "layout": self.layout_key, "capture": self.capture.root.name, "objects": objects}
         told |= {name: value for name, value in self.overrides.as_dict().items() if name == "white"}
         self.store.write_json("materials.json", told)

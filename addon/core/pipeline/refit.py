@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from ..brdf.material import ObjectMaterial
 from ..errors import BadInputError, MissingStageError
 from ..evidence.calibration import NOTHING_KNOWN
 from ..evidence.collect import Evidence
@@ -23,10 +24,9 @@ from ..evidence.light import LightEvidence
 from ..evidence.objects import object_evidence
 from ..evidence.texel import TexelEvidence, gloss_error
 from ..io.exr import read_exr
-from ..material import EMITTER, ObjectMaterial
-from ..overrides import Given, Overrides, heeded, parse
 from ..passes.albedo.albedo import MEASURED, Albedo
 from ..progress import Progress
+from ..results.overrides import Given, Overrides, heeded, parse
 from ..results.room_file import MATERIALS, Room, read_room
 from ..results.store import Store
 from ..settings import ROOM, Settings
@@ -281,7 +281,7 @@ class Refit(Recovery):
         bare = ~(error > 0).any(1, keepdims=True)
         relative = np.where(bare, np.hypot(shading, UNKNOWN_BEFORE)[:, None], relative)
         fresh = np.minimum(np.sqrt(np.square(relative * now.rho) + np.square(gloss)), NOTHING_KNOWN)
-        known = {m.object_id for m in mine if m.model == EMITTER or "base_color" in m.given}
+        known = {m.object_id for m in mine if m.model.gives_light or "base_color" in m.given}
         fresh = np.where(np.isin(atlas.object_id, list(known))[:, None], 0, fresh)
         texels = TexelEvidence(shading, np.where(self._own[:, None], fresh, error).astype(np.float32), unseen, clipped)
         zeros = np.zeros(len(atlas), np.float32)

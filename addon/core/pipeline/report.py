@@ -32,7 +32,7 @@ def make_report(run: Corrected) -> dict[str, Any]:
     if "shading" in run.done:
         _report_shading(run, figures, result["warnings"])
     if "specular" in run.done:
-        models = [m.model for m in run.materials()]
+        models = [m.model.name for m in run.materials()]
         figures["models"] = {model: models.count(model) for model in sorted(set(models))}
         figures["coats"] = sum(bool(m.coat) for m in run.materials())
         figures["evidence"] = _evidence_figures(run)

@@ -1,21 +1,22 @@
-"""The specular stage: target frames, phi and psi of each object, and what of its median was no diffuse light."""
+"""The specular stage: target frames, model and lobe of each object, and what of its median was no diffuse light."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..brdf.dielectric import DIELECTRIC
+from ..brdf.lambertian import LAMBERTIAN
+from ..brdf.material import ObjectMaterial, from_json
 from ..fit.layout import Problem
 from ..fit.lobe_fit import fit_lobe
 from ..light.field import LightField
 from ..light.lamps import Lamp
 from ..light.lobes import GRID
-from ..material import EMITTER, LAMBERTIAN, METAL, SPECULAR, TRANSPARENT, ObjectMaterial, from_json
-from ..overrides import NOTHING, Given, Overrides
 from ..parallel import ordered_map
 from ..passes.glossy_light.glossy_light import Excess, glossy_light
 from ..passes.see_through.see_through import is_sure, judge, look_behind
@@ -29,6 +30,7 @@ from ..passes.specular.problems import Problems
 from ..passes.specular.separate import specular_in_median, spread_over_object
 from ..passes.specular.targets import score_frames, target_frame
 from ..progress import Progress
+from ..results.overrides import NOTHING, Given, Overrides
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance
 from ..scene.samples import Samples
@@ -78,7 +80,7 @@ class Specular:
 
     def to_store(self, overrides: Overrides) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """What is stored of it: arrays, and what JSON holds."""
-        meta = {"materials": [asdict(m) for m in self.materials], "overrides": overrides.as_dict()}
+        meta = {"materials": [m.as_dict() for m in self.materials], "overrides": overrides.as_dict()}
         return {"specular": self.specular, "excess": self.excess}, meta
 
     @staticmethod
@@ -161,12 +163,12 @@ def fit_specular(
         if way == "frames" and choice.fit is not None and "see-through" not in without:
             element, direction = samples.element[index], samples.direction[index]
             behind = look_behind(field, lit_diffuse.seen, element, direction, object_id, noise)
-            lobe = None if choice.model == LAMBERTIAN else choice.fit
+            lobe = choice.fit if choice.model.has_lobe else None
             scale = max(1.4826 * choice.fit.residual, 1e-4)
             shown = judge(problem, behind, lobe, scale)
             if shown is not None:
                 choice = set_apart(choice, shown, is_sure(shown))
-        if way == "frames" and choice.model not in (METAL, TRANSPARENT):
+        if way == "frames" and choice.model.has_albedo:
             choice, problem = _by_looks(maker, object_id, choice, problem, irradiance, rays, without)
         return choice, problem, target
 
@@ -178,7 +180,7 @@ def fit_specular(
         if progress is not None:
             progress.update(0.7 * len(choices) / len(wanted))
     if way == "frames" and "class-lobes" not in without:
-        reflecting = {i: choice for i, choice in choices.items() if choice.model != EMITTER}
+        reflecting = {i: choice for i, choice in choices.items() if not choice.model.gives_light}
         adopted = adopt_from_class(reflecting, problems, {i.object_id: i.class_name for i in instances})
         choices |= {i: choice for i, choice in adopted.items() if i not in given}
 
@@ -191,7 +193,7 @@ def fit_specular(
 
     def describe(i: Instance) -> ObjectMaterial:
         own, choice = field.atlas.object_id == i.object_id, choices.get(i.object_id)
-        if choice is not None and choice.model == EMITTER:
+        if choice is not None and choice.model.gives_light:
             seen = np.median(field.radiance[own], 0) if own.any() else np.zeros(3)
             return lamp_material(i, seen, irradiance[own], given_note(given[i.object_id]))
         if choice is not None:
@@ -220,12 +222,12 @@ def fit_specular(
     specular = np.zeros((len(field.atlas), 3), np.float32)
     if held is not None:
         specular = np.where(np.isin(field.atlas.object_id, list(held.only))[:, None], specular, held.found.specular)
-    glass = [m for m in materials if m.model == TRANSPARENT and m.surfaces is not None]
-    glossy = [m for m in materials if m.model == SPECULAR] + glass if refine else []
+    glass = [m for m in materials if m.surfaces is not None]
+    glossy = [m for m in materials if m.model.layered] + glass if refine else []
     glossy = [m for m in glossy if m.object_id not in kept]
 
     def separate(material: ObjectMaterial) -> tuple[np.ndarray, np.ndarray]:
-        if material.model == TRANSPARENT:
+        if material.model.see_through:
             return _without_background(material, field, lit_diffuse.seen, maker, samples)
         return _separate(material, field, maker, samples, max(rays // SEPARATE_RAYS, 16))
 
@@ -270,7 +272,7 @@ def _by_frames(
     first = choose_model(screen)
     fit = first.fit
     hopeless = fit is None or fit.cost > HOPELESS * fit.cost_lambertian
-    if hopeless and first.model != METAL and first_look:
+    if hopeless and not first.model.lobe_alone and first_look:
         return first, screen, index
     index = maker.pick(object_id, FIT_ELEMENTS, FIT_VIEWS, seed=1)
     problem = maker.problem(index, rays)
@@ -292,7 +294,7 @@ def _by_looks(
         if first is None:
             return choice, problem
         like_metal = first.ratio <= LOOKS_LIKE_NONE
-        if not like_metal and (choice.model != LAMBERTIAN or compare_coat(problem, irradiance).ratio > 1):
+        if not like_metal and (choice.model.has_lobe or compare_coat(problem, irradiance).ratio > 1):
             return choice, problem
     index = maker.pick(object_id, FIT_ELEMENTS, LOOKS_VIEWS, least=1, seed=1)
     whole = maker.problem(index, rays) if len(index) else None
@@ -300,7 +302,7 @@ def _by_looks(
     if looks is None:
         return choice, problem
     found = choice if "metal-by-looks" in without else metal_by_looks(choice, looks, whole)
-    if found.model == LAMBERTIAN and "coat-by-looks" not in without:
+    if not found.model.has_lobe and "coat-by-looks" not in without:
         found = coated_by_looks(found, compare_coat(whole, irradiance))
     return found, whole if found.looks is not None else problem
 
@@ -311,7 +313,7 @@ def _by_target(maker: Problems, object_id: int, frame: np.ndarray, target: int, 
     problem = maker.problem(index[frame[index] == target][: FIT_ELEMENTS * FIT_VIEWS], rays)
     if len(problem.element) < 3:
         return Choice(LAMBERTIAN, None, note="No frame shows enough of it."), problem
-    return Choice(SPECULAR, fit_lobe(problem, "target")), problem
+    return Choice(DIELECTRIC, fit_lobe(problem, "target")), problem
 
 
 def _separate(
@@ -322,8 +324,9 @@ def _separate(
     index = maker.pick(material.object_id, SEPARATE_ELEMENTS, SEPARATE_VIEWS, least=1, seed=2)
     if not len(index):
         return own, np.zeros((len(own), 3), np.float32)
-    light = maker.light(index, rays, max(material.phi, float(GRID[0])))
-    element, part = specular_in_median(samples, index, material.psi * light.A[:, 0] + light.B[:, 0])
+    width = max(material.alpha, float(GRID[0]))
+    light = maker.light(index, rays, width, microfacets=material.model.microfacets)
+    element, part = specular_in_median(samples, index, material.f0 * light.A[:, 0] + light.B[:, 0])
     return own, spread_over_object(field.atlas, own, element, part)
 
 

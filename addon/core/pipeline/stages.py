@@ -17,11 +17,11 @@ from ..light.field import LightField
 from ..light.mirrors import in_their_planes
 from ..light.shading import Shading
 from ..memory import peak_memory
-from ..overrides import NONE as NO_OVERRIDES
-from ..overrides import Overrides
 from ..passes.pose_refinement.poses import Poses
 from ..passes.registry import check, left_out_of
 from ..progress import Progress
+from ..results.overrides import NONE as NO_OVERRIDES
+from ..results.overrides import Overrides
 from ..results.store import Store
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Capture, Frame, Mesh

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from ..atomic import replacing
+from ..brdf.material import ObjectMaterial
+from ..brdf.material import from_json as material
 from ..errors import BadInputError, MissingStageError
-from ..material import ObjectMaterial
-from ..material import from_json as material
 from ..scene.lenses_told import lens_of, told_lens
 from ..scene.model import Camera, Capture, Frame, Instance, Mesh, Shot
 

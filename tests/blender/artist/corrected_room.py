@@ -13,14 +13,14 @@ BOARD, TAP, LAMP, TABLE = 3, 5, 7, 9
 RUN = "0123456789abcdef"
 ENTRIES = [
     {"object_id": BOARD, "class_name": "board", "model": "lambertian", "evidence": {"albedo": [0.4, 0.2, 0.1]}},
-    {"object_id": TAP, "class_name": "tap", "model": "metal", "phi": 0.04, "f0": [0.9, 0.6, 0.3]},
+    {"object_id": TAP, "class_name": "tap", "model": "metal", "alpha": 0.04, "f0": [0.9, 0.6, 0.3]},
     {"object_id": LAMP, "class_name": "lamp", "model": "emitter", "emission": [3.0, 2.0, 1.0]},
     {
         "object_id": TABLE,
         "class_name": "table",
         "model": "specular",
-        "phi": 0.09,
-        "psi": 0.05,
+        "alpha": 0.09,
+        "f0": 0.05,
         "evidence": {"albedo": [0.5, 0.5, 0.5]},
     },
 ]

@@ -58,7 +58,7 @@ def test_this_is_metal_refits_that_object_alone(room, ops):
     changed = [number for number in after if after[number].get("model") != before[number].get("model")]
     assert changed == [sofa["object_id"]] and after[sofa["object_id"]]["given"] == {"model": "metal"}
     fitted, shown = after[sofa["object_id"]], sockets(sofa)
-    assert shown["Metallic"] == 1 and shown["Roughness"] == pytest.approx(fitted["phi"] ** 0.5, abs=1e-5)
+    assert shown["Metallic"] == 1 and shown["Roughness"] == pytest.approx(fitted["alpha"] ** 0.5, abs=1e-5)
     assert shown["Base Color"] == pytest.approx(fitted["f0"], abs=1e-3)
     assert sofa.material_slots[0].material == material, "whoever refers to it still does"
     assert {name: plain(thing) for name, thing in things.items() if name != "sofa"} == others
@@ -93,7 +93,7 @@ def test_values_that_were_set_by_hand_stay_and_the_rest_is_fitted(room, ops):
     ball.scan_relight_correct.roughness = 0.7
     ops.refit()
     one = entries(folder)[ball["object_id"]]
-    assert one["phi"] == pytest.approx(0.49, abs=1e-4) and sockets(ball)["Roughness"] == pytest.approx(0.7, abs=1e-4)
+    assert one["alpha"] == pytest.approx(0.49, abs=1e-4) and sockets(ball)["Roughness"] == pytest.approx(0.7, abs=1e-4)
     assert ball.scan_relight_correct.roughness == pytest.approx(0.7, abs=1e-4)
 
 

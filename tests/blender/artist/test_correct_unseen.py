@@ -124,7 +124,7 @@ def test_a_painted_image_survives_an_update(room, ops, tmp_path):
     ops.fill_unseen()
     image, filled = shown(room[BOARD])
     folder = tmp_path / "result"
-    write_result(folder, [one | {"phi": 0.3} if one["object_id"] == TABLE else one for one in ENTRIES], "f" * 16)
+    write_result(folder, [one | {"alpha": 0.3} if one["object_id"] == TABLE else one for one in ENTRIES], "f" * 16)
     from addon.core.io.exr import write_exr
 
     write_exr(folder / "base_color.exr", np.full((SIZE, SIZE, 3), 0.25, np.float32))

@@ -14,8 +14,8 @@ OBJECTS = [
     {
         "object_id": 0,
         "model": "specular",
-        "phi": 0.09,
-        "psi": 0.04,
+        "alpha": 0.09,
+        "f0": 0.04,
         "roughness_low": 0.1,
         "roughness_high": 0.7,
         "evidence": {
@@ -30,13 +30,19 @@ OBJECTS = [
     {
         "object_id": 1,
         "model": "lambertian",
-        "phi": None,
-        "psi": None,
+        "alpha": None,
         "roughness_low": 0.0,
         "roughness_high": 1.0,
         "evidence": {"albedo": [0.5] * 3, "albedo_low": [0.45] * 3, "albedo_high": [0.55] * 3},
     },
-    {"object_id": 2, "model": "metal", "phi": 0.04, "f0": [0.9, 0.6, 0.3], "roughness_low": 0.1, "roughness_high": 0.4},
+    {
+        "object_id": 2,
+        "model": "metal",
+        "alpha": 0.04,
+        "f0": [0.9, 0.6, 0.3],
+        "roughness_low": 0.1,
+        "roughness_high": 0.4,
+    },
     {"object_id": 3, "model": "emitter", "emission": [3.0, 2.0, 1.0]},
 ]
 RUN, LATER = "0123456789abcdef", "fedcba9876543210"
@@ -115,11 +121,11 @@ def test_read_again_when_the_file_changes_and_only_then(scene, results, tmp_path
 def listed(scene, results):
     """What the list shows: phi by the object's name."""
     result_file = results.result_file
-    return {thing.name: one.get("phi") for thing, one in result_file.rows(scene.objects).items()}
+    return {thing.name: one.get("alpha") for thing, one in result_file.rows(scene.objects).items()}
 
 
 def test_two_rooms_each_show_their_own_values(scene, results, tmp_path):
-    write(tmp_path / "attic", LATER, [{"object_id": 1, "model": "specular", "phi": 0.64}])
+    write(tmp_path / "attic", LATER, [{"object_id": 1, "model": "specular", "alpha": 0.64}])
     recovered(mesh_object("beam", *box((0, 3, 0), (1, 4, 1))), 1, tmp_path / "attic", LATER)
     assert listed(scene, results) == {"wall": 0.09, "Apple": None, "tap": 0.04, "lamp": None, "beam": 0.64}
     assert results.refused(scene.objects) == []

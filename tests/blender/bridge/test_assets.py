@@ -11,7 +11,8 @@ bpy = pytest.importorskip("bpy")
 from addon.bridge import assets  # noqa: E402
 from addon.bridge.marks import mark as from_run  # noqa: E402
 from addon.bridge.materials import make_material  # noqa: E402
-from addon.core.material import ObjectMaterial  # noqa: E402
+from addon.core.brdf.material import ObjectMaterial  # noqa: E402
+from addon.core.brdf.registry import named  # noqa: E402
 
 
 @pytest.fixture
@@ -25,8 +26,8 @@ def things(scene, tmp_path):
         if model is None:
             thing.data.materials.append(bpy.data.materials.new("my own"))
         else:
-            more = {"phi": 0.1, "psi": 0.04} if model == "specular" else {}
-            thing.data.materials.append(make_material(ObjectMaterial(number, "thing", model, **more)))
+            more = {"alpha": 0.1, "f0": 0.04} if model == "specular" else {}
+            thing.data.materials.append(make_material(ObjectMaterial(number, "thing", named(model), **more)))
             from_run(thing, tmp_path, "")
         made.append(thing)
     return made

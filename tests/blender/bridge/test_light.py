@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
-from addon.core.brdf.compensation import base_color, base_colors
-from addon.core.material import EMITTER, LAMBERTIAN, LAMP_ALBEDO, METAL, SPECULAR, ObjectMaterial
+from addon.core.brdf.compensation import base_color
+from addon.core.brdf.dielectric import DIELECTRIC
+from addon.core.brdf.emitter import EMITTER, LAMP_ALBEDO
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.material import ObjectMaterial, base_colors
+from addon.core.brdf.metal import METAL
 
 bpy = pytest.importorskip("bpy")
 
@@ -89,7 +93,7 @@ def test_furnace_specular(scene, shoot, look, white_world, phi, psi):
     scene.render.film_transparent = True
     look((0, 0, 3))
     albedo = np.float32([0.2, 0.5, 0.8])
-    description = ObjectMaterial(0, "Ball", SPECULAR, phi=phi, psi=psi)
+    description = ObjectMaterial(0, "Ball", DIELECTRIC, alpha=phi, f0=psi)
     ball = add("sphere", make_material(description, plain(base_color(albedo[None], psi, phi)[0])), subdivisions=5)
     whole = disc_mean(shoot(16, 16, 400))
     ball.data.materials[0] = make_material(description, plain((0, 0, 0)))
@@ -119,7 +123,7 @@ def test_furnace_metal(scene, shoot, look, white_world):
     scene.render.film_transparent = True
     look((0, 0, 3))
     f0 = np.array([0.9, 0.6, 0.3])
-    add("sphere", make_material(ObjectMaterial(0, "Tap", METAL, phi=0.05, f0=tuple(f0))), subdivisions=5)
+    add("sphere", make_material(ObjectMaterial(0, "Tap", METAL, alpha=0.05, f0=tuple(f0))), subdivisions=5)
     expected = [lobe_reflectance(0.05, x) for x in f0]
     np.testing.assert_allclose(disc_mean(shoot(16, 16, 400)), expected, rtol=0.05)
 
@@ -181,7 +185,7 @@ def test_highlight_profile(scene, shoot, look, phi, psi):
     """
     size, width, half, height = 24, 3.0, 0.1, 2.0
     lamp = (0.0, 2.0)
-    add("plane", make_material(ObjectMaterial(0, "Table", SPECULAR, phi=phi, psi=psi), plain((0, 0, 0))), size=20)
+    add("plane", make_material(ObjectMaterial(0, "Table", DIELECTRIC, alpha=phi, f0=psi), plain((0, 0, 0))), size=20)
     add(
         "plane",
         make_material(ObjectMaterial(1, "Lamp", EMITTER, emission=(100.0,) * 3)),

@@ -4,11 +4,17 @@ import math
 
 import pytest
 
-from addon.core.material import EMITTER, LAMBERTIAN, LAMP_ALBEDO, METAL, SPECULAR, TRANSPARENT, ObjectMaterial
+from addon.core.brdf.dielectric import DIELECTRIC
+from addon.core.brdf.emitter import EMITTER, LAMP_ALBEDO
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.material import ObjectMaterial
+from addon.core.brdf.metal import METAL
+from addon.core.brdf.transparent import TRANSPARENT
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge.materials import ior_of, make_material  # noqa: E402
+from addon.bridge.materials import make_material  # noqa: E402
+from addon.core.brdf.compensation import ior_of  # noqa: E402
 
 
 def sockets(material):
@@ -30,11 +36,11 @@ def test_lambertian(scene):
 
 @pytest.mark.parametrize("psi", [0.02, 0.04, 0.3, 0.89])
 def test_specular(scene, psi):
-    material = make_material(ObjectMaterial(3, "Table", SPECULAR, phi=0.16, psi=psi))
+    material = make_material(ObjectMaterial(3, "Table", DIELECTRIC, alpha=0.16, f0=psi))
     _, value = sockets(material)
     assert value("Roughness") == pytest.approx(0.4) and f0(value) == pytest.approx(psi, rel=1e-5)
-    assert material["scan_relight_model"] == SPECULAR
-    assert (material["scan_relight_phi"], material["scan_relight_psi"]) == (0.16, psi)
+    assert material["scan_relight_model"] == DIELECTRIC.name
+    assert (material["scan_relight_alpha"], material["scan_relight_f0"]) == (0.16, psi)
 
 
 @pytest.mark.parametrize(("surfaces", "alpha"), [(1, 0.36), (2, 0.2), (None, 1)], ids=["sheet", "slab", "cut out"])
@@ -53,7 +59,7 @@ def test_ior_stays_finite(psi):
 
 
 def test_metal(scene):
-    inputs, value = sockets(make_material(ObjectMaterial(3, "Tap", METAL, phi=0.04, f0=(0.9, 0.6, 1.2))))
+    inputs, value = sockets(make_material(ObjectMaterial(3, "Tap", METAL, alpha=0.04, f0=(0.9, 0.6, 1.2))))
     assert value("Metallic") == 1 and value("Roughness") == pytest.approx(0.2)
     assert tuple(value("Base Color")) == pytest.approx((0.9, 0.6, 1.0, 1)) and not inputs["Base Color"].links
 

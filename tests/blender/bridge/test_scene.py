@@ -5,9 +5,11 @@ import shutil
 import numpy as np
 import pytest
 
+from addon.core.brdf.emitter import EMITTER, LAMP_ALBEDO
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.material import ObjectMaterial
 from addon.core.errors import StorageError
 from addon.core.io.exr import write_exr
-from addon.core.material import EMITTER, LAMBERTIAN, LAMP_ALBEDO, ObjectMaterial
 from addon.core.pipeline.parts import Parts
 from addon.core.results.room_file import write_room
 from addon.core.scene.model import Camera, Capture, Frame, Instance, Mesh

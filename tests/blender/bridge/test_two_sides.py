@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.material import ObjectMaterial
 from addon.core.io.exr import write_exr
-from addon.core.material import LAMBERTIAN, ObjectMaterial
 from addon.core.scene.model import Instance
 from addon.core.scene.two_sides import laid_apart, with_backs
 from tests.core.surface.test_two_sides import ROUND, laid_out, tube

@@ -8,8 +8,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from addon.bridge.unwrap import unwrap  # noqa: E402
+from addon.core.brdf.material import Z90  # noqa: E402
+from addon.core.brdf.metal import METAL  # noqa: E402
 from addon.core.io.read import read_capture  # noqa: E402
-from addon.core.material import METAL, Z90  # noqa: E402
 from addon.core.passes.albedo.albedo import MEASURED  # noqa: E402
 from addon.core.pipeline.recover import Recovery  # noqa: E402
 from addon.core.progress import Progress  # noqa: E402

@@ -10,8 +10,8 @@ bpy = pytest.importorskip("bpy")
 from addon.bridge import demo_render  # noqa: E402
 from addon.bridge.demo_room import Paint, Thing, grid, room, tour  # noqa: E402
 from addon.bridge.unwrap import unwrap  # noqa: E402
+from addon.core.brdf.transparent import TRANSPARENT  # noqa: E402
 from addon.core.io.read import read_capture  # noqa: E402
-from addon.core.material import TRANSPARENT  # noqa: E402
 from addon.core.passes.albedo.albedo import NONE  # noqa: E402
 from addon.core.pipeline.recover import Recovery  # noqa: E402
 from addon.core.progress import Progress  # noqa: E402

@@ -6,7 +6,9 @@ import numpy as np
 from addon.bridge.marks import OBJECT_ID
 from addon.bridge.materials import make_material
 from addon.bridge.mesh_objects import mesh_data
-from addon.core.material import EMITTER, LAMBERTIAN, ObjectMaterial
+from addon.core.brdf.emitter import EMITTER
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.material import ObjectMaterial
 
 
 def sheet(scene, name, size, place, rotation=(0, 0, 0), object_id=0, emission=None, one_sided=False, grey=0.5):

@@ -15,22 +15,27 @@ from addon.bridge import export as exporting  # noqa: E402
 from addon.bridge import relight_lamps  # noqa: E402
 from addon.bridge.images import image_array, load_image  # noqa: E402
 from addon.bridge.marks import OBJECT_ID, UV_MAP  # noqa: E402
-from addon.bridge.materials import ior_of, make_material  # noqa: E402
+from addon.bridge.materials import make_material  # noqa: E402
 from addon.bridge.mesh_objects import ATLAS_UV, PARTS_UV, mesh_data  # noqa: E402
 from addon.bridge.world import set_world  # noqa: E402
+from addon.core.brdf.compensation import ior_of  # noqa: E402
+from addon.core.brdf.dielectric import DIELECTRIC  # noqa: E402
+from addon.core.brdf.emitter import EMITTER  # noqa: E402
+from addon.core.brdf.lambertian import LAMBERTIAN  # noqa: E402
+from addon.core.brdf.material import ObjectMaterial  # noqa: E402
+from addon.core.brdf.metal import METAL  # noqa: E402
 from addon.core.errors import BadInputError, StorageError  # noqa: E402
 from addon.core.io.exr import write_exr  # noqa: E402
-from addon.core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR, ObjectMaterial  # noqa: E402
 
 COLOUR = (0.5, 0.1, 0.02)
 UV = np.float32([[0.1, 0.1], [0.9, 0.1], [0.9, 0.8]])
 KNOWN = (
     ObjectMaterial(1, "wall", LAMBERTIAN),
-    ObjectMaterial(2, "table", SPECULAR, phi=0.09, psi=0.06),
-    ObjectMaterial(3, "tap", METAL, phi=0.04, f0=(0.9, 0.8, 0.5)),
+    ObjectMaterial(2, "table", DIELECTRIC, alpha=0.09, f0=0.06),
+    ObjectMaterial(3, "tap", METAL, alpha=0.04, f0=(0.9, 0.8, 0.5)),
     ObjectMaterial(4, "lamp", EMITTER, emission=(6.0, 3.0, 1.5)),
     ObjectMaterial(5, "sheet lamp", EMITTER, emission=(0.8, 0.4, 0.2)),
-    ObjectMaterial(6, "pane", METAL, phi=0.01, f0=(0.5, 0.5, 0.5)),
+    ObjectMaterial(6, "pane", METAL, alpha=0.01, f0=(0.5, 0.5, 0.5)),
 )
 
 

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from addon.core.brdf.metal import METAL
 from addon.core.errors import BadInputError
 from addon.core.io.exr import write_exr
 from addon.core.io.ptex import morton, std_sort
 from addon.core.io.read import describe, read_capture
 from addon.core.lit_diffuse.from_texture import face_edge, lit_from_tiles
-from addon.core.material import METAL
 from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
 from addon.core.results.store import Store
@@ -182,7 +182,7 @@ def test_mirrors_are_told_and_followed(replica, tmp_path):
         done = Finished(Recovery(capture, store, replace(CHEAP, mirrors=True), Progress(), replica.unwrap))
     assert [one.object_id for one in done.shading.mirrors] == [3]
     [material] = [m for m in done.materials if m.object_id == 3]
-    assert material.model == METAL and material.f0 == pytest.approx((0.9,) * 3) and material.phi == 0
+    assert material.model == METAL and material.f0 == pytest.approx((0.9,) * 3) and material.alpha == 0
 
 
 @pytest.mark.parametrize(

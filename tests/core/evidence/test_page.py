@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.evidence.colours import HEAT, heat
 from addon.core.evidence.pictures import BLOCK, worst_blocks
 from addon.core.io.oiio import read_coded
@@ -69,7 +70,7 @@ def test_what_shows_no_highlight_has_any_roughness():
     element, direction, _ = box.views(120, 8)
     problem = box.problem(element, direction, None, 0, np.full((len(element), 3), 0.2))
     choice = choose_model(problem)
-    assert gloss_interval(choice, problem) == UNKNOWN == gloss_interval(Choice("lambertian", None), None)
+    assert gloss_interval(choice, problem) == UNKNOWN == gloss_interval(Choice(LAMBERTIAN, None), None)
     assert choice.scores["lambertian"] == 1 and choice.scores["specular"] > 0.9
 
 

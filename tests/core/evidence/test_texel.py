@@ -7,12 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from addon.core.brdf.emitter import EMITTER
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.material import Z90, ObjectMaterial
 from addon.core.evidence import calibration as c
 from addon.core.evidence.light import LightEvidence, light_evidence, spots
 from addon.core.evidence.objects import object_evidence
 from addon.core.evidence.texel import contrast, texel_evidence, without_light
 from addon.core.light.lamps import Lamp
-from addon.core.material import EMITTER, LAMBERTIAN, Z90, ObjectMaterial
 from addon.core.passes.albedo.albedo import FILLED, MEASURED, Albedo
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.visibility import CLEAN, EDGE

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from addon.core.light.emitters import bright_triangles
-from addon.core.passes.glossy_light.caustics import Lobes, _over_cells, caustics
+from addon.core.passes.glossy_light.caustics import Gloss, _over_cells, caustics
 from tests.core.glossy_box import SIZE, Box
 from tests.core.rooms import Quad, polygon_irradiance
 from tests.core.specular.test_glossy_light import PSI, over_the_floor
@@ -23,11 +23,11 @@ def dark():
     return Box(walls=np.zeros((6, 3)))
 
 
-def on_the_floor(box: Box, phi: float, psi: float = PSI) -> Lobes:
+def on_the_floor(box: Box, phi: float, psi: float = PSI) -> Gloss:
     n, floor = len(box.room.atlas), box.room.atlas.object_id == 0
     f0 = np.zeros((n, 3), np.float32)
     f0[floor] = psi
-    return Lobes(np.where(floor, np.float32(phi), np.float32(0)), f0, np.zeros((n, 3), np.float32))
+    return Gloss(np.where(floor, np.float32(phi), np.float32(0)), f0, np.zeros((n, 3), np.float32))
 
 
 def above(box: Box) -> np.ndarray:
@@ -68,7 +68,7 @@ def test_what_a_bright_metal_was_taken_to_send_goes(dark):
     atlas = dark.room.atlas
     own = atlas.object_id == 6
     inside = np.where(own[:, None], np.float32(dark.glow), np.float32(0))
-    lobes = Lobes(np.where(own, np.float32(0.3), np.float32(0)), np.zeros((len(atlas), 3), np.float32), inside)
+    lobes = Gloss(np.where(own, np.float32(0.3), np.float32(0)), np.zeros((len(atlas), 3), np.float32), inside)
     found = caustics(dark.field, dark.bright, lobes)[:, :3]
     lamp = [quad for quad in dark.room.quads if quad.object_id == 6]
     at = np.flatnonzero(atlas.object_id < 6)[::20]
@@ -83,7 +83,7 @@ def test_two_mirrors_in_a_corner(dark):
     atlas = dark.room.atlas
     mirrors = np.isin(atlas.object_id, (0, 2))
     f0 = np.where(mirrors[:, None], np.float32(1), np.float32(0)).repeat(3, 1)
-    lobes = Lobes(np.where(mirrors, np.float32(0.01), np.float32(0)), f0, np.zeros((len(atlas), 3), np.float32))
+    lobes = Gloss(np.where(mirrors, np.float32(0.01), np.float32(0)), f0, np.zeros((len(atlas), 3), np.float32))
     found = caustics(dark.field, dark.bright, lobes, photons=MANY)
     (lamp,) = (quad for quad in dark.room.quads if quad.object_id == 6)
     images = [
@@ -104,16 +104,16 @@ def test_what_a_bright_metal_was_taken_to_send_is_not_reflected(dark):
     """What it does send is followed from where that starts."""
     lobes, lamp = on_the_floor(dark, 0.3, 1.0), dark.room.atlas.object_id == 6
     taken = np.where(lamp[:, None], np.float32(dark.glow), np.float32(0))
-    metal = Lobes(np.where(lamp, np.float32(0.3), np.float32(0)), np.zeros_like(lobes.f0), taken)
+    metal = Gloss(np.where(lamp, np.float32(0.3), np.float32(0)), np.zeros_like(lobes.f0), taken)
     alone = caustics(dark.field, dark.bright, metal)[:, :3]
-    with_floor = caustics(dark.field, dark.bright, Lobes(lobes.phi, lobes.f0, taken))[:, :3]
+    with_floor = caustics(dark.field, dark.bright, Gloss(lobes.alpha, lobes.f0, taken))[:, :3]
     assert alone.any() and with_floor == pytest.approx(alone)
     assert caustics(dark.field, dark.bright, lobes)[above(dark), :3].mean() > 0.1
 
 
 def test_nothing_glossy_or_nothing_bright(dark):
     n = len(dark.room.atlas)
-    matt = Lobes(np.zeros(n, np.float32), np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32))
+    matt = Gloss(np.zeros(n, np.float32), np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32))
     assert not caustics(dark.field, dark.bright, matt).any()
     even = dark.field.with_light(np.ones((n, 3), np.float32))
     assert not caustics(even, bright_triangles(even), on_the_floor(dark, 0.1)).any()

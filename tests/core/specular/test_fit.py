@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from addon.core.brdf.dielectric import PRIOR
+from addon.core.brdf.metal import METAL
+from addon.core.brdf.model import Constraints
 from addon.core.fit.layout import Layout
 from addon.core.fit.lobe_fit import between, fit_lobe, huber, robust_scale, solve
 from addon.core.light.lobes import GRID
-from addon.core.passes.specular.models import DIELECTRIC
 from tests.core.glossy_box import Box
 
 
@@ -53,7 +55,9 @@ def test_one_target_frame(box, phi, psi):
 def test_a_metal_has_colour(box):
     element, direction, _ = box.views(60, 10)
     f0 = np.array([0.9, 0.6, 0.3])
-    fit = fit_lobe(box.problem(element, direction, 0.11, f0, np.zeros((len(element), 3))), coloured=True)
+    fit = fit_lobe(
+        box.problem(element, direction, 0.11, f0, np.zeros((len(element), 3))), constraints=METAL.constraints
+    )
     assert steps(fit.phi, 0.11) <= 1 and np.allclose(fit.psi, f0, rtol=0.15)
 
 
@@ -100,8 +104,8 @@ def test_exposure_does_not_matter(box):
 def test_psi_is_bounded(box):
     element, direction, _ = box.views(30, 6)
     flat = box.problem(element, direction, None, 0, paint(element))
-    assert fit_lobe(flat, least_psi=0.02).psi[0] >= 0.02
-    assert 0 <= fit_lobe(flat, prior=DIELECTRIC).psi[0] < 0.06  # what the frames leave open
+    assert fit_lobe(flat, constraints=Constraints(least_psi=0.02)).psi[0] >= 0.02
+    assert 0 <= fit_lobe(flat, constraints=Constraints(prior=PRIOR)).psi[0] < 0.06  # what the frames leave open
     bright = box.problem(element, direction, 0.11, 3.0, paint(element))
     assert fit_lobe(bright).psi[0] == 1
 
@@ -146,9 +150,9 @@ def test_what_is_known_of_psi_fills_in(box):
     """A prior decides where the frames don't, and gives way where they do."""
     element, direction, _ = box.views(60, 10)
     blurred = box.problem(element, direction, 0.6, 0.04, paint(element), noise=0.05)
-    assert abs(fit_lobe(blurred, prior=DIELECTRIC).psi[0] - 0.04) < 0.015
+    assert abs(fit_lobe(blurred, constraints=Constraints(prior=PRIOR)).psi[0] - 0.04) < 0.015
     clear = box.problem(element, direction, 0.11, 0.08, paint(element))
-    assert fit_lobe(clear, prior=DIELECTRIC).psi[0] == pytest.approx(0.08, rel=0.15)
+    assert fit_lobe(clear, constraints=Constraints(prior=PRIOR)).psi[0] == pytest.approx(0.08, rel=0.15)
 
 
 def test_between_grid_points():

@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from addon.core.brdf.dielectric import DIELECTRIC
+from addon.core.brdf.emitter import EMITTER
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.metal import METAL
 from addon.core.light.lamps import Lamp
-from addon.core.material import EMITTER, LAMBERTIAN, METAL, SPECULAR
-from addon.core.overrides import Given
 from addon.core.passes.specular.given import fit_given
 from addon.core.passes.specular.problems import Problems
 from addon.core.pipeline.specular import Held, fit_specular
+from addon.core.results.overrides import Given
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.samples import Samples
 from addon.core.scene.visibility import CLEAN
@@ -77,7 +80,7 @@ def metal():
 
 def test_a_given_model_alone(glossy, metal):
     found = glossy.fit(Given("specular"))
-    assert found.model == SPECULAR and steps(found.fit.phi, 0.11) <= 1
+    assert found.model == DIELECTRIC and steps(found.fit.phi, 0.11) <= 1
     assert found.fit.psi[0] == pytest.approx(0.08, rel=0.2)
     copper = metal.fit(Given("metal"))
     assert copper.model == METAL and steps(copper.fit.phi, 0.11) <= 1
@@ -87,7 +90,7 @@ def test_a_given_model_alone(glossy, metal):
 
 def test_a_given_roughness_is_held_and_f0_fitted(glossy, metal):
     right = glossy.fit(Given(roughness=0.11**0.5))
-    assert right.model == SPECULAR and right.fit.phi == pytest.approx(0.11)
+    assert right.model == DIELECTRIC and right.fit.phi == pytest.approx(0.11)
     assert right.fit.psi[0] == pytest.approx(0.08, rel=0.2)
     off = glossy.fit(Given("specular", roughness=0.2))
     assert off.fit.phi == pytest.approx(0.04) and off.fit.psi[0] < right.fit.psi[0]
@@ -101,7 +104,7 @@ def test_a_given_roughness_makes_a_metal_no_dielectric(metal):
 
 def test_a_given_f0_is_held_and_roughness_fitted(glossy, metal):
     found = glossy.fit(Given(f0=0.08))
-    assert found.model == SPECULAR and (found.fit.psi == 0.08).all() and steps(found.fit.phi, 0.11) <= 1
+    assert found.model == DIELECTRIC and (found.fit.psi == 0.08).all() and steps(found.fit.phi, 0.11) <= 1
     copper = metal.fit(Given(f0=tuple(COPPER)))
     assert copper.model == METAL and np.allclose(copper.fit.psi, COPPER) and steps(copper.fit.phi, 0.11) <= 1
 
@@ -125,8 +128,8 @@ def test_descriptions_say_what_was_given(glossy):
     )
     by_id = {m.object_id: m for m in found.materials}
     floor = by_id[FLOOR]
-    assert floor.phi == pytest.approx(0.09) and (floor.roughness_low, floor.roughness_high) == (0.3, 0.3)
-    assert floor.specular_low < floor.psi < floor.specular_high
+    assert floor.alpha == pytest.approx(0.09) and (floor.roughness_low, floor.roughness_high) == (0.3, 0.3)
+    assert floor.specular_low < floor.f0 < floor.specular_high
     assert "given by the user" in floor.note.lower() and floor.observations == 600
     assert by_id[1].model == METAL and by_id[1].observations == 0 and min(by_id[1].f0) > 0.3  # nothing seen: plausible
     assert by_id[2].model == EMITTER and np.all(np.array(by_id[2].emission) > 0)
@@ -134,14 +137,14 @@ def test_descriptions_say_what_was_given(glossy):
     assert "light" in by_id[2].note
     assert by_id[3].model == LAMBERTIAN and by_id[3].roughness_high is None and by_id[3].specular_high == 0
     for i in (4, 5):  # along the chain
-        assert (by_id[i].model, by_id[i].phi, by_id[i].psi) == (SPECULAR, floor.phi, floor.psi)
+        assert (by_id[i].model, by_id[i].alpha, by_id[i].f0) == (DIELECTRIC, floor.alpha, floor.f0)
         assert by_id[i].object_id == i and by_id[i].roughness_high == floor.roughness_high
     assert by_id[LAMP].model == LAMBERTIAN
 
 
 def test_all_of_it_given_has_no_interval(glossy):
     floor = glossy.all({FLOOR: Given("specular", 0.3, 0.05)}).materials[FLOOR]
-    assert (floor.psi, floor.specular_low, floor.specular_high) == (0.05, 0.05, 0.05)
+    assert (floor.f0, floor.specular_low, floor.specular_high) == (0.05, 0.05, 0.05)
     assert (floor.roughness_low, floor.roughness_high) == (0.3, 0.3)
 
 

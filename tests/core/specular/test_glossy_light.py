@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.material import METAL, SPECULAR, ObjectMaterial
+from addon.core.brdf.dielectric import DIELECTRIC
+from addon.core.brdf.material import ObjectMaterial
+from addon.core.brdf.metal import METAL
 from addon.core.passes.glossy_light import glossy_light as glossy_light_module
 from addon.core.passes.glossy_light.glossy_light import Excess, glossy_light
 from addon.core.scene.tangent_frame import tangent_frame
@@ -20,9 +22,9 @@ def box():
     return Box()
 
 
-def polished(model: str = SPECULAR, psi: float = PSI) -> tuple[ObjectMaterial, ...]:
+def polished(model: str = DIELECTRIC, psi: float = PSI) -> tuple[ObjectMaterial, ...]:
     """The floor is all but a mirror, the rest is matt."""
-    return (ObjectMaterial(0, "floor", model, phi=0.01, psi=psi, f0=(psi,) * 3),)
+    return (ObjectMaterial(0, "floor", model, alpha=0.01, f0=model.as_f0(psi)),)
 
 
 def over_the_floor(box: Box, element: np.ndarray, psi: float, across: int = 120) -> np.ndarray:
@@ -77,7 +79,7 @@ def test_what_the_median_held_is_taken_off(box):
 def test_a_metal_sends_nothing_but_its_lobe(box):
     """Its L_d was no light of its own: with F0 next to 0, all that it threw is taken off, but for grazing views."""
     metal, element = found(box, polished(METAL, 0.02))
-    coat, _ = found(box, polished(SPECULAR, 0.02), box.walls[0])
+    coat, _ = found(box, polished(DIELECTRIC, 0.02), box.walls[0])
     assert metal.mean() < 0 and metal.mean() == pytest.approx(coat.mean(), rel=0.05)
 
 

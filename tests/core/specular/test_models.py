@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from addon.core.brdf.dielectric import DIELECTRIC, MOST_F0
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.metal import METAL
 from addon.core.fit.lobe_fit import fit_lobe
-from addon.core.material import LAMBERTIAN, METAL, SPECULAR
 from addon.core.passes.specular import models
-from addon.core.passes.specular.models import METAL_PSI, Choice, adopt_from_class, choose_model, metal_f0
+from addon.core.passes.specular.models import Choice, adopt_from_class, choose_model, metal_f0
 from tests.core.glossy_box import Box
 from tests.core.specular.test_fit import paint, steps
 
@@ -37,7 +39,7 @@ def seen():
 def test_each_gets_the_simplest_model(seen):
     chosen = {name: choose_model(problem) for name, problem in seen.items()}
     models = {name: choice.model for name, choice in chosen.items()}
-    assert models == {"matt": LAMBERTIAN, "glossy": SPECULAR, "metal": METAL, "few": LAMBERTIAN}
+    assert models == {"matt": LAMBERTIAN, "glossy": DIELECTRIC, "metal": METAL, "few": LAMBERTIAN}
     assert chosen["few"].fit is None and chosen["few"].note and chosen["matt"].note
     assert not chosen["glossy"].note and not chosen["metal"].note
     assert steps(chosen["glossy"].fit.phi, 0.11) <= 1 and chosen["glossy"].fit.psi[0] == pytest.approx(0.08, rel=0.15)
@@ -54,7 +56,7 @@ def test_a_metal_has_no_diffuse_part(seen):
     box = Box()
     element, direction, _ = box.views(60, 10)
     choice = choose_model(box.problem(element, direction, 0.11, COPPER / 4, 3 * paint(element)))
-    assert choice.model == SPECULAR and choice.fit.psi.max() <= METAL_PSI
+    assert choice.model == DIELECTRIC and choice.fit.psi.max() <= MOST_F0
 
 
 def test_a_metal_under_light_that_is_off(seen):
@@ -92,7 +94,7 @@ def test_the_others_of_its_class_are_no_metal(seen):
     sure = choose_model(seen["glossy"])
     hardly = replace(choose_model(seen["metal"]), sigmas=2 * sure.sigmas, dielectric=replace(sure.fit, phi=0.4))
     beyond = replace(hardly, dielectric=None)
-    for members, model in (([hardly], METAL), ([hardly, sure], SPECULAR), ([beyond, sure], METAL)):
+    for members, model in (([hardly], METAL), ([hardly, sure], DIELECTRIC), ([beyond, sure], METAL)):
         result = adopt_from_class(dict(enumerate(members)), {}, dict.fromkeys(range(2), "key"))
         assert result[0].model == model
     both = adopt_from_class({0: hardly, 1: sure}, {}, dict.fromkeys(range(2), "key"))
@@ -105,7 +107,7 @@ def test_a_metal_hardly_better_than_a_dielectric_says_so(seen, monkeypatch):
     gains = iter([(0.5, 10.0), (0.5, 10.0), (0.1, 2.5)])
     monkeypatch.setattr(models, "_gain", lambda with_lobe, without: next(gains))
     choice = choose_model(seen["metal"])
-    assert choice.model == METAL and choice.dielectric is not None and choice.dielectric.psi.max() <= METAL_PSI
+    assert choice.model == METAL and choice.dielectric is not None and choice.dielectric.psi.max() <= MOST_F0
 
 
 def test_a_metal_on_a_bumpy_mesh(seen):
@@ -122,7 +124,7 @@ def test_a_metal_on_a_bumpy_mesh(seen):
     light = replace(problem.light, A=problem.light.A[wrong], B=problem.light.B[wrong])
     sure, lost, matt = (choose_model(one) for one in (problem, replace(problem, light=light), seen["matt"]))
     assert lost.model != METAL and lost.bare and not matt.bare
-    lost = replace(lost, model=SPECULAR, sigmas=2 * sure.sigmas)  # as sure of a lobe as it may be
+    lost = replace(lost, model=DIELECTRIC, sigmas=2 * sure.sigmas)  # as sure of a lobe as it may be
     members = {0: lost, 1: sure, 2: matt}
     result = adopt_from_class(members, {2: seen["matt"]}, dict.fromkeys(range(3), "steel"))
     assert result[0].model == METAL and result[0].fit.phi == sure.fit.phi and "object 1" in result[0].note
@@ -132,7 +134,7 @@ def test_a_metal_on_a_bumpy_mesh(seen):
 def test_the_class_helps_out(seen):
     """0 is sure; 1 was seen too little, 2 not at all: both take its lobe. 3 looks different, 4 is of another class."""
     sure = choose_model(seen["glossy"])
-    weak = Choice(METAL, fit_lobe(seen["metal"], coloured=True), 0.1, sure.sigmas / 2)
+    weak = Choice(METAL, fit_lobe(seen["metal"], constraints=METAL.constraints), 0.1, sure.sigmas / 2)
     nothing = Choice(LAMBERTIAN, None, note="too few")
     matt = choose_model(seen["matt"])
     choices = {0: sure, 1: nothing, 2: nothing, 3: matt, 4: nothing, 5: weak}
@@ -142,7 +144,7 @@ def test_the_class_helps_out(seen):
     for i, own in ((0, sure), (5, weak)):  # what is sure of itself stays
         assert result[i].model == own.model and result[i].fit.phi == own.fit.phi and result[i].sigmas == own.sigmas
     for taker in (1, 2):
-        assert result[taker].model == SPECULAR and result[taker].fit.phi == sure.fit.phi
+        assert result[taker].model == DIELECTRIC and result[taker].fit.phi == sure.fit.phi
         assert "object 0" in result[taker].note and result[taker].sigmas == 0
     assert result[3] is matt and result[4] is nothing
     assert choices[1] is nothing  # what was handed in is left alone
@@ -158,7 +160,7 @@ def test_how_another_darkens_says_nothing_against_its_lobe(seen, monkeypatch):
     result = adopt_from_class({0: source, 1: own}, {1: seen["matt"]}, {0: "floor", 1: "floor"})
     assert [fit.kappa for fit in asked] == [0.6] and asked[0].phi == sure.fit.phi
     assert asked[0].kappa_lambertian == matt.fit.kappa_lambertian
-    assert result[1].model == SPECULAR
+    assert result[1].model == DIELECTRIC
 
 
 def test_nobody_to_take_over_from(seen):
@@ -168,7 +170,7 @@ def test_nobody_to_take_over_from(seen):
 
 
 @pytest.mark.parametrize(
-    ("sigmas", "model"), [((2.8, 2.6), SPECULAR), ((2.8, 0.5), LAMBERTIAN), ((2.9, 2.9, -4), LAMBERTIAN)],
+    ("sigmas", "model"), [((2.8, 2.6), DIELECTRIC), ((2.8, 0.5), LAMBERTIAN), ((2.9, 2.9, -4), LAMBERTIAN)],
     ids=["both nearly sure", "one nearly sure", "a third speaks against it"],
 )  # fmt: skip
 def test_a_class_may_be_sure_together(seen, sigmas, model):
@@ -176,7 +178,7 @@ def test_a_class_may_be_sure_together(seen, sigmas, model):
     choices = {i: Choice(LAMBERTIAN, fit, 0.03 if s > 1 else -0.01, s, "Not sure.") for i, s in enumerate(sigmas)}
     result = adopt_from_class(choices, {}, {i: "pot" for i in choices})
     assert {choice.model for choice in result.values()} == {model}
-    if model == SPECULAR:
+    if model == DIELECTRIC:
         assert "together" in result[0].note
 
 

@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.material import LAMBERTIAN, METAL, SPECULAR
+from addon.core.brdf.dielectric import DIELECTRIC
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.metal import METAL
 from addon.core.passes.specular.by_looks import coated_by_looks, metal_by_looks
 from addon.core.passes.specular.intervals import gloss_interval
 from addon.core.passes.specular.models import Choice, adopt_from_class
@@ -104,9 +106,9 @@ def test_looks_do_not_judge_others_of_the_class(floor, irradiance):
     """A table with a lobe of its own stays as it is, though a metal's lobe alone would serve it, too."""
     problem = floor(0.11, COPPER, 0.0)
     metal = metal_by_looks(UNSURE, compare(problem, irradiance), problem)
-    table = replace(metal, model=SPECULAR, looks=None, bare=True, sigmas=8.0)
+    table = replace(metal, model=DIELECTRIC, looks=None, bare=True, sigmas=8.0)
     result = adopt_from_class({0: metal, 1: table}, {0: problem, 1: problem}, dict.fromkeys(range(2), "wood"))
-    assert result[1].model == SPECULAR and result[0].model == METAL
+    assert result[1].model == DIELECTRIC and result[0].model == METAL
 
 
 LEAF = np.array([0.03, 0.2, 0.03])
@@ -119,7 +121,7 @@ def test_a_coat(floor, irradiance, rho):
     looks = compare_coat(problem, irradiance)
     assert looks.ratio < 0.7 and steps(looks.phi, 0.11) <= 1
     choice = coated_by_looks(UNSURE, looks)
-    assert choice.model == SPECULAR and choice.looks is looks and np.allclose(choice.fit.psi, 0.04)
+    assert choice.model == DIELECTRIC and choice.looks is looks and np.allclose(choice.fit.psi, 0.04)
     low, high = gloss_interval(choice, problem).roughness
     assert low < np.sqrt(0.11) < high and high - low > 0.4
 
@@ -146,4 +148,4 @@ def test_a_coat_by_looks_gives_way_to_one_by_views(floor, irradiance):
     result = adopt_from_class({0: coat, 1: views, 2: UNSURE}, problems, dict.fromkeys(range(3), "jar"))
     assert result[1].fit.phi == result[2].fit.phi == 0.06
     alone = adopt_from_class({0: coat, 2: UNSURE}, problems, dict.fromkeys((0, 2), "jar"))
-    assert alone[2].model == SPECULAR and alone[2].fit.phi == coat.fit.phi
+    assert alone[2].model == DIELECTRIC and alone[2].fit.phi == coat.fit.phi

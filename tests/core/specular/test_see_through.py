@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.material import TRANSPARENT
+from addon.core.brdf.transparent import TRANSPARENT
 from addon.core.passes.see_through.see_through import look_behind
 from addon.core.pipeline import specular as reflect
 from addon.core.pipeline.specular import fit_specular
@@ -78,7 +78,7 @@ class Room:
 def test_glass(thickness, tau):
     room = Room(thickness)
     material, passed, lit = room.recovered(0.1 + tau * room.behind)
-    assert material.model == TRANSPARENT and material.scores[TRANSPARENT] < 0.2
+    assert material.model == TRANSPARENT and material.scores[TRANSPARENT.name] < 0.2
     assert material.transmission == pytest.approx(tau, abs=0.05)
     assert material.surfaces == pytest.approx(2 if thickness else 1, abs=0.1)
     assert material.opacity == pytest.approx(1 - tau ** (0.5 if thickness else 1), abs=0.05)

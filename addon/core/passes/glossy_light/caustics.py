@@ -4,23 +4,26 @@ A lamp's highlight on a metal is a point of light that one ray in thousands meet
 part of a room's light. So photons are sent from the bright triangles; what they meet that is glossy sends them on by
 its lobe, and where they come to lie they are light. Each carries pi L / (number * density) at first, and on its way
 
-    f <n,wo> / p(wo) = 2 G1(n.wo) F <n,wo>,
+    f <n,wo> / p(wo),    of GGX 2 G1(n.wo) F <n,wo>,
 
-as directions are drawn from the lobe's visible normals (Heitz, JCGT 2018; f = G D F of `brdf`). A glossy thing that is
-itself bright was taken to send its L_d; what of that is its lobe's goes by photons of negative power.
+as directions are drawn from the lobe's visible normals (Heitz, JCGT 2018; f = G D F of `paper.brdf`). A glossy thing
+that is itself bright was taken to send its L_d; what of that is its lobe's goes by photons of negative power.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...brdf import ggx as brdf
+from ...brdf.ggx import GGX, LEAST
+from ...brdf.model import Microfacets
 from ...light.directions import cosine_hemisphere, sobol
 from ...light.emitters import BrightTriangles, sample_bright
 from ...light.field import LightField
 from ...light.less_noise import CELL, GRIDS, cells
+from ...paper.brdf import F
 from ...scene.atlas import Atlas
 from ...scene.tangent_frame import tangent_frame, to_world
 
@@ -37,26 +40,39 @@ the ceiling got up to half of its E taken away for what their rims no longer sen
 ENOUGH = 25
 """Photons in a cell from which on the finer ones inside it begin to count; with twice as many they alone do. Albedo in
 a kitchen, with 25, 50, 100: 28.60, 28.57, 28.52 dB (28.43 with cells of 12 cm alone)."""
-LEAST = 1e-4
-"""Cosine below which a direction runs along the surface."""
 
 
 @dataclass(frozen=True)
-class Lobes:
+class Gloss:
     """What each of the n elements reflects besides its diffuse part.
 
     Attributes
     ----------
-    phi : (n,) float32
+    alpha : (n,) float32
         0: nothing.
     f0 : (n, 3) float32
     inside : (n, 3) float32
         What of the L_d that it is taken to send was its lobe's.
+    microfacets : tuple of Microfacets
+    kind : (n,) int8 or int
+        Which of the `microfacets`.
     """
 
-    phi: np.ndarray
+    alpha: np.ndarray
     f0: np.ndarray
     inside: np.ndarray
+    microfacets: tuple[Microfacets, ...] = (GGX,)
+    kind: np.ndarray | int = 0
+
+    def alike(self, element: np.ndarray) -> Iterator[tuple[np.ndarray, Microfacets, float]]:
+        """Those of glossy elements that have one lobe: indices into `element`, microfacets, alpha."""
+        alpha = self.alpha[element]
+        kind = np.broadcast_to(self.kind, self.alpha.shape)[element]
+        for width in np.unique(alpha[alpha > 0]):
+            for number, microfacets in enumerate(self.microfacets):
+                own = np.flatnonzero((alpha == width) & (kind == number))
+                if len(own):
+                    yield own, microfacets, float(width)
 
 
 @dataclass(frozen=True)
@@ -72,7 +88,7 @@ class _Light:
 
 
 def caustics(
-    room: LightField, bright: BrightTriangles, lobes: Lobes, seed: int = 0, photons: int = PHOTONS, finer: bool = True
+    room: LightField, bright: BrightTriangles, gloss: Gloss, seed: int = 0, photons: int = PHOTONS, finer: bool = True
 ) -> np.ndarray:
     """E by way of glossy reflections of what bright triangles send, less what was taken for it.
 
@@ -80,7 +96,7 @@ def caustics(
     ----------
     room : LightField
         With its lamps. Mirrors stop photons.
-    lobes : Lobes
+    gloss : Gloss
     photons : int
     finer : bool
         Look in finer cells where there are many.
@@ -91,7 +107,7 @@ def caustics(
         Radiance * steradian, for every element; and half the difference of the photons' two halves, the noise in it.
     """
     halves = np.zeros((2, 4, len(room.atlas)), np.float32)  # the photons' power, by channel, and their number
-    if not len(bright) or not lobes.phi.any():
+    if not len(bright) or not gloss.alpha.any():
         return np.zeros((len(room.atlas), 6), np.float32)
     cube = sobol(photons, seed, 5)
     rng = np.random.default_rng([seed, 2])
@@ -104,13 +120,13 @@ def caustics(
         sender = room.lookup(pick.triangle, pick.u, pick.v)
         origin = room.scene.off_surface(pick.point, normal)
         # What of a bright thing's light is its lobe's comes by photons from elsewhere.
-        own = np.maximum(room.radiance[sender] - lobes.inside[sender], 0)
-        sent = _Light(origin, ways, np.concatenate([own, -lobes.inside[sender]], 1) * share)
+        own = np.maximum(room.radiance[sender] - gloss.inside[sender], 0)
+        sent = _Light(origin, ways, np.concatenate([own, -gloss.inside[sender]], 1) * share)
         element, place, at = _met(room, sent)
         _let_fall(fallen, element, sent.power[at, 3:])
         for _ in range(BOUNCES):
             light = _Light(place, sent.direction[at], sent.power[at, :3])
-            sent = _sent_on(room, lobes, element, light, rng)
+            sent = _sent_on(room, gloss, element, light, rng)
             if not len(sent.origin):
                 break
             element, place, at = _met(room, sent)
@@ -133,26 +149,19 @@ def _met(room: LightField, light: _Light) -> tuple[np.ndarray, np.ndarray, np.nd
     return element[at], place, at
 
 
-def _sent_on(room: LightField, lobes: Lobes, element: np.ndarray, light: _Light, rng: np.random.Generator) -> _Light:
+def _sent_on(room: LightField, gloss: Gloss, element: np.ndarray, light: _Light, rng: np.random.Generator) -> _Light:
     """The photons that glossy elements send on."""
-    phi = lobes.phi[element]
-    glossy = np.flatnonzero(phi > 0)
-    element, light, phi = element[glossy], light.part(glossy), phi[glossy]
+    glossy = np.flatnonzero(gloss.alpha[element] > 0)
+    element, light = element[glossy], light.part(glossy)
     normal = room.atlas.normal[element]
     axes = np.stack([*tangent_frame(normal), normal])
     came = -np.einsum("amj,mj->am", axes, light.direction)
     came[2] = np.maximum(came[2], LEAST)
     gone, share = np.zeros_like(came), np.zeros((len(element), 3), np.float32)
-    for width in np.unique(phi):
-        own = np.flatnonzero(phi == width)
-        wi = came[:, own]
-        h = brdf.sample_visible_normal(wi, rng.random((2, len(own), 1), np.float32), float(width))[..., 0]
-        w_h = np.clip((wi * h).sum(0), 0, 1)
-        wo = 2 * w_h * h - wi
-        cosine = np.maximum(wo[2], LEAST)
-        carried = 2 * cosine * brdf.G1(cosine, float(width)) * (wo[2] > LEAST)
-        gone[:, own] = wo
-        share[own] = brdf.F(w_h[:, None], lobes.f0[element[own]]) * carried[:, None]
+    for own, microfacets, alpha in gloss.alike(element):
+        square = rng.random((2, len(own)), np.float32)
+        gone[:, own], w_h, weight = microfacets.reflect(came[:, own], square, alpha)
+        share[own] = F(w_h[:, None], gloss.f0[element[own]]) * weight[:, None]
     alive = np.flatnonzero(share.any(1))
     ways = np.einsum("amj,am->mj", axes[:, alive], gone[:, alive]).astype(np.float32)
     origin = room.scene.off_surface(light.origin[alive], normal[alive])

@@ -13,6 +13,7 @@ from collections.abc import Collection
 
 import numpy as np
 
+from ...brdf.material import ObjectMaterial
 from ...light.emitters import bright_triangles
 from ...light.environment import Environment
 from ...light.field import LightField
@@ -22,11 +23,10 @@ from ...light.less_noise import less_noise
 from ...light.lobes import GRID, reflected_light
 from ...light.over_surface import block_step, finest_spacing
 from ...light.texel_blocks import TexelBlocks
-from ...material import METAL, SPECULAR, ObjectMaterial
 from ...parallel import for_blocks
 from ...progress import Progress, Rounds
 from ...scene.rays import Hits
-from .caustics import Lobes, caustics
+from .caustics import Gloss, caustics
 
 RAYS, LOBE_RAYS = 32, 4
 """Of each place, and of each of its rays that meets something glossy. 64 with 16 came to the same albedo within
@@ -62,17 +62,21 @@ class Excess(LightField):
         self.mirrors = ()  # light is followed over them in the room
         self._lit, self._sources, self._seed = room, bright_triangles(room), seed
         self._inside = specular.copy()
-        self._width = np.zeros(len(room.atlas), np.float32)
-        self._f0 = np.zeros((len(room.atlas), 3), np.float32)
+        alpha, kind = np.zeros(len(room.atlas), np.float32), np.zeros(len(room.atlas), np.int8)
+        self._f0, microfacets = np.zeros((len(room.atlas), 3), np.float32), []
         followed = {mirror.object_id for mirror in room.mirrors}
         for m in materials:
-            if m.model not in (SPECULAR, METAL) or m.object_id in followed:
+            if m.model.microfacets is None or m.object_id in followed:
                 continue
             own = room.atlas.object_id == m.object_id
-            self._width[own] = max(float(m.phi), float(GRID[0]))
-            self._f0[own] = m.f0 if m.model == METAL else m.psi
-            if m.model == METAL:
+            alpha[own] = max(float(m.alpha), float(GRID[0]))
+            if m.model.microfacets not in microfacets:
+                microfacets.append(m.model.microfacets)
+            kind[own] = microfacets.index(m.model.microfacets)
+            self._f0[own] = m.f0
+            if not m.model.has_diffuse:
                 self._inside[own] = room.radiance[own]
+        self._gloss = Gloss(alpha, self._f0, self._inside, tuple(microfacets), kind)
         # What bright triangles send is followed from there.
         self._aimed = self._sources.density[room.atlas.triangle] > 0
         self._room = room.with_light(np.where(self._aimed[:, None], 0, room.radiance))
@@ -81,27 +85,25 @@ class Excess(LightField):
     @property
     def any(self) -> bool:
         """Whether there is anything glossy at all."""
-        return bool(self._width.any())
+        return bool(self._gloss.alpha.any())
 
     def from_bright(self, finer: bool = True) -> np.ndarray:
         """The part of the excess that starts at bright triangles, and its noise, at every element (`caustics`)."""
-        return caustics(self._lit, self._sources, Lobes(self._width, self._f0, self._inside), self._seed, finer=finer)
+        return caustics(self._lit, self._sources, self._gloss, self._seed, finer=finer)
 
     def arriving(
         self, hits: Hits, element: np.ndarray, directions: np.ndarray, dark_in_mirrors: np.ndarray | None = None
     ) -> np.ndarray:
         """As `LightField.arriving`; what is behind a surface gets nothing from it."""
         result = np.zeros((len(element), 3), np.float32)
-        width = np.where(element >= 0, self._width[element], 0)
         towards = np.einsum("ij,ij->i", directions, self._room.atlas.normal[element]) < 0
-        for phi in np.unique(width[width > 0]):
-            at = np.flatnonzero((width == phi) & towards)
-            if not len(at):
-                continue
+        met = np.flatnonzero((element >= 0) & towards)
+        for alike, microfacets, alpha in self._gloss.alike(element[met]):
+            at = met[alike]
             own = element[at]
             light = reflected_light(
-                self._room, self._bright, own, -directions[at], rays=LOBE_RAYS, grid=np.float32([phi]),
-                proposals=(float(phi),), threads=1, seed=self._seed + int(at[0]) + len(at),
+                self._room, self._bright, own, -directions[at], rays=LOBE_RAYS, grid=np.float32([alpha]),
+                proposals=(alpha,), microfacets=microfacets, threads=1, seed=self._seed + int(at[0]) + len(at),
             )  # fmt: skip
             taken = np.where(self._aimed[own, None], 0, self._inside[own])
             result[at] = self._f0[own] * light.A[:, 0] + light.B[:, 0] - taken

@@ -10,11 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...brdf.dielectric import DIELECTRIC, MOST_F0, USUAL_F0
+from ...brdf.metal import METAL
 from ...fit.layout import Problem
 from ...fit.lobe_fit import LobeFit
-from ...material import METAL, SPECULAR
-from .models import METAL_PSI, Choice, metal_f0
-from .one_colour import DIELECTRIC_PSI, Coated, OneColour
+from .models import Choice, metal_f0
+from .one_colour import Coated, OneColour
 
 LOOKS, LOOKS_SIGMAS = 0.9, 3.0
 """An object of one colour is metal if that leaves less than this share of the spread that matt and dielectric leave, by
@@ -44,7 +45,7 @@ def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice
     if looks.other < LOOKS_SPREAD or looks.ratio > LOOKS or looks.sigmas < LIKELY_SIGMAS:
         return choice
     f0 = metal_f0(problem, looks.phi)
-    if f0.min() <= METAL_PSI:  # no metal is that dark in any channel, gold has .3 in blue; reddish wood had .06
+    if f0.min() <= MOST_F0:  # no metal is that dark in any channel, gold has .3 in blue; reddish wood had .06
         return choice
     fit = _fit(looks.phi, f0, looks.metal, looks.matt)
     if looks.sigmas < LOOKS_SIGMAS:
@@ -57,16 +58,16 @@ def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice
 
 
 def coated_by_looks(choice: Choice, looks: Coated) -> Choice:
-    """A Lambertian object's choice, SPECULAR where one colour under a coat explains all of its surface far better."""
+    """A Lambertian object's choice, DIELECTRIC where one colour under a coat explains all of its surface far better."""
     least, most = COATED_SPREAD
     if looks.matt < least or looks.coated > most or looks.ratio > COATED or looks.sigmas < COATED_SIGMAS:
         return choice
-    fit = _fit(looks.phi, np.full(3, DIELECTRIC_PSI), looks.coated, looks.matt)
+    fit = _fit(looks.phi, np.full(3, USUAL_F0), looks.coated, looks.matt)
     note = (
         f"Its radiance spreads by {looks.coated:.2f} about that of one colour under a coat, by {looks.matt:.2f} about "
         "a matt one's."
     )
-    return replace(choice, model=SPECULAR, fit=fit, gain=1 - looks.ratio, sigmas=looks.sigmas, note=note, looks=looks)
+    return replace(choice, model=DIELECTRIC, fit=fit, gain=1 - looks.ratio, sigmas=looks.sigmas, note=note, looks=looks)
 
 
 def _fit(phi: float, psi: np.ndarray, spread: float, matt: float) -> LobeFit:

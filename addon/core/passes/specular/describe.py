@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...brdf.emitter import EMITTER, LAMP_ALBEDO
+from ...brdf.material import ObjectMaterial
+from ...brdf.metal import METAL
 from ...fit.layout import Problem
 from ...light.mirrors import Mirror
-from ...material import EMITTER, LAMBERTIAN, LAMP_ALBEDO, METAL, TRANSPARENT, ObjectMaterial
-from ...overrides import Given
+from ...results.overrides import Given
 from ...scene.model import Instance
 from .given import given_interval, given_note
 from .intervals import GlossInterval
@@ -37,7 +39,7 @@ def flat_mirror(instance: Instance, mirror: Mirror, observations: int) -> Object
     """The description of a mirror that was found before the shading, or that the capture tells of."""
     note = "A flat mirror: the frames show the room in it." if observations else "A flat mirror, as the capture tells."
     return ObjectMaterial(
-        instance.object_id, instance.class_name, METAL, phi=0.0, f0=tuple(float(x) for x in mirror.f0),
+        instance.object_id, instance.class_name, METAL, alpha=0.0, f0=METAL.as_f0(mirror.f0),
         observations=observations, roughness_low=0.0, roughness_high=UNRESOLVED if observations else 0.0, note=note,
     )  # fmt: skip
 
@@ -62,31 +64,28 @@ def described(
         "scores": choice.scores,
         "note": choice.note,
     }
-    if choice.model == TRANSPARENT:
+    if choice.see_through is not None:
         found = choice.see_through
         return ObjectMaterial(
             **common, transmission=found.transmission, surfaces=None if found.cut_out else found.surfaces
         )
-    if choice.model == LAMBERTIAN:
+    if not choice.model.has_lobe:
         return ObjectMaterial(**(common | {"residual": common["residual_lambertian"]}))
-    if choice.model == METAL:
-        f0 = fit.psi if problem is None else metal_f0(problem, fit.phi)
-        return ObjectMaterial(**common, phi=fit.phi, f0=tuple(float(x) for x in f0))
-    return ObjectMaterial(**common, phi=fit.phi, psi=float(fit.psi.mean()))
+    f0 = metal_f0(problem, fit.phi) if choice.model.lobe_alone and problem is not None else fit.psi
+    return ObjectMaterial(**common, alpha=fit.phi, f0=choice.model.as_f0(f0))
 
 
 def as_given(found: ObjectMaterial, given: Given, choice: Choice) -> ObjectMaterial:
     """The description of an object of which something was given."""
     note = given_note(given)
-    if choice.model == LAMBERTIAN:  # that there is no highlight is known, and what it would be like does not apply
+    if not choice.model.has_lobe:  # that there is no highlight is known, and what it would be like does not apply
         return replace(found, roughness_low=None, roughness_high=None, specular_low=0.0, specular_high=0.0, note=note)
     sure = given_interval(given, choice, GlossInterval(
         (found.roughness_low, found.roughness_high), (found.specular_low, found.specular_high)))  # fmt: skip
-    f0 = tuple(float(x) for x in choice.fit.psi) if choice.model == METAL else None
-    psi = found.psi if given.f0 is None or choice.model == METAL else float(np.mean(given.f0))
+    f0 = choice.model.as_f0(choice.fit.psi if given.f0 is None else given.f0)
     fitted = choice.fit.residual > 0
     return replace(
-        found, psi=psi, f0=f0, note=note, residual=found.residual if fitted else None,
+        found, f0=f0, note=note, residual=found.residual if fitted else None,
         residual_lambertian=found.residual_lambertian if fitted else None,
         roughness_low=sure.roughness[0], roughness_high=sure.roughness[1],
         specular_low=sure.specular[0], specular_high=sure.specular[1],

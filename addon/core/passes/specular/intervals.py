@@ -11,10 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...brdf.dielectric import MOST_F0
+from ...brdf.material import Z90
+from ...brdf.model import Brdf
 from ...fit.layout import Layout, Problem
 from ...fit.lobe_fit import fit_lobe
-from ...material import METAL, SPECULAR, Z90
-from .models import HOW, METAL_PSI, Choice
+from .models import Choice
 
 GROUPS = 6
 ROUGHNESS_SYSTEMATIC = 0.07
@@ -46,27 +48,27 @@ class GlossInterval:
     specular: tuple[float, float]
 
 
-UNKNOWN = GlossInterval((0.0, 1.0), (0.0, METAL_PSI))
+UNKNOWN = GlossInterval((0.0, 1.0), (0.0, MOST_F0))
 """Any roughness, and any dielectric's reflectance."""
 
 
 def gloss_interval(choice: Choice, problem: Problem | None) -> GlossInterval:
     """The intervals of what was chosen for an object, from the observations that it was fitted to."""
-    if choice.model not in (SPECULAR, METAL) or choice.fit is None:
+    if not choice.model.has_lobe or choice.fit is None:
         return UNKNOWN
     roughness, specular = float(np.sqrt(choice.fit.phi)), max(float(np.mean(choice.fit.psi)), 1e-4)
     own = choice.sigmas > 0 and problem is not None and choice.looks is None
     spread = jackknife(problem, choice.model) if own else (0.0, 0.0)
     known = LOOKS if choice.looks is not None else ROUGHNESS_SYSTEMATIC if own else ADOPTED
     width = Z90 * float(np.hypot(spread[0], known))
-    systematic = METAL_SYSTEMATIC if choice.model == METAL else SPECULAR_SYSTEMATIC
+    systematic = METAL_SYSTEMATIC if choice.model.lobe_alone else SPECULAR_SYSTEMATIC
     factor = float(np.exp(Z90 * np.hypot(min(spread[1] / specular, 1.0), systematic)))
     return GlossInterval(
         (max(roughness - width, 0.0), min(roughness + width, 1.0)), (specular / factor, min(specular * factor, 1.0))
     )
 
 
-def jackknife(problem: Problem, model: str) -> tuple[float, float]:
+def jackknife(problem: Problem, model: Brdf) -> tuple[float, float]:
     """Standard errors of roughness and psi of a model's fit, as far as elements differ."""
     layout = Layout(problem)
     count = layout.there.shape[1]
@@ -74,7 +76,7 @@ def jackknife(problem: Problem, model: str) -> tuple[float, float]:
     if groups < 3:
         return 0.3, 0.3
     group = np.arange(count) * groups // count
-    fits = [fit_lobe(layout.part(group != left_out), **HOW[model]) for left_out in range(groups)]
+    fits = [fit_lobe(layout.part(group != left_out), constraints=model.constraints) for left_out in range(groups)]
     found = np.array([(np.sqrt(fit.phi), fit.psi.mean()) for fit in fits])
     error = np.sqrt((groups - 1) / groups * np.square(found - found.mean(0)).sum(0))
     return float(error[0]), float(error[1])

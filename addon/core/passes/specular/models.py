@@ -6,22 +6,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ...brdf.dielectric import DIELECTRIC, MOST_F0
+from ...brdf.lambertian import LAMBERTIAN
+from ...brdf.metal import METAL
+from ...brdf.model import Brdf
+from ...brdf.transparent import TRANSPARENT
 from ...fit.layout import Layout, Problem
-from ...fit.lobe_fit import LobeFit, Prior, element_costs, fit_lobe, held_out_costs, huber, solve
+from ...fit.lobe_fit import LobeFit, element_costs, fit_lobe, held_out_costs, huber, solve
 from ...fit.transmission import SeeThrough
 from ...light.lobes import nearest
-from ...material import LAMBERTIAN, METAL, SPECULAR, TRANSPARENT
 from ...weighted import weighted_median
-from .one_colour import BROADEST_PHI, DIELECTRIC_PSI, Coated, OneColour
+from .one_colour import BROADEST_PHI, Coated, OneColour
 
-LEAST_PSI = 0.02
-"""No solid dielectric reflects less at normal incidence (n = 1.33); a smaller fitted psi is no lobe at all."""
-DIELECTRIC = Prior(DIELECTRIC_PSI, 0.01)
-"""Plastics, lacquers, glass and woods have n = 1.4 to 1.6, F0 = 0.03 to 0.05. A broad lobe can be a little broader and
-much stronger for nearly the same frames (living room's panels: phi 0.39 with psi 0.05 or 0.45 with 0.1): there this
-decides; where the frames tell, they outweigh it."""
-METAL_PSI = 0.12
-"""No common dielectric reflects more (n = 2.06); what does is a metal or a mirror."""
 BARE = 2.0
 """A metal has no diffuse part. Its lobe alone, with nothing of each element's own, may cost up to so many times what
 each element's own mean does (errors of the light field and of the mesh): metals in the living room had 0.1 to 1.4,
@@ -29,8 +25,6 @@ dielectrics and matt things whose lobe looked like a metal's 2.4 to 60, there an
 BARE_AT_MOST, MUCH = 3.0, 0.2
 """The same where a metal takes away more than this share of what a matt surface costs, and of what a dielectric does:
 thin legs of steel, 32 elements in 5 views, had 2.4."""
-HOW = {SPECULAR: {"least_psi": LEAST_PSI, "prior": DIELECTRIC}, METAL: {"coloured": True}}
-"""What `fit_lobe` is told of each model."""
 MIN_GAIN = 0.02
 MIN_SIGMAS = 3.0
 """A lobe must lower the cost on elements that its fit has not seen by this share, and by this many standard errors."""
@@ -54,8 +48,7 @@ class Choice:
 
     Attributes
     ----------
-    model : str
-        LAMBERTIAN, SPECULAR, METAL or TRANSPARENT.
+    model : Brdf
     fit : LobeFit or None
         The best lobe, also where it was not taken; None if there was too little to fit.
     gain : float
@@ -67,7 +60,7 @@ class Choice:
         Cost on held-out elements relative to the Lambertian's, of each model that was tried.
     """
 
-    model: str
+    model: Brdf
     fit: LobeFit | None
     gain: float = 0.0
     sigmas: float = 0.0
@@ -100,12 +93,12 @@ def gain_of(fit: LobeFit, held: Problem) -> tuple[float, float]:
 
 def _dielectric(fit: LobeFit) -> bool:
     """Whether a dielectric can have this lobe, and frames can tell it from a diffuse part."""
-    return fit.psi[0] <= METAL_PSI and fit.phi <= BROADEST_PHI
+    return fit.psi[0] <= MOST_F0 and fit.phi <= BROADEST_PHI
 
 
 def _metallic(fit: LobeFit) -> bool:
     """Whether this lobe is too strong for a dielectric, and frames can tell it from a diffuse part."""
-    return float(fit.psi.mean()) > METAL_PSI and fit.phi <= BROADEST_PHI
+    return float(fit.psi.mean()) > MOST_F0 and fit.phi <= BROADEST_PHI
 
 
 def _bare_metal(problem: Problem, layout: Layout, phi: float, fit: LobeFit, scale: float) -> tuple[LobeFit, np.ndarray]:
@@ -119,7 +112,7 @@ def _bare_metal(problem: Problem, layout: Layout, phi: float, fit: LobeFit, scal
 
 def metal_fit(problem: Problem, layout: Layout) -> LobeFit:
     """The lobe of what is known to be a metal: the one over a diffuse part if it is a metal's, else the lobe alone."""
-    metal = fit_lobe(layout, **HOW[METAL])
+    metal = fit_lobe(layout, constraints=METAL.constraints)
     if _metallic(metal):
         return metal
     widths = layout.grid[layout.grid <= BROADEST_PHI] if len(layout.grid) > 1 else layout.grid
@@ -127,17 +120,18 @@ def metal_fit(problem: Problem, layout: Layout) -> LobeFit:
     return min((_bare_metal(problem, layout, phi, metal, scale) for phi in widths), key=lambda one: one[1].sum())[0]
 
 
-def _of_class(own: LobeFit, of_class: LobeFit, model: str, problem: Problem | None) -> LobeFit:
+def _of_class(own: LobeFit, of_class: LobeFit, model: Brdf, problem: Problem | None) -> LobeFit:
     """An object's own lobe where it explains its frames better than that of its class does, beyond doubt; else that.
 
     A metal's F0 is its own in either.
     """
-    shared = replace(own, phi=of_class.phi, psi=own.psi if model == METAL else of_class.psi)
+    shared = replace(own, phi=of_class.phi, psi=own.psi if model.lobe_alone else of_class.psi)
     if problem is None:
         return shared
     layout, scale = Layout(problem), max(1.4826 * own.residual, 1e-4)
-    if model == METAL:
-        shared = replace(shared, psi=solve(layout, layout.at(shared.phi), own.kappa, scale, **HOW[METAL]).psi[:, 0])
+    if model.lobe_alone:
+        solved = solve(layout, layout.at(shared.phi), own.kappa, scale, constraints=model.constraints)
+        shared = replace(shared, psi=solved.psi[:, 0])
     (with_own, _), (with_shared, _) = (element_costs(layout, fit, scale) for fit in (own, shared))
     gain, sigmas = _gain(with_own, with_shared)
     return own if gain > MIN_GAIN and sigmas > MIN_SIGMAS else shared
@@ -150,22 +144,22 @@ def choose_model(problem: Problem) -> Choice:
     layout = Layout(problem)
     odd = (np.random.default_rng(0).permutation(layout.there.shape[1]) % 2).astype(bool)
 
-    def held_out(fit: LobeFit, model: str) -> tuple[np.ndarray, np.ndarray]:
+    def held_out(fit: LobeFit, model: Brdf) -> tuple[np.ndarray, np.ndarray]:
         """Costs of the elements with the lobe that the others gave, and without one."""
-        found = [held_out_costs(layout, fit, train, scale, **HOW[model]) for train in (odd, ~odd)]
+        found = [held_out_costs(layout, fit, train, scale, model.constraints) for train in (odd, ~odd)]
         with_lobe, without = (np.concatenate(costs) for costs in zip(*found, strict=True))
         return with_lobe, without
 
-    fit = fit_lobe(layout, **HOW[SPECULAR])
+    fit = fit_lobe(layout, constraints=DIELECTRIC.constraints)
     scale = max(1.4826 * fit.residual, 1e-4)
-    with_lobe, without = held_out(fit, SPECULAR)
-    scores = {LAMBERTIAN: 1.0, SPECULAR: float(with_lobe.sum() / max(without.sum(), 1e-30))}
+    with_lobe, without = held_out(fit, DIELECTRIC)
+    scores = {LAMBERTIAN.name: 1.0, DIELECTRIC.name: float(with_lobe.sum() / max(without.sum(), 1e-30))}
     gain, sigmas = _gain(with_lobe, without)
     large = gain > LARGE_GAIN and layout.there.shape[1] >= LARGE_ELEMENTS
     sure = gain > MIN_GAIN and sigmas > (LARGE_SIGMAS if large else MIN_SIGMAS) and fit.phi <= BROADEST_PHI
     # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
-    dielectric = replace(fit, psi=np.minimum(fit.psi, METAL_PSI))
-    metal, likely = fit_lobe(layout, **HOW[METAL]), None
+    dielectric = replace(fit, psi=np.minimum(fit.psi, MOST_F0))
+    metal, likely = fit_lobe(layout, constraints=METAL.constraints), None
     found = [(metal, *held_out(metal, METAL))] if _metallic(metal) else []
     # Errors of the light draw psi down where each element has a diffuse part of its own; without one they don't.
     bare = min(
@@ -176,7 +170,7 @@ def choose_model(problem: Problem) -> Choice:
     found += [(*bare, without)] if with_bare else []
     no_diffuse = with_bare and bool(bare[1].sum() <= BARE * without.sum())
     for fit_of_metal, with_metal, matt in found:
-        scores[METAL] = min(float(with_metal.sum() / max(matt.sum(), 1e-30)), scores.get(METAL, np.inf))
+        scores[METAL.name] = min(float(with_metal.sum() / max(matt.sum(), 1e-30)), scores.get(METAL.name, np.inf))
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
         (less, by), (more, surely) = _gain(with_metal, matt), _gain(with_metal, with_lobe)
         most = BARE_AT_MOST if min(less, more) > MUCH else BARE
@@ -188,14 +182,14 @@ def choose_model(problem: Problem) -> Choice:
         if min(less, more) > MIN_GAIN and likely is None:
             likely = fit_of_metal
     if sure:
-        return Choice(SPECULAR, dielectric, gain, sigmas, scores=scores, metal=likely, bare=no_diffuse)
+        return Choice(DIELECTRIC, dielectric, gain, sigmas, scores=scores, metal=likely, bare=no_diffuse)
     note = "Roughness and specular are not identifiable from these frames."
     return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores, metal=likely, bare=no_diffuse)
 
 
 def set_apart(choice: Choice, found: SeeThrough, sure: bool) -> Choice:
     """An object's choice, TRANSPARENT where its frames `sure`ly show what is behind it."""
-    scores = choice.scores | {TRANSPARENT: found.score}
+    scores = choice.scores | {TRANSPARENT.name: found.score}
     if not sure:
         return replace(choice, scores=scores)
     what = (
@@ -221,40 +215,41 @@ def adopt_from_class(
     no ray finds it, and looks like anything, but not like diffuse light. Among dielectrics, one that is a metal no more
     surely than it is one of them is one of them.
     """
-    result, choices = dict(choices), {i: choice for i, choice in choices.items() if choice.model != TRANSPARENT}
+    result, choices = dict(choices), {i: choice for i, choice in choices.items() if not choice.model.see_through}
     for name in sorted(set(class_of[object_id] for object_id in choices)):
         members = {i: choice for i, choice in choices.items() if class_of[i] == name}
-        if all(choice.model == LAMBERTIAN for choice in members.values()):
+        if not any(choice.model.has_lobe for choice in members.values()):
             together = _together(members)
             members, result = members | together, result | together
-        found = {i: choice for i, choice in members.items() if choice.model != LAMBERTIAN}
+        found = {i: choice for i, choice in members.items() if choice.model.has_lobe}
         if not found:
             continue
         # What a metal explains as well says nothing against metals of its class; looks alone judge none with a lobe.
-        views = any(one.model == METAL and one.looks is None for one in found.values())
+        views = any(one.model.lobe_alone and one.looks is None for one in found.values())
         judges = {i: one for i, one in found.items() if not isinstance(one.looks, Coated)} or found
         clear = {
             i for i, one in judges.items()
-            if not (one.dielectric if one.model == METAL else one.metal or views and one.bare)
+            if not (one.dielectric if one.model.lobe_alone else one.metal or views and one.bare)
         }  # fmt: skip
         source = max(sorted(clear) or judges, key=lambda i: found[i].sigmas)
-        model = _pooled([c for c in judges.values() if c.model == found[source].model], found[source])
+        model = _pooled([c for c in judges.values() if c.model is found[source].model], found[source])
         for i, choice in members.items():
-            if model.model == METAL != choice.model and choice.metal is not None:
+            turns = model.model.lobe_alone and not choice.model.lobe_alone
+            if turns and choice.metal is not None:
                 note = "Not beyond doubt by itself; others of its class are metal."
-                fit = _of_class(choice.metal, model.fit, METAL, problems.get(i))
-                result[i] = replace(choice, model=METAL, fit=fit, note=note)
-            elif model.model == METAL != choice.model and choice.bare and (views or choice.model == LAMBERTIAN):
+                fit = _of_class(choice.metal, model.fit, model.model, problems.get(i))
+                result[i] = replace(choice, model=model.model, fit=fit, note=note)
+            elif turns and choice.bare and (views or not choice.model.has_lobe):
                 note = f"Needs no diffuse part, like object {source} of its class, which is metal."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
-            elif model.model == SPECULAR and choice.dielectric is not None:
+            elif model.model.layered and choice.dielectric is not None:
                 note = "Like a metal, but not beyond doubt; others of its class are not."
-                fit = _of_class(choice.dielectric, model.fit, SPECULAR, problems.get(i))
-                result[i] = replace(choice, model=SPECULAR, fit=fit, note=note)
-            elif choice.model == LAMBERTIAN and not _refused(model.fit, choice.fit, problems.get(i)):
+                fit = _of_class(choice.dielectric, model.fit, model.model, problems.get(i))
+                result[i] = replace(choice, model=model.model, fit=fit, note=note)
+            elif not choice.model.has_lobe and not _refused(model.fit, choice.fit, problems.get(i)):
                 note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
-            elif choice.model == model.model and len(found) > 1 and i in problems:
+            elif choice.model is model.model and len(found) > 1 and i in problems:
                 result[i] = replace(choice, fit=_of_class(choice.fit, model.fit, model.model, problems[i]))
     return result
 
@@ -270,7 +265,7 @@ def _together(members: dict[int, Choice]) -> dict[int, Choice]:
     if len(judged) < 2 or sum(counted) / np.sqrt(len(judged)) <= MIN_SIGMAS:
         return {}
     return {
-        i: replace(choice, model=SPECULAR, note="Sure of its lobe together with others of its class.")
+        i: replace(choice, model=DIELECTRIC, note="Sure of its lobe together with others of its class.")
         for i, choice in judged.items()
         if choice.gain > MIN_GAIN and _dielectric(choice.fit)
     }

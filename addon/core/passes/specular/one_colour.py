@@ -16,12 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...brdf.dielectric import USUAL_F0
 from ...fit.layout import Problem
 from ...fit.lobe_fit import robust_scale
 from ...luminance import LUMINANCE
 
-DIELECTRIC_PSI = 0.04
-"""What a dielectric of one colour reflects at normal incidence (n = 1.5)."""
 BROADEST_PHI = 0.5
 """A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface."""
 LEAST_OBSERVATIONS = 40
@@ -159,7 +158,7 @@ def _told(problem: Problem, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 def _coat(problem: Problem, at: int) -> np.ndarray:
     """Radiance (m, 3) of a dielectric's lobe, of the width at index `at` of the grid."""
-    return DIELECTRIC_PSI * problem.light.A[:, at] + problem.light.B[:, at]
+    return USUAL_F0 * problem.light.A[:, at] + problem.light.B[:, at]
 
 
 def _one_colour(seen: np.ndarray, E: np.ndarray, coat: np.ndarray) -> np.ndarray:

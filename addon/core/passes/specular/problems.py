@@ -6,13 +6,16 @@ from collections.abc import Collection
 
 import numpy as np
 
+from ...brdf.dielectric import USUAL_F0
+from ...brdf.ggx import GGX
+from ...brdf.model import Microfacets
 from ...fit.layout import Problem
 from ...light.emitters import bright_triangles
 from ...light.field import LightField
 from ...light.lobes import LobeLight, reflected_light
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.samples import Samples
-from .one_colour import BROADEST_PHI, DIELECTRIC_PSI
+from .one_colour import BROADEST_PHI
 
 NOISY, AGAIN, NARROWEST_PHI = 0.2, 8, 0.02
 """Noise of a dielectric's lobe, as a share of the radiance, from which on an observation gets so many times more rays.
@@ -84,13 +87,20 @@ class Problems:
         first, last = np.searchsorted(self._owner, [object_id, object_id + 1])
         return pick(self._samples, self._usable[first:last], elements, views, least, self._seed + seed)
 
-    def light(self, index: np.ndarray, rays: int, phi: float | None = None, rough: bool = False) -> LobeLight:
+    def light(
+        self,
+        index: np.ndarray,
+        rays: int,
+        phi: float | None = None,
+        rough: bool = False,
+        microfacets: Microfacets = GGX,
+    ) -> LobeLight:
         """A and B of observations: for the whole grid, or for the one width `phi` with rays of that width.
 
         Those that come out noisy are done again with more rays, unless it need only be `rough`.
         """
         how = {} if phi is None else {"grid": np.float32([phi]), "proposals": (phi,)}
-        how |= {"threads": self._threads, "seed": self._seed}
+        how |= {"threads": self._threads, "seed": self._seed, "microfacets": microfacets}
 
         def light(some: np.ndarray, count: int) -> LobeLight:
             element, direction = self._samples.element[some], self._samples.direction[some]
@@ -106,12 +116,19 @@ class Problems:
         """The elements of observations."""
         return self._samples.element[index]
 
-    def problem(self, index: np.ndarray, rays: int, rough: bool = False, phi: float | None = None) -> Problem:
+    def problem(
+        self,
+        index: np.ndarray,
+        rays: int,
+        rough: bool = False,
+        phi: float | None = None,
+        microfacets: Microfacets = GGX,
+    ) -> Problem:
         """The fit's problem over observations (see `light`)."""
         element = self._samples.element[index]
         cosine = np.einsum("ij,ij->i", self._field.atlas.normal[element], self._samples.direction[index])
         radiance = self._samples.radiance[index]
-        light = self.light(index, rays, phi, rough)
+        light = self.light(index, rays, phi, rough, microfacets)
         light = light.as_exact() if "ray-noise" in self._without else light
         return Problem(element, radiance, self._lit.radiance[element], light, cosine, frozenset(self._without))
 
@@ -119,5 +136,5 @@ class Problems:
 def _noise(light: LobeLight, radiance: np.ndarray) -> np.ndarray:
     """Noise of a dielectric's lobe as a share of the radiance, (m,), at the width that has most of it."""
     widths = np.flatnonzero((light.grid >= NARROWEST_PHI) & (light.grid <= BROADEST_PHI))
-    noise = DIELECTRIC_PSI * light.A_noise[:, widths] + light.B_noise[:, widths]
+    noise = USUAL_F0 * light.A_noise[:, widths] + light.B_noise[:, widths]
     return np.abs(noise).mean(2).max(1, initial=0) / np.maximum(radiance.mean(1), 1e-12)

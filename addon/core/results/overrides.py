@@ -16,20 +16,16 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from .errors import BadInputError
-from .json_values import is_number, key
-from .material import EMITTER, LAMBERTIAN, METAL, SPECULAR
+from ..brdf.model import Brdf
+from ..brdf.registry import find, models
+from ..errors import BadInputError
+from ..json_values import is_number, key
 
 OVERRIDES = "overrides.json"
-MODELS = (LAMBERTIAN, SPECULAR, METAL, EMITTER)
-"""Those that can be given."""
 LOBE = ("model", "roughness", "f0")
 """What describes a highlight, and `same_as` takes from another object."""
-HAS_NO: dict[str | None, tuple[str, ...]] = {
-    LAMBERTIAN: ("roughness", "f0"),
-    EMITTER: ("roughness", "f0", "base_color"),
-}
-"""What some models do not have."""
+VALUES = ("roughness", "f0", "base_color")
+"""What can be given of a model; not every one has all of them (`Brdf.parameters`)."""
 Colour = tuple[float, float, float]
 
 
@@ -40,7 +36,7 @@ class Given:
     Attributes
     ----------
     model : str or None
-        One of `MODELS`.
+        Name of one that can be given.
     roughness : float or None
         Blender's, 0...1: the square root of phi.
     f0 : float or (3,) tuple of float or None
@@ -63,9 +59,14 @@ class Given:
         return bool(self.as_dict())
 
     @property
+    def brdf(self) -> Brdf | None:
+        """The model itself."""
+        return find(self.model)
+
+    @property
     def lobe(self) -> Given:
         """What of it bears on the fit of the highlight; a metal's colour is its F0."""
-        f0 = self.base_color if self.f0 is None and self.model == METAL else self.f0
+        f0 = self.base_color if self.f0 is None and self.brdf is not None and self.brdf.lobe_alone else self.f0
         return replace(self, f0=f0, base_color=None)
 
     def as_dict(self) -> dict[str, Any]:
@@ -162,8 +163,8 @@ def merge(older: Overrides, newer: Overrides) -> Overrides:
         given = one.as_dict()
         outdated: tuple[str, ...] = LOBE if "same_as" in given else ("same_as",) if given.keys() & set(LOBE) else ()
         if "model" in given:
-            outdated += HAS_NO.get(given["model"], ())
-        elif given.keys() & set(HAS_NO.get(objects.get(object_id, NOTHING).model, ())):
+            outdated += _has_no(given["model"])
+        elif given.keys() & set(_has_no(objects.get(object_id, NOTHING).model)):
             outdated += ("model",)  # a highlight is given now, so it is matt no longer
         was = replace(objects.get(object_id, NOTHING), **dict.fromkeys(outdated))
         objects[object_id] = replace(was, **{name: getattr(one, name) for name in given})
@@ -264,6 +265,12 @@ def parse(told: Any, name: str, known: Iterable[int]) -> Overrides:
     return found
 
 
+def _has_no(model: str | None) -> tuple[str, ...]:
+    """What a model does not have of what can be given."""
+    brdf = find(model)
+    return () if brdf is None else tuple(name for name in VALUES if name not in brdf.parameters)
+
+
 def _given(object_id: int, entry: Any, known: set[int], name: str) -> tuple[Given, list[str]]:
     where = f"{name}, object {object_id}"
     _keys(entry, tuple(one.name for one in fields(Given)), where)
@@ -271,8 +278,9 @@ def _given(object_id: int, entry: Any, known: set[int], name: str) -> tuple[Give
     said = {key: value for key, value in entry.items() if value is not None}
     found: dict[str, Any] = {}
     if (model := said.get("model")) is not None:
-        if model not in MODELS:
-            raise BadInputError(f"{where}: 'model' is {model!r}; give one of {', '.join(MODELS)}.")
+        allowed = [one.name for one in models() if one.can_be_given]
+        if model not in allowed:
+            raise BadInputError(f"{where}: 'model' is {model!r}; give one of {', '.join(allowed)}.")
         found["model"] = model
     if "roughness" in said:
         found["roughness"] = _share(said["roughness"], f"{where}: 'roughness'")
@@ -285,7 +293,7 @@ def _given(object_id: int, entry: Any, known: set[int], name: str) -> tuple[Give
     also = [key for key in LOBE if key in said]
     if "same_as" in said and also:
         raise BadInputError(f"{where}: 'same_as' brings the other object's {also[0]}; leave one of the two out.")
-    for name_of in HAS_NO.get(model, ()):
+    for name_of in _has_no(model):
         if name_of in said:
             raise BadInputError(f"{where}: model '{model}' has no '{name_of}'; leave one of the two out.")
     return Given(**found), gone

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields
 from typing import Any
 
-from .naming import object_name
+import numpy as np
 
-LAMBERTIAN = "lambertian"
-SPECULAR = "specular"
-METAL = "metal"
-EMITTER = "emitter"
-TRANSPARENT = "transparent"
-MODELS = (LAMBERTIAN, SPECULAR, METAL, EMITTER, TRANSPARENT)
-LAMP_ALBEDO = 0.5
-"""What a lamp reflects can't be told under its own light. Shades and diffusers are white to grey: with its light off a
-lamp shows this grey. Black, it is a hole in the room (living room, lamps off: 1 % of the pixels, half of the error)."""
+from ..naming import object_name
+from .lambertian import LAMBERTIAN
+from .model import F0, Brdf
+from .registry import named
+from .transparent import opacity
+
 Z90 = 1.645
 """A 90 % interval is the value -+ this many standard errors."""
 
@@ -28,16 +26,12 @@ class ObjectMaterial:
     ----------
     object_id : int
     class_name : str
-    model : str
-        One of `MODELS`. 'lambertian': diffuse albedo alone. 'specular': diffuse albedo under the seed's microfacet
-        lobe. 'metal': the lobe alone, coloured. 'emitter': gives light; its albedo is unknown. 'transparent': shows
-        what lies behind it, as glass, or is cut out by a mask that the mesh does not have; set apart, not modelled.
-    phi : float or None
-        GGX alpha of the lobe, 0...1 (Blender's Roughness is its square root). None where there is no lobe.
-    psi : float or None
-        Specular: reflectance at normal incidence (F0), 0...1.
-    f0 : (3,) tuple of float or None
-        Metal only: coloured F0, linear Rec.709.
+    model : Brdf
+        By its name in JSON.
+    alpha : float or None
+        GGX's alpha of the lobe, 0...1 (Blender's Roughness is its square root). None where there is no lobe.
+    f0 : float, (3,) tuple of float or None
+        The lobe's reflectance at normal incidence, 0...1; three numbers, linear Rec.709, of a metal.
     emission : (3,) tuple of float or None
         Emitter only: the radiance that it gives of itself, linear Rec.709; what it reflects, as a grey of
         `LAMP_ALBEDO`, comes on top.
@@ -54,9 +48,9 @@ class ObjectMaterial:
     observations : int
         Pixels that the fit used.
     roughness_low, roughness_high : float or None
-        90 % interval of Blender's roughness, sqrt(phi); 0 and 1 where it is not identifiable. None for emitters.
+        90 % interval of Blender's roughness, sqrt(alpha); 0 and 1 where it is not identifiable. None for emitters.
     specular_low, specular_high : float or None
-        The same of psi, or of a metal's mean F0; all that a dielectric can have where it is not identifiable.
+        The same of F0, of a metal in the mean; all that a dielectric can have where it is not identifiable.
     scores : dict of str to float
         Cost on observations that the fit has not seen, relative to the Lambertian's, of each model that was tried:
         below 1 is better.
@@ -70,10 +64,9 @@ class ObjectMaterial:
 
     object_id: int
     class_name: str
-    model: str
-    phi: float | None = None
-    psi: float | None = None
-    f0: tuple[float, float, float] | None = None
+    model: Brdf
+    alpha: float | None = None
+    f0: F0 | None = None
     emission: tuple[float, float, float] | None = None
     transmission: float | None = None
     surfaces: float | None = None
@@ -98,9 +91,37 @@ class ObjectMaterial:
     @property
     def opacity(self) -> float:
         """Blender's Alpha: share of the light that each surface of the object stops; 1 but for glass."""
-        if self.transmission is None or self.surfaces is None:
-            return 1.0
-        return 1 - min(max(self.transmission, 0.0), 1.0) ** (1 / max(self.surfaces, 1.0))
+        return opacity(self)
+
+    def as_dict(self) -> dict[str, Any]:
+        """As materials.json and a stored stage have it."""
+        return {one.name: getattr(self, one.name) for one in fields(self)} | {"model": self.model.name}
+
+
+def with_metals(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[ObjectMaterial]) -> np.ndarray:
+    """Albedo, and F0 of metals: Base Color that makes up for nothing. Parameters as of `base_colors`."""
+    color = albedo.copy()
+    for m in materials:
+        if m.model.lobe_alone:
+            color[object_id == m.object_id] = m.f0
+    return color
+
+
+def base_colors(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[ObjectMaterial]) -> np.ndarray:
+    """Principled's Base Color of every element, (n, 3) float32, 0...1.
+
+    Parameters
+    ----------
+    albedo : (n, 3) float32
+        Diffuse albedo.
+    object_id : (n,) int
+    materials : iterable of ObjectMaterial
+    """
+    color = albedo.copy()
+    for m in materials:
+        own = object_id == m.object_id
+        color[own] = m.model.base_color(color[own], m)
+    return color
 
 
 def undescribed(object_id: int, class_name: str) -> ObjectMaterial:
@@ -108,11 +129,26 @@ def undescribed(object_id: int, class_name: str) -> ObjectMaterial:
     return ObjectMaterial(object_id, class_name, LAMBERTIAN, note="no description")
 
 
+def renamed(told: dict[str, Any]) -> dict[str, Any]:
+    """An entry of materials.json by today's names: results of version 0.1 say `phi` for alpha, `psi` for one F0."""
+    today = {name: value for name, value in told.items() if name not in ("phi", "psi")}
+    for name, before in (("alpha", "phi"), ("f0", "psi")):
+        if told.get(before) is not None and today.get(name) is None:
+            today[name] = told[before]
+    return today
+
+
 def from_json(told: dict[str, Any]) -> ObjectMaterial:
-    """A description as materials.json or a stored stage has it; further keys are left out."""
+    """A description as materials.json or a stored stage has it; further keys are left out.
+
+    Raises
+    ------
+    BadInputError
+        Its model is of a package that is not there.
+    """
     known: dict[str, Any] = {
         name: tuple(value) if isinstance(value, list) else value
-        for name, value in told.items()
+        for name, value in renamed(told).items()
         if name in ObjectMaterial.__dataclass_fields__
     }
-    return ObjectMaterial(**known)
+    return ObjectMaterial(**known | {"model": named(known["model"])})

@@ -1,0 +1,59 @@
+"""The reflectance models that there are, by name: those of this folder, and those that other packages bring.
+
+Another package's is made known by `register`, or found by its entry point:
+
+    [project.entry-points."scan_relight.brdfs"]
+    beckmann = "my_package.beckmann:BECKMANN"
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.metadata import entry_points
+
+from ..errors import BadInputError
+from .dielectric import DIELECTRIC
+from .emitter import EMITTER
+from .lambertian import LAMBERTIAN
+from .metal import METAL
+from .model import Brdf
+from .transparent import TRANSPARENT
+
+GROUP = "scan_relight.brdfs"
+_models: dict[str, Brdf] = {one.name: one for one in (LAMBERTIAN, DIELECTRIC, METAL, EMITTER, TRANSPARENT)}
+
+
+def register(model: Brdf) -> Brdf:
+    """Make a model known under its name; gives it back. Raises `BadInputError` where another one has that name."""
+    if _models.setdefault(model.name, model) is not model:
+        raise BadInputError(f"There is a reflectance model '{model.name}' already; give the new one another name.")
+    return model
+
+
+def models() -> tuple[Brdf, ...]:
+    """All of them, the program's own first."""
+    _installed()
+    return tuple(_models.values())
+
+
+def find(name: str | None) -> Brdf | None:
+    """The model of a name; None where there is none."""
+    if name not in _models:
+        _installed()
+    return _models.get(name) if name is not None else None
+
+
+def named(name: str) -> Brdf:
+    """The model of a name; raises `BadInputError` where there is none."""
+    found = find(name)
+    if found is None:
+        known = ", ".join(one.name for one in models())
+        raise BadInputError(f"There is no reflectance model '{name}', only {known}; install the package that has it.")
+    return found
+
+
+@cache
+def _installed() -> None:
+    """Register, once, what installed packages bring."""
+    for entry in entry_points(group=GROUP):
+        register(entry.load())
