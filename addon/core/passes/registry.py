@@ -64,7 +64,6 @@ PASSES = (
         sun="Solves for a sun that no frame sees from the patch of light that it makes.",
         seen_sun="Takes a sun that frames see out of the environment map and treats it by itself.",
         mirrors="Finds flat mirrors and follows light over them.",
-        facets="Finds the bevels of mirrors on a noisy mesh.",
         emitter_rays="Aims rays at bright triangles.",
         portal_rays="Aims rays at the openings to the outside.",
         interpolation="Gathers irradiance at few points and interpolates between them.",

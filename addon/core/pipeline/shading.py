@@ -53,8 +53,7 @@ def find_shading(
     s = settings
 
     def mirrors(field: LightField, lamps: tuple[Lamp, ...] | None) -> tuple[Mirror, ...]:
-        noisy = lamps is not None and surface.noise > 0 and "facets" not in s.without
-        found = find_mirrors(field, lamps or (), observed.samples, capture.instances, s.seed, noisy)
+        found = find_mirrors(field, lamps or (), observed.samples, capture.instances, s.seed)
         told = [known_mirror(mirror, field.mesh) for mirror in capture.mirrors]
         return (*found, *(one for one in told if one.object_id not in {mirror.object_id for mirror in found}))
 

@@ -12,8 +12,6 @@ field has there is one number, F0. Anything else shows its own light:
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.optimize import minimize
 
@@ -22,7 +20,6 @@ from ...light.lamps import Lamp
 from ...light.mirrors import Mirror
 from ...scene.model import Instance
 from ...scene.samples import Samples
-from .facets import facets_of
 from .mirrored import Views, sides_of, turned
 
 FLAT_SHARE = 0.8
@@ -62,20 +59,9 @@ def plane_of(field: LightField, object_id: int) -> tuple[np.ndarray, np.ndarray]
 
 
 def find_mirrors(
-    field: LightField,
-    lamps: tuple[Lamp, ...],
-    samples: Samples,
-    instances: tuple[Instance, ...],
-    seed: int = 0,
-    noisy: bool = False,
+    field: LightField, lamps: tuple[Lamp, ...], samples: Samples, instances: tuple[Instance, ...], seed: int = 0
 ) -> tuple[Mirror, ...]:
-    """Flat objects whose frames show the room mirrored.
-
-    Parameters
-    ----------
-    noisy : bool
-        The mesh had noise: their bevels are looked for, too (`facets`).
-    """
+    """Flat objects whose frames show the room mirrored."""
     rng = np.random.default_rng(seed)
     owner = field.atlas.object_id[samples.element]
     glowing = {lamp.object_id for lamp in lamps}
@@ -93,9 +79,6 @@ def find_mirrors(
         found = _mirrored(Views.of(field, samples, own), field.atlas.normal[samples.element[own]], normal)
         if found is not None:
             mirrors.append(Mirror(instance.object_id, point, *found))
-    for i, mirror in enumerate(mirrors if noisy else ()):
-        facets, facing = facets_of(field, samples, mirror)
-        mirrors[i] = replace(mirror, facets=facets, facing=facing)
     return tuple(mirrors)
 
 
