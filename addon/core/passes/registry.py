@@ -94,7 +94,6 @@ PASSES = (
         "write",
         albedo_prior="Draws uncertain albedo towards its neighbourhood's.",
         second_colour="Draws it to a second colour of the neighbourhood where that is likelier.",
-        outer_width="Takes the neighbourhood's width from an outer quantile, too.",
         wide_prior="Widens the neighbourhood for as long as it stays alike.",
         object_spread="Takes the spread of single observations from others of the object.",
         compensation="Raises Base Color for the light that the Principled coat keeps from the diffuse part.",

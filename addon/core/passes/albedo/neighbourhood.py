@@ -24,11 +24,6 @@ NEIGHBOURS = 128
 Under checks of .1 to .8 m laid over them the living room has .06 less in the mean, a bathroom .13 more."""
 ALIKE = 0.7
 """A wider neighbourhood speaks for a place if its median is within so many widths of the nearest neighbours' own."""
-OUTER = 0.7
-OUTER_OF_NORMAL = 1.036
-"""The width is the median deviation's or this quantile's (its place in a normal distribution), whichever is more:
-stripes on a ground that covers more than half have next to no median deviation, and would be drawn into the ground. A
-rug's stripes stay whole by it; kitchen and bathroom +.1 dB of albedo, living room -.1."""
 REFERENCES = 4096
 """Well-measured elements of an object that neighbours are sought among: a thinned set reaches further around."""
 CELL_TEXELS = 6.0
@@ -88,7 +83,7 @@ def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray) -> np.
     return few[object_id]
 
 
-def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, outer: bool) -> Surroundings:
+def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> Surroundings:
     """The nearest references of m places."""
     # At most an eighth of the object: a small object's ends are not each other's surroundings.
     k = min(NEIGHBOURS, max(len(references) // 8, 3), len(references))
@@ -102,8 +97,6 @@ def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, o
         middle[part] = _quantile(np.sort(around), 0.5).T
         off = np.sort(np.abs(around - middle[part].T[..., None]).mean(0))
         width[part] = 1.4826 * _quantile(off, 0.5)
-        if outer:
-            width[part] = np.maximum(width[part], _quantile(off, OUTER) / OUTER_OF_NORMAL)
 
     for_blocks(gather, len(position), BLOCK, 0)
     return Surroundings(middle, np.maximum(width, np.float32(0.02)), near)
@@ -121,14 +114,13 @@ def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, wi
 
     `references` are in random order: half of them reach twice as far (in area) with as many neighbours.
     """
-    outer = "outer-width" not in without
-    found = _around(position, references, log_rho, outer)
+    found = _around(position, references, log_rho)
     if "wide-prior" in without:
         return found
     first, allowed = found.middle.copy(), ALIKE * found.width
     todo, count = np.arange(len(position)), len(references) // 2
     while count >= 8 * NEIGHBOURS and len(todo):
-        wider = _around(position[todo], references[:count], log_rho[:count], outer)
+        wider = _around(position[todo], references[:count], log_rho[:count])
         alike = np.abs(wider.middle - first[todo]).mean(1) <= allowed[todo]
         todo = todo[alike]
         for kept, new in zip(found, wider, strict=True):
