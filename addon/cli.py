@@ -209,7 +209,7 @@ def reading_from(arguments: argparse.Namespace):
     from .core.io.layout import Reading
 
     def import_mesh(path: Path):
-        return need("import_mesh").import_mesh(path)  # only now: most captures need no Blender to be read
+        return need("data.import_mesh").import_mesh(path)  # only now: most captures need no Blender to be read
 
     return Reading(
         arguments.format,
@@ -300,7 +300,7 @@ def console_run(arguments: argparse.Namespace, stream: TextIO):
 def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`recover CAPTURE --out RESULT`."""
     settings = settings_from(arguments)
-    run = need("run")
+    run = need("job.run")
     with console_run(arguments, stream) as console:
         report = run.run(
             arguments.capture,
@@ -330,7 +330,7 @@ def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
 def demo_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`demo --out RESULT`."""
     settings = settings_from(arguments)
-    demo = need("demo")
+    demo = need("demo.run")
     with console_run(arguments, stream) as console:
         table = demo.run_demo(arguments.out, arguments.size, settings, **console)
     if not arguments.quiet:

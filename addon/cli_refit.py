@@ -53,7 +53,7 @@ def refit_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     from .cli import console_run, need  # which imports this module
     from .core.progress import Progress
 
-    refit = need("refit")
+    refit = need("job.refit")
     with console_run(arguments, stream) as console:
         report = refit.refit(
             arguments.result,

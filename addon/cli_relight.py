@@ -99,7 +99,7 @@ def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
 
     if arguments.samples < 0 or not 1 <= arguments.size <= 1000:
         raise BadInputError("Option --samples takes a number of at least 0, and --size 1 to 1000 percent.")
-    command = need("relight_command")
+    command = need("relight.command")
     added = {
         kind: getattr(arguments, name) for name, kind in command.OPTIONS.items() if getattr(arguments, name) is not None
     }

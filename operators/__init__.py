@@ -108,7 +108,8 @@ def unregister():
     """Take back what `register` did."""
     import bpy
 
-    from ..addon.bridge import corrections, job
+    from ..addon.bridge.corrections import corrections
+    from ..addon.bridge.job import job
     from . import find_result, findings, keymaps, light_pictures, manual, menus, results, translations
     from .correct_register import unregister_handlers
     from .job_operator import forget_job

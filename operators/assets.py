@@ -3,7 +3,8 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.bridge import assets, look
+from ..addon.bridge.export import assets
+from ..addon.bridge.results import look
 from . import poll
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 
-from ..addon.bridge import before_after, pictures
+from ..addon.bridge.relight import before_after, pictures
 from ..addon.bridge.render_device import told_device
 from ..addon.core.errors import ScanRelightError
 from . import poll
@@ -73,7 +73,7 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         """Blocks in the background; else starts the job."""
         if bpy.app.background:
             return RelightOperator.execute(self, context)
-        from ..addon.bridge.job_command import command
+        from ..addon.bridge.job.command import command
 
         try:
             out = self.target(context.scene)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import bpy
 
-from ..addon.bridge import result_home
+from ..addon.bridge.results import home
 from . import poll, preferences
 from .at_once import AtOnce
 from .settings_props import can_start
@@ -84,17 +84,17 @@ class SCAN_RELIGHT_OT_capture_from_scene(AtOnce, bpy.types.Operator):
 
     def work(self, context):
         """Write the folder and choose it in the panel."""
-        from ..addon.bridge.scene_capture import capture_scene
+        from ..addon.bridge.own_scene.capture import capture_scene
 
         choices = context.scene.scan_relight
         chosen = self.result_folder or choices.result_folder
         folder = (
             Path(bpy.path.abspath(chosen)) / FOLDER
             if chosen
-            else result_home.capture_folder(preferences.results_folder(), choices.capture_folder)
+            else home.capture_folder(preferences.results_folder(), choices.capture_folder)
         )
         first, last = (None, None) if self.whole_range else (self.frame_start, self.frame_end)
-        result_home.check(str(folder))
+        home.check(str(folder))
         told = capture_scene(context, folder, context.selected_objects, self.cameras, first, last, self.frame_step)
         choices.capture_folder = str(folder)
         self.report({"INFO"}, f"Captured into {folder}")

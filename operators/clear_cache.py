@@ -5,7 +5,7 @@ from pathlib import Path
 
 import bpy
 
-from ..addon.bridge import result_home
+from ..addon.bridge.results import home
 from . import poll, preferences, results
 
 
@@ -13,7 +13,7 @@ def folders(scene: bpy.types.Scene | None) -> list[Path]:
     """The results whose stages can be cleared: in the results folder, beside the .blend, and the scene's own."""
     from ..addon.core.results.cache import results as below
 
-    beside = result_home.beside()
+    beside = home.beside()
     own = results.folder_of(scene) if scene is not None else None
     return [*below(preferences.results_folder()), *(below(beside) if beside else ()), *([own] if own else ())]
 

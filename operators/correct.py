@@ -3,7 +3,7 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.bridge import corrections
+from ..addon.bridge.corrections import corrections
 from ..addon.bridge.marks import OBJECT_ID
 from ..addon.core.errors import BadInputError
 from . import poll
@@ -163,7 +163,7 @@ class SCAN_RELIGHT_OT_smooth_by_angle(CorrectOperator, bpy.types.Operator):
 
     def work(self, context, things):
         """Shade them."""
-        from ..addon.bridge.smoothing import smooth
+        from ..addon.bridge.corrections.smoothing import smooth
 
         if self.everything:
             things = [thing for thing in context.scene.objects if corrections.correctable(thing)]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-from ..addon.bridge import corrections, refitted
-from ..addon.bridge import job as jobs
+from ..addon.bridge.corrections import corrections, refitted
+from ..addon.bridge.job import job as jobs
 from . import poll, results
 from .at_once import AtOnce, OneSentence
 from .job_operator import JobOperator
@@ -78,7 +78,7 @@ class RefitOperator(OneSentence, JobOperator):
 
     def refit(self, context, things):
         """Fit `things` again; what `execute` returns."""
-        from ..addon.bridge.job_command import command
+        from ..addon.bridge.job.command import command
 
         folder, words, before = refitted.words(context.scene, things)
         facts = {"title": self.bl_label, "result_folder": str(folder), "before": before}

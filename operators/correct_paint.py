@@ -3,7 +3,7 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.bridge import painting, unseen
+from ..addon.bridge.corrections import painting, unseen
 from ..addon.core.errors import BadInputError
 from . import poll
 from .correct_base import CorrectOperator, chosen

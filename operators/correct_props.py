@@ -8,7 +8,7 @@ from math import radians
 
 import bpy
 
-from ..addon.bridge import corrections
+from ..addon.bridge.corrections import corrections
 from ..addon.core.brdf.lambertian import LAMBERTIAN
 from ..addon.core.brdf.registry import find, models
 from ..addon.core.errors import ScanRelightError

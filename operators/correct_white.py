@@ -5,8 +5,8 @@ import bpy
 from bpy_extras import view3d_utils
 from mathutils import Vector
 
-from ..addon.bridge import corrections, known_white
-from ..addon.bridge.relight_room import cast, depsgraph_of
+from ..addon.bridge.corrections import corrections, known_white
+from ..addon.bridge.light.room import cast, depsgraph_of
 from ..addon.core.errors import BadInputError
 from . import poll
 from .correct_base import RefitOperator

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import bpy
 
-from ..addon.bridge import export
+from ..addon.bridge.export import export
 from ..addon.core.errors import BadInputError
 from ..addon.core.results.room_file import capture_name
 from . import poll

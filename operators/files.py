@@ -260,7 +260,7 @@ class SCAN_RELIGHT_OT_open_result(AtOnce, bpy.types.Operator):
 
     def bring(self, context, folder: Path) -> tuple[str, ...]:
         """The room into this file; the panel of its scene is about this result. What is to be told of it."""
-        from ..addon.bridge.room import bringing
+        from ..addon.bridge.room.bring import bringing
         from ..addon.bridge.slices import whole
 
         brought = whole(bringing(folder))

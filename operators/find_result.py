@@ -5,7 +5,7 @@ from pathlib import Path
 
 import bpy
 
-from ..addon.bridge import find_result, result_images
+from ..addon.bridge.results import find, images
 from ..addon.core.errors import BadInputError
 from . import preferences
 from .at_once import AtOnce
@@ -51,19 +51,19 @@ class SCAN_RELIGHT_OT_find_result(AtOnce, bpy.types.Operator):
         one = self.wanted()
         if not self.directory:
             raise BadInputError("Choose the folder that the result lies in now.")
-        new = find_result.find(one, Path(bpy.path.abspath(self.directory)).absolute())
-        count = find_result.repoint(one.folder, new)
+        new = find.find(one, Path(bpy.path.abspath(self.directory)).absolute())
+        count = find.repoint(one.folder, new)
         for scene in bpy.data.scenes:
             choices = scene.scan_relight
             if choices.result_folder and Path(bpy.path.abspath(choices.result_folder)) == one.folder:
                 choices.result_folder = str(new)
-        left = next((other for other in find_result.missing() if other.folder == new), None)
+        left = next((other for other in find.missing() if other.folder == new), None)
         self.report({"INFO"}, f"{count} picture{'s' * (count != 1)} found in '{new}'.")
         return [left.sentence] if left is not None else []
 
-    def wanted(self) -> find_result.Missing:
+    def wanted(self) -> find.Missing:
         """The missing result in question."""
-        lost = find_result.missing()
+        lost = find.missing()
         if self.missing:
             folder = Path(bpy.path.abspath(self.missing)).absolute()
             lost = [one for one in lost if one.folder == folder]
@@ -83,17 +83,15 @@ class SCAN_RELIGHT_PT_missing(SidebarPanel, bpy.types.Panel):
     @classmethod
     def poll(cls, context):
         """Only where there is something to say."""
-        return context.scene is not None and bool(
-            _found or find_result.known_missing() or find_result.known_overtaken()
-        )
+        return context.scene is not None and bool(_found or find.known_missing() or find.known_overtaken())
 
     def draw(self, context):
         """Each missing result with its button; what was found again."""
         layout = self.layout
-        for one in find_result.known_missing():
+        for one in find.known_missing():
             self.say(layout, context, one.sentence, "ERROR")
             layout.operator("scan_relight.find_result", icon="FILE_FOLDER").missing = str(one.folder)
-        for folder in find_result.known_overtaken():
+        for folder in find.known_overtaken():
             self.say(
                 layout,
                 context,
@@ -109,7 +107,7 @@ class SCAN_RELIGHT_PT_missing(SidebarPanel, bpy.types.Panel):
 @bpy.app.handlers.persistent
 def look_for_results(*_) -> None:
     """A file was opened: find what was moved along with it."""
-    _found[:] = find_result.search(preferences.results_folder())
+    _found[:] = find.search(preferences.results_folder())
 
 
 @bpy.app.handlers.persistent
@@ -117,7 +115,7 @@ def keep_images(*told) -> None:
     """The file is about to be saved: what it refers to of results is kept from later runs."""
     path = next((one for one in told if isinstance(one, str) and one), bpy.data.filepath)
     if path:
-        result_images.keep(Path(path))
+        images.keep(Path(path))
 
 
 @bpy.app.handlers.persistent

@@ -7,7 +7,7 @@ import time
 
 import bpy
 
-from ..addon.bridge import job as jobs
+from ..addon.bridge.job import job as jobs
 from ..addon.core.io.folder import CAPTURE, Content, look_into
 from . import reading_props
 from .job_operator import redraw
@@ -53,7 +53,7 @@ def put(choices, found: dict | str) -> None:
 
 def begin(choices) -> None:
     """Read the capture beside the window; a panel shows what was found once it is there."""
-    from ..addon.bridge.job_command import command
+    from ..addon.bridge.job.command import command
 
     for one in _found.values():
         if isinstance(one, jobs.Job):

@@ -29,7 +29,7 @@ class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
 
     def begin(self, context):
         """Read it beside the window; large captures take a while."""
-        from ..addon.bridge.job_command import command
+        from ..addon.bridge.job.command import command
 
         capture, scratch = self.folder("capture_folder"), tempfile.mkdtemp(prefix="scan-relight-")
         words = ["info", capture, "--json", "--room", scratch, "--stop-with-stdin", *reading_props.options(self)]
@@ -48,7 +48,7 @@ class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
 
     def change(self, scene, loaded):
         """Build the objects."""
-        from ..addon.bridge.room_import import importing
+        from ..addon.bridge.room.scanned import importing
 
         brought = yield from importing(loaded, scene if self.into == "SCENE" else None)
         if self.into == "OWN":

@@ -12,7 +12,7 @@ from collections.abc import Generator
 
 import bpy
 
-from ..addon.bridge import job as jobs
+from ..addon.bridge.job import job as jobs
 from ..addon.console import duration, unexpected
 from ..addon.core.errors import ScanRelightError
 from ..addon.core.stages import LABELS

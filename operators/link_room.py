@@ -3,7 +3,7 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.bridge.room_parts import rooms
+from ..addon.bridge.scene.parts import rooms
 from ..addon.core.errors import BadInputError
 from . import poll
 from .at_once import AtOnce
@@ -49,7 +49,7 @@ class SCAN_RELIGHT_OT_link_room(AtOnce, bpy.types.Operator):
 
     def work(self, context):
         """Link all rooms of this scene."""
-        from ..addon.bridge.room import link_room
+        from ..addon.bridge.room.bring import link_room
 
         target = bpy.data.scenes.get(self.scene)
         if target is None:

@@ -3,7 +3,7 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.bridge import look
+from ..addon.bridge.results import look
 from . import poll
 from .at_once import AtOnce
 

@@ -3,7 +3,7 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.bridge import find_result, result_home
+from ..addon.bridge.results import find, home
 from ..addon.core.errors import ScanRelightError
 from . import poll, preferences
 
@@ -23,15 +23,15 @@ class SCAN_RELIGHT_OT_move_results(bpy.types.Operator):
     def poll(cls, context):
         """Not while a run may be writing there."""
         return poll.no_run(cls) and poll.check(
-            cls, bool(result_home.earlier_results()), "No result lies in the extension's own folder."
+            cls, bool(home.earlier_results()), "No result lies in the extension's own folder."
         )
 
     def execute(self, context):
         """Move each; one that can't be moved stays whole where it is, and is told."""
         moved = 0
-        for folder in result_home.earlier_results():
+        for folder in home.earlier_results():
             try:
-                find_result.move(folder, preferences.results_folder())
+                find.move(folder, preferences.results_folder())
                 moved += 1
             except ScanRelightError as error:
                 self.report({"WARNING"}, str(error))

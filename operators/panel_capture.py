@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..addon.bridge import job as jobs
+from ..addon.bridge.job import job as jobs
 from ..addon.core.naming import object_name
 from . import findings, reading_props
 from .panel import SidebarPanel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..addon.bridge import corrections, unseen
+from ..addon.bridge.corrections import corrections, unseen
 from ..addon.core.brdf.lambertian import LAMBERTIAN
 from ..addon.core.brdf.registry import find, named
 from .correct_base import chosen

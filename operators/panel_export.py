@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..addon.bridge import export
+from ..addon.bridge.export import export
 from .export import FORMATS
 from .panel import SidebarPanel
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..addon.bridge import look
+from ..addon.bridge.results import look
 from .panel import SidebarPanel
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from ..addon.bridge import job as jobs
-from ..addon.bridge import result_home, result_images, room_changes
+from ..addon.bridge.job import job as jobs
 from ..addon.bridge.marks import OWN_SCENE
+from ..addon.bridge.results import changes as room_changes
+from ..addon.bridge.results import home, images
 from ..addon.console import duration
 from ..addon.core.results.unfinished import goes_on_with
 from ..addon.core.stages import LABELS, STAGES
@@ -67,10 +68,10 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         layout.prop(choices, "result_folder")
         if not choices.result_folder and choices.capture_folder:
             folder = preferences.result_folder("", choices.capture_folder, context.scene)
-            self.say(layout, context, f"Goes into '{result_home.shown(folder)}'.", "FILE_FOLDER")
+            self.say(layout, context, f"Goes into '{home.shown(folder)}'.", "FILE_FOLDER")
         layout.prop(choices, "images")
-        if choices.images == result_images.FOLDER and not bpy.data.filepath:
-            self.say(layout, context, result_images.NEVER_SAVED, "ERROR")
+        if choices.images == images.FOLDER and not bpy.data.filepath:
+            self.say(layout, context, images.NEVER_SAVED, "ERROR")
         header, body = layout.panel("scan_relight_settings", default_closed=True)
         header.label(text="Settings" + (f" ({len(changed)} changed)" if changed else ""))
         if body is not None:

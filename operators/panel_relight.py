@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from ..addon.bridge import match_frame, relight_exposure, relight_lamps, relight_lights, relight_outside
-from ..addon.bridge.cameras import frame_cameras
+from ..addon.bridge.data.cameras import frame_cameras
+from ..addon.bridge.light import lamps as relight_lamps
+from ..addon.bridge.light import outside as relight_outside
+from ..addon.bridge.relight import exposure, lights, match_frame
 from ..addon.core.naming import in_order
 from . import light_pictures
 from .panel import NamedRows, SidebarPanel, places
@@ -162,7 +164,7 @@ class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):
             button = cell.operator("scan_relight.add_light", text=text, icon=ICONS[name])
             button.preset, button.aim, button.strength = name, studio.aim, getattr(studio, field)
             button.unit, button.kelvin = studio.unit, studio.kelvin
-        for light in relight_lights.added_lights(context.scene):
+        for light in lights.added_lights(context.scene):
             column = layout.column(align=True)
             row = column.row(align=True)
             row.prop(light, "hide_render", text="", icon_only=True, emboss=False)
@@ -198,10 +200,10 @@ class SCAN_RELIGHT_PT_exposure(RelightPanel, bpy.types.Panel):
         column.operator("scan_relight.expose", icon="LIGHT_SUN")
         column.prop(scene.scan_relight_studio, "follow", toggle=True)
         look_soon(scene)
-        said = relight_exposure.darkness(scene)
+        said = exposure.darkness(scene)
         if said:
             self.say(layout, context, said, "INFO")
-        if relight_exposure.CAPTURED in scene:
+        if exposure.CAPTURED in scene:
             layout.operator("scan_relight.restore_exposure", icon="LOOP_BACK")
         row = layout.row(align=True)
         row.operator("scan_relight.bake_preview", icon="LIGHTPROBE_VOLUME")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import bpy
 
-from ..addon.bridge import result_file
+from ..addon.bridge.results import file
 from ..addon.console import duration
 from ..addon.core.brdf.registry import find, models
 from ..addon.core.naming import in_order
@@ -58,7 +58,7 @@ class SCAN_RELIGHT_UL_results(NamedRows, bpy.types.UIList):
     def filter_items(self, context, data, property):
         """Only recovered objects that pass the filters, in the chosen order."""
         things = getattr(data, property)
-        known = type(self).known = {thing.name: one for thing, one in result_file.rows(things).items()}
+        known = type(self).known = {thing.name: one for thing, one in file.rows(things).items()}
         shown, keys = [], []
         for thing in things:
             one = known.get(thing.name)
@@ -125,7 +125,7 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         """The list, the chosen object, the page."""
         layout, scene = self.layout, context.scene
-        rows, refused = result_file.rows(scene.objects), results.refused(scene.objects)
+        rows, refused = file.rows(scene.objects), results.refused(scene.objects)
         for sentence, folder in refused:
             self.say(layout, context, sentence, "ERROR")
             self.bring_in(layout, scene, folder)

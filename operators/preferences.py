@@ -7,10 +7,10 @@ from pathlib import Path
 
 import bpy
 
-from ..addon.bridge import result_home
+from ..addon.bridge.results import home
 from . import keymaps
 
-PACKAGE = result_home.PACKAGE
+PACKAGE = home.PACKAGE
 
 
 class ScanRelightPreferences(bpy.types.AddonPreferences):
@@ -50,7 +50,7 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
         row = layout.row()
         row.label(text=size_text(), icon="FILE_FOLDER")
         row.operator("scan_relight.clear_cache", icon="TRASH")
-        count = len(result_home.earlier_results())
+        count = len(home.earlier_results())
         if count:
             row = layout.row()
             row.label(
@@ -74,7 +74,7 @@ def preferences() -> ScanRelightPreferences | None:
 def results_folder() -> Path:
     """The folder of results whose own was not chosen and whose .blend was never saved; not made here."""
     ours = preferences()
-    return result_home.results_folder((ours.results_folder or ours.cache_folder) if ours is not None else "")
+    return home.results_folder((ours.results_folder or ours.cache_folder) if ours is not None else "")
 
 
 def result_folder(chosen: str, capture_folder: str, scene: bpy.types.Scene | None = None) -> Path:
@@ -84,7 +84,7 @@ def result_folder(chosen: str, capture_folder: str, scene: bpy.types.Scene | Non
     """
     if chosen:
         return Path(bpy.path.abspath(chosen))
-    return result_home.result_folder(Path(bpy.path.abspath(capture_folder)).absolute(), results_folder(), scene)
+    return home.result_folder(Path(bpy.path.abspath(capture_folder)).absolute(), results_folder(), scene)
 
 
 SIZE_SECONDS = 30.0

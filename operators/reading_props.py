@@ -94,7 +94,7 @@ def reading(owner) -> Reading:
     """What `owner`'s properties are for `read_capture`."""
 
     def import_mesh(path: Path):
-        from ..addon.bridge.import_mesh import import_mesh as through_blender
+        from ..addon.bridge.data.import_mesh import import_mesh as through_blender
 
         return through_blender(path)
 

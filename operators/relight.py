@@ -3,7 +3,8 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.bridge import relight_lamps, relight_lights, relight_outside, relight_state
+from ..addon.bridge.light import lamps, outside
+from ..addon.bridge.relight import lights, state
 from ..addon.core.errors import BadInputError
 from . import poll
 from .light_pictures import PRESETS
@@ -24,8 +25,8 @@ class SCAN_RELIGHT_OT_switch_lamps(RelightOperator, bpy.types.Operator):
 
     def work(self, context):
         """All of them."""
-        for lamp in relight_lamps.find_lamps(context.scene):
-            relight_lamps.set_on(lamp, self.on)
+        for lamp in lamps.find_lamps(context.scene):
+            lamps.set_on(lamp, self.on)
         follow(context.scene)
 
 
@@ -40,8 +41,8 @@ class SCAN_RELIGHT_OT_restore_lamp(RelightOperator, bpy.types.Operator):
 
     def work(self, context):
         """By its name."""
-        for lamp in relight_lamps.lamp_named(context.scene, self.name):
-            relight_lamps.restore(lamp)
+        for lamp in lamps.lamp_named(context.scene, self.name):
+            lamps.restore(lamp)
         follow(context.scene)
 
 
@@ -56,12 +57,12 @@ class SCAN_RELIGHT_OT_restore_light(RelightOperator, bpy.types.Operator):
     def poll(cls, context):
         """Only where anything differs."""
         return super().poll(context) and poll.check(
-            cls, relight_state.is_relit(context.scene), "The light is as it was captured."
+            cls, state.is_relit(context.scene), "The light is as it was captured."
         )
 
     def work(self, context):
         """All of it."""
-        relight_state.restore_captured(context.scene)
+        state.restore_captured(context.scene)
         follow(context.scene)
 
 
@@ -98,7 +99,7 @@ class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
 
     def work(self, context):
         """Add it and make it the active object."""
-        light = relight_lights.add_light(
+        light = lights.add_light(
             context.scene, self.preset, self.strength, self.aim, context.object, self.kelvin or None, self.unit
         )
         make_active(context, light)
@@ -116,19 +117,19 @@ class SCAN_RELIGHT_OT_remove_lights(RelightOperator, bpy.types.Operator):
     def poll(cls, context):
         """Only where there are any."""
         return super().poll(context) and poll.check(
-            cls, bool(relight_lights.added_lights(context.scene)), "No light was added here."
+            cls, bool(lights.added_lights(context.scene)), "No light was added here."
         )
 
     def work(self, context):
         """All of them."""
-        relight_lights.remove_lights(context.scene)
+        lights.remove_lights(context.scene)
         follow(context.scene)
 
 
 def put_around(scene, picture: str) -> list[str]:
     """Put a picture around the room, scaled to a day outside such a room; returns warnings."""
-    relight_outside.use_hdri(scene, picture, relight_outside.usual_radiance(scene))
-    return relight_outside.remarks(scene)
+    outside.use_hdri(scene, picture, outside.usual_radiance(scene))
+    return outside.remarks(scene)
 
 
 class SCAN_RELIGHT_OT_use_hdri(RelightOperator, bpy.types.Operator):
@@ -162,8 +163,7 @@ _items: list[tuple[str, str, str]] = []  # Blender keeps no reference to what a 
 
 def _studio_items(operator, context):
     _items[:] = [
-        (str(path), path.stem.capitalize(), f"Blender's own picture '{path.stem}'")
-        for path in relight_outside.studio_lights()
+        (str(path), path.stem.capitalize(), f"Blender's own picture '{path.stem}'") for path in outside.studio_lights()
     ]
     return _items
 
@@ -181,9 +181,7 @@ class SCAN_RELIGHT_OT_use_studio_light(RelightOperator, bpy.types.Operator):
     def poll(cls, context):
         """Some builds have none."""
         return super().poll(context) and poll.check(
-            cls,
-            bool(relight_outside.studio_lights()),
-            "This Blender comes without its HDR pictures; choose a file instead.",
+            cls, bool(outside.studio_lights()), "This Blender comes without its HDR pictures; choose a file instead."
         )
 
     def work(self, context):

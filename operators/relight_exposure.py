@@ -6,7 +6,7 @@ import time
 
 import bpy
 
-from ..addon.bridge import relight_estimate, relight_exposure
+from ..addon.bridge.relight import estimate, exposure
 from ..addon.core.errors import ScanRelightError
 from .relight_base import RelightOperator
 
@@ -27,7 +27,7 @@ class SCAN_RELIGHT_OT_expose(RelightOperator, bpy.types.Operator):
 
     def work(self, context):
         """Measure and set."""
-        relight_exposure.expose(context.scene)
+        exposure.expose(context.scene)
 
 
 class SCAN_RELIGHT_OT_restore_exposure(RelightOperator, bpy.types.Operator):
@@ -39,13 +39,13 @@ class SCAN_RELIGHT_OT_restore_exposure(RelightOperator, bpy.types.Operator):
 
     def work(self, context):
         """Put it back."""
-        relight_exposure.restore(context.scene)
+        exposure.restore(context.scene)
 
 
 def follow(scene: bpy.types.Scene) -> None:
     """After a change of the light: expose for it, by an estimate, where that was asked for."""
     if scene.scan_relight_studio.follow and scene.camera is not None:
-        relight_exposure.follow(scene)
+        exposure.follow(scene)
 
 
 def follow_soon() -> None:
@@ -66,8 +66,8 @@ def _rested() -> None:
 
 def look_soon(scene: bpy.types.Scene) -> None:
     """Have a panel know before long how bright the light is; it can be asked for by what draws."""
-    if _looked["run"] is None and not bpy.app.background and not relight_estimate.is_known(scene):
-        _looked["run"] = relight_estimate.looking(scene)
+    if _looked["run"] is None and not bpy.app.background and not estimate.is_known(scene):
+        _looked["run"] = estimate.looking(scene)
         bpy.app.timers.register(_look, first_interval=_SLICE)
 
 

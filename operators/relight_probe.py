@@ -7,7 +7,7 @@ from functools import partial
 
 import bpy
 
-from ..addon.bridge import relight_probe
+from ..addon.bridge.relight import probe
 from ..addon.core.errors import ScanRelightError
 from . import poll
 from .relight_base import RelightOperator
@@ -33,9 +33,9 @@ class SCAN_RELIGHT_OT_bake_preview(RelightOperator, bpy.types.Operator):
 
     def work(self, context):
         """Renew the volume."""
-        relight_probe.bake(context.scene, self._wait)
+        probe.bake(context.scene, self._wait)
         if self._wait:
-            relight_probe.fit(context.scene)
+            probe.fit(context.scene)
         else:
             bpy.app.timers.register(partial(_fit_when_baked, context.scene.name), first_interval=0.5)
 
@@ -48,7 +48,7 @@ def _fit_when_baked(name: str) -> float | None:
     scene = bpy.data.scenes.get(name)
     if scene is not None:
         with suppress(ScanRelightError):  # then the light stays as it was baked
-            relight_probe.fit(scene)
+            probe.fit(scene)
     return None
 
 
@@ -63,9 +63,9 @@ class SCAN_RELIGHT_OT_remove_preview(RelightOperator, bpy.types.Operator):
     def poll(cls, context):
         """Only where there is any."""
         return super().poll(context) and poll.check(
-            cls, bool(relight_probe.probes(context.scene)), "No preview light was baked here."
+            cls, bool(probe.probes(context.scene)), "No preview light was baked here."
         )
 
     def work(self, context):
         """All of it."""
-        relight_probe.remove(context.scene)
+        probe.remove(context.scene)

@@ -6,9 +6,11 @@ The properties of lamps and outside hold nothing: they read and write what the b
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.bridge import match_frame, relight_lamps, relight_outside, relight_setup, relight_units
-from ..addon.bridge.cameras import frame_cameras
-from ..addon.bridge.relight_kelvin import HIGHEST, LOWEST
+from ..addon.bridge.data.cameras import frame_cameras
+from ..addon.bridge.light import lamps, outside, units
+from ..addon.bridge.light.kelvin import HIGHEST, LOWEST
+from ..addon.bridge.relight import match_frame
+from ..addon.bridge.relight import setup as relight_setup
 from .panel_results import active_row, choose_row
 from .relight_exposure import follow, follow_soon
 from .translations import OWN
@@ -54,7 +56,7 @@ ENGINE = bpy.props.EnumProperty(
 
 
 def _lamp(group):
-    return group.id_data if relight_lamps.is_lamp(group.id_data) else None
+    return group.id_data if lamps.is_lamp(group.id_data) else None
 
 
 def _change(change, group, value) -> None:
@@ -70,19 +72,19 @@ class ScanRelightLamp(bpy.types.PropertyGroup):
     on: bpy.props.BoolProperty(
         name="On",
         description="Whether this lamp shines",
-        get=lambda self: bool(_lamp(self)) and relight_lamps.is_on(self.id_data),
-        set=lambda self, value: _change(_lamp(self) and relight_lamps.set_on, self, value),
+        get=lambda self: bool(_lamp(self)) and lamps.is_on(self.id_data),
+        set=lambda self, value: _change(_lamp(self) and lamps.set_on, self, value),
     )
     factor: bpy.props.FloatProperty(
         name="Strength x",
         description="Times the radiance that the scan found; 1 is the lamp as captured",
         min=0.0,
-        max=relight_lamps.MAX_FACTOR,
+        max=lamps.MAX_FACTOR,
         soft_max=4.0,
         step=5,
         precision=2,
-        get=lambda self: relight_lamps.factor(self.id_data),
-        set=lambda self, value: _change(_lamp(self) and relight_lamps.set_factor, self, value),
+        get=lambda self: lamps.factor(self.id_data),
+        set=lambda self, value: _change(_lamp(self) and lamps.set_factor, self, value),
     )
     colour: bpy.props.FloatVectorProperty(
         name="Colour",
@@ -91,8 +93,8 @@ class ScanRelightLamp(bpy.types.PropertyGroup):
         size=3,
         min=0.0,
         soft_max=1.0,
-        get=lambda self: (_lamp(self) and relight_lamps.colour(self.id_data)) or (1.0, 1.0, 1.0),
-        set=lambda self, value: _change(_lamp(self) and relight_lamps.set_colour, self, value),
+        get=lambda self: (_lamp(self) and lamps.colour(self.id_data)) or (1.0, 1.0, 1.0),
+        set=lambda self, value: _change(_lamp(self) and lamps.set_colour, self, value),
     )
 
     kelvin: bpy.props.FloatProperty(
@@ -103,8 +105,8 @@ class ScanRelightLamp(bpy.types.PropertyGroup):
         max=HIGHEST,
         step=10000,
         precision=0,
-        get=lambda self: relight_lamps.kelvin(self.id_data) if _lamp(self) else 6500.0,
-        set=lambda self, value: _change(_lamp(self) and relight_lamps.set_kelvin, self, value),
+        get=lambda self: lamps.kelvin(self.id_data) if _lamp(self) else 6500.0,
+        set=lambda self, value: _change(_lamp(self) and lamps.set_kelvin, self, value),
     )
 
 
@@ -118,8 +120,8 @@ class ScanRelightLight(bpy.types.PropertyGroup):
         soft_max=100000.0,
         step=1000,
         precision=0,
-        get=lambda self: relight_units.lumens(self.id_data),
-        set=lambda self, value: _change(relight_units.set_lumens, self, value),
+        get=lambda self: units.lumens(self.id_data),
+        set=lambda self, value: _change(units.set_lumens, self, value),
     )
 
 
@@ -129,19 +131,19 @@ class ScanRelightOutside(bpy.types.PropertyGroup):
     on: bpy.props.BoolProperty(
         name="Light from Outside",
         description="Whether light comes in from outside the scanned room",
-        get=lambda self: relight_outside.is_on(self.id_data),
-        set=lambda self, value: _change(relight_outside.set_on, self, value),
+        get=lambda self: outside.is_on(self.id_data),
+        set=lambda self, value: _change(outside.set_on, self, value),
     )
     factor: bpy.props.FloatProperty(
         name="Strength",
         description="Times the light from outside that was recovered, or the picture's",
         min=0.0,
-        max=relight_outside.MAX_FACTOR,
+        max=outside.MAX_FACTOR,
         soft_max=4.0,
         step=5,
         precision=2,
-        get=lambda self: relight_outside.factor(self.id_data),
-        set=lambda self, value: _change(relight_outside.set_factor, self, value),
+        get=lambda self: outside.factor(self.id_data),
+        set=lambda self, value: _change(outside.set_factor, self, value),
     )
     rotation: bpy.props.FloatProperty(
         name="Rotation",
@@ -150,8 +152,8 @@ class ScanRelightOutside(bpy.types.PropertyGroup):
         soft_min=-3.141593,
         soft_max=3.141593,
         step=100,
-        get=lambda self: relight_outside.rotation(self.id_data),
-        set=lambda self, value: _change(relight_outside.set_rotation, self, value),
+        get=lambda self: outside.rotation(self.id_data),
+        set=lambda self, value: _change(outside.set_rotation, self, value),
     )
 
 

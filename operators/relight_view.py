@@ -3,9 +3,9 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ..addon.bridge import match_frame
-from ..addon.bridge.camera_track import track_cameras
-from ..addon.bridge.cameras import frame_cameras, use_camera
+from ..addon.bridge.data.camera_track import track_cameras
+from ..addon.bridge.data.cameras import frame_cameras, use_camera
+from ..addon.bridge.relight import match_frame
 from ..addon.core.errors import BadInputError
 from . import poll
 from .relight_base import RelightOperator

@@ -4,9 +4,9 @@
 import bpy
 from bpy_extras import view3d_utils
 
-from ..addon.bridge import virtual_object as virtual
+from ..addon.bridge.light.room import cast
 from ..addon.bridge.marks import OBJECT_ID
-from ..addon.bridge.relight_room import cast
+from ..addon.bridge.relight import virtual_object as virtual
 from ..addon.core.errors import ScanRelightError
 from . import poll
 from .relight_base import RelightOperator

@@ -24,7 +24,7 @@ class SCAN_RELIGHT_OT_restore_materials(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Whether anything wears recovered materials over its own."""
-        from ..addon.bridge.write_back import wearing
+        from ..addon.bridge.own_scene.write_back import wearing
 
         return poll.object_mode(cls, context) and poll.check(
             cls,
@@ -34,8 +34,8 @@ class SCAN_RELIGHT_OT_restore_materials(bpy.types.Operator):
 
     def execute(self, context):
         """Give them back."""
-        from ..addon.bridge import look
-        from ..addon.bridge.write_back import restore
+        from ..addon.bridge.own_scene.write_back import restore
+        from ..addon.bridge.results import look
 
         things = list(context.selected_objects if self.selected_only else context.scene.objects)
         count, warnings = restore(things)

@@ -7,8 +7,8 @@ from typing import Any
 
 import bpy
 
-from ..addon.bridge import look, result_file
-from ..addon.bridge.result_file import EARLIER, FITS, MATERIALS, UNTOLD, Result, standing, standings
+from ..addon.bridge.results import file, look
+from ..addon.bridge.results.file import EARLIER, FITS, MATERIALS, UNTOLD, Result, standing, standings
 from ..addon.core.brdf.lambertian import LAMBERTIAN
 from ..addon.core.brdf.registry import find
 from . import preferences
@@ -45,7 +45,7 @@ def active(scene: bpy.types.Scene) -> bpy.types.Object | None:
 def result_of(scene: bpy.types.Scene) -> Result | None:
     """What is known of a scene's result; None where there is none."""
     folder = folder_of(scene)
-    return None if folder is None else result_file.read(folder)
+    return None if folder is None else file.read(folder)
 
 
 def refused(things) -> list[tuple[str, Path | None]]:
@@ -79,7 +79,7 @@ def refused(things) -> list[tuple[str, Path | None]]:
     ]
 
 
-forget = result_file.forget
+forget = file.forget
 
 
 def label(model: str) -> str:

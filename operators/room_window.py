@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import bpy
 
-from ..addon.bridge import room_scene
-from ..addon.bridge.room_parts import find_room, own_scene
+from ..addon.bridge.scene import settings
+from ..addon.bridge.scene.parts import find_room, own_scene
 
 
 def show(before: bpy.types.Scene, scene: bpy.types.Scene) -> None:
     """Show a room's own scene in the window; its panel has what was chosen in the scene `before`."""
     if scene != before:
         take(scene.scan_relight, before.scan_relight)
-    room_scene.show(bpy.context.window, scene)
+    settings.show(bpy.context.window, scene)
 
 
 def show_own(before: bpy.types.Scene, capture_folder: str) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import bpy
 
-from ..addon.bridge.corrections import keep_for_run
+from ..addon.bridge.corrections.corrections import keep_for_run
 from ..addon.core.errors import ScanRelightError
 from . import poll, preferences, reading_props
 from .settings_props import FROM_STAGE, can_start, setting_infos, setting_value

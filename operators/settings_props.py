@@ -9,7 +9,7 @@ from functools import cache
 
 import bpy
 
-from ..addon.bridge import result_home
+from ..addon.bridge.results import home
 from ..addon.core.errors import BadInputError
 from ..addon.core.settings import PRESETS, Settings
 from ..addon.core.stages import LABELS, RUN_STAGES, WRITE
@@ -169,7 +169,7 @@ class CaptureOperator(OneSentence, JobOperator):
             raise BadInputError(f"Choose the {name.replace('_', ' ')} first.")
         folder = bpy.path.abspath(value)
         if name == "result_folder":
-            result_home.check(folder)
+            home.check(folder)
         return folder
 
 
@@ -220,8 +220,8 @@ class StageOperator(CaptureOperator):
         return replace(PRESETS["paper" if self.paper else self.preset], **given)
 
     def run(self, context, until: str, **where) -> list[str]:
-        """Run the stages up to `until` here; returns the report's warnings. `where` goes to `bridge.run.run`."""
-        from ..addon.bridge.run import progress_for, run  # not earlier: Blender's start should not wait for it
+        """Run the stages up to `until` here; returns the report's warnings. `where` goes to `bridge.job.run.run`."""
+        from ..addon.bridge.job.run import progress_for, run  # not earlier: Blender's start should not wait for it
 
         settings = self.settings()
         guard = MemoryGuard(self.memory_limit())
@@ -246,7 +246,7 @@ class StageOperator(CaptureOperator):
 
     def begin(self, context):
         """Start the run as a job; the command line's own, so that its result is the same."""
-        from ..addon.bridge.job_command import command
+        from ..addon.bridge.job.command import command
 
         capture, result, settings = self.folder("capture_folder"), self.folder("result_folder"), self.settings()
         words = [
@@ -302,10 +302,10 @@ class SceneStageOperator(StageOperator):
 
     def begin(self, context):
         """Start the run; where the capture should be in the file, its absence is told now and not afterwards."""
-        from ..addon.bridge import result_images
-        from ..addon.bridge.room_parts import imported
-        from ..addon.bridge.scene_capture import check_own
-        from ..addon.bridge.write_back import is_own
+        from ..addon.bridge.own_scene.capture import check_own
+        from ..addon.bridge.own_scene.write_back import is_own
+        from ..addon.bridge.results import images as result_images
+        from ..addon.bridge.scene.parts import imported
 
         result_images.check(self.images)
         capture = self.folder("capture_folder")
@@ -323,8 +323,8 @@ class SceneStageOperator(StageOperator):
 
     def change(self, scene, loaded):
         """Bring the room, or put the materials onto the artist's own objects."""
-        from ..addon.bridge.room import bringing
-        from ..addon.bridge.write_back import is_own, writing_back
+        from ..addon.bridge.own_scene.write_back import is_own, writing_back
+        from ..addon.bridge.room.bring import bringing
 
         if is_own(loaded.capture.root, self.target):
             return (

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import bpy
 import numpy as np
 
-from addon.bridge.materials import make_material
+from addon.bridge.data.materials import make_material
 from addon.core.brdf.dielectric import DIELECTRIC
 from addon.core.brdf.material import ObjectMaterial
 

@@ -56,7 +56,7 @@ def module(name: str):
 
 def phase() -> str:
     """Where the run is: what its operator does, the job's state, the stage."""
-    job = module("addon.bridge.job").current()
+    job = module("addon.bridge.job.job").current()
     return "none" if job is None else f"{job.facts.get('phase')}/{job.state}/{job.stage}"
 
 
@@ -135,7 +135,7 @@ def start() -> None:
     target = "import_capture" if options.scenario == "import" else "recover"
     with bpy.context.temp_override(**in_view()):
         bpy.ops.scan_relight.run("INVOKE_DEFAULT", target=target)
-    job = module("addon.bridge.job").current()
+    job = module("addon.bridge.job.job").current()
     tell("started", process=job.process_id if job else None)
     if options.scenario not in ("run", "import"):
         steps = itertools.count()

@@ -26,8 +26,8 @@ def root() -> Path:
 @pytest.fixture(scope="session")
 def grey_capture(tmp_path_factory) -> Path:
     """The demo's room seen by three frames of flat grey: a valid capture, made in no time."""
-    from addon.bridge.demo_capture import frame_path, write_all_but_frames
-    from addon.bridge.demo_room import room, tour
+    from addon.bridge.demo.capture import frame_path, write_all_but_frames
+    from addon.bridge.demo.room import room, tour
     from addon.core.io.exr import write_exr
 
     folder = tmp_path_factory.mktemp("grey") / "capture"
@@ -41,7 +41,7 @@ def grey_capture(tmp_path_factory) -> Path:
 def tiny_capture(tmp_path_factory) -> Path:
     """The demo's room in its smallest size, rendered with Cycles."""
     pytest.importorskip("bpy")
-    from addon.bridge.demo_render import render_capture
+    from addon.bridge.demo.render import render_capture
 
     return render_capture(tmp_path_factory.mktemp("tiny") / "capture", "tiny")
 

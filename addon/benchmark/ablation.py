@@ -238,7 +238,7 @@ class Bench:
 
 def _unwrap() -> Callable:
     try:
-        from ..bridge.unwrap import unwrap
+        from ..bridge.data.unwrap import unwrap
     except ImportError as error:
         raise BadInputError("The ablation lays meshes out with Blender; run it where bpy can be imported.") from error
     return unwrap

@@ -101,7 +101,7 @@ def run(options: Options) -> Iterator[Table]:
 def _captured(folder: Path) -> Scene | None:
     """The capture as a run lays it out; None where there is no Blender to do it."""
     try:
-        from ..bridge.unwrap import unwrap
+        from ..bridge.data.unwrap import unwrap
     except ModuleNotFoundError:
         return None
     capture = read_capture(folder)

@@ -55,7 +55,7 @@ def cut_in_four(mesh: Mesh, times: int) -> Mesh:
 
 def recovered(capture: Capture, settings: Settings, folder: Path, progress: Progress) -> Recovery:
     """All stages but writing, without anything stored before."""
-    from ..bridge.unwrap import unwrap
+    from ..bridge.data.unwrap import unwrap
 
     shutil.rmtree(folder, ignore_errors=True)
     with Store(folder) as store:
@@ -70,7 +70,7 @@ def run(options: Options) -> Iterator[Table]:
     """Tables of presets, of texels and of triangles."""
     if importlib.util.find_spec("bpy") is None:
         raise SkippedStage("It unwraps and renders with Blender; run it where bpy can be imported.")
-    from ..bridge.demo_render import render_capture
+    from ..bridge.demo.render import render_capture
 
     with tempfile.TemporaryDirectory(dir=options.out, prefix=SCRATCH) as scratch:
         scratch = Path(scratch)
@@ -85,7 +85,7 @@ def run(options: Options) -> Iterator[Table]:
 
 def _presets_table(folder: Path, scratch: Path, options: Options) -> Table:
     """Seconds and memory against what comes out."""
-    from ..bridge.run import run as run_all
+    from ..bridge.job.run import run as run_all
     from .scores import score
 
     rows = []

@@ -10,10 +10,10 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..bridge.demo import VIEW, new_lights, switch_off_the_lamps
-from ..bridge.demo_compare import describe, seen_albedo
-from ..bridge.demo_render import build, set_up_cycles
-from ..bridge.demo_room import room
+from ..bridge.demo.compare import describe, seen_albedo
+from ..bridge.demo.render import build, set_up_cycles
+from ..bridge.demo.room import room
+from ..bridge.demo.run import VIEW, new_lights, switch_off_the_lamps
 from ..bridge.marks import OBJECT_ID
 from ..core.brdf.dielectric import DIELECTRIC
 from ..core.brdf.emitter import EMITTER

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from addon.bridge.demo_room import ball, box, cone, grid, painting, planks
+from addon.bridge.demo.room import ball, box, cone, grid, painting, planks
 
 from .furnish import BRASS, CHROME, GOLD, STEEL, Finish, FurnishedRoom, legs
 from .shapes import arc, clouds, curtain, cushion, moved, stripes, tiles, tube, turned, wood

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from addon.bridge.demo_room import Paint, Thing, box, grid
+from addon.bridge.demo.room import Paint, Thing, box, grid
 
 from .shapes import tube, wall
 

@@ -1,13 +1,13 @@
 """Shapes beyond the demo's: tubes, turned pieces, cushions, curtains, walls with openings; and textures.
 
-A shape is corners (q, 4, 3) and uv (q, 4, 2), as in `addon.bridge.demo_room`.
+A shape is corners (q, 4, 3) and uv (q, 4, 2), as in `addon.bridge.demo.room`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from addon.bridge.demo_room import ball, grid
+from addon.bridge.demo.room import ball, grid
 
 Shape = tuple[np.ndarray, np.ndarray]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from addon.bridge.demo_room import ball, box, grid
+from addon.bridge.demo.room import ball, box, grid
 
 from .furnish import BRASS, CHROME, COPPER, STEEL, FurnishedRoom, legs
 from .shapes import arc, checker, clouds, curtain, cushion, tiles, tube, turned, wood

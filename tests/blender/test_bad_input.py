@@ -19,7 +19,7 @@ import pytest
 pytest.importorskip("bpy")
 
 from addon import cli
-from addon.bridge import scene as scene_module
+from addon.bridge.scene import write as scene_module
 from addon.core import atomic
 from addon.core.io.exr import read_exr, write_exr
 from addon.core.io.ply import read_ply

@@ -9,8 +9,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge.demo_render import SIZES, is_rendered, render_capture  # noqa: E402
-from addon.bridge.demo_room import room, tour  # noqa: E402
+from addon.bridge.demo.render import SIZES, is_rendered, render_capture  # noqa: E402
+from addon.bridge.demo.room import room, tour  # noqa: E402
 from addon.core.errors import StorageError  # noqa: E402
 from addon.core.io.exr import read_exr  # noqa: E402
 from addon.core.io.pixels import read_pixels  # noqa: E402
@@ -80,16 +80,16 @@ def test_rendering_leaves_nothing_open_and_is_not_repeated(tmp_path):
 
 def test_a_full_disk_leaves_no_capture(tmp_path, monkeypatch):
     """Blender does not always notice: a frame that was cut off is found, and nothing is left behind."""
-    from addon.bridge import demo_render
+    from addon.bridge.demo import render
 
     def cut_off(folder, things, poses, size, samples, progress):
         frames(folder, things, poses[:1], size, 1, progress)
         path = folder / "images" / "frame_0000.exr"
         path.write_bytes(path.read_bytes()[:-100])
-        demo_render.read_header(path)
+        render.read_header(path)
 
-    frames = demo_render.render_frames
-    monkeypatch.setattr(demo_render, "render_frames", cut_off)
+    frames = render.render_frames
+    monkeypatch.setattr(render, "render_frames", cut_off)
     with pytest.raises(StorageError, match="free some space"):
         render_capture(tmp_path / "capture", "tiny")
     assert not list(tmp_path.iterdir())
@@ -97,7 +97,7 @@ def test_a_full_disk_leaves_no_capture(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("content", [b"", b"\x89PNG half of it"])
 def test_half_a_picture_is_never_taken_for_a_whole_one(content, tmp_path):
-    from addon.bridge.pictures import saving
+    from addon.bridge.relight.pictures import saving
 
     with (
         pytest.raises(StorageError, match="relit.png' can't be written .No space left"),
@@ -114,7 +114,7 @@ def test_half_a_picture_is_never_taken_for_a_whole_one(content, tmp_path):
 
 @pytest.mark.slow
 def test_from_end_to_end(tmp_path):
-    from addon.bridge.demo import run_demo
+    from addon.bridge.demo.run import run_demo
 
     stages = []
     table = run_demo(tmp_path, "tiny", QUICK, lambda event: stages.append(event.stage))

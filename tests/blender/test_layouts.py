@@ -10,9 +10,9 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.bridge.import_mesh import import_mesh
-from addon.bridge.run import run
-from addon.bridge.unwrap import unwrap
+from addon.bridge.data.import_mesh import import_mesh
+from addon.bridge.data.unwrap import unwrap
+from addon.bridge.job.run import run
 from addon.core.io.layout import Reading
 from addon.core.io.read import read_capture
 from addon.core.pipeline.recover import Recovery

@@ -125,7 +125,7 @@ def fails_with(package, monkeypatch, error):
     def fail(*arguments, **keywords):
         raise error
 
-    monkeypatch.setattr(importlib.import_module("scan_relight.addon.bridge.run"), "run", fail)
+    monkeypatch.setattr(importlib.import_module("scan_relight.addon.bridge.job.run"), "run", fail)
 
 
 def test_an_unforeseen_error_is_told_and_logged(ops, package, grey_capture, tmp_path, monkeypatch):
@@ -168,7 +168,7 @@ def test_missing_packages_are_told(ops, name, package, monkeypatch):
 def test_what_is_chosen_arrives(ops, name, until, paper, package, tmp_path, monkeypatch):
     """Folders, settings and the last stage, in the words of the one function that does the work."""
     asked = []
-    module = importlib.import_module("scan_relight.addon.bridge.run")
+    module = importlib.import_module("scan_relight.addon.bridge.job.run")
     settings = importlib.import_module("scan_relight.addon.core.settings")
 
     def remember(capture, result, chosen, progress, until, **where):

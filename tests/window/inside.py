@@ -160,14 +160,14 @@ def next_page():
 
 def phase():
     """What the run does: its operator's part, its state, its stage."""
-    job = module("addon.bridge.job").current()
+    job = module("addon.bridge.job.job").current()
     return "none" if job is None else f"{job.facts.get('phase')}/{job.state}/{job.stage}"
 
 
 def pause_in(stage):
     """Wait for a stage of the run, and have its process stand still there until it is sent SIGCONT."""
     for _ in range(3000):
-        job = module("addon.bridge.job").current()
+        job = module("addon.bridge.job.job").current()
         if job is not None and job.running and job.stage == stage:
             os.kill(job.process_id, signal.SIGSTOP)
             return job.stage

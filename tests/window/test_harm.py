@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-JOB = "module('addon.bridge.job').current()"
+JOB = "module('addon.bridge.job.job').current()"
 
 
 @pytest.fixture

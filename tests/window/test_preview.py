@@ -8,7 +8,7 @@ import shutil
 import pytest
 
 MEDIANS = """
-pictures, cameras = module("addon.bridge.pictures"), module("addon.bridge.cameras")
+pictures, cameras = module("addon.bridge.relight.pictures"), module("addon.bridge.data.cameras")
 scene = bpy.context.scene
 found, answer = cameras.frame_cameras(scene), []
 before = scene.camera
@@ -41,7 +41,7 @@ with bpy.context.temp_override(**place()):
         patience=600,
     )
     after = medians("EEVEE", 4)
-    intensity = window.ask("module('addon.bridge.relight_probe').probes(bpy.context.scene)[0].data.intensity")
+    intensity = window.ask("module('addon.bridge.relight.probe').probes(bpy.context.scene)[0].data.intensity")
     stops = [math.log2(max(got, 1e-6) / wanted) for got, wanted in zip(after, traced, strict=True)]
     figures["preview"] = {
         "cycles": traced,

@@ -9,9 +9,9 @@ from PIL import Image
 
 from tests.window.story import VISIBLE, Story
 
-LAMPS = "module('addon.bridge.relight_lamps')"
+LAMPS = "module('addon.bridge.light.lamps')"
 ACTIVE = "module('operators.job_operator').active()"
-LOOK = "module('addon.bridge.look').current(bpy.context.scene)"
+LOOK = "module('addon.bridge.results.look').current(bpy.context.scene)"
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ bpy.context.view_layer.objects.active = None
 def test_rows_further_down_are_scrolled_to(window):
     story = Story(window)
     rows = window.ask(
-        "sorted((one.name for one in module('addon.bridge.result_file').rows(bpy.context.scene.objects)),"
+        "sorted((one.name for one in module('addon.bridge.results.file').rows(bpy.context.scene.objects)),"
         "key=module('addon.core.naming').in_order)"
     )
     for row in (len(rows) - 1, 1, VISIBLE):
@@ -101,7 +101,7 @@ with bpy.context.temp_override(**place()):
 scene = bpy.context.scene
 space = place()["area"].spaces.active
 answer = [scene.render.resolution_x, scene.render.resolution_y, space.region_3d.view_perspective,
-          module("addon.bridge.match_frame").current(scene)]
+          module("addon.bridge.relight.match_frame").current(scene)]
 """) == [64, 48, "CAMERA", 3]
     window.picture(pictures / "13-frame.png")
 
@@ -111,7 +111,7 @@ def test_before_and_after_are_rendered_beside_the_window(window, folder, picture
     window.click("scan_relight.before_after(")
     window.wait_for(f"{ACTIVE} is not None")
     window.wait_for(f"{ACTIVE} is None", patience=200)
-    assert window.ask("module('addon.bridge.job').current().state") == "done"
+    assert window.ask("module('addon.bridge.job.job').current().state") == "done"
     with Image.open(folder / "before_after.png") as pair:
         assert pair.size[1] == 48 and pair.size[0] >= 2 * 64
         left, right = (

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-JOB = "module('addon.bridge.job').current()"
+JOB = "module('addon.bridge.job.job').current()"
 ACTIVE = "module('operators.job_operator').active()"
 ROOM = "sum('object_id' in thing for thing in bpy.data.objects)"
 RAYS = 256
@@ -109,8 +109,8 @@ answer = choices.result_folder, choices.preset, list(choices.bl_rna.properties.k
     assert window.ask(JOB) is None and window.ask(ROOM) == 15
     assert window.ask("bpy.ops.scan_relight.look.poll() and bpy.ops.scan_relight.switch_lamps.poll()")
     window.click("scan_relight.look(", "'ALBEDO'", across=(0.75,))
-    window.wait_for("module('addon.bridge.look').current(bpy.context.scene) == 'ALBEDO'")
+    window.wait_for("module('addon.bridge.results.look').current(bpy.context.scene) == 'ALBEDO'")
     window.click("scan_relight.switch_lamps(", "on=False", top=False, across=(0.75,))
-    lamps = "module('addon.bridge.relight_lamps')"
+    lamps = "module('addon.bridge.light.lamps')"
     window.wait_for(f"not any({lamps}.is_on(one) for one in {lamps}.find_lamps(bpy.context.scene))")
     window.picture(pictures / "08-reopened.png")

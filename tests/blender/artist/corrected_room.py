@@ -66,16 +66,16 @@ def build(folder):
         uv += [[low + square[i] for i in face] for face in ((0, 1, 2), (0, 2, 3))]
         owner += [entry["object_id"]] * 2
     mesh = Mesh(np.float32(vertices), np.int32(triangles), np.int32(owner))
-    objects = bridge("mesh_objects").make_objects(
+    objects = bridge("data.mesh_objects").make_objects(
         mesh,
         [Instance(one["object_id"], one["class_name"]) for one in ENTRIES],
         np.float32(uv),
         bpy.context.scene.collection,
     )
-    image = bridge("result_images").image(folder, "base_color.exr")
+    image = bridge("results.images").image(folder, "base_color.exr")
     for entry in ENTRIES:
         thing = objects[entry["object_id"]]
-        thing.data.materials.append(bridge("materials").make_material(material(entry), image))
+        thing.data.materials.append(bridge("data.materials").make_material(material(entry), image))
         bridge("marks").mark(thing, folder, RUN)
     bpy.context.view_layer.update()
     return objects

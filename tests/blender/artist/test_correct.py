@@ -12,7 +12,7 @@ from tests.blender.artist.corrected_room import BOARD, LAMP, TABLE, TAP, build, 
 
 @pytest.fixture
 def room(ops, tmp_path):
-    bridge("corrections").forget()
+    bridge("corrections.corrections").forget()
     bpy.context.scene.scan_relight_correct.refit_automatically = False
     return build(tmp_path / "result")
 
@@ -23,7 +23,7 @@ def kept(room, tmp_path):
 
     def keep():
         folder = tmp_path / "result"
-        numbers = bridge("corrections").keep(bpy.context.scene, folder)
+        numbers = bridge("corrections.corrections").keep(bpy.context.scene, folder)
         return json.loads((folder / "overrides.json").read_text()), numbers
 
     return keep
@@ -71,7 +71,7 @@ def test_a_textures_colour_is_scaled_by_nodes_of_blenders_own(room):
     mix = next(n for n in nodes if n.type == "MIX")
     factor = next(s for s in mix.inputs if s.type == "RGBA" and not s.links)
     assert mix.blend_type == "MULTIPLY" and factor.default_value[:3] == pytest.approx((0.5, 1.0, 2.0), rel=1e-4)
-    bridge("corrections").take_back(board, "base_color")
+    bridge("corrections.corrections").take_back(board, "base_color")
     assert not any(n.type == "MIX" for n in nodes) and sockets(board)["linked"]
 
 
@@ -177,7 +177,7 @@ def test_it_survives_saving_without_the_add_on(room, tmp_path, package):
     """The sockets are in the file; so is what is given, and the way back."""
     name = room[BOARD].name
     bpy.context.scene.scan_relight_correct.refit_automatically = False
-    bridge("corrections").give(room[BOARD], model="metal", roughness=0.15)
+    bridge("corrections.corrections").give(room[BOARD], model="metal", roughness=0.15)
     package.unregister()
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
@@ -186,7 +186,7 @@ def test_it_survives_saving_without_the_add_on(room, tmp_path, package):
         assert shown["Metallic"] == 1 and shown["Roughness"] == pytest.approx(0.15)
     finally:
         package.register()
-    bridge("corrections").take_back(bpy.data.objects[name])
+    bridge("corrections.corrections").take_back(bpy.data.objects[name])
     assert sockets(bpy.data.objects[name])["Metallic"] == 0 and sockets(bpy.data.objects[name])["linked"]
 
 
@@ -206,7 +206,7 @@ def test_smooth_stays_when_the_mesh_is_new(room, ops):
     for edge in fresh.edges:
         edge.use_edge_sharp = False
     table.data = fresh
-    bridge("corrections").reapply(table)
+    bridge("corrections.corrections").reapply(table)
     assert state(table.data) == ([True, True], 1)
     ops.smooth_by_angle(angle=0.0)
     assert state(table.data) == ([False, False], 0) and "scan_relight_smooth" not in table
@@ -235,7 +235,7 @@ def test_undo_takes_a_statement_back(room, ops):
 
 def test_a_run_from_the_panel_heeds_what_is_given(room, tmp_path):
     """Also where it goes to another folder than the one that the room came from."""
-    corrections = bridge("corrections")
+    corrections = bridge("corrections.corrections")
     for thing in room.values():
         thing["scan_relight_capture"] = str(tmp_path / "capture")
     corrections.give(room[TABLE], roughness=0.6)

@@ -15,7 +15,7 @@ from tests.blender.relight.conftest import result  # noqa: E402, F401
 @pytest.fixture
 def room(ops, result, tmp_path):  # noqa: F811
     """The demo's room, recovered, in a folder of its own and opened; its objects by name of their class."""
-    bridge("corrections").forget()
+    bridge("corrections.corrections").forget()
     folder = shutil.copytree(result, tmp_path / "result")
     bpy.ops.wm.open_mainfile(filepath=str(folder / "scene.blend"), load_ui=False)
     things = {thing.name.rpartition(" ")[0]: thing for thing in bpy.context.scene.objects if "object_id" in thing}
@@ -63,7 +63,11 @@ def test_this_is_metal_refits_that_object_alone(room, ops):
     assert sofa.material_slots[0].material == material, "whoever refers to it still does"
     assert {name: plain(thing) for name, thing in things.items() if name != "sofa"} == others
     runs = {thing["scan_relight_run"] for thing in things.values()}
-    assert len(runs) == 1 and runs != {run} and bridge("corrections").entry(sofa)["given"] == {"model": "metal"}
+    assert (
+        len(runs) == 1
+        and runs != {run}
+        and bridge("corrections.corrections").entry(sofa)["given"] == {"model": "metal"}
+    )
     assert json.loads((folder / "overrides.json").read_text())["objects"] == {
         str(sofa["object_id"]): {"model": "metal"}
     }
@@ -111,9 +115,9 @@ def test_a_failed_refit_is_a_sentence_and_what_was_said_stays(room, ops):
 def test_a_later_run_brings_the_room_and_what_the_artist_did_stays(ops, result, tmp_path):  # noqa: F811
     """The material is the new run's, under what is given; painted image and smooth shading come back."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    bridge("corrections").forget()
+    bridge("corrections.corrections").forget()
     folder = shutil.copytree(result, tmp_path / "result")
-    bringing, whole = bridge("room").bringing, bridge("slices").whole
+    bringing, whole = bridge("room.bring").bringing, bridge("slices").whole
     scene = whole(bringing(folder)).scene
     bpy.context.window.scene = scene
     scene.scan_relight_correct.refit_automatically = False
@@ -123,29 +127,29 @@ def test_a_later_run_brings_the_room_and_what_the_artist_did_stays(ops, result, 
     ops.this_is(model="metal")
     sofa.scan_relight_correct.roughness = 0.33
     ops.smooth_by_angle(angle=0.5)
-    image = bridge("unseen").own_image(wall)
+    image = bridge("corrections.unseen").own_image(wall)
     materials = json.loads((folder / "materials.json").read_text())
     materials["run"] = "f" * 16
     (folder / "materials.json").write_text(json.dumps(materials))
     again = whole(bringing(folder))
     assert again.updated and not [said for said in again.warnings if "corrected" in said]
     assert sockets(sofa)["Metallic"] == 1 and sockets(sofa)["Roughness"] == pytest.approx(0.33)
-    assert bridge("unseen").texture_node(wall).image == image
+    assert bridge("corrections.unseen").texture_node(wall).image == image
     assert any(polygon.use_smooth for polygon in sofa.data.polygons)
     assert sofa["scan_relight_run"] == "f" * 16
     select(sofa, wall)
     ops.take_back()
     ops.restore_painted()
-    assert sockets(sofa)["Metallic"] == 0 and bridge("unseen").texture_node(wall).image != image
+    assert sockets(sofa)["Metallic"] == 0 and bridge("corrections.unseen").texture_node(wall).image != image
 
 
 def test_nodes_that_were_edited_by_hand_stay(ops, result, tmp_path):  # noqa: F811
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     folder = shutil.copytree(result, tmp_path / "result")
-    scene = bridge("slices").whole(bridge("room").bringing(folder)).scene
+    scene = bridge("slices").whole(bridge("room.bring").bringing(folder)).scene
     bpy.context.window.scene = scene
     sofa = next(thing for thing in scene.objects if thing.name.startswith("sofa"))
-    node = bridge("materials").principled(sofa.material_slots[0].material)
+    node = bridge("data.materials").principled(sofa.material_slots[0].material)
     node.inputs["Sheen Weight"].default_value = 0.7
     select(sofa)
     ops.this_is(model="metal")
@@ -167,4 +171,4 @@ def test_a_known_white_scales_the_room_in_the_scene(room, ops):
     assert json.loads((folder / "overrides.json").read_text())["white"]["object"] == wall["object_id"]
     lamps = [name for name, thing in things.items() if after[thing["object_id"]]["model"] == "emitter"]
     assert lamps and all(plain(things[name]) != before[name] for name in lamps)
-    assert bridge("corrections").entry(wall)
+    assert bridge("corrections.corrections").entry(wall)

@@ -22,14 +22,14 @@ from tests.blender.artist.corrected_room import (  # noqa: E402
 
 @pytest.fixture
 def room(ops, tmp_path):
-    bridge("corrections").forget()
+    bridge("corrections.corrections").forget()
     return build(tmp_path / "result")
 
 
 def shown(thing):
     """The image that Base Color shows, and its colours (64, 64, 3)."""
-    image = bridge("unseen").texture_node(thing).image
-    return image, bridge("images").image_array(image)[..., :3]
+    image = bridge("corrections.unseen").texture_node(thing).image
+    return image, bridge("data.images").image_array(image)[..., :3]
 
 
 def hole(board=True):
@@ -73,10 +73,10 @@ def test_restore(room, ops):
     ops.fill_unseen()
     assert ops.restore_painted() == {"FINISHED"}
     assert shown(room[BOARD])[0] == before and not ops.restore_painted.poll()
-    image = bridge("unseen").own_image(room[BOARD])
+    image = bridge("corrections.unseen").own_image(room[BOARD])
     assert (shown(room[BOARD])[1][hole()] < 0.6).all(), "it is still there"
     ops.restore_painted(discard=True)
-    bridge("unseen").own_image(room[BOARD])
+    bridge("corrections.unseen").own_image(room[BOARD])
     assert shown(room[BOARD])[0] == image and np.array_equal(shown(room[BOARD])[1], colours())
 
 
@@ -87,7 +87,7 @@ def test_paint_is_ready(room, ops):
     assert bpy.context.mode == "PAINT_TEXTURE"
     assert settings.mode == "IMAGE" and settings.canvas == shown(room[BOARD])[0]
     assert settings.use_stencil_layer and not settings.invert_stencil
-    mask = bridge("images").image_array(settings.stencil_image)[..., 0]
+    mask = bridge("data.images").image_array(settings.stencil_image)[..., 0]
     assert np.array_equal(mask < 0.5, unseen())
     assert room[BOARD].data.uv_layer_stencil.name == "ScanRelight"
     bpy.ops.object.mode_set(mode="OBJECT")
@@ -99,7 +99,7 @@ def test_what_is_painted_is_saved(room, ops, tmp_path):
     ops.paint_unseen()
     bpy.ops.object.mode_set(mode="OBJECT")
     image, pixels = shown(room[BOARD])
-    pixels = bridge("images").image_array(image)
+    pixels = bridge("data.images").image_array(image)
     pixels[12, 12, :3] = (0.1, 0.3, 0.7)
     image.pixels.foreach_set(pixels.ravel())
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "room.blend"))
@@ -128,7 +128,7 @@ def test_a_painted_image_survives_an_update(room, ops, tmp_path):
     from addon.core.io.exr import write_exr
 
     write_exr(folder / "base_color.exr", np.full((SIZE, SIZE, 3), 0.25, np.float32))
-    refitted = bridge("refitted")
+    refitted = bridge("corrections.refitted")
     before = {one["object_id"]: one | ({"model": "metal"} if one["object_id"] == BOARD else {}) for one in ENTRIES}
     bridge("slices").whole(refitted.bringing(bpy.context.scene, folder, before, refitted.fitted(folder)))
     assert shown(room[BOARD])[0] == image and np.array_equal(shown(room[BOARD])[1], filled)
@@ -141,10 +141,10 @@ def test_other_texture_coordinates_are_told(room, ops):
     select(room[BOARD])
     ops.fill_unseen()
     image = shown(room[BOARD])[0]
-    node = bridge("unseen").texture_node(room[BOARD])
+    node = bridge("corrections.unseen").texture_node(room[BOARD])
     node.image = shown(room[TABLE])[0]
     room[BOARD].data.uv_layers["ScanRelight"].uv[0].vector = (0.5, 0.5)
-    [sentence] = bridge("corrections").reapply(room[BOARD])
+    [sentence] = bridge("corrections.corrections").reapply(room[BOARD])
     assert image.name in sentence and node.image != image
 
 
@@ -161,5 +161,5 @@ def test_a_moved_result_is_followed(room, ops, tmp_path):
     select(room[BOARD])
     ops.fill_unseen()
     (tmp_path / "result").rename(tmp_path / "elsewhere")
-    bridge("find_result").repoint(tmp_path / "result", tmp_path / "elsewhere")
-    assert bridge("unseen").coverage(room[BOARD]).shape == (SIZE, SIZE, 3)
+    bridge("results.find").repoint(tmp_path / "result", tmp_path / "elsewhere")
+    assert bridge("corrections.unseen").coverage(room[BOARD]).shape == (SIZE, SIZE, 3)

@@ -48,8 +48,8 @@ def blend(ops, home, tmp_path):
     wall["object_id"] = 0
     for owner in (wall, top):
         bridge("marks").mark(owner, folder, RUN)
-    images = [bridge("images").load_image(folder / name) for name in FILES]
-    bridge("result_images").settle(images, "RESULT")
+    images = [bridge("data.images").load_image(folder / name) for name in FILES]
+    bridge("results.images").settle(images, "RESULT")
     bpy.ops.wm.save_mainfile()
     return file
 
@@ -63,7 +63,7 @@ def opened(file):
 def said():
     from tests.blender.panel.conftest import Layout
 
-    bridge("find_result").forget()
+    bridge("results.find").forget()
     module = importlib.import_module("scan_relight.operators.find_result")
     panel = module.SCAN_RELIGHT_PT_missing
     if not panel.poll(bpy.context):
@@ -71,8 +71,8 @@ def said():
     layout = Layout()
     context = SimpleNamespace(scene=bpy.context.scene, preferences=bpy.context.preferences, region=None)
     panel.draw(SimpleNamespace(layout=layout, say=panel.say), context)
-    assert ("scan_relight.find_result" in layout.buttons) == bool(bridge("find_result").missing())
-    assert ("scan_relight.open_result" in layout.buttons) == bool(bridge("find_result").overtaken())
+    assert ("scan_relight.find_result" in layout.buttons) == bool(bridge("results.find").missing())
+    assert ("scan_relight.open_result" in layout.buttons) == bool(bridge("results.find").overtaken())
     return layout.text
 
 
@@ -153,12 +153,12 @@ def test_only_some_images_are_missing(blend, tmp_path):
     assert shown() == {"base_color.exr": 0.25}
     (tmp_path / "put away.exr").rename(kept)
     assert said() == ""
-    bridge("find_result").reload(tmp_path / "hall")
+    bridge("results.find").reload(tmp_path / "hall")
     assert shown() == FILES
 
 
 def test_packed_images_stay_and_the_values_are_told(blend, tmp_path):
-    bridge("result_images").settle(list(bpy.data.images), "PACK")
+    bridge("results.images").settle(list(bpy.data.images), "PACK")
     bpy.ops.wm.save_mainfile()
     shutil.move(tmp_path / "hall", tmp_path / "far")
     assert "what was found of each object can't be listed" in opened(blend)
@@ -169,7 +169,7 @@ def test_packed_images_stay_and_the_values_are_told(blend, tmp_path):
 
 
 def test_copies_beside_the_file_that_are_gone_show_the_result_s_again(blend, tmp_path):
-    bridge("result_images").settle(list(bpy.data.images), "FOLDER")
+    bridge("results.images").settle(list(bpy.data.images), "FOLDER")
     bpy.ops.wm.save_mainfile()
     assert opened(blend) == "" and shown() == FILES
     shutil.rmtree(blend.parent / "file images")
@@ -240,11 +240,13 @@ def test_scene_blend_in_its_own_result_refers_to_what_is_beside_it(blend, tmp_pa
 
 
 def test_copies_beside_the_file_are_not_overwritten_by_another_layout(blend, tmp_path):
-    bridge("result_images").settle(list(bpy.data.images), "FOLDER")
+    bridge("results.images").settle(list(bpy.data.images), "FOLDER")
     bpy.ops.wm.save_mainfile()
     older = shutil.copy(blend, blend.with_name("older.blend"))
     result(tmp_path / "hall", OTHER, shift=0.25)
-    bridge("result_images").settle([bridge("images").load_image(tmp_path / "hall" / name) for name in FILES], "FOLDER")
+    bridge("results.images").settle(
+        [bridge("data.images").load_image(tmp_path / "hall" / name) for name in FILES], "FOLDER"
+    )
     assert shown() == {name: value + 0.25 for name, value in FILES.items()}
     without_the_extension(older)
     assert shown() == FILES

@@ -76,7 +76,7 @@ def rendered(scene, tmp_path):
 def test_on_and_off(scene, look):
     before = everything(scene)
     assert bpy.ops.scan_relight.look(look=look) == {"FINISHED"}
-    assert bridge("look").current(scene) == look
+    assert bridge("results.look").current(scene) == look
     for name in ("room", "table", "lamp", "chair.001", "bent"):
         assert all(one.startswith("Scan Relight look") for one in shown(scene, name)), name
     assert not any(one.startswith("Scan Relight look") for one in shown(scene, "round"))  # wears its own paint
@@ -84,7 +84,7 @@ def test_on_and_off(scene, look):
     assert after[0] == before[0]
     assert {name: tree for name, tree in after[3].items() if name in before[3]} == before[3]
     assert bpy.ops.scan_relight.look(look="MATERIAL") == {"FINISHED"}
-    assert everything(scene) == before and bridge("look").current(scene) == "MATERIAL"
+    assert everything(scene) == before and bridge("results.look").current(scene) == "MATERIAL"
 
 
 @pytest.mark.slow
@@ -107,7 +107,7 @@ def test_saved_with_a_look_and_opened(scene, dressed, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(dressed / "with look.blend"), copy=True)
     bpy.ops.wm.open_mainfile(filepath=str(dressed / "with look.blend"))
     scene = bpy.context.scene
-    assert bridge("look").current(scene) == "SHADING" and "Shading" in next(iter(shown(scene, "room")))
+    assert bridge("results.look").current(scene) == "SHADING" and "Shading" in next(iter(shown(scene, "room")))
     np.testing.assert_array_equal(rendered(scene, tmp_path), plain)
     bpy.ops.scan_relight.look(look="MATERIAL")
     assert everything(scene) == before
@@ -157,7 +157,7 @@ def test_a_missing_image_is_told_and_changes_nothing(scene, dressed):
         bpy.ops.scan_relight.look(look="ALBEDO")
         with pytest.raises(RuntimeError, match="coverage.exr' is missing"):
             bpy.ops.scan_relight.look(look="COVERAGE")
-        assert bridge("look").current(scene) == "ALBEDO"
+        assert bridge("results.look").current(scene) == "ALBEDO"
     finally:
         image.with_suffix(".away").rename(image)
 

@@ -32,7 +32,7 @@ def test_from_run_to_reopened(ops, tiny_capture, tmp_path, monkeypatch):
     run = json.loads((result / "materials.json").read_text())["run"]
     wearing = [thing for thing in bpy.data.objects if thing.get("scan_relight_run") == run and thing.type == "MESH"]
     assert wearing and {thing["scan_relight_result"] for thing in wearing} == {str(result)}
-    rows = importlib.import_module("scan_relight.addon.bridge.result_file").rows
+    rows = importlib.import_module("scan_relight.addon.bridge.results.file").rows
     assert set(rows(wearing)) == set(wearing)
 
     file = tmp_path / "project" / "file.blend"

@@ -1,4 +1,4 @@
-"""Blender's lenses as pixels: the inverse of `addon.bridge.cameras`, against Blender's own projection."""
+"""Blender's lenses as pixels: the inverse of `addon.bridge.data.cameras`, against Blender's own projection."""
 
 import itertools
 
@@ -15,8 +15,8 @@ bpy = pytest.importorskip("bpy")
 
 from mathutils import Vector  # noqa: E402
 
-from addon.bridge.cameras import make_cameras  # noqa: E402
-from addon.bridge.scene_cameras import ANIMATION, camera_of, cameras_with_pictures, frame_size, pixel_lens, views  # noqa: E402
+from addon.bridge.data.cameras import make_cameras  # noqa: E402
+from addon.bridge.own_scene.cameras import ANIMATION, camera_of, cameras_with_pictures, frame_size, pixel_lens, views  # noqa: E402
 
 POSE = np.array([[0.36, 0.48, -0.8, 1.5], [-0.8, 0.6, 0.0, -0.7], [0.48, 0.64, 0.6, 2.0], [0, 0, 0, 1.0]])
 ROUND = {

@@ -14,9 +14,9 @@ from addon.core.scene.model import Camera, Frame
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge.cameras import make_cameras  # noqa: E402
-from addon.bridge.scene_capture import capture_scene, polygons_of, sources  # noqa: E402
-from addon.bridge.unwrap import unwrap  # noqa: E402
+from addon.bridge.data.cameras import make_cameras  # noqa: E402
+from addon.bridge.data.unwrap import unwrap  # noqa: E402
+from addon.bridge.own_scene.capture import capture_scene, polygons_of, sources  # noqa: E402
 from tests.blender.artist.artist_room import add_cameras, build_room, mesh_object, show  # noqa: E402
 
 

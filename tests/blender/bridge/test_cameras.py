@@ -12,7 +12,7 @@ bpy = pytest.importorskip("bpy")
 from bpy_extras.object_utils import world_to_camera_view  # noqa: E402
 from mathutils import Vector  # noqa: E402
 
-from addon.bridge.cameras import best_view, differing, make_cameras, off_by, unlike, use_camera  # noqa: E402
+from addon.bridge.data.cameras import best_view, differing, make_cameras, off_by, unlike, use_camera  # noqa: E402
 
 POSE = np.array([[0.36, 0.48, -0.8, 1.5], [-0.8, 0.6, 0.0, -0.7], [0.48, 0.64, 0.6, 2.0], [0, 0, 0, 1.0]])
 CAMERAS = {

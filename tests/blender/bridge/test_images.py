@@ -8,7 +8,7 @@ from addon.core.io.exr import write_exr
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge.images import DATA, RADIANCE, array_image, image_array, load_image, relative_to  # noqa: E402
+from addon.bridge.data.images import DATA, RADIANCE, array_image, image_array, load_image, relative_to  # noqa: E402
 
 PIXELS = np.random.default_rng(0).uniform(0, 40, (5, 7, 3)).astype(np.float32)
 

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from addon.bridge.import_mesh import OWNED, import_mesh
+from addon.bridge.data.import_mesh import OWNED, import_mesh
 from addon.core.errors import BadInputError
 
 QUAD = "v 0 0 0\nv 1 0 0\nv 1 2 0\nv 0 2 3\n"

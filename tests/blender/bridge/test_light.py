@@ -12,9 +12,9 @@ from addon.core.brdf.metal import METAL
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge.images import array_image  # noqa: E402
-from addon.bridge.materials import make_material  # noqa: E402
-from addon.bridge.mesh_objects import ATLAS_UV  # noqa: E402
+from addon.bridge.data.images import array_image  # noqa: E402
+from addon.bridge.data.materials import make_material  # noqa: E402
+from addon.bridge.data.mesh_objects import ATLAS_UV  # noqa: E402
 
 LOBES = [(0.1, 0.04), (0.4, 0.04), (0.1, 0.3), (0.4, 0.3)]
 """phi, psi."""

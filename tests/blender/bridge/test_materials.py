@@ -13,7 +13,7 @@ from addon.core.brdf.transparent import TRANSPARENT
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge.materials import make_material  # noqa: E402
+from addon.bridge.data.materials import make_material  # noqa: E402
 from addon.core.brdf.compensation import ior_of  # noqa: E402
 
 

@@ -7,7 +7,7 @@ from addon.core.scene.model import Instance, Mesh
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge.mesh_objects import ATLAS_UV, CAPTURE_UV, make_objects  # noqa: E402
+from addon.bridge.data.mesh_objects import ATLAS_UV, CAPTURE_UV, make_objects  # noqa: E402
 
 INSTANCES = (Instance(2, "Sofa"), Instance(5, "Sofa"), Instance(7, "Wall"), Instance(8, "Ghost"))
 

@@ -13,13 +13,14 @@ bpy = pytest.importorskip("bpy")
 
 from mathutils import Matrix, Vector  # noqa: E402
 
-from addon.bridge import relight_lamps, relight_outside, room_changes  # noqa: E402
-from addon.bridge.cameras import frame_cameras  # noqa: E402
-from addon.bridge.match_frame import match_frame  # noqa: E402
-from addon.bridge.relight_lights import add_light  # noqa: E402
-from addon.bridge.room import bringing, link_room, rooms  # noqa: E402
-from addon.bridge.room_import import importing  # noqa: E402
-from addon.bridge.run import run  # noqa: E402
+from addon.bridge.data.cameras import frame_cameras  # noqa: E402
+from addon.bridge.job.run import run  # noqa: E402
+from addon.bridge.light import lamps, outside  # noqa: E402
+from addon.bridge.relight.lights import add_light  # noqa: E402
+from addon.bridge.relight.match_frame import match_frame  # noqa: E402
+from addon.bridge.results import changes  # noqa: E402
+from addon.bridge.room.bring import bringing, link_room, rooms  # noqa: E402
+from addon.bridge.room.scanned import importing  # noqa: E402
 from addon.bridge.slices import whole  # noqa: E402
 from addon.core.errors import BadInputError, MissingStageError  # noqa: E402
 from addon.core.io.read import read_capture  # noqa: E402
@@ -198,10 +199,10 @@ def test_the_artists_edits_stay(first, second, artist, tmp_path):
     ball.name = "crystal ball"
     ball.modifiers.new("Smoother", "SUBSURF")
     principled(ball).inputs["Roughness"].default_value = 0.77
-    relight_lamps.set_factor(lamp.data.materials[0], 2.5)
-    relight_lamps.set_on(lamp.data.materials[0], False)
-    relight_outside.set_factor(scene.world, 0.5)
-    relight_outside.set_rotation(scene.world, 0.7)
+    lamps.set_factor(lamp.data.materials[0], 2.5)
+    lamps.set_on(lamp.data.materials[0], False)
+    outside.set_factor(scene.world, 0.5)
+    outside.set_rotation(scene.world, 0.7)
     scene.view_settings.exposure += 1
     exposure = scene.view_settings.exposure
     add_light(scene, "SOFTBOX")
@@ -225,9 +226,9 @@ def test_the_artists_edits_stay(first, second, artist, tmp_path):
     assert [part.name for part in sofa.users_collection] == ["Mine"]
     assert "Smoother" in ball.modifiers and principled(ball).inputs["Roughness"].default_value == pytest.approx(0.77)
     material = lamp.data.materials[0]
-    assert not relight_lamps.is_on(material) and relight_lamps.factor(material) == 2.5
-    assert relight_outside.factor(scene.world) == 0.5
-    assert relight_outside.rotation(scene.world) == pytest.approx(0.7)
+    assert not lamps.is_on(material) and lamps.factor(material) == 2.5
+    assert outside.factor(scene.world) == 0.5
+    assert outside.rotation(scene.world) == pytest.approx(0.7)
     assert scene.view_settings.exposure == exposure
     assert [thing["scan_relight_light"] for thing in scene.objects if thing.type == "LIGHT"] == ["SOFTBOX"]
     told = " ".join(brought.warnings)
@@ -339,7 +340,7 @@ def test_what_differs_is_told(first, artist, tmp_path):
     brought = bring(other)
     assert [one["object_id"] for one in brought.changes] == [ball["object_id"], wall["object_id"]]
     assert "albedo" in brought.changes[1]["text"] and "now" in brought.changes[0]["text"]
-    assert room_changes.shown(brought.scene) == list(brought.changes)
+    assert changes.shown(brought.scene) == list(brought.changes)
 
 
 def test_one_camera_goes_along_the_track(first, artist, tiny_capture):

@@ -16,9 +16,9 @@ from addon.core.scene.model import Camera, Capture, Frame, Instance, Mesh
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge import scene as bridge_scene  # noqa: E402
-from addon.bridge.room import bringing  # noqa: E402
-from addon.bridge.scene import build_scene, write_scene  # noqa: E402
+from addon.bridge.room.bring import bringing  # noqa: E402
+from addon.bridge.scene import write as bridge_scene  # noqa: E402
+from addon.bridge.scene.write import build_scene, write_scene  # noqa: E402
 
 KINDS = ("scenes", "collections", "objects", "meshes", "cameras", "materials", "worlds", "images")
 

@@ -7,7 +7,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge.unwrap import unwrap  # noqa: E402
+from addon.bridge.data.unwrap import unwrap  # noqa: E402
 from addon.core.brdf.material import Z90  # noqa: E402
 from addon.core.brdf.metal import METAL  # noqa: E402
 from addon.core.io.read import read_capture  # noqa: E402

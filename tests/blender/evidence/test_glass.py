@@ -7,9 +7,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge import demo_render  # noqa: E402
-from addon.bridge.demo_room import Paint, Thing, grid, room, tour  # noqa: E402
-from addon.bridge.unwrap import unwrap  # noqa: E402
+from addon.bridge.data.unwrap import unwrap  # noqa: E402
+from addon.bridge.demo import render  # noqa: E402
+from addon.bridge.demo.room import Paint, Thing, grid, room, tour  # noqa: E402
 from addon.core.brdf.transparent import TRANSPARENT  # noqa: E402
 from addon.core.io.read import read_capture  # noqa: E402
 from addon.core.passes.albedo.albedo import NONE  # noqa: E402
@@ -45,11 +45,11 @@ def material(name: str, paint: Paint):
     return made
 
 
-_plain = demo_render.material
+_plain = render.material
 
 
 def test_glass_is_set_apart(tmp_path, monkeypatch):
-    monkeypatch.setattr(demo_render, "material", material)
+    monkeypatch.setattr(render, "material", material)
     things = room()
     pane = slab(max(one.object_id for one in things) + 1, (1.6, 1.5, 0.7), (1.2, 0, 0), (0, 0, 1.1), 0.01)
     known = KnownRoom((*things, pane), tour(20))

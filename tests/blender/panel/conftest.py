@@ -107,5 +107,5 @@ def no_job_is_left(request):
     """Every test begins and ends without a run."""
     yield
     if "package" in request.fixturenames:
-        importlib.import_module("scan_relight.addon.bridge.job").forget()
+        importlib.import_module("scan_relight.addon.bridge.job.job").forget()
         importlib.import_module("scan_relight.operators.findings").forget()

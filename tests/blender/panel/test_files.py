@@ -149,7 +149,7 @@ def test_a_stopped_run_is_resumed_or_begun_anew(draw, recover, choices, scan, tm
 @pytest.fixture(scope="module")
 def finished(grey_capture, tmp_path_factory):
     """A whole result, made as quickly as can be."""
-    from addon.bridge.run import run
+    from addon.bridge.job.run import run
     from addon.core.progress import Progress
     from addon.core.settings import Settings
 

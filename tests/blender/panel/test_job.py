@@ -12,9 +12,9 @@ import pytest
 
 pytest.importorskip("bpy")
 
-from addon.bridge import job as jobs
-from addon.bridge.job import DONE, FAILED, STOPPED, Job
-from addon.bridge.job_command import command
+from addon.bridge.job import job as jobs
+from addon.bridge.job.command import command
+from addon.bridge.job.job import DONE, FAILED, STOPPED, Job
 from addon.core.results.room_file import read_room
 
 QUICK = [
@@ -177,7 +177,7 @@ def room_time(folder):
 def test_a_job_ends_with_its_starter(grey_capture, tmp_path):
     """A Blender that crashes leaves nothing that goes on for hours."""
     code = (
-        "import json, os, sys, time\nfrom addon.bridge.job import Job\nimport bpy\n"
+        "import json, os, sys, time\nfrom addon.bridge.job.job import Job\nimport bpy\n"
         "job = Job(json.loads(sys.argv[1]))\n"
         "while not job.stage: time.sleep(0.02)\n"
         "print(job.process_id, flush=True)\nos.kill(os.getpid(), 9)"

@@ -185,7 +185,7 @@ def test_another_file_ends_the_run(stage, module):
     stage.start(DEAF)
     job = stage.operator.job
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    assert module("addon.bridge.job").current() is None
+    assert module("addon.bridge.job.job").current() is None
     assert stage.send() == {"CANCELLED"}
     assert job.wait(30) and job.state == "stopped"
 

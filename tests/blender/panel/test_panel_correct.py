@@ -9,7 +9,7 @@ from tests.blender.artist.corrected_room import BOARD, LAMP, TABLE, TAP, build, 
 
 @pytest.fixture
 def room(ops, tmp_path, module):
-    module("addon.bridge.corrections").forget()
+    module("addon.bridge.corrections.corrections").forget()
     bpy.context.scene.scan_relight_correct.refit_automatically = False
     return build(tmp_path / "result")
 

@@ -42,7 +42,7 @@ def choices(ops):
 @pytest.fixture
 def begin(module):
     """Begin a job as an operator would, and wait until it was heard of or has ended."""
-    jobs = module("addon.bridge.job")
+    jobs = module("addon.bridge.job.job")
 
     def begun(code, phase="run", **facts):
         job = jobs.begin([sys.executable, "-c", code], phase=phase, title="Recover", **facts)
@@ -189,7 +189,7 @@ def test_the_outcome_is_shown(draw, recover, begin, choices, code, said):
 def test_run_hands_over_what_was_chosen(choices, module, monkeypatch, tmp_path):
     asked = []
     monkeypatch.setattr(
-        module("addon.bridge.run"),
+        module("addon.bridge.job.run"),
         "run",
         lambda capture, result, settings, progress, until, **where: (
             asked.append((capture, result, settings, until, where)) or {"warnings": []}
@@ -227,7 +227,7 @@ def test_no_state_of_a_run_is_saved(begin, choices, tmp_path, module, grey_captu
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
     saved = bpy.context.scene.scan_relight
-    assert saved.capture_folder and module("addon.bridge.job").current() is None
+    assert saved.capture_folder and module("addon.bridge.job.job").current() is None
     names = {prop.identifier for prop in saved.bl_rna.properties} - {"rna_type", "name"}
     assert not {name for name in names if any(word in name for word in ("job", "progress", "running", "stage"))}
 

@@ -75,7 +75,7 @@ def test_stages_beside_the_file_are_cleared_too(preferences, module, ops, tmp_pa
 def test_threads_and_memory_reach_a_run(preferences, module, ops, monkeypatch, tmp_path):
     asked, limits = [], []
     monkeypatch.setattr(
-        module("addon.bridge.run"),
+        module("addon.bridge.job.run"),
         "run",
         lambda capture, result, settings, *rest, **where: asked.append(settings) or {"warnings": []},
     )
@@ -142,7 +142,7 @@ def extension(package, monkeypatch, tmp_path):
 
 def test_no_result_is_kept_where_removing_the_extension_deletes_it(extension, module, ops, root, tmp_path, monkeypatch):
     """Whatever is preferred, chosen or open: nothing leads into the extension's folders."""
-    preferences, home = module("operators.preferences"), module("addon.bridge.result_home")
+    preferences, home = module("operators.preferences"), module("addon.bridge.results.home")
     monkeypatch.setenv("HOME", str(tmp_path / "me"))
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     (tmp_path / "me" / "Documents").mkdir(parents=True)
@@ -178,7 +178,7 @@ def test_results_of_an_earlier_version_are_moved_out(extension, module, ops, tmp
         ops.move_results()
     old = result(module, extension / ".user" / "scan_relight" / "cache" / "room-01234567")
     write_exr(old / "albedo.exr", np.full((2, 2, 3), 0.25, np.float32))
-    image = module("addon.bridge.images").load_image(old / "albedo.exr")
+    image = module("addon.bridge.data.images").load_image(old / "albedo.exr")
     thing = bpy.data.objects.new("wall", None)
     thing["scan_relight_result"] = str(old)
     from tests.blender.panel.conftest import Layout

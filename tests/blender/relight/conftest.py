@@ -57,7 +57,7 @@ def room(result):
 @pytest.fixture
 def shoot(tmp_path):
     """``shoot(scene, width, height, samples)``: (height, width, 3) float32, row 0 at the top, linear Rec.709."""
-    from addon.bridge import pictures
+    from addon.bridge.relight import pictures
     from addon.core.io.exr import read_exr
 
     def render(scene, width, height, samples):

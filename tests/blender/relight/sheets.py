@@ -3,9 +3,9 @@
 import bpy
 import numpy as np
 
+from addon.bridge.data.materials import make_material
+from addon.bridge.data.mesh_objects import mesh_data
 from addon.bridge.marks import OBJECT_ID
-from addon.bridge.materials import make_material
-from addon.bridge.mesh_objects import mesh_data
 from addon.core.brdf.emitter import EMITTER
 from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.brdf.material import ObjectMaterial

@@ -10,8 +10,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from addon import cli  # noqa: E402
-from addon.bridge import before_after, render_device  # noqa: E402
+from addon.bridge import render_device  # noqa: E402
 from addon.bridge.marks import RESULT  # noqa: E402
+from addon.bridge.relight import before_after  # noqa: E402
 from addon.core.errors import BadInputError  # noqa: E402
 from addon.core.io.exr import read_exr  # noqa: E402
 from tests.blender.relight.sheets import sheet  # noqa: E402

@@ -106,7 +106,7 @@ def test_errors_are_one_sentence_and_no_picture(result, tmp_path, capsys, option
 
 
 def first_lamp(result):
-    from addon.bridge.relight_lamps import find_lamps
+    from addon.bridge.light.lamps import find_lamps
 
     bpy.ops.wm.open_mainfile(filepath=str(result / "scene.blend"), load_ui=False)
     return find_lamps(bpy.context.scene)[0].name

@@ -7,16 +7,12 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge import (  # noqa: E402
-    relight_estimate,
-    relight_exposure,
-    relight_lamps,
-    relight_lights,
-    relight_outside,
-    relight_state,
-)
-from addon.bridge.cameras import frame_cameras  # noqa: E402
-from addon.bridge.relight_kelvin import LUMINANCE  # noqa: E402
+from addon.bridge.data.cameras import frame_cameras  # noqa: E402
+from addon.bridge.light import lamps as relight_lamps  # noqa: E402
+from addon.bridge.light import outside  # noqa: E402
+from addon.bridge.light.kelvin import LUMINANCE  # noqa: E402
+from addon.bridge.relight import estimate, lights, state  # noqa: E402
+from addon.bridge.relight import exposure as relight_exposure  # noqa: E402
 
 
 def rooms_lights(scene):
@@ -24,37 +20,37 @@ def rooms_lights(scene):
     lamps = relight_lamps.find_lamps(scene)
 
     def dark():
-        relight_outside.set_on(scene.world, False)
+        outside.set_on(scene.world, False)
         for lamp in lamps:
             relight_lamps.set_on(lamp, False)
 
     yield "a quarter", lambda: [relight_lamps.set_factor(lamp, 0.25) for lamp in lamps]
     yield "one lamp off", lambda: relight_lamps.set_on(lamps[0], False)
-    for preset in (relight_lights.WINDOW, relight_lights.SOFTBOX, relight_lights.SPOT):
-        yield f"only {preset}", lambda preset=preset: (dark(), relight_lights.add_light(scene, preset))
-        yield f"{preset} too", lambda preset=preset: relight_lights.add_light(scene, preset, 8.0)
+    for preset in (lights.WINDOW, lights.SOFTBOX, lights.SPOT):
+        yield f"only {preset}", lambda preset=preset: (dark(), lights.add_light(scene, preset))
+        yield f"{preset} too", lambda preset=preset: lights.add_light(scene, preset, 8.0)
 
 
 @pytest.mark.parametrize("camera", [0, 4, 7])
 def test_it_is_about_a_stop_from_cycles(room, shoot, camera):
     room.camera = frame_cameras(room)[camera]
-    assert relight_estimate.stops(room) is None and not relight_exposure.darkness(room), "it was not looked for yet"
+    assert estimate.stops(room) is None and not relight_exposure.darkness(room), "it was not looked for yet"
     captured = np.median(shoot(room, 48, 36, 64) @ LUMINANCE)
-    assert relight_estimate.estimate(room) == pytest.approx(0.0, abs=1e-6)
+    assert estimate.estimate(room) == pytest.approx(0.0, abs=1e-6)
     for name, change in rooms_lights(room):
         change()
         traced = math.log2(np.median(shoot(room, 48, 36, 64) @ LUMINANCE) / captured)
         # A new light alone leaves the median to what bounces off what it lights, which is not followed.
         near = 2.0 if name.startswith("only") else 1.0
-        assert relight_estimate.estimate(room) == pytest.approx(traced, abs=near), name
-        relight_state.restore_captured(room)
+        assert estimate.estimate(room) == pytest.approx(traced, abs=near), name
+        state.restore_captured(room)
 
 
 def test_what_the_panel_says(room):
-    relight_estimate.estimate(room)
+    estimate.estimate(room)
     assert relight_exposure.darkness(room) == ""
     lamps = relight_lamps.find_lamps(room)
-    relight_outside.set_factor(room.world, 0.125)
+    outside.set_factor(room.world, 0.125)
     for lamp in lamps:
         relight_lamps.set_factor(lamp, 0.125)
     said = relight_exposure.darkness(room)
@@ -62,13 +58,13 @@ def test_what_the_panel_says(room):
     captured = room.view_settings.exposure
     relight_exposure.follow(room)
     assert room.view_settings.exposure == pytest.approx(captured + 3) and relight_exposure.darkness(room) == ""
-    relight_state.restore_captured(room)
+    state.restore_captured(room)
     assert "about as captured; exposure is 3.0 stops up" in relight_exposure.darkness(room)
     relight_exposure.restore(room)
     assert room.view_settings.exposure == pytest.approx(captured)
     for lamp in lamps:
         relight_lamps.set_on(lamp, False)
-    relight_outside.set_on(room.world, False)
+    outside.set_on(room.world, False)
     assert "No light is on" in relight_exposure.darkness(room)
 
 
@@ -79,7 +75,7 @@ def test_following_renders_nothing(package, room):
     assert bpy.context.scene.view_settings.exposure == pytest.approx(exposure)
     for lamp in relight_lamps.find_lamps(room):
         lamp.scan_relight_lamp.factor = 4.0
-    if relight_outside.has_outside(room):
+    if outside.has_outside(room):
         room.world.scan_relight_outside.factor = 4.0
     assert bpy.context.scene.view_settings.exposure == pytest.approx(exposure - 2, abs=0.01)
     assert not [one for one in bpy.data.images if one.type == "RENDER_RESULT"]

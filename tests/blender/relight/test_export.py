@@ -11,13 +11,13 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge import export as exporting  # noqa: E402
-from addon.bridge import relight_lamps  # noqa: E402
-from addon.bridge.images import image_array, load_image  # noqa: E402
+from addon.bridge.data.images import image_array, load_image  # noqa: E402
+from addon.bridge.data.materials import make_material  # noqa: E402
+from addon.bridge.data.mesh_objects import ATLAS_UV, PARTS_UV, mesh_data  # noqa: E402
+from addon.bridge.data.world import set_world  # noqa: E402
+from addon.bridge.export import export as exporting  # noqa: E402
+from addon.bridge.light import lamps  # noqa: E402
 from addon.bridge.marks import OBJECT_ID, UV_MAP  # noqa: E402
-from addon.bridge.materials import make_material  # noqa: E402
-from addon.bridge.mesh_objects import ATLAS_UV, PARTS_UV, mesh_data  # noqa: E402
-from addon.bridge.world import set_world  # noqa: E402
 from addon.core.brdf.compensation import ior_of  # noqa: E402
 from addon.core.brdf.dielectric import DIELECTRIC  # noqa: E402
 from addon.core.brdf.emitter import EMITTER  # noqa: E402
@@ -265,8 +265,8 @@ def test_usdz_holds_its_textures(things, tmp_path):
 
 
 def test_lamps_go_as_they_shine_now(things, tmp_path):
-    relight_lamps.set_factor(relight_lamps.lamp_named(things, "lamp 4")[0], 0.5)
-    relight_lamps.set_on(relight_lamps.lamp_named(things, "sheet lamp")[0], False)
+    lamps.set_factor(lamps.lamp_named(things, "lamp 4")[0], 0.5)
+    lamps.set_on(lamps.lamp_named(things, "sheet lamp")[0], False)
     exporting.export(things, tmp_path / "room.glb")
     found = read_back(tmp_path / "room.glb")
     assert np.allclose(light(found["lamp 4"][1]), (3.0, 1.5, 0.75), rtol=1e-3)

@@ -5,7 +5,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge import relight_kelvin, relight_lamps  # noqa: E402
+from addon.bridge.light import kelvin as relight_kelvin  # noqa: E402
+from addon.bridge.light import lamps  # noqa: E402
 from addon.core.errors import BadInputError  # noqa: E402
 from tests.blender.relight.sheets import sheet  # noqa: E402
 
@@ -20,15 +21,15 @@ def test_it_is_what_blenders_lights_show(kelvin):
 
 def test_a_lamp_keeps_its_luminance(scene):
     sheet(scene, "lamp 1", 1, (0, 0, 0), emission=(6, 5, 4))
-    (lamp,) = relight_lamps.find_lamps(scene)
-    before = np.array(relight_lamps.radiance(lamp))
-    relight_lamps.set_kelvin(lamp, 2700)
-    after = np.array(relight_lamps.radiance(lamp))
+    (lamp,) = lamps.find_lamps(scene)
+    before = np.array(lamps.radiance(lamp))
+    lamps.set_kelvin(lamp, 2700)
+    after = np.array(lamps.radiance(lamp))
     weights = (0.2126, 0.7152, 0.0722)
     assert after @ weights == pytest.approx(before @ weights, rel=1e-4)
-    assert after[2] / after[0] < 0.15 and relight_lamps.kelvin(lamp) == pytest.approx(2700, rel=0.01)
-    relight_lamps.restore(lamp)
-    assert np.allclose(relight_lamps.radiance(lamp), before)
+    assert after[2] / after[0] < 0.15 and lamps.kelvin(lamp) == pytest.approx(2700, rel=0.01)
+    lamps.restore(lamp)
+    assert np.allclose(lamps.radiance(lamp), before)
 
 
 def test_what_is_no_temperature_is_told():

@@ -7,7 +7,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge import relight_lamps as lamps  # noqa: E402
+from addon.bridge.light import lamps as lamps  # noqa: E402
 from addon.core.errors import BadInputError  # noqa: E402
 from tests.blender.relight.sheets import sheet  # noqa: E402
 

@@ -9,12 +9,12 @@ bpy = pytest.importorskip("bpy")
 
 from mathutils import Vector  # noqa: E402
 
-from addon.bridge import relight_lights as lights  # noqa: E402
-from addon.bridge import relight_state as state  # noqa: E402
-from addon.bridge.relight_aim import Placement  # noqa: E402
-from addon.bridge.relight_kelvin import LUMINANCE  # noqa: E402
-from addon.bridge.relight_room import bounds, cast, room_light  # noqa: E402
-from addon.bridge.relight_subject import side_of, subject_of  # noqa: E402
+from addon.bridge.light.kelvin import LUMINANCE  # noqa: E402
+from addon.bridge.light.room import bounds, cast, room_light  # noqa: E402
+from addon.bridge.relight import lights as lights  # noqa: E402
+from addon.bridge.relight import state as state  # noqa: E402
+from addon.bridge.relight.aim import Placement  # noqa: E402
+from addon.bridge.relight.subject import side_of, subject_of  # noqa: E402
 from addon.core.errors import BadInputError  # noqa: E402
 from tests.blender.relight.sheets import sheet  # noqa: E402
 

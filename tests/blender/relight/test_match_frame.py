@@ -8,8 +8,8 @@ bpy = pytest.importorskip("bpy")
 from bpy_extras.object_utils import world_to_camera_view  # noqa: E402
 from mathutils import Vector  # noqa: E402
 
-from addon.bridge.cameras import make_cameras  # noqa: E402
-from addon.bridge.match_frame import current, match_frame  # noqa: E402
+from addon.bridge.data.cameras import make_cameras  # noqa: E402
+from addon.bridge.relight.match_frame import current, match_frame  # noqa: E402
 from addon.core.io.exr import write_exr  # noqa: E402
 from addon.core.scene.model import Camera, Frame  # noqa: E402
 

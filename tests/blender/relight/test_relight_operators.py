@@ -152,7 +152,7 @@ def test_before_and_after_puts_every_setting_back(ops, tmp_path, fails, monkeypa
     scene.render.image_settings.file_format = "JPEG"
     scene.render.use_border = True
     before = settings(scene)
-    module = importlib.import_module("scan_relight.addon.bridge.before_after")
+    module = importlib.import_module("scan_relight.addon.bridge.relight.before_after")
     shoot, calls = module.shoot, []
 
     def maybe(*arguments):

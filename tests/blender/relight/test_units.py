@@ -6,7 +6,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge import relight_lights, relight_units  # noqa: E402
+from addon.bridge.light import units  # noqa: E402
+from addon.bridge.relight import lights  # noqa: E402
 from addon.cli_relight import strength  # noqa: E402
 from addon.core.errors import BadInputError  # noqa: E402
 
@@ -15,19 +16,19 @@ from addon.core.errors import BadInputError  # noqa: E402
 def test_a_watt_has_the_lumens_of_its_colour(colour, lumens):
     data = bpy.data.lights.new("lamp", "POINT")
     data.energy, data.color = 1.0, colour
-    assert relight_units.lumens(data) == pytest.approx(lumens, rel=1e-3)
-    relight_units.set_lumens(data, 100)
+    assert units.lumens(data) == pytest.approx(lumens, rel=1e-3)
+    units.set_lumens(data, 100)
     assert data.energy == pytest.approx(100 / lumens, rel=1e-3)
 
 
 def test_the_temperature_keeps_the_lumens(room):
     """Blender's own colours of temperatures have luminance 1."""
     for kelvin in (2700, 6500):
-        light = relight_lights.add_light(room, "SOFTBOX", 800, kelvin=kelvin, unit="LUMEN").data
+        light = lights.add_light(room, "SOFTBOX", 800, kelvin=kelvin, unit="LUMEN").data
         assert light.temperature == kelvin and light.energy == pytest.approx(800 / 683, rel=0.01)
-    assert relight_lights.add_light(room, "SPOT", 40, unit="WATT").data.energy == pytest.approx(40)
+    assert lights.add_light(room, "SPOT", 40, unit="WATT").data.energy == pytest.approx(40)
     with pytest.raises(BadInputError, match="no unit"):
-        relight_lights.add_light(room, "SPOT", 40, unit="CANDELA")
+        lights.add_light(room, "SPOT", 40, unit="CANDELA")
 
 
 def test_a_point_of_light_throws_its_lumens(scene, shoot, look_down):
@@ -38,7 +39,7 @@ def test_a_point_of_light_throws_its_lumens(scene, shoot, look_down):
     look_down(0.05, 0.02)
     data = bpy.data.lights.new("lamp", "POINT")
     data.shadow_soft_size = 0.01
-    relight_units.set_lumens(data, 800)
+    units.set_lumens(data, 800)
     lamp = bpy.data.objects.new("lamp", data)
     lamp.location.z = 1
     scene.collection.objects.link(lamp)

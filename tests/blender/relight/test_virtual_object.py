@@ -9,8 +9,8 @@ bpy = pytest.importorskip("bpy")
 
 from mathutils import Vector  # noqa: E402
 
-from addon.bridge import virtual_object as virtual  # noqa: E402
-from addon.bridge.relight_room import Hit, bounds, cast  # noqa: E402
+from addon.bridge.light.room import Hit, bounds, cast  # noqa: E402
+from addon.bridge.relight import virtual_object as virtual  # noqa: E402
 from addon.core.errors import BadInputError  # noqa: E402
 from tests.blender.relight.sheets import sheet  # noqa: E402
 

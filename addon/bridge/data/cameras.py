@@ -1,0 +1,272 @@
+"""The capture's cameras in Blender: pinholes exact to a thousandth of a pixel, lenses as near as Blender has them.
+
+Panoramas and fisheyes become panoramic cameras, which Cycles alone renders; lenses that distort a perspective have no
+counterpart, and become the perspective without distortion.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ...core.scene.lens import Lens
+from ...core.scene.lenses import Cropped, Equirectangular
+from ...core.scene.lenses_told import lens_of, told_lens
+from ...core.scene.model import Camera, Frame, Mesh
+from ...core.scene.pixel_rays import widest_angle
+from ..marks import CAPTURE
+
+LENS = "lens_model"
+"""Custom property of cameras with a lens: the lens, fx, fy, cx and cy as JSON, which Blender has no settings for."""
+FRAME_INDEX = "frame_index"
+"""Custom property of a frame's camera: its place in the capture's order, from 0."""
+_SENSOR = 36.0
+_WIDE = np.radians(80)
+"""A lens that sees further than this from its axis is no perspective."""
+_TOLD = 0.5
+"""Pixels off from which on a lens is told of."""
+_GRID = 33
+
+
+def make_cameras(frames: Iterable[Frame], collection: bpy.types.Collection, first: int = 0) -> list[bpy.types.Object]:
+    """Make a camera object for each frame and link it to a collection.
+
+    Parameters
+    ----------
+    frames : iterable of Frame
+    collection : bpy.types.Collection
+    first : int
+        Place of the first of `frames` in the capture's order.
+
+    Returns
+    -------
+    list of bpy.types.Object
+        Named after the frames. Custom properties ``width``, ``height`` (pixels) and ``pixel_aspect`` (fx / fy) tell
+        the render size each one is exact for; `use_camera` sets it. ``frame_path`` and ``frame_exposure`` tell the
+        frame's picture and what its radiance was multiplied by; `LENS` is the lens, where there is one.
+    """
+    made = []
+    for index, frame in enumerate(frames, first):
+        thing = make_view(frame.name, frame.camera, collection)
+        thing[FRAME_INDEX] = index
+        thing["frame_path"], thing["frame_exposure"] = str(Path(frame.path).absolute()), float(frame.exposure)
+        made.append(thing)
+    return made
+
+
+def use_camera(scene: bpy.types.Scene, thing: bpy.types.Object, size: bool = True) -> None:
+    """Render through one of `make_cameras`: active camera and, with `size`, the picture's size and shape of pixels."""
+    if size:
+        render = scene.render
+        render.resolution_x, render.resolution_y = int(thing["width"]), int(thing["height"])
+        render.resolution_percentage = 100
+        render.pixel_aspect_x, render.pixel_aspect_y = _pixel(thing)
+    scene.camera = thing
+    show_camera(scene, thing)
+
+
+def best_view(frames: Iterable[Frame], mesh: Mesh) -> int:
+    """Index of the frame that a room is first seen through: the first one with the most objects' middles in it.
+
+    What stands in whose way is not asked: a frame from the room's edge that looks into it has most, one of a wall or
+    ceiling few.
+    """
+    _, owner = np.unique(mesh.object_id, return_inverse=True)
+    centres = mesh.vertices[mesh.triangles].mean(1)
+    middles = np.stack([np.bincount(owner, centres[:, axis]) for axis in range(3)], -1) / np.bincount(owner)[:, None]
+
+    def shown(camera: Camera) -> int:
+        pixels, depth = camera.project(middles)
+        inside = (pixels >= 0) & (pixels < (camera.width, camera.height))
+        return int(((depth > 0) & inside.all(1)).sum())
+
+    return int(np.argmax([shown(frame.camera) for frame in frames]))
+
+
+def show_camera(scene: bpy.types.Scene, thing: bpy.types.Object) -> None:
+    """Show one camera of a room whose others are hidden: Blender draws no picture behind a hidden one."""
+    top = next(
+        (one for one in scene.collection.children_recursive if CAPTURE in one and thing in set(one.all_objects)), None
+    )
+    if top is None or thing.name in top.objects:
+        return
+    for other in [one for one in top.objects if FRAME_INDEX in one and len(one.users_collection) > 1]:
+        top.objects.unlink(other)
+    top.objects.link(thing)
+
+
+def shows_as_framed(scene: bpy.types.Scene, thing: bpy.types.Object) -> bool:
+    """Whether a scene's picture has the sides and pixel shape that a frame's camera was made for, at any size."""
+    render = scene.render
+    wide, high = _pixel(thing)
+    wanted = thing["width"] * wide / (thing["height"] * high)
+    shown = render.resolution_x * render.pixel_aspect_x / (render.resolution_y * render.pixel_aspect_y)
+    return abs(shown / wanted - 1) < 1e-3
+
+
+def _pixel(thing: bpy.types.Object) -> tuple[float, float]:
+    """Width and height of a pixel as Blender takes them: from 1 on."""
+    aspect = float(thing["pixel_aspect"])
+    return max(1.0, 1 / aspect), max(1.0, aspect)
+
+
+def frame_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The cameras of a scene that `make_cameras` made, one room after the other, in the capture's order."""
+    found = [
+        thing
+        for thing in scene.objects
+        if thing.type == "CAMERA" and "pixel_aspect" in thing and thing.get(FRAME_INDEX, 0) >= 0
+    ]
+    return sorted(found, key=lambda thing: (thing.get(CAPTURE, ""), thing.get(FRAME_INDEX, 0)))
+
+
+def differing(frames: Iterable[Frame]) -> str:
+    """One sentence if the frames don't all share one size and pixel shape ('' if they do).
+
+    Those are settings of the scene in Blender, not of a camera.
+    """
+    kinds = {(f.camera.width, f.camera.height, round(f.camera.fx / f.camera.fy, 6)) for f in frames}
+    if len(kinds) < 2:
+        return ""
+    return (
+        f"The frames have {len(kinds)} different sizes or pixel shapes, which Blender keeps in the scene, not in a "
+        "camera: set the render size from the camera's custom properties before you render through another one."
+    )
+
+
+def kept_lens(thing: bpy.types.Object) -> tuple[Lens, tuple[float, ...]] | None:
+    """The lens that `make_cameras` left with a camera, and its fx, fy, cx, cy; None where it left none."""
+    try:
+        lens, pixels = json.loads(thing[LENS])
+        fx, fy, cx, cy = map(float, pixels)
+        return lens_of(lens), (fx, fy, cx, cy)
+    except (KeyError, TypeError, ValueError):
+        return None
+
+
+def unlike(frames: Iterable[Frame]) -> str:
+    """One sentence if Blender has no camera like some of the frames' lenses ('' if it has): how far they are off."""
+    worst: dict[tuple, tuple[float, Camera]] = {}
+    for frame in frames:
+        camera = frame.camera
+        if camera.lens is not None:
+            key = (camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.lens)
+            if key not in worst:
+                worst[key] = off_by(camera), camera
+    far, camera = max(worst.values(), key=lambda pair: pair[0], default=(0.0, None))
+    if far < _TOLD:
+        return ""
+    return (
+        f"Blender has no camera with a lens such as {camera.lens.name}: its cameras show what the frames show "
+        f"up to {far:.1f} pixels beside it, most of all in the corners; the recovery itself uses the exact lens."
+    )
+
+
+def off_by(camera: Camera) -> float:
+    """Pixels by which the Blender camera's picture is off the camera's own, at most."""
+    y, x = (np.linspace(0, extent, _GRID) for extent in (camera.height, camera.width))
+    pixels = np.stack([i.ravel() for i in np.meshgrid(x, y)], -1)
+    points = (pixels - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+    seen = camera.lens.unproject(points)[1]
+    points = points[seen]
+    if isinstance(camera.lens, Equirectangular):
+        return 0.0
+    if _is_wide(camera):
+        radius = np.hypot(points[:, 0], points[:, 1])
+        theta = sum(k * (camera.fx * _SENSOR / camera.width * radius) ** power
+                    for power, k in enumerate(_angles(camera), 1))  # fmt: skip
+        across = points / np.maximum(radius, 1e-12)[:, None] * np.sin(theta)[:, None]
+        rays = np.column_stack([across, np.cos(theta)])
+    else:
+        rays = np.column_stack([points, np.ones(len(points))])
+    shown, known = camera.lens.project(rays)
+    off = np.hypot(*((shown - points) * (camera.fx, camera.fy))[known].T)
+    return float(off.max(initial=0)) if known.any() else float("inf")
+
+
+def _is_wide(camera: Camera) -> bool:
+    """Whether it becomes a panoramic camera."""
+    lens = camera.lens.lens if isinstance(camera.lens, Cropped) else camera.lens
+    return isinstance(lens, Equirectangular) or getattr(lens, "fisheye", False) or widest_angle(camera) > _WIDE
+
+
+def _angles(camera: Camera) -> np.ndarray:
+    """Coefficients of the ray's angle as a polynomial of the distance in millimetres from the principal point, (4,).
+
+    Cycles has no other fisheye with free coefficients; least squares in pixels over the frame, the mean of all
+    directions where a lens is not round.
+    """
+    corners = np.array([(x, y) for x in (0, camera.width) for y in (0, camera.height)], float)
+    reach = np.linalg.norm((corners - (camera.cx, camera.cy)) / (camera.fx, camera.fy), axis=1).max()
+    radius, phi = np.meshgrid(np.linspace(0, reach, 401)[1:], np.arange(16) * (np.pi / 8), indexing="ij")
+    points = np.stack([radius * np.cos(phi), radius * np.sin(phi)], -1).reshape(-1, 2)
+    rays, seen = camera.lens.unproject(points)
+    theta = np.arctan2(np.hypot(rays[:, 0], rays[:, 1]), rays[:, 2]).reshape(radius.shape)
+    good = seen.reshape(radius.shape).all(1)
+    radius, theta = radius[good, 0], theta[good].mean(1)
+    millimetres = camera.fx * _SENSOR / camera.width * radius
+    pixels = 1 / np.maximum(np.gradient(theta, radius), 1e-6)  # how much a wrong angle counts
+    powers = (millimetres / millimetres[-1])[:, None] ** np.arange(1, 5)
+    k = np.linalg.lstsq(powers * pixels[:, None], theta * pixels, rcond=None)[0]
+    return k / millimetres[-1] ** np.arange(1, 5)
+
+
+def _rim(camera: Camera) -> float:
+    """The angle from the axis at which the picture's circle ends, or the widest in the frame."""
+    widest = min(widest_angle(camera), np.pi)
+    if not isinstance(camera.lens, Cropped):
+        return widest
+    phi = np.arange(64) * (np.pi / 32)
+    rim = np.stack([camera.lens.across * np.cos(phi), camera.lens.down * np.sin(phi)], -1)
+    rays, seen = camera.lens.lens.unproject(rim)
+    return float(np.arccos(rays[:, 2].clip(-1, 1)).max()) if seen.all() else widest
+
+
+def _set_panorama(data: bpy.types.Camera, camera: Camera) -> None:
+    """Make `data` a whole or partial panorama, or a fisheye."""
+    data.type = "PANO"
+    if isinstance(camera.lens, Equirectangular):
+        data.panorama_type = "EQUIRECTANGULAR"
+        data.shift_x = data.shift_y = 0.0
+        data.longitude_min, data.longitude_max = (x / camera.fx for x in (-camera.cx, camera.width - camera.cx))
+        data.latitude_min, data.latitude_max = (y / camera.fy for y in (camera.cy - camera.height, camera.cy))
+        return
+    data.panorama_type = "FISHEYE_LENS_POLYNOMIAL"
+    data.fisheye_fov = 2 * _rim(camera)
+    # Its sign is Cycles' own; shifts count in the picture's width and height here.
+    data.fisheye_polynomial_k0 = 0.0
+    for power, k in enumerate(_angles(camera), 1):
+        setattr(data, f"fisheye_polynomial_k{power}", -k)
+    data.shift_x = 0.5 - camera.cx / camera.width
+    data.shift_y = camera.cy / camera.height - 0.5
+
+
+def make_view(name: str, camera: Camera, collection: bpy.types.Collection) -> bpy.types.Object:
+    """Make a camera object that belongs to no frame and link it to a collection."""
+    data = bpy.data.cameras.new(name)
+    data.sensor_fit = "HORIZONTAL"
+    data.sensor_width = _SENSOR
+    data.lens = camera.fx * _SENSOR / camera.width
+    aspect = camera.fx / camera.fy
+    # Shifts count in widths of the picture; a tall pixel counts by its true height.
+    data.shift_x = 0.5 - camera.cx / camera.width
+    data.shift_y = (camera.cy - camera.height / 2) * aspect / camera.width
+    if isinstance(camera.lens, Equirectangular):
+        aspect = 1.0  # its pixels may have any shape
+    if camera.lens is not None and _is_wide(camera):
+        _set_panorama(data, camera)
+    data.clip_start, data.clip_end = 0.01, 1000.0
+    data.display_size = 0.15
+    data.passepartout_alpha = 1.0  # what lies outside the picture Cycles' viewport then needn't compute
+    thing = bpy.data.objects.new(name, data)
+    thing.matrix_world = Matrix(np.asarray(camera.camera_to_world, np.float64).tolist())
+    thing["width"], thing["height"], thing["pixel_aspect"] = camera.width, camera.height, aspect
+    if camera.lens is not None:
+        thing[LENS] = json.dumps([told_lens(camera.lens), [camera.fx, camera.fy, camera.cx, camera.cy]])
+    collection.objects.link(thing)
+    return thing

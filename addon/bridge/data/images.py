@@ -1,0 +1,151 @@
+"""Images: the result folder's EXR files as Blender images, and arrays as generated ones."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.brdf.material import ObjectMaterial
+from ...core.errors import BadInputError
+from ...core.naming import LONGEST, cut
+from ...core.results.room_file import MATERIALS, layout_of
+from ..marks import IMAGE, LAYOUT, UV_MAP
+from .mesh_objects import PARTS_UV
+
+RADIANCE = "Linear Rec.709"
+"""Colour space of radiance, albedo and F0."""
+UDIM = "<UDIM>"
+DATA = "Non-Color"
+"""Colour space of numbers that are no colours."""
+
+
+def load_image(
+    path: Path | str, name: str | None = None, colour_space: str = RADIANCE, packed: bool = False, keep: bool = True
+) -> bpy.types.Image:
+    """Link an image file of a result folder; it is marked (`marks.IMAGE`) with where it came from.
+
+    Parameters
+    ----------
+    path : Path or str
+        One with ``<UDIM>`` in its name stands for all its tiles.
+    name : str, optional
+        Name of the image in Blender; the file's stem if left out.
+    colour_space : str
+        `RADIANCE` or `DATA`.
+    packed : bool
+        Store the file's bytes within the .blend.
+    keep : bool
+        Give it a fake user, so that it is saved although no material shows it.
+
+    Returns
+    -------
+    bpy.types.Image
+        Its path is absolute; `relative_to` changes that.
+
+    Raises
+    ------
+    BadInputError
+        The file is missing or is no image.
+    """
+    path = Path(path).absolute()
+    tiles = tiles_of(path)
+    try:
+        image = bpy.data.images.load(str(tiles[0] if tiles else path), check_existing=False)
+        if tiles:
+            image.source, image.filepath = "TILED", str(path)
+            for tile in tiles[1:]:
+                image.tiles.new(int(tile.name[len(path.name.split(UDIM)[0]) :][:4]))
+    except RuntimeError as error:
+        raise BadInputError(f"{path} can't be opened as an image; run the stage that writes it again.") from error
+    image.name = name or path.stem
+    image.colorspace_settings.name = colour_space
+    image.alpha_mode = "NONE"
+    image.use_fake_user = keep
+    image[IMAGE] = str(path)
+    layout = layout_of(result_of(path))
+    if layout:
+        image[LAYOUT] = layout
+    if packed:
+        image.pack()
+    return image
+
+
+def result_of(path: Path) -> Path:
+    """The result folder that an image's file is of: where it lies, or the folder above for an object's own."""
+    return path.parent if (path.parent / MATERIALS).is_file() else path.parent.parent
+
+
+def tiles_of(path: Path) -> list[Path]:
+    """The files that a path with ``<UDIM>`` in its name stands for; none for any other."""
+    return sorted(path.parent.glob(path.name.replace(UDIM, "[0-9]" * 4))) if UDIM in path.name else []
+
+
+def load_parts(
+    folder: Path, files: dict[int, str], room: str, descriptions: dict[int, ObjectMaterial]
+) -> dict[int, bpy.types.Image]:
+    """The images of a result folder's `Parts`, by object; objects of one file share its image."""
+    found: dict[str, bpy.types.Image] = {}
+    for number, file in files.items():
+        if file not in found:
+            name = image_name(room, "base_color tiles") if UDIM in file else f"{descriptions[number].name} base color"
+            found[file] = load_image(folder / file, name, keep=False)
+            found[file][UV_MAP] = PARTS_UV
+    return {number: found[file] for number, file in files.items()}
+
+
+def image_name(room: str, path: Path | str) -> str:
+    """What an image file of a room is called: 'kitchen base color', so that two rooms in one file are told apart."""
+    what = Path(path).stem.replace("_", " ")
+    return f"{cut(room, LONGEST - 8) or 'room'} {what}"
+
+
+def relative_to(image: bpy.types.Image, folder: Path | str) -> None:
+    """Give an image a path that starts at the .blend's folder (``//``), so that both can be moved together.
+
+    Paths on another drive stay absolute.
+    """
+    try:
+        relative = os.path.relpath(image.filepath, Path(folder).absolute())
+    except ValueError:
+        return
+    image.filepath = "//" + relative.replace(os.sep, "/")
+
+
+def array_image(name: str, pixels: np.ndarray, colour_space: str = RADIANCE) -> bpy.types.Image:
+    """Make a float image from an array and pack it into the .blend.
+
+    Parameters
+    ----------
+    name : str
+    pixels : (h, w), (h, w, 3) or (h, w, 4) float
+        Row 0 at the bottom. Linear Rec.709 for `RADIANCE`.
+    colour_space : str
+        `RADIANCE` or `DATA`.
+
+    Returns
+    -------
+    bpy.types.Image
+    """
+    height, width = pixels.shape[:2]
+    image = bpy.data.images.new(name, width, height, float_buffer=True, is_data=colour_space == DATA)
+    # The colour space comes first: setting it afterwards would throw the pixels away.
+    image.colorspace_settings.name = colour_space
+    rgba = np.ones((height, width, 4), np.float32)
+    rgba[..., :3] = (pixels if pixels.ndim == 3 else pixels[..., None])[..., :3]
+    if pixels.ndim == 3 and pixels.shape[2] == 4:
+        rgba[..., 3] = pixels[..., 3]
+    image.pixels.foreach_set(rgba.ravel())
+    image.update()
+    image.pack()
+    return image
+
+
+def image_array(image: bpy.types.Image) -> np.ndarray:
+    """Pixels of an image, (h, w, 4) float32, row 0 at the bottom."""
+    width, height = image.size
+    pixels = np.empty(width * height * image.channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    return pixels.reshape(height, width, image.channels)

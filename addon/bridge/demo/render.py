@@ -1,0 +1,168 @@
+"""Renders the demo's room with Cycles into a capture folder, exactly as a scanner's would look."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ...core.brdf.compensation import ior_of
+from ...core.errors import BadInputError, StorageError
+from ...core.io.exr import read_header
+from ...core.progress import Progress
+from ..data.images import array_image
+from ..data.materials import BASE_COLOR, IOR, ROUGHNESS, SPECULAR_LEVEL
+from ..relight.pictures import can_denoise
+from .capture import FIELD_OF_VIEW, frame_path, write_all_but_frames
+from .room import Paint, Thing, room, tour
+
+SIZES = {"tiny": (10, 64, 48, 24), "small": (36, 160, 120, 24), "large": (64, 320, 240, 128)}
+"""Frames, width, height and samples for each pixel."""
+
+FORMAT = 3  # raise when the room or its rendering changes, so that an older capture is not taken for this one
+
+
+def render_capture(folder: Path, size: str = "small", progress: Progress | None = None) -> Path:
+    """Render the demo's room into `folder`, unless it is there already.
+
+    Parameters
+    ----------
+    folder : Path
+        Becomes a capture: transforms.json, mesh.ply, info_semantic.json, images/, and truth/materials.json, which
+        only the demo's comparison reads.
+    size : str
+        One of `SIZES`.
+    progress : Progress, optional
+
+    Returns
+    -------
+    Path
+        `folder`.
+    """
+    folder, progress = Path(folder), progress or Progress()
+    if is_rendered(folder, size):
+        return folder
+    part = folder.with_name(folder.name + ".part")
+    try:
+        shutil.rmtree(part, ignore_errors=True)
+        things = room()
+        frames, width, height, samples = SIZES[size]
+        poses = tour(frames)
+        write_all_but_frames(part, things, poses, (width, height))
+        render_frames(part, things, poses, (width, height), samples, progress)
+        (part / "truth" / "demo.json").write_text(json.dumps(stamp_of(size)))
+        shutil.rmtree(folder, ignore_errors=True)
+        os.replace(part, folder)
+    except (OSError, RuntimeError, BadInputError) as error:  # Blender's failures to write are RuntimeErrors, or silent
+        reason = " ".join(str(getattr(error, "strerror", None) or error).split()).removeprefix("Error: ").rstrip(".")
+        raise StorageError(
+            f"The demo's capture can't be written to '{folder}' ({reason}); free some space or choose another folder."
+        ) from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    return folder
+
+
+def is_rendered(folder: Path, size: str) -> bool:
+    """Whether `folder` holds the demo's capture of this size already."""
+    try:
+        return json.loads((Path(folder) / "truth" / "demo.json").read_text()) == stamp_of(size)
+    except (OSError, ValueError):
+        return False
+
+
+def stamp_of(size: str) -> dict:
+    """What a finished capture is marked with."""
+    return {"format": FORMAT, "size": list(SIZES[size])}
+
+
+def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int], samples: int, progress: Progress):
+    """Render the room from every pose into the capture `folder`, as half-float EXR in linear Rec.709."""
+    before = {kind: set(getattr(bpy.data, kind)) for kind in KINDS}
+    scene = bpy.data.scenes.new("demo")
+    try:
+        for thing in things:
+            scene.collection.objects.link(build(thing))
+        camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+        camera.data.sensor_fit, camera.data.angle, camera.data.clip_start = "HORIZONTAL", FIELD_OF_VIEW, 0.01
+        scene.collection.objects.link(camera)
+        scene.camera = camera
+        set_up_cycles(scene, size, samples)
+        image = scene.render.image_settings
+        image.file_format, image.color_mode, image.color_depth = "OPEN_EXR", "RGB", "16"
+        for k, pose in enumerate(poses):
+            progress.update(k / len(poses))
+            camera.matrix_world = Matrix(pose.tolist())
+            scene.render.filepath = str(folder / frame_path(k))
+            bpy.ops.render.render(write_still=True, scene=scene.name)
+            read_header(folder / frame_path(k))  # raises where it is absent or cut off
+        progress.update(1.0)
+    finally:
+        bpy.data.scenes.remove(scene)
+        for kind in KINDS:
+            for block in set(getattr(bpy.data, kind)) - before[kind]:
+                getattr(bpy.data, kind).remove(block)
+
+
+KINDS = ("objects", "meshes", "cameras", "materials", "images")
+
+
+def set_up_cycles(scene, size: tuple[int, int], samples: int) -> None:
+    """Path tracing on the processor, one box filter a pixel, denoised where this Blender can."""
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x, scene.render.resolution_y = size
+    scene.render.resolution_percentage = 100
+    scene.render.use_persistent_data = True
+    scene.render.use_compositing = scene.render.use_sequencer = False
+    cycles = scene.cycles
+    cycles.device, cycles.samples, cycles.use_adaptive_sampling = "CPU", samples, False
+    cycles.pixel_filter_type = "BOX"
+    cycles.sample_clamp_indirect = cycles.sample_clamp_direct = 0
+    cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 10, 10, 10
+    cycles.caustics_reflective, cycles.blur_glossy = True, 0
+    cycles.use_light_tree = False  # two lamps: it would cost 40 % of the time for nothing
+    cycles.use_denoising = can_denoise()
+
+
+def build(thing: Thing):
+    """The thing as a mesh object with its true materials."""
+    vertices, faces, uv, slot = thing.faces()
+    mesh = bpy.data.meshes.new(thing.class_name)
+    mesh.from_pydata(vertices.tolist(), [], faces.tolist())
+    mesh.uv_layers.new(name="uv").uv.foreach_set("vector", uv.astype(np.float32).ravel())
+    mesh.polygons.foreach_set("material_index", slot.astype(np.int32))
+    for paint in thing.paints:
+        mesh.materials.append(material(thing.class_name, paint))
+    return bpy.data.objects.new(thing.class_name, mesh)
+
+
+def material(name: str, paint: Paint):
+    """The paint as a Cycles material: emission, or a Principled."""
+    made = bpy.data.materials.new(name)
+    if made.node_tree is None:  # before Blender 5.0
+        made.use_nodes = True
+    nodes, links = made.node_tree.nodes, made.node_tree.links
+    nodes.clear()
+    output = nodes.new("ShaderNodeOutputMaterial")
+    if paint.emission:
+        shader = nodes.new("ShaderNodeEmission")
+        shader.inputs["Color"].default_value = (*paint.emission, 1)
+    else:
+        shader = nodes.new("ShaderNodeBsdfPrincipled")
+        shader.distribution = "GGX"
+        shader.inputs[ROUGHNESS].default_value = paint.roughness
+        shader.inputs[IOR].default_value = ior_of(paint.f0) if paint.f0 else 1.5
+        shader.inputs[SPECULAR_LEVEL].default_value = 0.5 if paint.f0 else 0.0
+        if paint.albedo.ndim == 1:
+            shader.inputs[BASE_COLOR].default_value = (*paint.albedo.tolist(), 1)
+        else:
+            texture = nodes.new("ShaderNodeTexImage")
+            texture.image, texture.extension = array_image(name, paint.albedo), "EXTEND"
+            links.new(texture.outputs["Color"], shader.inputs[BASE_COLOR])
+    links.new(shader.outputs[0], output.inputs["Surface"])
+    return made

@@ -1,0 +1,311 @@
+"""The demo's room as plain values: shapes, colours, gloss and lamps that the demo knows and the method does not.
+
+Everything is made of quads; metres, +Z up. `demo.render` turns it into a scene for Cycles and into a capture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+SIZE = (4.4, 3.6, 2.6)
+"""The room's extent along x, y and z; its corner is the origin."""
+
+
+@dataclass(frozen=True)
+class Paint:
+    """A known material.
+
+    Attributes
+    ----------
+    albedo : (3,) or (height, width, 3) float32
+        Base colour, one or a picture whose row 0 is the bottom.
+    roughness : float
+        Blender's, the square root of GGX alpha.
+    f0 : float
+        Reflectance at normal incidence; 0 is purely diffuse.
+    emission : (3,) tuple of float or None
+        Radiance of a lamp.
+    """
+
+    albedo: np.ndarray
+    roughness: float = 1.0
+    f0: float = 0.0
+    emission: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Thing:
+    """One object of the room.
+
+    Attributes
+    ----------
+    object_id : int
+    class_name : str
+    quads : (q, 4, 3) float64
+        Corners, counter-clockwise from outside.
+    uv : (q, 4, 2) float64
+    slot : (q,) int
+        Which of `paints` each quad wears.
+    paints : tuple of Paint
+        All of the same gloss: one object, one roughness.
+    triangles : bool
+        Split every quad in two, in the scene and in the capture (quads that are not flat).
+    """
+
+    object_id: int
+    class_name: str
+    quads: np.ndarray
+    uv: np.ndarray
+    slot: np.ndarray
+    paints: tuple[Paint, ...]
+    triangles: bool = False
+
+    def faces(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Vertices (v, 3), their faces (f, 3 or 4), the faces' corner uv (f, 3 or 4, 2) and slot (f,)."""
+        vertices, index = np.unique(np.round(self.quads.reshape(-1, 3), 6), axis=0, return_inverse=True)
+        index, uv, slot = index.reshape(-1, 4), self.uv, self.slot
+        if self.triangles:
+            corners = np.array([[0, 1, 2], [0, 2, 3]])
+            index, uv, slot = index[:, corners].reshape(-1, 3), uv[:, corners].reshape(-1, 3, 2), np.repeat(slot, 2)
+        return vertices, index, uv, slot
+
+    def samples(self, count: int = 64) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """`count` points on each quad, (q, count, 3), their base colours (q, count, 3) and share of surface (q, count).
+
+        They lie on no grid, so that no stripe of a texture falls between them.
+        """
+        a, b = (((np.arange(count) + 0.5) * step % 1)[None, :, None] for step in (0.7548776662, 0.5698402910))
+        weights = (1 - a) * (1 - b), a * (1 - b), a * b, (1 - a) * b
+        points, uv = (sum(w * corners[:, None, k] for k, w in enumerate(weights)) for corners in (self.quads, self.uv))
+        colours = self.colours(self.slot, uv)
+        area = np.linalg.norm(self.normals(), axis=1)
+        return points, colours, np.repeat((area / area.sum())[:, None] / count, count, 1)
+
+    def colours(self, slot: np.ndarray, uv: np.ndarray) -> np.ndarray:
+        """Base colours where paint `slot` ((m,) int) has the coordinates `uv` ((m, ..., 2)), (m, ..., 3) float64."""
+        result = np.empty((*uv.shape[:-1], 3))
+        for k, paint in enumerate(self.paints):
+            mine = slot == k
+            if paint.albedo.ndim == 1:
+                result[mine] = paint.albedo
+            else:
+                size = np.array(paint.albedo.shape[1::-1])
+                x, y = np.moveaxis(np.clip((uv[mine] * size).astype(int), 0, size - 1), -1, 0)
+                result[mine] = paint.albedo[y, x]
+        return result
+
+    def normals(self) -> np.ndarray:
+        """Normals of the quads as long as their area, (q, 3) float64."""
+        return np.cross(self.quads[:, 2] - self.quads[:, 0], self.quads[:, 3] - self.quads[:, 1]) / 2
+
+    def mean_albedo(self) -> np.ndarray:
+        """Base colour averaged over the surface, (3,) float64."""
+        _, colours, share = self.samples(max(64, 6000 // len(self.quads)))
+        return np.einsum("qkc,qk->c", colours, share)
+
+
+def grid(origin, across, up, columns=1, rows=1) -> tuple[np.ndarray, np.ndarray]:
+    """A parallelogram cut into `columns` x `rows` quads: corners (q, 4, 3) and uv (q, 4, 2) over the whole of it."""
+    j, i = (x.ravel() for x in np.mgrid[:rows, :columns])
+    uv = np.stack([np.stack([(i + a) / columns, (j + b) / rows], -1) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))], 1)
+    origin, across, up = (np.asarray(x, float) for x in (origin, across, up))
+    return origin + uv[..., :1] * across + uv[..., 1:] * up, uv
+
+
+def box(low, high) -> tuple[np.ndarray, np.ndarray]:
+    """The six sides of a box, each with uv over its whole: top first, bottom last."""
+    (x, y, z), (dx, dy, dz) = low, np.subtract(high, low)
+    sides = [
+        grid((x, y, z + dz), (dx, 0, 0), (0, dy, 0)),
+        grid((x, y, z), (dx, 0, 0), (0, 0, dz)),
+        grid((x + dx, y, z), (0, dy, 0), (0, 0, dz)),
+        grid((x + dx, y + dy, z), (-dx, 0, 0), (0, 0, dz)),
+        grid((x, y + dy, z), (0, -dy, 0), (0, 0, dz)),
+        grid((x, y + dy, z), (dx, 0, 0), (0, -dy, 0)),
+    ]
+    return np.concatenate([s[0] for s in sides]), np.concatenate([s[1] for s in sides])
+
+
+def ball(centre, radius, steps) -> tuple[np.ndarray, np.ndarray]:
+    """A sphere from the sides of a cube, each cut into `steps` x `steps` quads of like size."""
+    quads, uv = zip(
+        *(
+            grid(*side, steps, steps)
+            for side in (
+                ((-1, -1, 1), (2, 0, 0), (0, 2, 0)),
+                ((-1, -1, -1), (2, 0, 0), (0, 0, 2)),
+                ((1, -1, -1), (0, 2, 0), (0, 0, 2)),
+                ((1, 1, -1), (-2, 0, 0), (0, 0, 2)),
+                ((-1, 1, -1), (0, -2, 0), (0, 0, 2)),
+                ((-1, 1, -1), (2, 0, 0), (0, -2, 0)),
+            )
+        )
+    )
+    cube = np.tan(np.concatenate(quads) * np.pi / 4)
+    return np.asarray(centre) + radius * cube / np.linalg.norm(cube, axis=-1, keepdims=True), np.concatenate(uv)
+
+
+def cone(centre, low_radius, high_radius, height, steps) -> tuple[np.ndarray, np.ndarray]:
+    """The side of a truncated cone that stands on `centre`, open above and below."""
+    turn = np.linspace(0, 2 * np.pi, steps + 1)
+    ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(steps + 1)], -1)
+    low = np.asarray(centre) + low_radius * ring
+    high = np.asarray(centre) + high_radius * ring + (0, 0, height)
+    return np.stack([low[:-1], low[1:], high[1:], high[:-1]], 1), np.zeros((steps, 4, 2))
+
+
+def planks(size=256) -> np.ndarray:
+    """A plank floor, (size, size, 3) float32."""
+    random = np.random.default_rng(3)
+    y, x = np.mgrid[:size, :size] / size
+    row = (y * 14).astype(int)
+    plank = ((x + random.random(14)[row]) * 2.5).astype(int)
+    tone = random.uniform(0.75, 1.2, (14, 8))[row, plank]
+    tone = tone * (1 + 0.12 * np.sin(40 * y * 14 + 3 * np.sin(9 * x + 5 * row)))
+    tone[(y * 14) % 1 < 0.06] *= 0.55
+    return (tone[..., None] * (0.36, 0.215, 0.11)).astype(np.float32)
+
+
+def wallpaper(size=256) -> np.ndarray:
+    """Diamonds in two tones, (size, size, 3) float32."""
+    y, x = np.mgrid[:size, :size] / size
+    u, v = x * 14 + y * 8, x * 14 - y * 8
+    dark = (np.floor(u) + np.floor(v)) % 2 < 1
+    line = (u % 1 < 0.09) | (v % 1 < 0.09)
+    colour = np.where(dark[..., None], (0.09, 0.27, 0.29), (0.19, 0.42, 0.40))
+    return np.where(line[..., None], (0.62, 0.56, 0.36), colour).astype(np.float32)
+
+
+def painting(size=128) -> np.ndarray:
+    """A sun over hills, (size, size, 3) float32."""
+    y, x = np.mgrid[:size, :size] / size
+    picture = (1 - y[..., None]) * (0.75, 0.33, 0.12) + y[..., None] * (0.10, 0.20, 0.45)
+    picture[np.hypot((x - 0.62) * 1.4, y - 0.55) < 0.17] = (0.80, 0.62, 0.18)
+    picture[y < 0.40 + 0.10 * np.sin(5 * x + 0.5)] = (0.10, 0.22, 0.10)
+    picture[y < 0.24 + 0.08 * np.sin(7 * x + 2.4)] = (0.04, 0.10, 0.07)
+    picture[np.maximum(abs(x - 0.5), abs(y - 0.5)) > 0.45] = 0.75
+    return picture.astype(np.float32)
+
+
+def stripes(size=128) -> np.ndarray:
+    """A striped rug, (size, size, 3) float32."""
+    x = np.broadcast_to(np.arange(size) / size, (size, size))
+    colours = np.array([(0.55, 0.48, 0.38), (0.30, 0.07, 0.06), (0.55, 0.48, 0.38), (0.10, 0.12, 0.20)])
+    return colours[(x * 16).astype(int) % 4].astype(np.float32)
+
+
+def room() -> tuple[Thing, ...]:
+    """The furnished room."""
+    x, y, z = SIZE
+    things: list[Thing] = []
+
+    def add(class_name, shapes, *paints, slots=None, triangles=False):
+        slots = slots or [0] * len(shapes)
+        quads, uv = np.concatenate([s[0] for s in shapes]), np.concatenate([s[1] for s in shapes])
+        slot = np.repeat(slots, [len(s[0]) for s in shapes])
+        things.append(Thing(len(things), class_name, quads, uv, slot, paints, triangles))
+
+    def plain(*colour, **gloss):
+        return Paint(np.array(colour, np.float32), **gloss)
+
+    def lamp(*radiance):
+        return Paint(np.zeros(3, np.float32), emission=radiance)
+
+    add("floor", [grid((0, 0, 0), (x, 0, 0), (0, y, 0), 16, 14)], Paint(planks()))
+    add("ceiling", [grid((0, y, z), (x, 0, 0), (0, -y, 0), 16, 14)], plain(0.80, 0.79, 0.77))
+    add(
+        "wall",
+        [
+            grid((0, y, 0), (0, -y, 0), (0, 0, z), 14, 10),
+            grid((0, 0, 0), (0, 0, z), (x, 0, 0), 10, 16),
+            grid((x, 0, 0), (0, 0, z), (0, y, 0), 10, 14),
+        ],
+        plain(0.70, 0.64, 0.54),
+    )
+    things[-1] = facing(things[-1], np.array([x / 2, y / 2, z / 2]))
+    add("papered wall", [grid((x, y, 0), (-x, 0, 0), (0, 0, z), 16, 10)], Paint(wallpaper()))
+    things[-1] = facing(things[-1], np.array([x / 2, y / 2, z / 2]))
+    add("ceiling lamp", [box((1.85, 1.45, z - 0.06), (2.55, 2.15, z - 0.01))], lamp(20.0, 18.5, 16.5))
+    add(
+        "sofa",
+        [
+            box((1.05, 2.75, 0.12), (3.15, 3.5, 0.42)),
+            box((1.05, 3.25, 0.42), (3.15, 3.5, 0.85)),
+            box((0.85, 2.75, 0.12), (1.05, 3.5, 0.62)),
+            box((3.15, 2.75, 0.12), (3.35, 3.5, 0.62)),
+            box((1.12, 3.08, 0.42), (1.52, 3.25, 0.78)),
+            box((2.68, 3.08, 0.42), (3.08, 3.25, 0.78)),
+        ],
+        plain(0.07, 0.13, 0.30),
+        plain(0.60, 0.27, 0.06),
+        slots=[0, 0, 0, 0, 1, 1],
+    )
+    legs = [box((a, b, 0.015), (a + 0.06, b + 0.06, 0.4)) for a in (1.6, 2.54) for b in (1.5, 2.04)]
+    add("table", [box((1.55, 1.45, 0.4), (2.65, 2.15, 0.45)), *legs], plain(0.10, 0.05, 0.03, roughness=0.3, f0=0.04))
+    add("ball", [ball((3.35, 1.05, 0.32), 0.32, 16)], plain(0.02, 0.07, 0.05, roughness=0.3, f0=0.04), triangles=True)
+    add("cabinet", [box((0.02, 1.0, 0.02), (0.47, 2.3, 0.8))], plain(0.30, 0.03, 0.02, roughness=0.45, f0=0.06))
+    add("painting", [box((0.01, 1.15, 1.15), (0.04, 2.15, 1.95))], plain(0.04, 0.03, 0.03), Paint(painting()))
+    things[-1].slot[2] = 1
+    add("lamp shade", [cone((3.95, 3.15, 1.25), 0.24, 0.15, 0.32, 24)], lamp(11.0, 7.2, 3.8))
+    add(
+        "lamp stand",
+        [box((3.935, 3.135, 0.03), (3.965, 3.165, 1.25)), box((3.8, 3.0, 0.0), (4.1, 3.3, 0.03))],
+        plain(0.05, 0.05, 0.05),
+    )
+    add(
+        "door",
+        [
+            box((1.5, 0.001, 0.0), (2.4, 0.04, 2.05)),
+            box((1.62, 0.04, 1.15), (2.28, 0.06, 1.9)),
+            box((1.62, 0.04, 0.15), (2.28, 0.06, 0.95)),
+        ],
+        plain(0.13, 0.20, 0.16),
+        plain(0.20, 0.29, 0.24),
+        slots=[0, 1, 1],
+    )
+    add("rug", [box((1.0, 0.9, 0.001), (3.0, 2.5, 0.015))], Paint(stripes()))
+    books = np.random.default_rng(5)
+    frame = [box((4.1, 0.3, h), (4.38, 1.5, h + 0.03)) for h in (0.02, 0.52, 1.02, 1.52)]
+    frame += [box((4.1, a, 0.02), (4.38, a + 0.03, 1.55)) for a in (0.27, 1.5)]
+    shelves, at = [], 0.0
+    for h in (0.05, 0.55, 1.05):
+        at = 0.32
+        while at < 1.40:
+            thick, tall = books.uniform(0.05, 0.09), books.uniform(0.26, 0.40)
+            shelves.append(box((4.15, at, h), (4.36, at + thick, h + tall)))
+            at += thick + 0.004
+    colours = [plain(*c) for c in ((0.45, 0.09, 0.06), (0.08, 0.20, 0.38), (0.60, 0.52, 0.36), (0.09, 0.25, 0.10))]
+    slots = [0] * len(frame) + [int(k) for k in books.integers(1, 5, len(shelves))]
+    add("bookshelf", frame + shelves, plain(0.55, 0.52, 0.48), *colours, slots=slots)
+    return tuple(things)
+
+
+def facing(thing: Thing, point: np.ndarray) -> Thing:
+    """The same thing with every quad's front towards `point`."""
+    normal = np.cross(thing.quads[:, 1] - thing.quads[:, 0], thing.quads[:, 3] - thing.quads[:, 0])
+    away = np.einsum("qk,qk->q", normal, point - thing.quads[:, 0]) < 0
+    thing.quads[away], thing.uv[away] = thing.quads[away, ::-1], thing.uv[away, ::-1]
+    return thing
+
+
+def tour(frames: int) -> np.ndarray:
+    """Poses of a hand-held walk around the room, (frames, 4, 4) float64, camera to world, OpenGL axes."""
+    t = 2 * np.pi * np.arange(frames) / frames
+    middle = np.array([SIZE[0] / 2, SIZE[1] / 2 - 0.1, 0])
+    eye = middle + np.stack([1.15 * np.cos(t), 0.8 * np.sin(t), 1.5 + 0.25 * np.sin(3 * t)], -1)
+    gaze = t + np.pi + 0.9 * np.sin(2 * t + 0.4)
+    target = middle + np.stack([1.5 * np.cos(gaze), 1.3 * np.sin(gaze), 1.2 + 1.15 * np.sin(5 * t + 1)], -1)
+    return np.stack([look_at(a, b) for a, b in zip(eye, target)])
+
+
+def look_at(eye, target) -> np.ndarray:
+    """Pose (4, 4) of a camera at `eye` that looks at `target`, upright."""
+    back = np.subtract(eye, target)
+    back /= np.linalg.norm(back)
+    right = np.cross((0, 0, 1), back)
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = right, np.cross(back, right), back, eye
+    return pose

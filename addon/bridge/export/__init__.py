@@ -1,0 +1,1 @@
+"""The room for other programs, and its materials as assets."""

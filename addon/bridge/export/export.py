@@ -1,0 +1,270 @@
+"""The room as glTF or USD, through Blender's own exporters.
+
+They understand plain Principled materials only. So a copy of each object is exported that shares its mesh and wears
+such a material; the copies are deleted afterwards and nothing of the scene has changed.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.errors import BadInputError, StorageError
+from ..data.materials import opacity
+from ..data.mesh_objects import PARTS_UV
+from ..marks import OBJECT_ID
+from .files import put, textures_of
+from .material import plain_copy
+from .names import Names, own_name, unique
+
+FORMATS = {".glb": "GLB", ".gltf": "GLTF_SEPARATE", ".usdc": "USD", ".usd": "USD", ".usda": "USD", ".usdz": "USD"}
+"""By ending."""
+ROOM, SELECTED, ALL = "ROOM", "SELECTED", "ALL"
+_BESIDE = (".usdc", ".usd", ".usda")
+"""Files whose textures we lay beside them ourselves."""
+_COLLECTION = "Scan Relight export"
+
+
+def can_export(ending: str) -> str:
+    """'' where this Blender can write files of that ending, else one sentence."""
+    if ending not in FORMATS:
+        return f"Files ending in '{ending}' can't be written; choose .glb, .gltf, .usdc or .usdz."
+    if FORMATS[ending] == "USD" and not bpy.app.build_options.usd:
+        return "This Blender was built without USD; choose glTF."
+    if FORMATS[ending] != "USD" and not hasattr(bpy.types, "EXPORT_SCENE_OT_gltf"):
+        return "Blender's glTF exporter is switched off; enable the add-on 'glTF 2.0 format' in the preferences."
+    return ""
+
+
+def export(
+    scene: bpy.types.Scene, path: Path | str, scope: str = ROOM, lights: bool = True, cameras: bool = False
+) -> list[str]:
+    """Write a scene's objects with plain materials.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    path : path
+        The ending decides on the format, see `FORMATS`.
+    scope : str
+        `ROOM`: what was scanned and what was set into it; `SELECTED`: selected meshes; `ALL`: every visible mesh.
+    lights, cameras : bool
+        Also Blender's lamps; also the scene's camera.
+
+    Returns
+    -------
+    list of str
+        What the format can't hold, one sentence each.
+
+    Raises
+    ------
+    BadInputError
+        Nothing to export, an unknown ending, or this Blender can't write the format.
+    StorageError
+        The file can't be written.
+    """
+    path = Path(path).absolute()
+    ending = path.suffix.lower()
+    problem = can_export(ending)
+    if problem:
+        raise BadInputError(problem)
+    things = chosen(scene, scope)
+    if not things:
+        raise BadInputError("There is nothing to export: no visible mesh among what was chosen.")
+    extra = [
+        thing
+        for thing in scene.objects
+        if not thing.hide_render and (lights and thing.type == "LIGHT" or cameras and thing == scene.camera)
+    ]
+    folder = Path(tempfile.mkdtemp(prefix="scan_relight_"))
+    try:
+        made = folder / "made"
+        made.mkdir()
+        # Blender's USD exporter can be told no folder for its textures, but it can leave them where they are.
+        textures = made / textures_of(path) if ending in _BESIDE else folder / "textures"
+        with copies(scene, things, extra, textures, FORMATS[ending] != "USD") as collection:
+            try:
+                _write(made / path.name, ending, collection)
+            except RuntimeError as error:
+                reason = " ".join(str(error).split()).removeprefix("Error: ").rstrip(".")
+                raise StorageError(f"'{path}' can't be exported ({reason[:300]}).") from error
+        try:
+            put(made, path)
+        except OSError as error:
+            raise StorageError(
+                f"'{path}' can't be written ({error.strerror or error}); free some space or choose another folder."
+            ) from error
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    return remarks(ending, things, extra, scene)
+
+
+def chosen(scene: bpy.types.Scene, scope: str) -> list[bpy.types.Object]:
+    """The meshes that a scope means; none that is hidden from renders."""
+    if scope not in (ROOM, SELECTED, ALL):
+        raise BadInputError(f"There is no scope '{scope}'; choose one of {ROOM}, {SELECTED}, {ALL}.")
+    meshes = [thing for thing in scene.objects if thing.type == "MESH" and not thing.hide_render]
+    if scope == SELECTED:
+        return [thing for thing in meshes if thing.select_get()]
+    if scope == ROOM:
+        return [thing for thing in meshes if OBJECT_ID in thing or "scan_relight_virtual" in thing]
+    return meshes
+
+
+def remarks(
+    ending: str, things: Iterable[bpy.types.Object], lamps: Iterable[bpy.types.Object], scene: bpy.types.Scene
+) -> list[str]:
+    """What a format loses of these, one sentence each."""
+    told = []
+    if FORMATS[ending] == "USD":
+        told.append(
+            "USD's preview surface has no one-sided emission and Blender writes no Specular IOR Level to it: "
+            "objects without highlight get an index of refraction of 1 instead."
+        )
+        if any(opacity(slot.material) < 0.99 for thing in things for slot in thing.material_slots if slot.material):
+            told.append("Blender 5.2 writes no Alpha to USD, so glass may be opaque there; glTF keeps it.")
+    else:
+        if any(lamp.type == "LIGHT" and lamp.data.type == "AREA" for lamp in lamps):
+            told.append("glTF has no area lights, so they are left out.")
+        if scene.world is not None and scene.world.node_tree:
+            told.append(
+                "glTF holds no light from outside, and few viewers light a room by its glowing lamps: add the "
+                "light there."
+            )
+    return told
+
+
+@contextmanager
+def copies(
+    scene: bpy.types.Scene,
+    things: Iterable[bpy.types.Object],
+    extra: Iterable[bpy.types.Object],
+    textures: Path,
+    level: bool = True,
+) -> Iterator[bpy.types.Collection]:
+    """A collection of copies with plain materials; afterwards no trace of it is left.
+
+    `textures` gets the 8-bit sRGB pictures that the materials show; for `level` see `plain_copy`.
+    """
+    kinds = ("objects", "materials", "images", "collections", "meshes", "worlds")
+    world, names = scene.world, Names()
+    before = {kind: set(getattr(bpy.data, kind)) for kind in kinds}
+    try:
+        textures.mkdir(parents=True)
+        collection = bpy.data.collections.new(_COLLECTION)
+        scene.collection.children.link(collection)
+        pictures: dict = {}
+        plain: dict = {}
+        things, extra = list(things), list(extra)
+        for thing, name in zip(things + extra, unique(own_name(thing) for thing in things + extra)):
+            copy = thing.copy()
+            names.give("objects", copy, name)
+            collection.objects.link(copy)
+            copy.parent = None
+            copy.matrix_world = thing.matrix_world
+            if thing not in things:
+                continue
+            copy.hide_viewport = False
+            for own, slot in zip(thing.material_slots, copy.material_slots):
+                if own.material is None:
+                    continue
+                if own.material not in plain:
+                    plain[own.material] = plain_copy(own.material, textures, pictures, level, _tiles(thing))
+                slot.link = "OBJECT"
+                slot.material = plain[own.material]
+        for own, name in zip(plain, unique(map(own_name, plain))):
+            names.give("materials", plain[own], name)
+        # By their first objects: one mesh may be worn by several.
+        meshes = {copy.data: copy for copy in reversed(collection.objects) if copy.type == "MESH"}
+        wanted = [copy.name if OBJECT_ID in copy else mesh.name for mesh, copy in meshes.items()]
+        for mesh, name in zip(meshes, unique(wanted)):
+            names.give("meshes", mesh, name)
+        if not level and world is not None and world.node_tree:
+            scene.world = _with_own_pictures(world, textures)
+        yield collection
+    finally:
+        scene.world = world
+        for kind in ("collections", "objects", "materials", "images", "meshes"):
+            new = [item for item in getattr(bpy.data, kind) if item not in before[kind]]
+            if new:
+                bpy.data.batch_remove(new)
+        names.put_back()
+
+
+def _tiles(thing: bpy.types.Object) -> frozenset[int]:
+    """The UDIM tiles that an object's faces lie on; none where it has no coordinates for tiles."""
+    layer = thing.data.uv_layers.get(PARTS_UV)
+    if layer is None or not len(layer.uv):
+        return frozenset()
+    uv = np.empty(2 * len(layer.uv), np.float32)
+    layer.uv.foreach_get("vector", uv)
+    # By the middles of faces: a corner may lie on an edge.
+    start = np.empty(len(thing.data.polygons), np.int32)
+    thing.data.polygons.foreach_get("loop_start", start)
+    middle = np.add.reduceat(uv.reshape(-1, 2), start) / np.diff(np.r_[start, len(layer.uv)])[:, None]
+    column, row = np.floor(middle).astype(int).T
+    return frozenset((1001 + column + 10 * row).tolist())
+
+
+def _with_own_pictures(world: bpy.types.World, textures: Path) -> bpy.types.World:
+    """A copy of a world whose pictures lie in `textures`."""
+    copy = world.copy()
+    for node in copy.node_tree.nodes:
+        image = node.image if node.type == "TEX_ENVIRONMENT" else None
+        if image is None or not (image.packed_file or image.source == "FILE"):
+            continue
+        source = Path(bpy.path.abspath(image.filepath))
+        path = textures / f"{bpy.path.clean_name(image.name)}{source.suffix}"
+        if image.packed_file:
+            path.write_bytes(image.packed_file.data)
+        elif source.is_file():
+            shutil.copyfile(source, path)
+        else:
+            continue
+        node.image = bpy.data.images.load(str(path))
+        node.image.colorspace_settings.name = image.colorspace_settings.name
+    return copy
+
+
+def _write(path: Path, ending: str, collection: bpy.types.Collection) -> None:
+    """Have Blender's exporter write the collection."""
+    if FORMATS[ending] == "USD":
+        bpy.ops.wm.usd_export(
+            filepath=str(path),
+            collection=collection.name,
+            export_materials=True,
+            generate_preview_surface=True,
+            rename_uvmaps=True,
+            relative_paths=True,
+            export_textures_mode="KEEP" if ending in _BESIDE else "NEW",
+            overwrite_textures=True,
+            evaluation_mode="RENDER",
+            convert_world_material=True,
+        )
+        return
+    bpy.ops.export_scene.gltf(
+        filepath=str(path),
+        export_format=FORMATS[ending],
+        collection=collection.name,
+        export_apply=True,
+        export_lights=True,
+        export_cameras=True,
+        export_yup=True,
+        export_image_format="AUTO",
+        export_texture_dir=textures_of(path),
+        export_extras=False,
+        export_animations=False,
+        use_active_scene=True,
+    )
+
+
+def srgb(linear: np.ndarray) -> np.ndarray:
+    """Linear Rec.709 to sRGB's transfer curve, clipped to 0...1 (IEC 61966-2-1)."""
+    linear = np.clip(np.nan_to_num(linear), 0, 1)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)

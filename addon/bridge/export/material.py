@@ -1,0 +1,182 @@
+"""A recovered material in plain Principled terms: numbers, one 8-bit picture over the atlas, one colour of light."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.brdf.compensation import ior_of
+from ...core.io.png import write_png
+from ..data.images import UDIM, image_array, load_image
+from ..data.materials import (
+    ALPHA,
+    BASE_COLOR,
+    EMISSION_COLOR,
+    EMISSION_STRENGTH,
+    IOR,
+    METALLIC,
+    REPEATS,
+    ROUGHNESS,
+    SPECULAR_LEVEL,
+    plain_material,
+)
+from ..light import lamps
+from ..marks import IMAGE, UV_MAP
+
+WHOLE = "base_color.exr"
+"""The room's one image, beside its tiles."""
+FIRST_TILE = 1001
+
+
+def plain_copy(
+    material: bpy.types.Material,
+    textures: Path,
+    pictures: dict,
+    level: bool = True,
+    tiles: frozenset[int] = frozenset(),
+) -> bpy.types.Material:
+    """A material that exporters understand.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        What it shows is read off its Principled node; one without such a node becomes grey.
+    textures : Path
+        Folder for the 8-bit pictures.
+    pictures : dict
+        Those that were made already, by the image they show (and its tile); filled here.
+    level : bool
+        The format holds Specular IOR Level; else F0, which that level scales, goes into the index of refraction.
+    tiles : frozenset of int
+        UDIM tiles that the material's object lies on. One becomes a picture that repeats; for an object on several, the
+        room's one image is taken.
+
+    Returns
+    -------
+    bpy.types.Material
+        Culled from behind where the original shines on one side only: glTF then has it single-sided.
+    """
+    shader = (
+        next((n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED"), None) if material.node_tree else None
+    )
+    if shader is None:
+        return plain_material(material.name)
+    value = shader.inputs
+    image = _image(value[BASE_COLOR])
+    ior, specular = value[IOR].default_value, value[SPECULAR_LEVEL].default_value
+    if not level:
+        ior, specular = ior_of(2 * specular * ((ior - 1) / (ior + 1)) ** 2), 0.5
+    elif specular == 0.5:
+        # Blender's glTF exporter writes an index of refraction only beside a specular factor that is not 1.
+        specular = 0.49999
+    made = plain_material(
+        material.name,
+        tuple(value[BASE_COLOR].default_value[:3]),
+        value[ROUGHNESS].default_value,
+        specular,
+        value[METALLIC].default_value,
+        ior,
+        emission(material),
+        None if image is None else _picture(*_one_tile(image, tiles), textures, pictures),
+        value[ALPHA].default_value,
+    )
+    made.use_backface_culling = bool(value[EMISSION_COLOR].links) and lamps.is_lamp(material)
+    return made
+
+
+def emission(material: bpy.types.Material) -> tuple[float, float, float]:
+    """Radiance that a material emits to its front, linear Rec.709; (0, 0, 0) for none."""
+    if lamps.is_lamp(material):
+        return lamps.radiance(material)
+    shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+    strength = shader.inputs[EMISSION_STRENGTH].default_value
+    return tuple(strength * c for c in shader.inputs[EMISSION_COLOR].default_value[:3])
+
+
+def _image(socket) -> bpy.types.Image | None:
+    """The image that a colour socket shows, through whatever nodes lie between (the first that is found)."""
+    waiting, seen = [socket], set()
+    while waiting:
+        for link in waiting.pop().links:
+            node = link.from_node
+            if node in seen:
+                continue
+            seen.add(node)
+            if node.type == "TEX_IMAGE":
+                return node.image
+            waiting.extend(node.inputs)
+    return None
+
+
+def _one_tile(image: bpy.types.Image, tiles: frozenset[int]) -> tuple[bpy.types.Image, int]:
+    """What formats get that know of no tiles: a tiled image and one tile's number, or the room's image and 0."""
+    if image.source != "TILED":
+        return image, 0
+    if len(tiles) == 1:
+        return image, next(iter(tiles))
+    folder = Path(bpy.path.abspath(image.filepath)).parent
+    whole = next(
+        (
+            one
+            for one in bpy.data.images
+            if one.source == "FILE"
+            and UV_MAP not in one
+            and (one.get(IMAGE) == str(folder / WHOLE) or Path(bpy.path.abspath(one.filepath)) == folder / WHOLE)
+        ),
+        None,
+    )
+    return (whole, 0) if whole else (image, min(tiles, default=FIRST_TILE))
+
+
+def _pixels(image: bpy.types.Image, tile: int, textures: Path) -> np.ndarray:
+    """The pixels of an image or of one of its tiles, (h, w, c) float32."""
+    if not tile:
+        return image_array(image)
+    path = Path(bpy.path.abspath(image.filepath.replace(UDIM, str(tile))))
+    packed = next((one for one in image.packed_files if str(tile) in Path(one.filepath).name), None)
+    if packed is not None:
+        path = textures.with_name(f"tile{path.suffix}")
+        path.write_bytes(packed.packed_file.data)
+    one = load_image(path, colour_space=image.colorspace_settings.name, keep=False)
+    try:
+        return image_array(one)
+    finally:
+        bpy.data.images.remove(one)
+        if packed is not None:
+            path.unlink()
+
+
+def _file_name(image: bpy.types.Image, textures: Path) -> str:
+    """A name that the folder does not hold yet, whatever the case."""
+    taken = {path.stem.casefold() for path in textures.iterdir()}
+    plain = name = bpy.path.clean_name(re.sub(r"\.\d{3,}$", "", image.name))
+    number = 1
+    while name.casefold() in taken:
+        number += 1
+        name = f"{plain}_{number}"
+    return name
+
+
+def _picture(image: bpy.types.Image, tile: int, textures: Path, pictures: dict) -> bpy.types.Image:
+    """An image as PNG of 8 bits in sRGB, which glTF and USD's preview surface take."""
+    if (image, tile) in pictures:
+        return pictures[image, tile]
+    if not all(image.size):
+        return image
+    from .export import srgb
+
+    pixels = _pixels(image, tile, textures)[::-1, :, :3]
+    if image.colorspace_settings.name != "sRGB" or image.is_float:
+        pixels = srgb(pixels)
+    path = textures / f"{_file_name(image, textures)}{f'_{tile}' if tile else ''}.png"
+    write_png(path, np.ascontiguousarray((pixels * 255 + 0.5).astype(np.uint8)))
+    made = bpy.data.images.load(str(path))
+    made.colorspace_settings.name = "sRGB"
+    if UV_MAP in image:
+        made[UV_MAP] = image[UV_MAP]
+    made[REPEATS] = bool(tile)
+    pictures[image, tile] = made
+    return made

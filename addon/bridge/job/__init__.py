@@ -1,0 +1,1 @@
+"""A run, a refit, and the process of its own that they go on in."""

@@ -1,0 +1,52 @@
+"""How this add-on's command line is started as a process of its own from within Blender."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import bpy
+
+ROOT = Path(__file__).resolve().parents[3]
+"""The root package's folder, wherever Blender installed it."""
+CHILD = """\
+import importlib.util, json, os, sys
+if hasattr(os, "nice"):
+    os.nice(5)
+told = json.loads({told})
+sys.path[:] = told["path"] + [one for one in sys.path if one not in told["path"]]
+spec = importlib.util.spec_from_file_location("scan_relight", told["root"] + "/__init__.py",
+                                              submodule_search_locations=[told["root"]])
+sys.modules["scan_relight"] = package = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(package)
+from scan_relight.addon.cli import main
+sys.exit(main(told["arguments"]))
+"""
+
+
+def command(arguments: Sequence[str]) -> list[str]:
+    """The words of a command that runs `scan-relight ARGUMENTS`.
+
+    In Blender it is Blender itself, without a window and with factory settings: so no preference, startup file or other
+    add-on has a say in the result, and it does not matter how this one was installed or enabled. Packages are looked
+    for where this process finds them, in the same order. Where `bpy` is a Python module it is Python. It has a
+    lower priority, so that the window gets the processor when it needs it.
+    """
+    scripts = bpy.utils.system_resource("SCRIPTS")  # the child's Blender puts them in place itself
+    path = [one for one in sys.path if isinstance(one, str) and not (scripts and one.startswith(scripts))]
+    told = {"root": ROOT.as_posix(), "path": path, "arguments": [str(one) for one in arguments]}
+    code = CHILD.format(told=ascii(json.dumps(told)))
+    if bpy.app.binary_path:
+        return [
+            bpy.app.binary_path,
+            "--background",
+            "--factory-startup",
+            "-noaudio",
+            "--python-exit-code",
+            "1",
+            "--python-expr",
+            code,
+        ]
+    return [sys.executable, "-c", code]

@@ -1,0 +1,223 @@
+"""A command in a process of its own, and the run that is going on now.
+
+A run shares nothing with Blender's window but two pipes: it can't hold the window up, and undo, another file or a
+crash on either side can't harm the other. Nothing of it is kept in Blender's data. This module knows no Blender.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import json
+import os
+import subprocess
+import threading
+import time
+from collections import deque
+from collections.abc import Sequence
+
+from ...core.errors import EXIT_INTERRUPTED, EXIT_OK
+
+GRACE = 0.5
+"""Seconds between the polite wish to stop and the end of the process: finished stages are whole files by then."""
+RUNNING, STOPPED, DONE, FAILED = "running", "stopped", "done", "failed"
+STOPPED_TEXT = "Stopped; the finished stages are kept and the next run goes on from them."
+SPOKEN = "scan-relight: "
+"""How the command line begins its errors."""
+
+
+class Job:
+    """A command that runs beside Blender; it starts at once.
+
+    Parameters
+    ----------
+    command : sequence of str
+        Program and arguments; ends its work when its standard input ends.
+    **facts
+        Whatever the interface has to remember of it; kept in `facts`.
+
+    Attributes
+    ----------
+    state : str
+        `RUNNING`, `STOPPED`, `DONE` or `FAILED`.
+    stage : str
+        Name of the stage that is worked at; '' before the first.
+    share, overall : float
+        Of the stage and of the whole, 0...1.
+    warnings : list of str
+    sentence : str
+        Why it ended without being done; '' else.
+    answer : dict
+        What the command said at its end.
+    text : str
+        Everything else that it wrote to standard output.
+    """
+
+    def __init__(self, command: Sequence[str], **facts: object):
+        self.facts = facts
+        self.state, self.stage, self.share, self.overall = RUNNING, "", 0.0, 0.0
+        self.warnings: list[str] = []
+        self.sentence, self.text = "", ""
+        self.answer: dict = {}
+        self.started, self.ended = time.monotonic(), None
+        self._left: float | None = None
+        self._said = self.started
+        self._wished: float | None = None
+        self._errors: deque[str] = deque(maxlen=40)
+        self._finished = threading.Event()
+        flags = {"start_new_session": True}
+        if os.name == "nt":
+            flags = {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS}
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **flags
+        )
+        _alive.add(self)
+        self._readers = [
+            threading.Thread(target=target, name=f"scan relight {name}", daemon=True)
+            for name, target in (("output", self._read), ("errors", self._read_errors))
+        ]
+        for reader in self._readers:
+            reader.start()
+        threading.Thread(target=self._wait, name="scan relight end", daemon=True).start()
+
+    @property
+    def running(self) -> bool:
+        """Whether its process has not ended yet."""
+        return self.state == RUNNING
+
+    @property
+    def stopping(self) -> bool:
+        """Whether it was asked to stop and has not ended yet."""
+        return self.running and self._wished is not None
+
+    @property
+    def seconds(self) -> float:
+        """How long it has run."""
+        return (self.ended if self.ended is not None else time.monotonic()) - self.started
+
+    @property
+    def seconds_left(self) -> float | None:
+        """Estimate that counts down between the run's own; None while nothing can be said."""
+        return None if self._left is None else max(self._left - (time.monotonic() - self._said), 0.0)
+
+    @property
+    def process_id(self) -> int:
+        """The process's number."""
+        return self._process.pid
+
+    def stop(self) -> None:
+        """Ask for its end, and see to it within `GRACE` seconds; returns at once."""
+        if not self.running or self._wished is not None:
+            return
+        self._wished = time.monotonic()
+        threading.Thread(target=self._end, name="scan relight stop", daemon=True).start()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait for the end; whether it came."""
+        return self._finished.wait(timeout)
+
+    def _end(self) -> None:
+        with contextlib.suppress(OSError, ValueError):
+            self._process.stdin.write(b"stop\n")
+            self._process.stdin.close()
+        try:
+            self._process.wait(GRACE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+
+    def _read(self) -> None:
+        other = []
+        for line in self._process.stdout:
+            text = line.decode("utf-8", "replace")
+            try:
+                event = json.loads(text) if text.startswith('{"event": ') else None
+            except ValueError:
+                event = None
+            if event is None:
+                other.append(text)
+            else:
+                self._take(event)
+        self.text = "".join(other)
+
+    def _take(self, event: dict) -> None:
+        kind = event.pop("event")
+        if kind == "progress":
+            self.stage, self.share, self.overall = event["stage"], event["share"], event["overall"]
+            self._left, self._said = event["seconds_left"], time.monotonic()
+        elif kind == "warning":
+            self.warnings.append(event["text"])
+        elif kind == "done":
+            self.answer = event
+
+    def _read_errors(self) -> None:
+        for line in self._process.stderr:
+            self._errors.append(line.decode("utf-8", "replace").rstrip())
+
+    def _wait(self) -> None:
+        code = self._process.wait()
+        for reader in self._readers:
+            reader.join(2.0)  # a grandchild may hold the pipe open
+        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
+            with contextlib.suppress(OSError, ValueError):
+                pipe.close()
+        self.ended = time.monotonic()
+        if code == EXIT_OK:
+            state = DONE
+        elif code == EXIT_INTERRUPTED or self._wished is not None:
+            state, self.sentence = STOPPED, STOPPED_TEXT
+        else:
+            state, self.sentence = FAILED, self._reason(code)
+        _alive.discard(self)
+        self.state = state  # last: whoever sees it finds everything else in place
+        self._finished.set()
+
+    def _reason(self, code: int) -> str:
+        said = [line.removeprefix(SPOKEN) for line in self._errors if line.startswith(SPOKEN)]
+        if said:
+            return said[-1]
+        if code in (-9, 137):
+            return (
+                "The system ended the run, most likely because memory ran out; the finished stages are kept. "
+                "Take a greater texel size or a smaller atlas size, or close other programs."
+            )
+        last = next((line for line in reversed(self._errors) if line.strip()), "it left no word")
+        return f"The run ended with code {code}: {last[:300]}"
+
+
+_alive: set[Job] = set()
+_current: Job | None = None
+
+
+def current() -> Job | None:
+    """The run that is going on, or the last one of this session; None where there was none."""
+    return _current
+
+
+def running() -> Job | None:
+    """The run that is going on, or None."""
+    return _current if _current is not None and _current.running else None
+
+
+def begin(command: Sequence[str], **facts: object) -> Job:
+    """Start a run and make it the current one; only where none is `running`."""
+    global _current
+    if running():
+        raise RuntimeError("a run is going on")
+    _current = Job(command, **facts)
+    return _current
+
+
+def forget() -> None:
+    """Have no run any more; what is still going on is stopped."""
+    global _current
+    if _current is not None:
+        _current.stop()
+    _current = None
+
+
+@atexit.register
+def end_all() -> None:
+    """End every process at once: Blender closes, or the add-on goes."""
+    for job in list(_alive):
+        with contextlib.suppress(OSError):
+            job._process.kill()

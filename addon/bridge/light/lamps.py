@@ -1,0 +1,228 @@
+"""The lamps that were found in the scan: on or off, stronger or weaker, of another colour, and back again.
+
+A lamp is a material whose model gives light. Its state is kept with the material as custom properties, so that it is
+saved with the file and needs no registered add-on; the node tree always shows it.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from ...core.errors import BadInputError
+from ...core.naming import in_order, numbered
+from ..data.materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, brdf_of
+from .kelvin import HIGHEST, LOWEST, kelvin_of, luminance, rgb_of
+
+_STRENGTH, _COLOUR, _BASE = (f"scan_relight_recovered_{name}" for name in ("strength", "colour", "base"))
+_OFF, _FACTOR = "scan_relight_lamp_off", "scan_relight_lamp_factor"
+
+MAX_FACTOR = 1000.0
+UNLIT_GREY = 0.5
+"""Albedo of a lamp that is off. What its shade reflects can't be told from what it emits, so this is a guess."""
+_DARK = ("window", "screen", "monitor", "tv", "television", "display", "laptop")
+"""Classes that are nearly black when off: what is behind them is unlit."""
+
+
+def is_lamp(material: bpy.types.Material | None) -> bool:
+    """Whether a material is a recovered lamp's."""
+    brdf = brdf_of(material)
+    return brdf is not None and brdf.gives_light and _principled(material) is not None
+
+
+def find_lamps(scene: bpy.types.Scene) -> list[bpy.types.Material]:
+    """The materials of all recovered lamps in a scene, each once, sorted by name."""
+    return sorted(sum(lamps_by_object(scene).values(), []), key=lambda material: in_order(material.name))
+
+
+def lamps_by_object(scene: bpy.types.Scene) -> dict[str, list[bpy.types.Material]]:
+    """Each lamp of a scene once, under the name of the first object that wears it."""
+    found, seen = {}, set()
+    for thing in scene.objects:
+        for slot in thing.material_slots if thing.type == "MESH" else ():
+            if slot.material not in seen:
+                seen.add(slot.material)
+                if is_lamp(slot.material):
+                    found.setdefault(thing.name, []).append(slot.material)
+    return found
+
+
+def lamp_named(scene: bpy.types.Scene, name: str) -> list[bpy.types.Material]:
+    """The lamps that a name means: that very material, or all of that class, whatever the case.
+
+    Raises
+    ------
+    BadInputError
+        There is none; the sentence lists the known ones.
+    """
+    lamps = find_lamps(scene)
+    wanted = name.strip().casefold()
+    found = [m for m in lamps if m.name.casefold() == wanted] or [
+        m for m in lamps if numbered(m.name.casefold())[0] == wanted
+    ]
+    if not found:
+        known = ", ".join(f"'{m.name}'" for m in lamps)
+        raise BadInputError(
+            f"There is no lamp '{name}'; " + (f"known are {known}." if known else "the scan has no lamp at all.")
+        )
+    return found
+
+
+def is_on(material: bpy.types.Material) -> bool:
+    """Whether a lamp shines."""
+    return not material.get(_OFF, False)
+
+
+def set_on(material: bpy.types.Material, on: bool) -> None:
+    """Switch a lamp on or off; its factor and colour stay."""
+    _keep(material)
+    material[_OFF] = not on
+    _show(material)
+
+
+def factor(material: bpy.types.Material) -> float:
+    """What the recovered radiance is multiplied by."""
+    return float(material.get(_FACTOR, 1.0))
+
+
+def set_factor(material: bpy.types.Material, value: float) -> None:
+    """Multiply the recovered radiance by `value` (0...`MAX_FACTOR`)."""
+    _keep(material)
+    material[_FACTOR] = min(max(float(value), 0.0), MAX_FACTOR)
+    _show(material)
+
+
+def colour(material: bpy.types.Material) -> tuple[float, float, float] | None:
+    """Colour of the light, linear Rec.709, its largest component 1 as recovered; None where a picture gives it."""
+    socket = _colour_socket(material)
+    return None if socket is None else tuple(socket.default_value[:3])
+
+
+def set_colour(material: bpy.types.Material, value: tuple[float, float, float]) -> None:
+    """Give the light another colour at the same strength; without effect where a picture gives it."""
+    _keep(material)
+    socket = _colour_socket(material)
+    if socket is not None:
+        socket.default_value = (*(max(float(c), 0.0) for c in value), 1)
+
+
+def kelvin(material: bpy.types.Material) -> float:
+    """Temperature of the colour of its light, the nearest there is; 6500 where a picture gives the colour."""
+    return kelvin_of(colour(material) or (1.0, 1.0, 1.0))
+
+
+def set_kelvin(material: bpy.types.Material, value: float) -> None:
+    """Give the light the colour of a temperature, at the same luminance; without effect where a picture gives it."""
+    now = colour(material)
+    if now is not None:
+        bright = luminance(now)
+        set_colour(material, tuple(bright * c for c in rgb_of(min(max(value, LOWEST), HIGHEST))))
+
+
+def recovered_radiance(material: bpy.types.Material) -> tuple[float, float, float]:
+    """What the scan found, linear Rec.709 in the frames' unit."""
+    node, socket = _principled(material), _colour_socket(material)
+    strength = material.get(_STRENGTH, node.inputs[EMISSION_STRENGTH].default_value)
+    tint = material.get(_COLOUR) or (socket.default_value[:3] if socket is not None else (1.0, 1.0, 1.0))
+    return tuple(float(strength) * float(c) for c in tint)
+
+
+def radiance(material: bpy.types.Material) -> tuple[float, float, float]:
+    """What the lamp emits now, linear Rec.709 in the frames' unit."""
+    strength = _principled(material).inputs[EMISSION_STRENGTH].default_value
+    return tuple(strength * c for c in colour(material) or (1.0, 1.0, 1.0))
+
+
+def is_changed(material: bpy.types.Material) -> bool:
+    """Whether a lamp differs from what was recovered."""
+    if _STRENGTH not in material:
+        return False
+    return not is_on(material) or factor(material) != 1 or is_coloured(material)
+
+
+def is_coloured(material: bpy.types.Material) -> bool:
+    """Whether a lamp's colour is another one than was recovered."""
+    return _COLOUR in material and tuple(material[_COLOUR]) != colour(material)
+
+
+def restore(material: bpy.types.Material) -> None:
+    """Make a lamp exactly what was recovered."""
+    if _STRENGTH not in material:
+        return
+    inputs, socket = _principled(material).inputs, _colour_socket(material)
+    inputs[EMISSION_STRENGTH].default_value = material[_STRENGTH]
+    inputs[BASE_COLOR].default_value = material[_BASE]
+    if socket is not None:
+        socket.default_value = (*material[_COLOUR], 1)
+    for name in (_STRENGTH, _COLOUR, _BASE, _OFF, _FACTOR):
+        if name in material:
+            del material[name]
+
+
+def snapshot(material: bpy.types.Material) -> dict:
+    """The state of a lamp for `put_back`."""
+    return {
+        "on": is_on(material),
+        "factor": factor(material),
+        "colour": colour(material),
+        "touched": _STRENGTH in material,
+    }
+
+
+def put_back(material: bpy.types.Material, state: dict) -> None:
+    """Bring a lamp into a state that `snapshot` gave."""
+    restore(material)
+    if not state["touched"]:
+        return
+    _keep(material)
+    set_factor(material, state["factor"])
+    if state["colour"] is not None:
+        set_colour(material, state["colour"])
+    set_on(material, state["on"])
+
+
+def carry(old: bpy.types.Material, new: bpy.types.Material) -> None:
+    """Give a lamp that was recovered anew the state of the lamp that it replaces."""
+    state = snapshot(old)
+    if state["colour"] is not None and tuple(old.get(_COLOUR, state["colour"])) == state["colour"]:
+        state["colour"] = None  # as found: the new one's own
+    put_back(new, state)
+
+
+def state_sockets(material: bpy.types.Material) -> list[bpy.types.NodeSocket]:
+    """The inputs that show a lamp's state; none while it is as recovered."""
+    if _STRENGTH not in material or not is_lamp(material):
+        return []
+    inputs = _principled(material).inputs
+    return [one for one in (inputs[EMISSION_STRENGTH], inputs[BASE_COLOR], _colour_socket(material)) if one is not None]
+
+
+def _keep(material):
+    """Note what was recovered, before the first change."""
+    if _STRENGTH in material:
+        return
+    inputs, tint = _principled(material).inputs, colour(material)
+    material[_STRENGTH] = inputs[EMISSION_STRENGTH].default_value
+    material[_BASE] = tuple(inputs[BASE_COLOR].default_value)
+    if tint is not None:
+        material[_COLOUR] = tint
+
+
+def _show(material):
+    """Bring the node tree in line with the state."""
+    inputs, on = _principled(material).inputs, is_on(material)
+    inputs[EMISSION_STRENGTH].default_value = material[_STRENGTH] * factor(material) * on
+    grey = 0.02 if numbered(material.name.casefold())[0] in _DARK else UNLIT_GREY
+    inputs[BASE_COLOR].default_value = material[_BASE] if on else (grey, grey, grey, 1)
+
+
+def _principled(material):
+    tree = material.node_tree
+    return next((n for n in tree.nodes if n.type == "BSDF_PRINCIPLED"), None) if tree else None
+
+
+def _colour_socket(material):
+    """The socket that holds the colour: the shader's own, or that of the node that blackens a lamp's back."""
+    socket = _principled(material).inputs[EMISSION_COLOR]
+    if socket.links and socket.links[0].from_node.type == "MIX":
+        socket = next(s for s in socket.links[0].from_node.inputs if s.type == "RGBA")
+    return None if socket.links else socket

@@ -1,0 +1,268 @@
+"""The light from outside, which is the scene's world: on or off, strength, turned about the vertical, another picture.
+
+As with lamps, the state is kept with the world as custom properties and its node tree shows it.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ...core.errors import BadInputError
+from ..data.images import RADIANCE, image_array
+from .room import bounds, leaves, room_light
+
+RECOVERED = "scan_relight_recovered_world"
+"""Custom property of the scene: its world before another picture took its place."""
+HDRI = "scan_relight_hdri"
+"""Custom property of a world of ours: the path of the picture that it shows."""
+_OFF, _FACTOR, _KEPT = "scan_relight_world_off", "scan_relight_world_factor", "scan_relight_recovered_strength"
+_TURN, _PLACE = "Scan Relight turn", "Scan Relight place"
+MAX_FACTOR = 1000.0
+_BRIGHTER = 4.0
+"""Mean radiance of a picture put around the room, relative to that of the room's median surface: it is the outdoors,
+which shows through openings that cover a small part of what any spot of the room sees."""
+
+
+def has_outside(scene: bpy.types.Scene) -> bool:
+    """Whether the scene's world shows a picture or any colour but black."""
+    node = _background(scene.world)
+    return node is not None and bool(node.inputs["Color"].links or any(node.inputs["Color"].default_value[:3]))
+
+
+def is_on(world: bpy.types.World) -> bool:
+    """Whether light comes from outside."""
+    return not world.get(_OFF, False)
+
+
+def set_on(world: bpy.types.World, on: bool) -> None:
+    """Let light in from outside, or not."""
+    _keep(world)
+    world[_OFF] = not on
+    _show(world)
+
+
+def factor(world: bpy.types.World) -> float:
+    """What the recovered light from outside is multiplied by."""
+    return float(world.get(_FACTOR, 1.0))
+
+
+def set_factor(world: bpy.types.World, value: float) -> None:
+    """Multiply the light from outside by `value` (0...`MAX_FACTOR`)."""
+    _keep(world)
+    world[_FACTOR] = min(max(float(value), 0.0), MAX_FACTOR)
+    _show(world)
+
+
+def rotation(world: bpy.types.World) -> float:
+    """Angle in radians by which the outside is turned about +Z, anticlockwise from above."""
+    turn = world.node_tree.nodes.get(_TURN) if world.node_tree else None
+    return -turn.inputs["Rotation"].default_value[2] if turn else 0.0
+
+
+def set_rotation(world: bpy.types.World, angle: float) -> None:
+    """Turn the outside to `angle` (radians about +Z); without effect where it shows no picture."""
+    texture = _texture(world)
+    if texture is None:
+        return
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    turn = nodes.get(_TURN)
+    if not angle:
+        for name in (_TURN, _PLACE):
+            if nodes.get(name):
+                nodes.remove(nodes[name])
+        return
+    if turn is None:
+        place, turn = nodes.new("ShaderNodeTexCoord"), nodes.new("ShaderNodeMapping")
+        place.name, turn.name = _PLACE, _TURN
+        place.location, turn.location = (-700, 0), (-500, 0)
+        links.new(place.outputs["Generated"], turn.inputs["Vector"])
+        links.new(turn.outputs["Vector"], texture.inputs["Vector"])
+    # The node turns the direction that is looked up, and so the picture the other way round.
+    turn.inputs["Rotation"].default_value = (0, 0, -angle)
+
+
+def use_hdri(scene: bpy.types.Scene, path: Path | str, mean: float | None = None) -> bpy.types.World:
+    """Put an equirectangular picture around the room; the recovered outside is kept for `restore`.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    path : path
+        EXR, HDR or any picture that Blender reads.
+    mean : float, optional
+        Mean radiance that the picture is scaled to; None leaves it as it is.
+
+    Raises
+    ------
+    BadInputError
+        The file is missing or no picture.
+    """
+    path = Path(path).absolute()
+    if not path.is_file():
+        raise BadInputError(f"There is no picture '{path}'; choose an equirectangular EXR or HDR file.")
+    try:
+        image = bpy.data.images.load(str(path), check_existing=False)
+    except RuntimeError:
+        image = None
+    if image is None or not all(image.size):
+        if image is not None:
+            bpy.data.images.remove(image)
+        raise BadInputError(f"'{path}' can't be opened as a picture; choose an equirectangular EXR or HDR file.")
+    if image.is_float:
+        image.colorspace_settings.name = RADIANCE
+    strength = 1.0
+    if mean is not None:
+        found = mean_radiance(image)
+        strength = mean / found if found > 0 else 1.0
+    if HDRI not in (scene.world or {}) and scene.world is not None:
+        scene[RECOVERED] = scene.world
+    world = bpy.data.worlds.new(f"Scan Relight {path.stem}")
+    if world.node_tree is None:  # before Blender 5.0
+        world.use_nodes = True
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    nodes.clear()
+    texture, background, output = (
+        nodes.new(f"ShaderNode{name}") for name in ("TexEnvironment", "Background", "OutputWorld")
+    )
+    texture.image, texture.location, output.location = image, (-300, 0), (300, 0)
+    background.inputs["Strength"].default_value = strength
+    links.new(texture.outputs[0], background.inputs["Color"])
+    links.new(background.outputs[0], output.inputs["Surface"])
+    world[HDRI] = str(path)
+    scene.world = world
+    return world
+
+
+def restore(scene: bpy.types.Scene) -> None:
+    """Make the outside exactly what was recovered."""
+    if scene.get(RECOVERED) is not None:
+        scene.world = scene[RECOVERED]
+    if RECOVERED in scene:
+        del scene[RECOVERED]
+    world = scene.world
+    if world is None:
+        return
+    set_rotation(world, 0.0)
+    if _KEPT in world:
+        _background(world).inputs["Strength"].default_value = world[_KEPT]
+    for name in (_KEPT, _OFF, _FACTOR):
+        if name in world:
+            del world[name]
+
+
+def recovered_world(scene: bpy.types.Scene) -> bpy.types.World | None:
+    """The world that the scan gave, also while another picture is shown."""
+    return scene.get(RECOVERED) or scene.world
+
+
+def is_changed(scene: bpy.types.Scene) -> bool:
+    """Whether the outside differs from what was recovered."""
+    world = scene.world
+    return (
+        scene.get(RECOVERED) is not None
+        or world is not None
+        and (not is_on(world) or factor(world) != 1 or rotation(world) != 0)
+    )
+
+
+def strength(world: bpy.types.World | None) -> float:
+    """What the world's picture or colour is multiplied by now; 0 without a world."""
+    node = _background(world)
+    return 0.0 if node is None else float(node.inputs["Strength"].default_value)
+
+
+def recovered_strength(world: bpy.types.World | None) -> float:
+    """`strength` as it was recovered."""
+    return float(world[_KEPT]) if world is not None and _KEPT in world else strength(world)
+
+
+def usual_radiance(scene: bpy.types.Scene) -> float:
+    """Mean radiance that a picture around this room is scaled to, in the frames' unit."""
+    return _BRIGHTER * room_light(scene) / math.pi
+
+
+def is_open(scene: bpy.types.Scene) -> bool:
+    """Whether light from outside can reach what the camera looks at, or the room's middle: any of 256 rays leaves."""
+    low, high = bounds(scene)
+    places = [(low + high) / 2]
+    if scene.camera:
+        places.append(scene.camera.matrix_world.translation)
+    golden = math.pi * (3 - math.sqrt(5))
+    for place in places:
+        for k in range(128):
+            z = 1 - (2 * k + 1) / 128
+            r = math.sqrt(1 - z * z)
+            if leaves(scene, place, Vector((r * math.cos(golden * k), r * math.sin(golden * k), z))):
+                return True
+    return False
+
+
+def remarks(scene: bpy.types.Scene) -> list[str]:
+    """What there is to say, in sentences, of a picture around this room."""
+    return [] if is_open(scene) else ["The scanned room is closed, so the picture around it sends no light in."]
+
+
+def studio_lights() -> list[Path]:
+    """The equirectangular pictures that come with Blender; some builds have none."""
+    folder = bpy.utils.system_resource("DATAFILES", path="studiolights/world")
+    return sorted(Path(folder).glob("*.exr")) if folder else []
+
+
+def mean_radiance(image: bpy.types.Image) -> float:
+    """Mean over all directions of an equirectangular picture's luminance."""
+    pixels = image_array(image)[::4, ::4, :3]
+    height = len(pixels)
+    weight = np.cos((np.arange(height) + 0.5) / height * math.pi - math.pi / 2)
+    luminance = np.nan_to_num(pixels, posinf=0.0).clip(0) @ (0.2126, 0.7152, 0.0722)
+    return float((luminance.mean(1) * weight).sum() / weight.sum())
+
+
+def snapshot(world: bpy.types.World | None) -> dict:
+    """The state of a world for `put_back`."""
+    if world is None:
+        return {}
+    return {"on": is_on(world), "factor": factor(world), "rotation": rotation(world), "touched": _KEPT in world}
+
+
+def put_back(world: bpy.types.World | None, state: dict) -> None:
+    """Bring a world into a state that `snapshot` gave, after `restore`."""
+    if world is None:
+        return
+    set_rotation(world, state["rotation"])
+    if state["touched"]:
+        set_factor(world, state["factor"])
+        set_on(world, state["on"])
+
+
+def state_sockets(world: bpy.types.World) -> list[bpy.types.NodeSocket]:
+    """The inputs that show the state of the light from outside."""
+    texture = _texture(world)
+    turned = [texture.inputs["Vector"]] if texture is not None and rotation(world) else []
+    return turned + ([_background(world).inputs["Strength"]] if _KEPT in world else [])
+
+
+def _keep(world):
+    node = _background(world)
+    if node is not None and _KEPT not in world:
+        world[_KEPT] = node.inputs["Strength"].default_value
+
+
+def _show(world):
+    node = _background(world)
+    if node is not None:
+        node.inputs["Strength"].default_value = world[_KEPT] * factor(world) * is_on(world)
+
+
+def _background(world):
+    tree = world.node_tree if world else None
+    return next((n for n in tree.nodes if n.type == "BACKGROUND"), None) if tree else None
+
+
+def _texture(world):
+    tree = world.node_tree if world else None
+    return next((n for n in tree.nodes if n.type == "TEX_ENVIRONMENT"), None) if tree else None

@@ -1,0 +1,154 @@
+"""What a new light or thing has to know of the room: its bounds, what is looked at, what is hit, how bright it is."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ...core.errors import BadInputError
+from ..data.images import image_array
+from ..data.materials import opacity
+from ..marks import OBJECT_ID
+
+ROOM_LIGHT = "scan_relight_room_light"
+"""Custom property of the scene: median irradiance of the scanned room, in the frames' unit."""
+_ALBEDO, _GREY = 0.4, 0.18
+VIEW, CURSOR, OBJECT = "VIEW", "CURSOR", "OBJECT"
+
+
+class Hit(NamedTuple):
+    """Where a ray ends: place and unit normal towards the ray's origin (metres), distance, object."""
+
+    place: Vector
+    normal: Vector
+    distance: float
+    thing: bpy.types.Object
+
+
+def room_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """The objects that were scanned.
+
+    Raises
+    ------
+    BadInputError
+        The scene has none.
+    """
+    things = [thing for thing in scene.objects if OBJECT_ID in thing and thing.type == "MESH"]
+    if not things:
+        raise BadInputError(
+            f"Scene '{scene.name}' holds no scanned room; recover a capture or open a result's scene.blend first."
+        )
+    return things
+
+
+def bounds(scene: bpy.types.Scene) -> tuple[Vector, Vector]:
+    """Lowest and highest corner of the scanned room in metres; raises `BadInputError` where there is none."""
+    corners = np.array(
+        [thing.matrix_world @ Vector(corner) for thing in room_objects(scene) for corner in thing.bound_box]
+    )
+    return Vector(corners.min(0)), Vector(corners.max(0))
+
+
+def cast(scene: bpy.types.Scene, origin: Vector, direction: Vector, distance: float = 1e4) -> Hit | None:
+    """The first surface along a ray."""
+    direction = direction.normalized()
+    hit, place, normal, _, thing, _ = scene.ray_cast(depsgraph_of(scene), origin, direction, distance=distance)
+    if not hit:
+        return None
+    return Hit(place, -normal if normal.dot(direction) > 0 else normal, (place - origin).length, thing)
+
+
+def leaves(scene: bpy.types.Scene, origin: Vector, direction: Vector) -> bool:
+    """Whether a ray leaves the room; what lets most of the light through, such as a pane, does not hold it."""
+    for _ in range(8):
+        hit = cast(scene, origin, direction)
+        if hit is None:
+            return True
+        if not any(opacity(slot.material) < 0.5 for slot in hit.thing.material_slots if slot.material):
+            return False
+        origin = hit.place + direction.normalized() * 1e-4
+    return False
+
+
+def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
+    """The evaluated state of a scene, also of one that no window shows."""
+    layer = bpy.context.view_layer if bpy.context.scene == scene else scene.view_layers[0]
+    layer.update()
+    return layer.depsgraph
+
+
+def target_of(scene: bpy.types.Scene, kind: str = VIEW, thing: bpy.types.Object | None = None) -> Vector:
+    """What a light is aimed at.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    kind : str
+        `VIEW`: the surface in the middle of the camera's picture, or the room's middle without a camera; `CURSOR`:
+        the 3D cursor; `OBJECT`: the middle of `thing`'s box.
+    thing : bpy.types.Object, optional
+
+    Raises
+    ------
+    BadInputError
+        `OBJECT` without an object, or no room in the scene.
+    """
+    if kind == OBJECT:
+        if thing is None:
+            raise BadInputError("No object is selected to aim the light at; select one or aim at the view instead.")
+        return sum((thing.matrix_world @ Vector(c) for c in thing.bound_box), Vector()) / 8
+    if kind == CURSOR:
+        return scene.cursor.location.copy()
+    low, high = bounds(scene)
+    if scene.camera:
+        hit = cast(scene, *picture_ray(scene))
+        if hit:
+            return hit.place
+    return (low + high) / 2
+
+
+def picture_ray(scene: bpy.types.Scene, x: float = 0.5, y: float = 0.5) -> tuple[Vector, Vector]:
+    """Origin and direction of the ray through a place in the camera's picture: x and y from its lower left, 0...1."""
+    pose = scene.camera.matrix_world
+    right_top, right_low, left_low, _ = scene.camera.data.view_frame(scene=scene)
+    middle = left_low + (right_low - left_low) * x + (right_top - right_low) * y
+    if scene.camera.data.type == "ORTHO":
+        return pose @ Vector((middle.x, middle.y, 0)), (pose.to_3x3() @ Vector((0, 0, -1))).normalized()
+    return pose.translation.copy(), (pose.to_3x3() @ middle).normalized()
+
+
+def view_direction(scene: bpy.types.Scene) -> Vector:
+    """Where the camera looks, level and of unit length; +Y without a camera."""
+    if scene.camera:
+        direction = picture_ray(scene)[1]
+        level = Vector((direction.x, direction.y, 0))
+        if level.length > 1e-3:
+            return level.normalized()
+    return Vector((0, 1, 0))
+
+
+def room_light(scene: bpy.types.Scene) -> float:
+    """How much light falls on the scanned room's surfaces: median irradiance in the frames' unit.
+
+    From the recovered shading where the file has its picture, else from the exposure that `scene.py` set, which shows
+    the median radiance as middle grey.
+    """
+    kept = scene.get(ROOM_LIGHT)
+    if kept:
+        return float(kept)
+    found = _median_shading() or math.pi * _GREY / 2**scene.view_settings.exposure / _ALBEDO
+    scene[ROOM_LIGHT] = found
+    return found
+
+
+def _median_shading() -> float | None:
+    image = next((i for i in bpy.data.images if bpy.path.basename(i.filepath) == "shading.exr"), None)
+    if image is None or not all(image.size):
+        return None
+    values = image_array(image)[::8, ::8, :3] @ (0.2126, 0.7152, 0.0722)
+    values = values[np.isfinite(values) & (values > 0)]
+    return float(np.median(values)) if len(values) else None

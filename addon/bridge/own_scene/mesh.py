@@ -1,0 +1,203 @@
+"""Objects of the open scene as one mesh of triangles, and the way back from each triangle to its face.
+
+What is read is what the viewport shows: modifiers and instances evaluated, in world space. Materials are told by
+object, so each object becomes an instance of the capture; so does each object that an instanced collection shows.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...core.errors import BadInputError
+from ..data.unwrap import Polygons
+
+KINDS = ("MESH", "CURVE", "SURFACE", "FONT", "EMPTY")
+"""Types of object that may have faces to show; an empty has those of the collection that it instances."""
+
+
+@dataclass
+class Part:
+    """One instance of the capture.
+
+    Attributes
+    ----------
+    object_id : int
+    name : str
+        As the artist reads it.
+    class_name : str
+        Objects of one mesh share it, as they are of one kind.
+    thing : bpy.types.Object
+        The artist's object that shows it.
+    own : bool
+        Its faces are those of the object's mesh, one by one and in their order, so that materials can be put there.
+    pieces : list of (vertices, starts, corners, loops)
+        World positions (v, 3) float64; first corner of each face (f + 1,), vertex of each corner (c,) and the corners
+        of each triangle (t, 3), int32.
+    """
+
+    object_id: int
+    name: str
+    class_name: str
+    thing: bpy.types.Object
+    own: bool = True
+    pieces: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=list)
+
+    @property
+    def topology(self) -> str:
+        """A hash of what its faces connect; stays the same where vertices are only moved."""
+        return topology_hash([piece[1:3] for piece in self.pieces])
+
+    def mesh(self) -> bpy.types.Mesh:
+        """Its faces as a mesh of their own, in world coordinates, flat."""
+        one = joined([self])
+        data = bpy.data.meshes.new(self.name)
+        data.vertices.add(len(one.vertices))
+        data.vertices.foreach_set("co", one.vertices.astype(np.float32).ravel())
+        data.loops.add(len(one.polygons.vertex))
+        data.loops.foreach_set("vertex_index", one.polygons.vertex)
+        data.polygons.add(len(one.polygons.start) - 1)
+        data.polygons.foreach_set("loop_start", one.polygons.start[:-1])
+        data.shade_flat()
+        data.update(calc_edges=True)
+        return data
+
+
+@dataclass(frozen=True)
+class SceneMesh:
+    """All parts as one.
+
+    Attributes
+    ----------
+    vertices : (v, 3) float64
+        World, Blender's units.
+    triangles : (t, 3) int32
+    object_id : (t,) int32
+    polygons : Polygons
+        The faces that the triangles were cut from, over the same vertices.
+    corner_start : dict of int to int
+        First corner in `polygons` of each object; the next ones follow in the order of its mesh's loops.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    object_id: np.ndarray
+    polygons: Polygons
+    corner_start: dict[int, int]
+
+
+def gather(depsgraph: bpy.types.Depsgraph, things: Iterable[bpy.types.Object]) -> list[Part]:
+    """Read what the objects show.
+
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+        Brought up to date.
+    things : iterable of bpy.types.Object
+        The artist's; those without a surface are passed over.
+
+    Returns
+    -------
+    list of Part
+        In the order of `things`; one without faces is left out. Same scene, same numbers.
+
+    Raises
+    ------
+    BadInputError
+        An object has vertices that are not finite.
+    """
+    wanted = {thing: rank for rank, thing in enumerate(things) if thing.type in KINDS}
+    found: dict[tuple, Part] = {}
+    for shown in depsgraph.object_instances:
+        owner = shown.parent.original if shown.is_instance and shown.parent else shown.object.original
+        if owner not in wanted or shown.object.type != "MESH":
+            continue
+        instanced = shown.is_instance and owner.type == "EMPTY"
+        # What a mesh object spreads over itself (geometry nodes, particles) belongs to it.
+        key = (wanted[owner], *(shown.persistent_id if instanced else ()))
+        part = found.get(key)
+        if part is None:
+            name = f"{owner.name}/{shown.object.name}" if instanced else owner.name
+            part = found[key] = Part(0, name, "", owner)
+        data = shown.object.data
+        part.own &= (
+            not shown.is_instance and not part.pieces and owner.type == "MESH" and same_topology(data, owner.data)
+        )
+        piece = _piece(data, np.array(shown.matrix_world, np.float64))
+        if not np.isfinite(piece[0]).all():
+            raise BadInputError(f"Object '{owner.name}' has vertices that are not finite; mend its mesh first.")
+        part.pieces.append(piece)
+    parts = [found[key] for key in sorted(found) if any(len(loops) for *_, loops in found[key].pieces)]
+    kinds: dict[bpy.types.ID, str] = {}
+    for number, part in enumerate(parts):
+        part.object_id = number
+        part.class_name = kinds.setdefault(part.thing.data, part.name) if part.own else part.name
+    return parts
+
+
+def same_topology(one: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
+    """Whether two meshes have the same faces in the same order, wherever their vertices are."""
+    return len(one.vertices) == len(other.vertices) and all(
+        np.array_equal(a, b) for a, b in zip(topology(one), topology(other))
+    )
+
+
+def topology(data: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """First corner of each face, and the end, (f + 1,); vertex of each corner, (c,); both int32."""
+    starts = np.empty(len(data.polygons) + 1, np.int32)
+    data.polygons.foreach_get("loop_start", starts[:-1])
+    starts[-1] = len(data.loops)
+    corners = np.empty(len(data.loops), np.int32)
+    data.loops.foreach_get("vertex_index", corners)
+    return starts, corners
+
+
+def topology_hash(pieces: Iterable[tuple[np.ndarray, np.ndarray]]) -> str:
+    """A hash of `topology`'s arrays, piece by piece."""
+    digest = hashlib.sha256()
+    for starts, corners in pieces:
+        digest.update(np.int64([len(starts), len(corners)]).tobytes() + starts.tobytes() + corners.tobytes())
+    return digest.hexdigest()
+
+
+def _piece(data, matrix):
+    starts, corners = topology(data)
+    local = np.empty((len(data.vertices), 3), np.float32)
+    data.vertices.foreach_get("co", local.ravel())
+    vertices = local.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    data.calc_loop_triangles()
+    loops = np.empty((len(data.loop_triangles), 3), np.int32)
+    data.loop_triangles.foreach_get("loops", loops.ravel())
+    if np.linalg.det(matrix[:3, :3]) < 0:  # mirrored: front is where the other order of corners says
+        loops = loops[:, [0, 2, 1]]
+    return vertices, starts, corners, loops
+
+
+def joined(parts: Iterable[Part]) -> SceneMesh:
+    """One mesh of all parts.
+
+    Triangles keep the order of the objects' faces; `mesh_repair` may leave some out later.
+    """
+    vertices, starts, corners, loops, ids = [], [], [], [], []
+    first_vertex = first_corner = 0
+    corner_start = {}
+    for part in parts:
+        corner_start[part.object_id] = first_corner
+        for points, start, corner, loop in part.pieces:
+            vertices.append(points)
+            starts.append(start[:-1] + first_corner)
+            corners.append(corner + first_vertex)
+            loops.append(loop + first_corner)
+            ids.append(np.full(len(loop), part.object_id, np.int32))
+            first_vertex += len(points)
+            first_corner += len(corner)
+    corner = np.concatenate(corners).astype(np.int32)
+    loop = np.concatenate(loops).astype(np.int32)
+    start = np.append(np.concatenate(starts), first_corner).astype(np.int32)
+    return SceneMesh(
+        np.concatenate(vertices), corner[loop], np.concatenate(ids), Polygons(start, corner, loop), corner_start
+    )

@@ -1,0 +1,1 @@
+"""New light on the room: lights, exposure, preview, before and after, things set into it."""

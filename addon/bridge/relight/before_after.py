@@ -1,0 +1,126 @@
+"""Before and after: one view under the captured and under the present light, side by side.
+
+In background mode the pictures are rendered here. Beside a window the command line renders a saved copy of the scene
+(`save_copy`), so that the window never freezes, nothing of the open scene changes, and a stop ends a process.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import time
+from pathlib import Path
+
+import bpy
+
+from ...core.atomic import TEMPORARY
+from ...core.errors import BadInputError, StorageError
+from ...core.progress import Progress
+from ...core.results.room_file import MATERIALS
+from ..marks import RESULT
+from .pictures import beside, check_format, seconds_expected, shoot, ticking
+from .state import captured_light
+
+NAME = "Before and After"
+"""Name of the image in Blender."""
+COPY = "scene.blend"
+WEIGHTS = {"before": 1, "after": 1}
+
+
+def render_pair(scene: bpy.types.Scene, out: Path, progress: Progress | None = None) -> None:
+    """Render both pictures, one after the other, and save them side by side; within `pictures.settings_kept`."""
+    ending = check_format(out)
+    if scene.camera is None:
+        raise BadInputError("The scene has no camera to render through; choose a frame of the capture first.")
+    progress = progress or Progress()
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=f"{TEMPORARY}{os.getpid()}-", dir=out.parent))
+    except OSError as error:
+        raise StorageError(f"'{out}' can't be written ({error.strerror or error}); choose another folder.") from error
+    try:
+        before, after = folder / f"before{ending}", folder / f"after{ending}"
+        progress.stage("before")
+        with captured_light(scene):
+            expected = seconds_expected(scene)
+            began = time.monotonic()
+            with ticking(progress, expected):
+                shoot(scene, before)
+            taken = time.monotonic() - began
+        progress.done()
+        progress.stage("after")
+        with ticking(progress, taken):
+            shoot(scene, after)
+        progress.done()
+        beside(before, after, out)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def picture_folder(scene: bpy.types.Scene, chosen: str = "") -> tuple[Path, bool]:
+    """Where a picture of a scene goes unless told.
+
+    The result folder that the open file lies in, else the one that the room came from, else the `chosen` one, else
+    beside the file; a folder that is gone or can't be written to is passed over. Where none is left it is Blender's own
+    for things of passing use.
+
+    Returns
+    -------
+    (Path, bool)
+        The folder; whether it stays when Blender ends.
+    """
+    beside_file = bpy.path.abspath("//") if bpy.data.filepath else ""
+    places = [thing[RESULT] for thing in (*scene.collection.children_recursive, *scene.objects) if RESULT in thing]
+    places += [bpy.path.abspath(chosen), beside_file]
+    if beside_file and (Path(beside_file) / MATERIALS).is_file():
+        places.insert(0, beside_file)
+    for place in dict.fromkeys(places):
+        if place and Path(place).is_absolute() and Path(place).is_dir() and os.access(place, os.W_OK):
+            return Path(place), True
+    return Path(bpy.app.tempdir), False
+
+
+def save_copy(folder: Path) -> None:
+    """Save what is open as a copy that the command `relight` can open; what is open stays as it is.
+
+    Raises
+    ------
+    StorageError
+        The copy can't be written.
+    """
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(folder / COPY), copy=True, compress=False, relative_remap=True)
+    except RuntimeError as error:
+        reason = " ".join(str(error).split()).removeprefix("Error: ").rstrip(".")
+        raise StorageError(f"A copy of the scene can't be saved to '{folder}' ({reason}); free some space.") from error
+
+
+def show(path: Path) -> bpy.types.Image:
+    """The finished picture as an image in Blender; an earlier one is replaced."""
+    image = bpy.data.images.get(NAME)
+    if image is None:
+        image = bpy.data.images.load(str(path), check_existing=False)
+        image.name = NAME
+    else:
+        image.filepath = str(path)
+        image.reload()
+    return image
+
+
+def show_in_window(image: bpy.types.Image) -> None:
+    """Show an image in an image editor; where none is open, in a window of its own."""
+    manager = bpy.context.window_manager
+    for window in manager.windows:
+        for area in window.screen.areas:
+            if area.type == "IMAGE_EDITOR":
+                area.spaces.active.image = image
+                return
+    known = {window.as_pointer() for window in manager.windows}
+    with bpy.context.temp_override(window=manager.windows[0]):
+        bpy.ops.wm.window_new()
+    for window in manager.windows:
+        if window.as_pointer() not in known:
+            area = window.screen.areas[0]
+            area.type = "IMAGE_EDITOR"
+            area.spaces.active.image = image

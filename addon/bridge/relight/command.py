@@ -1,0 +1,222 @@
+"""The command `relight`: a result's scene rendered under another light; the file itself is not changed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import BadInputError
+from ...core.progress import Progress
+from ..data.cameras import frame_cameras, use_camera
+from ..light import lamps as relight_lamps
+from ..light import outside
+from ..light.kelvin import rgb_of
+from ..render_device import use_device
+from .before_after import COPY as SCENE
+from .before_after import render_pair
+from .lights import SOFTBOX, SPOT, SUN, WINDOW, add_light
+from .pictures import CYCLES, check_format, prepare, seconds_expected, settings_kept, shoot, ticking
+
+
+@dataclass(frozen=True)
+class Light:
+    """What is to be changed about the light; None leaves it as the file has it.
+
+    Attributes
+    ----------
+    lamps : str or None
+        'on', 'off', or NAME=FACTOR and NAME=off, separated by commas; a name stands for one lamp or a class of them.
+    world : str or None
+        'on', 'off', or degrees by which the outside is turned, anticlockwise from above.
+    world_strength : float or None
+    hdri : Path or None
+        Picture to put around the room.
+    added : dict of str to (float, str)
+        Strength of each new light and its unit (`light.units.UNITS`), by `relight.lights.PRESETS`.
+    kelvin : float or None
+        Temperature of the new lights; None: what suits each.
+    """
+
+    lamps: str | None = None
+    world: str | None = None
+    world_strength: float | None = None
+    hdri: Path | None = None
+    added: dict[str, tuple[float, str]] = field(default_factory=dict)
+    kelvin: float | None = None
+
+
+def relight(
+    result: Path,
+    light: Light,
+    out: Path,
+    camera: str | None = None,
+    samples: int = 0,
+    engine: str = CYCLES,
+    before_after: bool = False,
+    percentage: int = 100,
+    progress: Progress | None = None,
+    device: str | None = None,
+    of: str | None = None,
+) -> list[str]:
+    """Open a result's scene, change its light, render.
+
+    Parameters
+    ----------
+    result : Path
+        A result folder.
+    light : Light
+    out : Path
+        Ends in .png, .jpg or .exr.
+    camera : str, optional
+        Number of a frame in the capture's order, from 0, or its name; by default the scene's camera.
+    samples : int
+        0: as the scene says.
+    engine : str
+        `pictures.CYCLES` or `pictures.EEVEE`.
+    before_after : bool
+        Two pictures beside each other: the captured light, the new one.
+    percentage : int
+        Of the frame's size.
+    progress : Progress, optional
+    device : str, optional
+        See `render_device.use_device`; by default the file's, on which Cycles may have no say without preferences.
+    of : str, optional
+        Name of the scene, where the file holds several; by default the one that it was saved with.
+
+    Returns
+    -------
+    list of str
+        Remarks, one sentence each.
+
+    Raises
+    ------
+    BadInputError, StorageError
+        One sentence for the user; nothing is rendered if anything that was given is wrong.
+    """
+    progress = progress or Progress()
+    check_format(out)
+    path = Path(result) / SCENE
+    if not path.is_file():
+        raise BadInputError(f"Result folder '{result}' holds no {SCENE}; run 'recover CAPTURE --out {result}' first.")
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path.absolute()), load_ui=False)
+    except RuntimeError as error:
+        raise BadInputError(
+            f"'{path}' can't be opened by Blender {bpy.app.version_string}; recover the capture again."
+        ) from error
+    scene = scene_named(of)
+    if camera is not None:
+        use_camera(scene, camera_named(scene, camera))
+    if scene.camera is None:
+        raise BadInputError(f"'{path}' has no camera to render through.")
+    remarks = apply_light(scene, light)
+    with settings_kept(scene):
+        if device is not None and engine == CYCLES:
+            remarks += filter(None, [use_device(scene, device)])
+        prepare(scene, engine, samples, percentage)
+        if before_after:
+            render_pair(scene, out, progress)
+        else:
+            progress.stage("after")
+            with ticking(progress, seconds_expected(scene)):
+                shoot(scene, out)
+            progress.done()
+    return remarks
+
+
+def scene_named(name: str | None) -> bpy.types.Scene:
+    """A scene of the open file, made the one that is worked in; raises `BadInputError` where there is none."""
+    scene = bpy.context.scene if name is None else bpy.data.scenes.get(name)
+    if scene is None:
+        known = ", ".join(f"'{one.name}'" for one in bpy.data.scenes)
+        raise BadInputError(f"There is no scene '{name}' in the file; it holds {known}.")
+    if bpy.context.window is not None:
+        bpy.context.window.scene = scene
+    return scene
+
+
+def apply_light(scene: bpy.types.Scene, light: Light) -> list[str]:
+    """Change a scene's light; returns remarks, raises `BadInputError` where something is unknown."""
+    if light.kelvin is not None:
+        rgb_of(light.kelvin)  # which raises where there is no such temperature
+    if light.lamps is not None:
+        set_lamps(scene, light.lamps)
+    if light.hdri is not None:
+        outside.use_hdri(scene, light.hdri, outside.usual_radiance(scene))
+    if scene.world is not None and light.world is not None:
+        turn = world_rotation(light.world)
+        outside.set_on(scene.world, turn is not None)
+        if light.world not in ("on", "off"):
+            outside.set_rotation(scene.world, math.radians(turn))
+    if scene.world is not None and light.world_strength is not None:
+        outside.set_factor(scene.world, light.world_strength)
+    for preset, (strength, unit) in light.added.items():
+        add_light(scene, preset, strength, kelvin=light.kelvin, unit=unit)
+    return outside.remarks(scene) if light.hdri is not None else []
+
+
+def set_lamps(scene: bpy.types.Scene, text: str) -> None:
+    """Obey the option ``--lamps``; every part of it is checked before anything changes."""
+    if text in ("on", "off"):
+        for lamp in relight_lamps.find_lamps(scene):
+            relight_lamps.set_on(lamp, text == "on")
+        return
+    wanted = []
+    for part in text.split(","):
+        name, sign, value = part.rpartition("=")
+        if not sign:
+            raise BadInputError(f"Option --lamps takes on, off or NAME=FACTOR, separated by commas, not '{part}'.")
+        lamps = relight_lamps.lamp_named(scene, name)
+        wanted.append((lamps, None if value == "off" else 1.0 if value == "on" else _factor(value)))
+    for lamps, value in wanted:
+        for lamp in lamps:
+            relight_lamps.set_on(lamp, value is not None)
+            if value is not None:
+                relight_lamps.set_factor(lamp, value)
+
+
+def world_rotation(text: str) -> float | None:
+    """Degrees that the option ``--world`` asks for; None: off."""
+    if text in ("on", "off"):
+        return 0.0 if text == "on" else None
+    try:
+        angle = float(text)
+    except ValueError:
+        angle = math.nan
+    if not math.isfinite(angle):
+        raise BadInputError(f"Option --world takes on, off or an angle in degrees, not '{text}'.")
+    return angle
+
+
+def camera_named(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
+    """The camera of a frame, by its number from 0 or its name; raises `BadInputError`."""
+    cameras = frame_cameras(scene)
+    found = next((c for c in cameras if c.name == name), None)
+    if found is None and name.lstrip("-").isdigit() and 0 <= int(name) < len(cameras):
+        found = cameras[int(name)]
+    if found is None:
+        some = ", ".join(f"'{c.name}'" for c in cameras[:3])
+        raise BadInputError(
+            f"There is no camera '{name}'; take a number from 0 to {len(cameras) - 1} or a name such as {some}."
+            if cameras
+            else f"There is no camera '{name}'; the scene has none at all."
+        )
+    return found
+
+
+def _factor(text: str) -> float:
+    """A lamp's factor from the option ``--lamps``: a number of at least 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value >= 0):
+        raise BadInputError(f"Option --lamps takes factors of at least 0, not '{text}'.")
+    return value
+
+
+OPTIONS = {"window": WINDOW, "softbox": SOFTBOX, "spot": SPOT, "sun": SUN}
+"""Options of the command line that add a light."""

@@ -1,0 +1,100 @@
+"""The exposure that a light asks for: a small picture is rendered and its median brought to middle grey.
+
+As `scene.py` does with the median of the frames, so that the captured light asks for about the captured exposure.
+"""
+
+from __future__ import annotations
+
+import math
+
+import bpy
+
+from ...core.errors import BadInputError
+from ..scene.settings import EXPOSURE
+from . import estimate
+from .pictures import small_median
+
+CAPTURED = "scan_relight_captured_exposure"
+"""Custom property of a scene: its exposure before ours, in stops."""
+ASKED = "scan_relight_asked_exposure"
+"""Custom property of a scene: the exposure that its light asked for when it was last measured, in stops."""
+_GREY, _MOST = 0.18, 32.0
+
+
+def measure(scene: bpy.types.Scene) -> float:
+    """The exposure in stops that shows the median of the present picture as middle grey.
+
+    Raises
+    ------
+    BadInputError
+        There is no camera, or no light at all.
+    StorageError
+        The small picture can't be written.
+    """
+    if scene.camera is None:
+        raise BadInputError("The scene has no camera to measure the light through; choose a frame first.")
+    median = small_median(scene)
+    if not median > 0:
+        raise BadInputError("No light reaches what the camera looks at; switch a lamp on or add a light.")
+    asked = min(max(math.log2(_GREY / median), -_MOST), _MOST)
+    scene[ASKED] = asked
+    return asked
+
+
+def expose(scene: bpy.types.Scene) -> float:
+    """Set the scene's exposure to what its light asks for; returns it in stops. Raises as `measure`."""
+    asked = measure(scene)
+    if CAPTURED not in scene:
+        scene[CAPTURED] = scene.view_settings.exposure
+    scene.view_settings.exposure = asked
+    return asked
+
+
+def restore(scene: bpy.types.Scene) -> None:
+    """The exposure as it was before `expose`."""
+    if CAPTURED in scene:
+        scene.view_settings.exposure = scene[CAPTURED]
+        del scene[CAPTURED]
+    if ASKED in scene:
+        del scene[ASKED]
+
+
+def captured_exposure(scene: bpy.types.Scene) -> float:
+    """The exposure in stops that shows the captured light: the room's own, else what it was before `expose`."""
+    return float(scene.get(EXPOSURE, scene.get(CAPTURED, scene.view_settings.exposure)))
+
+
+def follow(scene: bpy.types.Scene) -> None:
+    """Set the exposure to what the light asks for by `relight.estimate`: no picture is rendered, none is lost.
+
+    Without effect where nothing can be estimated: no camera, no light.
+    """
+    stops = estimate.estimate(scene)
+    if stops is None or stops == estimate.NO_LIGHT:
+        return
+    captured = captured_exposure(scene)
+    if CAPTURED not in scene:
+        scene[CAPTURED] = scene.view_settings.exposure
+    scene.view_settings.exposure = min(max(captured - stops, -_MOST), _MOST)
+    if ASKED in scene:
+        del scene[ASKED]  # of another light
+
+
+def darkness(scene: bpy.types.Scene) -> str:
+    """A sentence where the picture is much darker or brighter than the captured one was; '' else, or if unknown.
+
+    By `relight.estimate.stops`, which renders nothing.
+    """
+    stops = estimate.stops(scene)
+    if stops is None:
+        return ""
+    if stops == estimate.NO_LIGHT:
+        return "No light is on that reaches what the camera looks at."
+    raised = scene.view_settings.exposure - captured_exposure(scene)
+    if abs(stops + raised) < 0.5:
+        return ""
+    light = f"about {abs(stops):.1f} stops {'darker' if stops < 0 else 'brighter'} than captured"
+    if abs(stops) < 0.5:
+        light = "about as captured"
+    exposure = "as captured" if abs(raised) < 0.05 else f"{abs(raised):.1f} stops {'up' if raised > 0 else 'down'}"
+    return f"The light is {light}; exposure is {exposure}."

@@ -1,0 +1,276 @@
+"""Pictures of a scene as files: rendered whole or not at all, two beside each other, every setting put back."""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.atomic import replacing
+from ...core.errors import BadInputError, InterruptedRun, StorageError
+from ...core.progress import Progress
+from ..data.images import image_array
+from ..light.kelvin import LUMINANCE
+
+FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32"), ".jpg": ("JPEG", "8"), ".jpeg": ("JPEG", "8")}
+"""By ending: Blender's name of the format and its depth."""
+CYCLES, EEVEE = "CYCLES", "EEVEE"
+_SLOT = "Scan Relight"
+"""Name of the slot of Blender's Render Result for pictures that only measure something."""
+_RENDER = (
+    "engine",
+    "filepath",
+    "resolution_x",
+    "resolution_y",
+    "resolution_percentage",
+    "pixel_aspect_x",
+    "pixel_aspect_y",
+    "use_border",
+    "use_file_extension",
+    "use_compositing",
+    "use_sequencer",
+    "use_overwrite",
+    "use_placeholder",
+    "film_transparent",
+)
+_IMAGE = ("media_type", "file_format", "color_mode", "color_depth", "color_management")
+_CYCLES = ("samples", "use_denoising", "use_adaptive_sampling", "device")
+_VIEW = ("view_transform", "look", "exposure", "gamma", "use_curve_mapping")
+
+
+def check_format(path: Path | str) -> str:
+    """The ending of a picture's name, in small letters; raises `BadInputError` where we can't write such a one."""
+    ending = Path(path).suffix.lower()
+    if ending not in FORMATS:
+        raise BadInputError(f"Picture '{path}' has to end in .png, .exr or .jpg.")
+    return ending
+
+
+def engine_name(engine: str) -> str:
+    """What this Blender calls an engine (`CYCLES` or `EEVEE`), as EEVEE's name changed with 5.0."""
+    if engine != EEVEE:
+        return engine
+    return "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0) else "BLENDER_EEVEE"
+
+
+@contextmanager
+def settings_kept(scene: bpy.types.Scene) -> Iterator[None]:
+    """Put back a scene's settings of rendering, its camera and its picture format, whatever happens."""
+    groups = [(scene.render, _RENDER), (scene.render.image_settings, _IMAGE), (scene.view_settings, _VIEW)]
+    if hasattr(scene, "cycles"):
+        groups.append((scene.cycles, _CYCLES))
+    kept = [(group, name, getattr(group, name)) for group, names in groups for name in names if hasattr(group, name)]
+    eevee = getattr(scene.eevee, "taa_render_samples", None)
+    camera = scene.camera
+    try:
+        yield
+    finally:
+        for group, name, value in kept:
+            setattr(group, name, value)
+        if eevee is not None:
+            scene.eevee.taa_render_samples = eevee
+        scene.camera = camera
+
+
+@contextmanager
+def result_kept() -> Iterator[None]:
+    """Within: what is rendered goes into a slot of its own, so that the artist's Render Result stays."""
+    slots = _render_slots()
+    shown = slots.active_index if slots is not None else 0
+    if slots is not None:
+        if _SLOT not in [slot.name for slot in slots]:
+            slots.new(name=_SLOT)
+        slots.active_index = [slot.name for slot in slots].index(_SLOT)
+    try:
+        yield
+    finally:
+        slots = _render_slots()
+        if slots is not None and shown < len(slots):
+            slots.active_index = shown
+
+
+def _render_slots():
+    """The slots of the Render Result; None before anything was rendered."""
+    image = next((one for one in bpy.data.images if one.type == "RENDER_RESULT"), None)
+    return image.render_slots if image is not None else None
+
+
+def prepare(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 0, percentage: int = 0) -> None:
+    """Set a scene up for a picture; to be called within `settings_kept`.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    engine : str
+        `CYCLES` or `EEVEE`.
+    samples : int
+        For each pixel; 0: the scene's.
+    percentage : int
+        Of the scene's size; 0: the scene's.
+    """
+    render = scene.render
+    render.engine = engine_name(engine)
+    render.use_border = render.use_sequencer = False
+    if percentage:
+        render.resolution_percentage = percentage
+    if samples and engine == CYCLES:
+        scene.cycles.samples = samples
+    elif samples:
+        scene.eevee.taa_render_samples = samples
+    if engine == CYCLES and scene.cycles.use_denoising and not can_denoise():
+        scene.cycles.use_denoising = False  # else Blender 4.x raises
+
+
+def can_denoise() -> bool:
+    """Whether this Blender was built with OpenImageDenoise; some distributions' are not."""
+    import _cycles
+
+    return bool(getattr(_cycles, "with_openimagedenoise", False))
+
+
+def shoot(scene: bpy.types.Scene, path: Path | str) -> None:
+    """Render to a file, in the format of its ending; raises `StorageError` where it can't be written.
+
+    PNG and JPEG show the scene's view transform and exposure, EXR holds linear radiance.
+    """
+    path = Path(path)
+    kind, depth = FORMATS[check_format(path)]
+    image = scene.render.image_settings
+    if hasattr(image, "media_type"):  # Blender 5.0 sorts formats by it
+        image.media_type = "IMAGE"
+    image.file_format, image.color_mode, image.color_depth = kind, "RGB", depth
+    scene.render.use_file_extension = False
+    with saving(path) as temporary:
+        scene.render.filepath = str(temporary.absolute())
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+        if "EEVEE" in scene.render.engine and _is_black(temporary):
+            raise BadInputError(
+                "EEVEE gave a black picture: it needs a graphics card, which Blender has none of here; take Cycles."
+            )
+
+
+def small_median(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 16, width: int = 64) -> float:
+    """Median luminance of a small picture through the scene's camera, linear; nothing of the scene's settings changes.
+
+    Raises
+    ------
+    BadInputError
+        EEVEE finds no graphics card.
+    StorageError
+        The picture can't be written.
+    """
+    from ...core.io.exr import read_exr  # not earlier: Blender's start should not wait for OpenEXR
+
+    with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, result_kept(), settings_kept(scene):
+        prepare(scene, engine, samples)
+        render = scene.render
+        render.resolution_y = max(round(width * render.resolution_y / render.resolution_x), 8)
+        render.resolution_x, render.resolution_percentage = width, 100
+        if engine == CYCLES:
+            scene.cycles.use_denoising = False
+        shoot(scene, Path(folder) / "small.exr")
+        return float(np.median(read_exr(Path(folder) / "small.exr").rgb @ LUMINANCE))
+
+
+def seconds_expected(scene: bpy.types.Scene) -> float:
+    """About how long a picture will take, from two of few samples; 0 where that is not worth asking.
+
+    Blender tells Python nothing while it renders: its handler of render statistics waits for Python, which waits for
+    the render, and what Cycles writes of its samples is next to nothing without a window.
+    """
+    if scene.render.engine != CYCLES or scene.cycles.samples < 32:
+        return 0.0
+    samples, denoising = scene.cycles.samples, scene.cycles.use_denoising
+    few, taken = max(samples // 16, 4), []
+    try:
+        scene.cycles.use_denoising = False
+        for count in (few, 1):  # the first one loads what the device needs
+            scene.cycles.samples = count
+            began = time.monotonic()
+            bpy.ops.render.render(write_still=False, scene=scene.name)
+            taken.append(time.monotonic() - began)
+    finally:
+        scene.cycles.samples, scene.cycles.use_denoising = samples, denoising
+    return taken[1] + (samples - 1) * max(taken[0] - taken[1], 0.0) / (few - 1)
+
+
+@contextmanager
+def ticking(progress: Progress, expected: float) -> Iterator[None]:
+    """While a picture is rendered within, tell its share by the clock; `expected` seconds, 0: nothing is told."""
+    end, began = threading.Event(), time.monotonic()
+
+    def tell() -> None:
+        with suppress(InterruptedRun):  # the wish to stop is heard by who rendered, at its end
+            while not end.wait(0.25):
+                progress.update(min((time.monotonic() - began) / expected, 0.97))
+
+    thread = threading.Thread(target=tell, name="scan relight picture", daemon=True)
+    if expected > 0:
+        thread.start()
+    try:
+        yield
+    finally:
+        end.set()
+        if expected > 0:
+            thread.join()
+
+
+def _is_black(path: Path) -> bool:
+    """Whether a picture holds nothing but zeros; EEVEE without a graphics card gives such a one without a word."""
+    if not path.exists():
+        return False
+    image = bpy.data.images.load(str(path.absolute()))
+    try:
+        return not image_array(image)[..., :3].any()
+    finally:
+        bpy.data.images.remove(image)
+
+
+@contextmanager
+def saving(path: Path) -> Iterator[Path]:
+    """A temporary name beside `path` that Blender saves a picture to, moved over it; one sentence where that fails."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as temporary:
+            yield temporary
+            content = temporary.read_bytes() if temporary.exists() else b""
+            whole = content[-8:-4] == b"IEND" if path.suffix.lower() == ".png" else len(content) > 100
+            if not whole:  # Blender does not always notice a full disk
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    except (OSError, RuntimeError) as error:
+        reason = " ".join(str(getattr(error, "strerror", None) or error).split()).removeprefix("Error: ").rstrip(".")
+        raise StorageError(
+            f"'{path}' can't be written ({reason}); free some space or choose another result folder."
+        ) from error
+
+
+def beside(left: Path, right: Path, out: Path) -> None:
+    """Put two pictures of one size beside each other; `out` ends as they do."""
+    images = [bpy.data.images.load(str(Path(path).absolute())) for path in (left, right)]
+    pixels = [image_array(image) for image in images]
+    gap = np.ones((pixels[0].shape[0], max(pixels[0].shape[1] // 80, 1), 4), np.float32)
+    joined = np.concatenate([_rgba(pixels[0]), gap, _rgba(pixels[1])], 1)
+    kind = FORMATS[check_format(out)][0]
+    made = bpy.data.images.new("before_after", joined.shape[1], joined.shape[0], float_buffer=kind == "OPEN_EXR")
+    try:
+        made.pixels.foreach_set(joined.astype(np.float32).ravel())
+        with saving(Path(out)) as temporary:
+            made.filepath_raw, made.file_format = str(temporary.absolute()), kind
+            made.save()
+    finally:
+        bpy.data.batch_remove([*images, made])
+
+
+def _rgba(pixels: np.ndarray) -> np.ndarray:
+    """Pixels with four channels, opaque."""
+    out = np.ones((*pixels.shape[:2], 4), np.float32)
+    out[..., :3] = pixels[..., :3]
+    return out

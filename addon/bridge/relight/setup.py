@@ -1,0 +1,172 @@
+"""A set-up of light as text, so that it can be kept as a preset and used in another room.
+
+New lights are kept as seen by the camera, in units of the room's size and of its own light; lamps by their class, with
+the colour that the artist gave them; the outside by its factor and turn, a picture around the room by its path.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+
+import bpy
+from mathutils import Matrix, Vector
+
+from ...core.errors import BadInputError
+from ..data.own_collection import own_collection
+from ..light import lamps as relight_lamps
+from ..light import outside as relight_outside
+from ..light.room import bounds, cast, room_light, view_direction
+from .lights import COLLECTION, KIND, PRESETS, added_lights, remove_lights
+
+_NUMBERS = ("angle", "spread", "spot_size", "spot_blend", "temperature")
+_LENGTHS = ("size", "size_y", "shadow_soft_size")
+_CLEAR = 0.15
+
+
+def setup_of(scene: bpy.types.Scene) -> str:
+    """The light of a scene as JSON; raises `BadInputError` where it holds no room."""
+    frame, size, light = _frame(scene), _size(scene), room_light(scene)
+    back = frame.inverted()
+    lights = []
+    for thing in added_lights(scene):
+        data = thing.data
+        told = {
+            "kind": thing[KIND],
+            "type": data.type,
+            "name": thing.name,
+            "shown": not thing.hide_render,
+            "pose": [list(row) for row in back @ thing.matrix_world],
+            "color": list(data.color),
+            "use_temperature": data.use_temperature,
+            # The power of a lamp goes with the square of its distance; a sun's strength does not.
+            "energy": data.energy / light / (1.0 if data.type == "SUN" else size**2),
+        }
+        told.update({name: getattr(data, name) for name in _NUMBERS if hasattr(data, name)})
+        told.update({name: getattr(data, name) / size for name in _LENGTHS if hasattr(data, name)})
+        lights.append(told)
+    lamps = {}
+    for lamp in relight_lamps.find_lamps(scene):
+        if relight_lamps.is_changed(lamp):
+            # Its colour only where it is the artist's: another room's lamps have colours of their own.
+            tint = relight_lamps.colour(lamp) if relight_lamps.is_coloured(lamp) else None
+            lamps[_class(lamp)] = [relight_lamps.is_on(lamp), relight_lamps.factor(lamp), tint]
+    world = scene.world
+    outside = (
+        None
+        if world is None
+        else [relight_outside.is_on(world), relight_outside.factor(world), relight_outside.rotation(world)]
+    )
+    dark = not any(map(relight_lamps.is_on, relight_lamps.find_lamps(scene)))
+    return json.dumps(
+        {
+            "lights": lights,
+            "lamps": lamps,
+            "dark": dark,
+            "outside": outside,
+            "picture": world.get(relight_outside.HDRI) if world is not None else None,
+        }
+    )
+
+
+def apply_setup(scene: bpy.types.Scene, text: str) -> list[str]:
+    """Light a scene as `setup_of` told; its new lights are replaced, lamps of unknown classes are as captured.
+
+    Returns
+    -------
+    list of str
+        One sentence where the picture around the room is gone: the recovered outside shines then.
+
+    Raises
+    ------
+    BadInputError
+        It is no set-up, or the scene holds no room; nothing is changed then.
+    """
+    try:
+        told = json.loads(text)
+        lights, lamps, outside = told["lights"], dict(told["lamps"]), told["outside"]
+        poses = [Matrix(one["pose"]) for one in lights]
+        states = {name: (bool(one[0]), float(one[1]), one[2] if len(one) > 2 else None) for name, one in lamps.items()}
+        known = all(math.isfinite(c) for pose in poses for row in pose for c in row) and all(
+            one["kind"] in PRESETS and one["type"] in ("AREA", "SPOT", "SUN", "POINT") for one in lights
+        )
+    except (ValueError, TypeError, KeyError, IndexError):
+        known = False
+    if not known:
+        raise BadInputError("This preset holds no light that was saved here; save it anew.")
+    frame, size, light = _frame(scene), _size(scene), room_light(scene)
+    remove_lights(scene)
+    for one, pose in zip(lights, poses, strict=True):
+        data = bpy.data.lights.new(one["name"], one["type"])
+        data.energy = one["energy"] * light * (1.0 if one["type"] == "SUN" else size**2)
+        data.color, data.use_temperature = one["color"], one["use_temperature"]
+        for names, factor in ((_NUMBERS, 1.0), (_LENGTHS, size)):
+            for name in names:
+                if name in one and hasattr(data, name):
+                    setattr(data, name, one[name] * factor)
+        if one["type"] == "AREA":
+            data.shape = "RECTANGLE"
+        thing = bpy.data.objects.new(one["name"], data)
+        thing[KIND], thing.hide_render, thing.visible_camera = one["kind"], not one["shown"], False
+        place = frame @ pose
+        if one["type"] != "SUN":
+            place.translation = _within(scene, frame.translation, place.translation)
+        thing.matrix_world = Matrix.LocRotScale(place.translation, place.to_quaternion(), None)
+        own_collection(scene, COLLECTION).objects.link(thing)
+    for lamp in relight_lamps.find_lamps(scene):
+        relight_lamps.restore(lamp)
+        on, factor, tint = states.get(_class(lamp), (not told.get("dark"), 1.0, None))
+        if tint is not None:
+            relight_lamps.set_colour(lamp, tint)
+        if not on or factor != 1.0:
+            relight_lamps.set_factor(lamp, factor)
+            relight_lamps.set_on(lamp, on)
+    remarks = _put_picture(scene, told.get("picture"))
+    if outside is not None and scene.world is not None:
+        relight_outside.set_on(scene.world, outside[0])
+        relight_outside.set_factor(scene.world, outside[1])
+        relight_outside.set_rotation(scene.world, outside[2])
+    return remarks
+
+
+def _put_picture(scene, picture: str | None) -> list[str]:
+    """Put a picture around the room, or the recovered outside; returns what there is to say."""
+    relight_outside.restore(scene)
+    if not picture:
+        return []
+    try:
+        relight_outside.use_hdri(scene, picture, relight_outside.usual_radiance(scene))
+    except BadInputError:
+        return [f"The picture around the room, '{picture}', is gone; the recovered outside shines instead."]
+    return relight_outside.remarks(scene)
+
+
+def _frame(scene) -> Matrix:
+    """The level frame of who looks through the camera, in units of the room's size: right, ahead, up."""
+    low, high = bounds(scene)
+    ahead = view_direction(scene)
+    origin = scene.camera.matrix_world.translation if scene.camera else (low + high) / 2
+    turn = Matrix(((ahead.y, ahead.x, 0), (-ahead.x, ahead.y, 0), (0, 0, 1))).to_4x4()
+    return Matrix.Translation(origin) @ turn @ Matrix.Scale(_size(scene), 4)
+
+
+def _size(scene) -> float:
+    """Metres: the diagonal of the room."""
+    low, high = bounds(scene)
+    return max((high - low).length, 1e-3)
+
+
+def _within(scene, eye: Vector, place: Vector) -> Vector:
+    """A place inside the room: as far from the camera towards `place` as nothing is in the way."""
+    way = place - eye
+    if way.length < 1e-6:
+        return place
+    hit = cast(scene, eye, way, way.length + _CLEAR)
+    low, high = bounds(scene)
+    reached = eye + way.normalized() * max(hit.distance - _CLEAR, 0.0) if hit else place
+    return Vector(min(max(reached[k], low[k] + _CLEAR), high[k] - _CLEAR) for k in range(3))
+
+
+def _class(lamp) -> str:
+    """A lamp's class: its name without its number."""
+    return lamp.name.casefold().rpartition(" ")[0] or lamp.name.casefold()

@@ -1,0 +1,225 @@
+"""The recovered room in the open file. All of it comes out of the result's scene.blend: one code path makes the room.
+
+A capture has one room in a file. Where it is there already, `bringing` updates it (`room.update`): what the artist did
+to it stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import BadInputError, MissingStageError
+from ...core.results.room_file import ROOM, root_of, run_of
+from ..data.cameras import show_camera
+from ..data.scene_data import Made
+from ..marks import IMAGE, OWN_SCENE, RESULT, UV_MAP, mark
+from ..results import changes as room_changes
+from ..results import images
+from ..scene.as_made import stamp, stamp_tree
+from ..scene.parts import find_room, hide_cameras, imported, own_scene, rooms, scene_name
+from ..scene.settings import dress, take_settings
+from .update import commit, note_known, plan
+
+SCENE_FILE = "scene.blend"
+__all__ = ["Brought", "bringing", "link_room", "rooms"]
+
+
+@dataclass(frozen=True)
+class Brought:
+    """What came into the file.
+
+    Attributes
+    ----------
+    scene : bpy.types.Scene
+        Where the room is to be seen: the scene that was named, or the room's own.
+    collection : bpy.types.Collection
+        The room's.
+    updated : bool
+        It was in the file already.
+    warnings : tuple of str
+        What was left as the artist has it, one sentence each.
+    changes : tuple of dict
+        Objects that were found to be notably different from last time: `object_id`, `name` and `text`, the sentence.
+    """
+
+    scene: bpy.types.Scene
+    collection: bpy.types.Collection
+    updated: bool = False
+    warnings: tuple[str, ...] = ()
+    changes: tuple[dict, ...] = ()
+
+
+def bringing(
+    folder: Path | str, scene: bpy.types.Scene | None = None, where: str = images.RESULT, known: bool = False
+) -> Generator[float, None, Brought]:
+    """Bring a finished result's room into the open file, or update the one that is there; yields the share done.
+
+    Nothing that was in the file changes before the last slice: a generator that fails, or is closed before, leaves all
+    as it was.
+
+    Parameters
+    ----------
+    folder : Path or str
+        The result folder.
+    scene : bpy.types.Scene, optional
+        Link the room into this scene and change nothing else of it. By default the room has a scene of its own,
+        "Scan Relight: <capture>", with its world, exposure, engine and camera; no other scene is touched.
+    where : str
+        Where the images go: see `results.images`.
+    known : bool
+        Only update a room that is there.
+
+    Returns
+    -------
+    Brought
+
+    Raises
+    ------
+    MissingStageError
+        The folder holds no finished result; with `known`, the file holds no room of that capture.
+    BadInputError
+        scene.blend is damaged, or `where` is a folder beside a file that was never saved.
+    StorageError
+        Images can't be copied.
+    """
+    folder = Path(folder).absolute()
+    root = root_of(folder)
+    if root is None:
+        raise MissingStageError(
+            f"Folder '{folder}' holds no finished result ('{ROOM}' is missing or damaged); run the "
+            "recovery to its end first."
+        )
+    top = imported(root) if known else find_room(root)
+    made = Made()
+    try:
+        yield 0.0
+        shell = _append(folder / SCENE_FILE)
+        yield 0.4
+        fresh = _top(shell)
+        run = run_of(folder)
+        things = list(fresh.all_objects)
+        for owner in (fresh, *things):
+            mark(owner, folder, run, root)
+        for done, thing in enumerate(things, 1):  # a scene.blend of an older version has no stamps
+            stamp(thing)
+            if not done % 16:
+                yield 0.4 + 0.2 * done / len(things)
+        if shell.world is not None:
+            stamp_tree(shell.world)
+        now = room_changes.found(folder)
+        steps = None
+        if top is not None:
+            steps = yield from plan(top, fresh)
+        yield 0.95
+        images.settle(_images(made, folder), where)
+        for name in (images.ALBEDO, images.SHADING):  # shown by nothing yet, but asked for by name
+            if (folder / name).exists():
+                images.image(folder, name, where)
+    except BaseException:
+        made.remove()
+        raise
+    if top is not None:
+        _replace_images(made, top)
+    warnings: list[str] = []
+    if steps is None:
+        top, differences = fresh, ()
+        note_known(top, things)
+    else:
+        differences = room_changes.compare(room_changes.kept(top), now)
+        warnings = commit(steps, top, fresh, shell)
+        shell.collection.children.unlink(fresh)
+    room_changes.keep(top, now)
+    place, kept = _place(top, shell, scene, root, steps is None)
+    room_changes.show(place, differences)
+    made.remove_unused(steps.replaced if steps is not None else ())
+    for one, label in steps.names if steps is not None else ():
+        one.name = label
+    brought = Brought(place, top, steps is not None, (*warnings, *kept), differences)
+    yield 0.98
+    if brought.scene.camera is not None:
+        show_camera(brought.scene, brought.scene.camera)
+    # Without this no matrix_world is right before the scene is looked at.
+    brought.scene.view_layers[0].update()
+    return brought
+
+
+def _append(path: Path) -> bpy.types.Scene:
+    """The scene of a result's scene.blend, appended by Blender itself."""
+    if not path.is_file():
+        raise MissingStageError(f"Folder '{path.parent}' holds no {path.name}; run the recovery to its end first.")
+    try:
+        with bpy.data.libraries.load(str(path), link=False) as (there, wanted):
+            wanted.scenes = there.scenes[:1]
+    except OSError as error:
+        raise BadInputError(
+            f"'{path}' can't be read by Blender {bpy.app.version_string}; run the recovery again from its last stage."
+        ) from error
+    if not wanted.scenes or wanted.scenes[0] is None or not wanted.scenes[0].collection.children:
+        raise BadInputError(f"'{path}' holds no room; run the recovery again from its last stage.")
+    return wanted.scenes[0]
+
+
+def _images(made: Made, folder: Path) -> list[bpy.types.Image]:
+    """The images that came, marked with their files of the result folder."""
+    found = [image for image in made.new("images") if image.source in ("FILE", "TILED") and image.filepath]
+    for image in found:
+        path = Path(image.filepath.replace("\\", "/"))
+        own = UV_MAP in image and image.source == "FILE"  # an object's, in a folder below the result's
+        image[IMAGE] = str(folder / path.parent.name / path.name if own else folder / path.name)
+    return found
+
+
+def _replace_images(made: Made, top: bpy.types.Collection) -> None:
+    """Let the images that came stand for those of the same name that the room had from another result folder."""
+    came = {Path(image[IMAGE]).name: image for image in made.new("images") if IMAGE in image}
+    for image in [one for one in bpy.data.images if one.get(IMAGE) and not one.library]:
+        path = Path(image[IMAGE])
+        if path.name in came and came[path.name] != image and path.is_relative_to(top.get(RESULT, "")):
+            images.replace(image, came[path.name])
+
+
+def _top(shell: bpy.types.Scene) -> bpy.types.Collection:
+    """The room's collection in an appended scene; an older one is not marked."""
+    return next(iter(rooms(shell)), shell.collection.children[0])
+
+
+def _place(top, shell, scene, root: str, new: bool) -> tuple[bpy.types.Scene, list[str]]:
+    """Have the room in `scene`, or in one of its own: the scene to see it in, and what stays as the artist has it."""
+    kept: list[str] = []
+    own = None if new else own_scene(top)
+    if own is not None:
+        kept = take_settings(own, shell)
+    if scene is not None and top not in scene.collection.children_recursive:
+        scene.collection.children.link(top)
+        hide_cameras(scene, top)
+    if scene is None and own is None:
+        if not new:
+            shell.collection.children.link(top)
+            hide_cameras(shell, top)
+        shell.name, shell[OWN_SCENE] = scene_name(root), True
+        dress(shell)
+        return shell, kept
+    bpy.data.scenes.remove(shell)
+    return scene or own, kept
+
+
+def link_room(top: bpy.types.Collection, scene: bpy.types.Scene, outside: bpy.types.Scene | None = None) -> None:
+    """Show a room in another scene as well.
+
+    Parameters
+    ----------
+    top : bpy.types.Collection
+        The room's.
+    scene : bpy.types.Scene
+    outside : bpy.types.Scene, optional
+        Give `scene` the world and the exposure of this one, too.
+    """
+    if top not in scene.collection.children_recursive:
+        scene.collection.children.link(top)
+        hide_cameras(scene, top)
+    if outside is not None:
+        scene.world, scene.view_settings.exposure = outside.world, outside.view_settings.exposure

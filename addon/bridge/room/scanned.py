@@ -1,0 +1,88 @@
+"""A capture as it was scanned, in the open file: its objects without materials, its cameras with their frames."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+
+import bpy
+import numpy as np
+
+from ...core.scene.model import Capture
+from ..data.camera_track import make_track
+from ..data.cameras import make_cameras, show_camera, use_camera
+from ..data.mesh_objects import each_object
+from ..data.scene_data import Made
+from ..marks import CAPTURE, OWN_SCENE
+from ..relight.match_frame import show_picture
+from ..scene.as_made import stamp
+from ..scene.parts import CAMERAS, ROOM, find_room, hide_cameras, new_room, part_of, scene_name, scenes_with
+from .bring import Brought
+from .update import note_known
+
+
+def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generator[float, None, Brought]:
+    """Bring a capture into the open file in slices of an object or camera each; yields the share done.
+
+    A later run finds the room and updates it. Nothing that was in the file changes before the last slice.
+
+    Parameters
+    ----------
+    capture : Capture
+    scene : bpy.types.Scene, optional
+        Link it into this scene; by default it has one of its own. A room of the capture that the file has already
+        stays as it is, and only comes into the scene.
+
+    Returns
+    -------
+    Brought
+    """
+    top = find_room(capture.root)
+    if top is not None:
+        if scene is not None and top not in scene.collection.children_recursive:
+            scene.collection.children.link(top)
+        return Brought(
+            scene or scenes_with(top)[0],
+            top,
+            True,
+            (
+                f"Capture '{capture.root.name}' is in this file already, in its scene "
+                f"'{scenes_with(top)[0].name}'; it stays as it is.",
+            ),
+        )
+    made = Made()
+    try:
+        top = new_room(capture.root)
+        total = len(capture.instances) + len(capture.frames)
+        blank = np.zeros((len(capture.mesh.triangles), 3, 2), np.float32)
+        names = {one.object_id: one.name for one in capture.instances}
+        things = []
+        for number, thing in each_object(capture.mesh, capture.instances, blank, part_of(top, ROOM)):
+            stamp(thing, names[number])
+            things.append(thing)
+            yield len(things) / total
+        cameras = []
+        for index, frame in enumerate(capture.frames):
+            cameras += make_cameras([frame], part_of(top, CAMERAS), index)
+            show_picture(cameras[-1])
+            cameras[-1].data.show_background_images = True
+            yield (len(things) + len(cameras)) / total
+        track = make_track(cameras, part_of(top, CAMERAS))
+        for thing in (*things, *cameras, *filter(None, (track,))):
+            thing[CAPTURE] = top[CAPTURE]
+            stamp(thing)
+        note_known(top, top.all_objects)
+    except BaseException:
+        made.remove()
+        raise
+    if scene is None:
+        scene = bpy.data.scenes.new(scene_name(capture.root))
+        scene[OWN_SCENE] = True
+        scene.frame_start, scene.frame_end = 1, max(len(cameras), 1)
+        if cameras:
+            use_camera(scene, cameras[0])
+    scene.collection.children.link(top)
+    hide_cameras(scene, top)
+    if scene.camera is not None:
+        show_camera(scene, scene.camera)
+    scene.view_layers[0].update()
+    return Brought(scene, top)

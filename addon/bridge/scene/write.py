@@ -1,0 +1,289 @@
+"""The recovered room as a Blender scene: built into any scene, or saved as a file that renders when opened."""
+
+from __future__ import annotations
+
+import errno
+import math
+import os
+import struct
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ...core.brdf.material import ObjectMaterial, undescribed
+from ...core.errors import StorageError
+from ...core.results.room_file import run_of
+from ...core.scene.model import Capture
+from ..data.camera_track import make_track
+from ..data.cameras import best_view, differing, make_cameras, make_view, unlike, use_camera
+from ..data.images import image_name, load_image, load_parts, relative_to
+from ..data.materials import make_material
+from ..data.mesh_objects import is_open, make_objects
+from ..data.scene_data import Made
+from ..data.world import set_world
+from ..marks import OWN_SCENE, mark
+from .as_made import stamp, stamp_tree
+from .parts import CAMERAS, LAMPS, ROOM, hide_cameras, new_room, part_of, scene_name
+from .settings import EXPOSURE
+
+if TYPE_CHECKING:
+    from ...core.pipeline.parts import Parts
+
+BASE_COLOR, ALBEDO, SHADING, ENVIRONMENT = "base_color.exr", "albedo.exr", "shading.exr", "environment.exr"
+"""Files of the result folder that the scene shows; a missing one is left out."""
+_WRITING = ".scene-being-written.blend"
+SCENE_FILES = "scene.blend", _WRITING
+"""A result's own file of its room; what it is called while it is written."""
+_GREY = 0.18
+
+
+@dataclass
+class BuiltScene:
+    """What `build_scene` made.
+
+    Attributes
+    ----------
+    collection : bpy.types.Collection
+        "Scan Relight", linked to the scene; within it "Room", "Lamps" and "Cameras".
+    objects : dict of int to bpy.types.Object
+        By `object_id`.
+    cameras : list of bpy.types.Object
+        In the capture's order.
+    images : list of bpy.types.Image
+        All that refer to files of the result folder.
+    warnings : tuple of str
+    """
+
+    collection: bpy.types.Collection
+    objects: dict[int, bpy.types.Object]
+    cameras: list[bpy.types.Object]
+    images: list[bpy.types.Image] = field(default_factory=list)
+    warnings: tuple[str, ...] = ()
+
+
+def build_scene(
+    scene: bpy.types.Scene,
+    capture: Capture,
+    atlas_uv: np.ndarray,
+    materials: Iterable[ObjectMaterial],
+    result_folder: Path | str,
+    median_radiance: float = 0.0,
+    own: bool = False,
+    facing: bool = False,
+    parts: Parts | None = None,
+) -> BuiltScene:
+    """Add the recovered room to a scene as a new collection; nothing that is there is changed.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+    capture : Capture
+    atlas_uv : (t, 3, 2) float32
+        What `unwrap` gave.
+    materials : iterable of ObjectMaterial
+        An instance without one becomes lambertian.
+    result_folder : Path or str
+        Holds the images, see `BASE_COLOR` and its neighbours.
+    median_radiance : float
+        Of the frames; with `own` it sets the exposure so that this becomes middle grey. 0: unknown.
+    own : bool
+        The scene is ours: also set its world, active camera, render engine and exposure.
+    facing : bool
+        The mesh's normals face the frames: a lamp that is an open sheet then shines on that side only, as it was seen.
+    parts : Parts, optional
+        Images that the materials show instead of the room's one; that is there all the same.
+
+    Returns
+    -------
+    BuiltScene
+
+    Raises
+    ------
+    BadInputError
+        An image of the result folder can't be read.
+    """
+    folder = Path(result_folder).absolute()
+    images = {
+        name: load_image(folder / name, image_name(capture.root.name, name))
+        for name in (BASE_COLOR, ALBEDO, SHADING)
+        if (folder / name).exists()
+    }
+    top = new_room(capture.root)
+    room, lamps, eyes = (part_of(top, name) for name in (ROOM, LAMPS, CAMERAS))
+    scene.collection.children.link(top)
+    objects = make_objects(capture.mesh, capture.instances, atlas_uv, room, parts and parts.uv)
+    run = run_of(folder)
+    for owner in (top, *objects.values()):
+        mark(owner, folder, run, capture.root)
+    descriptions = {m.object_id: m for m in materials}
+    own_images = load_parts(folder, parts.images, capture.root.name, descriptions) if parts else {}
+    for instance in capture.instances:
+        if instance.object_id not in objects:
+            continue
+        thing = objects[instance.object_id]
+        description = descriptions.get(instance.object_id) or undescribed(instance.object_id, instance.class_name)
+        one_sided = facing and description.model.gives_light and is_open(thing.data)
+        base_color = own_images.get(instance.object_id, images.get(BASE_COLOR))
+        thing.data.materials.append(make_material(description, base_color, one_sided=one_sided))
+        if description.model.gives_light:
+            room.objects.unlink(thing)
+            lamps.objects.link(thing)
+        stamp(thing, instance.name)
+    cameras = make_cameras(capture.frames, eyes)
+    track = make_track(cameras, eyes)
+    if own:
+        environment = folder / ENVIRONMENT
+        world = set_world(scene, environment if environment.exists() else None)
+        for node in world.node_tree.nodes:
+            if node.type == "TEX_ENVIRONMENT":
+                node.image.name = image_name(capture.root.name, ENVIRONMENT)
+                images[node.name] = node.image
+        _prepare(scene, median_radiance)
+        stamp_tree(world)
+        use_camera(scene, cameras[best_view(capture.frames, capture.mesh)] if cameras else _overview(capture, eyes))
+        scene.frame_start, scene.frame_end = 1, max(len(cameras), 1)
+        scene.name, scene[OWN_SCENE] = scene_name(capture.root), True
+        scene[EXPOSURE] = scene.view_settings.exposure
+    for thing in (*cameras, *filter(None, (track,))):
+        mark(thing, folder, run, capture.root)
+        stamp(thing)
+    hide_cameras(scene, top)
+    warnings = tuple(filter(None, (differing(capture.frames), unlike(capture.frames))))
+    shown = [*images.values(), *dict.fromkeys(own_images.values())]
+    return BuiltScene(top, objects, cameras, shown, warnings)
+
+
+def _overview(capture: Capture, collection: bpy.types.Collection) -> bpy.types.Object:
+    """A camera for a capture that has none."""
+    from ...core.scene.overview import overview  # not earlier: Blender's start should not wait for embreex
+
+    return make_view("overview", overview(capture.mesh), collection)
+
+
+def write_scene(
+    path: Path | str,
+    capture: Capture,
+    atlas_uv: np.ndarray,
+    materials: Iterable[ObjectMaterial],
+    result_folder: Path | str,
+    median_radiance: float = 0.0,
+    fresh: bool | None = None,
+    facing: bool = False,
+    parts: Parts | None = None,
+) -> tuple[str, ...]:
+    """Save the recovered room as a .blend of its own that renders when opened.
+
+    The file appears whole or not at all, and refers to the images by paths relative to itself.
+
+    Parameters
+    ----------
+    path : Path or str
+        Best within `result_folder`, so that both are moved together.
+    capture, atlas_uv, materials, result_folder, median_radiance, facing, parts
+        See `build_scene`.
+    fresh : bool, optional
+        True: start from an empty file; what is open in this process is lost. False: build next to what is open, save
+        that part alone and take it away again. By default fresh in background mode only.
+
+    Returns
+    -------
+    tuple of str
+        Warnings, one sentence each.
+
+    Raises
+    ------
+    BadInputError
+        An image of the result folder can't be read.
+    StorageError
+        The file can't be written.
+    """
+    path = Path(path).absolute()
+    fresh = bpy.app.background if fresh is None else fresh
+    if fresh:
+        # Not read_factory_settings: that would disable the running extension itself.
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        scene = bpy.context.scene
+        scene.name = "Scan Relight"
+    else:
+        made = Made()
+        scene = bpy.data.scenes.new("Scan Relight")
+    try:
+        built = build_scene(
+            scene, capture, atlas_uv, materials, result_folder, median_radiance, own=True, facing=facing, parts=parts
+        )
+        for image in built.images:
+            relative_to(image, path.parent)
+        _save_whole(path, lambda name: _save(name, scene, built, fresh))
+    finally:
+        if not fresh:
+            made.remove()
+    return built.warnings
+
+
+def _save(name, scene, built, fresh):
+    if fresh:
+        bpy.ops.wm.save_as_mainfile(filepath=name, copy=True, compress=True, relative_remap=False)
+    else:
+        # Blender 5.2 crashes on a scene whose view layer was never brought up to date.
+        scene.view_layers[0].update()
+        bpy.data.libraries.write(name, {scene, *built.images}, path_remap="NONE", compress=True, fake_user=False)
+
+
+def _save_whole(path: Path, save: Callable[[str], None]) -> None:
+    """Save beside `path` and put the whole file in its place."""
+    writing = path.parent / _WRITING
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        writing.unlink(missing_ok=True)
+        save(str(writing))
+        if not is_whole(writing):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        writing.replace(path)
+    except (OSError, RuntimeError) as error:
+        with suppress(OSError):
+            writing.unlink(missing_ok=True)
+        reason = getattr(error, "strerror", None) or str(error).strip().removeprefix("Error: ").rstrip(".")
+        raise StorageError(
+            f"{path} can't be saved ({' '.join(reason.split())}); free some space or choose another folder."
+        ) from error
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a compressed .blend was written to its end.
+
+    Blender does not notice a full disk while it compresses (4.5, 5.2). The file's last frame lists the sizes of all
+    others (zstd's seekable format), so it tells what should be there.
+    """
+    with open(path, "rb") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(size - _FOOTER.size, 0))
+        footer = file.read()
+        if len(footer) < _FOOTER.size:
+            return False
+        frames, _, magic = _FOOTER.unpack(footer)
+        table = frames * _FRAME.size
+        if magic != _SEEKABLE or table + _FOOTER.size + 8 > size:
+            return False
+        file.seek(size - _FOOTER.size - table)
+        packed = sum(frame[0] for frame in _FRAME.iter_unpack(file.read(table)))
+    return packed + 8 + table + _FOOTER.size == size
+
+
+_FOOTER, _FRAME, _SEEKABLE = struct.Struct("<IBI"), struct.Struct("<II"), 0x8F92EAB1
+
+
+def _prepare(scene, median_radiance):
+    """Cycles, and an exposure that shows the room's median radiance as middle grey."""
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples = 128
+    scene.cycles.use_denoising = True
+    # Clamping would darken a room that is lit by small bright lamps; closed rooms need more bounces than four.
+    scene.cycles.sample_clamp_indirect = 0.0
+    scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.glossy_bounces = 12, 8, 8
+    if median_radiance > 0 and math.isfinite(median_radiance):
+        scene.view_settings.exposure = min(max(math.log2(_GREY / median_radiance), -32.0), 32.0)
