@@ -84,6 +84,7 @@ def test_files_and_index(toy, tmp_path):
     assert results["shy"].startswith("It needs") and len(results["toy"]) == 1
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_files(toy, tmp_path):
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         run_benchmark(["toy"], Options(out=tmp_path / name, seed=seed))

@@ -29,6 +29,7 @@ def test_the_furnace_is_exact():
     assert np.allclose(E[element], np.pi, rtol=1e-4) and np.allclose(true, np.pi)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["lamp", "window", "many lamps"])
 def test_rooms_are_lit_and_the_default_is_nearer_than_the_paper(name, few):
     room = make_room(name, SMALL, 0)
@@ -38,6 +39,7 @@ def test_rooms_are_lit_and_the_default_is_nearer_than_the_paper(name, few):
     assert ours < 0.75 * papers
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_error(few):
     errors = []
     for _ in range(2):

@@ -22,6 +22,7 @@ def few(monkeypatch):
         monkeypatch.setattr(specular, name, {k: v for k, v in getattr(specular, name).items() if k in keep})
 
 
+@pytest.mark.slow
 def test_errors_by_alternative(few):
     tables = list(specular.run(Options(seed=1)))
     assert [table.stage for table in tables] == ["specular", "specular-range"]

@@ -26,6 +26,7 @@ def few(monkeypatch):
     monkeypatch.setattr(accumulation, "ELEMENTS", 3000)
 
 
+@pytest.mark.slow
 def test_medians(few):
     errors, costs = medians.run(Options(seed=1))
     records = {(r["sequence"], r["observations"], r["alternative"]): r for r in errors.records()}
@@ -69,6 +70,7 @@ def test_rivals_are_near_the_median(n):
     assert twice.result().count.tolist() == [n] * 40
 
 
+@pytest.mark.slow
 def test_accumulation(few, tmp_path):
     (table,) = accumulation.run(Options(out=tmp_path, threads=2))
     records = {r["alternative"]: r for r in table.records()}

@@ -44,6 +44,7 @@ def objects(folder):
     return {one["object_id"]: one for one in json.loads((folder / "materials.json").read_text())["objects"]}
 
 
+@pytest.mark.slow
 def test_a_base_colour_is_the_mean_and_texture_stays(recovered, folder):
     before = recovered()
     found = recovered({"objects": {"2": {"base_color": [0.3, 0.5, 0.1]}}})
@@ -74,6 +75,7 @@ def test_a_lamp_that_is_none_has_an_albedo(recovered):
     assert found.materials[6].model == LAMBERTIAN and (found.albedo.origin[own] != NONE).all()
 
 
+@pytest.mark.slow
 def test_a_white_scales_all_albedo_and_the_light_makes_up_for_it(recovered, folder):
     before = recovered()
     white = mean(before, 1) / np.float32([1.25, 1, 0.8])  # as if E were too small in red, too great in blue
@@ -89,6 +91,7 @@ def test_a_white_scales_all_albedo_and_the_light_makes_up_for_it(recovered, fold
     assert lamp[0] > scale[0] > 1 and lamp[2] < scale[2] < 1 and lamp[1] == pytest.approx(1, abs=0.02)
 
 
+@pytest.mark.slow
 def test_the_room_under_the_whites_light_looks_as_before(recovered, disk):
     """Radiosity, which knows nothing of the run, under the scaled lamps and albedos."""
     truth = {i: np.broadcast_to(np.float32(rho), 3) for i, rho in ALBEDO.items()}
@@ -111,6 +114,7 @@ def test_a_doubtful_white_is_warned_of(recovered):
     assert np.allclose(lamp.report["figures"]["white_scale"], 1)
 
 
+@pytest.mark.slow
 def test_keys_stay_where_nothing_is_given(recovered, folder):
     recovered()
     first = json.loads((folder / "materials.json").read_text())["run"]

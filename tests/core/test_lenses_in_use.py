@@ -51,6 +51,7 @@ def pinholes(disk, tmp_path_factory):
     return disk.run(tmp_path_factory.mktemp("pinholes"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LENSES)
 def test_albedo_is_that_of_pinholes(name, disk, pinholes, tmp_path, few_samples):
     frames = []

@@ -78,6 +78,7 @@ def error(disk, folder, recovery):
     return float(np.std(found / middle - wave) / np.std(wave))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["object", "udim"])
 def test_parts_show_more_than_a_small_atlas_holds(striped, tmp_path, kind):
     room = run(striped, tmp_path)
@@ -93,6 +94,7 @@ def test_parts_show_more_than_a_small_atlas_holds(striped, tmp_path, kind):
     assert parted.run_key != room.run_key
 
 
+@pytest.mark.slow
 def test_each_way_takes_the_others_images_away(disk, tmp_path):
     def parts():
         return {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*base_color*.exr")}
@@ -107,6 +109,7 @@ def test_each_way_takes_the_others_images_away(disk, tmp_path):
     assert parts() == {"base_color.exr"}
 
 
+@pytest.mark.slow
 def test_the_look_at_the_frames_is_told_and_stopped_and_done_once(striped, tmp_path):
     def files():
         return {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.[ehj]*")}

@@ -90,6 +90,7 @@ def same(one: Finished, other: Finished) -> bool:
     return all(np.array_equal(a, b, equal_nan=a.dtype.kind == "f") for a, b in pairs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "kept"),
     [
@@ -113,6 +114,7 @@ def test_only_later_stages_are_done_again(disk, cheap, tmp_path, change, kept):
     assert (mine == theirs) == (kept == STAGES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("after", [1, 2, 3])
 def test_a_stopped_run_goes_on_from_there(disk, cheap, tmp_path, after):
     """The stop is asked for while the next stage runs."""
@@ -141,6 +143,7 @@ def spoilt(disk: OnDisk, tmp_path: Path) -> OnDisk:
     return copy
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [2, 6])
 def test_frames_that_turn_out_damaged(disk, tmp_path, count):
     """Whole when the run begins, cut off when they are read: few are left out, many are too many."""
@@ -161,6 +164,7 @@ def test_frames_that_turn_out_damaged(disk, tmp_path, count):
     assert again.report["warnings"] == run.report["warnings"]  # told as well when nothing is read
 
 
+@pytest.mark.slow
 def test_pixels_that_are_no_numbers(disk, tmp_path):
     copy = spoilt(disk, tmp_path)
     rng = np.random.default_rng(0)
@@ -174,6 +178,7 @@ def test_pixels_that_are_no_numbers(disk, tmp_path):
     assert np.isfinite(run.albedo.rho).all() and np.isfinite(run.shading.irradiance).all()
 
 
+@pytest.mark.slow
 def test_an_object_that_nobody_sees(tmp_path):
     """A cupboard's inside: a small box far outside the room, its inner sides out of every frame's sight."""
     hidden = [quad((9, 9, 0), (1, 0, 0), (0, 1, 0), 7), quad((9, 9, 0.5), (0, 1, 0), (1, 0, 0), 7)]
@@ -196,6 +201,7 @@ def test_an_object_that_nobody_sees(tmp_path):
     assert run.report["figures"]["unseen_share"] > 0
 
 
+@pytest.mark.slow
 def test_a_room_lit_through_its_roof(tmp_path):
     """No ceiling, a sky of radiance 2 that the frames see: albedo of what it lights."""
     quads = [q for q in lit_box() if q.object_id not in (1, 6)]
@@ -222,6 +228,7 @@ def test_a_capture_that_sees_nothing(disk, tmp_path):
         copy.run(tmp_path / "result")
 
 
+@pytest.mark.slow
 def test_the_papers_way(disk, tmp_path):
     run = disk.run(tmp_path / "result", replace(PAPER, shading_rays=512, specular_rays=16, texel_size=0.1, threads=2))
     # 512 rays instead of 10 000 give 10 % noise; the median over an object has less.
@@ -230,6 +237,7 @@ def test_the_papers_way(disk, tmp_path):
     assert {m.object_id: m.model for m in run.materials}[6] == EMITTER
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distance", [1e3, 1e4])
 def test_far_from_the_origin(tmp_path, distance):
     """In a national grid's coordinates the room lies kilometres away, where float32 is coarser than a ray's offset."""

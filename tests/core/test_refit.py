@@ -74,6 +74,7 @@ def pictures(folder):
 GIVEN = {"objects": {"3": {"model": "specular", "roughness": 0.4}, "5": {"base_color": [0.2, 0.4, 0.1]}}}
 
 
+@pytest.mark.slow
 def test_as_a_whole_run_with_the_same_corrections(disk, finished, result, tmp_path):
     run = refit(result, told=GIVEN)
     assert run.touched == {3, 5} and run.fitted_again == {3}

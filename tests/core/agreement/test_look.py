@@ -68,6 +68,7 @@ def test_right_poses_are_left_alone(room):
     assert np.median(found.misaligned) < 0.15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", MENDS)
 def test_the_convention_that_mends_is_found(room, text):
     capture, read = room
@@ -80,6 +81,7 @@ def test_the_convention_that_mends_is_found(room, text):
         assert np.allclose(frame.camera.camera_to_world, right.camera.camera_to_world)
 
 
+@pytest.mark.slow
 def test_nothing_is_proposed_where_nothing_fits(room):
     capture, read = room
     names = [frame.name for frame in capture.frames]

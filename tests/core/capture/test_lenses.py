@@ -114,6 +114,7 @@ def test_projects_as_colmap(name):
     np.testing.assert_allclose(pixels, SEEN_BY_COLMAP[name][1], atol=1e-5 if name == "FOV" else 2e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SEEN_BY_COLMAP)
 def test_every_pixel_comes_back(name):
     one = Camera(

@@ -35,6 +35,7 @@ def cameras(draw):
     return model.name, [*focal, draw(st.floats(20, 28)), draw(st.floats(13, 19)), *extra]
 
 
+@pytest.mark.slow
 @settings(max_examples=120, deadline=None, derandomize=True)
 @given(cameras())
 def test_pixels_come_back(drawn):

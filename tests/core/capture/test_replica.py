@@ -100,6 +100,7 @@ def test_morton_codes_bit_by_bit():
     assert morton(points, 0.1).tolist() == [interleave(cell) for cell in cells]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [{}, {"order_file": True}, {"split_size": 0.0}, {"size": 1}, {"size": 5, "edge": 0.7}])
 def test_each_element_finds_its_light(lit, tmp_path, how):
     room, light = lit
@@ -171,6 +172,7 @@ def wall_mirror(reflectivity, wall=3):
     return {"plane_w": [-1, 0, 0, 4], "boundary_w": ring, "reflectivity": reflectivity}
 
 
+@pytest.mark.slow
 def test_mirrors_are_told_and_followed(replica, tmp_path):
     (replica.root / "glass.sur").write_text(json.dumps([wall_mirror(0.9), {"plane_w": 7}]))
     capture = read_capture(replica.root)

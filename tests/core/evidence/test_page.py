@@ -103,6 +103,7 @@ def check_page(text: str) -> Checker:
     return found
 
 
+@pytest.mark.slow
 def test_the_page_of_a_run(tmp_path):
     from addon.core.io.read import read_capture
     from addon.core.pipeline.recover import Recovery

@@ -92,12 +92,14 @@ def test_good_poses_stay_to_the_last_bit(filmed):
     assert all(a is b for a, b in zip(poses.of(frames), frames))
 
 
+@pytest.mark.slow
 def test_without_texture_nothing_is_said():
     """A room of one colour: its only edges are a wall's against the next, and those look alike."""
     poses = Filmed(lambda room: np.ones((len(room.atlas), 3))).refined()
     assert not poses.moved.any() and np.isnan(poses.shift)
 
 
+@pytest.mark.slow
 def test_frames_that_are_no_good_harm_no_other(filmed):
     """One frame shows something else altogether, one is masked out, one is brighter by a stop than told."""
     other, before = Filmed(lambda room: patches(room, 0.3, 1)), filmed.apart(filmed.told)

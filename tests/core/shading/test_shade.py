@@ -47,6 +47,7 @@ HOW = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", HOW)
 def test_albedo_comes_back(lit, how):
     room, _, found = lit
@@ -76,6 +77,7 @@ def test_irradiance_agrees_with_radiosity(lit):
     assert np.percentile(np.abs(off), 90) < 0.05 and abs(np.median(off)) < 0.005
 
 
+@pytest.mark.slow
 def test_exposure_does_not_matter(lit):
     """Pictures a thousand times as bright: the same albedo."""
     room, _, found = lit

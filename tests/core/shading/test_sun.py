@@ -61,6 +61,7 @@ def test_a_sun_that_no_frame_sees_is_found_by_its_patch(room):
     assert np.allclose(np.median(rho, 0), sunny.ALBEDO[0], rtol=0.15)
 
 
+@pytest.mark.slow
 def test_without_a_sun_none_is_made_up(room):
     found = run(room, sunny.light(room, sun=np.zeros(3)))
     assert found.sun is None and not any("sun" in note for note in found.notes)
@@ -70,6 +71,7 @@ def poster(points, low, high):
     return ((points > low) & (points < high)).all(1)
 
 
+@pytest.mark.slow
 def test_paper_and_posters_are_no_sun(room):
     """A sheet of albedo 0.9 on a floor of 0.06, and a bright poster on a dark wall, opposite the window."""
     L = sunny.light(room, sunny.ALBEDO | {0: 0.06, 2: 0.08}, sun=np.zeros(3))
@@ -81,6 +83,7 @@ def test_paper_and_posters_are_no_sun(room):
     assert run(room, L, texture=0.1).sun is None
 
 
+@pytest.mark.slow
 def test_what_a_lamp_lights_is_no_sun(room):
     """A spotlight that the mesh lacks throws a round spot on the floor, brighter than all else."""
 
@@ -92,6 +95,7 @@ def test_what_a_lamp_lights_is_no_sun(room):
     assert found.sun is None
 
 
+@pytest.mark.slow
 def test_no_sun_is_looked_for_where_frames_saw_the_sky(room):
     """The same patch, but every direction of the sky is known."""
     assert run(room, sunny.light(room), sky_map(np.ones((64, 128), np.int32))).sun is None
@@ -154,6 +158,7 @@ def test_what_is_no_sun_stays_in_the_map():
     assert taken_out(Environment.dark())[1] is None
 
 
+@pytest.mark.slow
 def test_a_seen_sun_lights_the_room_without_noise(room):
     """E in the patch is that of sun and sky, though the sun is half a texel of the map."""
     blank = sky_map(np.ones((64, 128), np.int32))

@@ -43,6 +43,7 @@ def test_a_lamp_over_a_polished_floor(dark):
     assert np.corrcoef(found[some].mean(1), truth.mean(1))[0, 1] > 0.97
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("phi", [0.1, 0.4])
 def test_a_rough_floor(dark, phi):
     """Every element of the floor sends its lobe to a place: summed up, E there."""

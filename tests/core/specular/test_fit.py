@@ -118,6 +118,7 @@ def test_huber_and_scale():
     assert robust_scale(np.zeros(5)) > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rays", [20, 40, 160])
 @pytest.mark.parametrize(("phi", "psi"), [(0.15, 0.04), (0.26, 0.1)])
 def test_few_rays_do_not_draw_psi_to_0(box, rays, phi, psi):
@@ -135,6 +136,7 @@ def test_few_rays_do_not_draw_psi_to_0(box, rays, phi, psi):
     assert naive < found and (rays > 20 or naive < 0.95 * clear)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("f0", [0.02, 0.2, 0.9])
 @pytest.mark.parametrize("phi", [0.02, 0.15, 0.5, 0.9])
 def test_the_whole_range(box, phi, f0):

@@ -56,6 +56,7 @@ def found(box: Box, materials, specular=0.0) -> tuple[np.ndarray, np.ndarray]:
     return glossy_light(excess, element, np.full((len(element), 3), 20, np.float32), threads=2), element
 
 
+@pytest.mark.slow
 def test_a_polished_floor(box, monkeypatch):
     """The lamp comes back from it to the ceiling and the walls, as from a lamp below the floor."""
     monkeypatch.setattr(glossy_light_module, "RAYS", 256)  # next to no noise

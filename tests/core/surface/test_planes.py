@@ -84,6 +84,7 @@ def test_a_box_has_six_planes_and_sharp_edges(parts, noise):
         assert rms(found.vertices - true.vertices) < 0.4 * rms(off.vertices - true.vertices)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.002, 0.005, 0.008])
 def test_what_is_round_is_not_faceted(noise, monkeypatch):
     """No sheet is found, and so nothing is moved."""

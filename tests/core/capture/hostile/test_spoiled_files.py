@@ -87,6 +87,7 @@ def check_sentence(text: str, root: Path, victim: Path) -> None:
     assert victim.name in text or str(root) in text or "Frame '" in text, text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_spoiled(case, tmp_path):
     root = tmp_path / "capture"
@@ -127,6 +128,7 @@ def test_what_is_no_file(case, what, tmp_path):
     attempt(root, victim, reading)
 
 
+@pytest.mark.slow
 def test_any_name_of_a_picture(tmp_path):
     root = tmp_path / "capture"
     victim, reading = fresh(CASES[0], root)
