@@ -46,6 +46,16 @@ def tiny_capture(tmp_path_factory) -> Path:
     return render_capture(tmp_path_factory.mktemp("tiny") / "capture", "tiny")
 
 
+def pytest_collection_modifyitems(items):
+    """Mark as `once` what takes long and depends on arithmetic alone: one Python is enough for it."""
+    both = ("tests/core/io/", "tests/core/pipeline/", "tests/core/results/")
+    for item in items:
+        place = item.path.relative_to(ROOT).as_posix()
+        slow = place.startswith("tests/core/") and not place.startswith(both) and item.get_closest_marker("slow")
+        if slow or place.startswith("tests/blender/evidence/"):
+            item.add_marker(pytest.mark.once)
+
+
 def pytest_sessionfinish(session, exitstatus):
     """Keep the status for `pytest_unconfigure`."""
     session.config.stash[_STATUS] = int(exitstatus)
