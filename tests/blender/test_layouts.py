@@ -20,7 +20,7 @@ from addon.core.progress import Progress
 from addon.core.results.store import Store
 from addon.core.scene.model import Capture
 from addon.core.settings import Settings
-from tests.core.capture import layouts_on_disk as on_disk
+from tests.core.io import layouts_on_disk as on_disk
 from tests.core.on_disk import ALBEDO, LAMP
 from tests.core.replica_on_disk import ReplicaOnDisk
 from tests.core.rooms import lit_box, make_room, radiosity

@@ -11,7 +11,7 @@ from addon.core.brdf.material import ObjectMaterial
 from addon.core.io.exr import write_exr
 from addon.core.scene.model import Instance
 from addon.core.scene.two_sides import laid_apart, with_backs
-from tests.core.surface.test_two_sides import ROUND, laid_out, tube
+from tests.core.scene.test_two_sides import ROUND, laid_out, tube
 from tests.hard_cases.rooms import QUICK, Captured, sheet_between_rooms
 
 bpy = pytest.importorskip("bpy")

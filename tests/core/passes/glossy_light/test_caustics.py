@@ -1,0 +1,144 @@
+"""Light of lamps by way of glossy things, against sums that send no photons."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from addon.core.light.emitters import bright_triangles
+from addon.core.passes.glossy_light.caustics import Gloss, _over_cells, caustics
+from tests.core.glossy_box import SIZE, Box
+from tests.core.passes.glossy_light.test_glossy_light import PSI, over_the_floor
+from tests.core.rooms import Quad, polygon_irradiance
+
+MANY = 1 << 20
+"""Photons that leave little noise: 262,144 leave 12 % of what the floor throws, here next to nothing of E."""
+
+
+@pytest.fixture(scope="module")
+def dark():
+    """The box with black walls: all light is the lamp's."""
+    return Box(walls=np.zeros((6, 3)))
+
+
+def on_the_floor(box: Box, phi: float, psi: float = PSI) -> Gloss:
+    n, floor = len(box.room.atlas), box.room.atlas.object_id == 0
+    f0 = np.zeros((n, 3), np.float32)
+    f0[floor] = psi
+    return Gloss(np.where(floor, np.float32(phi), np.float32(0)), f0, np.zeros((n, 3), np.float32))
+
+
+def above(box: Box) -> np.ndarray:
+    return np.flatnonzero((box.room.atlas.object_id > 0) & (box.room.atlas.object_id < 6))
+
+
+def test_a_lamp_over_a_polished_floor(dark):
+    """It comes back as from a lamp below the floor, with its outline."""
+    found = caustics(dark.field, dark.bright, on_the_floor(dark, 0.01), photons=MANY)[:, :3]
+    some = np.random.default_rng(0).choice(above(dark), 150, replace=False)
+    truth = over_the_floor(dark, some, PSI, 250)
+    assert found[some].mean(0) == pytest.approx(truth.mean(0), rel=0.03)
+    assert np.corrcoef(found[some].mean(1), truth.mean(1))[0, 1] > 0.97
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("phi", [0.1, 0.4])
+def test_a_rough_floor(dark, phi):
+    """Every element of the floor sends its lobe to a place: summed up, E there."""
+    atlas = dark.room.atlas
+    found = caustics(dark.field, dark.bright, on_the_floor(dark, phi), photons=MANY)[:, :3]
+    floor = np.flatnonzero(atlas.object_id == 0)[::3]
+    area = atlas.area[atlas.object_id == 0].sum() / len(floor)
+    for place in ([1.2, 2.6, 2.5], [4.0, 1.5, 1.2]):
+        at = np.argmin(((atlas.position - place) ** 2).sum(1))
+        way = atlas.position[at] - atlas.position[floor]
+        distance = np.linalg.norm(way, axis=1)
+        way = (way / distance[:, None]).astype(np.float32)
+        A, B = dark.lobe(floor, way, phi, 60)
+        here, there = np.abs(way @ atlas.normal[at]), way[:, 2]
+        truth = ((PSI * A + B) * (here * there / distance**2)[:, None]).sum(0) * area
+        near = ((atlas.position - atlas.position[at]) ** 2).sum(1) < 0.15**2
+        near &= atlas.object_id == atlas.object_id[at]
+        assert found[near].mean(0) == pytest.approx(truth, rel=0.08)
+
+
+def test_what_a_bright_metal_was_taken_to_send_goes(dark):
+    """A lamp-bright element whose L_d is all reflection lights nothing by itself."""
+    atlas = dark.room.atlas
+    own = atlas.object_id == 6
+    inside = np.where(own[:, None], np.float32(dark.glow), np.float32(0))
+    lobes = Gloss(np.where(own, np.float32(0.3), np.float32(0)), np.zeros((len(atlas), 3), np.float32), inside)
+    found = caustics(dark.field, dark.bright, lobes)[:, :3]
+    lamp = [quad for quad in dark.room.quads if quad.object_id == 6]
+    at = np.flatnonzero(atlas.object_id < 6)[::20]
+    thrown = polygon_irradiance(atlas.position[at].astype(float), atlas.normal[at].astype(float), lamp)
+    truth = thrown.sum(1)[:, None] * dark.glow
+    assert found[at].mean(0) == pytest.approx(-truth.mean(0), rel=0.03)
+    assert np.corrcoef(found[at].mean(1), truth.mean(1))[0, 1] < -0.98
+
+
+def test_two_mirrors_in_a_corner(dark):
+    """The lamp comes back as three images: beneath the floor, behind the wall, and across the corner by way of both."""
+    atlas = dark.room.atlas
+    mirrors = np.isin(atlas.object_id, (0, 2))
+    f0 = np.where(mirrors[:, None], np.float32(1), np.float32(0)).repeat(3, 1)
+    lobes = Gloss(np.where(mirrors, np.float32(0.01), np.float32(0)), f0, np.zeros((len(atlas), 3), np.float32))
+    found = caustics(dark.field, dark.bright, lobes, photons=MANY)
+    (lamp,) = (quad for quad in dark.room.quads if quad.object_id == 6)
+    images = [
+        Quad(lamp.corner * turn, lamp.edge_u * turn, lamp.edge_v * turn, 6)
+        for turn in np.array([(1, 1, -1), (-1, 1, 1), (-1, 1, -1)])
+    ]
+    middle = ((atlas.position > 0.2) & (atlas.position < np.array(SIZE) - 0.2))[:, 1:].all(1)  # cells end at edges
+    at = np.flatnonzero((atlas.object_id == 3) & middle)
+    thrown = polygon_irradiance(atlas.position[at].astype(float), atlas.normal[at].astype(float), images)
+    assert thrown[:, 2].mean() > 0.2 * thrown.sum(1).mean()
+    truth = thrown.sum(1)[:, None] * dark.glow
+    assert found[at, :3].mean(0) == pytest.approx(truth.mean(0), rel=0.02)
+    off, noise = (found[at, :3] - truth).std(), np.sqrt(np.square(found[at, 3:]).mean())
+    assert off < 1.2 * noise
+
+
+def test_what_a_bright_metal_was_taken_to_send_is_not_reflected(dark):
+    """What it does send is followed from where that starts."""
+    lobes, lamp = on_the_floor(dark, 0.3, 1.0), dark.room.atlas.object_id == 6
+    taken = np.where(lamp[:, None], np.float32(dark.glow), np.float32(0))
+    metal = Gloss(np.where(lamp, np.float32(0.3), np.float32(0)), np.zeros_like(lobes.f0), taken)
+    alone = caustics(dark.field, dark.bright, metal)[:, :3]
+    with_floor = caustics(dark.field, dark.bright, Gloss(lobes.alpha, lobes.f0, taken))[:, :3]
+    assert alone.any() and with_floor == pytest.approx(alone)
+    assert caustics(dark.field, dark.bright, lobes)[above(dark), :3].mean() > 0.1
+
+
+def test_nothing_glossy_or_nothing_bright(dark):
+    n = len(dark.room.atlas)
+    matt = Gloss(np.zeros(n, np.float32), np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32))
+    assert not caustics(dark.field, dark.bright, matt).any()
+    even = dark.field.with_light(np.ones((n, 3), np.float32))
+    assert not caustics(even, bright_triangles(even), on_the_floor(dark, 0.1)).any()
+
+
+def test_two_halves_tell_the_noise(dark):
+    lobes, at = on_the_floor(dark, 0.4), above(dark)
+    sure = caustics(dark.field, dark.bright, lobes, photons=MANY)[at, :3]
+    few = caustics(dark.field, dark.bright, lobes, seed=3, photons=1 << 16)[at]
+    off, told = (few[:, :3] - sure).std(), np.sqrt(np.square(few[:, 3:]).mean())
+    assert told == pytest.approx(off, rel=0.3)
+
+
+def test_light_close_by_keeps_its_edge():
+    """Many photons lie in a patch narrower than a cell of 12 cm: none of its light is spread beside it."""
+    x, y = np.meshgrid(np.arange(0, 1, 0.01), np.arange(0, 1, 0.01))
+    position = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], 1).astype(np.float32)
+    n = len(position)
+    floor = SimpleNamespace(
+        position=position, normal=np.tile(np.float32([0, 0, 1]), (n, 1)), area=np.full(n, 1e-4, np.float32)
+    )
+    away = np.abs(position - [0.5, 0.5, 0]).max(1)
+    patch, beside = away < 0.03, (away > 0.07) & (away < 0.11)
+    halves = np.zeros((2, 4, n), np.float32)
+    halves[:, :3, patch], halves[:, 3, patch] = 1e-4 / 2, 400 / patch.sum()
+    found = _over_cells(floor, halves)[:, :3].mean(1)
+    assert found[away < 0.01] == pytest.approx(1, rel=0.2) and found[beside].max() < 0.1

@@ -1,0 +1,187 @@
+"""Flat and gently bent parts of a noisy mesh are found; what is round stays round, and thin plates keep two sides."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from addon.core.passes.mesh_denoising import denoise, planes
+from addon.core.passes.mesh_denoising.planes import Sheet, neighbours_of, sheet_of, sheets_of
+from addon.core.scene.model import Mesh
+from addon.core.scene.weld import welded
+from tests.core.passes.mesh_denoising.test_denoise import NOISE, cube, noisy, rms, sheet, smoothed, sphere, tilted, tube
+from tests.core.rooms import make_room, quad, split
+
+
+def board(thick: float, parts: int = 24) -> Mesh:
+    """0.36 by 0.36 m, closed by four sides of one quad in the height."""
+    box = cube(0.36, parts)
+    middle = (box.vertices[:, 2] > 1e-6) & (box.vertices[:, 2] < 0.36 - 1e-6)
+    keep = ~middle[box.triangles].any(1)
+    flat = box.vertices * [1, 1, thick / 0.36]
+    edge = np.linspace(0, 0.36, parts + 1)
+    sides = []
+    for axis in (0, 1):
+        for at in (0.0, 0.36):
+            for low, high in zip(edge[:-1], edge[1:]):
+                corners = np.zeros((4, 3))
+                corners[:, axis], corners[:, 1 - axis] = at, (low, high, high, low)
+                corners[2:, 2] = thick
+                sides.append(corners if (axis == 0) == (at > 0) else corners[::-1])
+    count = len(flat) + 4 * np.arange(len(sides))[:, None, None]
+    triangles = np.concatenate([box.triangles[keep], (count + [[0, 1, 2], [0, 2, 3]]).reshape(-1, 3)])
+    vertices = np.round(np.concatenate([flat, *sides]), 9)
+    return Mesh(vertices, triangles, np.zeros(len(triangles), np.int32))
+
+
+def by_angles_alone(mesh: Mesh, monkeypatch, noise: float = NOISE) -> Mesh:
+    with monkeypatch.context() as patch:
+        patch.setattr(denoise, "onto_sheets", lambda measured, smooth, faces, noise: smooth)
+        return Mesh(denoise.denoised(mesh, noise), mesh.triangles, mesh.object_id)
+
+
+def found_in(mesh: Mesh, noise: float = NOISE):
+    points, faces, _ = welded(mesh, denoise.WELD * noise)
+    return sheets_of(points, points, faces, noise)[0]
+
+
+def test_neighbours_know_how_they_are_wound():
+    across, alike = neighbours_of(np.array([[0, 1, 2], [2, 1, 3], [1, 3, 4]]))
+    assert across.tolist() == [[-1, 1, -1], [0, 2, -1], [1, -1, -1]]
+    assert alike[0, 1] == alike[1, 0] == 1  # the edge is gone along once each way
+    assert alike[1, 1] == alike[2, 0] == -1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_mirror_of_a_few_triangles_is_flat_to_the_eye(seed, monkeypatch):
+    """A crease of half a degree would show in it."""
+    true = make_room(split(quad((0, 0, 0), (0.7, 0, 0), (0, 1.3, 0), 0), 2), 0.05).mesh
+    off = noisy(true, seed=seed)
+
+    def crease(mesh: Mesh) -> float:
+        corners = mesh.vertices[mesh.triangles]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        return float(np.degrees(np.arccos(np.clip((normal @ normal.T).min(), -1, 1))))
+
+    assert crease(by_angles_alone(off, monkeypatch)) > 0.5
+    assert crease(smoothed(off)) < 0.02
+    assert tilted(smoothed(off), true).max() < 1
+
+
+@pytest.mark.parametrize("parts", [2, 5, 20])
+@pytest.mark.parametrize("noise", [0.002, 0.005, 0.008])
+def test_a_box_has_six_planes_and_sharp_edges(parts, noise):
+    true = cube(0.6, parts)
+    off = noisy(true, noise, seed=1)
+    found = Mesh(denoise.denoised(off, noise), true.triangles, true.object_id)
+    angle = tilted(found, true)
+    assert np.median(angle) < max(0.4 * np.median(tilted(off, true)), 0.1)
+    if parts == 20:
+        assert angle.max() < 0.6 and np.median(tilted(off, true)) > 5
+        assert rms(found.vertices - true.vertices) < 0.4 * rms(off.vertices - true.vertices)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [0.002, 0.005, 0.008])
+def test_what_is_round_is_not_faceted(noise, monkeypatch):
+    """No sheet is found, and so nothing is moved."""
+    found = []
+
+    def listed(measured, smooth, faces, noise):
+        found.extend(sheets_of(measured, smooth, faces, noise)[0])
+        return smooth
+
+    monkeypatch.setattr(denoise, "onto_sheets", listed)
+    wide = tube(0.3, 1.0, 40, 20)
+    thin = Mesh(wide.vertices * [0.2, 0.2, 0.6], wide.triangles, wide.object_id)
+    for true in (sphere(0.3, 24), sphere(0.1, 20), wide, thin):
+        denoise.denoised(noisy(true, noise), noise)
+        assert not found
+    denoise.denoised(noisy(cube(0.6), noise), noise)
+    assert len(found) == 6
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_front_and_back_of_a_plate_as_thin_as_the_noise_stay_two(seed, monkeypatch):
+    true = board(NOISE)
+    off = noisy(true, seed=seed)
+    found = smoothed(off)
+    front, back = (np.abs(true.vertices[true.triangles][:, :, 2] - z).max(1) < 1e-6 for z in (NOISE, 0.0))
+    assert 0.9 < front.sum() / (2 * 24**2) <= 1 and back.sum() == front.sum()
+    heights = [np.unique(true.triangles[side]) for side in (front, back)]
+    measured = [off.vertices[side, 2] for side in heights]
+    assert measured[0].min() < measured[1].max()  # the scan's sides cross
+    upper, lower = (found.vertices[side, 2] for side in heights)
+    assert np.median(upper) - np.median(lower) == pytest.approx(NOISE, abs=0.0012)
+    # All but those few that crossed so closely that they were welded.
+    middle = (np.median(upper) + np.median(lower)) / 2
+    assert np.mean(upper > middle) > 0.995 and np.mean(lower < middle) > 0.995
+    assert np.mean(measured[0] > middle) < 0.95
+    now, before = (tilted(mesh, true)[front | back] for mesh in (found, by_angles_alone(off, monkeypatch)))
+    assert np.quantile(now, 0.95) < 0.5 < np.quantile(before, 0.95)
+
+
+def test_a_point_of_front_and_back_goes_to_one_of_them(monkeypatch):
+    """Half-way between would be on neither; where sheets cross, it goes to their line."""
+    points = np.array([[0, 0, 0.002], [0, 1, 0.002], [1, 0, 0], [1, 0, 0.005]])
+    faces = np.array([[0, 1, 2], [0, 1, 3]])
+
+    def placed(second: np.ndarray) -> np.ndarray:
+        first = Sheet(np.zeros(3), np.eye(3)[::-1], np.zeros(6), np.array([0]))
+        other = Sheet(np.array([0, 0, 0.005]), second, np.zeros(6), np.array([1]))
+        grower = SimpleNamespace(area=np.array([0.5, 0.4]))
+        monkeypatch.setattr(planes, "sheets_of", lambda *_: ([first, other], grower))
+        return planes.onto_sheets(points, points, faces, NOISE)
+
+    assert placed(-np.eye(3)[::-1])[:, 2] == pytest.approx([0, 0, 0, 0.005], abs=1e-5)
+    across = placed(np.array([[0.6, 0, 0.8], [0, 1, 0], [0.8, 0, -0.6]]))
+    assert across[:2] == pytest.approx(np.array([[0.004 / 0.6, 0, 0], [0.004 / 0.6, 1, 0]]), abs=2e-5)
+
+
+def test_small_triangles_do_not_lead_around_an_edge(monkeypatch):
+    """Of 1 cm under noise of 8 mm: however much these may be tilted, sides of a box are sides."""
+    true = cube(0.25, 25)
+    off = noisy(true, 0.008, seed=2)
+    found = Mesh(denoise.denoised(off, 0.008), true.triangles, true.object_id)
+    before = tilted(by_angles_alone(off, monkeypatch, 0.008), true)
+    assert np.quantile(tilted(found, true), 0.9) < 0.6 < np.quantile(before, 0.9)
+    assert rms(found.vertices - true.vertices) < 0.4 * rms(off.vertices - true.vertices)
+
+
+def test_gently_bent_metal_is_one_smooth_sheet(monkeypatch):
+    """1 cm of bend over 28 cm, ending at its borders: sure to be bent, and known better as a whole than by angles."""
+    true = sheet(np.linspace(-0.14, 0.14, 20), np.linspace(0, 0.36, 25), lambda x, y: 0.5 * x**2)
+    off = noisy(true)
+    now, before = tilted(smoothed(off), true), tilted(by_angles_alone(off, monkeypatch), true)
+    assert np.quantile(now, 0.9) < 2 and np.quantile(now, 0.9) < 0.7 * np.quantile(before, 0.9)
+
+
+def test_a_moulding_around_a_room_is_no_plane():
+    """A ring of 2 cm, inclined by 11 degrees, lies in a plane within the noise, which says nothing of how it faces."""
+    x = np.linspace(0, 2 * np.pi, 5)[:-1] + np.pi / 4
+    ring = np.stack([np.cos(x), np.sin(x), 0 * x], 1)
+    inner, outer = 2.0 * ring, 2.0 * ring * 1.015 + [0, 0, 0.004]
+    faces = [[k, (k + 1) % 4, 4 + (k + 1) % 4] for k in range(4)] + [[k, 4 + (k + 1) % 4, 4 + k] for k in range(4)]
+    mesh = Mesh(np.concatenate([inner, outer]), np.array(faces), np.zeros(8, np.int32))
+    assert found_in(mesh) == []
+    wide = Mesh(mesh.vertices * [[1, 1, 0]] * ([[0.2]] * 4 + [[1]] * 4), mesh.triangles, mesh.object_id)
+    assert len(found_in(wide)) == 1
+
+
+def test_a_bend_is_weighed_against_the_noise():
+    rng = np.random.default_rng(5)
+    xy = rng.uniform(-0.3, 0.3, (200, 2))
+    outline = (2.4, 0.0)  # smooth on all sides
+    flat = np.c_[xy, NOISE * rng.normal(size=200)]
+    found = sheet_of(flat, np.arange(1), 0.36, outline, NOISE)
+    assert found is not None and not found.c.any() and abs(found.axes[0, 2]) > 0.9999
+    bowl = flat + np.c_[np.zeros((200, 2)), 0.2 * (xy**2).sum(1)]
+    assert sheet_of(bowl, np.arange(1), 0.36, outline, NOISE) is None
+    bent = sheet_of(bowl, np.arange(1), 0.36, (2.4, 1.0), NOISE)
+    normal, gap = bent.tangent(np.array([[0.2, 0.0, 0.2 * 0.04]]))
+    assert normal[0] * np.sign(normal[0, 2]) == pytest.approx([-0.08, 0, 1], abs=0.02) and abs(gap[0]) < 0.002
+    few = flat[:4] * [0.1, 0.1, 1]  # 6 cm of four points say nothing
+    assert sheet_of(few, np.arange(1), 0.0036, (0.24, 1.0), NOISE) is None

@@ -1,0 +1,192 @@
+"""The choice of model, and what objects take over from their class."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from addon.core.brdf.dielectric import DIELECTRIC, MOST_F0
+from addon.core.brdf.lambertian import LAMBERTIAN
+from addon.core.brdf.metal import METAL
+from addon.core.fit.lobe_fit import fit_lobe
+from addon.core.passes.specular import models
+from addon.core.passes.specular.models import Choice, adopt_from_class, choose_model, metal_f0
+from tests.core.fit.test_fit import paint, steps
+from tests.core.glossy_box import Box
+
+COPPER = np.array([0.9, 0.6, 0.3])
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """Problems of four floors in the same box: as good as matt, glossy, metal, and glossy but hardly seen."""
+    box = Box()
+    element, direction, _ = box.views(60, 10)
+    few = element == element[0]
+    for one in np.unique(element)[:7]:
+        few |= element == one
+    glossy = box.problem(element, direction, 0.11, 0.08, paint(element))
+    return {
+        "matt": box.problem(element, direction, None, 0, paint(element)),
+        "glossy": glossy,
+        "metal": box.problem(element, direction, 0.11, COPPER, np.zeros((len(element), 3))),
+        "few": glossy.part(few),
+    }
+
+
+def test_each_gets_the_simplest_model(seen):
+    chosen = {name: choose_model(problem) for name, problem in seen.items()}
+    models = {name: choice.model for name, choice in chosen.items()}
+    assert models == {"matt": LAMBERTIAN, "glossy": DIELECTRIC, "metal": METAL, "few": LAMBERTIAN}
+    assert chosen["few"].fit is None and chosen["few"].note and chosen["matt"].note
+    assert not chosen["glossy"].note and not chosen["metal"].note
+    assert steps(chosen["glossy"].fit.phi, 0.11) <= 1 and chosen["glossy"].fit.psi[0] == pytest.approx(0.08, rel=0.15)
+    assert chosen["glossy"].gain > 0.02 and chosen["glossy"].sigmas > 3
+    assert chosen["matt"].gain < 0.02
+
+
+def test_a_metals_colour(seen):
+    assert np.allclose(metal_f0(seen["metal"], 0.11), COPPER, rtol=0.05)
+
+
+def test_a_metal_has_no_diffuse_part(seen):
+    """The same coloured lobe over a strong diffuse part is no metal's, however well it fits."""
+    box = Box()
+    element, direction, _ = box.views(60, 10)
+    choice = choose_model(box.problem(element, direction, 0.11, COPPER / 4, 3 * paint(element)))
+    assert choice.model == DIELECTRIC and choice.fit.psi.max() <= MOST_F0
+
+
+def test_a_metal_under_light_that_is_off(seen):
+    """What each view is thought to show is off by a quarter; that draws psi down, and must not pass for a coat."""
+    problem = seen["metal"]
+    rng = np.random.default_rng(2)
+    off = np.exp(0.25 * rng.normal(size=(len(problem.element), 1, 1))).astype(np.float32)
+    wrong = replace(problem, light=replace(problem.light, A=problem.light.A * off, B=problem.light.B * off))
+    choice = choose_model(wrong)
+    assert choice.model == METAL and choice.fit.phi == pytest.approx(0.11, abs=0.05)
+    assert np.allclose(metal_f0(wrong, choice.fit.phi), COPPER, rtol=0.15)
+
+
+def test_the_others_of_its_class_are_metal(seen):
+    """One that is not sure of being metal takes their roughness unless its frames are sure of another; one whose frames
+    say otherwise stays."""
+    sure, matt = choose_model(seen["metal"]), choose_model(seen["matt"])
+    own = replace(sure.fit, phi=0.2)
+    likely = Choice(LAMBERTIAN, sure.fit, 0.1, 2.5, "Not sure.", metal=own)
+    classes = dict.fromkeys(range(4), "steel")
+    result = adopt_from_class({0: sure, 1: likely, 2: matt}, {2: seen["matt"]}, classes)
+    assert result[1].model == METAL and result[1].fit.phi == sure.fit.phi and "class" in result[1].note
+    assert result[2] is matt
+    # Frames of a metal of phi .11: those of a class that is broader (by the better judged 3) do not fit.
+    broad = replace(sure, fit=replace(sure.fit, phi=0.5), sigmas=2 * sure.sigmas)
+    likely = replace(likely, metal=sure.fit)
+    for seen_enough in (True, False):
+        problems = {1: seen["metal"]} if seen_enough else {}
+        result = adopt_from_class({1: likely, 3: broad}, problems, classes)
+        assert result[1].model == METAL and result[1].fit.phi == (sure if seen_enough else broad).fit.phi
+
+
+def test_the_others_of_its_class_are_no_metal(seen):
+    """One hardly surer to be metal than dielectric is what the sure ones of its class are; alone it is metal."""
+    sure = choose_model(seen["glossy"])
+    hardly = replace(choose_model(seen["metal"]), sigmas=2 * sure.sigmas, dielectric=replace(sure.fit, phi=0.4))
+    beyond = replace(hardly, dielectric=None)
+    for members, model in (([hardly], METAL), ([hardly, sure], DIELECTRIC), ([beyond, sure], METAL)):
+        result = adopt_from_class(dict(enumerate(members)), {}, dict.fromkeys(range(2), "key"))
+        assert result[0].model == model
+    both = adopt_from_class({0: hardly, 1: sure}, {}, dict.fromkeys(range(2), "key"))
+    assert both[0].fit.phi == sure.fit.phi and "class" in both[0].note and both[1].fit.phi == sure.fit.phi
+
+
+def test_a_metal_hardly_better_than_a_dielectric_says_so(seen, monkeypatch):
+    assert choose_model(seen["metal"]).dielectric is None
+    # Of the dielectric over matt, the metal over matt, the metal over the dielectric: share and standard errors.
+    gains = iter([(0.5, 10.0), (0.5, 10.0), (0.1, 2.5)])
+    monkeypatch.setattr(models, "_gain", lambda with_lobe, without: next(gains))
+    choice = choose_model(seen["metal"])
+    assert choice.model == METAL and choice.dielectric is not None and choice.dielectric.psi.max() <= MOST_F0
+
+
+def test_a_metal_on_a_bumpy_mesh(seen):
+    """Where each view is thought to show what others do, no lobe explains it; but it needs no diffuse part either.
+
+    Alone it stays what it is, beside a metal of its class it is one; a matt thing beside it stays matt.
+    """
+    problem = seen["metal"]
+    rng = np.random.default_rng(3)
+    wrong = np.arange(len(problem.element))
+    for one in np.unique(problem.element):
+        own = np.flatnonzero(problem.element == one)
+        wrong[own] = rng.permutation(own)
+    light = replace(problem.light, A=problem.light.A[wrong], B=problem.light.B[wrong])
+    sure, lost, matt = (choose_model(one) for one in (problem, replace(problem, light=light), seen["matt"]))
+    assert lost.model != METAL and lost.bare and not matt.bare
+    lost = replace(lost, model=DIELECTRIC, sigmas=2 * sure.sigmas)  # as sure of a lobe as it may be
+    members = {0: lost, 1: sure, 2: matt}
+    result = adopt_from_class(members, {2: seen["matt"]}, dict.fromkeys(range(3), "steel"))
+    assert result[0].model == METAL and result[0].fit.phi == sure.fit.phi and "object 1" in result[0].note
+    assert result[1].model == METAL and result[2].model == LAMBERTIAN
+
+
+def test_the_class_helps_out(seen):
+    """0 is sure; 1 was seen too little, 2 not at all: both take its lobe. 3 looks different, 4 is of another class."""
+    sure = choose_model(seen["glossy"])
+    weak = Choice(METAL, fit_lobe(seen["metal"], constraints=METAL.constraints), 0.1, sure.sigmas / 2)
+    nothing = Choice(LAMBERTIAN, None, note="too few")
+    matt = choose_model(seen["matt"])
+    choices = {0: sure, 1: nothing, 2: nothing, 3: matt, 4: nothing, 5: weak}
+    problems = {0: seen["glossy"], 1: seen["few"], 3: seen["matt"], 5: seen["metal"]}
+    classes = dict.fromkeys([0, 1, 2, 3, 5], "floor") | {4: "wall"}
+    result = adopt_from_class(choices, problems, classes)
+    for i, own in ((0, sure), (5, weak)):  # what is sure of itself stays
+        assert result[i].model == own.model and result[i].fit.phi == own.fit.phi and result[i].sigmas == own.sigmas
+    for taker in (1, 2):
+        assert result[taker].model == DIELECTRIC and result[taker].fit.phi == sure.fit.phi
+        assert "object 0" in result[taker].note and result[taker].sigmas == 0
+    assert result[3] is matt and result[4] is nothing
+    assert choices[1] is nothing  # what was handed in is left alone
+
+
+def test_how_another_darkens_says_nothing_against_its_lobe(seen, monkeypatch):
+    """How the diffuse part darkens towards grazing views is an object's own matter, with a lobe as without one."""
+    sure, matt = choose_model(seen["glossy"]), choose_model(seen["matt"])
+    asked = []
+    monkeypatch.setattr(models, "gain_of", lambda fit, problem: asked.append(fit) or (0.0, 0.0))
+    own = replace(matt, fit=replace(matt.fit, kappa=0.6))
+    source = replace(sure, fit=replace(sure.fit, kappa=0.3))
+    result = adopt_from_class({0: source, 1: own}, {1: seen["matt"]}, {0: "floor", 1: "floor"})
+    assert [fit.kappa for fit in asked] == [0.6] and asked[0].phi == sure.fit.phi
+    assert asked[0].kappa_lambertian == matt.fit.kappa_lambertian
+    assert result[1].model == DIELECTRIC
+
+
+def test_nobody_to_take_over_from(seen):
+    choices = {0: Choice(LAMBERTIAN, None), 1: Choice(LAMBERTIAN, None)}
+    assert adopt_from_class(choices, {}, {0: "a", 1: "a"}) == choices
+    assert adopt_from_class({}, {}, {}) == {}
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "model"), [((2.8, 2.6), DIELECTRIC), ((2.8, 0.5), LAMBERTIAN), ((2.9, 2.9, -4), LAMBERTIAN)],
+    ids=["both nearly sure", "one nearly sure", "a third speaks against it"],
+)  # fmt: skip
+def test_a_class_may_be_sure_together(seen, sigmas, model):
+    fit = choose_model(seen["glossy"]).fit
+    choices = {i: Choice(LAMBERTIAN, fit, 0.03 if s > 1 else -0.01, s, "Not sure.") for i, s in enumerate(sigmas)}
+    result = adopt_from_class(choices, {}, {i: "pot" for i in choices})
+    assert {choice.model for choice in result.values()} == {model}
+    if model == DIELECTRIC:
+        assert "together" in result[0].note
+
+
+def test_what_is_no_lobe_makes_no_class_sure(seen):
+    """Matt curtains gained by phi .87 and 1, surely; the one that gains by a lobe is not sure of it."""
+    fit = choose_model(seen["glossy"]).fit
+    broad = replace(fit, phi=0.9)
+    choices = {i: Choice(LAMBERTIAN, broad, 0.03, s, "Not sure.") for i, s in enumerate((3.5, 6.5))}
+    choices[2] = Choice(LAMBERTIAN, fit, 0.05, 2.5, "Not sure.")
+    result = adopt_from_class(choices, {}, dict.fromkeys(choices, "curtain"))
+    assert {choice.model for choice in result.values()} == {LAMBERTIAN}
