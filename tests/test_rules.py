@@ -195,3 +195,24 @@ def test_every_module_is_short_and_says_what_it_is():
         text = path.read_text(encoding="utf-8")
         assert ast.get_docstring(ast.parse(text)), f"{relative(path)} has no docstring"
         assert text.count("\n") <= 480, f"{relative(path)} is too long: is it one thing?"
+
+
+def has_a_quick_test(path: Path) -> bool:
+    """Whether `scripts/test.py --quick` runs a test of the module."""
+    tests = [one for one in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(one, ast.FunctionDef)]
+    slow = [any("mark.slow" in ast.unparse(mark) for mark in one.decorator_list) for one in tests]
+    return any(one.name.startswith("test_") and not marked for one, marked in zip(tests, slow))
+
+
+def test_every_pass_has_a_quick_test():
+    tests = ROOT / "tests" / "core" / "passes"
+    passes = [folder.parent.name for folder in (ROOT / "addon" / "core" / "passes").glob("*/__init__.py")]
+    assert len(passes) > 5
+    assert not [name for name in passes if not any(map(has_a_quick_test, (tests / name).glob("test_*.py")))]
+
+
+def test_every_pass_is_described():
+    from addon.core.passes.registry import PASSES
+
+    told = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
+    assert not [one.name for one in PASSES if f"`{one.name}`" not in told]
