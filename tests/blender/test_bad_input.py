@@ -263,6 +263,7 @@ REFUSED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FINISHED)
 def test_a_run_goes_on_and_tells(name, capture, recover, tmp_path):
     change, told = FINISHED[name]
@@ -273,6 +274,7 @@ def test_a_run_goes_on_and_tells(name, capture, recover, tmp_path):
     assert np.isfinite(read_exr(tmp_path / "out" / "albedo.exr").rgb).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", UNTOLD)
 def test_pixels_that_say_nothing_do_no_harm(name, capture, recover, tmp_path):
     UNTOLD[name](capture)
@@ -293,6 +295,7 @@ def test_pixels_that_say_nothing_do_no_harm(name, capture, recover, tmp_path):
     assert 0 <= albedo.min() and albedo.max() <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_capture_is_refused(name, capture, recover, tmp_path):
     change, told = REFUSED[name]
@@ -357,6 +360,7 @@ def test_a_folder_in_use(recover, tmp_path):
 NO_SPACE = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "full_at, done",
     [

@@ -47,6 +47,7 @@ def plain(thing):
     )
 
 
+@pytest.mark.slow
 def test_this_is_metal_refits_that_object_alone(room, ops):
     folder, things = room
     sofa, others = things["sofa"], {name: plain(thing) for name, thing in things.items() if name != "sofa"}
@@ -73,6 +74,7 @@ def test_this_is_metal_refits_that_object_alone(room, ops):
     }
 
 
+@pytest.mark.slow
 def test_taken_back_it_is_found_again(room, ops):
     folder, things = room
     sofa = things["sofa"]
@@ -90,6 +92,7 @@ def test_taken_back_it_is_found_again(room, ops):
     assert "scan_relight_found" not in sofa
 
 
+@pytest.mark.slow
 def test_values_that_were_set_by_hand_stay_and_the_rest_is_fitted(room, ops):
     folder, things = room
     ball = things["ball"]
@@ -101,6 +104,7 @@ def test_values_that_were_set_by_hand_stay_and_the_rest_is_fitted(room, ops):
     assert ball.scan_relight_correct.roughness == pytest.approx(0.7, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_failed_refit_is_a_sentence_and_what_was_said_stays(room, ops):
     folder, things = room
     shutil.rmtree(folder / "stages")
@@ -143,6 +147,7 @@ def test_a_later_run_brings_the_room_and_what_the_artist_did_stays(ops, result, 
     assert sockets(sofa)["Metallic"] == 0 and bridge("corrections.unseen").texture_node(wall).image != image
 
 
+@pytest.mark.slow
 def test_nodes_that_were_edited_by_hand_stay(ops, result, tmp_path):  # noqa: F811
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     folder = shutil.copytree(result, tmp_path / "result")
@@ -158,6 +163,7 @@ def test_nodes_that_were_edited_by_hand_stay(ops, result, tmp_path):  # noqa: F8
     assert entries(folder)[sofa["object_id"]]["model"] == "metal"
 
 
+@pytest.mark.slow
 def test_a_known_white_scales_the_room_in_the_scene(room, ops):
     """Albedo of all objects by the given over the found; lamps the other way."""
     folder, things = room

@@ -87,6 +87,7 @@ def through(name):
     return Camera(width, height, 30.0, 33.0, 44.7, 42.2, POSE, lens)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [(0.5, 0.35, -1.0), (-0.9, -0.4, -0.3), (0.2, -0.9, -0.6), (-0.7, 0.3, 0.05)])
 @pytest.mark.parametrize("name", LENSES)
 def test_cycles_renders_through_lenses(scene, shoot, tmp_path, name, place):

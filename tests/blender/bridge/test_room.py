@@ -113,6 +113,7 @@ def state_of(scene):
     )
 
 
+@pytest.mark.slow
 def test_the_windows_room_renders_as_scene_blend(first, artist, tmp_path):
     """Another scene, file and way, the same picture: world, exposure, lamps, mesh and images are the same."""
     before = state_of(artist)
@@ -164,6 +165,7 @@ def test_a_room_can_be_linked_with_its_light(first, artist):
     assert artist.view_settings.exposure == brought.scene.view_settings.exposure
 
 
+@pytest.mark.slow
 def test_running_twice_gives_one_room(first, second, artist):
     bring(first)
     once = counts()
@@ -189,6 +191,7 @@ def test_the_second_result_is_shown(first, second, artist):
     assert not any(str(first) in bpy.path.abspath(image.filepath) for image in bpy.data.images)
 
 
+@pytest.mark.slow
 def test_the_artists_edits_stay(first, second, artist, tmp_path):
     """Transform, corrected material, lamp, world, exposure, name, light, parent, modifier, collection: all stay."""
     scene = bring(first).scene

@@ -54,6 +54,7 @@ def counts():
     return {kind: sorted(x.name for x in getattr(bpy.data, kind)) for kind in KINDS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fresh", [True, False])
 def test_it_renders_when_opened_elsewhere(scene, tmp_path, result, capture, fresh):
     (result / "materials.json").write_text('{"run": "0123456789abcdef", "objects": []}')

@@ -70,6 +70,7 @@ def test_cycles_shows_each_side_on_its_own(scene, shoot, look, white_world, tmp_
         assert picture[there][:, other].max() < 0.01 * picture[there][:, own].min()
 
 
+@pytest.mark.slow
 def test_round_trip_of_a_sheet_between_two_rooms(scene, shoot, tmp_path):
     """The result shows either side of the sheet as the frames did, twenty times apart in light and two in albedo."""
     case = sheet_between_rooms()
@@ -100,6 +101,7 @@ def test_round_trip_of_a_sheet_between_two_rooms(scene, shoot, tmp_path):
         assert np.abs(ratio - 1).max() < 0.1, f"frame {index}: {ratio}"
 
 
+@pytest.mark.slow
 def test_the_room_in_an_open_scene_has_both_sides_and_a_stored_run_is_the_same(scene, tmp_path):
     """The sheet has the two layers that it has in scene.blend; a second run takes the stored stages."""
     case = sheet_between_rooms()

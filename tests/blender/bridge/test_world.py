@@ -25,6 +25,7 @@ def looking(direction):
     return Camera(64, 48, 32, 32, 30, 22, pose)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("direction", [(1, 0.3, 0.2), (-0.4, 1, -0.5), (-1, -0.2, 0.6), (0.3, -0.5, -1)])
 def test_a_patch_appears_in_its_direction(scene, shoot, tmp_path, direction):
     x, y, z = np.array(direction) / np.linalg.norm(direction)
@@ -45,6 +46,7 @@ def test_a_patch_appears_in_its_direction(scene, shoot, tmp_path, direction):
     np.testing.assert_allclose(brightest / brightest[0], [1, 0.6, 0.2], atol=0.01)
 
 
+@pytest.mark.slow
 def test_a_constant_world_has_its_radiance(scene, shoot, look, tmp_path):
     write_exr(tmp_path / "environment.exr", np.broadcast_to(np.float32([0.5, 20.0, 0.25]), (8, 16, 3)))
     set_world(scene, tmp_path / "environment.exr")
@@ -64,6 +66,7 @@ def test_a_missing_file_is_told(scene, tmp_path):
     assert scene.world is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rows", [64, 512])
 def test_a_sun_lights_a_plane_and_throws_its_shadow(scene, shoot, look, tmp_path, rows):
     """A white floor under the written sun and a dim sky: E / pi in the light, the sky alone under a board."""

@@ -69,6 +69,7 @@ def recovered(tmp_path_factory) -> dict[str, tuple[Recovery, np.ndarray, dict]]:
     return result
 
 
+@pytest.mark.slow
 def test_intervals_of_albedo_hold_the_truth(recovered):
     by_room = {name: held(run, truth) for name, (run, truth, _) in recovered.items()}
     for kind in ("measured", "filled", "objects"):

@@ -48,6 +48,7 @@ def material(name: str, paint: Paint):
 _plain = render.material
 
 
+@pytest.mark.slow
 def test_glass_is_set_apart(tmp_path, monkeypatch):
     monkeypatch.setattr(render, "material", material)
     things = room()

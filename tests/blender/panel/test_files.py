@@ -169,6 +169,7 @@ def finished(grey_capture, tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_a_dropped_result_comes_in_as_a_scene_of_its_own(choices, finished):
     before = set(bpy.data.scenes)
     assert drop(finished / "materials.json") == {"FINISHED"}

@@ -135,6 +135,7 @@ def test_end_all_leaves_none():
     assert all(one.wait(30) and not alive(one.process_id) for one in some)
 
 
+@pytest.mark.slow
 def test_no_setting_of_this_blender_reaches_a_job(grey_capture):
     """It finds package and wheels wherever it is started, and knows the capture."""
     job = Job(command(["info", str(grey_capture), "--json"]))
@@ -190,6 +191,7 @@ def test_a_job_ends_with_its_starter(grey_capture, tmp_path):
     assert not (tmp_path / "report.json").exists()
 
 
+@pytest.mark.slow
 def test_the_memory_limit_ends_a_job(grey_capture, tmp_path):
     job = Job(recover(grey_capture, tmp_path, "--memory-limit", "0.05"))
     assert job.wait(120) and job.state == FAILED

@@ -126,6 +126,7 @@ def test_facts_of_further_readers_are_shown(draw, capture, choices, module):
     assert "Give --transfer srgb." in draw(capture).text and "Scale: unknown" in draw(capture).text
 
 
+@pytest.mark.slow
 def test_a_check_beside_the_window(draw, capture, choices, module, grey_capture):
     findings = module("operators.findings")
     choices.capture_folder = str(grey_capture)

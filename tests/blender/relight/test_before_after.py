@@ -92,6 +92,7 @@ def cards(kind):
         return []
 
 
+@pytest.mark.slow
 def test_progress_is_told_during_each_picture(result, tmp_path, capfd):
     """Not only at its ends, and never backwards."""
     capfd.readouterr()

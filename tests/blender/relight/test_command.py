@@ -26,6 +26,7 @@ def files(folder):
     return {p.name: hashlib.md5(p.read_bytes()).hexdigest() for p in folder.iterdir() if p.is_file()}
 
 
+@pytest.mark.slow
 def test_lamps_change_the_picture_and_the_result_stays(result, tmp_path):
     before = files(result)
     half = ("--lamps", "ceiling lamp=0.5,lamp shade=off")
@@ -43,6 +44,7 @@ def test_lamps_change_the_picture_and_the_result_stays(result, tmp_path):
     assert files(result) == before and len(list(tmp_path.glob("*.exr"))) == 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("camera", ["3", None])
 def test_before_and_after_beside_each_other(result, tmp_path, camera):
     name = camera and bpy_camera_name(result, 3)
@@ -73,6 +75,7 @@ def bpy_camera_name(result, index):
     return sorted(thing.name for thing in bpy.context.scene.objects if "frame_path" in thing)[index]
 
 
+@pytest.mark.slow
 def test_a_number_and_a_name_are_the_same_camera(result, tmp_path):
     name = bpy_camera_name(result, 4)
     for out, camera in (("n.exr", "4"), ("m.exr", name), ("o.exr", "1")):
@@ -134,6 +137,7 @@ def test_a_place_that_cant_be_written_is_told(result, tmp_path, capsys):
     assert "can't be written" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_eevee_without_a_graphics_card_is_told_instead_of_a_black_picture(result, tmp_path, capsys):
     """Where there is one, there is a picture."""
     code = relight(result, tmp_path / "x.png", "--engine", "eevee")

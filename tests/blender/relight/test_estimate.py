@@ -31,7 +31,8 @@ def rooms_lights(scene):
         yield f"{preset} too", lambda preset=preset: lights.add_light(scene, preset, 8.0)
 
 
-@pytest.mark.parametrize("camera", [0, 4, 7])
+@pytest.mark.slow
+@pytest.mark.parametrize("camera", [0, *(pytest.param(k, marks=pytest.mark.once) for k in (4, 7))])
 def test_it_is_about_a_stop_from_cycles(room, shoot, camera):
     room.camera = frame_cameras(room)[camera]
     assert estimate.stops(room) is None and not relight_exposure.darkness(room), "it was not looked for yet"

@@ -60,6 +60,7 @@ def test_it_stands_free_in_the_room_and_faces_what_it_is_for(room, preset, camer
         assert hit is None or hit.distance > way.length - 1e-3, "it sticks in something"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["WINDOW", "SOFTBOX", "SPOT"])
 @pytest.mark.parametrize("camera", [1, 4, 8])
 def test_what_the_camera_looks_at_is_lit(room, shoot, preset, camera):
@@ -75,6 +76,7 @@ def test_what_the_camera_looks_at_is_lit(room, shoot, preset, camera):
     assert np.quantile(after, 0.99) < 40 * np.quantile(before, 0.9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset, steepest", [("SOFTBOX", 0.25), ("SPOT", 0.3)])
 def test_no_edge_is_burnt_into_the_ceiling(scene, shoot, preset, steepest):
     """In a room of 5 x 4 x 2.7 m, seen across; the ceiling from below, 5 cm a pixel."""
@@ -180,6 +182,7 @@ def test_without_a_room_it_is_told(scene):
     assert not lights.added_lights(scene)
 
 
+@pytest.mark.slow
 def test_the_captured_light_is_exactly_the_captured_one(room, shoot):
     before = shoot(room, 32, 24, 4)
     lamp = state.relight_lamps.find_lamps(room)[0]

@@ -35,6 +35,7 @@ def brightest(scene, shoot):
     return 90 - (column / 72 - 0.5) * 360, picture
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0, 40, -70])
 def test_rotation_turns_it_anticlockwise(scene, shoot, towards_x, angle):
     world = set_world(scene, towards_x)
@@ -43,6 +44,7 @@ def test_rotation_turns_it_anticlockwise(scene, shoot, towards_x, angle):
     assert outside.rotation(world) == pytest.approx(math.radians(angle))
 
 
+@pytest.mark.slow
 def test_factor_and_off(scene, shoot, towards_x):
     world = set_world(scene, towards_x)
     _, one = brightest(scene, shoot)
@@ -84,6 +86,7 @@ def test_restored_is_exact(scene, towards_x, tmp_path):
     assert scene.world == world and state(world) == before and not outside.is_changed(scene)
 
 
+@pytest.mark.slow
 def test_a_picture_is_scaled_to_a_mean(scene, shoot, tmp_path):
     write_exr(tmp_path / "grey.exr", np.full((16, 32, 3), 5.0, np.float32))
     outside.use_hdri(scene, tmp_path / "grey.exr", mean=0.5)

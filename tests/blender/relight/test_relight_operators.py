@@ -144,6 +144,7 @@ def settings(scene):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fails", [None, 1, 2])
 def test_before_and_after_puts_every_setting_back(ops, tmp_path, fails, monkeypatch):
     scene = bpy.context.scene

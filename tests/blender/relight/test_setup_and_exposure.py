@@ -75,6 +75,7 @@ def test_a_preset_is_blenders_own(package, scene, tmp_path):
     assert len(lights.added_lights(scene)) == 1
 
 
+@pytest.mark.slow
 def test_the_exposure_shows_middle_grey(scene, shoot):
     build(scene, 1)
     scene.render.resolution_x, scene.render.resolution_y = 64, 48
