@@ -10,7 +10,7 @@ import bpy
 
 from ..addon.bridge.corrections import corrections
 from ..addon.core.brdf.lambertian import LAMBERTIAN
-from ..addon.core.brdf.registry import find, models
+from ..addon.core.brdf.registry import models, shown
 from ..addon.core.errors import ScanRelightError
 
 _GIVEN = [one for one in models() if one.can_be_given]
@@ -68,7 +68,7 @@ def _f0(group) -> float:
 
 
 def _colour(group):
-    bare = (find(_value(group, "model", "")) or LAMBERTIAN).lobe_alone
+    bare = shown(_value(group, "model", "")).lobe_alone
     value = _value(group, "f0" if bare else "base_color", (0.5, 0.5, 0.5))
     return tuple(value) if hasattr(value, "__len__") else (value,) * 3
 
@@ -77,7 +77,7 @@ def _give_colour(group, value) -> None:
     colour = list(value)
     for thing in targets(bpy.context, group.id_data):
         if corrections.correctable(thing):
-            brdf = find(corrections.effective(thing)["model"]) or LAMBERTIAN
+            brdf = shown(corrections.effective(thing)["model"])
             corrections.give(thing, **{"f0" if brdf.lobe_alone else "base_color": colour})
 
 

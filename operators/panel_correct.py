@@ -5,8 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..addon.bridge.corrections import corrections, unseen
-from ..addon.core.brdf.lambertian import LAMBERTIAN
-from ..addon.core.brdf.registry import find, named
+from ..addon.core.brdf.registry import named, shown
 from .correct_base import chosen
 from .correct_props import STATEMENTS
 from .job_operator import active, bar
@@ -70,7 +69,7 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
 
     def values(self, layout, thing) -> None:
         """Each value with a pin where it is given, and the way back."""
-        said, brdf = corrections.given(thing), find(corrections.effective(thing)["model"]) or LAMBERTIAN
+        said, brdf = corrections.given(thing), shown(corrections.effective(thing)["model"])
         values, metal = thing.scan_relight_correct, brdf.lobe_alone
         rows = [("model", "model")]
         if brdf.has_lobe:

@@ -9,8 +9,7 @@ import bpy
 
 from ..addon.bridge.results import file, look
 from ..addon.bridge.results.file import EARLIER, FITS, MATERIALS, UNTOLD, Result, standing, standings
-from ..addon.core.brdf.lambertian import LAMBERTIAN
-from ..addon.core.brdf.registry import find
+from ..addon.core.brdf.registry import find, shown
 from . import preferences
 
 PAGE = "report.html"
@@ -96,7 +95,7 @@ def doubt(one: dict[str, Any]) -> float | None:
     """
     found = []
     low, high = one.get("roughness_low"), one.get("roughness_high")
-    brdf = find(one.get("model")) or LAMBERTIAN
+    brdf = shown(one.get("model"))
     if brdf.has_lobe and None not in (low, high):
         found.append(high - low)
     evidence = one.get("evidence") or {}
@@ -129,7 +128,7 @@ def _mean(value) -> float | None:
 def facts(one: dict[str, Any]) -> list[tuple[str, str]]:
     """Label and text of everything that the panel tells of an object."""
     name, evidence = one.get("model", ""), one.get("evidence") or {}
-    brdf = find(name) or LAMBERTIAN
+    brdf = shown(name)
     found = [("Model", label(name))]
     alpha = one.get("alpha")
     if alpha is not None:

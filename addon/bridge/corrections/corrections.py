@@ -15,8 +15,7 @@ import bpy
 
 from ...core.atomic import write_bytes
 from ...core.brdf.dielectric import DIELECTRIC
-from ...core.brdf.lambertian import LAMBERTIAN
-from ...core.brdf.registry import find
+from ...core.brdf.registry import shown
 from ...core.errors import BadInputError
 from ...core.results.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
 from ...core.results.place import write_capture
@@ -165,7 +164,7 @@ def effective(thing: bpy.types.Object, seen: frozenset = frozenset()) -> dict[st
     before = values["model"]
     values |= theirs
     values |= {key: said[key] for key in (*LOBE, "base_color") if key in said}
-    model = find(values["model"]) or LAMBERTIAN
+    model = shown(values["model"])
     if "model" not in said and {"f0", "roughness"} & said.keys() and model.has_albedo and not model.has_lobe:
         model = DIELECTRIC
         values["model"] = model.name

@@ -13,7 +13,7 @@ import bpy
 
 from ...core.brdf.compensation import ior_of
 from ...core.brdf.lambertian import LAMBERTIAN
-from ...core.brdf.registry import find
+from ...core.brdf.registry import shown
 from ...core.results.overrides import LOBE
 from ..data.materials import (
     BASE_COLOR,
@@ -100,7 +100,7 @@ def show(thing: bpy.types.Object, wanted: dict[str, Any], entry: dict[str, Any])
     if wanted == made:
         del material[WORN]
         return
-    inputs, model = principled(material).inputs, find(wanted["model"]) or LAMBERTIAN
+    inputs, model = principled(material).inputs, shown(wanted["model"])
     if wanted["model"] != made["model"]:
         inputs[METALLIC].default_value = float(model.lobe_alone)
         inputs[SPECULAR_LEVEL].default_value = 0.5 if model.has_lobe else 0.0

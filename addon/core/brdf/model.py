@@ -184,6 +184,9 @@ class Brdf:
     can_be_given: bool = True
     constraints: Constraints = Constraints()
 
+    def __str__(self) -> str:
+        return self.name
+
     @property
     def has_lobe(self) -> bool:
         """Whether there is a specular lobe."""

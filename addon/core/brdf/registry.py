@@ -8,6 +8,7 @@ Another package's is made known by `register`, or found by its entry point:
 
 from __future__ import annotations
 
+import warnings
 from functools import cache
 from importlib.metadata import entry_points
 
@@ -43,6 +44,11 @@ def find(name: str | None) -> Brdf | None:
     return _models.get(name) if name is not None else None
 
 
+def shown(name: str | None) -> Brdf:
+    """The model of a name as interfaces show it: `LAMBERTIAN` where its package is not there."""
+    return find(name) or LAMBERTIAN
+
+
 def named(name: str) -> Brdf:
     """The model of a name; raises `BadInputError` where there is none."""
     found = find(name)
@@ -54,6 +60,9 @@ def named(name: str) -> Brdf:
 
 @cache
 def _installed() -> None:
-    """Register, once, what installed packages bring."""
+    """Register, once, what installed packages bring; one that is broken is left out with a warning."""
     for entry in entry_points(group=GROUP):
-        register(entry.load())
+        try:
+            register(entry.load())
+        except Exception as error:  # whatever another package does wrong
+            warnings.warn(f"The reflectance model '{entry.name}' can't be loaded ({error!r}); mend it.", stacklevel=2)
