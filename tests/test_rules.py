@@ -65,6 +65,19 @@ LAYERS = (
     ("pipeline",),
 )
 """Folders of addon/core from the bottom up; '' are the modules at its root. Each may import from lower ones alone."""
+BRIDGE_LAYERS = (
+    ("",),
+    ("data",),
+    ("light",),
+    ("scene", "export"),
+    ("results", "relight"),
+    ("own_scene",),
+    ("corrections",),
+    ("room",),
+    ("job",),
+    ("demo",),
+)
+"""The same of addon/bridge."""
 Graph = dict[tuple[str, ...], set[tuple[str, ...]]]
 
 
@@ -106,20 +119,22 @@ def test_a_circle_is_found():
     assert circle({("a",): {("b",), ("c",)}, ("b",): {("c",)}, ("c",): set()}) == []
 
 
-def test_the_core_has_no_circle_of_imports():
-    assert not circle(graph(ROOT / "addon" / "core"))
+@pytest.mark.parametrize("part", ["core", "bridge"])
+def test_there_is_no_circle_of_imports(part):
+    assert not circle(graph(ROOT / "addon" / part))
 
 
-def test_dependencies_in_the_core_point_down():
-    level = {folder: i for i, folders in enumerate(LAYERS) for folder in folders}
-    assert {path.name for path in (ROOT / "addon" / "core").iterdir() if (path / "__init__.py").is_file()} < set(level)
+@pytest.mark.parametrize(("part", "layers"), [("core", LAYERS), ("bridge", BRIDGE_LAYERS)])
+def test_dependencies_point_down(part, layers):
+    level = {folder: i for i, folders in enumerate(layers) for folder in folders}
+    assert {path.name for path in (ROOT / "addon" / part).iterdir() if (path / "__init__.py").is_file()} < set(level)
 
     def folder(name: tuple[str, ...]) -> str:
         return name[0] if name and (len(name) > 1 or name[0] in level) else ""
 
     wrong = [
         f"{'.'.join(one)} imports {'.'.join(other)}"
-        for one, others in graph(ROOT / "addon" / "core").items()
+        for one, others in graph(ROOT / "addon" / part).items()
         for other in others
         if folder(one) != folder(other) and level[folder(one)] <= level[folder(other)]
     ]

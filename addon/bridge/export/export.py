@@ -262,9 +262,3 @@ def _write(path: Path, ending: str, collection: bpy.types.Collection) -> None:
         export_animations=False,
         use_active_scene=True,
     )
-
-
-def srgb(linear: np.ndarray) -> np.ndarray:
-    """Linear Rec.709 to sRGB's transfer curve, clipped to 0...1 (IEC 61966-2-1)."""
-    linear = np.clip(np.nan_to_num(linear), 0, 1)
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.brdf.compensation import ior_of
 from ...core.io.png import write_png
+from ...core.photo import encoded
 from ..data.images import UDIM, image_array, load_image
 from ..data.materials import (
     ALPHA,
@@ -166,13 +167,10 @@ def _picture(image: bpy.types.Image, tile: int, textures: Path, pictures: dict) 
         return pictures[image, tile]
     if not all(image.size):
         return image
-    from .export import srgb
-
     pixels = _pixels(image, tile, textures)[::-1, :, :3]
-    if image.colorspace_settings.name != "sRGB" or image.is_float:
-        pixels = srgb(pixels)
+    linear = image.colorspace_settings.name != "sRGB" or image.is_float
     path = textures / f"{_file_name(image, textures)}{f'_{tile}' if tile else ''}.png"
-    write_png(path, np.ascontiguousarray((pixels * 255 + 0.5).astype(np.uint8)))
+    write_png(path, np.ascontiguousarray(encoded(pixels) if linear else (pixels * 255 + 0.5).astype(np.uint8)))
     made = bpy.data.images.load(str(path))
     made.colorspace_settings.name = "sRGB"
     if UV_MAP in image:
