@@ -10,17 +10,15 @@ from typing import Any
 import numpy as np
 
 from ..light.environment import Environment
-from ..light.few_elements import evened
 from ..light.field import LightField
 from ..light.lamps import Lamp
 from ..light.mirrors import Mirror, known_mirror
 from ..light.over_surface import finest_spacing, irradiance
 from ..light.shading import Shading
 from ..light.sun import Sun, taken_out
-from ..passes.albedo.albedo import MAX_ALBEDO, fill, quotient
 from ..passes.clipped_lamps.clipped import shade_clipped
 from ..passes.mirrors.flat_mirrors import find_mirrors
-from ..passes.unseen_light.shades import BOUNCES, strongly_lit
+from ..passes.unseen_light.unseen_light import Light
 from ..progress import Progress
 from ..scene.atlas import Atlas
 from ..scene.creases import crease_doubt
@@ -37,6 +35,7 @@ from .frames import STAGE as FRAMES
 from .frames import Observed
 from .stage import Stage
 from .surface import STAGE as SURFACE
+from .unseen_surfaces import with_unseen_surfaces
 
 STAGE = Stage(
     "shading",
@@ -77,9 +76,9 @@ def lit_room(surface: Surface, shading: Shading) -> LightField:
     return room.with_mirrors(shading.mirrors).with_sun(shading.sun)
 
 
-def fill_unseen(radiance: np.ndarray, seen: np.ndarray) -> np.ndarray:
+def unseen_dark(lit_diffuse: LitDiffuse) -> np.ndarray:
     """L_d with the unseen elements dark, as (n, 3) float32 without NaN."""
-    return np.where(seen[:, None], radiance, np.float32(0)).astype(np.float32)
+    return np.where(lit_diffuse.seen[:, None], lit_diffuse.radiance, np.float32(0)).astype(np.float32)
 
 
 def shade(
@@ -122,95 +121,90 @@ def shade(
     InterruptedRun
         From `progress`.
     """
-    class_of = {i.object_id: i.class_name for i in instances}
-    seen = lit_diffuse.seen
-    objects = int(atlas.object_id.max()) + 1
-    surface = np.bincount(atlas.object_id, atlas.area, objects)
-    seen_surface = np.bincount(atlas.object_id, atlas.area * seen, objects)
-    seen_share = {i: float(seen_surface[i] / surface[i]) for i in np.unique(atlas.object_id) if surface[i] > 0}
-    finest = finest_spacing(atlas)
-    how = {"sampler": sampler, "threads": threads, "seed": seed, "smooth": "lamp-noise" not in without}
-    emitter_rays = 0 if "emitter-rays" in without else emitter_rays
-    portal_rays = 0 if "portal-rays" in without else portal_rays
-    interpolate = interpolate and "interpolation" not in without
+    how = {
+        "sampler": sampler,
+        "threads": threads,
+        "seed": seed,
+        "smooth": "lamp-noise" not in without,
+        "finest": finest_spacing(atlas),
+    }
+    rays_of = {
+        "rays": rays,
+        "emitter_rays": 0 if "emitter-rays" in without else emitter_rays,
+        "portal_rays": 0 if "portal-rays" in without else portal_rays,
+        "interpolate": interpolate and "interpolation" not in without,
+    }
     find_mirrors = None if "mirrors" in without else find_mirrors
     colours = None if "fringe-colours" in without else colours
+    tilted = turned_by_noise(mesh, atlas, 0.0 if "tilt-error" in without else noise)
 
-    # 1. All light. What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
     environment, sun = (environment, None) if "seen-sun" in without else taken_out(environment)
-    field = LightField(mesh, atlas, scene, fill_unseen(lit_diffuse.radiance, seen), environment).with_sun(sun)
-    good = seen & (((lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= ENOUGH)) | (lit_diffuse.tier == SATURATED))
-    unseen = [object_id for object_id, share in seen_share.items() if share == 0 and "unseen-lamps" not in without]
+    # What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
+    field = LightField(mesh, atlas, scene, unseen_dark(lit_diffuse), environment).with_sun(sun)
+    field, light = with_all_light(field, lit_diffuse, instances, find_mirrors, seed, tilted, colours, without)
+
+    # Where there is no L_d to divide, the rough E does.
+    emitters = {lamp.object_id for lamp in light.lamps}
+    told = lit_diffuse.seen | np.isin(atlas.object_id, list(emitters))
+    E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
+    if not told.all() and "unseen-surfaces" not in without:
+        follow_shades = "shades" not in without
+        field, E, escaped = with_unseen_surfaces(field, told, lit_diffuse, instances, emitters, how, follow_shades)
+    lit, unsure = np.flatnonzero(told), np.zeros(len(atlas), np.float32)
+    E[lit], escaped[lit], points, unsure[lit] = irradiance(field, lit, progress=progress, **rays_of, **how)
+    # A noisy mesh faces elsewhere than the surface did.
+    unsure = np.hypot(unsure, tilted)
+    # Near a crease the light of two sides is mixed; less so than the paper's uniform rays leave noise.
+    if sampler != "uniform" and "crease-error" not in without:
+        unsure = np.hypot(unsure, crease_doubt(mesh, atlas, atlas.texel_edge))
+    notes = light.notes if field.sun is None else (*light.notes, field.sun.note)
+    return Shading(
+        E, escaped, unsure, field.radiance, light.lamps, field.environment, notes, field.mirrors, points, field.sun
+    )
+
+
+def turned_by_noise(mesh: Mesh, atlas: Atlas, noise: float) -> np.ndarray:
+    """Radians by which `noise` metres in the vertices may have turned each element, (n,) float."""
     single, sheet = fronts(mesh)
-    tilted = tilt(single, 0.0 if "tilt-error" in without else noise)[sheet[atlas.triangle]]
+    return tilt(single, noise)[sheet[atlas.triangle]]
+
+
+def with_all_light(
+    field: LightField,
+    lit_diffuse: LitDiffuse,
+    instances: tuple[Instance, ...],
+    find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None,
+    seed: int,
+    tilted: np.ndarray,
+    colours: dict[int, np.ndarray] | None,
+    without: Collection[str],
+) -> tuple[LightField, Light]:
+    """The room with lamps, sky, sun and mirrors, and what was found of the first two.
+
+    Parameters
+    ----------
+    field : LightField
+        Dark where no frame saw it.
+    tilted : (n,) float
+        `turned_by_noise`.
+    """
+    atlas, seen, tier = field.atlas, lit_diffuse.seen, lit_diffuse.tier
+    good = seen & (((tier == CLEAN) & (lit_diffuse.count >= ENOUGH)) | (tier == SATURATED))
+    real = atlas.area > 0
+    unseen = np.setdiff1d(atlas.object_id[real], atlas.object_id[real & seen]).tolist()
+    unseen = [] if "unseen-lamps" in without else unseen
     # Mirrors first: what hangs opposite or over one gets light over it, which lamps would have to answer for.
     field = field.with_mirrors(find_mirrors(field, None) if find_mirrors else ())
     good = good if good.any() else seen
     light, sun = find_all_light(field, good, unseen, instances, seed, tilted, colours, without=without)
     field = field.with_mirrors(()).with_sun(sun)
-    notes = light.notes if sun is None else (*light.notes, sun.note)
-    lamps = light.lamps
     radiance = field.radiance.copy()
-    for lamp in lamps:
+    for lamp in light.lamps:
         own = atlas.object_id == lamp.object_id
         # At its edges the surroundings are mixed in.
-        radiance[own & (lit_diffuse.tier != CLEAN) if lamp.seen else own] = lamp.radiance
-    emitters = {lamp.object_id for lamp in lamps}
-    field = field.with_light(radiance, light.environment, emitters)
-
-    mirrors = find_mirrors(field, lamps) if find_mirrors else ()
-    field = field.with_mirrors(mirrors)
-
-    # 2. What nobody saw reflects like the rest of its object under the light that reaches it: a rough first pass.
-    unseen_lamp = ~seen & np.isin(atlas.object_id, list(emitters))
-    dark = np.flatnonzero(~seen & ~unseen_lamp)
-    lit = np.flatnonzero(seen | unseen_lamp)
-    if len(dark) and "unseen-surfaces" in without:
-        dark = dark[:0]
-    if len(dark):
-        rough = how | {"sampler": "aimed", "rays": 64, "emitter_rays": 4, "portal_rays": 8}
-        rough |= {"interpolate": True, "finest": 8 * finest}
-        coarse_lit, _, _, _ = irradiance(field, lit, **rough)
-        coarse_dark, escaped_dark, _, _ = irradiance(field, dark, **rough)
-        everywhere = np.zeros((len(atlas), 3), np.float32)
-        everywhere[lit], everywhere[dark] = coarse_lit, coarse_dark
-        rho, valid = quotient(lit_diffuse.radiance, everywhere)
-        guess = fill(atlas, rho, valid, class_of, emitters)
-        radiance[dark] = guess.rho[dark] * everywhere[dark] / np.float32(np.pi)
-        seen_as = evened(field)[dark]
-        field = field.with_light(radiance)
-        # Inside a shade light goes to and fro.
-        for _ in range(0 if "shades" in without else BOUNCES - 1):
-            shades = strongly_lit(atlas, dark, radiance[dark], seen_as)
-            if not shades:
-                break
-            radiance = field.radiance.copy()
-            for own in shades:
-                everywhere[own] = irradiance(field, own, **(rough | {"finest": finest}))[0]
-                rho, valid = quotient(lit_diffuse.radiance[own], everywhere[own])
-                told = valid & seen[own]
-                paint = np.clip(np.median(rho[told], 0), 0, MAX_ALBEDO) if told.any() else guess.rho[own]
-                radiance[own] = np.where(seen[own, None], radiance[own], paint * everywhere[own] / np.float32(np.pi))
-            field = field.with_light(radiance)
-        coarse_dark = everywhere[dark]
-
-    # 3. The real thing, where there is an L_d to divide; elsewhere the rough values do.
-    E = np.zeros((len(atlas), 3), np.float32)
-    escaped, unsure = np.zeros(len(atlas), np.float32), np.zeros(len(atlas), np.float32)
-    if len(dark):
-        E[dark], escaped[dark] = coarse_dark, escaped_dark
-    E[lit], escaped[lit], points, unsure[lit] = irradiance(
-        field, lit, rays=rays, emitter_rays=emitter_rays, portal_rays=portal_rays,
-        interpolate=interpolate, finest=finest, progress=progress, **how,
-    )  # fmt: skip
-    # A noisy mesh faces elsewhere than the surface did.
-    unsure = np.hypot(unsure, tilted)
-    if (
-        sampler != "uniform" and "crease-error" not in without
-    ):  # the paper's way, whose rays alone leave more noise than creases do
-        # Near a crease the light of two sides is mixed.
-        unsure = np.hypot(unsure, crease_doubt(mesh, atlas, atlas.texel_edge))
-    return Shading(E, escaped, unsure, field.radiance, lamps, light.environment, notes, mirrors, points, sun)
+        radiance[own & (tier != CLEAN) if lamp.seen else own] = lamp.radiance
+    field = field.with_light(radiance, light.environment, [lamp.object_id for lamp in light.lamps])
+    return field.with_mirrors(find_mirrors(field, light.lamps) if find_mirrors else ()), light
 
 
 def to_store(found: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:

@@ -1,0 +1,78 @@
+"""What no frame saw reflects like the rest of its object, under the light that reaches it: a rough first pass."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..light.few_elements import evened
+from ..light.field import LightField
+from ..light.over_surface import irradiance
+from ..passes.albedo.albedo import MAX_ALBEDO, fill, quotient
+from ..passes.unseen_light.shades import BOUNCES, strongly_lit
+from ..scene.lit_diffuse import LitDiffuse
+from ..scene.model import Instance
+
+ROUGH = {"sampler": "aimed", "rays": 64, "emitter_rays": 4, "portal_rays": 8, "interpolate": True}
+COARSER = 8
+"""Times the finest spacing of gathering points."""
+
+
+def with_unseen_surfaces(
+    field: LightField,
+    told: np.ndarray,
+    lit_diffuse: LitDiffuse,
+    instances: tuple[Instance, ...],
+    emitters: set[int],
+    how: dict[str, Any],
+    follow_shades: bool,
+) -> tuple[LightField, np.ndarray, np.ndarray]:
+    """The room with what the elements that are not `told` send.
+
+    Parameters
+    ----------
+    field : LightField
+        With all of its light.
+    told : (n,) bool
+        Elements whose radiance is known; some are not.
+    emitters : set of int
+        Objects that are lamps.
+    how : dict
+        Of `irradiance`.
+    follow_shades : bool
+        Follow the light to and fro inside of what is lit strongly.
+
+    Returns
+    -------
+    field : LightField
+    E : (n, 3) float32
+        Rough, everywhere.
+    escaped : (n,) float32
+        Share of the rays that left the mesh, where not `told`.
+    """
+    atlas, lit, dark = field.atlas, np.flatnonzero(told), np.flatnonzero(~told)
+    rough = how | ROUGH | {"finest": COARSER * how["finest"]}
+    E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
+    E[lit] = irradiance(field, lit, **rough)[0]
+    E[dark], escaped[dark], _, _ = irradiance(field, dark, **rough)
+    rho, valid = quotient(lit_diffuse.radiance, E)
+    guess = fill(atlas, rho, valid, {i.object_id: i.class_name for i in instances}, emitters).rho
+    radiance = field.radiance.copy()
+    radiance[dark] = guess[dark] * E[dark] / np.float32(np.pi)
+    field = field.with_light(radiance)
+    seen_as = evened(field)[dark]
+    for _ in range(BOUNCES - 1 if follow_shades else 0):
+        shades = strongly_lit(atlas, dark, field.radiance[dark], seen_as)
+        if not shades:
+            break
+        radiance = field.radiance.copy()
+        for own in shades:
+            E[own] = irradiance(field, own, **(rough | {"finest": how["finest"]}))[0]
+            rho, valid = quotient(lit_diffuse.radiance[own], E[own])
+            seen = lit_diffuse.seen[own]
+            known = valid & seen
+            paint = np.clip(np.median(rho[known], 0), 0, MAX_ALBEDO) if known.any() else guess[own]
+            radiance[own] = np.where(seen[:, None], radiance[own], paint * E[own] / np.float32(np.pi))
+        field = field.with_light(radiance)
+    return field, E, escaped
