@@ -19,12 +19,12 @@ from pathlib import Path
 from typing import TextIO
 
 from .cli_ablation import ablation_command, add_ablation, joined
-from .cli_refit import add_override, add_refit, refit_command
+from .cli_recover import add_reading, add_recover, reading_from, recover_command
+from .cli_refit import add_refit, refit_command
 from .cli_relight import add_relight, relight_command
-from .console import ConsoleProgress, StopWish, duration, own_console, unexpected
+from .console import ConsoleProgress, StopWish, own_console, unexpected
 from .core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, EXIT_OK, BadInputError, ScanRelightError
 from .core.settings import PRESETS, Settings
-from .core.stages import RUN_STAGES, WRITE
 from .leash import JsonProgress, Leash, MemoryGuard
 from .settings_info import setting_infos
 from .version import VERSION
@@ -95,35 +95,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"scan-relight {VERSION}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
-    recover = commands.add_parser(
-        "recover",
-        help="recover a capture into a relightable scene",
-        epilog=EXIT_CODES,
-        description="Recover a capture and write scene.blend, its images and a report. A stopped or repeated run goes "
-        "on from the finished stages in RESULT.",
-    )
-    recover.add_argument(
-        "capture",
-        metavar="CAPTURE",
-        type=Path,
-        help="folder with transforms.json, mesh.ply, info_semantic.json and the frames",
-    )
-    recover.add_argument("--out", metavar="RESULT", type=Path, required=True, help="folder to write, made if missing")
-    add_reading(recover)
-    recover.add_argument(
-        "--until",
-        metavar="STAGE",
-        choices=RUN_STAGES,
-        default=WRITE,
-        help=f"last stage to do: {', '.join(RUN_STAGES)} (default write, which is all)",
-    )
-    recover.add_argument(
-        "--from-stage",
-        metavar="STAGE",
-        choices=RUN_STAGES,
-        help="do this stage and all later ones anew, though they are stored",
-    )
-    add_override(recover)
+    recover = add_recover(commands, EXIT_CODES)
     add_settings(recover)
     add_leash(recover)
     add_common(recover, recover_command)
@@ -179,47 +151,6 @@ def make_parser() -> argparse.ArgumentParser:
     add_common(benchmark, benchmark_command)
     add_common(add_ablation(commands, EXIT_CODES), ablation_command)
     return parser
-
-
-def add_reading(parser: argparse.ArgumentParser) -> None:
-    """How the capture is to be read, where its folder does not tell: one option for each field of `Reading`."""
-    group = parser.add_argument_group("the capture")
-    group.add_argument(
-        "--format",
-        metavar="NAME",
-        default="",
-        help="its layout, such as nerfstudio (default: found from what the folder holds)",
-    )
-    group.add_argument("--mesh", metavar="FILE", type=Path, help="the mesh, where it is not the format's own")
-    group.add_argument("--outside", action="store_true", help="let its files name others outside of its folder")
-    group.add_argument(
-        "--transfer",
-        metavar="CURVE",
-        default="",
-        help="curve of 8 and 16-bit pictures: srgb, linear, or a gamma such as 2.2",
-    )
-    group.add_argument("--exposures", metavar="CSV", type=Path, help="exposure of each frame: lines of name, exposure")
-    group.add_argument(
-        "--convention", metavar="NAME", default="", help="a correction of all poses, as `info` proposes it"
-    )
-
-
-def reading_from(arguments: argparse.Namespace):
-    """The `Reading` that was asked for."""
-    from .core.io.layout import Reading
-
-    def import_mesh(path: Path):
-        return need("data.import_mesh").import_mesh(path)  # only now: most captures need no Blender to be read
-
-    return Reading(
-        arguments.format,
-        arguments.mesh,
-        arguments.outside,
-        arguments.transfer,
-        arguments.exposures,
-        arguments.convention,
-        import_mesh,
-    )
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
@@ -295,36 +226,6 @@ def console_run(arguments: argparse.Namespace, stream: TextIO):
         finally:
             guard.close()
             listener.close()
-
-
-def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
-    """`recover CAPTURE --out RESULT`."""
-    settings = settings_from(arguments)
-    run = need("job.run")
-    with console_run(arguments, stream) as console:
-        report = run.run(
-            arguments.capture,
-            arguments.out,
-            settings,
-            run.progress_for(settings, **console),
-            until=arguments.until,
-            reading=reading_from(arguments),
-            from_stage=arguments.from_stage,
-            override=arguments.override,
-            heed_kept=not arguments.no_overrides,
-        )
-    if isinstance(console["listener"], JsonProgress):
-        for warning in report.get("warnings", ()):
-            console["listener"].tell("warning", text=warning)
-        console["listener"].tell(
-            "done", seconds=report["seconds"], result=str(arguments.out.absolute()), until=arguments.until
-        )
-    elif not arguments.quiet:
-        for warning in report.get("warnings", ()):
-            print(f"Warning: {warning}", file=stream)
-        made = arguments.out / ("scene.blend" if arguments.until == WRITE else "stages")
-        print(f"Done in {duration(report['seconds'])}: {made}", file=stream)
-    return EXIT_OK
 
 
 def demo_command(arguments: argparse.Namespace, stream: TextIO) -> int:
@@ -445,9 +346,10 @@ def needed_packages():
         yield
     except ModuleNotFoundError as error:
         if error.name and error.name.split(".")[0] in ("bpy", "numpy", "scipy", "embreex", "OpenEXR"):
+            how = "pip install 'scan-relight[blender]'" if error.name == "bpy" else "pip install scan-relight"
             raise BadInputError(
-                f"The Python package '{error.name}' is missing; install Scan Relight with "
-                "scripts/demo.py or as a Blender extension."
+                f"The Python package '{error.name}' is missing; {how} brings it"
+                f"{'; recover --no-scene does without' if error.name == 'bpy' else ''}."
             ) from error
         raise
 

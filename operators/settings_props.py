@@ -221,7 +221,8 @@ class StageOperator(CaptureOperator):
 
     def run(self, context, until: str, **where) -> list[str]:
         """Run the stages up to `until` here; returns the report's warnings. `where` goes to `bridge.job.run.run`."""
-        from ..addon.bridge.job.run import progress_for, run  # not earlier: Blender's start should not wait for it
+        from ..addon.bridge.job.run import run
+        from ..addon.core.pipeline.run import progress_for  # not earlier: Blender's start should not wait for it
 
         settings = self.settings()
         guard = MemoryGuard(self.memory_limit())

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core.scene.model import Mesh
 from ...core.scene.uv_islands import areas, connected, corner_ids, cut_sparse
-from .uv_overlap import layers, overlapping_pairs
+from ...core.scene.uv_overlap import layers, overlapping_pairs
 
 OVERLAP_TEXELS = 0.02
 """Triangles may penetrate each other by this much; far less than what moves a texel's centre, more than rounding."""

@@ -10,10 +10,11 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.atomic import write_bytes
+from ...core.pipeline.run import WEIGHTS
 from ...core.progress import Progress, ProgressEvent
 from ...core.results.store import Store
 from ...core.settings import Settings
-from ..job.run import WEIGHTS, run
+from ..job.run import run
 from ..light import outside
 from ..light.lamps import find_lamps, set_on
 from ..relight.pictures import beside, can_denoise, shoot

@@ -8,12 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...core.pipeline.refit import REPORT, Refit, open_result
+from ...core.pipeline.run import package_versions, told_in_a_sentence
 from ...core.progress import Progress
 from ...core.results.overrides import OVERRIDES
 from ...core.results.store import Store
 from ...core.stages import READ, WRITE
 from ..scene.write import write_scene
-from .run import told_in_a_sentence, versions
+from .run import versions
 
 SCENE = "scene.blend"
 WEIGHTS = {READ: 1, "surface": 2, "lit_diffuse": 0.1, "shading": 0.1, "specular": 3, WRITE: 5}
@@ -78,7 +79,7 @@ def refit(
             )
         else:
             report["warnings"].append(OUTDATED)
-        report["versions"] = versions()
+        report["versions"] = versions() | package_versions()
         report["refit"] = {"objects": sorted(run.touched), "seconds": round(time.monotonic() - started, 2)}
         store.write_json(REPORT, report)
         progress.done()

@@ -45,9 +45,9 @@ class Content:
 
 def is_capture(folder: Path) -> bool:
     """Whether a folder has the files by which a known format begins; cheap, reads none of them."""
-    from .readers import READERS  # not earlier: interfaces know this module from their start, and readers take numpy
+    from .readers import readers  # not earlier: interfaces know this module from their start, and readers take numpy
 
-    return any(reader.find(folder) for reader in READERS)
+    return any(reader.find(folder) for reader in readers())
 
 
 def is_result(folder: Path) -> bool:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import functools
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
 from ..errors import BadInputError
 from . import colmap, fipt, nerfstudio, replica, scannetpp, traj
-from .layout import Reader
+from .layout import Layout, Reader, Reading
 
+GROUP = "scan_relight.readers"
+"""Entry points of other packages: the name of each is a format's, and it loads a `Reader`."""
 READERS: tuple[Reader, ...] = (
     replica.READER,
     fipt.SYNTHETIC,
@@ -17,6 +21,48 @@ READERS: tuple[Reader, ...] = (
     nerfstudio.READER,
     colmap.READER,
 )
+_registered: dict[str, Reader] = {}
+
+
+def register_reader(reader: Reader) -> None:
+    """Have captures of another format read; it is asked before those that Scan Relight brings.
+
+    One of the same name that was registered before is replaced.
+
+    Raises
+    ------
+    BadInputError
+        Scan Relight brings a format of that name.
+    """
+    if reader.name in {one.name for one in READERS}:
+        raise BadInputError(f"There is a format '{reader.name}' already; give the reader another name.")
+    _registered[reader.name] = reader
+
+
+def readers() -> tuple[Reader, ...]:
+    """All that can be read: what was registered, what other packages bring as entry points, then our own."""
+    taken = {*_registered, *(one.name for one in READERS)}
+    return (*_registered.values(), *(one for one in _of_packages() if one.name not in taken), *READERS)
+
+
+@functools.cache
+def _of_packages() -> tuple[Reader, ...]:
+    return tuple(_loaded(point) for point in entry_points(group=GROUP))
+
+
+def _loaded(point: EntryPoint) -> Reader:
+    """The reader of an entry point; one that fits no folder, and says why when it is asked for, where it is broken."""
+    package = point.dist.name if point.dist is not None else point.value
+    try:
+        name, wants, find, read = point.load()
+        return Reader(point.name, wants, find, read)
+    except Exception as error:  # whatever another package does wrong
+        told = f"The format '{point.name}' can't be loaded from the Python package '{package}' ({error!r}); mend it."
+
+    def refuse(root: Path, reading: Reading) -> Layout:
+        raise BadInputError(told)
+
+    return Reader(point.name, f"nothing, as its package '{package}' is broken", lambda root: False, refuse)
 
 
 def reader_for(root: Path, name: str = "") -> Reader:
@@ -27,13 +73,14 @@ def reader_for(root: Path, name: str = "") -> Reader:
     BadInputError
         No format is called so, or none fits.
     """
+    known = readers()
     if name:
-        for reader in READERS:
+        for reader in known:
             if reader.name == name:
                 return reader
-        raise BadInputError(f"There is no format '{name}'; choose one of {', '.join(r.name for r in READERS)}.")
-    for reader in READERS:
+        raise BadInputError(f"There is no format '{name}'; choose one of {', '.join(r.name for r in known)}.")
+    for reader in known:
         if reader.find(root):
             return reader
-    wanted = "; ".join(f"{reader.wants} ({reader.name})" for reader in READERS)
+    wanted = "; ".join(f"{reader.wants} ({reader.name})" for reader in known)
     raise BadInputError(f"Folder '{root}' holds no capture that is known; it needs one of: {wanted}.")

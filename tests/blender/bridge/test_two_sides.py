@@ -20,10 +20,10 @@ from addon.bridge.data.images import load_image  # noqa: E402
 from addon.bridge.data.materials import make_material  # noqa: E402
 from addon.bridge.data.mesh_objects import make_objects  # noqa: E402
 from addon.bridge.data.unwrap import Polygons, unwrap  # noqa: E402
-from addon.bridge.data.uv_overlap import overlapping_pairs  # noqa: E402
 from addon.bridge.job.run import run  # noqa: E402
 from addon.core.progress import Progress  # noqa: E402
 from addon.core.scene.uv_islands import areas  # noqa: E402
+from addon.core.scene.uv_overlap import overlapping_pairs  # noqa: E402
 
 
 @pytest.mark.parametrize("in_faces", [False, True])

@@ -8,8 +8,8 @@ from addon.core.scene.model import Mesh
 bpy = pytest.importorskip("bpy")
 
 from addon.bridge.data.unwrap import unwrap  # noqa: E402
-from addon.bridge.data.uv_overlap import overlapping_pairs  # noqa: E402
 from addon.core.scene.uv_islands import areas, connected, corner_ids  # noqa: E402
+from addon.core.scene.uv_overlap import overlapping_pairs  # noqa: E402
 
 SIZE = 512
 

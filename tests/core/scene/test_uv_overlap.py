@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.bridge.data.uv_overlap import layers, overlapping_pairs
+from addon.core.scene.uv_overlap import layers, overlapping_pairs
 
 
 def brute_force(uv, depth):

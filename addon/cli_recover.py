@@ -1,0 +1,143 @@
+"""The command `recover`: its options, how a capture is read, with a scene or without."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TextIO
+
+from .cli_refit import add_override
+from .console import duration
+from .core.errors import EXIT_OK, BadInputError
+from .core.stages import RUN_STAGES, WRITE
+from .leash import JsonProgress
+
+UNWRAPS = ("blender", "xatlas", "own")
+"""As `api.UNWRAPS`, which takes numpy."""
+
+
+def add_recover(commands, epilog: str) -> argparse.ArgumentParser:
+    """Add the parser of `recover` to the program's `commands`; its settings come after."""
+    parser = commands.add_parser(
+        "recover",
+        help="recover a capture into a relightable scene",
+        epilog=epilog,
+        description="Recover a capture and write scene.blend, its images and a report. A stopped or repeated run goes "
+        "on from the finished stages in RESULT.",
+    )
+    parser.add_argument(
+        "capture",
+        metavar="CAPTURE",
+        type=Path,
+        help="folder with transforms.json, mesh.ply, info_semantic.json and the frames",
+    )
+    parser.add_argument("--out", metavar="RESULT", type=Path, required=True, help="folder to write, made if missing")
+    add_reading(parser)
+    parser.add_argument(
+        "--until",
+        metavar="STAGE",
+        choices=RUN_STAGES,
+        default=WRITE,
+        help=f"last stage to do: {', '.join(RUN_STAGES)} (default write, which is all)",
+    )
+    parser.add_argument(
+        "--from-stage",
+        metavar="STAGE",
+        choices=RUN_STAGES,
+        help="do this stage and all later ones anew, though they are stored",
+    )
+    parser.add_argument(
+        "--scene",
+        action=argparse.BooleanOptionalAction,
+        default=True,
+        help="also write scene.blend, which takes Blender's bpy (default yes)",
+    )
+    parser.add_argument(
+        "--unwrap",
+        choices=UNWRAPS,
+        default="",
+        help="with --no-scene: what lays out the atlas; own: the mesh's own texture coordinates (default: the first of "
+        "them that is installed)",
+    )
+    add_override(parser)
+    return parser
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """How the capture is to be read, where its folder does not tell: one option for each field of `Reading`."""
+    group = parser.add_argument_group("the capture")
+    group.add_argument(
+        "--format",
+        metavar="NAME",
+        default="",
+        help="its layout, such as nerfstudio (default: found from what the folder holds)",
+    )
+    group.add_argument("--mesh", metavar="FILE", type=Path, help="the mesh, where it is not the format's own")
+    group.add_argument("--outside", action="store_true", help="let its files name others outside of its folder")
+    group.add_argument(
+        "--transfer",
+        metavar="CURVE",
+        default="",
+        help="curve of 8 and 16-bit pictures: srgb, linear, or a gamma such as 2.2",
+    )
+    group.add_argument("--exposures", metavar="CSV", type=Path, help="exposure of each frame: lines of name, exposure")
+    group.add_argument(
+        "--convention", metavar="NAME", default="", help="a correction of all poses, as `info` proposes it"
+    )
+
+
+def reading_from(arguments: argparse.Namespace):
+    """The `Reading` that was asked for."""
+    from .cli import need  # which imports this module
+    from .core.io.layout import Reading
+
+    def import_mesh(path: Path):
+        return need("data.import_mesh").import_mesh(path)  # only now: most captures need no Blender to be read
+
+    return Reading(
+        arguments.format,
+        arguments.mesh,
+        arguments.outside,
+        arguments.transfer,
+        arguments.exposures,
+        arguments.convention,
+        import_mesh,
+    )
+
+
+def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+    """`recover CAPTURE --out RESULT`."""
+    from .cli import console_run, need, needed_packages, settings_from  # which imports this module
+
+    settings = settings_from(arguments)
+    if arguments.unwrap and arguments.scene:
+        raise BadInputError("Option --unwrap goes with --no-scene: the scene is laid out by Blender.")
+    how = {
+        "until": arguments.until,
+        "reading": reading_from(arguments),
+        "from_stage": arguments.from_stage,
+        "override": arguments.override,
+        "heed_kept": not arguments.no_overrides,
+    }
+    with needed_packages():
+        if arguments.scene:
+            run = need("job.run").run
+        else:
+            from .api import run_without_scene as run
+
+            how["unwrap"] = arguments.unwrap
+        from .core.pipeline.run import progress_for
+    with console_run(arguments, stream) as console:
+        report = run(arguments.capture, arguments.out, settings, progress_for(settings, **console), **how)
+    if isinstance(console["listener"], JsonProgress):
+        for warning in report.get("warnings", ()):
+            console["listener"].tell("warning", text=warning)
+        console["listener"].tell(
+            "done", seconds=report["seconds"], result=str(arguments.out.absolute()), until=arguments.until
+        )
+    elif not arguments.quiet:
+        for warning in report.get("warnings", ()):
+            print(f"Warning: {warning}", file=stream)
+        made = "stages" if arguments.until != WRITE else "scene.blend" if arguments.scene else "materials.json"
+        print(f"Done in {duration(report['seconds'])}: {arguments.out / made}", file=stream)
+    return EXIT_OK

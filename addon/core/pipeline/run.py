@@ -1,0 +1,211 @@
+"""A whole run: a capture in, the result folder out, but for the Blender scene, which the caller writes."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..agreement.look import look
+from ..errors import BadInputError, StorageError
+from ..io.conventions import AS_READ
+from ..io.layout import AS_FOUND, Reading
+from ..io.pixels import read_pixels
+from ..memory import peak_memory
+from ..progress import Progress, ProgressEvent
+from ..results.overrides import OVERRIDES, heeded
+from ..results.place import write_capture
+from ..results.room_file import ROOM, write_room
+from ..results.store import Store
+from ..scene.model import Capture
+from ..scene.unwrap import Unwrap
+from ..settings import Settings
+from ..stages import READ, RUN_STAGES, STAGES, WRITE
+from .recover import Recovery
+
+WEIGHTS: dict[str, float] = {READ: 1, "surface": 5, "lit_diffuse": 8, "shading": 17, "specular": 16, WRITE: 5}
+"""Rough cost of the stages, for the estimate of the time left."""
+PACKAGES = ("numpy", "scipy", "embreex", "OpenEXR")
+LEFT_OUT = f"The corrections that the result folder keeps in {OVERRIDES} were left out of this run, as was asked."
+SceneWriter = Callable[[Recovery, Capture], tuple[str, ...]]
+"""Writes the scene of a finished recovery, given the capture with the frames' poses and the mesh as they were found to
+be; gives sentences on what is doubtful."""
+
+
+def progress_for(
+    settings: Settings,
+    listener: Callable[[ProgressEvent], None] | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> Progress:
+    """A `Progress` that knows what the stages of a run cost under `settings`."""
+    return Progress(listener, should_stop, WEIGHTS)
+
+
+def check_run(capture_folder: Path, out_folder: Path, until: str = WRITE, from_stage: str | None = None) -> None:
+    """Raise `BadInputError` for a stage that does not exist and a result folder that is the capture's."""
+    for stage in (until, from_stage):
+        if stage is not None and stage not in RUN_STAGES:
+            raise BadInputError(f"There is no stage '{stage}'; choose one of {', '.join(RUN_STAGES)}.")
+    if out_folder.resolve() == capture_folder.resolve():
+        raise BadInputError(f"Result folder '{out_folder}' is the capture itself; choose another.")
+
+
+class Run:
+    """A run over a capture that was read: its stages, then what they are written as.
+
+    The result folder is its own while it is entered (`with`), and both are done there.
+
+    Parameters
+    ----------
+    capture : Capture
+    out_folder : Path
+        The result folder; made where absent.
+    settings : Settings
+    progress : Progress
+        In the stage `READ`.
+    reading : Reading
+        How the capture was read.
+    override : Path, optional
+        File of what the artist gives (`results.overrides`), merged into what the result folder keeps.
+    heed_kept : bool
+        False leaves out, for this run, what the result folder keeps.
+    versions : mapping of str to str
+        What the report names besides Python and its packages.
+    started : float, optional
+        When it began, by `time.monotonic`; now, unless given.
+
+    Attributes
+    ----------
+    recovery : Recovery
+        Once `stages` was called.
+
+    Raises
+    ------
+    BadInputError
+        What was given can't be heeded, or the poses are surely read wrongly and how they would be right is known.
+    """
+
+    recovery: Recovery
+
+    def __init__(
+        self,
+        capture: Capture,
+        out_folder: Path,
+        settings: Settings,
+        progress: Progress,
+        reading: Reading = AS_FOUND,
+        override: Path | None = None,
+        heed_kept: bool = True,
+        versions: Mapping[str, str] | None = None,
+        started: float | None = None,
+    ):
+        self._started = time.monotonic() if started is None else started
+        self.capture, self.folder = capture, out_folder
+        self._settings, self._progress, self._versions = settings, progress, dict(versions or {})
+        self._keep = override is not None and heed_kept
+        self._given = heeded(out_folder, (one.object_id for one in capture.instances), override, heed_kept)
+        self._told = _look(capture, reading) if capture.frames else []
+        if not heed_kept and (out_folder / OVERRIDES).is_file():
+            self._told = [LEFT_OUT, *self._told]
+
+    def __enter__(self) -> Run:
+        self._store = Store(self.folder)
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._store.close()
+
+    def stages(self, unwrap: Unwrap, until: str = WRITE, from_stage: str | None = None) -> dict[str, Any]:
+        """Do the stages up to `until`, and all from `from_stage` on anew; returns the report of a run that ends there.
+
+        What was written before stays untouched where `until` is `WRITE`: `write` is to follow.
+        """
+        store = self._store
+        with told_in_a_sentence(self.folder):
+            write_capture(store.folder, self.capture.root)
+            if from_stage in STAGES:
+                store.drop(STAGES[STAGES.index(from_stage) :])
+            if self._keep:
+                store.write_json(OVERRIDES, self._given.as_dict())
+            self._progress.done()
+            self.recovery = Recovery(self.capture, store, self._settings, self._progress, unwrap, self._given)
+            for stage in STAGES:
+                getattr(self.recovery, stage)()
+                if stage == until:
+                    break
+            report = self._report(())
+            if until != WRITE:
+                store.write_json("report.json", report)
+            return report
+
+    def write(self, scene: SceneWriter | None = None) -> dict[str, Any]:
+        """Write images, materials.json and the page, what an interface needs, then the scene and report.json."""
+        recovery, store = self.recovery, self._store
+        recovery.store = store
+        with told_in_a_sentence(self.folder):
+            self._progress.stage(WRITE)
+            writing = time.monotonic()
+            recovery.look_closer()
+            # A stopped run must not leave the last one's among new images.
+            for name in ("report.json", "scene.blend", ROOM):
+                store.path(name).unlink(missing_ok=True)
+            recovery.write_images()
+            self._progress.update(0.7)
+            # The scene gets the mesh whose normals face the frames: its lamps shine on that side. And the one that the
+            # materials were measured on: their colours fit its normals.
+            posed = replace(self.capture, frames=recovery.room_poses().of(self.capture.frames))
+            write_room(store.folder, posed, recovery.surface().first_uv)
+            warnings = () if scene is None else scene(recovery, replace(posed, mesh=recovery.written_mesh()))
+            self._progress.done()
+            figures = {"seconds": round(time.monotonic() - writing, 2), "stored": False}
+            report = self._report(warnings, {WRITE: figures | {"peak_memory_bytes": peak_memory()}})
+            store.write_json("report.json", report)
+            return report
+
+    def _report(self, warnings: tuple[str, ...], stages: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        report = self.recovery.report()
+        report["stages"] |= stages or {}
+        report["warnings"] += (*self._told, *warnings)
+        report["versions"] = self._versions | package_versions()
+        report["peak_memory_bytes"] = peak_memory()
+        report["seconds"] = round(time.monotonic() - self._started, 2)
+        return report
+
+
+def _look(capture: Capture, reading: Reading) -> list[str]:
+    """Sentences on what does not fit between frames and mesh; none where all does.
+
+    Raises
+    ------
+    BadInputError
+        The poses are surely read wrongly, and how they would be right is known.
+    """
+    found = look(capture, read_pixels, search=not reading.convention)
+    if found.best is not None:
+        raise BadInputError(
+            f"Capture '{capture.root}': {found.sentence()} Give that, or --convention {AS_READ} to go on all the same."
+        )
+    return found.sentences()[found.fits :]
+
+
+@contextmanager
+def told_in_a_sentence(folder: Path) -> Iterator[None]:
+    """Turn what the system refuses while `folder` is written into one sentence."""
+    try:
+        yield
+    except OSError as error:
+        where = f" for '{error.filename}'" if error.filename else ""
+        raise StorageError(
+            f"Result folder '{folder}' can't be written any more ({error.strerror or error}{where}); "
+            "free some space or choose another."
+        ) from error
+
+
+def package_versions() -> dict[str, str]:
+    """Python and the packages that a report names, so that a run can be repeated."""
+    return {"python": platform.python_version(), **{name: importlib.metadata.version(name) for name in PACKAGES}}
