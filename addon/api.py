@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from .core.brdf.emitter import EMITTER
+from .core.brdf.material import ObjectMaterial
 from .core.errors import BadInputError, InterruptedRun, ScanRelightError
 from .core.io.layout import AS_FOUND, Layout, RawMesh, Reader, Reading
 from .core.io.read import read_capture
 from .core.io.readers import register_reader
-from .core.material import EMITTER, ObjectMaterial
 from .core.pipeline.run import Run, SceneWriter, check_run, progress_for
 from .core.progress import Progress, ProgressEvent
 from .core.scene.model import Camera, Capture, Frame, Mesh
@@ -138,7 +139,7 @@ class Recovered:
     @property
     def lamps(self) -> list[ObjectMaterial]:
         """Those of the objects that give light; `emission` is the radiance that they give, linear Rec.709."""
-        return [material for material in self.materials if material.model == EMITTER]
+        return [material for material in self.materials if material.model is EMITTER]
 
     @property
     def mesh(self) -> Mesh:
