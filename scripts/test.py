@@ -11,7 +11,7 @@ import sys
 
 from environment import hand_over, prepare
 
-QUICK = ["-m", "not slow and not hard_case"]
+QUICK = ["-m", "not slow and not hard_case", "--ignore=tests/window"]
 
 if __name__ == "__main__":
     words = [word for word in sys.argv[1:] if word != "--quick"]

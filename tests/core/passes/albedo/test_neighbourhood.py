@@ -21,13 +21,9 @@ def atlas():
     return make_room([quad((0, 0, 0), (3, 0, 0), (0, 3, 0), 0)], 0.05).atlas
 
 
-def run(atlas, rho, error):
-    return steadied(atlas, np.arange(len(atlas)), rho.astype(np.float32), error.astype(np.float32))[0]
-
-
-def alone(steady, *_):
-    """In the place of `drawn_to_minority`."""
-    return steady
+def run(atlas, rho, error, without=()):
+    own = np.arange(len(atlas))
+    return steadied(atlas, own, rho.astype(np.float32), error.astype(np.float32), without=without)[0]
 
 
 def grey(values):
@@ -97,7 +93,7 @@ def blotch(atlas, size):
     return inside, poor
 
 
-def test_errors_that_neighbours_share_lose_their_say_further_out(monkeypatch):
+def test_errors_that_neighbours_share_lose_their_say_further_out():
     """A blotch of light that is 10 % off, as wide as the nearest neighbourhood, on a wall measured to 15 %."""
     wall = make_room([quad((0, 0, 0), (3, 0, 0), (0, 3, 0), 0)], 0.03).atlas
     inside, _ = blotch(wall, 0.5)
@@ -106,12 +102,11 @@ def test_errors_that_neighbours_share_lose_their_say_further_out(monkeypatch):
     rho[inside] *= 1.1
     error = np.where(poor, POOR, 0.15)
     wide = np.median(run(wall, rho, error)[poor])
-    monkeypatch.setattr(neighbourhood, "ALIKE", 0)
-    near = np.median(run(wall, rho, error)[poor])
+    near = np.median(run(wall, rho, error, without=("wide-prior",))[poor])
     assert abs(wide / 0.5 - 1) < 0.03 and near / 0.5 - 1 > 0.05
 
 
-def test_surroundings_that_differ_are_left_out(monkeypatch):
+def test_surroundings_that_differ_are_left_out():
     """A dark square no larger than that on a bright wall: what is in doubt in it stays dark."""
     wall = make_room([quad((0, 0, 0), (3, 0, 0), (0, 3, 0), 0)], 0.03).atlas
     _, poor = blotch(wall, 0.2)
@@ -119,10 +114,7 @@ def test_surroundings_that_differ_are_left_out(monkeypatch):
     noise = np.exp(np.random.default_rng(0).normal(0, 0.03, (len(wall), 3)))
     rho, error = grey(np.where(inside, 0.2, 0.6)) * noise, np.where(poor, POOR, GOOD)
     assert np.allclose(run(wall, rho, error)[poor], 0.2, rtol=0.1)
-    monkeypatch.setattr(neighbourhood, "drawn_to_minority", alone)
-    assert np.allclose(run(wall, rho, error)[poor], 0.2, rtol=0.1)
-    monkeypatch.setattr(neighbourhood, "ALIKE", np.inf)
-    assert np.median(run(wall, rho, error)[poor]) > 0.4
+    assert np.allclose(run(wall, rho, error, without=("second-colour",))[poor], 0.2, rtol=0.1)
 
 
 def test_stripes_on_a_ground_that_covers_more_stay(atlas):
