@@ -18,7 +18,7 @@ from .panel import SidebarPanel
 
 GROUPS = (
     ("Capture", ("denoise_mesh", "refine_poses")),
-    ("Texture", ("texel_size", "detail", "atlas_size", "atlas", "median", "sharpen", "frame_order")),
+    ("Texture", ("texel_size", "detail", "atlas_size", "atlas", "median", "sharpen")),
     ("Light", ("shading", "shading_rays", "emitter_rays", "portal_rays", "interpolate", "mirrors")),
     ("Highlights", ("specular", "specular_rays", "refine")),
     ("Computer", ("threads", "seed")),

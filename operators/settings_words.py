@@ -60,14 +60,6 @@ WORDS = {
     "sharpen": Words(
         "Sharpen", "Give the texture back the detail that averaging has blurred; reads the frames once more"
     ),
-    "frame_order": Words(
-        "Frame Order",
-        "In which order the frames are taken",
-        {
-            "shuffled": ("Shuffled", "In an order that is mixed, and the same every time"),
-            "capture": ("As Filmed", "In the order of the video, as in the paper"),
-        },
-    ),
     "shading": Words(
         "Light Rays",
         "Where rays go that look for light",

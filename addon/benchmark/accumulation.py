@@ -17,6 +17,7 @@ from ..core.io.read import read_capture
 from ..core.lit_diffuse.accumulate import accumulate
 from ..core.memory import peak_memory
 from ..core.parallel import ordered_map
+from ..core.pipeline.published.frames import lit_diffuse
 from ..core.scene.atlas import Atlas
 from ..core.scene.lit_diffuse import LitDiffuse
 from ..core.scene.model import Frame, Mesh, Pixels
@@ -33,11 +34,7 @@ FRAMES = (12, 48, 192)
 SCRATCH = "tmp-accumulation-"
 SIZE, ELEMENTS = (192, 128), 60_000
 LARGE_FRAMES, LARGE_SIZE, LARGE_ELEMENTS = 500, (1152, 768), 2_000_000
-ALTERNATIVES = {
-    "p2 (paper)": (PAPER.median, PAPER.frame_order),
-    "exact": ("exact", "shuffled"),
-    "default": (Settings().median, Settings().frame_order),
-}
+ALTERNATIVES = {"p2 (paper)": PAPER.median, "exact": "exact", "default": Settings().median}
 COLUMNS = ("capture", "frames", "elements", "alternative", BASELINE, "RMS log error", "seconds", "CPU seconds",
            "against the least", "observations", "rays")  # fmt: skip
 
@@ -110,26 +107,29 @@ def _captured(folder: Path) -> Scene | None:
     return Scene(name, surface.mesh, surface.atlas, surface.scene, capture.frames, read_pixels)
 
 
-def _accumulate(scene: Scene, median: str, order: str, options: Options, rays: RayScene | None = None) -> LitDiffuse:
+def _accumulate(scene: Scene, median: str, options: Options, rays: RayScene | None = None) -> LitDiffuse:
+    if median == PAPER.median:
+        where = scene.mesh, scene.atlas, rays or scene.rays, scene.frames, scene.read
+        return lit_diffuse(*where, threads=options.threads)
     with tempfile.TemporaryDirectory(dir=options.out, prefix=SCRATCH) as folder:
         return accumulate(
             scene.mesh, scene.atlas, rays or scene.rays, scene.frames, scene.read,
-            median=median, order=order, seed=options.seed, threads=options.threads, folder=Path(folder),
+            median=median, seed=options.seed, threads=options.threads, folder=Path(folder),
         )  # fmt: skip
 
 
 def _rows(scene: Scene, options: Options) -> list[tuple]:
     """Reading, rays, their sum and every alternative, of one scene."""
     counted = CountedRays(scene.mesh)
-    exact = _accumulate(scene, "exact", "capture", options, counted)
+    exact = _accumulate(scene, "exact", options, counted)
     functions = {
         "reading": lambda: sum(1 for _ in ordered_map(scene.read, scene.frames, options.threads)),
         "rays": lambda: sum(
             1 for _ in ordered_map(lambda asked: scene.rays.occluded(*asked), counted.asked, options.threads)
         ),
     }
-    for name, (median, order) in ALTERNATIVES.items():
-        functions[name] = lambda median=median, order=order: _accumulate(scene, median, order, options)
+    for name, median in ALTERNATIVES.items():
+        functions[name] = lambda median=median: _accumulate(scene, median, options)
     times = alternately(functions, repeats=2 if len(scene.frames) > FRAMES[0] else 3)
     least = Timing(
         times["reading"].seconds + times["rays"].seconds, times["reading"].cpu_seconds + times["rays"].cpu_seconds, None

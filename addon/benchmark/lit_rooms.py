@@ -127,7 +127,7 @@ def make_room(name: str, elements: int, seed: int, threads: int = 0) -> LitRoom:
     for bounce in range(BOUNCES):
         field = LightField(mesh, atlas, scene, radiance, sky, list(emitted))
         E, _, _, _ = irradiance(
-            field, np.arange(len(atlas)), sampler="aimed", rays=64, emitter_rays=32, portal_rays=32, interpolate=True,
+            field, np.arange(len(atlas)), rays=64, emitter_rays=32, portal_rays=32, interpolate=True,
             finest=finest, threads=threads, seed=seed + bounce,
         )  # fmt: skip
         radiance = own + albedo * E / np.float32(np.pi)

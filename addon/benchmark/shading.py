@@ -9,8 +9,9 @@ import numpy as np
 from ..core.light.directions import cosine_hemisphere, shifted, sobol
 from ..core.light.emitters import bright_triangles
 from ..core.light.field import LightField
-from ..core.light.irradiance import direct, gather, uniform
+from ..core.light.irradiance import direct, gather
 from ..core.light.portals import find_portals
+from ..core.paper.irradiance import irradiance as uniform
 from ..core.paper.irradiance import uniform_hemisphere
 from ..core.parallel import for_blocks
 from ..core.scene.tangent_frame import to_world
@@ -118,7 +119,10 @@ def _alternatives(room: LitRoom, seed: int) -> dict[str, tuple[tuple[int, ...], 
         return lambda field, p, n, rays, seed: _by_pattern(field, p, n, rays, seed, kind)
 
     return {
-        "uniform": ((*PAPER[:1], 1000, *PAPER[1:]), lambda f, p, n, rays, seed: uniform(f, p, n, rays, seed)[0]),
+        "uniform": (
+            (*PAPER[:1], 1000, *PAPER[1:]),
+            lambda f, p, n, rays, seed: uniform(f, p, n, rays, threads=1, seed=seed)[0],
+        ),
         "uniform, Sobol": ((128, 1024, 8192), pattern("uniform, Sobol")),
         "cosine": ((64, 512, 4096), pattern("cosine, random")),
         "cosine, Sobol": ((16, 64, 256, 1024, 4096), pattern("cosine, Sobol")),

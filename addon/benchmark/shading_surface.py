@@ -9,6 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..core.light.over_surface import finest_spacing, irradiance
+from ..core.paper.irradiance import irradiance as uniform
 from ..core.scene.atlas import Atlas
 from ..core.settings import Settings
 from .lit_rooms import LitRoom, make_room
@@ -26,12 +27,12 @@ BAKE_SAMPLES = (4, 16)
 
 def _setting(**changes) -> dict:
     s = Settings()
-    return {"sampler": "aimed", "rays": s.shading_rays, "emitter_rays": s.emitter_rays, "portal_rays": s.portal_rays,
+    return {"rays": s.shading_rays, "emitter_rays": s.emitter_rays, "portal_rays": s.portal_rays,
             "interpolate": True} | changes  # fmt: skip
 
 
 WAYS = {
-    "uniform, each texel": _setting(sampler="uniform", rays=PAPER_RAYS, interpolate=False),
+    "uniform, each texel": {"rays": PAPER_RAYS},
     "aimed, each texel, few rays": _setting(rays=16, emitter_rays=8, portal_rays=8, interpolate=False),
     "the same, smoothed": _setting(rays=16, emitter_rays=8, portal_rays=8, interpolate=False),
     "aimed, each texel": _setting(interpolate=False),
@@ -53,6 +54,9 @@ def smoothed(atlas: Atlas, E: np.ndarray) -> np.ndarray:
 def over(room: LitRoom, way: str, options: Options) -> tuple[np.ndarray, int]:
     """E of every element but the lamps' in one of the `WAYS`, and at how many places the hemisphere was gathered."""
     atlas = room.atlas
+    if way == PAPER_WAY:
+        how = {"threads": options.threads, "seed": options.seed}
+        return uniform(room.field, atlas.position, atlas.normal, **WAYS[way], **how)[0], len(atlas)
     E, _, points, _ = irradiance(
         room.field, np.arange(len(atlas)), **WAYS[way], finest=finest_spacing(atlas), threads=options.threads,
         seed=options.seed,

@@ -19,6 +19,7 @@ from ..core.light.emitters import bright_triangles
 from ..core.light.environment import Environment
 from ..core.light.field import LightField
 from ..core.light.lobes import GRID, LobeLight, reflected_light
+from ..core.paper.fit import fit_lobe
 from ..core.paper.irradiance import uniform_hemisphere
 from ..core.passes.specular.models import choose_model
 from ..core.scene.tangent_frame import to_world
@@ -144,30 +145,22 @@ def _measure(options: Options) -> Iterator[tuple]:
                 for name, rival in RIVALS.items():
                     light, seconds = lights[rival.rays, rival.sampler, len(rival.grid)]
                     problem = scene.problem(radiance, usable, light, rival)
-                    timing = once(lambda p=problem, r=rival: _fit(p, r))
+                    timing = once(lambda p=problem, r=rival: _fit(*p, r))
                     found_phi, found_f0 = timing.value
                     off = abs(np.log(max(found_f0, 1e-9) / f0))
-                    share = len(problem.element) / len(scene.element)
+                    share = len(problem[0].element) / len(scene.element)
                     yield (case_name, name, phi, f0, abs(np.sqrt(found_phi) - np.sqrt(phi)), min(off, np.log(10)),
                            seconds * share + timing.cpu_seconds)  # fmt: skip
         options.progress.update((done + 1) / len(phis))
 
 
-def _fit(problem: Problem, rival: Rival) -> tuple[float, float]:
-    """phi and F0, as the product finds them."""
+def _fit(problem: Problem, lit_diffuse: np.ndarray, rival: Rival) -> tuple[float, float]:
+    """phi and F0, as the product finds them; L_d of each observation is what the paper's way takes off."""
     if rival.way == "target":
-        return _plain(problem)
+        lobe = fit_lobe(problem.light.A, problem.light.B, problem.radiance - lit_diffuse, problem.light.grid)
+        return lobe.phi, lobe.psi
     fit = choose_model(problem).fit
     return (fit.phi, float(fit.psi.mean())) if fit is not None else (0.25, 0.04)
-
-
-def _plain(problem: Problem) -> tuple[float, float]:
-    """The paper's nested least squares (sec. 3.4), without robust weights: psi for each phi, the best phi."""
-    A, B = (x.transpose(1, 0, 2).reshape(len(problem.light.grid), -1) for x in (problem.light.A, problem.light.B))
-    r = (problem.radiance - problem.lit_diffuse).ravel() - B
-    psi = np.clip((A * r).sum(1) / np.maximum((A * A).sum(1), 1e-30), 0, 1)
-    best = int(np.argmin(((r - psi[:, None] * A) ** 2).sum(1)))
-    return float(problem.light.grid[best]), float(psi[best])
 
 
 class Scene:
@@ -227,8 +220,10 @@ class Scene:
         brightest = radiance.max(1)
         return radiance, (brightest < 2 * np.median(brightest)) | (not case.clipped)
 
-    def problem(self, radiance: np.ndarray, usable: np.ndarray, light: LobeLight, rival: Rival) -> Problem:
-        """The rival's part of the observations; L_d is the median of each element's, as the product has it."""
+    def problem(
+        self, radiance: np.ndarray, usable: np.ndarray, light: LobeLight, rival: Rival
+    ) -> tuple[Problem, np.ndarray]:
+        """The rival's part of the observations, and L_d of each: the median of its element's."""
         names, group = np.unique(self.element, return_inverse=True)
         median = np.stack([np.median(radiance[(group == g) & usable], axis=0) if (usable & (group == g)).any()
                            else np.zeros(3) for g in range(len(names))])  # fmt: skip
@@ -243,8 +238,8 @@ class Scene:
         else:
             counts = np.bincount(group[chosen], minlength=len(names))
             chosen &= counts[group] >= 3
-        whole = Problem(self.element, radiance, median[group], light, self.direction[:, 2])
-        return whole.part(chosen)
+        whole = Problem(self.element, radiance, light, self.direction[:, 2])
+        return whole.part(chosen), median[group][chosen]
 
     def _by_rays(self, position, direction, rays: int, grid: np.ndarray, uniform: bool):
         """A and B by uniform rays for a whole grid, or by normals drawn from GGX's distribution for its one phi."""

@@ -32,14 +32,14 @@ class Settings:
         in your own scene.
     median : str
         'adaptive' (exact for short videos, batched beyond), 'batched' (exact for a spot's first 20 observations, close
-        beyond, in fixed memory), 'exact' (all observations go to disk), 'p2' (the paper's P-square) or 'mean'.
+        beyond, in fixed memory), 'exact' (all observations go to disk), 'p2' (as in the paper: P-square over all
+        observations, in the order of the video) or 'mean'.
     sharpen : bool
         Put back onto the lit diffuse texture what its blur took from it and the frames still show; one more look at
         every frame.
-    frame_order : str
-        'shuffled' (fixed pseudo-random order) or 'capture' (video order, the paper's).
     shading : str
-        'aimed' (cosine rays, and rays aimed at bright triangles) or 'uniform' (the paper's uniform hemisphere).
+        'aimed' (cosine rays, and rays aimed at bright triangles) or 'uniform' (as in the paper: uniform rays at each
+        surface element, no other light than what frames saw, albedo as the quotient has it).
     shading_rays : int
         Gather rays for each shading point.
     emitter_rays : int
@@ -49,14 +49,15 @@ class Settings:
     interpolate : bool
         Gather where the indirect light changes and interpolate between; False gathers at each element.
     mirrors : bool
-        Find flat mirrors and follow light over them; False takes what they show for L_d (the paper).
+        Find flat mirrors and follow light over them; False takes what they show for L_d.
     specular : str
-        'frames' (several frames at once) or 'target' (the paper's one target frame).
+        'frames' (several frames at once, and a choice of model) or 'target' (as in the paper: a lobe for each object,
+        from one target frame).
     specular_rays : int
         Rays for each observation in the specular fit.
     refine : int
         Rounds after the fit: 1 takes the fitted specular out of the lit diffuse texture; 2 also lights the room with
-        what glossy things really reflect; 0 leaves both (the paper).
+        what glossy things really reflect; 0 leaves both.
     coat : bool
         Give objects of which too little was seen to look for a highlight a plausible dielectric's coat in the scene.
     threads : int
@@ -75,7 +76,6 @@ class Settings:
     refine_poses: bool = True
     median: str = "adaptive"
     sharpen: bool = True
-    frame_order: str = "shuffled"
     shading: str = "aimed"
     shading_rays: int = 128
     emitter_rays: int = 32
@@ -93,7 +93,6 @@ class Settings:
     CHOICES = {
         "atlas": (ROOM, "object", "udim"),
         "median": ("adaptive", "batched", "exact", "p2", "mean"),
-        "frame_order": ("shuffled", "capture"),
         "shading": ("aimed", "uniform"),
         "specular": ("frames", "target"),
     }
@@ -112,13 +111,19 @@ class Settings:
         if self.shading_rays < 1 or self.specular_rays < 1 or self.atlas_size < 64:
             raise BadInputError("Settings shading_rays and specular_rays must be at least 1, atlas_size at least 64.")
 
+    @property
+    def published(self) -> frozenset[str]:
+        """The stages that are done as in the paper, and by nothing else."""
+        chosen = {"lit_diffuse": self.median == "p2", "shading": self.shading == "uniform",
+                  "specular": self.specular == "target"}  # fmt: skip
+        return frozenset(stage for stage, wanted in chosen.items() if wanted)
+
 
 PAPER = Settings(
     denoise_mesh=False,
     refine_poses=False,
     median="p2",
     sharpen=False,
-    frame_order="capture",
     shading="uniform",
     shading_rays=10000,
     emitter_rays=0,
@@ -126,10 +131,11 @@ PAPER = Settings(
     interpolate=False,
     mirrors=False,
     specular="target",
+    specular_rays=10000,
     refine=0,
     coat=False,
 )
-"""Haefner et al. 2021: P-square in video order, uniform rays, one target frame."""
+"""Haefner et al. 2021 and nothing else: `paper/`."""
 DRAFT = Settings(detail=0.5, sharpen=False, shading_rays=48, emitter_rays=16, portal_rays=16, specular_rays=96)
 """A first look: texels of two pixels' edge, few rays."""
 FINE = Settings(detail=1.5, shading_rays=384, emitter_rays=64, portal_rays=96, specular_rays=512)

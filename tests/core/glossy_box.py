@@ -101,4 +101,4 @@ class Box:
             seen = seen + np.asarray(psi) * A + B
         seen = seen * np.exp(np.random.default_rng(seed).normal(0, noise, (m, 3)))
         light = reflected_light(self.field, self.bright, element, direction, rays=rays, threads=2, seed=seed)
-        return Problem(element, seen, np.array(diffuse, float), light, direction[:, 2])
+        return Problem(element, seen, light, direction[:, 2])

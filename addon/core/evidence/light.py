@@ -123,7 +123,7 @@ def light_evidence(
     """
     atlas = field.atlas
     chosen, nearest = spots(atlas, lit.seen, SPOTS, seed)
-    how = {"sampler": "aimed", "interpolate": False, "finest": 1.0, "threads": threads}
+    how = {"interpolate": False, "finest": 1.0, "threads": threads}
     kept = np.log(np.maximum(shading.irradiance[chosen].mean(1), 1e-20))
     again = [irradiance(field, chosen, **RAYS, **how, seed=seed + 100_003 * (k + 1))[0].mean(1) for k in range(2)]
     a, b = (np.clip(np.log(np.maximum(E, 1e-20)) - kept, -WORST, WORST) for E in again)

@@ -19,8 +19,6 @@ class Problem:
         Group of each observation: those of one surface element.
     radiance : (m, 3) float
         I.
-    lit_diffuse : (m, 3) float
-        L_d of the element; what 'target' takes as I_d.
     light : LobeLight
         A and B of each observation.
     cosine : (m,) float32
@@ -31,7 +29,6 @@ class Problem:
 
     element: np.ndarray
     radiance: np.ndarray
-    lit_diffuse: np.ndarray
     light: LobeLight
     cosine: np.ndarray
     without: frozenset[str] = frozenset()
@@ -39,7 +36,7 @@ class Problem:
     def part(self, chosen: np.ndarray) -> Problem:
         """The observations `chosen` ((m,) bool)."""
         return Problem(
-            self.element[chosen], self.radiance[chosen], self.lit_diffuse[chosen], self.light.part(chosen),
+            self.element[chosen], self.radiance[chosen], self.light.part(chosen),
             self.cosine[chosen], self.without,
         )  # fmt: skip
 
@@ -64,13 +61,11 @@ class Layout:
     Parameters
     ----------
     problem : Problem
-    free : bool
-        Whether each element's diffuse part is solved for; else it is L_d.
 
     Attributes
     ----------
     I : (3, 1, v, g) float32
-        Radiance, less L_d where the diffuse part is not free, over the element's own level: noise and misregistration
+        Radiance over the element's own level: noise and misregistration
         grow with radiance.
     there : (v, g) float32
         1 where there is an observation, else 0.
@@ -82,8 +77,8 @@ class Layout:
         phi of the lobes.
     """
 
-    def __init__(self, problem: Problem, free: bool = True):
-        self.free, self.count, self.grid = free, len(problem.element), problem.light.grid
+    def __init__(self, problem: Problem):
+        self.count, self.grid = len(problem.element), problem.light.grid
         self.without = problem.without
         order = np.argsort(problem.element, kind="stable")
         _, start, views = np.unique(problem.element[order], return_index=True, return_counts=True)
@@ -96,11 +91,8 @@ class Layout:
         mean = np.bincount(group, problem.radiance[order].mean(1), shape[1]) / views
         # with a floor at a tenth of the object's level
         self._level = level = np.maximum(mean, 0.1 * np.median(mean) + 1e-12).astype(np.float32)
-        self.inflate = np.ones(shape[1], np.float32)
-        if free:
-            self.inflate = np.sqrt(views / np.maximum(views - 1, 1)).astype(np.float32)
-        diffuse = 0 if free else problem.lit_diffuse
-        self.I = self._laid((problem.radiance - diffuse).T)[:, None] / level
+        self.inflate = np.sqrt(views / np.maximum(views - 1, 1)).astype(np.float32)
+        self.I = self._laid(problem.radiance.T)[:, None] / level
         self._grazing = (1 - self._laid(problem.cosine)) ** 2
         light = problem.light
         A, B, dA, dB = (self._laid(x.T) / level for x in (light.A, light.B, light.A_noise, light.B_noise))
@@ -126,9 +118,9 @@ class Layout:
         return result.reshape(*values.shape[:-1], *self._shape)
 
     def darkening(self, kappa: float | tuple[float, ...]) -> np.ndarray:
-        """t of the diffuse part for each kappa, (k, v, g); 0 where the diffuse part is not free."""
+        """t of the diffuse part for each kappa, (k, v, g)."""
         kappa = np.atleast_1d(np.float32(kappa))[:, None, None]
-        return (1 - kappa * self._grazing) * np.float32(self.free)
+        return 1 - kappa * self._grazing
 
     def at(self, phi: float) -> slice:
         """The phi of the grid next to this one."""
@@ -147,7 +139,7 @@ class Layout:
     def part(self, chosen: np.ndarray) -> Layout:
         """The same for some elements, (g,) bool."""
         part = object.__new__(Layout)
-        part.free, part.grid, part.without = self.free, self.grid, self.without
+        part.grid, part.without = self.grid, self.without
         part.there, part.inflate, part.I = self.there[:, chosen], self.inflate[chosen], self.I[..., chosen]
         part._grazing = self._grazing[:, chosen]
         part.count = int(part.there.sum())

@@ -1,10 +1,10 @@
-"""Fit of phi and psi: grid search in phi, nested least squares in psi (Haefner et al. 2021, sec. 3.4).
+"""Fit of phi and psi to several frames at once: grid search in phi, nested least squares in psi.
 
-Two ways. 'target': the paper's, one frame, I - L_d against psi A + B. 'frames': several frames at once; what does not
-change from view to view, the diffuse part, is taken out of each element by least squares over the views, so that a
-median that still holds a broad lobe does not bias the fit. A diffuse part under a glossy coat darkens towards grazing
-views, where the coat reflects more; 'frames' lets it: D t(n.wo), t = 1 - kappa (1 - n.wo)^2. Without it a floor's
-highlights were half hidden by that darkening (living room: cost 0.90 of the Lambertian's without kappa, 0.78 with).
+The published fit (`paper.fit`) takes one frame and I - L_d. Here what does not change from view to view, the diffuse
+part, is taken out of each element by least squares over the views, so that a median that still holds a broad lobe does
+not bias the fit. A diffuse part under a glossy coat darkens towards grazing views, where the coat reflects more:
+D t(n.wo), t = 1 - kappa (1 - n.wo)^2. Without it a floor's highlights were half hidden by that darkening (living room:
+cost 0.90 of the Lambertian's without kappa, 0.78 with).
 
 The regressor A is noisy, as it comes of few rays. Least squares would take that noise for signal: it draws psi to 0,
 and makes whatever phi has the noisier A look worse. A and B come from two independent halves of the rays, so that the
@@ -168,30 +168,26 @@ def robust_scale(size: np.ndarray) -> float:
     return max(1.4826 * float(np.median(size)), 1e-4)
 
 
-def fit_lobe(
-    problem: Problem | Layout, way: str = "frames", constraints: Constraints = FREE, psi: np.ndarray | None = None
-) -> LobeFit:
+def fit_lobe(problem: Problem | Layout, constraints: Constraints = FREE, psi: np.ndarray | None = None) -> LobeFit:
     """Best phi, with its psi.
 
     Parameters
     ----------
     problem : Problem, or its Layout where several fits are made
-    way : str
-        'frames' or 'target'.
     constraints : Constraints
         Of psi, as the model has them.
     psi : (3,) float, optional
         Given: phi alone is sought.
     """
-    layout = problem if isinstance(problem, Layout) else Layout(problem, way == "frames")
+    layout = problem if isinstance(problem, Layout) else Layout(problem)
     how = {"constraints": constraints, "psi": psi}
-    kappas = KAPPAS if layout.free and "grazing" not in layout.without else (0.0,)
+    kappas = KAPPAS if "grazing" not in layout.without else (0.0,)
     flat = solve(layout, None, kappas, 1.0).size
     scale = robust_scale(layout.seen(flat[0]))
     kappa = kappas[len(kappas) // 2]
     # phi at a middling kappa, kappa at that phi, phi again; and the scale from the fit, or every outlier of the poor
     # start would count as noise.
-    for _ in range(2 if layout.free else 1):
+    for _ in range(2):
         costs = solve(layout, slice(None), kappa, scale, **how).total
         best = int(np.argmin(costs))
         by_kappa = solve(layout, slice(best, best + 1), kappas, scale, **how)

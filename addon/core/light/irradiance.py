@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..paper.irradiance import uniform_hemisphere
-from ..scene.tangent_frame import to_world
 from .directions import PATTERNS, cosine_patterns, shifted, sobol, turned
 from .emitters import BrightTriangles, aimed_at, sample_bright
 from .field import LightField
@@ -196,29 +194,3 @@ def direct(
         weight[:, emitter_rays // 2 :] *= -1
         noise[part] = BOTH_HALVES * np.abs(np.matmul(weight[:, None], shown)[:, 0]).mean(1)
     return total, noise
-
-
-def uniform(
-    field: LightField, position: np.ndarray, normal: np.ndarray, rays: int, seed: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """The paper's estimator: `rays` independent uniform directions; E = 2 pi / N * sum of L <w, n> (eq. 3 and 4).
-
-    Returns
-    -------
-    irradiance : (n, 3) float32
-    escaped : (n,) float32
-    """
-    rng = np.random.default_rng(seed)
-    total = np.zeros((len(position), 3), np.float32)
-    escaped = np.zeros(len(position), np.float32)
-    step = max(RAYS_AT_ONCE // rays, 1)
-    for start in range(0, len(position), step):
-        part = slice(start, start + step)
-        p, n = position[part], normal[part]
-        local = uniform_hemisphere(rng.random((len(p), rays, 2), np.float32))
-        directions = to_world(local, n).reshape(-1, 3)
-        radiance, _, element = field.along(np.repeat(field.scene.off_surface(p, n), rays, 0), directions)
-        weighted = radiance.reshape(len(p), rays, 3) * local[..., 2:3]
-        total[part] = np.float32(2 * np.pi / rays) * weighted.sum(1)
-        escaped[part] = (element < 0).reshape(len(p), rays).mean(1)
-    return total, escaped

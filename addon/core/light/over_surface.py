@@ -12,7 +12,7 @@ from ..scene.atlas import Atlas
 from .emitters import bright_triangles
 from .field import LightField
 from .interpolate import interpolated
-from .irradiance import direct, gather, uniform
+from .irradiance import direct, gather
 from .less_noise import less_noise
 from .portals import find_portals
 from .sun import Sun, sunlight
@@ -42,7 +42,6 @@ def irradiance(
     field: LightField,
     element: np.ndarray,
     *,
-    sampler: str,
     rays: int,
     emitter_rays: int,
     portal_rays: int,
@@ -59,8 +58,6 @@ def irradiance(
     ----------
     element : (m,) int
         The elements wanted.
-    sampler : str
-        'aimed' or 'uniform' (the paper's).
     finest : float
         Least distance of two gathering points in metres.
     smooth : bool
@@ -77,10 +74,9 @@ def irradiance(
     """
     atlas = field.atlas
     position, normal = atlas.position[element], atlas.normal[element]
-    aimed = sampler == "aimed"
     bright = bright_triangles(field)
-    lamp_rays = emitter_rays if aimed and len(bright) else 0
-    portals = find_portals(field, seed) if aimed and portal_rays else None
+    lamp_rays = emitter_rays if len(bright) else 0
+    portals = find_portals(field, seed) if portal_rays else None
     steps = {"count": 0}
     gathering, aiming = Rounds(progress, 0.0, 0.75), Rounds(progress, 0.75, 1.0)
 
@@ -92,25 +88,21 @@ def irradiance(
         def run(part: slice) -> None:
             at = index[part]
             here = seed + 7919 * steps["count"] + part.start
-            if aimed:
-                found = gather(field, bright, position[at], normal[at], rays, lamp_rays, here, portals, portal_rays)
-                value[part, :3], radius[part], value[part, 3] = found
-            else:
-                value[part, :3], value[part, 3] = uniform(field, position[at], normal[at], rays, here)
+            found = gather(field, bright, position[at], normal[at], rays, lamp_rays, here, portals, portal_rays)
+            value[part, :3], radius[part], value[part, 3] = found
 
         for_blocks(run, len(index), max(ELEMENTS_AT_ONCE * 64 // rays, 64), threads, gathering)
         gathering.next()
         return value, radius
 
-    cached = interpolate and aimed
     blocks = TexelBlocks(atlas, element, threads)
-    step = block_step(atlas) if cached else 1
+    step = block_step(atlas) if interpolate else 1
     points = 0
 
     def around(index: np.ndarray) -> np.ndarray:
         """E, the escaped share and the contrast, (k, 5) float32."""
         nonlocal points
-        if not cached:
+        if not interpolate:
             points += len(index)
             return np.concatenate([gathered(index)[0], np.zeros((len(index), 1), np.float32)], 1)
         at = position[index], normal[index]

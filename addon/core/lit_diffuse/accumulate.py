@@ -20,9 +20,9 @@ from ..scene.visibility import CLEAN, EDGE, SATURATED, FrameView, Observations, 
 from .medians import Summary, make_estimator
 
 
-def frame_order(count: int, name: str, seed: int) -> np.ndarray:
-    """'capture': as filmed. 'shuffled': fixed pseudo-random, which keeps P-square from following slow drifts."""
-    return np.arange(count) if name == "capture" else np.random.default_rng(seed).permutation(count)
+def frame_order(count: int, seed: int) -> np.ndarray:
+    """Fixed and pseudo-random: a median in fixed memory would follow slow drifts."""
+    return np.random.default_rng(seed).permutation(count)
 
 
 def _choose(tiers: dict[int, Summary]) -> LitDiffuse:
@@ -50,7 +50,6 @@ def accumulate(
     read: Callable[[Frame], Pixels],
     *,
     median: str = "adaptive",
-    order: str = "shuffled",
     seed: int = 0,
     threads: int = 0,
     folder: Path | None = None,
@@ -59,7 +58,7 @@ def accumulate(
     also: Callable[[int, FrameView, Pixels, Observations], None] | None = None,
     progress: Progress | None = None,
 ) -> LitDiffuse:
-    """Project every frame onto the elements it sees and take the median (Haefner et al. 2021, sec. 3.1).
+    """Project every frame onto the elements it sees and take the median, kinds of observations apart.
 
     Frames are streamed: a handful is in memory at once.
 
@@ -69,8 +68,6 @@ def accumulate(
         Gives a frame's pixels.
     median : str
         'adaptive', 'batched', 'exact', 'p2' or 'mean'; see `medians`.
-    order : str
-        'shuffled' or 'capture'.
     folder : Path, optional
         Where the exact median keeps observations meanwhile.
     edge_tier : bool
@@ -90,7 +87,7 @@ def accumulate(
     normal, _ = triangle_geometry(mesh)
     groups = ElementGroups(atlas)
     estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
-    wanted = frame_order(len(frames), order, seed)
+    wanted = frame_order(len(frames), seed)
 
     def look(index: int) -> tuple[int, FrameView, Pixels, Observations]:
         frame = frames[index]

@@ -23,6 +23,7 @@ from ..passes.albedo.albedo import MEASURED, Albedo, albedo_of
 from ..passes.albedo.albedo import NONE as NO_ALBEDO
 from ..results.overrides import Overrides
 from ..scene.atlas import Atlas
+from .published import light as published_light
 from .stages import Stages
 
 ROUNDS = 4
@@ -115,6 +116,8 @@ class Corrected(Stages):
         """
         atlas, lit, shading = self.surface().atlas, self.lit_diffuse(), self.shading()
         without = shading.emitters if without is None else without
+        if "shading" in self.settings.published:
+            return published_light.albedo_of(atlas, lit, irradiance, self.capture.instances, without, specular)
         return albedo_of(
             atlas, lit, irradiance, shading.doubt, self.capture.instances, without, specular, self.settings.without
         )
@@ -190,7 +193,7 @@ def _direct_share(run: Corrected) -> np.ndarray:
     chosen = chosen[seen[chosen]]
     lamps = np.isin(field.atlas.object_id, [lamp.object_id for lamp in run.shading().lamps])
     direct = field.with_light(np.where(lamps[:, None], field.radiance, np.float32(0)))
-    how = {"sampler": "aimed", "interpolate": False, "finest": 1.0, "threads": run.settings.threads}
+    how = {"interpolate": False, "finest": 1.0, "threads": run.settings.threads}
     part = irradiance(direct, chosen, **RAYS, **how, seed=run.settings.seed)[0]
     whole = run.irradiance_found[chosen]
     area = field.atlas.area[chosen, None]

@@ -26,11 +26,13 @@ from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Capture, Frame, Pixels
 from ..scene.samples import SampleCollector, Samples
 from ..scene.surface import Surface
+from ..scene.visibility import FrameView, Observations
 from ..settings import Settings
+from .published.frames import lit_diffuse as running_lit_diffuse
 from .stage import Stage
 from .surface import STAGE as SURFACE
 
-STAGE = Stage("lit_diffuse", Path(__file__), (SURFACE,), ("refine_poses", "median", "sharpen", "frame_order", "seed"))
+STAGE = Stage("lit_diffuse", Path(__file__), (SURFACE,), ("refine_poses", "median", "sharpen", "seed"))
 
 
 @dataclass(frozen=True)
@@ -124,6 +126,26 @@ def observe(
     return Observed(lit, Environment.dark(), Samples.none(), Fringes.none(), Poses.as_read(()))
 
 
+def lit_diffuse(
+    surface: Surface,
+    frames: Sequence[Frame],
+    read: Callable[[Frame], Pixels],
+    settings: Settings,
+    folder: Path,
+    progress: Progress | Rounds,
+    also: Callable[[int, FrameView, Pixels, Observations], None] | None = None,
+) -> LitDiffuse:
+    """L_d as the settings ask for it; parameters are those of `one_pass` and of `accumulate`."""
+    where, threads = (surface.mesh, surface.atlas, surface.scene, frames, read), settings.threads
+    if "lit_diffuse" in settings.published:
+        return running_lit_diffuse(*where, threads=threads, also=also, progress=progress)
+    median = "batched" if settings.median == "adaptive" and "exact-median" in settings.without else settings.median
+    return accumulate(
+        *where, median=median, edge_tier="edge-tier" not in settings.without, seed=settings.seed, threads=threads,
+        folder=folder, also=also, progress=progress,
+    )  # fmt: skip
+
+
 def one_pass(
     surface: Surface,
     frames: Sequence[Frame],
@@ -153,18 +175,13 @@ def one_pass(
     sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
     kept = SampleCollector(surface.atlas, len(frames), settings.seed)
     fringes = FringeCollector()
-    median = "batched" if settings.median == "adaptive" and "exact-median" in settings.without else settings.median
 
     def also(index, view, pixels, seen):
         sky.add(view, pixels)
         kept.add(index, seen)
         fringes.add(view, pixels)
 
-    lit = accumulate(
-        surface.mesh, surface.atlas, surface.scene, frames, read, median=median, order=settings.frame_order,
-        edge_tier="edge-tier" not in settings.without, seed=settings.seed, threads=settings.threads, folder=folder,
-        also=also, progress=progress,
-    )  # fmt: skip
+    lit = lit_diffuse(surface, frames, read, settings, folder, progress, also)
     if not lit.seen.any():
         raise BadInputError(
             "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; check the frames."
@@ -195,8 +212,8 @@ def all_passes(
     if settings.sharpen and "sharpening" not in settings.without:
         rounds.next()
         lit = sharpened(
-            found.lit_diffuse, surface, found.poses.of(frames), read, median=settings.median,
-            order=settings.frame_order, seed=settings.seed, threads=settings.threads, folder=folder, progress=rounds,
+            found.lit_diffuse, surface, found.poses.of(frames), read, median=settings.median, seed=settings.seed,
+            threads=settings.threads, folder=folder, progress=rounds,
         )  # fmt: skip
         found = replace(found, lit_diffuse=lit)
     return found

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..json_values import key
-from ..lit_diffuse.accumulate import accumulate
 from ..parallel import ordered_map
 from ..passes.albedo.albedo import MEASURED
 from ..passes.sharpening.sharpen import FLOOR, MOST, sharpened
@@ -26,6 +25,7 @@ from ..scene.pages import OBJECT, Pages, lay_out
 from ..scene.surface import Surface
 from ..scene.visibility import CLEAN
 from .corrected import Corrected
+from .frames import lit_diffuse
 
 FINEST = 4.0
 """Times that an object's texels may be finer than the room's."""
@@ -178,16 +178,9 @@ def _looked(run: Corrected, part: Mesh, atlas: Atlas, chosen: np.ndarray) -> Lit
         return element
 
     rounds = Rounds(run.progress, 0, LOOKED)
-    how = {
-        "median": s.median,
-        "order": s.frame_order,
-        "seed": s.seed,
-        "threads": s.threads,
-        "folder": run.store.folder,
-        "progress": rounds,
-    }
+    how = {"median": s.median, "seed": s.seed, "threads": s.threads, "folder": run.store.folder, "progress": rounds}
     finer = replace(surface, atlas=atlas)
-    found = accumulate(surface.mesh, atlas, surface.scene, run.frames, run.read, **how)
+    found = lit_diffuse(finer, run.frames, run.read, s, run.store.folder, rounds)
     rounds.next()
     return sharpened(found, finer, run.frames, run.read, lookup, **how) if s.sharpen and found.seen.any() else found
 

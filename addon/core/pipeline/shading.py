@@ -33,6 +33,7 @@ from ..settings import Settings
 from .find_light import find_all_light
 from .frames import STAGE as FRAMES
 from .frames import Observed
+from .published import light as published_light
 from .stage import Stage
 from .surface import STAGE as SURFACE
 from .unseen_surfaces import with_unseen_surfaces
@@ -59,13 +60,18 @@ def find_shading(
     def shaded(lit: LitDiffuse) -> Shading:
         return shade(
             surface.mesh, capture.instances, surface.atlas, surface.scene, lit, observed.environment,
-            sampler=s.shading, rays=s.shading_rays, emitter_rays=s.emitter_rays, portal_rays=s.portal_rays,
+            rays=s.shading_rays, emitter_rays=s.emitter_rays, portal_rays=s.portal_rays,
             interpolate=s.interpolate, threads=s.threads, seed=s.seed, progress=progress,
             find_mirrors=mirrors if s.mirrors else None, noise=surface.noise,
             colours=observed.fringes.colours(), without=s.without,
         )  # fmt: skip
 
     lit = observed.lit_diffuse
+    if "shading" in s.published:
+        return published_light.shade(
+            surface.mesh, surface.atlas, surface.scene, lit, observed.environment,
+            rays=s.shading_rays, threads=s.threads, seed=s.seed, progress=progress,
+        )  # fmt: skip
     return shaded(lit) if "clipped-lamps" in s.without else shade_clipped(shaded, lit, surface.atlas)
 
 
@@ -89,7 +95,6 @@ def shade(
     lit_diffuse: LitDiffuse,
     environment: Environment,
     *,
-    sampler: str = "aimed",
     rays: int = 128,
     emitter_rays: int = 32,
     portal_rays: int = 32,
@@ -102,7 +107,7 @@ def shade(
     colours: dict[int, np.ndarray] | None = None,
     without: Collection[str] = (),
 ) -> Shading:
-    """Lamps and irradiance (Haefner et al. 2021, sec. 3.2, with aimed rays and interpolation by default).
+    """Lamps and irradiance by aimed rays, interpolated.
 
     Parameters
     ----------
@@ -121,13 +126,7 @@ def shade(
     InterruptedRun
         From `progress`.
     """
-    how = {
-        "sampler": sampler,
-        "threads": threads,
-        "seed": seed,
-        "smooth": "lamp-noise" not in without,
-        "finest": finest_spacing(atlas),
-    }
+    how = {"threads": threads, "seed": seed, "smooth": "lamp-noise" not in without, "finest": finest_spacing(atlas)}
     rays_of = {
         "rays": rays,
         "emitter_rays": 0 if "emitter-rays" in without else emitter_rays,
@@ -154,8 +153,8 @@ def shade(
     E[lit], escaped[lit], points, unsure[lit] = irradiance(field, lit, progress=progress, **rays_of, **how)
     # A noisy mesh faces elsewhere than the surface did.
     unsure = np.hypot(unsure, tilted)
-    # Near a crease the light of two sides is mixed; less so than the paper's uniform rays leave noise.
-    if sampler != "uniform" and "crease-error" not in without:
+    # Near a crease the light of two sides is mixed.
+    if "crease-error" not in without:
         unsure = np.hypot(unsure, crease_doubt(mesh, atlas, atlas.texel_edge))
     notes = light.notes if field.sun is None else (*light.notes, field.sun.note)
     return Shading(

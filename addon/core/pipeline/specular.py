@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ..brdf.dielectric import DIELECTRIC
 from ..brdf.lambertian import LAMBERTIAN
 from ..brdf.material import ObjectMaterial, from_json
 from ..fit.layout import Problem
-from ..fit.lobe_fit import fit_lobe
 from ..light.field import LightField
 from ..light.lamps import Lamp
 from ..light.lobes import GRID
+from ..paper.target_frame import frame_scores, target_frame
 from ..parallel import ordered_map
 from ..passes.glossy_light.glossy_light import Excess, glossy_light
 from ..passes.see_through.see_through import is_sure, judge, look_behind
@@ -28,13 +27,13 @@ from ..passes.specular.models import MIN_ELEMENTS, Choice, adopt_from_class, cho
 from ..passes.specular.one_colour import compare, compare_coat
 from ..passes.specular.problems import Problems
 from ..passes.specular.separate import specular_in_median, spread_over_object
-from ..passes.specular.targets import score_frames, target_frame
 from ..progress import Progress
 from ..results.overrides import NOTHING, Given, Overrides
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance
 from ..scene.samples import Samples
 from .frames import STAGE as FRAMES
+from .published.targets import fit_targets
 from .shading import STAGE as SHADING
 from .stage import Stage
 from .surface import STAGE as SURFACE
@@ -56,8 +55,6 @@ SEPARATE_ELEMENTS = 2500
 SEPARATE_VIEWS = 9
 SEPARATE_RAYS = 8
 """Taking the lobe out of a median averages over views, and its width is known; so many times fewer rays do."""
-TARGET_PHI = 7
-"""Index into the grid of the middle width with which highlights are foreseen (A1)."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +103,6 @@ def fit_specular(
     samples: Samples,
     frame_names: list[str],
     *,
-    way: str = "frames",
     rays: int = 256,
     refine: int = 2,
     threads: int = 0,
@@ -115,14 +111,13 @@ def fit_specular(
     given: Mapping[int, Given] | None = None,
     held: Held | None = None,
     without: Collection[str] = (),
+    as_published: bool = False,
     progress: Progress | None = None,
 ) -> Specular:
-    """Fit every object (Haefner et al. 2021, sec. 3.3 and 3.4) and find the specular part of L_d.
+    """Fit every object to many of its views, choose its model, and find the specular part of L_d.
 
     Parameters
     ----------
-    way : str
-        'target': the paper's single target frame and always a lobe. 'frames': many views and a choice of model.
     irradiance : (n, 3) float32
         E of each element, from L_d.
     refine : int
@@ -135,6 +130,8 @@ def fit_specular(
         Fit a few objects only.
     without : collection of str
         Passes left out.
+    as_published : bool
+        Objects of which nothing is given get the lobe of their target frame instead (`fit_targets`).
 
     Raises
     ------
@@ -144,7 +141,7 @@ def fit_specular(
     given = given or {}
     glowing, mirrors = {lamp.object_id: lamp for lamp in lamps}, {mirror.object_id: mirror for mirror in field.mirrors}
     # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
-    maker = Problems(field, lit_diffuse, samples, threads=1, seed=seed, without=without)
+    maker = Problems(field, samples, threads=1, seed=seed, without=without)
     refine = 0 if "specular-in-median" in without else min(refine, 1) if "glossy-light" in without else refine
     # What is given goes before what the shading stage found.
     taken = {i for i, one in given.items() if one.same_as is not None}
@@ -156,11 +153,21 @@ def fit_specular(
         class_of = {i.object_id: i.class_name for i in instances}
         wanted = [i for i in wanted if i in held.only or i not in given and class_of[i] in alike]
 
+    told: dict[int, ObjectMaterial] = {}
+    if as_published:
+        others = [i for i in instances if i.object_id in wanted and i.object_id not in given]
+        told = fit_targets(
+            others, field, lit_diffuse, samples, frame_names, rays=rays, threads=threads, seed=seed, progress=progress
+        )
+        wanted = [i for i in wanted if i not in told]
+
     def look(object_id: int) -> tuple[Choice, Problem | None, int]:
         if object_id in given:
             return *fit_given(given[object_id], maker, object_id, irradiance, rays), -1
-        choice, problem, target, index = _look(maker, object_id, samples, len(frame_names), way, rays, without)
-        if way == "frames" and choice.fit is not None and "see-through" not in without:
+        choice, problem, index = _by_frames(maker, object_id, rays, "first-look" not in without)
+        where = field.atlas.position[samples.element[index]], field.atlas.normal[samples.element[index]]
+        scores = frame_scores(field, *where, samples.direction[index], samples.frame[index], len(frame_names))
+        if choice.fit is not None and "see-through" not in without:
             element, direction = samples.element[index], samples.direction[index]
             behind = look_behind(field, lit_diffuse.seen, element, direction, object_id, noise)
             lobe = choice.fit if choice.model.has_lobe else None
@@ -168,9 +175,9 @@ def fit_specular(
             shown = judge(problem, behind, lobe, scale)
             if shown is not None:
                 choice = set_apart(choice, shown, is_sure(shown))
-        if way == "frames" and choice.model.has_albedo:
+        if choice.model.has_albedo:
             choice, problem = _by_looks(maker, object_id, choice, problem, irradiance, rays, without)
-        return choice, problem, target
+        return choice, problem, target_frame(scores)
 
     problems, choices, targets = {}, {}, {}
     for object_id, found in zip(wanted, ordered_map(look, wanted, threads, ahead=len(wanted)), strict=True):
@@ -179,19 +186,19 @@ def fit_specular(
             problems[object_id] = problem
         if progress is not None:
             progress.update(0.7 * len(choices) / len(wanted))
-    if way == "frames" and "class-lobes" not in without:
+    if "class-lobes" not in without:
         reflecting = {i: choice for i, choice in choices.items() if not choice.model.gives_light}
         adopted = adopt_from_class(reflecting, problems, {i.object_id: i.class_name for i in instances})
         choices |= {i: choice for i, choice in adopted.items() if i not in given}
 
-    # Where the target frame alone was fitted, elements have one view: the jackknife has nothing to work on.
-    told = problems if way == "frames" else {}
-    intervals = ordered_map(lambda i: gloss_interval(choices[i], told.get(i)), wanted, threads)
+    intervals = ordered_map(lambda i: gloss_interval(choices[i], problems.get(i)), wanted, threads)
     sure = dict(zip(wanted, intervals, strict=True))
 
     names = {i.object_id: i.name for i in instances}
 
     def describe(i: Instance) -> ObjectMaterial:
+        if i.object_id in told:
+            return told[i.object_id]
         own, choice = field.atlas.object_id == i.object_id, choices.get(i.object_id)
         if choice is not None and choice.model.gives_light:
             seen = np.median(field.radiance[own], 0) if own.any() else np.zeros(3)
@@ -247,28 +254,14 @@ def fit_specular(
     return Specular(tuple(materials), specular, excess)
 
 
-def _look(
-    maker: Problems, object_id: int, samples: Samples, frames: int, way: str, rays: int, without: Collection[str]
-) -> tuple[Choice, Problem | None, int, np.ndarray]:
-    """Model, observations, target frame (-1: none) of one object, and which of the samples the observations are."""
+def _by_frames(
+    maker: Problems, object_id: int, rays: int, first_look: bool
+) -> tuple[Choice, Problem | None, np.ndarray]:
+    """Choose a model; in two looks, as only some objects deserve the second. Last: which samples were looked at."""
     index = maker.pick(object_id, SCREEN_ELEMENTS, FIT_VIEWS)
     if not len(index):
-        return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, -1, index
-    problem = maker.problem(index, max(rays // SCREEN_RAYS, 16), rough=True)
-    target = target_frame(
-        score_frames(samples.frame[index], problem.light.A[:, TARGET_PHI], problem.lit_diffuse, frames)
-    )
-    if way == "frames":
-        choice, problem, index = _by_frames(maker, object_id, index, problem, rays, "first-look" not in without)
-    else:
-        choice, problem = _by_target(maker, object_id, samples.frame, target, rays)
-    return choice, problem, target, index
-
-
-def _by_frames(
-    maker: Problems, object_id: int, index: np.ndarray, screen: Problem, rays: int, first_look: bool
-) -> tuple[Choice, Problem, np.ndarray]:
-    """Choose a model; in two looks, as only some objects deserve the second."""
+        return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
+    screen = maker.problem(index, max(rays // SCREEN_RAYS, 16), rough=True)
     first = choose_model(screen)
     fit = first.fit
     hopeless = fit is None or fit.cost > HOPELESS * fit.cost_lambertian
@@ -305,15 +298,6 @@ def _by_looks(
     if not found.model.has_lobe and "coat-by-looks" not in without:
         found = coated_by_looks(found, compare_coat(whole, irradiance))
     return found, whole if found.looks is not None else problem
-
-
-def _by_target(maker: Problems, object_id: int, frame: np.ndarray, target: int, rays: int) -> tuple[Choice, Problem]:
-    """The paper's fit: one frame, one lobe; no choice of model."""
-    index = maker.pick(object_id, 10**9, 10**9, least=1)
-    problem = maker.problem(index[frame[index] == target][: FIT_ELEMENTS * FIT_VIEWS], rays)
-    if len(problem.element) < 3:
-        return Choice(LAMBERTIAN, None, note="No frame shows enough of it."), problem
-    return Choice(DIELECTRIC, fit_lobe(problem, "target")), problem
 
 
 def _separate(

@@ -233,13 +233,13 @@ class Stages:
 
     def fitted(self, settings: Settings, held: Held | None = None) -> Specular:
         """The specular stage as it is computed, of all objects or with some `held`."""
-        s, light = settings, self.shading()
+        s, light, lit, samples = settings, self.shading(), self.lit_diffuse(), self.samples()
+        names = [frame.name for frame in self.capture.frames]
         return fit_specular(
-            self.capture.instances, self.field, self.lit_diffuse(), light.irradiance, light.lamps, self.samples(),
-            [frame.name for frame in self.capture.frames],
-            way=s.specular, rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
+            self.capture.instances, self.field, lit, light.irradiance, light.lamps, samples, names,
+            rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
             noise=self.surface().noise, given=self.overrides.lobes(), held=held, without=s.without,
-            progress=self.progress,
+            as_published="specular" in s.published, progress=self.progress,
         )  # fmt: skip
 
     def median_radiance(self) -> float:

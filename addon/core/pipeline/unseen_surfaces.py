@@ -14,7 +14,7 @@ from ..passes.unseen_light.shades import BOUNCES, strongly_lit
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance
 
-ROUGH = {"sampler": "aimed", "rays": 64, "emitter_rays": 4, "portal_rays": 8, "interpolate": True}
+ROUGH = {"rays": 64, "emitter_rays": 4, "portal_rays": 8, "interpolate": True}
 COARSER = 8
 """Times the finest spacing of gathering points."""
 

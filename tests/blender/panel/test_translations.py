@@ -38,7 +38,7 @@ def test_the_script_finds_what_is_shown(strings):
     assert {
         "Recover Capture",
         "Edge of a texel in metres; 0 takes what the frames resolve",
-        "As Filmed",
+        "Estimated",
         "Resume",
         "No run is going on.",
         "{}: done in {}.",

@@ -10,7 +10,7 @@ import pytest
 from addon.core.light import emitters
 from addon.core.light.emitters import bright_triangles
 from addon.core.light.environment import Environment
-from addon.core.light.irradiance import direct, gather, uniform
+from addon.core.light.irradiance import direct, gather
 from tests.core.rooms import box_sides, lit_box, make_room, polygon_irradiance, quad
 
 LAMP_SIDE, HEIGHT = 0.4, 2.0
@@ -57,14 +57,6 @@ def test_a_furnace_gives_pi_l(furnace):
     assert not escaped.any() and (radius > 0).all() and (radius < 5.6).all()
 
 
-def test_a_furnace_seen_uniformly(furnace):
-    room, field = furnace
-    some = slice(0, None, 9)
-    E, escaped = uniform(field, room.atlas.position[some], room.atlas.normal[some], 1024, 0)
-    assert np.allclose(E.mean(0), np.pi * np.float32([1, 2, 3]), rtol=5e-3)
-    assert np.allclose(E, np.pi * np.float32([1, 2, 3]), rtol=0.12) and not escaped.any()
-
-
 @pytest.mark.parametrize("aimed_at", [{0}, {2, 3}, {1, 4}])
 def test_a_furnace_with_rays_aimed_at_some_of_its_walls(furnace, aimed_at, monkeypatch):
     """The walls aimed at are as bright as the rest: the weights alone must make the two parts one whole."""
@@ -90,15 +82,13 @@ def test_a_small_lamp_over_a_plane(lamp, where):
     assert (E.std(0) / E.mean(0)).max() < 0.1
 
 
-def test_rays_that_are_not_aimed_find_the_same_in_the_mean(lamp):
+def test_rays_that_are_not_aimed_find_the_same(lamp):
     room, field, shade = lamp
     position, up = np.repeat(np.float32([[0.3, 0, 0]]), 64, 0), np.repeat(np.float32([[0, 0, 1]]), 64, 0)
     wanted = 10 * polygon_irradiance(position[:1].astype(float), up[:1].astype(float), [shade])[0, 0]
     none = bright_triangles(room.field(room.by_object({})))
     around, _, escaped = gather(field, none, position, up, 4096, 0, 0)
-    even, _ = uniform(field, position, up, 4096, 1)
     assert around[:, 0].mean() == pytest.approx(wanted, rel=0.03)
-    assert even[:, 0].mean() == pytest.approx(wanted, rel=0.06)
     assert escaped.mean() == pytest.approx(1 - wanted / 10 / np.pi, abs=0.003)
 
 

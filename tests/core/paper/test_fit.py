@@ -77,6 +77,7 @@ def test_psi_stays_physical():
     assert best_psi(0 * A, 0 * A, np.ones((4, 3))) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("phi", "psi"), [(0.11, 0.1), (0.2, 0.2), (0.41, 0.2), (0.2, 0.04)])
 def test_the_lobe_of_one_frame_comes_back(box, phi, psi):
     element, direction, _ = box.views(400, 1, seed=4)

@@ -11,13 +11,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from addon.core.brdf.dielectric import DIELECTRIC
 from addon.core.brdf.emitter import EMITTER
 from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.errors import BadInputError, InterruptedRun
 from addon.core.io.exr import read_exr, write_exr
 from addon.core.io.read import read_capture
-from addon.core.passes.albedo.albedo import NONE
+from addon.core.paper.recover import recover
+from addon.core.passes.albedo.albedo import MEASURED, NONE
+from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
+from addon.core.results.store import Store
 from addon.core.settings import PAPER
 from tests.core.on_disk import ALBEDO, CHEAP, LAMP, QUICK, Finished, OnDisk
 from tests.core.rooms import lit_box, make_room, quad, radiosity
@@ -226,6 +230,23 @@ def test_a_capture_that_sees_nothing(disk, tmp_path):
         write_exr(copy.path(i), np.full((40, 40, 3), np.nan, np.float32))
     with pytest.raises(BadInputError, match="No frame shows any of the mesh"):
         copy.run(tmp_path / "result")
+
+
+def test_the_papers_preset_is_the_paper_alone(disk, tmp_path):
+    """The stages, stored one by one, give what `paper.recover` gives in one go."""
+    settings = replace(PAPER, shading_rays=64, specular_rays=64, texel_size=0.2, threads=2)
+    run = disk.run(tmp_path / "result", settings)
+    with Store(tmp_path / "other") as store:
+        other = Recovery(read_capture(disk.root), store, settings, Progress(), disk.unwrap)
+        alone = recover(other.surface(), other.frames, other.read, 64, threads=2)
+    assert np.array_equal(run.lit.radiance, alone.lit_diffuse, equal_nan=True)
+    assert np.array_equal(run.shading.irradiance, alone.irradiance)
+    measured = run.albedo.origin == MEASURED
+    assert measured.any() and np.allclose(run.albedo.rho[measured], np.clip(alone.albedo[measured], 0, 1), atol=1e-5)
+    lobes = {m.object_id: m for m in run.materials if m.model == DIELECTRIC}
+    assert lobes.keys() | {6} == alone.fits.keys()
+    for i, one in lobes.items():
+        assert (one.alpha, one.f0) == pytest.approx((alone.fits[i].lobe.phi, alone.fits[i].lobe.psi), rel=1e-6)
 
 
 @pytest.mark.slow

@@ -41,9 +41,8 @@ def test_lit_diffuse_is_what_the_frames_show(lit):
 
 
 HOW = {
-    "aimed": {"sampler": "aimed", "rays": 128, "emitter_rays": 16},
-    "aimed everywhere": {"sampler": "aimed", "rays": 64, "emitter_rays": 16, "interpolate": False},
-    "uniform": {"sampler": "uniform", "rays": 4096, "emitter_rays": 0, "interpolate": False},
+    "aimed": {"rays": 128, "emitter_rays": 16},
+    "aimed everywhere": {"rays": 64, "emitter_rays": 16, "interpolate": False},
 }
 
 

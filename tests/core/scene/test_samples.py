@@ -7,7 +7,6 @@ import pytest
 
 from addon.core.passes.specular.problems import pick
 from addon.core.passes.specular.separate import grouped_median, specular_in_median, spread_over_object
-from addon.core.passes.specular.targets import MIN_OBSERVATIONS, score_frames, target_frame
 from addon.core.scene import samples as module
 from addon.core.scene.samples import SampleCollector, Samples, choose_elements
 from addon.core.scene.visibility import CLEAN, EDGE, SATURATED, Observations
@@ -85,30 +84,6 @@ def test_pick_is_bounded_sorted_and_the_same_again():
     assert np.array_equal(index, pick(samples, some, 10, 5, 4, 0))
     assert len(pick(samples, some[:3], 10, 5, 4, 0)) == 0  # too few views
     assert len(pick(samples, some[:0], 10, 5, 4, 0)) == 0
-
-
-def test_the_frame_with_the_highlight_wins():
-    """0: even; 1: a highlight on some of it; 2: a stronger one, on too few pixels; 3: bright all over; 4: nothing."""
-    many = 40
-    frame = np.repeat([0, 1, 2, 3], [many, many, MIN_OBSERVATIONS - 1, many])
-    highlight = np.full((len(frame), 3), 0.1)
-    highlight[many : many + 8] = 2
-    highlight[2 * many : 2 * many + 5] = 50
-    highlight[frame == 3] = 5
-    diffuse = np.full((len(frame), 3), 0.5)
-    scores = score_frames(frame, highlight, diffuse, 5)
-    assert target_frame(scores) == 1
-    assert scores[2] == 0 and scores[4] == 0 and scores[3] < 1e-6 and scores.shape == (5,)
-    # a highlight counts against the object's own brightness
-    diffuse[frame == 1] = 100
-    highlight[:8] = 0.6
-    assert target_frame(score_frames(frame, highlight, diffuse, 5)) == 0
-
-
-def test_no_frame_serves():
-    assert target_frame(np.zeros(3)) == -1 and target_frame(np.zeros(0)) == -1
-    black = score_frames(np.zeros(20, int), np.zeros((20, 3)), np.zeros((20, 3)), 2)
-    assert np.isfinite(black).all() and target_frame(black) == -1
 
 
 def test_grouped_median_is_numpys():

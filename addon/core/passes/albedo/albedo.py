@@ -86,7 +86,7 @@ def albedo_of(
     specular: np.ndarray | float = 0.0,
     without: Collection[str] = (),
 ) -> Albedo:
-    """Albedo = L_d / S (Haefner et al. 2021, sec. 3.2), clamped, filled in and steadied (`fill`).
+    """Albedo = pi L_d / E, clamped, filled in and steadied (`fill`).
 
     Parameters
     ----------

@@ -13,7 +13,6 @@ from ...fit.layout import Problem
 from ...light.emitters import bright_triangles
 from ...light.field import LightField
 from ...light.lobes import LobeLight, reflected_light
-from ...scene.lit_diffuse import LitDiffuse
 from ...scene.samples import Samples
 from .one_colour import BROADEST_PHI
 
@@ -58,22 +57,15 @@ class Problems:
     Parameters
     ----------
     field : LightField
-    lit_diffuse : LitDiffuse
     samples : Samples
     without : collection of str
         Passes left out.
     """
 
     def __init__(
-        self,
-        field: LightField,
-        lit_diffuse: LitDiffuse,
-        samples: Samples,
-        threads: int = 0,
-        seed: int = 0,
-        without: Collection[str] = (),
+        self, field: LightField, samples: Samples, threads: int = 0, seed: int = 0, without: Collection[str] = ()
     ):
-        self._field, self._lit, self._samples = field, lit_diffuse, samples
+        self._field, self._samples = field, samples
         self._threads, self._seed, self._without = threads, seed, without
         self._bright = bright_triangles(field)
         # A clipped pixel is no value; what is left is sorted by object, so that each object's lies together.
@@ -130,7 +122,7 @@ class Problems:
         radiance = self._samples.radiance[index]
         light = self.light(index, rays, phi, rough, microfacets)
         light = light.as_exact() if "ray-noise" in self._without else light
-        return Problem(element, radiance, self._lit.radiance[element], light, cosine, frozenset(self._without))
+        return Problem(element, radiance, light, cosine, frozenset(self._without))
 
 
 def _noise(light: LobeLight, radiance: np.ndarray) -> np.ndarray:

@@ -44,7 +44,7 @@ class Seen:
         values = self.field.radiance
         self.lit = LitDiffuse(values, values, values, np.full(n, 9, np.int32), np.full(n, CLEAN, np.int8),
                               np.zeros(n, np.float32))  # fmt: skip
-        self.maker = Problems(self.field, self.lit, self.samples, threads=2)
+        self.maker = Problems(self.field, self.samples, threads=2)
         self.irradiance = self.box.irradiance.astype(np.float32)
 
     def fit(self, given):

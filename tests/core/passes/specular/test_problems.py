@@ -8,9 +8,7 @@ import pytest
 from addon.core.light.lobes import GRID, LobeLight
 from addon.core.passes.specular import problems
 from addon.core.passes.specular.problems import AGAIN, Problems
-from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.samples import Samples
-from addon.core.scene.visibility import CLEAN
 from tests.core.rooms import box_sides, make_room
 
 RAYS, COUNT = 32, 12
@@ -39,11 +37,10 @@ def maker():
     room = make_room(box_sides(), 0.5)
     n = len(room.atlas)
     one = np.ones((n, 3), np.float32)
-    lit = LitDiffuse(one, one, one, np.full(n, 9, np.int32), np.full(n, CLEAN, np.int8), np.zeros(n, np.float32))
     direction = np.tile(np.float32([0, 0, 1]), (COUNT, 1))
     samples = Samples(np.arange(COUNT, dtype=np.int32), np.zeros(COUNT, np.int32), one[:COUNT], direction,
                       np.zeros(COUNT, bool))  # fmt: skip
-    return Problems(room.field(one), lit, samples)
+    return Problems(room.field(one), samples)
 
 
 def test_noisy_ones_are_done_again(asked, maker):

@@ -1,0 +1,60 @@
+"""Irradiance and albedo, and which objects are lamps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...light.environment import Environment
+from ...light.lamps import find_seen
+from ...light.shading import Shading
+from ...paper.albedo import albedo as quotient
+from ...paper.captured_light import CapturedLight
+from ...paper.irradiance import irradiance
+from ...passes.albedo.albedo import MEASURED, Albedo, fill
+from ...passes.albedo.neighbourhood import doubt
+from ...progress import Progress
+from ...scene.atlas import Atlas
+from ...scene.lit_diffuse import LitDiffuse
+from ...scene.model import Instance, Mesh
+from ...scene.rays import RayScene
+from ...scene.visibility import SATURATED
+
+
+def shade(
+    mesh: Mesh,
+    atlas: Atlas,
+    scene: RayScene,
+    lit: LitDiffuse,
+    environment: Environment,
+    *,
+    rays: int,
+    threads: int,
+    seed: int,
+    progress: Progress | None = None,
+) -> Shading:
+    """S of every element by uniform rays, and the objects that must be lamps under it."""
+    light = CapturedLight(mesh, atlas, scene, lit.radiance, environment)
+    E, escaped = irradiance(light, atlas.position, atlas.normal, rays, threads=threads, seed=seed, progress=progress)
+    lamps = find_seen(atlas.object_id[lit.seen], lit.radiance[lit.seen], E[lit.seen])
+    unknown = np.zeros(len(atlas), np.float32)
+    return Shading(E, escaped, unknown, light.radiance, tuple(lamps), environment, (), (), len(atlas))
+
+
+def albedo_of(
+    atlas: Atlas,
+    lit: LitDiffuse,
+    irradiance: np.ndarray,
+    instances: tuple[Instance, ...],
+    emitters: set[int],
+    specular: np.ndarray | float = 0.0,
+) -> Albedo:
+    """The quotient as it is, clamped at 1; what has none takes its object's albedo. Parameters as `albedo.albedo_of`.
+
+    The error is that of the median.
+    """
+    rho = quotient(np.maximum(lit.radiance - specular, 0), irradiance)
+    valid = np.isfinite(rho).all(1) & (lit.tier != SATURATED)
+    found = fill(atlas, rho, valid, {i.object_id: i.class_name for i in instances}, emitters)
+    return replace(found, error=np.where(found.origin == MEASURED, doubt(lit, atlas.object_id), found.error))

@@ -1,0 +1,66 @@
+"""The lobe of each object, from its target frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ...brdf.dielectric import DIELECTRIC
+from ...brdf.lambertian import LAMBERTIAN
+from ...brdf.material import ObjectMaterial
+from ...fit.lobe_fit import LobeFit
+from ...light.field import LightField
+from ...paper.recover import fit_object, usable
+from ...passes.specular.describe import described
+from ...passes.specular.intervals import gloss_interval
+from ...passes.specular.models import Choice
+from ...progress import Progress
+from ...scene.lit_diffuse import LitDiffuse
+from ...scene.model import Instance
+from ...scene.samples import Samples
+
+
+def fit_targets(
+    instances: Sequence[Instance],
+    field: LightField,
+    lit: LitDiffuse,
+    samples: Samples,
+    frame_names: Sequence[str],
+    *,
+    rays: int,
+    threads: int,
+    seed: int,
+    progress: Progress | None = None,
+) -> dict[int, ObjectMaterial]:
+    """A lobe for each object, from its target frame; matt where no frame can be one."""
+
+    def look(instance: Instance) -> ObjectMaterial:
+        index = usable(samples, field.atlas.object_id, instance.object_id)
+        known = lit.radiance
+        found = fit_object(
+            field, field.atlas, known, samples, index, len(frame_names), rays, threads=threads, seed=seed
+        )
+        if found is None:
+            note = "No frame shows enough of it."
+            return ObjectMaterial(instance.object_id, instance.class_name, LAMBERTIAN, note=note)
+        diffuse = known[samples.element[found.index]]
+        level = np.maximum(diffuse.mean(1), 1e-12)
+        left, whole = (
+            float(np.median(np.sqrt(np.square(x).mean(1)) / level))
+            for x in (found.lobe.residual, samples.radiance[found.index] - diffuse)
+        )
+        psi = np.full(3, found.lobe.psi)
+        cost = [float(np.square(x).mean()) for x in (found.lobe.residual, samples.radiance[found.index] - diffuse)]
+        choice = Choice(DIELECTRIC, LobeFit(found.lobe.phi, psi, 0.0, 0.0, *cost, left, whole))
+        name = frame_names[found.frame]
+        material = described(instance, choice, None, name, gloss_interval(choice, None))
+        return replace(material, observations=len(found.index))
+
+    materials = {}
+    for instance in instances:
+        materials[instance.object_id] = look(instance)
+        if progress is not None:
+            progress.update(0.7 * len(materials) / len(instances))
+    return materials
