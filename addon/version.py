@@ -1,3 +1,3 @@
 """The version; `blender_manifest.toml` and `pyproject.toml` say the same (a test compares them)."""
 
-VERSION = "0.1.0"
+VERSION = "0.2.0"
