@@ -74,7 +74,7 @@ def order_key(name: str, one: dict, order: str) -> tuple:
     if order == "MODEL":
         return one.get("model", ""), in_order(name)
     if order == "CERTAINTY":
-        value = results.doubt(one)
+        value = results.interval_width(one)
         return -(value if value is not None else -1.0), in_order(name)
     return in_order(name)
 

@@ -14,7 +14,7 @@ from . import preferences
 
 PAGE = "report.html"
 SURE, FAIR = 0.15, 0.4
-"""Doubt (`doubt`) up to which an object counts as sure, and as fairly sure."""
+"""Interval width up to which an object counts as sure, and as fairly sure."""
 GIVEN = {"model": "model", "roughness": "roughness", "f0": "F0", "base_color": "colour", "same_as": "same as object"}
 
 
@@ -87,7 +87,7 @@ def label(model: str) -> str:
     return brdf.label if brdf else model
 
 
-def doubt(one: dict[str, Any]) -> float | None:
+def interval_width(one: dict[str, Any]) -> float | None:
     """How unsure an object's material is, 0...1: the greater of two widths of 90 % intervals.
 
     That of its roughness where it has a highlight, and half of that of its albedo, relative to it, where it has one.
@@ -107,8 +107,8 @@ def doubt(one: dict[str, Any]) -> float | None:
 
 
 def certainty(one: dict[str, Any]) -> str:
-    """`doubt` in a word."""
-    value = doubt(one)
+    """`interval_width` in a word."""
+    value = interval_width(one)
     if value is None:
         return "unknown"
     return "sure" if value <= SURE else "fair" if value <= FAIR else "unsure"

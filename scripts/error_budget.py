@@ -58,7 +58,7 @@ def main() -> int:
             ("without the compensation for Principled's layering", psnr(seen, albedo.rho)),
             ("that, and glossy things lighting by their median", psnr(seen, medians)),
             ("... and the specular part left in the median", psnr(seen, recovery.albedo_under(shading.irradiance).rho)),
-            ("plain quotient: neither filled in nor steadied, unseen black", psnr(seen, np.nan_to_num(raw))),
+            ("plain quotient: neither filled in nor shrunk, unseen black", psnr(seen, np.nan_to_num(raw))),
             ("albedo on measured elements only", psnr(seen, albedo.rho, measured)),
             ("albedo on elements with six or more clean observations", psnr(seen, albedo.rho, good)),
             ("the truth itself through the texels (limit of the sampling)", psnr(seen, limit)),

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core.brdf import ggx as brdf
-from ..core.fit.layout import Problem
+from ..core.fit.problem import Problem
 from ..core.light.directions import shifted, sobol
 from ..core.light.emitters import bright_triangles
 from ..core.light.environment import Environment

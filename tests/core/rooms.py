@@ -237,4 +237,4 @@ def radiosity(room: Room, albedo: dict[int, object], emission: dict[int, object]
 
 def albedo_in(room, lit, found):
     """The `Albedo` that L_d has under the E of a `Shading`."""
-    return albedo_of(room.atlas, lit, found.irradiance, found.doubt, room.instances, found.emitters)
+    return albedo_of(room.atlas, lit, found.irradiance, found.relative_error, room.instances, found.emitters)

@@ -204,7 +204,7 @@ class Result:
         shading, rho = self.shading, self.albedo.rho
         for name, values in {
             "albedo": rho, "base color": self.base_color, "irradiance": shading.irradiance, "escaped": shading.escaped,
-            "doubt": shading.doubt, "light": shading.radiance, "sky": shading.environment.radiance,
+            "relative_error": shading.relative_error, "light": shading.radiance, "sky": shading.environment.radiance,
             "specular": self.specular.specular, "L_d": self.lit.radiance[self.lit.seen],
             "quartiles": np.stack([self.lit.lower, self.lit.upper])[:, self.lit.seen],
             "position": self.atlas.position, "normal": self.atlas.normal, "area": self.atlas.area,

@@ -23,8 +23,8 @@ LIGHT_FLOOR = 0.015
 NOISE_LEFT = 0.4
 """Of the error of E that gathering it again shows, as far as it is the albedo's: neighbours steady that."""
 OWN = 0.6
-"""Of the error that an element is left with once its neighbours have steadied it: the doubt it starts from
-(`neighbourhood.doubt`) is more than what was found."""
+"""Of the error that an element is left with once its neighbours have shrunk it: the error it starts from
+(`neighbourhood.relative_error`) is more than what was found."""
 TEXTURE = 0.7
 """Of the contrast around a texel: pixels blur a texture and misplace it by about a texel. It was 1.0 before L_d was
 made sharper (`lit_diffuse.sharpen`); since then 95.2 % of the rooms' texels were held by that, and 94.4 % by 0.7 (16

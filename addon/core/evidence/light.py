@@ -88,7 +88,7 @@ def spots(atlas: Atlas, seen: np.ndarray, count: int, seed: int = 0) -> tuple[np
     return chosen, nearest.ravel()
 
 
-def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, doubt: np.ndarray) -> LightField:
+def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, relative_error: np.ndarray) -> LightField:
     """The room with nothing but the light that no frame looked at.
 
     Channel 0: all of it; 1: that of surfaces, times its relative error; 2: the same of lamps and sky.
@@ -97,7 +97,7 @@ def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, doubt: np
     solved = np.isin(field.atlas.object_id, [lamp.object_id for lamp in shading.lamps if not lamp.seen])
     clipped = lit.tier == SATURATED
     surface = (~lit.seen | clipped) & ~solved
-    off = np.where(clipped, CLIPPED_UNSURE, SURFACES * np.minimum(np.hypot(doubt, ROUGH_LIGHT), 1))
+    off = np.where(clipped, CLIPPED_UNSURE, SURFACES * np.minimum(np.hypot(relative_error, ROUGH_LIGHT), 1))
     kinds = [luminance * (surface | solved), luminance * surface * off, luminance * solved * LAMP_UNSURE]
     sky = (shading.environment.radiance @ LUMINANCE) * (shading.environment.observations == 0)
     sky = np.stack([sky, np.zeros_like(sky), SKY_UNSURE * sky], -1).astype(np.float32)
@@ -110,7 +110,7 @@ def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, doubt: np
 
 
 def light_evidence(
-    field: LightField, shading: Shading, lit: LitDiffuse, doubt: np.ndarray, *, threads: int = 0, seed: int = 0
+    field: LightField, shading: Shading, lit: LitDiffuse, relative_error: np.ndarray, *, threads: int = 0, seed: int = 0
 ) -> LightEvidence:
     """Check E at some spots and carry what was found over to all elements.
 
@@ -118,7 +118,7 @@ def light_evidence(
     ----------
     field : LightField
         The room as E was gathered in it.
-    doubt : (n,) float32
+    relative_error : (n,) float32
         Relative error of each element's albedo, the light aside.
     """
     atlas = field.atlas
@@ -129,7 +129,7 @@ def light_evidence(
     a, b = (np.clip(np.log(np.maximum(E, 1e-20)) - kept, -WORST, WORST) for E in again)
     noise, bias = _by_group(2 * atlas.object_id[chosen] + lit.seen[chosen], a, b)
 
-    hidden = unsure_light(field, shading, lit, doubt)
+    hidden = unsure_light(field, shading, lit, relative_error)
     shares = np.zeros((len(chosen), 3), np.float32)
     if hidden.radiance.any() or hidden.environment.radiance.any() or hidden.sun is not None:
         part = irradiance(hidden, chosen, **SHARE_RAYS, **how, seed=seed + 7)[0]

@@ -109,7 +109,7 @@ def _objects(found: Findings, evidence: Evidence) -> str:
     """A table of the objects, the least certain first."""
     sure = {one.object_id: one for one in evidence.objects}
     known = [(m, sure[m.object_id]) for m in found.materials if m.object_id in sure and not m.model.gives_light]
-    known.sort(key=lambda pair: -_doubt(pair[1]))
+    known.sort(key=lambda pair: -_relative_width(pair[1]))
     rows = "".join(_row(m, e) for m, e in known[:ROWS])
     more = f"<p>{len(known) - ROWS} more are in materials.json.</p>" if len(known) > ROWS else ""
     return (
@@ -119,7 +119,7 @@ def _objects(found: Findings, evidence: Evidence) -> str:
     )
 
 
-def _doubt(one: ObjectEvidence) -> float:
+def _relative_width(one: ObjectEvidence) -> float:
     """Half an albedo's interval relative to the albedo."""
     width = np.mean(one.albedo_high) - np.mean(one.albedo_low)
     return float(width / 2 / max(np.mean(one.albedo), 0.02))
@@ -128,7 +128,7 @@ def _doubt(one: ObjectEvidence) -> float:
 def _row(m: ObjectMaterial, e: ObjectEvidence) -> str:
     bare = m.model.lobe_alone
     colour = m.f0 if bare and m.f0 else e.albedo
-    albedo = "" if bare else f"{np.mean(e.albedo):.2f} &plusmn; {_doubt(e):.0%}"
+    albedo = "" if bare else f"{np.mean(e.albedo):.2f} &plusmn; {_relative_width(e):.0%}"
     specular = "coloured" if isinstance(m.f0, tuple) else _interval(m.f0, *_range(m, "specular"))
     roughness = None if m.alpha is None else float(np.sqrt(m.alpha))
     return (

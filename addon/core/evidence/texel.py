@@ -93,10 +93,10 @@ def texel_evidence(
     """
     beside = np.square(light.unsure) + c.LIGHT_FLOOR**2
     shading = np.sqrt(np.square(light.noise) + beside)
-    steadied = np.sqrt(np.square(c.NOISE_LEFT * light.noise) + beside)
+    shrunk = np.sqrt(np.square(c.NOISE_LEFT * light.noise) + beside)
     # What was filled in shares the error of the light on what it was filled in from.
-    _, common, _ = by_object(atlas, albedo, steadied)
-    relative = np.square(own) + np.square(np.where(albedo.origin == MEASURED, steadied, common))
+    _, common, _ = by_object(atlas, albedo, shrunk)
+    relative = np.square(own) + np.square(np.where(albedo.origin == MEASURED, shrunk, common))
     gloss = gloss_error(atlas, albedo, materials, specular, irradiance)
     error = np.sqrt(relative[:, None] * np.square(albedo.rho) + np.square(gloss)[:, None])
     # Of an albedo between 0 and 1 nothing worse can be said than that nothing is known.

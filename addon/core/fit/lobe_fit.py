@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..brdf.model import Constraints
-from .layout import Layout, Problem
+from .problem import DenseProblem, Problem
 
 HUBER = 2.0
 """Residuals beyond this many (robust) standard deviations weigh less: misregistration, edges, texture."""
@@ -83,7 +83,7 @@ class Solution:
 
 
 def solve(
-    layout: Layout,
+    dense: DenseProblem,
     phi: slice | None,
     kappa: float | tuple[float, ...],
     scale: float,
@@ -105,16 +105,16 @@ def solve(
         Of psi.
     """
     prior, least_psi = constraints.prior, constraints.least_psi
-    t = layout.darkening(kappa)
-    prior = None if "dielectric-prior" in layout.without else prior
+    t = dense.darkening(kappa)
+    prior = None if "dielectric-prior" in dense.without else prior
     if phi is None:
-        lobe, R = None, layout.I
+        lobe, R = None, dense.I
     else:
-        lobe = layout.lobe(phi)
-        R = layout.I - lobe.B
+        lobe = dense.lobe(phi)
+        R = dense.I - lobe.B
     shape = np.broadcast_shapes(t.shape, R.shape[1:])
     R = np.broadcast_to(R, (3, *shape))
-    weight = np.broadcast_to(layout.there, shape)
+    weight = np.broadcast_to(dense.there, shape)
     fixed = None if psi is None else np.asarray(psi, np.float32)[:, None] * np.ones((1, shape[0]), np.float32)
     for _ in range(1 if lobe is None or fixed is not None else rounds):
         wt = weight * t
@@ -137,23 +137,23 @@ def solve(
                     up, down, clean = (np.broadcast_to(x.sum(0), x.shape) for x in (up, down, clean))
                 if prior is not None:
                     # errors of one element's channels and views go together: they count once
-                    sure = 3 * layout.views * (scale / prior.sigma) ** 2
+                    sure = 3 * dense.views * (scale / prior.sigma) ** 2
                     up, down, clean = up + sure * prior.psi, down + sure, clean + sure
                 values = np.clip(up / np.maximum(np.maximum(clean, LEAST_SIGNAL * down), 1e-30), least_psi, 1)
             each = values[:, :, None, None]
             rest = R - each * A
             rest -= ((SR - values[..., None] * SA) / below)[:, :, None] * t
-        size = np.sqrt(np.einsum("chvg,chvg->hvg", rest, rest) / 3) * layout.inflate
-        weight = layout.there * np.minimum(1, HUBER * scale / np.maximum(size, 1e-12))
+        size = np.sqrt(np.einsum("chvg,chvg->hvg", rest, rest) / 3) * dense.inflate
+        weight = dense.there * np.minimum(1, HUBER * scale / np.maximum(size, 1e-12))
     cost = huber(size, scale)
     if lobe is not None:
         noise = (each * (each * lobe.AA + 2 * lobe.AB) + lobe.BB).sum(0)
-        cost -= weight * left / np.maximum(layout.there, 1e-20) * noise * (layout.inflate / scale) ** 2 / 6
-    cost *= layout.there
+        cost -= weight * left / np.maximum(dense.there, 1e-20) * noise * (dense.inflate / scale) ** 2 / 6
+    cost *= dense.there
     by_element = cost.sum(1, dtype=np.float64)
     total = by_element.sum(1)
     if prior is not None:
-        total += layout.views * ((values[0] - prior.psi) / prior.sigma) ** 2 / 2
+        total += dense.views * ((values[0] - prior.psi) / prior.sigma) ** 2 / 2
     return Solution(values, size, by_element, total)
 
 
@@ -168,49 +168,51 @@ def robust_scale(size: np.ndarray) -> float:
     return max(1.4826 * float(np.median(size)), 1e-4)
 
 
-def fit_lobe(problem: Problem | Layout, constraints: Constraints = FREE, psi: np.ndarray | None = None) -> LobeFit:
+def fit_lobe(
+    problem: Problem | DenseProblem, constraints: Constraints = FREE, psi: np.ndarray | None = None
+) -> LobeFit:
     """Best phi, with its psi.
 
     Parameters
     ----------
-    problem : Problem, or its Layout where several fits are made
+    problem : Problem, or its DenseProblem where several fits are made
     constraints : Constraints
         Of psi, as the model has them.
     psi : (3,) float, optional
         Given: phi alone is sought.
     """
-    layout = problem if isinstance(problem, Layout) else Layout(problem)
+    dense = problem if isinstance(problem, DenseProblem) else DenseProblem(problem)
     how = {"constraints": constraints, "psi": psi}
-    kappas = KAPPAS if "grazing" not in layout.without else (0.0,)
-    flat = solve(layout, None, kappas, 1.0).size
-    scale = robust_scale(layout.seen(flat[0]))
+    kappas = KAPPAS if "grazing" not in dense.without else (0.0,)
+    flat = solve(dense, None, kappas, 1.0).size
+    scale = robust_scale(dense.seen(flat[0]))
     kappa = kappas[len(kappas) // 2]
     # phi at a middling kappa, kappa at that phi, phi again; and the scale from the fit, or every outlier of the poor
     # start would count as noise.
     for _ in range(2):
-        costs = solve(layout, slice(None), kappa, scale, **how).total
+        costs = solve(dense, slice(None), kappa, scale, **how).total
         best = int(np.argmin(costs))
-        by_kappa = solve(layout, slice(best, best + 1), kappas, scale, **how)
+        by_kappa = solve(dense, slice(best, best + 1), kappas, scale, **how)
         at = int(np.argmin(by_kappa.total))
         kappa = kappas[at]
-        scale = robust_scale(layout.seen(by_kappa.size[at]))
+        scale = robust_scale(dense.seen(by_kappa.size[at]))
     near = slice(max(best - 1, 0), best + 2)
-    found = solve(layout, near, kappa, scale, **how)
+    found = solve(dense, near, kappa, scale, **how)
     costs = found.total
     middle = best - near.start
-    root, best_psi = between(np.sqrt(layout.grid[near]), costs, found.psi, middle)
-    flat_costs = huber(flat, scale) * layout.there
+    root, best_psi = between(np.sqrt(dense.grid[near]), costs, found.psi, middle)
+    flat_costs = huber(flat, scale) * dense.there
     flattest = int(np.argmin(flat_costs.sum((1, 2))))
-    unit = scale**2 / layout.count
+    unit = scale**2 / dense.count
     return LobeFit(
-        phi=float(min(max(root**2, layout.grid[0]), layout.grid[-1])),
+        phi=float(min(max(root**2, dense.grid[0]), dense.grid[-1])),
         psi=best_psi,
         kappa=kappa,
         kappa_lambertian=kappas[flattest],
         cost=float(found.cost[middle].sum()) * unit,
         cost_lambertian=float(flat_costs[flattest].sum(dtype=np.float64)) * unit,
-        residual=float(np.median(layout.seen(found.size[middle]))),
-        residual_lambertian=float(np.median(layout.seen(flat[flattest]))),
+        residual=float(np.median(dense.seen(found.size[middle]))),
+        residual_lambertian=float(np.median(dense.seen(flat[flattest]))),
     )
 
 
@@ -245,20 +247,20 @@ def between(x: np.ndarray, cost: np.ndarray, psi: np.ndarray, middle: int) -> tu
 
 
 def held_out_costs(
-    layout: Layout, fit: LobeFit, train: np.ndarray, scale: float, constraints: Constraints
+    dense: DenseProblem, fit: LobeFit, train: np.ndarray, scale: float, constraints: Constraints
 ) -> tuple[np.ndarray, np.ndarray]:
     """Costs of the elements that `train` ((g,) bool) leaves, with and without a lobe whose psi the others gave.
 
     phi and kappa are those of the fit over all: two numbers of hundreds of elements, whose optimism is far below
     what a lobe must gain.
     """
-    at = layout.at(fit.phi)
-    psi = solve(layout.part(train), at, fit.kappa, scale, constraints=constraints).psi[:, 0]
-    return element_costs(layout.part(~train), replace(fit, psi=psi), scale)
+    at = dense.at(fit.phi)
+    psi = solve(dense.part(train), at, fit.kappa, scale, constraints=constraints).psi[:, 0]
+    return element_costs(dense.part(~train), replace(fit, psi=psi), scale)
 
 
-def element_costs(layout: Layout, fit: LobeFit, scale: float) -> tuple[np.ndarray, np.ndarray]:
+def element_costs(dense: DenseProblem, fit: LobeFit, scale: float) -> tuple[np.ndarray, np.ndarray]:
     """Robust cost of each element's observations under a fit made elsewhere, with its lobe and without: (g,) each."""
-    at = layout.at(fit.phi)
-    lobe = solve(layout, at, fit.kappa, scale, psi=fit.psi).cost[0]
-    return lobe, solve(layout, None, fit.kappa_lambertian, scale).cost[0]
+    at = dense.at(fit.phi)
+    lobe = solve(dense, at, fit.kappa, scale, psi=fit.psi).cost[0]
+    return lobe, solve(dense, None, fit.kappa_lambertian, scale).cost[0]

@@ -25,8 +25,8 @@ def less_noise(
 
     Over seeds a third of the noise is left (a kitchen with seven small lamps: .030 of E, from .081). Where rays
     disagree, though, lamps are near or hidden in part, and E is off for reasons that all rays share: mesh, texel, the
-    lamp's own evenness. So doubt in E goes by what there was (kitchen: albedo of 25.7 dB, 24.0 by what is left; in four
-    other rooms -.2 to +.1 dB, after one scale -.3 to +.5).
+    lamp's own evenness. So the error of E goes by what there was (kitchen: albedo of 25.7 dB, 24.0 by what is left; in
+    four other rooms -.2 to +.1 dB, after one scale -.3 to +.5).
 
     Parameters
     ----------

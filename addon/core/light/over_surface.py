@@ -69,7 +69,7 @@ def irradiance(
     escaped : (m,) float32
     points : int
         How many places were gathered at.
-    doubt : (m,) float32
+    relative_error : (m,) float32
         Relative error of E by interpolation, by the aimed rays' noise and at the edges of the sun's light.
     """
     atlas = field.atlas

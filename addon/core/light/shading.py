@@ -22,7 +22,7 @@ class Shading:
         E, radiance * steradian.
     escaped : (n,) float32
         Share of the hemisphere's rays that left the mesh.
-    doubt : (n,) float32
+    relative_error : (n,) float32
         Relative error of `irradiance` by interpolation and by the mesh's noise.
     radiance : (n, 3) float32
         L_d with everything filled in: what the light field shows at each element. Lamps have their own radiance.
@@ -41,7 +41,7 @@ class Shading:
 
     irradiance: np.ndarray
     escaped: np.ndarray
-    doubt: np.ndarray
+    relative_error: np.ndarray
     radiance: np.ndarray
     lamps: tuple[Lamp, ...]
     environment: Environment

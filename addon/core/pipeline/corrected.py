@@ -27,7 +27,7 @@ from .published import light as published_light
 from .stages import Stages
 
 ROUNDS = 4
-"""Albedo is clamped at 1 and steadied among neighbours, so its mean follows E but roughly."""
+"""Albedo is clamped at 1 and shrunk towards its neighbours, so its mean follows E but roughly."""
 SPOTS = 600
 RAYS = {"rays": 64, "emitter_rays": 32, "portal_rays": 32}
 LEAST_LIGHT = 0.1
@@ -119,7 +119,14 @@ class Corrected(Stages):
         if "shading" in self.settings.published:
             return published_light.albedo_of(atlas, lit, irradiance, self.capture.instances, without, specular)
         return albedo_of(
-            atlas, lit, irradiance, shading.doubt, self.capture.instances, without, specular, self.settings.without
+            atlas,
+            lit,
+            irradiance,
+            shading.relative_error,
+            self.capture.instances,
+            without,
+            specular,
+            self.settings.without,
         )
 
     def base_color(self) -> np.ndarray:

@@ -21,7 +21,7 @@ from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.unseen_light.unseen_light import Light
 from ..progress import Progress
 from ..scene.atlas import Atlas
-from ..scene.creases import crease_doubt
+from ..scene.creases import crease_error
 from ..scene.lit_diffuse import ENOUGH, LitDiffuse
 from ..scene.mesh_noise import tilt
 from ..scene.model import Capture, Instance, Mesh
@@ -155,7 +155,7 @@ def shade(
     unsure = np.hypot(unsure, tilted)
     # Near a crease the light of two sides is mixed.
     if "crease-error" not in without:
-        unsure = np.hypot(unsure, crease_doubt(mesh, atlas, atlas.texel_edge))
+        unsure = np.hypot(unsure, crease_error(mesh, atlas, atlas.texel_edge))
     notes = light.notes if field.sun is None else (*light.notes, field.sun.note)
     return Shading(
         E, escaped, unsure, field.radiance, light.lamps, field.environment, notes, field.mirrors, points, field.sun
@@ -208,7 +208,7 @@ def with_all_light(
 
 def to_store(found: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """What is stored of a `Shading`: arrays, and what JSON holds."""
-    arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "doubt", "radiance")}
+    arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "relative_error", "radiance")}
     arrays |= {"sky": found.environment.radiance, "sky_seen": found.environment.observations}
     meta = {
         "sun": found.sun and {k: np.asarray(v).tolist() for k, v in asdict(found.sun).items()},
@@ -228,7 +228,7 @@ def from_store(a: dict[str, np.ndarray], meta: dict[str, Any]) -> Shading:
     )
     mirrors = tuple(Mirror.from_lists(d) for d in meta["mirrors"])
     return Shading(
-        a["irradiance"], a["escaped"], a["doubt"], a["radiance"], lamps,
+        a["irradiance"], a["escaped"], a["relative_error"], a["radiance"], lamps,
         Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
         meta["sun"] and Sun(**{k: np.float32(v) if isinstance(v, list) else v for k, v in meta["sun"].items()}),
     )  # fmt: skip

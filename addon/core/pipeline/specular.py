@@ -11,7 +11,7 @@ import numpy as np
 
 from ..brdf.lambertian import LAMBERTIAN
 from ..brdf.material import ObjectMaterial, from_json
-from ..fit.layout import Problem
+from ..fit.problem import Problem
 from ..light.field import LightField
 from ..light.lamps import Lamp
 from ..light.lobes import GRID

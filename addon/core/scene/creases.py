@@ -18,7 +18,7 @@ KNEE = 0.1
 """Radians from which on a crease has its full effect: a facet of a curved moulding is no smoother than a corner."""
 THIN = 1e-3
 """A triangle of less height, relative to its longest edge, faces no sure way: an edge with it tells of no bend."""
-DOUBT = 0.3
+MOST_ERROR = 0.3
 """Relative standard error of the irradiance right at a crease. Living room, white panelling: 0.25 to 0.4 there and
 0.07 to 0.12 on flat parts."""
 
@@ -52,7 +52,7 @@ def edge_angles(mesh: Mesh) -> np.ndarray:
     return angle.reshape(-1, 3)
 
 
-def crease_doubt(mesh: Mesh, atlas: Atlas, texel: float) -> np.ndarray:
+def crease_error(mesh: Mesh, atlas: Atlas, texel: float) -> np.ndarray:
     """Relative standard error of the irradiance for nearby creases, (n,) float32.
 
     Parameters
@@ -61,7 +61,7 @@ def crease_doubt(mesh: Mesh, atlas: Atlas, texel: float) -> np.ndarray:
         Edge of an element in metres.
     """
     angles = edge_angles(mesh)
-    doubt = np.zeros(len(atlas), np.float32)
+    relative_error = np.zeros(len(atlas), np.float32)
     corners = mesh.vertices[mesh.triangles].astype(np.float32)
     bent = np.flatnonzero((angles[atlas.triangle] > 0.01 * KNEE).any(1))
     triangle, position = atlas.triangle[bent], atlas.position[bent]
@@ -72,6 +72,6 @@ def crease_doubt(mesh: Mesh, atlas: Atlas, texel: float) -> np.ndarray:
         off = position - a
         off -= (off * way).sum(1, keepdims=True) * way
         near = np.maximum(1 - np.linalg.norm(off, axis=1) / (REACH * texel), 0)
-        felt = DOUBT * np.minimum(angles[triangle, k] * near / KNEE, 1)
-        doubt[bent] = np.maximum(doubt[bent], felt)
-    return doubt
+        felt = MOST_ERROR * np.minimum(angles[triangle, k] * near / KNEE, 1)
+        relative_error[bent] = np.maximum(relative_error[bent], felt)
+    return relative_error

@@ -77,7 +77,7 @@ def scene(ops, results, tmp_path):
 
 
 def test_doubt(results):
-    found = [results.doubt(one) for one in OBJECTS]
+    found = [results.interval_width(one) for one in OBJECTS]
     assert found[:3] == pytest.approx([0.6, 0.1, 0.3]) and found[3] is None
     assert [results.certainty(one) for one in OBJECTS] == ["unsure", "sure", "fair", "unknown"]
 

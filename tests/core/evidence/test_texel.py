@@ -59,8 +59,8 @@ def evidence(room, lit, albedo, light, models=None):
 def test_errors_add_up(box):
     found = evidence(box, known(box), grey(box, error=0.1), sure_light(box, 0.04, 0.03))
     assert np.allclose(found.shading, np.sqrt(0.04**2 + 0.03**2 + c.LIGHT_FLOOR**2), rtol=1e-4)
-    steadied = (c.NOISE_LEFT * 0.04) ** 2 + 0.03**2 + c.LIGHT_FLOOR**2
-    expected = np.sqrt(0.25 * ((c.OWN * 0.1) ** 2 + steadied) + c.LEFT**2)
+    shrunk = (c.NOISE_LEFT * 0.04) ** 2 + 0.03**2 + c.LIGHT_FLOOR**2
+    expected = np.sqrt(0.25 * ((c.OWN * 0.1) ** 2 + shrunk) + c.LEFT**2)
     assert np.median(found.albedo) == pytest.approx(expected, rel=1e-3)
 
 

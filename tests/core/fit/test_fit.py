@@ -10,8 +10,8 @@ import pytest
 from addon.core.brdf.dielectric import PRIOR
 from addon.core.brdf.metal import METAL
 from addon.core.brdf.model import Constraints
-from addon.core.fit.layout import Layout
 from addon.core.fit.lobe_fit import between, fit_lobe, huber, robust_scale, solve
+from addon.core.fit.problem import DenseProblem
 from addon.core.light.lobes import GRID
 from tests.core.glossy_box import Box
 
@@ -110,7 +110,7 @@ def test_few_rays_do_not_draw_psi_to_0(box, rays, phi, psi):
     deaf = replace(problem, light=replace(light, A_noise=0 * light.A, B_noise=0 * light.B))
     at = slice(int(np.argmin(np.abs(GRID - phi))), int(np.argmin(np.abs(GRID - phi))) + 1)
     found, naive, clear = (
-        float(solve(Layout(p), at, 0.0, 0.03).psi[0, 0])
+        float(solve(DenseProblem(p), at, 0.0, 0.03).psi[0, 0])
         for p in (problem, deaf, box.problem(element, direction, phi, psi, paint(element), rays=2000))
     )
     assert found == pytest.approx(clear, rel=0.12)

@@ -107,7 +107,7 @@ def test_the_digest_is_the_same_wherever_the_source_lies(copy):
         ("passes/mesh_denoising/planes.py", NAMES[:1]),
         ("passes/pose_refinement/poses.py", NAMES[1:2]),
         ("passes/sun/sun_fit.py", NAMES[2:3]),
-        ("fit/layout.py", NAMES[3:]),
+        ("fit/problem.py", NAMES[3:]),
         ("scene/rays.py", NAMES),
         ("io/exr.py", NAMES),  # the surface's texel may come from pictures on the mesh
         ("evidence/page.py", []),

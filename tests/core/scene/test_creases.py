@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from addon.core.scene.atlas import Atlas
-from addon.core.scene.creases import DOUBT, REACH, crease_doubt, edge_angles
+from addon.core.scene.creases import MOST_ERROR, REACH, crease_error, edge_angles
 from addon.core.scene.model import Mesh
 
 TEXEL = 0.01
@@ -56,14 +56,14 @@ def test_doubt_is_full_at_a_crease_and_gone_beyond_its_reach():
     mesh = folded(np.pi / 2)
     off = np.array([0.0, 0.5, 0.99 * REACH, 1.01 * REACH, 20]) * TEXEL
     atlas = elements([(1 - x, 0.4, 0) for x in off], [0] * 5)
-    doubt = crease_doubt(mesh, atlas, TEXEL)
-    assert doubt[0] == pytest.approx(DOUBT) and (np.diff(doubt) <= 0).all()
-    assert doubt[2] > 0 and (doubt[3:] == 0).all()
+    relative_error = crease_error(mesh, atlas, TEXEL)
+    assert relative_error[0] == pytest.approx(MOST_ERROR) and (np.diff(relative_error) <= 0).all()
+    assert relative_error[2] > 0 and (relative_error[3:] == 0).all()
 
 
 def test_a_flat_surface_is_not_in_doubt():
     atlas = elements([(0.999, 0.4, 0), (0.5, 0.5, 0)], [0, 0])
-    assert (crease_doubt(folded(0.0), atlas, TEXEL) == 0).all()
+    assert (crease_error(folded(0.0), atlas, TEXEL) == 0).all()
 
 
 def test_slivers_tell_of_no_bend():

@@ -11,7 +11,7 @@ from ...groups import by_label
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Instance
-from .neighbourhood import doubt, steadied
+from .neighbourhood import relative_error, shrink
 
 FLOOR = 1e-3
 """Below this share of the room's median irradiance a quotient says nothing."""
@@ -86,7 +86,7 @@ def albedo_of(
     specular: np.ndarray | float = 0.0,
     without: Collection[str] = (),
 ) -> Albedo:
-    """Albedo = pi L_d / E, clamped, filled in and steadied (`fill`).
+    """Albedo = pi L_d / E, clamped, filled in and shrunk (`fill`).
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def albedo_of(
         Passes left out.
     """
     rho, valid = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
-    error = np.hypot(doubt(lit_diffuse, atlas.object_id, "object-spread" not in without), unsure)
+    error = np.hypot(relative_error(lit_diffuse, atlas.object_id, "object-spread" not in without), unsure)
     class_of = {i.object_id: i.class_name for i in instances}
     return fill(atlas, rho, valid & lit_diffuse.seen, class_of, emitters, error, without)
 
@@ -116,15 +116,15 @@ def fill(
     error: np.ndarray | None = None,
     without: Collection[str] = (),
 ) -> Albedo:
-    """Clamp, fill in what was not measured, and steady what was measured badly, from the same object.
+    """Clamp, fill in what was not measured, and shrink what was measured badly, from the same object.
 
     An object without any measurement takes the median of its class, else of the room.
 
     Parameters
     ----------
     error : (n,) float32, optional
-        Relative standard error of each quotient (`neighbourhood.doubt`); without it all count as equally good. Where
-        it is inf, the quotient counts as not measured.
+        Relative standard error of each quotient (`neighbourhood.relative_error`); without it all count as equally good.
+        Where it is inf, the quotient counts as not measured.
     """
     if error is not None:
         valid = valid & np.isfinite(error)
@@ -144,7 +144,7 @@ def fill(
         if not valid[own].any():
             bare.append((object_id, own))
             continue
-        result[own], left[own] = steadied(atlas, own, result[own], error[own], most=MAX_ALBEDO, without=without)
+        result[own], left[own] = shrink(atlas, own, result[own], error[own], most=MAX_ALBEDO, without=without)
         by_class.setdefault(class_of.get(object_id, ""), []).append(np.median(result[own][valid[own]], 0))
     known = [middle for alike in by_class.values() for middle in alike]
     for object_id, own in bare:

@@ -25,7 +25,7 @@ LOCAL = 0.5
 APART = 0.03
 """Relative difference between elements of one colour."""
 UNEXPLAINED = 1e-4
-"""Density under which neither tells what an element is; `steadied` decides."""
+"""Density under which neither tells what an element is; `shrink` decides."""
 BLOCK = 1 << 11
 
 
@@ -38,7 +38,7 @@ class Surroundings(NamedTuple):
 
 
 def drawn_to_minority(
-    steady: np.ndarray,
+    shrunk: np.ndarray,
     rho: np.ndarray,
     error: np.ndarray,
     around: Surroundings,
@@ -54,7 +54,7 @@ def drawn_to_minority(
 
     Parameters
     ----------
-    steady : (m, 3)
+    shrunk : (m, 3)
         Log albedo, drawn to the middle of its surroundings.
     rho : (m, 3)
         As measured; above 0.
@@ -85,7 +85,7 @@ def drawn_to_minority(
     for_blocks(far, len(near), BLOCK, 0)
     share = other.mean(1)
     real = np.clip(1 - BY_CHANCE / np.maximum(share, 1e-9), 0, 1)
-    result = steady.copy()
+    result = shrunk.copy()
     todo = np.flatnonzero(real[cell] > 0)
 
     def draw(part: slice) -> None:
@@ -101,7 +101,7 @@ def drawn_to_minority(
         drawn = (of_other[:, :, None] * np.log(beside)).sum(1)
         trust = (APART**2 / (APART**2 + local))[:, None]
         as_other = trust * of_other.sum(1)[:, None] * np.log(value) + (1 - trust) * drawn
-        result[own] = (of_ground[:, None] * steady[own] + as_other) / total[:, None]
+        result[own] = (of_ground[:, None] * shrunk[own] + as_other) / total[:, None]
 
     for_blocks(draw, len(todo), BLOCK, 0)
     return result

@@ -28,10 +28,10 @@ REFERENCES = 4096
 """Well-measured elements of an object that neighbours are sought among: a thinned set reaches further around."""
 CELL_TEXELS = 6.0
 """Edge of the cells that share one prior."""
-LEAST_DOUBT = 0.06
+LEAST_ERROR = 0.06
 """Relative error that even the best measured element has: shading, texels against pixels."""
 SURE = 0.15
-"""An element with less doubt than this may speak for its surroundings."""
+"""An element with a lesser relative error than this may speak for its surroundings."""
 FEW, LEAST_FEW = 0.35, 0.1
 """Bounds of the relative error of a single observation, whose spread can't be known."""
 OF_OTHERS, TIMES = 0.84, 2.0
@@ -40,7 +40,7 @@ made where little is seen, so for more than theirs. `FEW` for all drew a bathroo
 25.4 to 26.3 dB, in finer frames 27.3 to 27.9, hall 32.7 to 33.3, kitchen 28.8 to 29.0, living room 32.7 to 32.5, others
 within .15."""
 ENOUGH_OTHERS = 30
-EDGE_DOUBT = 0.3
+EDGE_ERROR = 0.3
 """Added for observations at depth edges, where another surface is mixed in."""
 SURPRISE = 3.0
 """Deviations of up to so many of an element's own errors are taken for error."""
@@ -48,7 +48,7 @@ DARK = 1e-3
 BLOCK = 1 << 11
 
 
-def doubt(lit: LitDiffuse, object_id: np.ndarray, of_object: bool = True) -> np.ndarray:
+def relative_error(lit: LitDiffuse, object_id: np.ndarray, of_object: bool = True) -> np.ndarray:
     """Relative standard error of each element's L_d, from its observations: (n,) float32.
 
     inf where there are none, or none but clipped ones: a lower bound may be off by any factor.
@@ -68,8 +68,8 @@ def doubt(lit: LitDiffuse, object_id: np.ndarray, of_object: bool = True) -> np.
     few = FEW
     if of_object:
         few = _single(spread, lit.seen & (lit.count >= 3) & (lit.tier == CLEAN), object_id)
-    error = np.hypot(1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, few)) / np.sqrt(n), LEAST_DOUBT)
-    error = np.where(lit.tier == CLEAN, error, error + EDGE_DOUBT)
+    error = np.hypot(1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, few)) / np.sqrt(n), LEAST_ERROR)
+    error = np.where(lit.tier == CLEAN, error, error + EDGE_ERROR)
     return np.where(lit.seen & (lit.tier != SATURATED), error, np.inf).astype(np.float32)
 
 
@@ -129,7 +129,7 @@ def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, wi
     return found
 
 
-def steadied(
+def shrink(
     atlas: Atlas,
     own: np.ndarray,
     rho: np.ndarray,
@@ -179,7 +179,7 @@ def steadied(
     rho = np.maximum(rho, DARK)
     reference, reference_error = rho[sure], error[sure]
     around = _prior(centre[asked], position[sure], np.log(reference), without)
-    steady, left = rho.astype(np.float32), error.astype(np.float32)
+    shrunk, left = rho.astype(np.float32), error.astype(np.float32)
     rho, error = rho[todo], error[todo]
     measured = np.isfinite(error)
     log_rho = np.log(rho)
@@ -200,5 +200,5 @@ def steadied(
     if not {"second-colour", "albedo-prior"} & set(without):
         near = around, index[measured], reference, reference_error
         result[measured] = drawn_to_minority(result[measured], rho[measured], error[measured, 0], *near, most)
-    steady[todo] = np.exp(result)
-    return steady, left
+    shrunk[todo] = np.exp(result)
+    return shrunk, left

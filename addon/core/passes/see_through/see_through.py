@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...fit.layout import Layout, Problem
 from ...fit.lobe_fit import HUBER, ROUNDS, LobeFit, huber
+from ...fit.problem import DenseProblem, Problem
 from ...fit.transmission import SeeThrough
 from ...light.field import LightField
 
@@ -124,19 +124,19 @@ def judge(problem: Problem, behind: Behind, lobe: LobeFit | None, scale: float) 
     scale : float
         Standard deviation of the relative residual.
     """
-    layout = Layout(problem)
-    there = layout.there * layout.each(behind.known[:, None].astype(np.float32))[0]
+    dense = DenseProblem(problem)
+    there = dense.there * dense.each(behind.known[:, None].astype(np.float32))[0]
     told = there.sum(0) >= LEAST_VIEWS
     if told.sum() < max(LEAST_ELEMENTS, LEAST_TOLD * len(told)):
         return None
-    b = layout.relative(behind.radiance)[..., told]
-    layout, there = layout.part(told), there[:, told]
+    b = dense.relative(behind.radiance)[..., told]
+    dense, there = dense.part(told), there[:, told]
     rank = np.cumsum(there, 0)
     first = there * (rank <= there.sum(0) / 2)
-    radiance = layout.I[:, 0]
+    radiance = dense.I[:, 0]
     opaque = [radiance]
     if lobe is not None:
-        one = layout.lobe(layout.at(lobe.phi))
+        one = dense.lobe(dense.at(lobe.phi))
         opaque.append(radiance - lobe.psi.astype(np.float32)[:, None, None] * one.A[:, 0] - one.B[:, 0])
     costs = {name: np.zeros(int(told.sum())) for name in ("plain", "lobe", "glass", "holes")}
     passed, holes = [], []

@@ -12,8 +12,8 @@ import numpy as np
 
 from ...brdf.dielectric import DIELECTRIC, MOST_F0, USUAL_F0
 from ...brdf.metal import METAL
-from ...fit.layout import Problem
 from ...fit.lobe_fit import LobeFit
+from ...fit.problem import Problem
 from .models import Choice, metal_f0
 from .one_colour import Coated, OneColour
 

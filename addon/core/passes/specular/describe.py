@@ -9,7 +9,7 @@ import numpy as np
 from ...brdf.emitter import EMITTER, LAMP_ALBEDO
 from ...brdf.material import ObjectMaterial
 from ...brdf.metal import METAL
-from ...fit.layout import Problem
+from ...fit.problem import Problem
 from ...light.mirrors import Mirror
 from ...results.overrides import Given
 from ...scene.model import Instance

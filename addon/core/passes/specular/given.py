@@ -14,8 +14,8 @@ from ...brdf.dielectric import DIELECTRIC, MOST_F0
 from ...brdf.material import ObjectMaterial
 from ...brdf.metal import METAL
 from ...brdf.model import Brdf, Microfacets
-from ...fit.layout import Layout, Problem
 from ...fit.lobe_fit import LobeFit, fit_lobe
+from ...fit.problem import DenseProblem, Problem
 from ...light.lobes import GRID
 from ...results.overrides import Given
 from .intervals import UNKNOWN, GlossInterval
@@ -82,13 +82,13 @@ def _fit(
 ) -> LobeFit:
     """The lobe; where `phi` is given, `problem` has no other."""
     if enough:
-        layout = Layout(problem)
+        dense = DenseProblem(problem)
         if f0 is not None:
-            return fit_lobe(layout, constraints=replace(model.constraints, least_psi=0.0, prior=None), psi=f0)
+            return fit_lobe(dense, constraints=replace(model.constraints, least_psi=0.0, prior=None), psi=f0)
         if model.has_diffuse:
-            fit = fit_lobe(layout, constraints=model.constraints)
+            fit = fit_lobe(dense, constraints=model.constraints)
             return replace(fit, psi=np.minimum(fit.psi, MOST_F0))
-        fit = metal_fit(problem, layout)
+        fit = metal_fit(problem, dense)
         return replace(fit, psi=metal_f0(problem, fit.phi))
     looks = None
     if problem is not None and phi is None:

@@ -14,8 +14,8 @@ import numpy as np
 from ...brdf.dielectric import MOST_F0
 from ...brdf.material import Z90
 from ...brdf.model import Brdf
-from ...fit.layout import Layout, Problem
 from ...fit.lobe_fit import fit_lobe
+from ...fit.problem import DenseProblem, Problem
 from .models import Choice
 
 GROUPS = 6
@@ -70,13 +70,13 @@ def gloss_interval(choice: Choice, problem: Problem | None) -> GlossInterval:
 
 def jackknife(problem: Problem, model: Brdf) -> tuple[float, float]:
     """Standard errors of roughness and psi of a model's fit, as far as elements differ."""
-    layout = Layout(problem)
-    count = layout.there.shape[1]
+    dense = DenseProblem(problem)
+    count = dense.there.shape[1]
     groups = min(GROUPS, count // 3)
     if groups < 3:
         return 0.3, 0.3
     group = np.arange(count) * groups // count
-    fits = [fit_lobe(layout.part(group != left_out), constraints=model.constraints) for left_out in range(groups)]
+    fits = [fit_lobe(dense.part(group != left_out), constraints=model.constraints) for left_out in range(groups)]
     found = np.array([(np.sqrt(fit.phi), fit.psi.mean()) for fit in fits])
     error = np.sqrt((groups - 1) / groups * np.square(found - found.mean(0)).sum(0))
     return float(error[0]), float(error[1])

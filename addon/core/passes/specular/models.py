@@ -11,8 +11,8 @@ from ...brdf.lambertian import LAMBERTIAN
 from ...brdf.metal import METAL
 from ...brdf.model import Brdf
 from ...brdf.transparent import TRANSPARENT
-from ...fit.layout import Layout, Problem
 from ...fit.lobe_fit import LobeFit, element_costs, fit_lobe, held_out_costs, huber, solve
+from ...fit.problem import DenseProblem, Problem
 from ...fit.transmission import SeeThrough
 from ...light.lobes import nearest
 from ...weighted import weighted_median
@@ -88,7 +88,7 @@ def _gain(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
 
 def gain_of(fit: LobeFit, held: Problem) -> tuple[float, float]:
     """Share of the cost that a fit's lobe takes off elements it has not seen, and that in standard errors."""
-    return _gain(*element_costs(Layout(held), fit, max(1.4826 * fit.residual, 1e-4)))
+    return _gain(*element_costs(DenseProblem(held), fit, max(1.4826 * fit.residual, 1e-4)))
 
 
 def _dielectric(fit: LobeFit) -> bool:
@@ -101,23 +101,25 @@ def _metallic(fit: LobeFit) -> bool:
     return float(fit.psi.mean()) > MOST_F0 and fit.phi <= BROADEST_PHI
 
 
-def _bare_metal(problem: Problem, layout: Layout, phi: float, fit: LobeFit, scale: float) -> tuple[LobeFit, np.ndarray]:
+def _bare_metal(
+    problem: Problem, dense: DenseProblem, phi: float, fit: LobeFit, scale: float
+) -> tuple[LobeFit, np.ndarray]:
     """A metal's lobe of width phi with no diffuse part at all: `fit` with its F0, and the elements' costs, (g,)."""
     f0 = metal_f0(problem, phi)
-    lobe = layout.lobe(layout.at(phi))
-    rest = layout.I - f0.astype(np.float32)[:, None, None, None] * lobe.A - lobe.B
+    lobe = dense.lobe(dense.at(phi))
+    rest = dense.I - f0.astype(np.float32)[:, None, None, None] * lobe.A - lobe.B
     size = np.sqrt(np.square(rest[:, 0]).mean(0))
-    return replace(fit, phi=float(phi), psi=f0, kappa=0.0), (huber(size, scale) * layout.there).sum(0, dtype=np.float64)
+    return replace(fit, phi=float(phi), psi=f0, kappa=0.0), (huber(size, scale) * dense.there).sum(0, dtype=np.float64)
 
 
-def metal_fit(problem: Problem, layout: Layout) -> LobeFit:
+def metal_fit(problem: Problem, dense: DenseProblem) -> LobeFit:
     """The lobe of what is known to be a metal: the one over a diffuse part if it is a metal's, else the lobe alone."""
-    metal = fit_lobe(layout, constraints=METAL.constraints)
+    metal = fit_lobe(dense, constraints=METAL.constraints)
     if _metallic(metal):
         return metal
-    widths = layout.grid[layout.grid <= BROADEST_PHI] if len(layout.grid) > 1 else layout.grid
+    widths = dense.grid[dense.grid <= BROADEST_PHI] if len(dense.grid) > 1 else dense.grid
     scale = max(1.4826 * metal.residual, 1e-4)
-    return min((_bare_metal(problem, layout, phi, metal, scale) for phi in widths), key=lambda one: one[1].sum())[0]
+    return min((_bare_metal(problem, dense, phi, metal, scale) for phi in widths), key=lambda one: one[1].sum())[0]
 
 
 def _of_class(own: LobeFit, of_class: LobeFit, model: Brdf, problem: Problem | None) -> LobeFit:
@@ -128,11 +130,11 @@ def _of_class(own: LobeFit, of_class: LobeFit, model: Brdf, problem: Problem | N
     shared = replace(own, phi=of_class.phi, psi=own.psi if model.lobe_alone else of_class.psi)
     if problem is None:
         return shared
-    layout, scale = Layout(problem), max(1.4826 * own.residual, 1e-4)
+    dense, scale = DenseProblem(problem), max(1.4826 * own.residual, 1e-4)
     if model.lobe_alone:
-        solved = solve(layout, layout.at(shared.phi), own.kappa, scale, constraints=model.constraints)
+        solved = solve(dense, dense.at(shared.phi), own.kappa, scale, constraints=model.constraints)
         shared = replace(shared, psi=solved.psi[:, 0])
-    (with_own, _), (with_shared, _) = (element_costs(layout, fit, scale) for fit in (own, shared))
+    (with_own, _), (with_shared, _) = (element_costs(dense, fit, scale) for fit in (own, shared))
     gain, sigmas = _gain(with_own, with_shared)
     return own if gain > MIN_GAIN and sigmas > MIN_SIGMAS else shared
 
@@ -141,29 +143,29 @@ def choose_model(problem: Problem) -> Choice:
     """The simplest model that the observations support, by two-fold cross-validation over the elements."""
     if len(np.unique(problem.element)) < MIN_ELEMENTS:
         return Choice(LAMBERTIAN, None, note="Too few observations to look for a highlight.")
-    layout = Layout(problem)
-    odd = (np.random.default_rng(0).permutation(layout.there.shape[1]) % 2).astype(bool)
+    dense = DenseProblem(problem)
+    odd = (np.random.default_rng(0).permutation(dense.there.shape[1]) % 2).astype(bool)
 
     def held_out(fit: LobeFit, model: Brdf) -> tuple[np.ndarray, np.ndarray]:
         """Costs of the elements with the lobe that the others gave, and without one."""
-        found = [held_out_costs(layout, fit, train, scale, model.constraints) for train in (odd, ~odd)]
+        found = [held_out_costs(dense, fit, train, scale, model.constraints) for train in (odd, ~odd)]
         with_lobe, without = (np.concatenate(costs) for costs in zip(*found, strict=True))
         return with_lobe, without
 
-    fit = fit_lobe(layout, constraints=DIELECTRIC.constraints)
+    fit = fit_lobe(dense, constraints=DIELECTRIC.constraints)
     scale = max(1.4826 * fit.residual, 1e-4)
     with_lobe, without = held_out(fit, DIELECTRIC)
     scores = {LAMBERTIAN.name: 1.0, DIELECTRIC.name: float(with_lobe.sum() / max(without.sum(), 1e-30))}
     gain, sigmas = _gain(with_lobe, without)
-    large = gain > LARGE_GAIN and layout.there.shape[1] >= LARGE_ELEMENTS
+    large = gain > LARGE_GAIN and dense.there.shape[1] >= LARGE_ELEMENTS
     sure = gain > MIN_GAIN and sigmas > (LARGE_SIGMAS if large else MIN_SIGMAS) and fit.phi <= BROADEST_PHI
     # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
     dielectric = replace(fit, psi=np.minimum(fit.psi, MOST_F0))
-    metal, likely = fit_lobe(layout, constraints=METAL.constraints), None
+    metal, likely = fit_lobe(dense, constraints=METAL.constraints), None
     found = [(metal, *held_out(metal, METAL))] if _metallic(metal) else []
     # Errors of the light draw psi down where each element has a diffuse part of its own; without one they don't.
     bare = min(
-        (_bare_metal(problem, layout, phi, metal, scale) for phi in layout.grid[layout.grid <= BROADEST_PHI]),
+        (_bare_metal(problem, dense, phi, metal, scale) for phi in dense.grid[dense.grid <= BROADEST_PHI]),
         key=lambda one: one[1].sum(),
     )
     with_bare = _metallic(bare[0]) and "bare-metal" not in problem.without
@@ -174,7 +176,7 @@ def choose_model(problem: Problem) -> Choice:
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
         (less, by), (more, surely) = _gain(with_metal, matt), _gain(with_metal, with_lobe)
         most = BARE_AT_MOST if min(less, more) > MUCH else BARE
-        if _bare_metal(problem, layout, fit_of_metal.phi, metal, scale)[1].sum() > most * matt.sum():
+        if _bare_metal(problem, dense, fit_of_metal.phi, metal, scale)[1].sum() > most * matt.sum():
             continue
         if min(less, more) > MIN_GAIN and by > MIN_SIGMAS and surely > SURELY_METAL:
             other = dielectric if sure and surely < MIN_SIGMAS else None

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...brdf.dielectric import USUAL_F0
-from ...fit.layout import Problem
 from ...fit.lobe_fit import robust_scale
+from ...fit.problem import Problem
 from ...luminance import LUMINANCE
 
 BROADEST_PHI = 0.5

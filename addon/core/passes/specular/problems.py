@@ -9,7 +9,7 @@ import numpy as np
 from ...brdf.dielectric import USUAL_F0
 from ...brdf.ggx import GGX
 from ...brdf.model import Microfacets
-from ...fit.layout import Problem
+from ...fit.problem import Problem
 from ...light.emitters import bright_triangles
 from ...light.field import LightField
 from ...light.lobes import LobeLight, reflected_light

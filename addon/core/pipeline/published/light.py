@@ -13,7 +13,7 @@ from ...paper.albedo import albedo as quotient
 from ...paper.captured_light import CapturedLight
 from ...paper.irradiance import irradiance
 from ...passes.albedo.albedo import MEASURED, Albedo, fill
-from ...passes.albedo.neighbourhood import doubt
+from ...passes.albedo.neighbourhood import relative_error
 from ...progress import Progress
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
@@ -57,4 +57,4 @@ def albedo_of(
     rho = quotient(np.maximum(lit.radiance - specular, 0), irradiance)
     valid = np.isfinite(rho).all(1) & (lit.tier != SATURATED)
     found = fill(atlas, rho, valid, {i.object_id: i.class_name for i in instances}, emitters)
-    return replace(found, error=np.where(found.origin == MEASURED, doubt(lit, atlas.object_id), found.error))
+    return replace(found, error=np.where(found.origin == MEASURED, relative_error(lit, atlas.object_id), found.error))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from addon.core.passes.albedo.albedo import fill
-from addon.core.passes.albedo.neighbourhood import steadied
+from addon.core.passes.albedo.neighbourhood import shrink
 from tests.core.rooms import make_room, quad
 
 TILE, JOINT = 0.75, 0.5
@@ -29,7 +29,7 @@ def noisy(values, width):
 
 
 def wall(atlas, rho, error, without=()):
-    return steadied(atlas, np.arange(len(atlas)), rho, np.asarray(error, np.float32), without=without)[0]
+    return shrink(atlas, np.arange(len(atlas)), rho, np.asarray(error, np.float32), without=without)[0]
 
 
 def test_joints_in_doubt_stay_as_dark_as_they_are(atlas, joints):
@@ -72,6 +72,6 @@ def test_what_is_above_all_albedos_is_no_colour(atlas, joints):
     rho = noisy(np.where(weak, 0.97, bright), 0.02)
     everywhere = np.ones(len(atlas), bool)
     found = fill(atlas, rho, everywhere, {}, set(), np.full(len(atlas), 0.14, np.float32)).rho
-    lone = steadied(atlas, np.arange(len(atlas)), np.minimum(rho, 1), np.full(len(atlas), 0.14, np.float32))[0]
+    lone = shrink(atlas, np.arange(len(atlas)), np.minimum(rho, 1), np.full(len(atlas), 0.14, np.float32))[0]
     far = joints & (atlas.position[:, 0] < 1)
     assert np.median(found[far]) < np.median(lone[far])

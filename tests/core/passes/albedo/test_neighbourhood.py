@@ -1,4 +1,4 @@
-"""Albedo steadied by its surroundings: what is drawn to them and what is left alone."""
+"""Albedo shrunk towards its surroundings: what is drawn to them and what is left alone."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import pytest
 
 from addon.core.passes.albedo import neighbourhood
 from addon.core.passes.albedo.albedo import FILLED, MEASURED, fill
-from addon.core.passes.albedo.neighbourhood import EDGE_DOUBT, FEW, LEAST_DOUBT, SURE, doubt, steadied
+from addon.core.passes.albedo.neighbourhood import EDGE_ERROR, FEW, LEAST_ERROR, SURE, relative_error, shrink
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.visibility import CLEAN, EDGE, SATURATED
 from tests.core.rooms import make_room, quad
 
-GOOD, POOR, NONE = LEAST_DOUBT, 0.8, np.inf
+GOOD, POOR, NONE = LEAST_ERROR, 0.8, np.inf
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def atlas():
 
 def run(atlas, rho, error, without=()):
     own = np.arange(len(atlas))
-    return steadied(atlas, own, rho.astype(np.float32), error.astype(np.float32), without=without)[0]
+    return shrink(atlas, own, rho.astype(np.float32), error.astype(np.float32), without=without)[0]
 
 
 def grey(values):
@@ -187,14 +187,14 @@ def observed(median, spread, count, tier) -> LitDiffuse:
 
 
 def of_one(lit: LitDiffuse) -> np.ndarray:
-    """The doubt of elements that all belong to one object."""
-    return doubt(lit, np.zeros(len(lit.count), np.int32))
+    """The relative error of elements that all belong to one object."""
+    return relative_error(lit, np.zeros(len(lit.count), np.int32))
 
 
 def test_doubt_falls_with_observations_and_rises_with_spread():
     by_count = of_one(observed(5.0, 0.3, [3, 10, 100], CLEAN))
     assert (np.diff(by_count) < 0).all()
-    assert by_count[1] == pytest.approx(np.hypot(1.25 * 0.3 / np.sqrt(10), LEAST_DOUBT), rel=1e-3)
+    assert by_count[1] == pytest.approx(np.hypot(1.25 * 0.3 / np.sqrt(10), LEAST_ERROR), rel=1e-3)
     by_spread = of_one(observed(5.0, [0.01, 0.3, 1.0], 10, CLEAN))
     assert (np.diff(by_spread) > 0).all() and by_spread[0] < SURE
     assert np.allclose(of_one(observed(5e-3, 0.3, 10, CLEAN)), of_one(observed(5e3, 0.3, 10, CLEAN)))
@@ -203,23 +203,23 @@ def test_doubt_falls_with_observations_and_rises_with_spread():
 def test_one_or_two_observations_are_no_certainty():
     """Their quartiles coincide, which is no sign of agreement."""
     few = of_one(observed(1.0, 0.0, [1, 2, 3], CLEAN))
-    assert few[0] == pytest.approx(np.hypot(1.25 * FEW, LEAST_DOUBT)) and SURE < few[1] < few[0]
-    assert few[2] == pytest.approx(LEAST_DOUBT)
+    assert few[0] == pytest.approx(np.hypot(1.25 * FEW, LEAST_ERROR)) and SURE < few[1] < few[0]
+    assert few[2] == pytest.approx(LEAST_ERROR)
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.08, 0.5])
 def test_a_single_observation_is_as_unsure_as_the_object_s_others(spread):
     """Within bounds; what is known of one object says nothing of another."""
     lit = observed(1.0, [spread] * 40 + [0.0, 0.0], [20] * 40 + [1, 1], CLEAN)
-    own, other = doubt(lit, np.int32([7] * 41 + [2]))[-2:]
+    own, other = relative_error(lit, np.int32([7] * 41 + [2]))[-2:]
     expected = np.clip(neighbourhood.TIMES * spread, neighbourhood.LEAST_FEW, FEW)
-    assert own == pytest.approx(np.hypot(1.25 * expected, LEAST_DOUBT), rel=0.01)
-    assert other == pytest.approx(np.hypot(1.25 * FEW, LEAST_DOUBT))
+    assert own == pytest.approx(np.hypot(1.25 * expected, LEAST_ERROR), rel=0.01)
+    assert other == pytest.approx(np.hypot(1.25 * FEW, LEAST_ERROR))
 
 
 def test_edges_and_saturation_are_in_doubt():
     clean, edge, saturated = of_one(observed(1.0, 0.1, 20, [CLEAN, EDGE, SATURATED]))
-    assert edge == pytest.approx(clean + EDGE_DOUBT) and saturated > edge > SURE > clean
+    assert edge == pytest.approx(clean + EDGE_ERROR) and saturated > edge > SURE > clean
 
 
 def test_what_nobody_saw_is_no_measurement():

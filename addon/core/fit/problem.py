@@ -42,7 +42,7 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Lobe:
+class Regressors:
     """A, B and the products of their noise for h phi, (3, h, views, elements) float32 each, relative to the level."""
 
     A: np.ndarray
@@ -52,7 +52,7 @@ class Lobe:
     BB: np.ndarray
 
 
-class Layout:
+class DenseProblem:
     """A problem as dense arrays: channel, phi, view, element; what an element was not seen in has weight 0.
 
     Sums over an element's views are then sums over an axis, and every loop runs along hundreds of elements: solving
@@ -96,7 +96,7 @@ class Layout:
         self._grazing = (1 - self._laid(problem.cosine)) ** 2
         light = problem.light
         A, B, dA, dB = (self._laid(x.T) / level for x in (light.A, light.B, light.A_noise, light.B_noise))
-        self._lobe = Lobe(A, B, dA * dA, dA * dB, dB * dB)
+        self._lobe = Regressors(A, B, dA * dA, dA * dB, dB * dB)
 
     @property
     def views(self) -> float:
@@ -127,22 +127,22 @@ class Layout:
         index = nearest(self.grid, phi)
         return slice(index, index + 1)
 
-    def lobe(self, phi: slice) -> Lobe:
+    def lobe(self, phi: slice) -> Regressors:
         """A, B and their noise for some phi of the grid."""
         one = self._lobe
-        return Lobe(*(getattr(one, name)[:, phi] for name in ("A", "B", "AA", "AB", "BB")))
+        return Regressors(*(getattr(one, name)[:, phi] for name in ("A", "B", "AA", "AB", "BB")))
 
     def seen(self, values: np.ndarray) -> np.ndarray:
         """Of (v, g) values those of observations, (m,)."""
         return values[self.there > 0]
 
-    def part(self, chosen: np.ndarray) -> Layout:
+    def part(self, chosen: np.ndarray) -> DenseProblem:
         """The same for some elements, (g,) bool."""
-        part = object.__new__(Layout)
+        part = object.__new__(DenseProblem)
         part.grid, part.without = self.grid, self.without
         part.there, part.inflate, part.I = self.there[:, chosen], self.inflate[chosen], self.I[..., chosen]
         part._grazing = self._grazing[:, chosen]
         part.count = int(part.there.sum())
         one = self._lobe
-        part._lobe = Lobe(*(getattr(one, name)[..., chosen] for name in ("A", "B", "AA", "AB", "BB")))
+        part._lobe = Regressors(*(getattr(one, name)[..., chosen] for name in ("A", "B", "AA", "AB", "BB")))
         return part
