@@ -46,13 +46,20 @@ def tiny_capture(tmp_path_factory) -> Path:
     return render_capture(tmp_path_factory.mktemp("tiny") / "capture", "tiny")
 
 
+SLOW_FIXTURES = {"archive", "office", "recovered", "same", "tiny_capture"}
+"""Rooms that are rendered or recovered, and the built zip: whoever asks for them is slow."""
+ON_BOTH = ("tests/core/io/", "tests/core/pipeline/", "tests/core/results/")
+"""Parts of the core that depend on more than arithmetic."""
+
+
 def pytest_collection_modifyitems(items):
-    """Mark as `once` what takes long and depends on arithmetic alone: one Python is enough for it."""
-    both = ("tests/core/io/", "tests/core/pipeline/", "tests/core/results/")
+    """Mark what takes long, and as `once` what does and depends on arithmetic alone: one Python is enough for it."""
     for item in items:
         place = item.path.relative_to(ROOT).as_posix()
-        slow = place.startswith("tests/core/") and not place.startswith(both) and item.get_closest_marker("slow")
-        if slow or place.startswith("tests/blender/evidence/"):
+        if SLOW_FIXTURES & set(getattr(item, "fixturenames", ())):
+            item.add_marker(pytest.mark.slow)
+        arithmetic = place.startswith("tests/core/") and not place.startswith(ON_BOTH)
+        if place.startswith("tests/blender/evidence/") or (arithmetic and item.get_closest_marker("slow")):
             item.add_marker(pytest.mark.once)
 
 

@@ -409,6 +409,7 @@ def test_a_disk_that_is_full_of_observations(recover, tmp_path, monkeypatch):
     assert not list((tmp_path / "out").glob("tmp-*"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.99])
 def test_half_a_scene_is_never_taken_for_a_whole_one(share, recover, tmp_path, monkeypatch):
     """Blender does not notice that a disk is full; the program does, and takes the last run's scene away too."""
@@ -427,6 +428,7 @@ def test_half_a_scene_is_never_taken_for_a_whole_one(share, recover, tmp_path, m
     assert recover() == (0, "") and whole(out)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="mounts a small file system")
 @pytest.mark.parametrize("left", ["a third", "all but a bit of the scene"])
 def test_a_disk_that_is_really_full(left, capture, recover, tmp_path, root):
@@ -462,6 +464,7 @@ def test_the_memory_is_used_up(recover, monkeypatch):
     assert code == 1 and "memory is used up" in err
 
 
+@pytest.mark.slow
 def test_a_stage_that_was_damaged_is_done_again(recover, tmp_path):
     recover()
     stage = tmp_path / "out" / "stages" / "shading.npz"

@@ -67,6 +67,7 @@ def test_truth_says_what_the_paints_are(tiny_capture):
     assert all(0 <= c <= 1 for one in truth.values() for c in one["base_color"])
 
 
+@pytest.mark.slow
 def test_rendering_leaves_nothing_open_and_is_not_repeated(tmp_path):
     before = [len(getattr(bpy.data, kind)) for kind in ("scenes", "objects", "meshes", "materials", "images")]
     folder = render_capture(tmp_path / "capture", "tiny")

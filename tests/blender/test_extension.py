@@ -108,6 +108,7 @@ def install(script: str, tmp_path: Path, *arguments) -> subprocess.CompletedProc
     return subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True)
 
 
+@pytest.mark.slow
 def test_content(archive, root):
     with zipfile.ZipFile(archive) as content:
         names = content.namelist()
@@ -141,6 +142,7 @@ def test_blender_takes_it_as_valid(archive, cli):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_installs_enables_and_runs(archive, grey_capture, tmp_path):
     done = install(INSTALLED, tmp_path, archive, grey_capture)
     assert done.returncode == 0 and "INSTALLED AND RUN" in done.stdout, done.stdout + done.stderr

@@ -86,6 +86,8 @@ def same(tmp_path_factory) -> Same:
     return Same(tmp_path_factory.mktemp("same"))
 
 
+@pytest.mark.slow
+@pytest.mark.once
 @pytest.mark.parametrize("name", WRITERS)
 def test_the_living_room_in_another_layout(same, tmp_path, name):
     root = tmp_path / "capture"
@@ -118,6 +120,7 @@ def test_the_living_room_in_another_layout(same, tmp_path, name):
     assert np.abs(albedo - same.albedo).mean() < 1e-3
 
 
+@pytest.mark.slow
 def test_a_replica_room_becomes_a_scene(tmp_path):
     room = make_room(lit_box(lamps=(((0.3, 0.7), (0.3, 0.7)),)), 0.05)
     made = ReplicaOnDisk(tmp_path / "room", room, radiosity(room, ALBEDO, {6: LAMP}), edge=0.4)

@@ -28,6 +28,7 @@ def truth(folder, kind: str) -> np.ndarray:
     return np.stack([read_exr(path).rgb for path in sorted((folder / "truth" / kind).glob("*.exr"))])
 
 
+@pytest.mark.slow
 def test_it_is_a_capture(office):
     capture = read_capture(office)
     assert len(capture.frames) == 3

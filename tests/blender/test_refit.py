@@ -44,6 +44,7 @@ def shader(folder, object_id):
     return {name: node.inputs[name].default_value for name in ("Metallic", "Roughness", "IOR", "Specular IOR Level")}
 
 
+@pytest.mark.slow
 def test_a_correction_reaches_the_scene_without_the_capture(result, tmp_path, capsys):
     assert shader(result, 0)["Metallic"] == 0
     file = given(tmp_path, {"0": {"model": "metal", "roughness": 0.25}})
@@ -80,6 +81,7 @@ def test_what_is_wrong_is_one_sentence(result, tmp_path, capsys):
     assert (result / "materials.json").read_bytes() == before and (result / "scene.blend").exists()
 
 
+@pytest.mark.slow
 def test_later_runs_heed_what_is_kept(tiny_capture, tmp_path, capsys):
     result = tmp_path / "result"
     file = given(tmp_path, {"0": {"model": "metal", "roughness": 0.25}})
@@ -102,6 +104,7 @@ COARSE = [*FAST[: FAST.index("--texel-size")], "--atlas-size", "128"]
 """The room's atlas is too small for what the frames show: parts of it are finer."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["object", "udim"])
 def test_parts_of_an_atlas_are_renewed_without_the_capture(tiny_capture, tmp_path, capsys, kind):
     capture, result = shutil.copytree(tiny_capture, tmp_path / "capture"), tmp_path / "result"
