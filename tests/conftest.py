@@ -53,14 +53,14 @@ ON_BOTH = ("tests/core/io/", "tests/core/pipeline/", "tests/core/results/")
 
 
 def pytest_collection_modifyitems(items):
-    """Mark what takes long, and as `once` what does and depends on arithmetic alone: one Python is enough for it."""
+    """Mark what is slow by its fixtures, and as `arithmetic` what is slow and depends on nothing but that."""
     for item in items:
         place = item.path.relative_to(ROOT).as_posix()
         if SLOW_FIXTURES & set(getattr(item, "fixturenames", ())):
             item.add_marker(pytest.mark.slow)
-        arithmetic = place.startswith("tests/core/") and not place.startswith(ON_BOTH)
-        if place.startswith("tests/blender/evidence/") or (arithmetic and item.get_closest_marker("slow")):
-            item.add_marker(pytest.mark.once)
+        slow = place.startswith("tests/core/") and not place.startswith(ON_BOTH) and item.get_closest_marker("slow")
+        if slow or place.startswith("tests/hard_cases/"):
+            item.add_marker(pytest.mark.arithmetic)
 
 
 def pytest_sessionfinish(session, exitstatus):

@@ -264,6 +264,7 @@ REFUSED = {
 
 
 @pytest.mark.slow
+@pytest.mark.once  # what is wrong with a capture is the core's matter
 @pytest.mark.parametrize("name", FINISHED)
 def test_a_run_goes_on_and_tells(name, capture, recover, tmp_path):
     change, told = FINISHED[name]
@@ -275,6 +276,7 @@ def test_a_run_goes_on_and_tells(name, capture, recover, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.once  # what is wrong with a capture is the core's matter
 @pytest.mark.parametrize("name", UNTOLD)
 def test_pixels_that_say_nothing_do_no_harm(name, capture, recover, tmp_path):
     UNTOLD[name](capture)
