@@ -39,12 +39,12 @@ class Dielectric(Brdf):
     def base_color(self, albedo: np.ndarray, of: Parameters) -> np.ndarray:
         """More than the albedo by what Principled's specular layer takes from its diffuse part."""
         # Above 1 the object would reflect more than all light, and a room of it would never grow dark.
-        return np.minimum(base_color(albedo, of.f0, of.alpha), 1)
+        return np.minimum(base_color(albedo, float(np.mean(of.f0 or 0.0)), of.alpha or 0.0), 1)
 
     def principled(self, of: Parameters) -> Principled:
         """The lobe by its index of refraction."""
         roughness = None if of.alpha is None else math.sqrt(min(max(of.alpha, 0.0), 1.0))
-        return Principled(roughness=roughness, ior=ior_of(of.f0 or 0.0), specular_level=0.5)
+        return Principled(roughness=roughness, ior=ior_of(float(np.mean(of.f0 or 0.0))), specular_level=0.5)
 
 
 DIELECTRIC = Dielectric(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..luminance import rgb
 from .ggx import GGX
 from .model import F0, Brdf, Constraints, Microfacets, Parameters, Principled
 
@@ -26,7 +27,7 @@ class Metal(Brdf):
 
     def as_f0(self, value) -> F0 | None:
         """Three numbers."""
-        return None if value is None else tuple(float(x) for x in np.broadcast_to(np.asarray(value, float), 3))
+        return None if value is None else rgb(np.broadcast_to(np.asarray(value, float), 3))
 
     def plausible_f0(self, base_color=None) -> F0:
         """The colour it is known by."""
@@ -39,7 +40,7 @@ class Metal(Brdf):
     def principled(self, of: Parameters) -> Principled:
         """Metallic, in the colour of its F0."""
         roughness = None if of.alpha is None else math.sqrt(min(max(of.alpha, 0.0), 1.0))
-        colour = (0.5,) * 3 if of.f0 is None else tuple(min(max(float(c), 0.0), 1.0) for c in np.broadcast_to(of.f0, 3))
+        colour = (0.5, 0.5, 0.5) if of.f0 is None else rgb(np.clip(np.broadcast_to(of.f0, 3), 0, 1))
         return Principled(base_color=colour, roughness=roughness, metallic=1.0, specular_level=0.5)
 
 

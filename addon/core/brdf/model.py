@@ -227,8 +227,8 @@ class Brdf:
         if self.has_diffuse:
             result += np.asarray(albedo) / np.pi
         if self.microfacets is not None and of.alpha is not None and of.f0 is not None:
-            cosines = (np.asarray(x, np.float32)[:, None] for x in (n_w, n_wo, (1 - n_h) * (1 + n_h)))
-            lobe = self.microfacets.lobes(*cosines, np.array([of.alpha]))[:, 0]
+            w, wo, sin2_h = (np.asarray(x, np.float32)[:, None] for x in (n_w, n_wo, (1 - n_h) * (1 + n_h)))
+            lobe = self.microfacets.lobes(w, wo, sin2_h, np.array([of.alpha]))[:, 0]
             result += lobe * F(np.asarray(w_h)[:, None], np.broadcast_to(of.f0, 3))
         return result
 

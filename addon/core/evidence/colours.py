@@ -29,4 +29,5 @@ def heat_css() -> str:
 def gloss(colour: tuple[int, int, int], alpha: float | None) -> tuple[int, int, int]:
     """A model's colour, lighter the glossier."""
     polish = 0.0 if alpha is None else 1 - float(np.sqrt(alpha))
-    return tuple(int(c + (255 - c) * 0.7 * polish) for c in colour)
+    red, green, blue = (int(c + (255 - c) * 0.7 * polish) for c in colour)
+    return red, green, blue

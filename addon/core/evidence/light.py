@@ -7,12 +7,13 @@ how much further they differ from E is the error of E, be it its rays' or its in
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ..light.environment import Environment
 from ..light.field import LightField
-from ..light.over_surface import irradiance
+from ..light.over_surface import RayCounts, irradiance
 from ..light.shading import Shading
 from ..luminance import LUMINANCE
 from ..scene.atlas import Atlas
@@ -21,9 +22,9 @@ from ..scene.visibility import SATURATED
 from .calibration import CLIPPED_UNSURE, LAMP_UNSURE, ROUGH_LIGHT, SKY_UNSURE, SUN_UNSURE, SURFACES
 
 SPOTS = 4000
-RAYS = {"rays": 128, "emitter_rays": 32, "portal_rays": 32}
+RAYS: RayCounts = {"rays": 128, "emitter_rays": 32, "portal_rays": 32}
 """Of one check. 2 x 4000 spots cost 1 s of CPU in the living room; an object's error is then known to 10 - 20 %."""
-SHARE_RAYS = {"rays": 64, "emitter_rays": 16, "portal_rays": 16}
+SHARE_RAYS: RayCounts = {"rays": 64, "emitter_rays": 16, "portal_rays": 16}
 ONE_SIGMA = 0.683
 WORST = 1.0
 """Where next to no light comes, the logarithm may be off by anything."""
@@ -104,7 +105,7 @@ def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, relative_
     sun = None
     if shading.sun is not None and not shading.sun.seen:
         level = float(shading.sun.irradiance @ LUMINANCE)
-        sun = replace(shading.sun, irradiance=np.float32([level, 0, SUN_UNSURE * level]))
+        sun = replace(shading.sun, irradiance=np.array([level, 0, SUN_UNSURE * level], np.float32))
     room = field.with_light(np.stack(kinds, 1), Environment(sky, shading.environment.observations))
     return room.with_sun(sun)
 
@@ -123,16 +124,16 @@ def light_evidence(
     """
     atlas = field.atlas
     chosen, nearest = spots(atlas, lit.seen, SPOTS, seed)
-    how = {"interpolate": False, "finest": 1.0, "threads": threads}
+    again_at = partial(irradiance, interpolate=False, finest=1.0, threads=threads)
     kept = np.log(np.maximum(shading.irradiance[chosen].mean(1), 1e-20))
-    again = [irradiance(field, chosen, **RAYS, **how, seed=seed + 100_003 * (k + 1))[0].mean(1) for k in range(2)]
+    again = [again_at(field, chosen, **RAYS, seed=seed + 100_003 * (k + 1))[0].mean(1) for k in range(2)]
     a, b = (np.clip(np.log(np.maximum(E, 1e-20)) - kept, -WORST, WORST) for E in again)
     noise, bias = _by_group(2 * atlas.object_id[chosen] + lit.seen[chosen], a, b)
 
     hidden = unsure_light(field, shading, lit, relative_error)
     shares = np.zeros((len(chosen), 3), np.float32)
     if hidden.radiance.any() or hidden.environment.radiance.any() or hidden.sun is not None:
-        part = irradiance(hidden, chosen, **SHARE_RAYS, **how, seed=seed + 7)[0]
+        part = again_at(hidden, chosen, **SHARE_RAYS, seed=seed + 7)[0]
         shares = np.clip(part / np.maximum(shading.irradiance[chosen] @ LUMINANCE, 1e-20)[:, None], 0, 1)
     return LightEvidence(
         noise=noise[nearest].astype(np.float32),

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..brdf.material import Z90
 from ..groups import by_label
+from ..luminance import rgb
 from ..passes.albedo.albedo import MEASURED, Albedo
 from ..scene.atlas import Atlas
 from ..scene.lit_diffuse import LitDiffuse
@@ -81,4 +82,4 @@ def _one(own: np.ndarray, atlas: Atlas, lit: LitDiffuse, albedo: Albedo, texels:
 
 
 def _three(values: np.ndarray) -> tuple[float, float, float]:
-    return tuple(round(float(x), 5) for x in values)
+    return rgb(round(float(x), 5) for x in values)

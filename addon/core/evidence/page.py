@@ -122,7 +122,7 @@ def _objects(found: Findings, evidence: Evidence) -> str:
 def _relative_width(one: ObjectEvidence) -> float:
     """Half an albedo's interval relative to the albedo."""
     width = np.mean(one.albedo_high) - np.mean(one.albedo_low)
-    return float(width / 2 / max(np.mean(one.albedo), 0.02))
+    return float(width / 2 / max(float(np.mean(one.albedo)), 0.02))
 
 
 def _row(m: ObjectMaterial, e: ObjectEvidence) -> str:

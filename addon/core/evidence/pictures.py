@@ -84,7 +84,7 @@ def worst_blocks(residual: np.ndarray, object_id: np.ndarray) -> list[tuple[int,
     mean = ndimage.uniform_filter(residual.astype(np.float32), BLOCK, mode="constant")
     half = BLOCK // 2
     mean[:half], mean[-half:], mean[:, :half], mean[:, -half:] = 0, 0, 0, 0
-    found = []
+    found: list[tuple[int, int, float]] = []
     while len(found) < WORST and mean.max() > 0:
         y, x = np.unravel_index(np.argmax(mean), mean.shape)
         found.append((int(y) - half, int(x) - half, float(mean[y, x])))

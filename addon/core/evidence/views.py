@@ -63,7 +63,8 @@ class View:
 def choose_frames(found: Findings, count: int) -> list[int]:
     """Frames that together show the most surface, the one that shows most first."""
     samples, atlas = found.samples, found.surface.atlas
-    area, chosen = atlas.area[samples.element].astype(np.float64), []
+    area = atlas.area[samples.element].astype(np.float64)
+    chosen: list[int] = []
     left = np.ones(len(atlas), bool)
     while len(chosen) < min(count, len(found.frames)):
         gain = np.bincount(samples.frame, area * left[samples.element], len(found.frames))
@@ -107,13 +108,13 @@ def _add_lobes(found: Findings, predicted: np.ndarray, element: np.ndarray, dire
     owner = np.where(element >= 0, room.atlas.object_id[element], -1)
     for m in found.materials:
         at = np.flatnonzero(owner == m.object_id)
-        if not m.model.has_lobe or m.object_id in mirrors or not len(at):
+        if m.model.microfacets is None or m.alpha is None or m.f0 is None or m.object_id in mirrors or not len(at):
             continue
         alpha = max(float(m.alpha), float(GRID[0]))
         light = reflected_light(
-            room, bright, element[at], -directions[at], rays=LOBE_RAYS, grid=np.float32([alpha]), proposals=(alpha,),
-            microfacets=m.model.microfacets, threads=found.threads, seed=found.seed,
+            room, bright, element[at], -directions[at], rays=LOBE_RAYS, grid=np.array([alpha], np.float32),
+            proposals=(alpha,), microfacets=m.model.microfacets, threads=found.threads, seed=found.seed,
         )  # fmt: skip
         if not m.model.has_diffuse:
             predicted[at] = 0
-        predicted[at] += np.float32(m.f0) * light.A[:, 0] + light.B[:, 0]
+        predicted[at] += np.asarray(m.f0, np.float32) * light.A[:, 0] + light.B[:, 0]

@@ -13,6 +13,7 @@ noise's part of every product is known (`LobeLight.A_noise`), and is taken out o
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -126,8 +127,9 @@ def solve(
         else:
             A = np.broadcast_to(lobe.A, R.shape)
             SA = np.einsum("hvg,chvg->chg", wt, A)
-            values = fixed
-            if fixed is None:
+            if fixed is not None:
+                values = fixed
+            else:
                 wA = weight * A
                 up = np.einsum("chvg,chvg->ch", wA, R) - np.einsum("chg,chg->ch", SA / below, SR)
                 down = np.einsum("chvg,chvg->ch", wA, A) - np.einsum("chg,chg->ch", SA / below, SA)
@@ -182,7 +184,7 @@ def fit_lobe(
         Given: phi alone is sought.
     """
     dense = problem if isinstance(problem, DenseProblem) else DenseProblem(problem)
-    how = {"constraints": constraints, "psi": psi}
+    solved = functools.partial(solve, dense, constraints=constraints, psi=psi)
     kappas = KAPPAS if "grazing" not in dense.without else (0.0,)
     flat = solve(dense, None, kappas, 1.0).size
     scale = robust_scale(dense.seen(flat[0]))
@@ -190,14 +192,14 @@ def fit_lobe(
     # phi at a middling kappa, kappa at that phi, phi again; and the scale from the fit, or every outlier of the poor
     # start would count as noise.
     for _ in range(2):
-        costs = solve(dense, slice(None), kappa, scale, **how).total
+        costs = solved(slice(None), kappa, scale).total
         best = int(np.argmin(costs))
-        by_kappa = solve(dense, slice(best, best + 1), kappas, scale, **how)
+        by_kappa = solved(slice(best, best + 1), kappas, scale)
         at = int(np.argmin(by_kappa.total))
         kappa = kappas[at]
         scale = robust_scale(dense.seen(by_kappa.size[at]))
     near = slice(max(best - 1, 0), best + 2)
-    found = solve(dense, near, kappa, scale, **how)
+    found = solved(near, kappa, scale)
     costs = found.total
     middle = best - near.start
     root, best_psi = between(np.sqrt(dense.grid[near]), costs, found.psi, middle)

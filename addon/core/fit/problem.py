@@ -119,8 +119,8 @@ class DenseProblem:
 
     def darkening(self, kappa: float | tuple[float, ...]) -> np.ndarray:
         """t of the diffuse part for each kappa, (k, v, g)."""
-        kappa = np.atleast_1d(np.float32(kappa))[:, None, None]
-        return 1 - kappa * self._grazing
+        kappas = np.atleast_1d(np.asarray(kappa, np.float32))[:, None, None]
+        return 1 - kappas * self._grazing
 
     def at(self, phi: float) -> slice:
         """The phi of the grid next to this one."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from typing import TypedDict
 
 import numpy as np
 
@@ -36,6 +37,23 @@ def finest_spacing(atlas: Atlas, share: float = FINEST_SHARE) -> float:
 def block_step(atlas: Atlas) -> int:
     """Edge in texels of the blocks that light is interpolated in: a power of two."""
     return 1 << max(int(np.log2(finest_spacing(atlas) / atlas.texel_edge + 1e-6)), 0)
+
+
+class Gathering(TypedDict):
+    """Those of `irradiance`'s keywords that are the same for all elements of a room."""
+
+    finest: float
+    smooth: bool
+    threads: int
+    seed: int
+
+
+class RayCounts(TypedDict):
+    """Those that say how many rays are taken of each kind, at each place."""
+
+    rays: int
+    emitter_rays: int
+    portal_rays: int
 
 
 def irradiance(

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..parallel import ordered_map
-from ..progress import Progress
+from ..progress import Progress, Rounds
 from ..scene.atlas import Atlas
 from ..scene.element_groups import ElementGroups
 from ..scene.elements import triangle_geometry
@@ -39,7 +39,7 @@ def _choose(tiers: dict[int, Summary]) -> LitDiffuse:
         for name, values in parts.items():
             values[chosen] = getattr(tiers[other], name)[chosen]
     clipped = saturated.count / np.maximum(clean.count + edge.count + saturated.count, 1)
-    return LitDiffuse(*parts.values(), tier, clipped.astype(np.float32))
+    return LitDiffuse(**parts, tier=tier, clipped=clipped.astype(np.float32))
 
 
 def accumulate(
@@ -56,7 +56,7 @@ def accumulate(
     edge_tier: bool = True,
     only: np.ndarray | None = None,
     also: Callable[[int, FrameView, Pixels, Observations], None] | None = None,
-    progress: Progress | None = None,
+    progress: Progress | Rounds | None = None,
 ) -> LitDiffuse:
     """Project every frame onto the elements it sees and take the median, kinds of observations apart.
 

@@ -35,12 +35,12 @@ class Adaptive:
         if isinstance(self.now, Exact):
             self._left -= len(element)
             if self._left < 0:
-                self._settle()
+                self._settle(self.now)
         self.now.add(element, values)
 
-    def _settle(self) -> None:
+    def _settle(self, exact: Exact) -> None:
         """Hand the observations over to a summary."""
-        exact, self.now = self.now, Batched(self._count, self._threads)
+        self.now = Batched(self._count, self._threads)
         for element, values in exact.replay():
             self.now.add(element, values)
         exact.close()

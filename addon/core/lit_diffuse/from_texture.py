@@ -20,7 +20,9 @@ TEXELS_AT_ONCE = 1 << 22
 
 def face_edge(mesh: Mesh) -> float:
     """Edge in metres of the usual face of the stored light's mesh: how large an element should be."""
-    _, area = _tiles(mesh)
+    if mesh.lit is None:
+        raise BadInputError("No light is stored on the mesh; give the capture frames.")
+    _, area = _tiles(mesh, mesh.lit)
     return float(np.sqrt(np.median(area)))
 
 
@@ -46,10 +48,10 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
     lit, n = mesh.lit, len(atlas)
     if lit is None:
         raise BadInputError("The capture has no frames, and no light stored on its mesh; give it either.")
-    of_triangle, area = _tiles(mesh)
+    of_triangle, area = _tiles(mesh, lit)
     key = of_triangle[atlas.triangle]
     order = np.argsort(key, kind="stable")
-    place = _place(mesh, atlas)
+    place = _place(mesh, lit, atlas)
     # How many texels of its tile an element covers along an edge.
     width = np.sqrt(atlas.area / np.maximum(area[key], 1e-30)) * lit.size
     sums = np.zeros((n, 5))
@@ -76,15 +78,14 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
     return LitDiffuse(radiance, radiance, radiance, np.where(seen, ENOUGH, 0).astype(np.int32), tier, share)
 
 
-def _tiles(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
+def _tiles(mesh: Mesh, lit: LitTiles) -> tuple[np.ndarray, np.ndarray]:
     """A number for each triangle's tile, (t,), and the surface that each tile covers, square metres."""
-    lit = mesh.lit
     _, area = triangle_geometry(mesh)
     of_triangle = np.unique(lit.picture.astype(np.int64) * (1 << 32) + lit.tile, return_inverse=True)[1].ravel()
     return of_triangle, np.bincount(of_triangle, area)
 
 
-def _place(mesh: Mesh, atlas: Atlas) -> np.ndarray:
+def _place(mesh: Mesh, lit: LitTiles, atlas: Atlas) -> np.ndarray:
     """Where in its tile each element lies, (n, 2) float64, 0...1."""
     result = np.empty((len(atlas), 2))
     for part in blocks(len(atlas), 1 << 18):
@@ -94,14 +95,15 @@ def _place(mesh: Mesh, atlas: Atlas) -> np.ndarray:
         ee, ef, ff, pe, pf = (np.einsum("ij,ij->i", x, y) for x, y in ((e, e), (e, f), (f, f), (p, e), (p, f)))
         scale = np.maximum(ee * ff - ef * ef, 1e-300)
         u, v = (pe * ff - pf * ef) / scale, (pf * ee - pe * ef) / scale
-        corner = mesh.lit.uv[triangle].astype(np.float64)
+        corner = lit.uv[triangle].astype(np.float64)
         result[part] = (1 - u - v)[:, None] * corner[:, 0] + u[:, None] * corner[:, 1] + v[:, None] * corner[:, 2]
     return np.clip(np.nan_to_num(result), 0, 1)
 
 
 def _runs(picture: np.ndarray, most: int) -> list[slice]:
     """Slices of at most so many tiles, each within one picture."""
-    result, at = [], 0
+    result: list[slice] = []
+    at = 0
     changes = np.append(np.flatnonzero(np.diff(picture)) + 1, len(picture))
     for end in changes.tolist():
         while at < end:

@@ -6,6 +6,7 @@ All share one interface (`estimator.Estimator`): `add(element, values)` with eac
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from ..paper.estimator import Estimator, Summary
@@ -23,8 +24,11 @@ def make_estimator(name: str, count: int, folder: Path | str | None = None, thre
 
     `folder` takes what 'exact', and 'adaptive' at first, write to disk.
     """
-    if name in ("adaptive", "exact"):
-        return {"adaptive": Adaptive, "exact": Exact}[name](count, folder, threads)
-    if name == "batched":
-        return Batched(count, threads)
-    return {"p2": PSquare, "mean": Mean}[name](count)
+    make: dict[str, Callable[[], Estimator]] = {
+        "adaptive": lambda: Adaptive(count, folder, threads),
+        "exact": lambda: Exact(count, folder, threads),
+        "batched": lambda: Batched(count, threads),
+        "p2": lambda: PSquare(count),
+        "mean": lambda: Mean(count),
+    }
+    return make[name]()

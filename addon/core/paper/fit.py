@@ -11,7 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-PHI = np.float32([0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15, 0.2, 0.26, 0.33, 0.41, 0.5, 0.6, 0.72, 0.85, 1.0])
+PHI = np.array(
+    [0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15, 0.2, 0.26, 0.33, 0.41, 0.5, 0.6, 0.72, 0.85, 1.0], np.float32
+)
 """The grid: close to equal steps in sqrt(phi), the roughness that Blender's users see."""
 
 

@@ -17,8 +17,9 @@ from ..brdf.material import ObjectMaterial, base_colors, with_metals
 from ..evidence.collect import Evidence, collect
 from ..evidence.findings import Findings
 from ..evidence.light import spots
-from ..light.over_surface import irradiance
+from ..light.over_surface import RayCounts, irradiance
 from ..light.sun import put_in
+from ..luminance import rgb
 from ..passes.albedo.albedo import MEASURED, Albedo, albedo_of
 from ..passes.albedo.albedo import NONE as NO_ALBEDO
 from ..results.overrides import Overrides
@@ -29,7 +30,7 @@ from .stages import Stages
 ROUNDS = 4
 """Albedo is clamped at 1 and shrunk towards its neighbours, so its mean follows E but roughly."""
 SPOTS = 600
-RAYS = {"rays": 64, "emitter_rays": 32, "portal_rays": 32}
+RAYS: RayCounts = {"rays": 64, "emitter_rays": 32, "portal_rays": 32}
 LEAST_LIGHT = 0.1
 """Less than this of its light no lamp is left."""
 DOUBTFUL = 1.5
@@ -183,7 +184,7 @@ def white_scale(run: Corrected) -> WhiteScale | None:
         if white.object_id in run.emitters or mean.min() <= 0:
             told = f"No albedo of {name} was measured, so it can't be the white; it was left out."
             return WhiteScale(ones, ones, told)
-        scale = np.float32(scale * mean / np.asarray(white.albedo))
+        scale = (scale * mean / np.asarray(white.albedo)).astype(np.float32)
     direct = _direct_share(run)
     light = np.maximum(1 + (scale - 1) / direct, LEAST_LIGHT).astype(np.float32)
     warning = ""
@@ -200,8 +201,9 @@ def _direct_share(run: Corrected) -> np.ndarray:
     chosen = chosen[seen[chosen]]
     lamps = np.isin(field.atlas.object_id, [lamp.object_id for lamp in run.shading().lamps])
     direct = field.with_light(np.where(lamps[:, None], field.radiance, np.float32(0)))
-    how = {"interpolate": False, "finest": 1.0, "threads": run.settings.threads}
-    part = irradiance(direct, chosen, **RAYS, **how, seed=run.settings.seed)[0]
+    part = irradiance(
+        direct, chosen, **RAYS, interpolate=False, finest=1.0, threads=run.settings.threads, seed=run.settings.seed
+    )[0]
     whole = run.irradiance_found[chosen]
     area = field.atlas.area[chosen, None]
     return np.clip((area * part).sum(0) / np.maximum((area * whole).sum(0), 1e-20), 0.05, 1)
@@ -218,7 +220,7 @@ def with_base_colors(albedo: Albedo, atlas: Atlas, overrides: Overrides) -> Albe
         if not len(own):
             continue
         told = own[albedo.origin[own] == MEASURED]
-        rho[own] = _coloured(rho[own], np.isin(own, told), atlas.area[own], np.float32(colour))
+        rho[own] = _coloured(rho[own], np.isin(own, told), atlas.area[own], np.asarray(colour, np.float32))
         error[own] = 0
     return replace(albedo, rho=rho, error=error)
 
@@ -240,7 +242,7 @@ def corrected(materials: tuple[ObjectMaterial, ...], overrides: Overrides, light
         given = overrides.of(m.object_id)
         m = replace(m, given=given.as_dict())
         if m.emission is not None:
-            m = replace(m, emission=tuple(float(x) for x in np.asarray(m.emission) * light))
+            m = replace(m, emission=rgb(np.asarray(m.emission) * light))
         if m.model.lobe_alone and given.base_color is not None and given.f0 is None:
             mean = float(np.mean(given.base_color))
             m = replace(m, f0=m.model.as_f0(given.base_color), specular_low=mean, specular_high=mean)

@@ -8,6 +8,7 @@ base colour is multiplied by what this differs from the room's own lit diffuse t
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,24 +65,30 @@ class Parts:
 
 
 @dataclass(frozen=True)
-class Parting:
-    """How an atlas is parted, and what the frames show of the objects whose texels are finer.
+class Closer:
+    """What the frames show of the objects whose texels are finer than the room's.
 
     Attributes
     ----------
-    pages : Pages
-    sheet : Pages or None
-        Of the finer objects alone; None, like what follows, where no object is finer.
-    atlas : Atlas or None
+    sheet : Pages
+        Of these objects alone.
+    atlas : Atlas
         Over that sheet.
-    radiance : (n, 3) float32 or None
+    radiance : (n, 3) float32
         L_d of its elements; NaN where too little tells.
     """
 
+    sheet: Pages
+    atlas: Atlas
+    radiance: np.ndarray
+
+
+@dataclass(frozen=True)
+class Parting:
+    """How an atlas is parted, and a closer look at the objects whose texels are finer; None where no object is."""
+
     pages: Pages
-    sheet: Pages | None = None
-    atlas: Atlas | None = None
-    radiance: np.ndarray | None = None
+    closer: Closer | None = None
 
 
 def footprints(surface: Surface, cameras: list[Camera]) -> dict[int, float]:
@@ -136,7 +143,7 @@ def look_closer(run: Corrected) -> Parting:
         From the run's progress.
     """
     surface, own = run.surface(), stored_key(run)
-    stored, meta = run.store.load(STAGE, own), run.store.load_meta(STAGE, own)
+    stored, meta = run.store.load(STAGE, own), run.store.load_meta(STAGE, own) or {}
     wanted = scales(run) if stored is None else dict(meta["wanted"])
     mesh, uv, size = surface.mesh, surface.atlas.uv, surface.atlas.size
     pages = lay_out(run.settings.atlas, mesh.triangles, uv, mesh.object_id, size, wanted, run.settings.atlas_size)
@@ -155,7 +162,7 @@ def look_closer(run: Corrected) -> Parting:
         told = (found.tier == CLEAN) & (found.count >= ENOUGH)
         stored = {"radiance": np.where(told[:, None], found.radiance, np.nan).astype(np.float32)}
         run.store.save(STAGE, own, stored, {"wanted": [*wanted.items()], "finer": [*finer.items()]})
-    return Parting(pages, sheet, atlas, stored["radiance"])
+    return Parting(pages, Closer(sheet, atlas, stored["radiance"]))
 
 
 def stored_key(run: Corrected) -> str:
@@ -197,8 +204,8 @@ def write_parts(run: Corrected, parting: Parting, base_color: np.ndarray) -> Par
     """
     pages = parting.pages
     sheet = pages.image(base_color, _owner(run))
-    if parting.atlas is not None:
-        pages.multiply(sheet, parting.sheet, finer_detail(run, parting))
+    if parting.closer is not None:
+        pages.multiply(sheet, parting.closer.sheet, finer_detail(run, parting.closer))
     materials = {m.object_id: m for m in run.materials()}
     shown = {number: m for number, m in materials.items() if m.model.has_diffuse}
     if run.settings.atlas == OBJECT:
@@ -208,7 +215,7 @@ def write_parts(run: Corrected, parting: Parting, base_color: np.ndarray) -> Par
             if page.number in shown
         }
         files = {images[page.number]: page for page in pages.pages if page.number in images}
-        tiles = ()
+        tiles: tuple[int, ...] = ()
     else:
         images = dict.fromkeys(shown, TILE)
         files = {TILE.replace("<UDIM>", str(page.number)): page for page in pages.pages}
@@ -223,15 +230,15 @@ def write_parts(run: Corrected, parting: Parting, base_color: np.ndarray) -> Par
     return Parts(pages.uv, images, tiles)
 
 
-def finer_detail(run: Corrected, parting: Parting) -> np.ndarray:
+def finer_detail(run: Corrected, closer: Closer) -> np.ndarray:
     """What base colour is multiplied by on the finer objects' sheet, (size, size, 3) float32."""
-    surface, lit, atlas = run.surface(), run.lit_diffuse(), parting.atlas
+    surface, lit, atlas = run.surface(), run.lit_diffuse(), closer.atlas
     good = (lit.tier == CLEAN) & (lit.count >= ENOUGH) & (run.albedo.origin == MEASURED)
     known = np.concatenate([np.where(good[:, None], lit.radiance, 0), good[:, None]], 1).astype(np.float32)
-    room = parting.sheet.image(surface.atlas.image(known), _owner(run)).reshape(-1, 4)[atlas.texel]
+    room = closer.sheet.image(surface.atlas.image(known), _owner(run)).reshape(-1, 4)[atlas.texel]
     floor = np.float32(max(FLOOR * run.median_radiance(), 1e-30))
     level = room[:, :3] / np.maximum(room[:, 3:], 1e-6)
-    ratio = np.clip((parting.radiance + floor) / (level + floor), 1 / MOST, MOST)
+    ratio = np.clip((closer.radiance + floor) / (level + floor), 1 / MOST, MOST)
     ratio[(room[:, 3] < HALF) | ~np.isfinite(ratio).all(1)] = 1
     return atlas.image(ratio, 1.0)
 
@@ -242,7 +249,7 @@ def _owner(run: Corrected) -> np.ndarray:
     return atlas.image(atlas.object_id, -1)
 
 
-def remove_parts(run: Corrected, kept: set[str] = frozenset()) -> None:
+def remove_parts(run: Corrected, kept: Collection[str] = ()) -> None:
     """Take away the parts that an earlier run left, but for the files `kept`."""
     folder = run.store.folder
     for path in [*folder.glob(f"{FOLDER}/* base_color.exr"), *folder.glob(TILE.replace("<UDIM>", "[0-9]" * 4))]:

@@ -72,9 +72,11 @@ class Recovery(Corrected):
             self.store.write_exr("environment.exr", self.sky()[::-1])
         if self.settings.atlas == ROOM:
             remove_parts(self)
-        elif "base_color" in images:
+        elif "base_color" in images and self._parting is not None:
             self.parts = write_parts(self, self._parting, atlas.image(images["base_color"]))
-        known = {one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects}
+        known: dict[int, dict[str, Any]] = {
+            one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects
+        }
         for number, name in (self.parts.images if self.parts else {}).items():
             known.setdefault(number, {})["image"] = name
         objects = [{"name": m.name} | m.as_dict() | known.get(m.object_id, {}) for m in self.materials()]

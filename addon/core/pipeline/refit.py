@@ -29,8 +29,8 @@ from ..progress import Progress
 from ..results.overrides import Given, Overrides, heeded, parse
 from ..results.room_file import MATERIALS, Room, read_room
 from ..results.store import Store
+from ..scene.model import Mesh
 from ..settings import ROOM, Settings
-from .corrected import Corrected
 from .parts import STAGE as DETAIL
 from .parts import stored_key as detail_key
 from .recover import Recovery
@@ -132,6 +132,11 @@ def _again(folder: Path, why: str) -> MissingStageError:
     )
 
 
+def _laid_out(mesh: Mesh, size: int) -> np.ndarray:
+    """No atlas is laid out here: the result has one."""
+    raise AssertionError("the surface stage of a finished result is stored")
+
+
 class Refit(Recovery):
     """A finished run of which some objects are fitted again.
 
@@ -149,7 +154,7 @@ class Refit(Recovery):
     """
 
     def __init__(self, result: Result, store: Store, progress: Progress):
-        super().__init__(result.room.capture, store, result.settings, progress, None, result.overrides)
+        super().__init__(result.room.capture, store, result.settings, progress, _laid_out, result.overrides)
         self.result = result
         self._before = {m.object_id: m for m in result.room.materials}
         self.whole = self.overrides.as_dict().get("white") != result.materials.get("white") or not self._has_images()
@@ -177,7 +182,7 @@ class Refit(Recovery):
         arrays = self.store.load("specular", stored) if stored and stored == self.keys_under(was)["specular"] else None
         if arrays is None:
             raise _again(self.store.folder, "its stages were cleared or are another run's")
-        return Specular.from_store(arrays, meta), was.lobes()
+        return Specular.from_store(arrays, meta or {}), was.lobes()
 
     @cached_property
     def touched(self) -> set[int]:
@@ -230,7 +235,7 @@ class Refit(Recovery):
     def albedo(self) -> Albedo:
         """As `Recovery.albedo`, of the touched objects anew."""
         if self.whole:
-            return Corrected.albedo.func(self)
+            return super().albedo
         before, atlas = self._albedo_before, self.surface().atlas
         others = {i.object_id for i in self.capture.instances} - self.touched
         found = self.albedo_of_all_but(self.emitters | others)
@@ -253,7 +258,7 @@ class Refit(Recovery):
 
     @cached_property
     def _materials(self) -> list[ObjectMaterial]:
-        found = Corrected._materials.func(self)
+        found = super()._materials
         return (
             found
             if self.whole
@@ -264,7 +269,7 @@ class Refit(Recovery):
     def evidence(self) -> Evidence:
         """As `Recovery.evidence`, of the touched objects anew: what gloss and albedo have to do with it."""
         if self.whole:
-            return Recovery.evidence.func(self)
+            return super().evidence
         atlas, lit = self.surface().atlas, self.lit_diffuse()
         error, (shading, clipped, unseen) = self._image("albedo_error"), self._image("evidence").T
         before, now = self._albedo_before, self.albedo

@@ -13,7 +13,7 @@ from ..light.environment import Environment
 from ..light.field import LightField
 from ..light.lamps import Lamp
 from ..light.mirrors import Mirror, known_mirror
-from ..light.over_surface import finest_spacing, irradiance
+from ..light.over_surface import Gathering, finest_spacing, irradiance
 from ..light.shading import Shading
 from ..light.sun import Sun, taken_out
 from ..passes.clipped_lamps.clipped import shade_clipped
@@ -126,12 +126,11 @@ def shade(
     InterruptedRun
         From `progress`.
     """
-    how = {"threads": threads, "seed": seed, "smooth": "lamp-noise" not in without, "finest": finest_spacing(atlas)}
-    rays_of = {
-        "rays": rays,
-        "emitter_rays": 0 if "emitter-rays" in without else emitter_rays,
-        "portal_rays": 0 if "portal-rays" in without else portal_rays,
-        "interpolate": interpolate and "interpolation" not in without,
+    how: Gathering = {
+        "finest": finest_spacing(atlas),
+        "smooth": "lamp-noise" not in without,
+        "threads": threads,
+        "seed": seed,
     }
     find_mirrors = None if "mirrors" in without else find_mirrors
     colours = None if "fringe-colours" in without else colours
@@ -148,9 +147,14 @@ def shade(
     E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
     if not told.all() and "unseen-surfaces" not in without:
         follow_shades = "shades" not in without
-        field, E, escaped = with_unseen_surfaces(field, told, lit_diffuse, instances, emitters, how, follow_shades)
+        field, E, escaped = with_unseen_surfaces(field, told, lit_diffuse, instances, emitters, follow_shades, **how)
     lit, unsure = np.flatnonzero(told), np.zeros(len(atlas), np.float32)
-    E[lit], escaped[lit], points, unsure[lit] = irradiance(field, lit, progress=progress, **rays_of, **how)
+    E[lit], escaped[lit], points, unsure[lit] = irradiance(
+        field, lit, rays=rays,
+        emitter_rays=0 if "emitter-rays" in without else emitter_rays,
+        portal_rays=0 if "portal-rays" in without else portal_rays,
+        interpolate=interpolate and "interpolation" not in without, progress=progress, **how,
+    )  # fmt: skip
     # A noisy mesh faces elsewhere than the surface did.
     unsure = np.hypot(unsure, tilted)
     # Near a crease the light of two sides is mixed.
@@ -230,5 +234,9 @@ def from_store(a: dict[str, np.ndarray], meta: dict[str, Any]) -> Shading:
     return Shading(
         a["irradiance"], a["escaped"], a["relative_error"], a["radiance"], lamps,
         Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
-        meta["sun"] and Sun(**{k: np.float32(v) if isinstance(v, list) else v for k, v in meta["sun"].items()}),
+        None if meta["sun"] is None else _sun(**meta["sun"]),
     )  # fmt: skip
+
+
+def _sun(direction: list[float], irradiance: list[float], **more: Any) -> Sun:
+    return Sun(np.array(direction, np.float32), np.array(irradiance, np.float32), **more)

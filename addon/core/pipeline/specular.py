@@ -167,7 +167,7 @@ def fit_specular(
         choice, problem, index = _by_frames(maker, object_id, rays, "first-look" not in without)
         where = field.atlas.position[samples.element[index]], field.atlas.normal[samples.element[index]]
         scores = frame_scores(field, *where, samples.direction[index], samples.frame[index], len(frame_names))
-        if choice.fit is not None and "see-through" not in without:
+        if problem is not None and choice.fit is not None and "see-through" not in without:
             element, direction = samples.element[index], samples.direction[index]
             behind = look_behind(field, lit_diffuse.seen, element, direction, object_id, noise)
             lobe = choice.fit if choice.model.has_lobe else None
@@ -207,7 +207,7 @@ def fit_specular(
             target, problem = targets[i.object_id], problems.get(i.object_id)
             name = frame_names[target] if target >= 0 else None
             found = described(i, choice, problem, name, sure[i.object_id])
-            return as_given(found, given[i.object_id], choice) if i.object_id in given else found
+            return as_given(found, given[i.object_id], choice, sure[i.object_id]) if i.object_id in given else found
         if i.object_id in glowing and i.object_id not in given:
             known = glowing[i.object_id]
             return lamp_material(i, known.radiance, irradiance[own], known.note(names))
@@ -219,8 +219,7 @@ def fit_specular(
     kept = {} if held is None else {m.object_id: m for m in held.found.materials if m.object_id not in held.only}
     by_id = {i.object_id: kept.get(i.object_id) or describe(i) for i in instances}
     for i in by_id:
-        if i not in kept and given.get(i, NOTHING).same_as is not None:
-            source = given[i].same_as
+        if i not in kept and (source := given.get(i, NOTHING).same_as) is not None:
             while (further := given.get(source, NOTHING).same_as) is not None:
                 source = further
             by_id[i] = same_material(by_id[source], by_id[i])
@@ -286,17 +285,21 @@ def _by_looks(
         first = compare(problem, irradiance)
         if first is None:
             return choice, problem
-        like_metal = first.ratio <= LOOKS_LIKE_NONE
-        if not like_metal and (choice.model.has_lobe or compare_coat(problem, irradiance).ratio > 1):
-            return choice, problem
+        if first.ratio > LOOKS_LIKE_NONE:
+            coat = None if choice.model.has_lobe else compare_coat(problem, irradiance)
+            if coat is None or coat.ratio > 1:
+                return choice, problem
     index = maker.pick(object_id, FIT_ELEMENTS, LOOKS_VIEWS, least=1, seed=1)
-    whole = maker.problem(index, rays) if len(index) else None
-    looks = compare(whole, irradiance) if whole is not None else None
+    if not len(index):
+        return choice, problem
+    whole = maker.problem(index, rays)
+    looks = compare(whole, irradiance)
     if looks is None:
         return choice, problem
     found = choice if "metal-by-looks" in without else metal_by_looks(choice, looks, whole)
-    if not found.model.has_lobe and "coat-by-looks" not in without:
-        found = coated_by_looks(found, compare_coat(whole, irradiance))
+    coat = None if found.model.has_lobe or "coat-by-looks" in without else compare_coat(whole, irradiance)
+    if coat is not None:
+        found = coated_by_looks(found, coat)
     return found, whole if found.looks is not None else problem
 
 
@@ -308,8 +311,9 @@ def _separate(
     index = maker.pick(material.object_id, SEPARATE_ELEMENTS, SEPARATE_VIEWS, least=1, seed=2)
     if not len(index):
         return own, np.zeros((len(own), 3), np.float32)
-    width = max(material.alpha, float(GRID[0]))
-    light = maker.light(index, rays, width, microfacets=material.model.microfacets)
+    if material.alpha is None or material.f0 is None or material.model.microfacets is None:
+        raise ValueError(f"{material.name} has no lobe")
+    light = maker.light(index, rays, max(material.alpha, float(GRID[0])), microfacets=material.model.microfacets)
     element, part = specular_in_median(samples, index, material.f0 * light.A[:, 0] + light.B[:, 0])
     return own, spread_over_object(field.atlas, own, element, part)
 

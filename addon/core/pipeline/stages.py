@@ -114,7 +114,7 @@ class Stages:
     @property
     def run_key(self) -> str:
         """16 hex digits that are the same where a capture and all that was asked of it are, and else differ."""
-        told = (self.overrides.as_dict(),) if self.overrides.any else ()
+        told: tuple[Any, ...] = (self.overrides.as_dict(),) if self.overrides.any else ()
         told += () if self.settings.coat else ("no coat",)
         told += () if self.settings.atlas == ROOM else (self.settings.atlas,)
         told += left_out_of(WRITE, self.settings.without)

@@ -55,5 +55,8 @@ def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any], captured: Me
     """The inverse of `to_store`."""
     mesh = replace(captured, vertices=arrays["vertices"]) if "vertices" in arrays else captured
     mesh = with_backs(mesh, arrays["backs"])
-    known = tuple(arrays[name] for name in ELEMENTS) if "texel" in arrays else None
+    texel, triangle, position = (arrays.get(name) for name in ELEMENTS)
+    known = None
+    if texel is not None and triangle is not None and position is not None:
+        known = texel, triangle, position
     return from_uv(mesh, arrays["sign"], arrays["uv"], int(meta["size"]), float(meta["noise"]), known)

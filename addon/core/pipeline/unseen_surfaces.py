@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from functools import partial
 
 import numpy as np
 
 from ..light.few_elements import evened
 from ..light.field import LightField
-from ..light.over_surface import irradiance
+from ..light.over_surface import RayCounts, irradiance
 from ..passes.albedo.albedo import MAX_ALBEDO, fill, quotient
 from ..passes.unseen_light.shades import BOUNCES, strongly_lit
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance
 
-ROUGH = {"rays": 64, "emitter_rays": 4, "portal_rays": 8, "interpolate": True}
+ROUGH: RayCounts = {"rays": 64, "emitter_rays": 4, "portal_rays": 8}
 COARSER = 8
 """Times the finest spacing of gathering points."""
 
@@ -25,8 +25,12 @@ def with_unseen_surfaces(
     lit_diffuse: LitDiffuse,
     instances: tuple[Instance, ...],
     emitters: set[int],
-    how: dict[str, Any],
     follow_shades: bool,
+    *,
+    finest: float,
+    smooth: bool,
+    threads: int,
+    seed: int,
 ) -> tuple[LightField, np.ndarray, np.ndarray]:
     """The room with what the elements that are not `told` send.
 
@@ -38,10 +42,10 @@ def with_unseen_surfaces(
         Elements whose radiance is known; some are not.
     emitters : set of int
         Objects that are lamps.
-    how : dict
-        Of `irradiance`.
     follow_shades : bool
         Follow the light to and fro inside of what is lit strongly.
+    finest, smooth, threads, seed
+        Of `irradiance`.
 
     Returns
     -------
@@ -52,10 +56,12 @@ def with_unseen_surfaces(
         Share of the rays that left the mesh, where not `told`.
     """
     atlas, lit, dark = field.atlas, np.flatnonzero(told), np.flatnonzero(~told)
-    rough = how | ROUGH | {"finest": COARSER * how["finest"]}
+    rough = partial(
+        irradiance, **ROUGH, interpolate=True, smooth=smooth, threads=threads, seed=seed
+    )  # fmt: skip
     E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
-    E[lit] = irradiance(field, lit, **rough)[0]
-    E[dark], escaped[dark], _, _ = irradiance(field, dark, **rough)
+    E[lit] = rough(field, lit, finest=COARSER * finest)[0]
+    E[dark], escaped[dark], _, _ = rough(field, dark, finest=COARSER * finest)
     rho, valid = quotient(lit_diffuse.radiance, E)
     guess = fill(atlas, rho, valid, {i.object_id: i.class_name for i in instances}, emitters).rho
     radiance = field.radiance.copy()
@@ -68,7 +74,7 @@ def with_unseen_surfaces(
             break
         radiance = field.radiance.copy()
         for own in shades:
-            E[own] = irradiance(field, own, **(rough | {"finest": how["finest"]}))[0]
+            E[own] = rough(field, own, finest=finest)[0]
             rho, valid = quotient(lit_diffuse.radiance[own], E[own])
             seen = lit_diffuse.seen[own]
             known = valid & seen

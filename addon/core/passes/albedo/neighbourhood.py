@@ -65,7 +65,7 @@ def relative_error(lit: LitDiffuse, object_id: np.ndarray, of_object: bool = Tru
     spread = (np.nan_to_num(lit.upper) - np.nan_to_num(lit.lower)).mean(1) / 1.35 / middle
     n = np.maximum(lit.count, 1)
     # The median of n values of standard deviation s has the error 1.25 s / sqrt(n); few values hide their spread.
-    few = FEW
+    few: float | np.ndarray = FEW
     if of_object:
         few = _single(spread, lit.seen & (lit.count >= 3) & (lit.tier == CLEAN), object_id)
     error = np.hypot(1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, few)) / np.sqrt(n), LEAST_ERROR)

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...light.shading import Shading
 from ...luminance import LUMINANCE
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
@@ -41,7 +42,7 @@ def unseen(lit: LitDiffuse, atlas: Atlas, objects: list[int]) -> LitDiffuse:
     )  # fmt: skip
 
 
-def shade_clipped(shade: Callable[[LitDiffuse], object], lit: LitDiffuse, atlas: Atlas):
+def shade_clipped(shade: Callable[[LitDiffuse], Shading], lit: LitDiffuse, atlas: Atlas) -> Shading:
     """`shade(lit)`, with clipped lamps solved for.
 
     Parameters

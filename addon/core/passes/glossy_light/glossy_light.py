@@ -66,7 +66,7 @@ class Excess(LightField):
         self._f0, microfacets = np.zeros((len(room.atlas), 3), np.float32), []
         followed = {mirror.object_id for mirror in room.mirrors}
         for m in materials:
-            if m.model.microfacets is None or m.object_id in followed:
+            if m.model.microfacets is None or m.alpha is None or m.object_id in followed:
                 continue
             own = room.atlas.object_id == m.object_id
             alpha[own] = max(float(m.alpha), float(GRID[0]))
@@ -102,7 +102,7 @@ class Excess(LightField):
             at = met[alike]
             own = element[at]
             light = reflected_light(
-                self._room, self._bright, own, -directions[at], rays=LOBE_RAYS, grid=np.float32([alpha]),
+                self._room, self._bright, own, -directions[at], rays=LOBE_RAYS, grid=np.array([alpha], np.float32),
                 proposals=(alpha,), microfacets=microfacets, threads=1, seed=self._seed + int(at[0]) + len(at),
             )  # fmt: skip
             taken = np.where(self._aimed[own, None], 0, self._inside[own])

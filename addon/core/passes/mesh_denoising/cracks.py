@@ -89,13 +89,13 @@ def _beside(
     beside = (gap < near) & inner & (edges[edge] != point[:, None]).all(1)
     edge, point, share, gap = edge[beside], point[beside], share[beside], gap[beside]
     # A border that only ends at an edge has one point there; one that runs along it has its next point there, too.
-    around = {}
-    for a, b in edges:
+    around: dict[int, list[int]] = {}
+    for a, b in edges.tolist():
         around.setdefault(a, []).append(b)
         around.setdefault(b, []).append(a)
     pairs = list(zip(edge.tolist(), point.tolist(), strict=True))
     here = set(pairs) | {(e, end) for e in np.unique(edge).tolist() for end in edges[e].tolist()}
-    runs = np.array([any((e, next_one) in here for next_one in around[p]) for e, p in pairs], bool)
+    runs = np.fromiter((any((e, next_one) in here for next_one in around[p]) for e, p in pairs), bool, len(pairs))
     edge, point, share, gap = edge[runs], point[runs], share[runs], gap[runs]
     order = np.lexsort((gap, point))
     first = order[np.flatnonzero(np.r_[True, np.diff(point[order]) != 0])] if len(order) else order

@@ -105,5 +105,5 @@ def _mirrored(views: Views, facing: np.ndarray, normal: np.ndarray) -> tuple[np.
         by = minimize(lambda x, cost=cost: cost(turned(normal, sides, x)), by, method="Nelder-Mead", options=how).x
     found = turned(normal, sides, by)
     if not few.off(found) < TELLS * few.off(normal):
-        found = np.float32(normal)
+        found = np.asarray(normal, np.float32)
     return found, np.clip(f0, 0.02, 1).astype(np.float32)

@@ -103,4 +103,4 @@ def sides_of(normal: np.ndarray) -> np.ndarray:
 def turned(normal: np.ndarray, sides: np.ndarray, by: np.ndarray) -> np.ndarray:
     """A unit vector ((3,)) turned towards its `sides_of` by so many times its length ((2,)), (3,) float32."""
     way = normal + by @ sides
-    return np.float32(way / np.linalg.norm(way))
+    return (way / np.linalg.norm(way)).astype(np.float32)

@@ -11,6 +11,7 @@ from ...brdf.material import ObjectMaterial
 from ...brdf.metal import METAL
 from ...fit.problem import Problem
 from ...light.mirrors import Mirror
+from ...luminance import rgb
 from ...results.overrides import Given
 from ...scene.model import Instance
 from .given import given_interval, given_note
@@ -32,7 +33,7 @@ def lamp_material(instance: Instance, radiance: np.ndarray, irradiance: np.ndarr
 def given_off(radiance: np.ndarray, irradiance: np.ndarray) -> tuple[float, float, float]:
     """What a lamp gives of itself of the `radiance` ((3,)) that it was seen with, under E ((3,)); never all of it."""
     reflected = np.minimum(LAMP_ALBEDO * irradiance / np.pi, LAMP_ALBEDO * radiance)
-    return tuple(float(x) for x in radiance - reflected)
+    return rgb(radiance - reflected)
 
 
 def flat_mirror(instance: Instance, mirror: Mirror, observations: int) -> ObjectMaterial:
@@ -49,41 +50,39 @@ def described(
 ) -> ObjectMaterial:
     """The description of what was chosen."""
     fit = choice.fit
-    common = {
-        "object_id": instance.object_id,
-        "class_name": instance.class_name,
-        "model": choice.model,
-        "target_frame": target,
-        "observations": 0 if problem is None else len(problem.element),
-        "residual": None if fit is None else fit.residual,
-        "residual_lambertian": None if fit is None else fit.residual_lambertian,
-        "roughness_low": sure.roughness[0],
-        "roughness_high": sure.roughness[1],
-        "specular_low": sure.specular[0],
-        "specular_high": sure.specular[1],
-        "scores": choice.scores,
-        "note": choice.note,
-    }
+    common = ObjectMaterial(
+        instance.object_id,
+        instance.class_name,
+        choice.model,
+        target_frame=target,
+        observations=0 if problem is None else len(problem.element),
+        residual=None if fit is None else fit.residual,
+        residual_lambertian=None if fit is None else fit.residual_lambertian,
+        roughness_low=sure.roughness[0],
+        roughness_high=sure.roughness[1],
+        specular_low=sure.specular[0],
+        specular_high=sure.specular[1],
+        scores=choice.scores,
+        note=choice.note,
+    )
     if choice.see_through is not None:
         found = choice.see_through
-        return ObjectMaterial(
-            **common, transmission=found.transmission, surfaces=None if found.cut_out else found.surfaces
-        )
+        surfaces = None if found.cut_out else found.surfaces
+        return replace(common, transmission=found.transmission, surfaces=surfaces)
     if not choice.model.has_lobe:
-        return ObjectMaterial(**(common | {"residual": common["residual_lambertian"]}))
-    f0 = metal_f0(problem, fit.phi) if choice.model.lobe_alone and problem is not None else fit.psi
-    return ObjectMaterial(**common, alpha=fit.phi, f0=choice.model.as_f0(f0))
+        return replace(common, residual=common.residual_lambertian)
+    f0 = metal_f0(problem, choice.lobe.phi) if choice.model.lobe_alone and problem is not None else choice.lobe.psi
+    return replace(common, alpha=choice.lobe.phi, f0=choice.model.as_f0(f0))
 
 
-def as_given(found: ObjectMaterial, given: Given, choice: Choice) -> ObjectMaterial:
-    """The description of an object of which something was given."""
+def as_given(found: ObjectMaterial, given: Given, choice: Choice, fitted_interval: GlossInterval) -> ObjectMaterial:
+    """The description of an object of which something was given; the interval is of what was fitted."""
     note = given_note(given)
     if not choice.model.has_lobe:  # that there is no highlight is known, and what it would be like does not apply
         return replace(found, roughness_low=None, roughness_high=None, specular_low=0.0, specular_high=0.0, note=note)
-    sure = given_interval(given, choice, GlossInterval(
-        (found.roughness_low, found.roughness_high), (found.specular_low, found.specular_high)))  # fmt: skip
-    f0 = choice.model.as_f0(choice.fit.psi if given.f0 is None else given.f0)
-    fitted = choice.fit.residual > 0
+    sure = given_interval(given, choice, fitted_interval)
+    f0 = choice.model.as_f0(choice.lobe.psi if given.f0 is None else given.f0)
+    fitted = choice.lobe.residual > 0
     return replace(
         found, f0=f0, note=note, residual=found.residual if fitted else None,
         residual_lambertian=found.residual_lambertian if fitted else None,

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...brdf.dielectric import DIELECTRIC, MOST_F0
+from ...brdf.ggx import GGX
 from ...brdf.material import ObjectMaterial
 from ...brdf.metal import METAL
 from ...brdf.model import Brdf, Microfacets
@@ -48,7 +49,7 @@ def fit_given(
     if given.brdf is not None and not given.brdf.has_lobe:
         return Choice(given.brdf, None, sigmas=SURE), None
     phi = None if given.roughness is None else given.roughness**2
-    problem, enough = _problem(maker, object_id, rays, phi, (given.brdf or DIELECTRIC).microfacets)
+    problem, enough = _problem(maker, object_id, rays, phi, (given.brdf or DIELECTRIC).microfacets or GGX)
     model = given.brdf or _model(given, problem, enough)
     f0 = None if given.f0 is None else np.broadcast_to(np.asarray(model.as_f0(given.f0), float), 3)
     fit = _fit(model, phi, f0, problem, enough, irradiance)
@@ -74,14 +75,14 @@ def _model(given: Given, problem: Problem | None, enough: bool) -> Brdf:
     """The model of an object whose roughness or F0 is given."""
     if given.f0 is not None:
         return METAL if np.mean(given.f0) > MOST_F0 else DIELECTRIC
-    return METAL if enough and choose_model(problem).model is METAL else DIELECTRIC
+    return METAL if enough and problem is not None and choose_model(problem).model is METAL else DIELECTRIC
 
 
 def _fit(
     model: Brdf, phi: float | None, f0: np.ndarray | None, problem: Problem | None, enough: bool, irradiance: np.ndarray
 ) -> LobeFit:
     """The lobe; where `phi` is given, `problem` has no other."""
-    if enough:
+    if enough and problem is not None:
         dense = DenseProblem(problem)
         if f0 is not None:
             return fit_lobe(dense, constraints=replace(model.constraints, least_psi=0.0, prior=None), psi=f0)

@@ -57,9 +57,9 @@ def gloss_interval(choice: Choice, problem: Problem | None) -> GlossInterval:
     if not choice.model.has_lobe or choice.fit is None:
         return UNKNOWN
     roughness, specular = float(np.sqrt(choice.fit.phi)), max(float(np.mean(choice.fit.psi)), 1e-4)
-    own = choice.sigmas > 0 and problem is not None and choice.looks is None
-    spread = jackknife(problem, choice.model) if own else (0.0, 0.0)
-    known = LOOKS if choice.looks is not None else ROUGHNESS_SYSTEMATIC if own else ADOPTED
+    spread, known = (0.0, 0.0), ADOPTED if choice.looks is None else LOOKS
+    if choice.sigmas > 0 and problem is not None and choice.looks is None:
+        spread, known = jackknife(problem, choice.model), ROUGHNESS_SYSTEMATIC
     width = Z90 * float(np.hypot(spread[0], known))
     systematic = METAL_SYSTEMATIC if choice.model.lobe_alone else SPECULAR_SYSTEMATIC
     factor = float(np.exp(Z90 * np.hypot(min(spread[1] / specular, 1.0), systematic)))

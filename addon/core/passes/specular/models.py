@@ -78,6 +78,13 @@ class Choice:
     looks: OneColour | Coated | None = None
     """What said that it is metal or coated, where its views alone did not (`by_looks`)."""
 
+    @property
+    def lobe(self) -> LobeFit:
+        """`fit`, which a model with a lobe has."""
+        if self.fit is None:
+            raise ValueError(f"the model {self.model.name} was taken without a lobe")
+        return self.fit
+
 
 def _gain(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
     """Share of the elements' costs that the lobe takes off, and that in standard errors."""
@@ -239,20 +246,20 @@ def adopt_from_class(
             turns = model.model.lobe_alone and not choice.model.lobe_alone
             if turns and choice.metal is not None:
                 note = "Not beyond doubt by itself; others of its class are metal."
-                fit = _of_class(choice.metal, model.fit, model.model, problems.get(i))
+                fit = _of_class(choice.metal, model.lobe, model.model, problems.get(i))
                 result[i] = replace(choice, model=model.model, fit=fit, note=note)
             elif turns and choice.bare and (views or not choice.model.has_lobe):
                 note = f"Needs no diffuse part, like object {source} of its class, which is metal."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
             elif model.model.layered and choice.dielectric is not None:
                 note = "Like a metal, but not beyond doubt; others of its class are not."
-                fit = _of_class(choice.dielectric, model.fit, model.model, problems.get(i))
+                fit = _of_class(choice.dielectric, model.lobe, model.model, problems.get(i))
                 result[i] = replace(choice, model=model.model, fit=fit, note=note)
-            elif not choice.model.has_lobe and not _refused(model.fit, choice.fit, problems.get(i)):
+            elif not choice.model.has_lobe and not _refused(model.lobe, choice.fit, problems.get(i)):
                 note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
             elif choice.model is model.model and len(found) > 1 and i in problems:
-                result[i] = replace(choice, fit=_of_class(choice.fit, model.fit, model.model, problems[i]))
+                result[i] = replace(choice, fit=_of_class(choice.lobe, model.lobe, model.model, problems[i]))
     return result
 
 
@@ -263,13 +270,13 @@ def _together(members: dict[int, Choice]) -> dict[int, Choice]:
     what is no dielectric's lobe (matt curtains did by phi .87 and 1, at 3.5 and 6.5 standard errors) speaks for none.
     """
     judged = {i: choice for i, choice in members.items() if choice.fit is not None}
-    counted = [c.sigmas if _dielectric(c.fit) else min(c.sigmas, 0) for c in judged.values()]
+    counted = [c.sigmas if _dielectric(c.lobe) else min(c.sigmas, 0) for c in judged.values()]
     if len(judged) < 2 or sum(counted) / np.sqrt(len(judged)) <= MIN_SIGMAS:
         return {}
     return {
         i: replace(choice, model=DIELECTRIC, note="Sure of its lobe together with others of its class.")
         for i, choice in judged.items()
-        if choice.gain > MIN_GAIN and _dielectric(choice.fit)
+        if choice.gain > MIN_GAIN and _dielectric(choice.lobe)
     }
 
 
@@ -280,9 +287,9 @@ def _pooled(found: list[Choice], best: Choice) -> Choice:
     """
     found = [choice for choice in found if choice.looks is None] or found
     weight = np.square([choice.sigmas for choice in found])
-    phi = weighted_median(np.array([choice.fit.phi for choice in found]), weight)
-    psi = [weighted_median(values, weight) for values in np.array([choice.fit.psi for choice in found]).T]
-    return replace(best, fit=replace(best.fit, phi=phi, psi=np.array(psi)))
+    phi = weighted_median(np.array([choice.lobe.phi for choice in found]), weight)
+    psi = [weighted_median(values, weight) for values in np.array([choice.lobe.psi for choice in found]).T]
+    return replace(best, fit=replace(best.lobe, phi=phi, psi=np.array(psi)))
 
 
 def _refused(lobe: LobeFit, own: LobeFit | None, problem: Problem | None) -> bool:

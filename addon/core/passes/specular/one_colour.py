@@ -139,7 +139,7 @@ def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
         rest = np.log(np.maximum(seen, least) / np.maximum(predicted, least))
         return rest - np.median(rest.mean(1))
 
-    matt = residual(_one_colour(seen, E, np.float32(0)))
+    matt = residual(_one_colour(seen, E, np.zeros(1, np.float32)))
     coats = [residual(_one_colour(seen, E, _coat(problem, at)[usable])) for at in widths]
     best = int(np.argmin([spread(rest) for rest in coats]))
     return Coated(

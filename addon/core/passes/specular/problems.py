@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ...brdf.model import Microfacets
 from ...fit.problem import Problem
 from ...light.emitters import bright_triangles
 from ...light.field import LightField
-from ...light.lobes import LobeLight, reflected_light
+from ...light.lobes import GRID, PROPOSALS, LobeLight, reflected_light
 from ...scene.samples import Samples
 from .one_colour import BROADEST_PHI
 
@@ -91,12 +91,15 @@ class Problems:
 
         Those that come out noisy are done again with more rays, unless it need only be `rough`.
         """
-        how = {} if phi is None else {"grid": np.float32([phi]), "proposals": (phi,)}
-        how |= {"threads": self._threads, "seed": self._seed, "microfacets": microfacets}
+        grid = GRID if phi is None else np.array([phi], np.float32)
+        proposals: Sequence[float] = PROPOSALS if phi is None else (phi,)
 
         def light(some: np.ndarray, count: int) -> LobeLight:
             element, direction = self._samples.element[some], self._samples.direction[some]
-            return reflected_light(self._field, self._bright, element, direction, rays=count, **how)
+            return reflected_light(
+                self._field, self._bright, element, direction, rays=count, grid=grid, proposals=proposals,
+                threads=self._threads, seed=self._seed, microfacets=microfacets,
+            )  # fmt: skip
 
         found = light(index, rays)
         if rough or "more-rays" in self._without:

@@ -219,8 +219,8 @@ def _coloured(spots: Spots, direction: np.ndarray, radius: float, before: float,
     luminance = spots.strength(thrown)
     channels = np.array([spots.strength(thrown, np.eye(3)[c]) for c in range(3)])
     channels = np.clip(channels, luminance / COLOUR, luminance * COLOUR)
-    light = np.float32(channels * (luminance / float(channels @ LUMINANCE)))
-    sun = Sun(np.float32(direction), light, radius)
+    light = (channels * (luminance / float(channels @ LUMINANCE))).astype(np.float32)
+    sun = Sun(np.asarray(direction, np.float32), light, radius)
     note = (
         f"A sun that no frame sees was solved from the patch of light that it throws: {sun.where()} "
         f"(spread of log albedo around it {before:.3f} to {after:.3f})."

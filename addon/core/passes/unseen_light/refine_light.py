@@ -178,7 +178,7 @@ def refined(
     colour = now() * (luminance / (now() @ LUMINANCE))[:, None]
     bright = all_light(base, fixed, thrown, others) @ LUMINANCE + thrown_by() @ luminance if len(colour) else None
     told = np.array([lamp.object_id in colours for lamp in free] + [False] * len(parts), bool)
-    fixed += [replace(lamp, radiance=np.float32(colour[k])) for k, lamp in enumerate(free) if told[k]]
+    fixed += [replace(lamp, radiance=colour[k].astype(np.float32)) for k, lamp in enumerate(free) if told[k]]
     free = [lamp for lamp in free if lamp.object_id not in colours]
     colour, luminance = colour[~told], luminance[~told]
     if len(colour):
@@ -188,5 +188,5 @@ def refined(
     for k, i in enumerate(parts, len(free)):
         sky.radiance[i] = np.clip(colour[k], *sky.bounds(i))
     done = {lamp.object_id: lamp for lamp in fixed}
-    done |= {lamp.object_id: replace(lamp, radiance=np.float32(colour[k])) for k, lamp in enumerate(free)}
+    done |= {lamp.object_id: replace(lamp, radiance=colour[k].astype(np.float32)) for k, lamp in enumerate(free)}
     return [done[lamp.object_id] for lamp in lamps]

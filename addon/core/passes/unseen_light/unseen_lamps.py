@@ -24,8 +24,8 @@ def solve_lamps(sample: Sample, thrown, least, instances, seen, sky: Sky, base, 
     left = dict(thrown)
     while left:
         received = all_light(base, lamps, thrown, sky) @ LUMINANCE
-        found = {i: sample.best(sent, received, G) for i, G in left.items()}
-        found = {i: f for i, f in found.items() if f is not None and f[2] < (1 - MIN_GAIN) * f[1] and f[0] > least[i]}
+        best = {i: sample.best(sent, received, G) for i, G in left.items()}
+        found = {i: f for i, f in best.items() if f is not None and f[2] < (1 - MIN_GAIN) * f[1] and f[0] > least[i]}
         if not found:
             break
         object_id = min(found, key=lambda i: found[i][2])
@@ -34,7 +34,8 @@ def solve_lamps(sample: Sample, thrown, least, instances, seen, sky: Sky, base, 
             for c in range(3)
         ]
         known = colours.get(object_id)
-        lamps.append(_coloured(object_id, *found[object_id], class_of, seen, sample.received, by_channel, known))
+        s, before, after = found[object_id]
+        lamps.append(_coloured(object_id, s, before, after, class_of, seen, sample.received, by_channel, known))
         del left[object_id]
     return lamps
 
@@ -68,8 +69,9 @@ def _coloured(object_id, s, before, after, class_of, seen, received, by_channel,
     if known is not None:
         return Lamp(int(object_id), (s * known).astype(np.float32), False, spread=spread, from_edges=True)
     alike = [lamp for lamp in seen if class_of.get(lamp.object_id) == class_of.get(object_id)]
-    if not alike and all(found is not None for found in by_channel):
-        colour = np.float32([found[0] for found in by_channel])
+    solved = [found[0] for found in by_channel if found is not None]
+    if not alike and len(solved) == 3:
+        colour = np.array(solved, np.float32)
         if abs(float(colour @ LUMINANCE) / s - 1) < AGREES:
             return Lamp(int(object_id), colour, False, spread=spread)
     white = np.mean([lamp.radiance for lamp in alike or seen], 0) if seen else received.mean(0)
@@ -83,8 +85,9 @@ def solve_sky(sample: Sample, lamps, thrown, sky: Sky, base) -> None:
         others = all_light(base, lamps, thrown, sky, without=i)
         if (G[:, None] * sky.guess[i]).mean() < MIN_SKY * others.mean():
             continue
-        solved = [sample.best(sample.radiance[:, c], others[:, c], G) for c in range(3)]
-        if any(found is None for found in solved):
+        found = [sample.best(sample.radiance[:, c], others[:, c], G) for c in range(3)]
+        solved = [one[0] for one in found if one is not None]
+        if len(solved) < 3:
             continue
         sky.solved.add(i)
-        sky.radiance[i] = np.clip([found[0] for found in solved], *sky.bounds(i))
+        sky.radiance[i] = np.clip(solved, *sky.bounds(i))

@@ -173,9 +173,9 @@ def find_light(
     # About half of the elements are on flat spots, of large objects as of small ones.
     most = SAMPLES / len(np.unique(atlas.object_id[element])) / 2 if clipped else np.inf
     sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit], most)
-    known_thrown = old is not None and np.array_equal(old.element, sample.element)
-    if known_thrown:
-        thrown, least = old.lamps, old.least
+    earlier = old if old is not None and np.array_equal(old.element, sample.element) else None
+    if earlier is not None:
+        thrown, least = earlier.lamps, earlier.least
     else:
         thrown = {i: thrown_by_object(field, sample.element, i, seed) for i in unseen_objects}
         # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
@@ -196,7 +196,7 @@ def find_light(
         return lamps, sky, np.log(np.maximum(sent, 1e-9) / np.maximum(E, 1e-12))
 
     lamps, sky, log_albedo = solve(thrown, sky)
-    if lamps and not known_thrown and "shades" not in without:
+    if lamps and earlier is None and "shades" not in without:
         thrown |= _by_shades(field, lamps, even, sample, log_albedo, thrown, seed)
         lamps, sky, log_albedo = solve(thrown, sky)
     class_of = {i.object_id: i.class_name for i in instances}

@@ -30,6 +30,7 @@ def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[L
     received = irradiance_at(field.with_light(evened(field)), element, seed)
     object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
     left = np.ones(len(element), bool)
+    found = None
     for _ in range(SWEEPS):
         sample = Sample(element[left], object_id[left], sent[left], received[left])
         found = sample.best(sent[left] @ LUMINANCE, received[left] @ LUMINANCE, thrown[left])
@@ -40,11 +41,13 @@ def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[L
         left = ~np.isin(object_id, [lamp.object_id for lamp in lamps])
         if left.sum() < LEAST:
             return field, ()
+    assert found is not None  # there was a sweep
     radiance = np.full(3, found[0])
     at = np.searchsorted(element, sample.element)
     by_channel = [sample.best(sample.radiance[:, c], sample.received[:, c], thrown[at]) for c in range(3)]
-    if all(one is not None for one in by_channel):
-        radiance = np.array([one[0] for one in by_channel])
+    solved = [one[0] for one in by_channel if one is not None]
+    if len(solved) == 3:
+        radiance = np.array(solved)
     # No object reflects more than it gets.
     least = (np.pi * sample.radiance - sample.received) / np.maximum(thrown[at], 1e-3 * thrown.mean())[:, None]
     for one in np.unique(sample.object_id):

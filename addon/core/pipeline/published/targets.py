@@ -52,8 +52,10 @@ def fit_targets(
             for x in (found.lobe.residual, samples.radiance[found.index] - diffuse)
         )
         psi = np.full(3, found.lobe.psi)
-        cost = [float(np.square(x).mean()) for x in (found.lobe.residual, samples.radiance[found.index] - diffuse)]
-        choice = Choice(DIELECTRIC, LobeFit(found.lobe.phi, psi, 0.0, 0.0, *cost, left, whole))
+        cost, flat_cost = (
+            float(np.square(x).mean()) for x in (found.lobe.residual, samples.radiance[found.index] - diffuse)
+        )
+        choice = Choice(DIELECTRIC, LobeFit(found.lobe.phi, psi, 0.0, 0.0, cost, flat_cost, left, whole))
         name = frame_names[found.frame]
         material = described(instance, choice, None, name, gloss_interval(choice, None))
         return replace(material, observations=len(found.index))
