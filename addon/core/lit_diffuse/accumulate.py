@@ -39,7 +39,8 @@ def _choose(tiers: dict[int, Summary]) -> LitDiffuse:
         for name, values in parts.items():
             values[chosen] = getattr(tiers[other], name)[chosen]
     clipped = saturated.count / np.maximum(clean.count + edge.count + saturated.count, 1)
-    return LitDiffuse(**parts, tier=tier, clipped=clipped.astype(np.float32))
+    median, lower, upper, count = parts.values()
+    return LitDiffuse(median, lower, upper, count, tier, clipped.astype(np.float32))
 
 
 def accumulate(
