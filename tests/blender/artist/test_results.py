@@ -118,9 +118,22 @@ def test_read_again_when_the_file_changes_and_only_then(scene, results, tmp_path
     assert len(results.result_of(scene).objects) == 2
 
 
+def test_a_result_of_version_0_1_shows_the_same(scene, results, tmp_path):
+    now = [results.facts(one) for one in results.result_of(scene).objects.values()]
+    old = {"alpha": "phi", "f0": "psi"}
+    before = [
+        {old.get(key, key) if not isinstance(value, list) else key: value for key, value in one.items()}
+        for one in OBJECTS
+    ]
+    assert "phi" in before[0] and "alpha" not in before[0]
+    write(tmp_path, objects=before)
+    os.utime(tmp_path / "materials.json", (1, 1))
+    assert [results.facts(one) for one in results.result_of(scene).objects.values()] == now
+
+
 def listed(scene, results):
-    """What the list shows: phi by the object's name."""
-    result_file = results.result_file
+    """What the list shows: alpha by the object's name."""
+    result_file = results.file
     return {thing.name: one.get("alpha") for thing, one in result_file.rows(scene.objects).items()}
 
 
