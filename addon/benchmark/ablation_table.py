@@ -129,6 +129,8 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None) -> str:
     acting = [one for one in PASSES if _acts(one.name, runs)]
     idle = [one for one in PASSES if _was_run(one.name, runs) and not _acts(one.name, runs)]
     missing = [one for one in PASSES if not _was_run(one.name, runs)]
+    known = {one.name for one in PASSES}
+    gone = sorted({name for _, _, name in runs if name not in known and name != WHOLE})
     presets = sorted({preset for _, preset in rooms})
     lines = [
         "# What each pass gains",
@@ -139,7 +141,8 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None) -> str:
         "A gain is the whole method's figure less the figure without the pass, under the same seed: above 0 the pass "
         "helps. After the sign ± is the standard error of the mean over the rooms by the seeds alone; rooms differ by "
         "more, as worst and best room show. Albedo: PSNR of Base Color over held-out views. Re-render: PSNR of those "
-        "views in display values, predicted from albedo, irradiance and lobes without a renderer. Roughness: mean "
+        "views in display values, predicted from albedo, irradiance and lobes without a renderer; the plain quotient "
+        "gives L_d back whatever E is, so what corrects the albedo alone can lower it. Roughness: mean "
         "absolute error of the square root of alpha. Seconds: processor time of the stages that were done again.",
         "",
         f"Rooms ({', '.join(presets)} preset): {', '.join(_room(one) for one in rooms)}. "
@@ -148,15 +151,19 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None) -> str:
     ]
     if image:
         lines += [f"![Gain of albedo against seconds]({image})", ""]
-    head = ["pass", "rooms", *(f.column for f in FIGURES), "worst room, dB", "best room, dB", "seconds"]
-    lines += ["## All rooms together", "", *_table(head, [_summary(one, runs) for one in acting]), ""]
+    columns = ["pass", "rooms", *(f.column for f in FIGURES), "worst room, dB", "best room, dB", "seconds"]
+    lines += ["## All rooms together", "", *_table(columns, [_summary(one.name, runs) for one in acting]), ""]
     head = ["pass", *(_room(room) for room in rooms)]
     lines += ["## Albedo by room, dB", "", *_table(head, [_by_room(one, rooms, runs) for one in acting]), ""]
     whole = [["whole method", *(_whole(room, runs) for room in rooms)]]
     lines += ["## The whole method's albedo, dB", "", *_table(head, whole), ""]
+    if gone:
+        lines += ["## Taken out of the method since", "", *_table(columns, [_summary(name, runs) for name in gone]), ""]
     if idle:
         lines += ["## Without effect in these rooms", "", "What these look for is in none of them.", ""]
-        lines += _table(["pass", "does", "seconds"], [[one.name, one.does, _seconds(one, runs)] for one in idle]) + [""]
+        lines += _table(
+            ["pass", "does", "seconds"], [[one.name, one.does, _seconds(one.name, runs)] for one in idle]
+        ) + [""]
     if missing:
         lines += ["## Not measured", "", ", ".join(one.name for one in missing) + ".", ""]
     lines += ["## What they do", "", *_table(["pass", "first stage", "does"], [_does(one) for one in acting]), ""]
@@ -181,22 +188,22 @@ def _acts(name: str, runs: Mapping[tuple, Line]) -> bool:
     return any(left_out == name and not line["same"] for (_, _, left_out), line in runs.items())
 
 
-def _seconds(one: Pass, runs: Mapping[tuple, Line]) -> str:
-    found = seconds_of(one.name, runs)
+def _seconds(name: str, runs: Mapping[tuple, Line]) -> str:
+    found = seconds_of(name, runs)
     return "" if found is None else f"{found:.1f}"
 
 
-def _summary(one: Pass, runs: Mapping[tuple, Line]) -> list[str]:
+def _summary(name: str, runs: Mapping[tuple, Line]) -> list[str]:
     cells = []
     for figure in FIGURES:
-        gain = gain_of(figure, one.name, runs)
+        gain = gain_of(figure, name, runs)
         cells.append("" if gain is None else _signed(gain.mean, figure.digits, gain.error))
-    of = {room for room, _, left_out in runs if left_out == one.name}
-    acts = {room for (room, _, left_out), line in runs.items() if left_out == one.name and not line["same"]}
-    by_room = getattr(gain_of(ALBEDO, one.name, runs), "by_room", None) or {}
+    of = {room for room, _, left_out in runs if left_out == name}
+    acts = {room for (room, _, left_out), line in runs.items() if left_out == name and not line["same"]}
+    by_room = getattr(gain_of(ALBEDO, name, runs), "by_room", None) or {}
     ends: list[Callable] = [min, max]
     extremes = [f"{_signed(end(by_room.values()))} {_room(end(by_room, key=by_room.get))}" for end in ends if by_room]
-    return [one.name, f"{len(acts)} of {len(of)}", *cells, *(extremes or ["", ""]), _seconds(one, runs)]
+    return [name, f"{len(acts)} of {len(of)}", *cells, *(extremes or ["", ""]), _seconds(name, runs)]
 
 
 def _by_room(one: Pass, rooms: Sequence[tuple[str, str]], runs: Mapping[tuple, Line]) -> list[str]:

@@ -121,5 +121,10 @@ def test_gains_and_their_error(tmp_path):
     text = (tmp_path / "table.md").read_text()
     row = next(one for one in text.splitlines() if one.startswith("| sun | 2 of 2"))
     assert "+1.00 ± 0.87" in row and "-1.00 b" in row and "+3.00 a" in row
+    assert "Taken out" not in text
+    (tmp_path / "three.jsonl").write_text(json.dumps(line("a", 0, "moonlight", 29.5, 0.1, {})))
+    write_report(tmp_path, tmp_path / "table.md")
+    _, _, gone = (tmp_path / "table.md").read_text().partition("## Taken out of the method since")
+    assert "| moonlight | 1 of 1 | +0.50 |" in gone
     with pytest.raises(BadInputError, match="no runs"):
         write_report(tmp_path / "empty", tmp_path / "other.md")
