@@ -87,7 +87,6 @@ PASSES = (
         specular_in_median="Takes the fitted specular part out of the lit diffuse texture.",
         glossy_light="Lights the room by what glossy things really reflect.",
         caustics="Follows light from bright triangles over glossy things by photons.",
-        fine_photons="Looks for photons in finer cells where there are many.",
         glossy_smoothing="Takes noise out of the glossy things' light.",
     ),
     *_of(

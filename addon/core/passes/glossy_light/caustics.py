@@ -34,12 +34,6 @@ BOUNCES = 4
 """Glossy reflections in a row. Beside copper shades half of the light on a kitchen's wall came by no other way, and a
 third of that by more than one; its albedo with 1 and 4: 27.85, 28.51 dB, in coarser frames 27.71, 28.96; no more by 10.
 """
-FINER = (CELL / 2, CELL / 4)
-"""Metres: cells where many photons come to lie. Light close to what throws it has edges that 12 cm lose: around spots
-the ceiling got up to half of its E taken away for what their rims no longer send (albedo 1.1 for .8)."""
-ENOUGH = 25
-"""Photons in a cell from which on the finer ones inside it begin to count; with twice as many they alone do. Albedo in
-a kitchen, with 25, 50, 100: 28.60, 28.57, 28.52 dB (28.43 with cells of 12 cm alone)."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +82,7 @@ class _Light:
 
 
 def caustics(
-    room: LightField, bright: BrightTriangles, gloss: Gloss, seed: int = 0, photons: int = PHOTONS, finer: bool = True
+    room: LightField, bright: BrightTriangles, gloss: Gloss, seed: int = 0, photons: int = PHOTONS
 ) -> np.ndarray:
     """E by way of glossy reflections of what bright triangles send, less what was taken for it.
 
@@ -98,15 +92,13 @@ def caustics(
         With its lamps. Mirrors stop photons.
     gloss : Gloss
     photons : int
-    finer : bool
-        Look in finer cells where there are many.
 
     Returns
     -------
     (n, 6) float32
         Radiance * steradian, for every element; and half the difference of the photons' two halves, the noise in it.
     """
-    halves = np.zeros((2, 4, len(room.atlas)), np.float32)  # the photons' power, by channel, and their number
+    halves = np.zeros((2, 3, len(room.atlas)), np.float32)  # the photons' power, by channel
     if not len(bright) or not gloss.alpha.any():
         return np.zeros((len(room.atlas), 6), np.float32)
     cube = sobol(photons, seed, 5)
@@ -131,11 +123,11 @@ def caustics(
                 break
             element, place, at = _met(room, sent)
             _let_fall(fallen, element, sent.power[at])
-    return _over_cells(room.atlas, halves, FINER if finer else ())
+    return _over_cells(room.atlas, halves)
 
 
 def _let_fall(fallen: np.ndarray, element: np.ndarray, power: np.ndarray) -> None:
-    for row, values in zip(fallen, (*power.T, power.any(1)), strict=True):
+    for row, values in zip(fallen, power.T, strict=True):
         row += np.bincount(element, values, len(row))
 
 
@@ -168,34 +160,13 @@ def _sent_on(room: LightField, gloss: Gloss, element: np.ndarray, light: _Light,
     return _Light(origin, ways, light.power[alive] * share[alive])
 
 
-def _over_cells(atlas: Atlas, halves: np.ndarray, sizes: tuple[float, ...] = FINER) -> np.ndarray:
-    """Power over area in cells of the surface and its noise, (n, 6) float32; in finer ones where enough photons lie."""
-    (a, b), everything = halves, np.arange(halves.shape[2])
-    fallen = np.concatenate([a[:3] + b[:3], a[:3] - b[:3], a[3:] + b[3:]])
-    result, count = _density(atlas, fallen, everything, CELL)
-    for size in sizes:
-        many = np.flatnonzero(count > ENOUGH)
-        if not len(many):
-            break
-        finer, in_finer = _density(atlas, fallen, many, size)
-        # By the coarser cell's number: where none of its photons lie there is no light, and few photons tell that.
-        share = np.clip(count[many] / ENOUGH - 1, 0, 1)[:, None]
-        result[many] += share * (finer - result[many])
-        count = np.zeros_like(count)
-        count[many] = in_finer
-    return result
-
-
-def _density(atlas: Atlas, fallen: np.ndarray, element: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Power over area around some elements, (m, 6), and photons, (m,): means over cells of several shifted grids.
-
-    Small cells count for what they hold.
-    """
-    held, area = np.zeros((7, len(element)), np.float32), np.zeros(len(element), np.float32)
+def _over_cells(atlas: Atlas, halves: np.ndarray) -> np.ndarray:
+    """Power over area, and its noise by the photons' halves, (n, 6): means over cells of several shifted grids."""
+    a, b = halves
+    held, area = np.zeros((6, len(atlas)), np.float32), np.zeros(len(atlas), np.float32)
     for k in range(GRIDS):
-        group, _ = cells(atlas.position[element], atlas.normal[element], k / GRIDS, size)
-        for row, values in zip(held, fallen, strict=True):
-            row += np.bincount(group, values[element])[group]
-        area += np.bincount(group, atlas.area[element])[group]
-    held[:6] /= np.maximum(area, np.float32(1e-12))
-    return held[:6].T, held[6] / GRIDS
+        group, _ = cells(atlas.position, atlas.normal, k / GRIDS, CELL)
+        for row, values in zip(held, (*(a + b), *(a - b)), strict=True):
+            row += np.bincount(group, values)[group]
+        area += np.bincount(group, atlas.area)[group]
+    return (held / np.maximum(area, np.float32(1e-12))).T

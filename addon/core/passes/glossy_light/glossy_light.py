@@ -87,9 +87,9 @@ class Excess(LightField):
         """Whether there is anything glossy at all."""
         return bool(self._gloss.alpha.any())
 
-    def from_bright(self, finer: bool = True) -> np.ndarray:
+    def from_bright(self) -> np.ndarray:
         """The part of the excess that starts at bright triangles, and its noise, at every element (`caustics`)."""
-        return caustics(self._lit, self._sources, self._gloss, self._seed, finer=finer)
+        return caustics(self._lit, self._sources, self._gloss, self._seed)
 
     def arriving(
         self, hits: Hits, element: np.ndarray, directions: np.ndarray, dark_in_mirrors: np.ndarray | None = None
@@ -167,7 +167,7 @@ def glossy_light(
 
     found = TexelBlocks(atlas, element, threads).evaluate(around, block_step(atlas), np.inf)
     if "caustics" not in without:
-        found += excess.from_bright("fine-photons" not in without)[element]
+        found += excess.from_bright()[element]
     # Spread like the light itself, the halves' difference has the noise that is left in it.
     found, noise = found[:, :3] - level, found[:, 3:].mean(1)
     if "glossy-smoothing" not in without:

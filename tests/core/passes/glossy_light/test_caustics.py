@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from addon.core.light.emitters import bright_triangles
-from addon.core.passes.glossy_light.caustics import Gloss, _over_cells, caustics
+from addon.core.passes.glossy_light.caustics import Gloss, caustics
 from tests.core.glossy_box import SIZE, Box
 from tests.core.passes.glossy_light.test_glossy_light import PSI, over_the_floor
 from tests.core.rooms import Quad, polygon_irradiance
@@ -126,19 +124,3 @@ def test_two_halves_tell_the_noise(dark):
     few = caustics(dark.field, dark.bright, lobes, seed=3, photons=1 << 16)[at]
     off, told = (few[:, :3] - sure).std(), np.sqrt(np.square(few[:, 3:]).mean())
     assert told == pytest.approx(off, rel=0.3)
-
-
-def test_light_close_by_keeps_its_edge():
-    """Many photons lie in a patch narrower than a cell of 12 cm: none of its light is spread beside it."""
-    x, y = np.meshgrid(np.arange(0, 1, 0.01), np.arange(0, 1, 0.01))
-    position = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], 1).astype(np.float32)
-    n = len(position)
-    floor = SimpleNamespace(
-        position=position, normal=np.tile(np.float32([0, 0, 1]), (n, 1)), area=np.full(n, 1e-4, np.float32)
-    )
-    away = np.abs(position - [0.5, 0.5, 0]).max(1)
-    patch, beside = away < 0.03, (away > 0.07) & (away < 0.11)
-    halves = np.zeros((2, 4, n), np.float32)
-    halves[:, :3, patch], halves[:, 3, patch] = 1e-4 / 2, 400 / patch.sum()
-    found = _over_cells(floor, halves)[:, :3].mean(1)
-    assert found[away < 0.01] == pytest.approx(1, rel=0.2) and found[beside].max() < 0.1
