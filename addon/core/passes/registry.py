@@ -38,10 +38,8 @@ PASSES = (
     *_of(
         "surface",
         mesh_denoising="Takes a scan's noise out of its vertices.",
-        unfolding="Where triangles are smaller than the noise, draws points towards their neighbours first.",
         angle_variance="Weights dihedral angles by their variance, from draws of the posterior.",
         sheets="Puts what lies in flat parts into their planes.",
-        shared_error="Tells sheets from shallow shapes by the spatial autocorrelation of their residuals.",
         cracks="Closes cracks that the noise opened between parts that only touch.",
         two_sides="Gives triangles that frames see from both sides a second side of its own.",
     ),
@@ -79,7 +77,6 @@ PASSES = (
         grazing="Lets the diffuse part darken towards grazing views.",
         ray_noise="Takes the rays' noise out of the least squares for the lobe.",
         dielectric_prior="Gives the specular weight of dielectrics a prior.",
-        bare_metal="Fits metals without any diffuse part, too.",
         see_through="Sets apart what is transparent or cut out.",
         metal_by_looks="Tells metals of one colour from all of their surface.",
         coat_by_looks="Tells coated things of one colour from all of their surface.",

@@ -8,7 +8,7 @@ the points' distance against the prediction interval of the plane fitted so far.
 its points tell well which way it faces, they lie about as far off as the noise takes them, and a bend (quadratic terms)
 explains them no better than chance would. Spheres, cushions and cylinders fail the last and stay as they are. A region
 that ends at creases all around and whose bend explains its points entirely is a sheet too, gently bent: the metal of a
-sconce. Steps and pillows no higher than the noise give themselves away as neighbours share them (`moran`).
+sconce.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ import numpy as np
 from scipy import sparse
 
 from ...groups import by_label
-from .moran import SURE, moran, most_alike
 
 NEAR, REACH = 3.0, 4.5
 """Times the noise (and the plane's own uncertainty), how far denoised points may lie off, of low triangles and of high
@@ -274,9 +273,7 @@ def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: tuple
     return None
 
 
-def sheets_of(
-    measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise: float, shared_error: bool = True
-) -> tuple[list[Sheet], Grower]:
+def sheets_of(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise: float) -> tuple[list[Sheet], Grower]:
     """The flat and gently bent parts of a mesh.
 
     Parameters
@@ -286,42 +283,21 @@ def sheets_of(
     faces : (t, 3) int
     noise : float
         Metres.
-    shared_error : bool
-        Leave out what neighbouring points' residuals tell from a sheet (`moran`).
     """
-
-    def found(most: float) -> tuple[list[Sheet], list[float]]:
-        """Sheets whose points' neighbours are off no more alike than that, and how much they are."""
-        grower.free[:], grower.tried[:] = True, False
-        sheets, index = [], []
-        for seed in seeds:
-            if grower.tried[seed] or not grower.free[seed]:
-                continue
-            region = grower.grow(seed)
-            own = np.unique(faces[region])
-            sheet = sheet_of(measured[own], region, float(grower.area[region].sum()), grower.outline(region), noise)
-            if sheet is None:
-                continue
-            off[own] = sheet.tangent(measured[own])[1]
-            alike, error = moran(off, faces[region])
-            if alike <= most + SURE * error:
-                grower.free[region] = False
-                sheets.append(sheet)
-                index.append(alike)
-        return sheets, index
-
-    grower, off = Grower(smooth, faces, noise), np.zeros(len(measured))
-    seeds = grower.seeds()
-    # A scan's smooth error is shared by neighbours, too: most of a room's flat parts tell how much.
-    sheets, index = found(np.inf)
-    if shared_error:
-        sheets, _ = found(most_alike(index, [float(grower.area[sheet.faces].sum()) for sheet in sheets]))
+    grower, sheets = Grower(smooth, faces, noise), []
+    for seed in grower.seeds():
+        if grower.tried[seed] or not grower.free[seed]:
+            continue
+        region = grower.grow(seed)
+        own = np.unique(faces[region])
+        sheet = sheet_of(measured[own], region, float(grower.area[region].sum()), grower.outline(region), noise)
+        if sheet is not None:
+            grower.free[region] = False
+            sheets.append(sheet)
     return sheets, grower
 
 
-def onto_sheets(
-    measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise: float, shared_error: bool = True
-) -> np.ndarray:
+def onto_sheets(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise: float) -> np.ndarray:
     """Points moved onto the sheets of their triangles, and onto lines and corners where sheets meet:
 
         minimise  |x - smooth|^2 + STIFF^2 sum over sheets (distance of x)^2
@@ -329,7 +305,7 @@ def onto_sheets(
     Parameters as of `sheets_of`. A point that would go farther than `REACH` from where it was measured goes to its
     largest sheet alone; one of no sheet, or too far even from that, is given back `smooth`. (p, 3) float.
     """
-    sheets, grower = sheets_of(measured, smooth, faces, noise, shared_error)
+    sheets, grower = sheets_of(measured, smooth, faces, noise)
     moved = smooth.copy()
     if not sheets:
         return moved
