@@ -70,9 +70,6 @@ class Choice:
     """A dielectric's sure lobe that serves nearly as well as the metal's that was taken."""
     metal: LobeFit | None = None
     """A metal's lobe that serves better than any other model, but not beyond doubt."""
-    bare: bool = False
-    """Whether a metal's lobe alone, with nothing of each element's own, explains the frames about as well as a metal's
-    does (`BARE`)."""
     see_through: SeeThrough | None = None
     """How the object shows what is behind it; it is TRANSPARENT then."""
     looks: OneColour | Coated | None = None
@@ -169,31 +166,22 @@ def choose_model(problem: Problem) -> Choice:
     # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
     dielectric = replace(fit, psi=np.minimum(fit.psi, MOST_F0))
     metal, likely = fit_lobe(dense, constraints=METAL.constraints), None
-    found = [(metal, *held_out(metal, METAL))] if _metallic(metal) else []
-    # Errors of the light draw psi down where each element has a diffuse part of its own; without one they don't.
-    bare = min(
-        (_bare_metal(problem, dense, phi, metal, scale) for phi in dense.grid[dense.grid <= BROADEST_PHI]),
-        key=lambda one: one[1].sum(),
-    )
-    with_bare = _metallic(bare[0]) and "bare-metal" not in problem.without
-    found += [(*bare, without)] if with_bare else []
-    no_diffuse = with_bare and bool(bare[1].sum() <= BARE * without.sum())
-    for fit_of_metal, with_metal, matt in found:
-        scores[METAL.name] = min(float(with_metal.sum() / max(matt.sum(), 1e-30)), scores.get(METAL.name, np.inf))
+    if _metallic(metal):
+        with_metal, matt = held_out(metal, METAL)
+        scores[METAL.name] = float(with_metal.sum() / max(matt.sum(), 1e-30))
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
         (less, by), (more, surely) = _gain(with_metal, matt), _gain(with_metal, with_lobe)
         most = BARE_AT_MOST if min(less, more) > MUCH else BARE
-        if _bare_metal(problem, dense, fit_of_metal.phi, metal, scale)[1].sum() > most * matt.sum():
-            continue
-        if min(less, more) > MIN_GAIN and by > MIN_SIGMAS and surely > SURELY_METAL:
-            other = dielectric if sure and surely < MIN_SIGMAS else None
-            return Choice(METAL, fit_of_metal, less, by, scores=scores, dielectric=other)
-        if min(less, more) > MIN_GAIN and likely is None:
-            likely = fit_of_metal
+        alone = _bare_metal(problem, dense, metal.phi, metal, scale)[1].sum()
+        if min(less, more) > MIN_GAIN and alone <= most * matt.sum():
+            if by > MIN_SIGMAS and surely > SURELY_METAL:
+                other = dielectric if sure and surely < MIN_SIGMAS else None
+                return Choice(METAL, metal, less, by, scores=scores, dielectric=other)
+            likely = metal
     if sure:
-        return Choice(DIELECTRIC, dielectric, gain, sigmas, scores=scores, metal=likely, bare=no_diffuse)
+        return Choice(DIELECTRIC, dielectric, gain, sigmas, scores=scores, metal=likely)
     note = "Roughness and specular are not identifiable from these frames."
-    return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores, metal=likely, bare=no_diffuse)
+    return Choice(LAMBERTIAN, fit, gain, sigmas, note, scores, metal=likely)
 
 
 def set_apart(choice: Choice, found: SeeThrough, sure: bool) -> Choice:
@@ -219,10 +207,8 @@ def adopt_from_class(
     model, weighted by evidence. Members keep their own lobe where their frames set it apart from that. Objects
     whose own frames decide nothing take over the class's, but not where it raises their cost by more than `EXCLUDED`.
     What is set apart neither gives nor takes. Among metals, one whose frames favour metal without being sure of it is
-    one, as rough as the others unless its frames are sure of something else; and one whose frames a metal's lobe
-    explains alone, without any diffuse part, takes over that of the class: a metal on a bumpy mesh shows the room where
-    no ray finds it, and looks like anything, but not like diffuse light. Among dielectrics, one that is a metal no more
-    surely than it is one of them is one of them.
+    one, as rough as the others unless its frames are sure of something else. Among dielectrics, one that is a metal no
+    more surely than it is one of them is one of them.
     """
     result, choices = dict(choices), {i: choice for i, choice in choices.items() if not choice.model.see_through}
     for name in sorted(set(class_of[object_id] for object_id in choices)):
@@ -233,13 +219,8 @@ def adopt_from_class(
         found = {i: choice for i, choice in members.items() if choice.model.has_lobe}
         if not found:
             continue
-        # What a metal explains as well says nothing against metals of its class; looks alone judge none with a lobe.
-        views = any(one.model.lobe_alone and one.looks is None for one in found.values())
         judges = {i: one for i, one in found.items() if not isinstance(one.looks, Coated)} or found
-        clear = {
-            i for i, one in judges.items()
-            if not (one.dielectric if one.model.lobe_alone else one.metal or views and one.bare)
-        }  # fmt: skip
+        clear = {i for i, one in judges.items() if not (one.dielectric if one.model.lobe_alone else one.metal)}
         source = max(sorted(clear) or judges, key=lambda i: found[i].sigmas)
         model = _pooled([c for c in judges.values() if c.model is found[source].model], found[source])
         for i, choice in members.items():
@@ -248,9 +229,6 @@ def adopt_from_class(
                 note = "Not beyond doubt by itself; others of its class are metal."
                 fit = _of_class(choice.metal, model.lobe, model.model, problems.get(i))
                 result[i] = replace(choice, model=model.model, fit=fit, note=note)
-            elif turns and choice.bare and (views or not choice.model.has_lobe):
-                note = f"Needs no diffuse part, like object {source} of its class, which is metal."
-                result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
             elif model.model.layered and choice.dielectric is not None:
                 note = "Like a metal, but not beyond doubt; others of its class are not."
                 fit = _of_class(choice.dielectric, model.lobe, model.model, problems.get(i))

@@ -110,27 +110,6 @@ def test_a_metal_hardly_better_than_a_dielectric_says_so(seen, monkeypatch):
     assert choice.model == METAL and choice.dielectric is not None and choice.dielectric.psi.max() <= MOST_F0
 
 
-def test_a_metal_on_a_bumpy_mesh(seen):
-    """Where each view is thought to show what others do, no lobe explains it; but it needs no diffuse part either.
-
-    Alone it stays what it is, beside a metal of its class it is one; a matt thing beside it stays matt.
-    """
-    problem = seen["metal"]
-    rng = np.random.default_rng(3)
-    wrong = np.arange(len(problem.element))
-    for one in np.unique(problem.element):
-        own = np.flatnonzero(problem.element == one)
-        wrong[own] = rng.permutation(own)
-    light = replace(problem.light, A=problem.light.A[wrong], B=problem.light.B[wrong])
-    sure, lost, matt = (choose_model(one) for one in (problem, replace(problem, light=light), seen["matt"]))
-    assert lost.model != METAL and lost.bare and not matt.bare
-    lost = replace(lost, model=DIELECTRIC, sigmas=2 * sure.sigmas)  # as sure of a lobe as it may be
-    members = {0: lost, 1: sure, 2: matt}
-    result = adopt_from_class(members, {2: seen["matt"]}, dict.fromkeys(range(3), "steel"))
-    assert result[0].model == METAL and result[0].fit.phi == sure.fit.phi and "object 1" in result[0].note
-    assert result[1].model == METAL and result[2].model == LAMBERTIAN
-
-
 def test_the_class_helps_out(seen):
     """0 is sure; 1 was seen too little, 2 not at all: both take its lobe. 3 looks different, 4 is of another class."""
     sure = choose_model(seen["glossy"])

@@ -103,10 +103,10 @@ def test_reddish_wood_is_no_copper(floor, irradiance):
 
 
 def test_looks_do_not_judge_others_of_the_class(floor, irradiance):
-    """A table with a lobe of its own stays as it is, though a metal's lobe alone would serve it, too."""
+    """A table with a lobe of its own stays as it is."""
     problem = floor(0.11, COPPER, 0.0)
     metal = metal_by_looks(UNSURE, compare(problem, irradiance), problem)
-    table = replace(metal, model=DIELECTRIC, looks=None, bare=True, sigmas=8.0)
+    table = replace(metal, model=DIELECTRIC, looks=None, sigmas=8.0)
     result = adopt_from_class({0: metal, 1: table}, {0: problem, 1: problem}, dict.fromkeys(range(2), "wood"))
     assert result[1].model == DIELECTRIC and result[0].model == METAL
 
