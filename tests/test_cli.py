@@ -11,6 +11,7 @@ from dataclasses import fields, replace
 import pytest
 
 from addon import cli
+from addon.cli.common import settings_from
 from addon.console import ConsoleProgress, StopWish, duration
 from addon.core.errors import BadInputError, InterruptedRun, StorageError
 from addon.core.progress import Progress, ProgressEvent
@@ -51,20 +52,20 @@ def test_every_setting_is_described():
 
 
 def test_passes_to_leave_out_are_collected():
-    assert cli.settings_from(parse("--without", "sun", "--without", "caustics")).without == ("sun", "caustics")
+    assert settings_from(parse("--without", "sun", "--without", "caustics")).without == ("sun", "caustics")
 
 
 def test_no_option_gives_the_defaults():
-    assert cli.settings_from(parse()) == Settings()
+    assert settings_from(parse()) == Settings()
 
 
 def test_options_go_on_top_of_the_preset():
-    given = cli.settings_from(parse("--preset", "paper", "--shading-rays", "64", "--interpolate"))
+    given = settings_from(parse("--preset", "paper", "--shading-rays", "64", "--interpolate"))
     assert given == replace(PAPER, shading_rays=64, interpolate=True)
 
 
 def test_every_option_arrives():
-    given = cli.settings_from(parse("--texel-size", "0.01", "--median", "mean", "--no-interpolate", "--seed", "7"))
+    given = settings_from(parse("--texel-size", "0.01", "--median", "mean", "--no-interpolate", "--seed", "7"))
     assert given == Settings(texel_size=0.01, median="mean", interpolate=False, seed=7)
 
 

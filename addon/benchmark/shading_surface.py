@@ -15,6 +15,7 @@ from ..core.settings import Settings
 from .lit_rooms import LitRoom, make_room
 from .recorded_rays import recorded
 from .run import Options
+from .shading_reference import looked_at, relative_error
 from .table import BASELINE, Curves, Table
 from .timing import Timing, alternately, once
 
@@ -66,7 +67,6 @@ def over(room: LitRoom, way: str, options: Options) -> tuple[np.ndarray, int]:
 
 def surface_tables(rooms: dict[str, LitRoom], options: Options) -> Iterator[Table]:
     """The tables, one by one."""
-    from .shading import looked_at, relative_error
 
     size = LARGE if options.large else 1
     rows, best = [], {}
@@ -135,7 +135,6 @@ def _bake_table(
 ) -> Table:
     """Cycles baking the same E on the processor, beside ours."""
     from .cycles_bake import bake
-    from .shading import looked_at, relative_error
 
     rows = []
     for name in ("lamp", "window"):

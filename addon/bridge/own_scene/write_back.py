@@ -23,7 +23,6 @@ from ..data.mesh_objects import ATLAS_UV
 from ..light.room import depsgraph_of
 from ..marks import OBJECT_ID, RESULT, RUN, mark
 from ..results import images
-from ..slices import whole
 from .capture import Source, check_own, few, polygons_of, sharing, sources
 from .mesh import Part, gather, same_topology, topology
 from .mesh import topology_hash as hash_of
@@ -39,7 +38,12 @@ AUTO, IMPORTED, SELECTED = "AUTO", "IMPORTED", "SELECTED"
 SUFFIX = " (Scan Relight)"
 
 
-def write_back(
+def is_own(capture_folder: Path | str, target: str = AUTO) -> bool:
+    """Whether a capture's materials belong onto the artist's own objects."""
+    return target == SELECTED or target == AUTO and bool(sources(capture_folder))
+
+
+def writing_back(
     scene: bpy.types.Scene,
     capture: Capture,
     atlas_uv: np.ndarray,
@@ -47,8 +51,10 @@ def write_back(
     result_folder: Path | str,
     where: str = images.RESULT,
     copies: bool = False,
-) -> tuple[str, ...]:
-    """Put the recovered materials onto the objects that a capture was made of.
+) -> Generator[float, None, tuple[str, ...]]:
+    """Put the recovered materials onto the objects that a capture was made of, in slices of an object each.
+
+    It yields the share done, so that a window can be drawn.
 
     Parameters
     ----------
@@ -76,24 +82,6 @@ def write_back(
     BadInputError
         An image can't be read, or the images' folder can't be told.
     """
-    return whole(writing_back(scene, capture, atlas_uv, materials, result_folder, where, copies))
-
-
-def is_own(capture_folder: Path | str, target: str = AUTO) -> bool:
-    """Whether a capture's materials belong onto the artist's own objects."""
-    return target == SELECTED or target == AUTO and bool(sources(capture_folder))
-
-
-def writing_back(
-    scene: bpy.types.Scene,
-    capture: Capture,
-    atlas_uv: np.ndarray,
-    materials: Iterable[ObjectMaterial],
-    result_folder: Path | str,
-    where: str = images.RESULT,
-    copies: bool = False,
-) -> Generator[float, None, tuple[str, ...]]:
-    """`own_scene.write_back` in slices of an object each; yields the share done, so that a window can be drawn."""
     known, polygons = sources(capture.root), polygons_of(capture.root, capture.mesh)
     check_own(capture.root)
     if polygons is None:

@@ -109,11 +109,6 @@ class Store:
             raise ValueError(f"'{name}' leads out of the result folder")
         return self.folder / name
 
-    def finished(self) -> list[str]:
-        """Names of the stages that are stored whole, oldest first; their keys may be out of date."""
-        paths = [path for path in (self.folder / STAGES).glob("*.npz") if _read_meta(path) is not None]
-        return [path.stem for path in sorted(paths, key=lambda path: (path.stat().st_mtime_ns, path.stem))]
-
     def load(self, name: str, key: str) -> dict[str, np.ndarray] | None:
         """The arrays of stage `name`; None where it is absent, was made under another key, or is damaged."""
         path = self._stage(name)

@@ -8,7 +8,7 @@ bpy = pytest.importorskip("bpy")
 
 from addon.bridge.light import units  # noqa: E402
 from addon.bridge.relight import lights  # noqa: E402
-from addon.cli_relight import strength  # noqa: E402
+from addon.cli.relight import strength  # noqa: E402
 from addon.core.errors import BadInputError  # noqa: E402
 
 

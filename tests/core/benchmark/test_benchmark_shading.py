@@ -10,7 +10,7 @@ from addon.benchmark.lit_rooms import make_room
 from addon.benchmark.pipeline import cut_in_four
 from addon.benchmark.recorded_rays import recorded
 from addon.benchmark.run import Options
-from addon.benchmark.shading import looked_at, relative_error
+from addon.benchmark.shading_reference import looked_at, relative_error
 from addon.benchmark.shading_surface import DEFAULT_WAY, PAPER_WAY, over
 
 SMALL = 3000

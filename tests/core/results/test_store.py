@@ -69,7 +69,7 @@ def test_a_half_written_or_damaged_stage_is_none(store):
     whole = path.read_bytes()
     for length in range(0, len(whole), 97):
         path.write_bytes(whole[:length])
-        assert store.load("a", "k") is None and store.finished() == []
+        assert store.load("a", "k") is None
     at = whole.index(ARRAYS["albedo"].tobytes()) + 8  # one byte of the pixels: only the checksum can tell
     path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
     assert store.load("a", "k") is None
@@ -78,13 +78,6 @@ def test_a_half_written_or_damaged_stage_is_none(store):
     with open(path, "wb") as file:
         np.save(file, np.arange(3))  # an array, but no archive
     assert store.load("a", "k") is None
-
-
-def test_finished_in_their_order(store):
-    for i, name in enumerate(["shading", "accumulate", "fit"]):
-        store.save(name, "k", {})
-        os.utime(store.folder / f"stages/{name}.npz", ns=(i, i))
-    assert store.finished() == ["shading", "accumulate", "fit"]
 
 
 def test_objects_and_bad_names_are_the_callers_mistake(store):

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from addon.core.io.exr import write_exr
 from addon.core.io.layout import Reading
 from addon.core.io.png import write_png
 from tests.core.io.colmap_files import images_of, write_binary, write_text
@@ -141,10 +140,6 @@ def png_content() -> bytes:
         lines += b"".join(bytes((k % 5,)) + line.tobytes() for k, line in enumerate(part) if part.size)
     header = struct.pack(">IIBBBBB", WIDTH, HEIGHT, 16, 2, 0, 0, 1)
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(lines)) + chunk(b"IEND", b"")
-
-
-def write_frame(path: Path) -> None:
-    write_exr(path, RADIANCE)
 
 
 def mesh_only(root: Path) -> CaptureOnDisk:

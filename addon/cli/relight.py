@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TextIO
 
-from .core.errors import EXIT_OK, BadInputError
+from ..core.errors import EXIT_OK, BadInputError
+from .common import console_run, need
 
 
 def add_relight(commands, epilog: str) -> argparse.ArgumentParser:
@@ -93,9 +94,8 @@ def strength(text: str) -> tuple[float, str]:
 
 def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`relight RESULT --out FILE`."""
-    from .cli import console_run, need  # which imports this module
-    from .core.progress import Progress
-    from .leash import JsonProgress
+    from ..core.progress import Progress
+    from ..leash import JsonProgress
 
     if arguments.samples < 0 or not 1 <= arguments.size <= 1000:
         raise BadInputError("Option --samples takes a number of at least 0, and --size 1 to 1000 percent.")

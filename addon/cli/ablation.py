@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
-from .core.errors import EXIT_OK, BadInputError
-from .core.settings import PRESETS
+from ..core.errors import EXIT_OK, BadInputError
+from ..core.settings import PRESETS
 
 NAMES = ("benchmark", "ablation")
 """How it is called."""
@@ -53,7 +53,7 @@ def add_ablation(commands, epilog: str) -> argparse.ArgumentParser:
 
 def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`benchmark ablation ROOM ... --out DIR`, or with `--list` or `--table FILE`."""
-    from .core.passes.registry import PASSES
+    from ..core.passes.registry import PASSES
 
     if arguments.list:
         width = max(len(one.name) for one in PASSES)
@@ -63,7 +63,7 @@ def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     if arguments.out is None:
         raise BadInputError("Option --out names the folder of the runs; give it.")
     if arguments.table is not None:
-        from .benchmark.ablation_table import write_report
+        from ..benchmark.ablation_table import write_report
 
         write_report(arguments.out, arguments.table)
         if not arguments.quiet:
@@ -73,7 +73,7 @@ def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         raise BadInputError("Name at least one room: a capture with truth/ beside its frames.")
     if min(arguments.seeds) < 0 or arguments.threads < 0:
         raise BadInputError("Options --seeds and --threads take whole numbers of at least 0.")
-    from .benchmark.ablation import Ablation, run_ablation
+    from ..benchmark.ablation import Ablation, run_ablation
 
     asked = Ablation(
         arguments.rooms,

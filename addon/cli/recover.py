@@ -6,11 +6,12 @@ import argparse
 from pathlib import Path
 from typing import TextIO
 
-from .cli_refit import add_override
-from .console import duration
-from .core.errors import EXIT_OK, BadInputError
-from .core.stages import RUN_STAGES, WRITE
-from .leash import JsonProgress
+from ..console import duration
+from ..core.errors import EXIT_OK, BadInputError
+from ..core.stages import RUN_STAGES, WRITE
+from ..leash import JsonProgress
+from .common import add_reading, console_run, need, needed_packages, reading_from, settings_from
+from .refit import add_override
 
 UNWRAPS = ("blender", "xatlas", "own")
 """As `api.UNWRAPS`, which takes numpy."""
@@ -63,51 +64,8 @@ def add_recover(commands, epilog: str) -> argparse.ArgumentParser:
     return parser
 
 
-def add_reading(parser: argparse.ArgumentParser) -> None:
-    """How the capture is to be read, where its folder does not tell: one option for each field of `Reading`."""
-    group = parser.add_argument_group("the capture")
-    group.add_argument(
-        "--format",
-        metavar="NAME",
-        default="",
-        help="its layout, such as nerfstudio (default: found from what the folder holds)",
-    )
-    group.add_argument("--mesh", metavar="FILE", type=Path, help="the mesh, where it is not the format's own")
-    group.add_argument("--outside", action="store_true", help="let its files name others outside of its folder")
-    group.add_argument(
-        "--transfer",
-        metavar="CURVE",
-        default="",
-        help="curve of 8 and 16-bit pictures: srgb, linear, or a gamma such as 2.2",
-    )
-    group.add_argument("--exposures", metavar="CSV", type=Path, help="exposure of each frame: lines of name, exposure")
-    group.add_argument(
-        "--convention", metavar="NAME", default="", help="a correction of all poses, as `info` proposes it"
-    )
-
-
-def reading_from(arguments: argparse.Namespace):
-    """The `Reading` that was asked for."""
-    from .cli import need  # which imports this module
-    from .core.io.layout import Reading
-
-    def import_mesh(path: Path):
-        return need("data.import_mesh").import_mesh(path)  # only now: most captures need no Blender to be read
-
-    return Reading(
-        arguments.format,
-        arguments.mesh,
-        arguments.outside,
-        arguments.transfer,
-        arguments.exposures,
-        arguments.convention,
-        import_mesh,
-    )
-
-
 def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`recover CAPTURE --out RESULT`."""
-    from .cli import console_run, need, needed_packages, settings_from  # which imports this module
 
     settings = settings_from(arguments)
     if arguments.unwrap and arguments.scene:
@@ -123,10 +81,10 @@ def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         if arguments.scene:
             run = need("job.run").run
         else:
-            from .api import run_without_scene as run
+            from ..api import run_without_scene as run
 
             how["unwrap"] = arguments.unwrap
-        from .core.pipeline.run import progress_for
+        from ..core.pipeline.run import progress_for
     with console_run(arguments, stream) as console:
         report = run(arguments.capture, arguments.out, settings, progress_for(settings, **console), **how)
     if isinstance(console["listener"], JsonProgress):

@@ -6,9 +6,10 @@ import argparse
 from pathlib import Path
 from typing import TextIO
 
-from .console import duration
-from .core.errors import EXIT_OK
-from .leash import JsonProgress
+from ..console import duration
+from ..core.errors import EXIT_OK
+from ..leash import JsonProgress
+from .common import console_run, need
 
 
 def add_override(parser: argparse.ArgumentParser) -> None:
@@ -50,8 +51,7 @@ def add_refit(commands, epilog: str) -> argparse.ArgumentParser:
 
 def refit_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`refit RESULT --object ID`."""
-    from .cli import console_run, need  # which imports this module
-    from .core.progress import Progress
+    from ..core.progress import Progress
 
     refit = need("job.refit")
     with console_run(arguments, stream) as console:

@@ -1,0 +1,132 @@
+"""The command line: arguments to settings, errors to exit codes. One program for both homes.
+
+As `scan-relight` in a Python environment with Blender's bpy, and as `blender --command scan_relight` once the
+extension is installed. Nothing of Blender or the method is imported before it is needed, so that `--help` is quick.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+from ..console import own_console, unexpected
+from ..core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, ScanRelightError
+from ..version import VERSION
+from .ablation import ablation_command, add_ablation, joined
+from .benchmark import add_benchmark, benchmark_command
+from .common import add_common, add_leash, add_settings, complain
+from .demo import add_demo, demo_command
+from .info import add_info, info_command
+from .recover import add_recover, recover_command
+from .refit import add_refit, refit_command
+from .relight import add_relight, relight_command
+
+COMMAND = "scan_relight"
+EXIT_CODES = """\
+exit codes: 0 done, 1 failure, 2 bad input, 130 interrupted (what is finished is kept; the same command goes on from
+there)"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        The arguments after the program's name; those of this process if not given.
+
+    Returns
+    -------
+    int
+        The exit code: 0 done, 1 failure, 2 bad input, 130 interrupted.
+    """
+    try:
+        arguments = make_parser().parse_args(joined(argv))
+    except SystemExit as end:  # argparse has printed help, the version, or what is wrong
+        return end.code if isinstance(end.code, int) else EXIT_BAD_INPUT
+    try:
+        with own_console(keep_others=arguments.debug) as stream:
+            return arguments.function(arguments, stream)
+    except ScanRelightError as error:
+        if arguments.debug:
+            traceback.print_exc()
+        return complain(str(error), error.exit_code)
+    except KeyboardInterrupt:
+        return complain("Interrupted; the finished stages are kept.", EXIT_INTERRUPTED)
+    except BrokenPipeError:  # whoever read our output has gone
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_FAILURE
+    except MemoryError:
+        return complain(
+            "The memory is used up; a greater --texel-size, a smaller --atlas-size or fewer rays take less.",
+            EXIT_FAILURE,
+        )
+    except Exception as error:  # the last line of defence: a sentence, never a bare traceback
+        if arguments.debug:
+            traceback.print_exc()
+        return complain(unexpected(error, getattr(arguments, "out", None)), EXIT_FAILURE)
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that says what is wrong in one sentence instead of a page of usage."""
+
+    def error(self, message: str):
+        """End with exit code 2."""
+        self.exit(EXIT_BAD_INPUT, f"scan-relight: {message[:1].upper()}{message[1:]}; see '{self.prog} --help'.\n")
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """The parser for every command."""
+    parser = Parser(
+        prog="scan-relight",
+        epilog=EXIT_CODES,
+        description="Recover albedo, roughness and lamps from a scanned room and write a Blender scene to relight.",
+    )
+    parser.add_argument("--version", action="version", version=f"scan-relight {VERSION}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    recover = add_recover(commands, EXIT_CODES)
+    add_settings(recover)
+    add_leash(recover)
+    add_common(recover, recover_command)
+
+    add_common(add_info(commands, EXIT_CODES), info_command, quiet=False)
+
+    for add, function in ((add_refit, refit_command), (add_relight, relight_command)):
+        command = add(commands, EXIT_CODES)
+        add_leash(command)
+        add_common(command, function)
+
+    demo = add_demo(commands, EXIT_CODES)
+    add_settings(demo)
+    add_common(demo, demo_command)
+
+    add_common(add_benchmark(commands, EXIT_CODES), benchmark_command)
+    add_common(add_ablation(commands, EXIT_CODES), ablation_command)
+    return parser
+
+
+_handle = None
+
+
+def register() -> None:
+    """Make `blender --command scan_relight` known."""
+    global _handle
+    import bpy
+
+    _handle = bpy.utils.register_cli_command(COMMAND, main)
+
+
+def unregister() -> None:
+    """Take the command back."""
+    global _handle
+    import bpy
+
+    if _handle is not None:
+        bpy.utils.unregister_cli_command(_handle)
+        _handle = None

@@ -1,0 +1,162 @@
+"""What the commands have in common: options that several take, and how their runs are followed."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import TextIO
+
+from ..console import ConsoleProgress, StopWish
+from ..core.errors import EXIT_FAILURE, BadInputError
+from ..core.settings import PRESETS, Settings
+from ..leash import JsonProgress, Leash, MemoryGuard
+from ..settings_info import setting_infos
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """How the capture is to be read, where its folder does not tell: one option for each field of `Reading`."""
+    group = parser.add_argument_group("the capture")
+    group.add_argument(
+        "--format",
+        metavar="NAME",
+        default="",
+        help="its layout, such as nerfstudio (default: found from what the folder holds)",
+    )
+    group.add_argument("--mesh", metavar="FILE", type=Path, help="the mesh, where it is not the format's own")
+    group.add_argument("--outside", action="store_true", help="let its files name others outside of its folder")
+    group.add_argument(
+        "--transfer",
+        metavar="CURVE",
+        default="",
+        help="curve of 8 and 16-bit pictures: srgb, linear, or a gamma such as 2.2",
+    )
+    group.add_argument("--exposures", metavar="CSV", type=Path, help="exposure of each frame: lines of name, exposure")
+    group.add_argument(
+        "--convention", metavar="NAME", default="", help="a correction of all poses, as `info` proposes it"
+    )
+
+
+def reading_from(arguments: argparse.Namespace):
+    """The `Reading` that was asked for."""
+    from ..core.io.layout import Reading
+
+    def import_mesh(path: Path):
+        return need("data.import_mesh").import_mesh(path)  # only now: most captures need no Blender to be read
+
+    return Reading(
+        arguments.format,
+        arguments.mesh,
+        arguments.outside,
+        arguments.transfer,
+        arguments.exposures,
+        arguments.convention,
+        import_mesh,
+    )
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """One option for each field of `Settings`."""
+    group = parser.add_argument_group("settings")
+    group.add_argument(
+        "--preset",
+        choices=tuple(PRESETS),
+        default="normal",
+        help="what the settings below start from; 'paper' is the published method (default normal)",
+    )
+    for info in setting_infos():
+        text = f"{info.help} (default {info.default})".replace("%", "%%")
+        option = f"--{info.name.replace('_', '-')}"
+        if info.kind is bool:
+            group.add_argument(option, action=argparse.BooleanOptionalAction, default=None, help=text)
+        elif info.choices:
+            group.add_argument(option, choices=info.choices, help=text)
+        else:
+            group.add_argument(option, type=info.kind, metavar=info.kind.__name__.upper(), help=text)
+    text = "leave a pass out, to see what it does; can be repeated (names: benchmark ablation --list)"
+    group.add_argument("--without", metavar="PASS", action="append", help=text)
+
+
+def settings_from(arguments: argparse.Namespace) -> Settings:
+    """The preset with everything that was given."""
+    given = {info.name: getattr(arguments, info.name) for info in setting_infos()}
+    given["without"] = None if arguments.without is None else tuple(arguments.without)
+    return replace(PRESETS[arguments.preset], **{name: value for name, value in given.items() if value is not None})
+
+
+def add_leash(parser: argparse.ArgumentParser) -> None:
+    """Options for programs that start a run and follow it."""
+    group = parser.add_argument_group("for programs that start a run")
+    group.add_argument(
+        "--progress",
+        choices=("text", "json"),
+        default="text",
+        help="json: one line of JSON for each event instead of text (default text)",
+    )
+    group.add_argument(
+        "--stop-with-stdin",
+        action="store_true",
+        help="stop when standard input says 'stop' or ends, so that the run never outlives its starter",
+    )
+    group.add_argument(
+        "--memory-limit",
+        type=float,
+        metavar="GB",
+        default=0.0,
+        help="stop when the run takes more gigabytes (default 0, no limit)",
+    )
+
+
+def add_common(parser: argparse.ArgumentParser, function, quiet: bool = True) -> None:
+    """Options of every command, and what runs it; `quiet`: one of them is to print nothing."""
+    if quiet:
+        parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    parser.add_argument("--debug", action="store_true", help="also print Blender's messages and tracebacks of errors")
+    parser.set_defaults(function=function)
+
+
+@contextlib.contextmanager
+def console_run(arguments: argparse.Namespace, stream: TextIO):
+    """The listener and the wish to stop of a long command, as keywords of `run.progress_for`."""
+    machine = getattr(arguments, "progress", "text") == "json"
+    listener = JsonProgress(stream) if machine else ConsoleProgress(stream, quiet=arguments.quiet)
+    guard = MemoryGuard(getattr(arguments, "memory_limit", 0.0), lambda text: os._exit(complain(text, EXIT_FAILURE)))
+    leash = Leash() if getattr(arguments, "stop_with_stdin", False) else None
+    with StopWish() as wish:
+        try:
+            yield {"listener": listener, "should_stop": lambda: guard() or wish() or (leash is not None and leash())}
+        finally:
+            guard.close()
+            listener.close()
+
+
+def need(module: str):
+    """A module of the bridge; where there is no Blender, say so in one sentence."""
+    with needed_packages():
+        return importlib.import_module(f"..bridge.{module}", __package__)
+
+
+@contextlib.contextmanager
+def needed_packages():
+    """Turn the absence of a package that the method needs into one sentence."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if error.name and error.name.split(".")[0] in ("bpy", "numpy", "scipy", "embreex", "OpenEXR"):
+            how = "pip install 'scan-relight[blender]'" if error.name == "bpy" else "pip install scan-relight"
+            raise BadInputError(
+                f"The Python package '{error.name}' is missing; {how} brings it"
+                f"{'; recover --no-scene does without' if error.name == 'bpy' else ''}."
+            ) from error
+        raise
+
+
+def complain(sentence: str, code: int) -> int:
+    """Say what went wrong on standard error; returns `code`."""
+    with contextlib.suppress(OSError, ValueError):
+        print(f"scan-relight: {sentence}", file=sys.stderr, flush=True)
+    return code

@@ -1,0 +1,95 @@
+"""The command `info`: what a capture holds, and what is wrong with it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TextIO
+
+from ..core.errors import EXIT_OK
+from ..leash import Leash
+from .common import add_reading, needed_packages, reading_from
+
+
+def add_info(commands, epilog: str) -> argparse.ArgumentParser:
+    """Add the parser of `info` to the program's `commands`."""
+    parser = commands.add_parser(
+        "info",
+        help="say what a capture holds, and what is wrong with it",
+        description="Read and check a capture without recovering anything.",
+        epilog=epilog,
+    )
+    parser.add_argument("capture", metavar="CAPTURE", type=Path, help="folder of the capture")
+    parser.add_argument("--json", action="store_true", help="machine-readable")
+    parser.add_argument("--room", metavar="FOLDER", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--stop-with-stdin", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--no-look", action="store_true", help="don't compare the frames with the mesh")
+    parser.add_argument(
+        "--overlay", metavar="PNG", type=Path, help="write frames with the mesh's edges drawn over them"
+    )
+    add_reading(parser)
+    return parser
+
+
+def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+    """`info CAPTURE`."""
+    from ..core.io.read import describe, read_capture
+
+    if arguments.stop_with_stdin:
+        Leash(grace=0.0)
+    capture = read_capture(arguments.capture, reading_from(arguments))
+    if arguments.room is not None:
+        from ..core.results.room_file import write_room
+
+        write_room(arguments.room, capture)
+    facts = describe(capture)
+    if capture.frames and not arguments.no_look:
+        facts["agreement"] = compare(capture, arguments)
+    if arguments.json:
+        print(json.dumps(facts, indent=1), file=stream)
+        return EXIT_OK
+    extent = " x ".join(f"{length:.2f}" for length in facts["extent_m"])
+    sizes = ", ".join(f"{count} of {size}" for size, count in facts["resolutions"].items())
+    lenses = ", ".join(f"{count} of {name}" for name, count in facts["lenses"].items())
+    lenses = f"; lenses: {lenses}" if set(facts["lenses"]) - {"PINHOLE"} else ""
+    print(f"{facts['capture']} ({facts['format']})", file=stream)
+    told = f": {sizes} pixels; {facts['masks']} with a mask{lenses}" if facts["frames"] else ""
+    print(f"  frames     {facts['frames']}{told}", file=stream)
+    print(
+        f"  mesh       {facts['triangles']} triangles, {facts['vertices']} vertices, {facts['area_m2']:.1f} m2, "
+        f"{extent} m",
+        file=stream,
+    )
+    print(f"  instances  {len(facts['instances'])}", file=stream)
+    for one in facts["instances"]:
+        print(f"    {one['object_id']:>5}  {one['class_name']:<24} {one['triangles']:>8} triangles", file=stream)
+    for warning in facts["warnings"]:
+        print(f"  warning    {warning}", file=stream)
+    for sentence in facts.get("agreement", {}).get("sentences", ()):
+        print(f"  poses      {sentence}", file=stream)
+    return EXIT_OK
+
+
+def compare(capture, arguments: argparse.Namespace) -> dict:
+    """Whether frames and mesh fit, ready for JSON; writes the overlay where one is wanted."""
+    with needed_packages():
+        from ..core.agreement.look import look
+        from ..core.agreement.overlay import overlay
+        from ..core.atomic import write_bytes
+        from ..core.io.conventions import Convention
+        from ..core.io.pixels import read_pixels
+        from ..core.io.png import png
+
+        found = look(capture, read_pixels, search=not arguments.convention)
+        if arguments.overlay is not None:
+            columns = [Convention()] + ([found.best.convention] if found.best else [])
+            write_bytes(arguments.overlay, png(overlay(capture, read_pixels, columns)))
+    return {
+        "fits": found.fits,
+        "quality": found.as_read.quality,
+        "hit": found.as_read.hit,
+        "convention": str(found.best.convention) if found.best else None,
+        "misaligned_pixels": found.misaligned.round(3).tolist(),
+        "sentences": found.sentences(),
+    }
