@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.benchmark import shading
+from addon.benchmark import shading, shading_reference
 from addon.benchmark.lit_rooms import make_room
 from addon.benchmark.pipeline import cut_in_four
 from addon.benchmark.recorded_rays import recorded
@@ -18,7 +18,7 @@ SMALL = 3000
 
 @pytest.fixture
 def few(monkeypatch):
-    monkeypatch.setattr(shading, "REFERENCE", (1 << 10, 1 << 8, 1 << 10))
+    monkeypatch.setattr(shading_reference, "REFERENCE", (1 << 10, 1 << 8, 1 << 10))
 
 
 def test_the_furnace_is_exact():
