@@ -27,7 +27,7 @@ from addon.core.scene.elements import triangle_geometry
 from addon.core.scene.model import Mesh
 from scripts.perturb_capture import SEAM, offsets, vertex_normals
 
-PARTS = ("", "angle-variance", "sheets", "cracks")
+PARTS = ("", "unfolding", "angle-variance", "sheets", "cracks")
 """'' has all of them."""
 
 

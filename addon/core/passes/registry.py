@@ -38,6 +38,7 @@ PASSES = (
     *_of(
         "surface",
         mesh_denoising="Takes a scan's noise out of its vertices.",
+        unfolding="Where triangles are smaller than the noise, draws points towards their neighbours first.",
         angle_variance="Weights dihedral angles by their variance, from draws of the posterior.",
         sheets="Puts what lies in flat parts into their planes.",
         cracks="Closes cracks that the noise opened between parts that only touch.",
