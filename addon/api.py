@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from .core.brdf.emitter import EMITTER
 from .core.brdf.material import ObjectMaterial
 from .core.errors import BadInputError, InterruptedRun, ScanRelightError
 from .core.io.layout import AS_FOUND, Layout, RawMesh, Reader, Reading
@@ -139,7 +138,7 @@ class Recovered:
     @property
     def lamps(self) -> list[ObjectMaterial]:
         """Those of the objects that give light; `emission` is the radiance that they give, linear Rec.709."""
-        return [material for material in self.materials if material.model is EMITTER]
+        return [material for material in self.materials if material.model.gives_light]
 
     @property
     def mesh(self) -> Mesh:

@@ -75,7 +75,8 @@ def _model(given: Given, problem: Problem | None, enough: bool) -> Brdf:
     """The model of an object whose roughness or F0 is given."""
     if given.f0 is not None:
         return METAL if np.mean(given.f0) > MOST_F0 else DIELECTRIC
-    return METAL if enough and problem is not None and choose_model(problem).model is METAL else DIELECTRIC
+    chosen = choose_model(problem).model if enough and problem is not None else DIELECTRIC
+    return chosen if chosen.has_lobe else DIELECTRIC
 
 
 def _fit(
