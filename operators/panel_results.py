@@ -81,10 +81,10 @@ def order_key(name: str, one: dict, order: str) -> tuple:
 
 def columns(one: dict) -> tuple[str, str]:
     """Roughness and specular F0 of a row, as short as can be; empty where it has no highlight."""
-    if one.get("phi") is None:
+    if one.get("alpha") is None:
         return "", ""
     value = results.specular(one)
-    return _short(max(one["phi"], 0) ** 0.5), "" if value is None else _short(value)
+    return _short(max(one["alpha"], 0) ** 0.5), "" if value is None else _short(value)
 
 
 def _short(value: float) -> str:

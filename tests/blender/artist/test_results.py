@@ -118,6 +118,11 @@ def test_read_again_when_the_file_changes_and_only_then(scene, results, tmp_path
     assert len(results.result_of(scene).objects) == 2
 
 
+def test_the_list_shows_roughness_and_f0(results):
+    columns = importlib.import_module("scan_relight.operators.panel_results").columns
+    assert [columns(one) for one in OBJECTS] == [(".30", ".04"), ("", ""), (".20", ".60"), ("", "")]
+
+
 def test_a_result_of_version_0_1_shows_the_same(scene, results, tmp_path):
     now = [results.facts(one) for one in results.result_of(scene).objects.values()]
     old = {"alpha": "phi", "f0": "psi"}
