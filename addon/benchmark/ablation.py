@@ -193,7 +193,8 @@ class Bench:
                 getattr(recovery, stage)()
                 if stage not in before:
                     seconds[stage] = round(time.process_time() - started, 2)
-                if name != WHOLE and stage not in before and self._same(stage, store):
+                # Of a later stage it would not do: what is written looks at all of them.
+                if name != WHOLE and stage == first and self._same(stage, store):
                     same = True
                     break
             figures = dict(self._whole["figures"]) if same else {}
