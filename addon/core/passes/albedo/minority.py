@@ -13,19 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...parallel import for_blocks
+from .params import SECOND_COLOUR, SecondColourParams
 
-FAR = 2.0
-"""Widths of its surroundings that a neighbour of another colour lies off; 2.5 tells fewer of a bathroom's joints."""
-FAR_OF_ERROR = 2.0
-"""Of its own errors as well: where E is in doubt, as along a moulding, its faults lie in lines too."""
-BY_CHANCE = 1 / 16
-"""Share of the neighbours that may lie so far off by chance. With 1/8 nothing is gained in bathrooms."""
-LOCAL = 0.5
-"""Of an element's error this share is its own; the rest, E's above all, those beside it have too."""
-APART = 0.03
-"""Relative difference between elements of one colour."""
-UNEXPLAINED = 1e-4
-"""Density under which neither tells what an element is; `shrink` decides."""
 BLOCK = 1 << 11
 
 
@@ -46,6 +35,7 @@ def drawn_to_minority(
     reference: np.ndarray,
     reference_error: np.ndarray,
     most: float,
+    params: SecondColourParams = SECOND_COLOUR,
 ) -> np.ndarray:
     """Log albedo of measured elements, drawn to the other colours around them as far as those are likelier.
 
@@ -68,6 +58,7 @@ def drawn_to_minority(
         Albedo above 0, and relative standard error.
     most : float
         Albedo that a reference was cut off at: there E is wrong, and no colour is told.
+    params : SecondColourParams
 
     Returns
     -------
@@ -75,16 +66,16 @@ def drawn_to_minority(
     """
     ground, width, near = np.exp(around.middle), around.width, around.near
     other = np.empty(near.shape, bool)
-    uncut, least = reference.max(1) < most, (FAR_OF_ERROR * reference_error) ** 2
+    uncut, least = reference.max(1) < most, (params.far_of_error * reference_error) ** 2
 
     def far(part: slice) -> None:
         beside = near[part]
-        limit = (FAR * width[part, None]) ** 2 + least[beside]
+        limit = (params.far * width[part, None]) ** 2 + least[beside]
         other[part] = (_apart(reference[beside], ground[part, None]) > limit) & uncut[beside]
 
     for_blocks(far, len(near), BLOCK, 0)
     share = other.mean(1)
-    real = np.clip(1 - BY_CHANCE / np.maximum(share, 1e-9), 0, 1)
+    real = np.clip(1 - params.by_chance / np.maximum(share, 1e-9), 0, 1)
     result = shrunk.copy()
     todo = np.flatnonzero(real[cell] > 0)
 
@@ -92,14 +83,14 @@ def drawn_to_minority(
         own = todo[part]
         at = cell[own]
         beside, value = reference[near[at]], rho[own]
-        local = (LOCAL * error[own]) ** 2
+        local = (params.local * error[own]) ** 2
         of_ground = (1 - real[at] * share[at]) * _normal(_apart(value, ground[at]), local + width[at] ** 2)
         away = _apart(value[:, None], beside)
-        of_other = (real[at] / near.shape[1])[:, None] * other[at] * _normal(away, (local + APART**2)[:, None])
-        of_ground += UNEXPLAINED
+        of_other = (real[at] / near.shape[1])[:, None] * other[at] * _normal(away, (local + params.apart**2)[:, None])
+        of_ground += params.unexplained
         total = of_ground + of_other.sum(1)
         drawn = (of_other[:, :, None] * np.log(beside)).sum(1)
-        trust = (APART**2 / (APART**2 + local))[:, None]
+        trust = (params.apart**2 / (params.apart**2 + local))[:, None]
         as_other = trust * of_other.sum(1)[:, None] * np.log(value) + (1 - trust) * drawn
         result[own] = (of_ground[:, None] * shrunk[own] + as_other) / total[:, None]
 

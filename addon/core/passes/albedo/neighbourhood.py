@@ -18,37 +18,15 @@ from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.visibility import CLEAN, SATURATED
 from .minority import Surroundings, drawn_to_minority
+from .params import PRIOR, PriorParams
 
-NEIGHBOURS = 128
-"""With 64, two kitchens have .8 and .4 dB less, bedroom .4, study, bathrooms and living room .2, hall and office .0.
-Under checks of .1 to .8 m laid over them the living room has .06 less in the mean, a bathroom .13 more."""
-ALIKE = 0.7
-"""A wider neighbourhood speaks for a place if its median is within so many widths of the nearest neighbours' own."""
-REFERENCES = 4096
-"""Well-measured elements of an object that neighbours are sought among: a thinned set reaches further around."""
-CELL_TEXELS = 6.0
-"""Edge of the cells that share one prior."""
-LEAST_ERROR = 0.06
-"""Relative error that even the best measured element has: shading, texels against pixels."""
-SURE = 0.15
-"""An element with a lesser relative error than this may speak for its surroundings."""
-FEW, LEAST_FEW = 0.35, 0.1
-"""Bounds of the relative error of a single observation, whose spread can't be known."""
-OF_OTHERS, TIMES = 0.84, 2.0
-"""It is taken for so many times what so many of its object's spots, seen often, have at most. Single observations are
-made where little is seen, so for more than theirs. `FEW` for all drew a bathroom's grout into its tiles; albedo since:
-25.4 to 26.3 dB, in finer frames 27.3 to 27.9, hall 32.7 to 33.3, kitchen 28.8 to 29.0, living room 32.7 to 32.5, others
-within .15."""
-ENOUGH_OTHERS = 30
-EDGE_ERROR = 0.3
-"""Added for observations at depth edges, where another surface is mixed in."""
-SURPRISE = 3.0
-"""Deviations of up to so many of an element's own errors are taken for error."""
 DARK = 1e-3
 BLOCK = 1 << 11
 
 
-def relative_error(lit: LitDiffuse, object_id: np.ndarray, of_object: bool = True) -> np.ndarray:
+def relative_error(
+    lit: LitDiffuse, object_id: np.ndarray, of_object: bool = True, params: PriorParams = PRIOR
+) -> np.ndarray:
     """Relative standard error of each element's L_d, from its observations: (n,) float32.
 
     inf where there are none, or none but clipped ones: a lower bound may be off by any factor.
@@ -60,33 +38,38 @@ def relative_error(lit: LitDiffuse, object_id: np.ndarray, of_object: bool = Tru
         Of each element: one seen once or twice is as unsure as others of its object.
     of_object : bool
         If not, all that was seen once or twice is equally unsure.
+    params : PriorParams
     """
     middle = np.maximum(np.nan_to_num(lit.radiance).mean(1), 1e-12)
     spread = (np.nan_to_num(lit.upper) - np.nan_to_num(lit.lower)).mean(1) / 1.35 / middle
     n = np.maximum(lit.count, 1)
     # The median of n values of standard deviation s has the error 1.25 s / sqrt(n); few values hide their spread.
-    few: float | np.ndarray = FEW
+    few: float | np.ndarray = params.single
     if of_object:
-        few = _single(spread, lit.seen & (lit.count >= 3) & (lit.tier == CLEAN), object_id)
-    error = np.hypot(1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, few)) / np.sqrt(n), LEAST_ERROR)
-    error = np.where(lit.tier == CLEAN, error, error + EDGE_ERROR)
+        few = _single(spread, lit.seen & (lit.count >= 3) & (lit.tier == CLEAN), object_id, params)
+    error = np.hypot(1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, few)) / np.sqrt(n), params.least_error)
+    error = np.where(lit.tier == CLEAN, error, error + params.edge_error)
     return np.where(lit.seen & (lit.tier != SATURATED), error, np.inf).astype(np.float32)
 
 
-def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray) -> np.ndarray:
+def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray, params: PriorParams) -> np.ndarray:
     """Relative error of a single observation of each element's object, (n,), from the elements seen `often`."""
-    few = np.full(int(object_id.max()) + 1, FEW)
+    few = np.full(int(object_id.max()) + 1, params.single)
     ids, known = object_id[often], spread[often]
     for own in by_label(ids):
-        if len(own) >= ENOUGH_OTHERS:
-            few[ids[own[0]]] = np.clip(TIMES * np.quantile(known[own], OF_OTHERS), LEAST_FEW, FEW)
+        if len(own) >= params.enough_others:
+            few[ids[own[0]]] = np.clip(
+                params.single_factor * np.quantile(known[own], params.single_quantile),
+                params.least_single,
+                params.single,
+            )
     return few[object_id]
 
 
-def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> Surroundings:
+def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, params: PriorParams) -> Surroundings:
     """The nearest references of m places."""
     # At most an eighth of the object: a small object's ends are not each other's surroundings.
-    k = min(NEIGHBOURS, max(len(references) // 8, 3), len(references))
+    k = min(params.neighbours, max(len(references) // 8, 3), len(references))
     near = cKDTree(references).query(position, k=k, workers=-1)[1].reshape(len(position), k)
     middle = np.empty((len(position), 3), np.float32)
     width = np.empty(len(position), np.float32)
@@ -109,18 +92,20 @@ def _quantile(ordered: np.ndarray, share: float) -> np.ndarray:
     return (1 - rest) * ordered[..., int(low)] + rest * ordered[..., min(int(low) + 1, ordered.shape[-1] - 1)]
 
 
-def _prior(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, without: Collection[str]) -> Surroundings:
+def _prior(
+    position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, without: Collection[str], params: PriorParams
+) -> Surroundings:
     """As `_around`, from as far around each place as it stays the same.
 
     `references` are in random order: half of them reach twice as far (in area) with as many neighbours.
     """
-    found = _around(position, references, log_rho)
+    found = _around(position, references, log_rho, params)
     if "wide-prior" in without:
         return found
-    first, allowed = found.middle.copy(), ALIKE * found.width
+    first, allowed = found.middle.copy(), params.alike * found.width
     todo, count = np.arange(len(position)), len(references) // 2
-    while count >= 8 * NEIGHBOURS and len(todo):
-        wider = _around(position[todo], references[:count], log_rho[:count])
+    while count >= 8 * params.neighbours and len(todo):
+        wider = _around(position[todo], references[:count], log_rho[:count], params)
         alike = np.abs(wider.middle - first[todo]).mean(1) <= allowed[todo]
         todo = todo[alike]
         for kept, new in zip(found, wider, strict=True):
@@ -137,6 +122,7 @@ def shrink(
     seed: int = 0,
     most: float = np.inf,
     without: Collection[str] = (),
+    params: PriorParams = PRIOR,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Albedo of one object's elements, each drawn towards its neighbourhood as far as it is in doubt.
 
@@ -152,6 +138,7 @@ def shrink(
         Albedo that `rho` was clamped to.
     without : collection of str
         Passes left out.
+    params : PriorParams
 
     Returns
     -------
@@ -162,11 +149,11 @@ def shrink(
     position = atlas.position[own]
     known = np.flatnonzero(np.isfinite(error))
     # The better half at least: the few that are surer may be all of one kind, the frame of a painting.
-    sure = known[error[known] <= max(SURE, float(np.median(error[known])))]
-    if len(sure) < NEIGHBOURS:
+    sure = known[error[known] <= max(params.sure, float(np.median(error[known])))]
+    if len(sure) < params.neighbours:
         sure = known
-    sure = np.random.default_rng(seed).permutation(sure)[:REFERENCES]
-    cell = CELL_TEXELS * float(np.sqrt(np.median(atlas.area[own])))
+    sure = np.random.default_rng(seed).permutation(sure)[: params.references]
+    cell = params.cell * float(np.sqrt(np.median(atlas.area[own])))
     place = np.floor((position - position.min(0)) / max(cell, 1e-9)).astype(np.int64)
     extent = place.max(0) + 1
     _, index, count = np.unique(
@@ -178,7 +165,7 @@ def shrink(
     asked, index = np.unique(index[todo], return_inverse=True)
     rho = np.maximum(rho, DARK)
     reference, reference_error = rho[sure], error[sure]
-    around = _prior(centre[asked], position[sure], np.log(reference), without)
+    around = _prior(centre[asked], position[sure], np.log(reference), without, params)
     shrunk, left = rho.astype(np.float32), error.astype(np.float32)
     rho, error = rho[todo], error[todo]
     measured = np.isfinite(error)
@@ -189,7 +176,7 @@ def shrink(
     # prior gets the width that makes this element likeliest.
     # One verdict for all channels, by their sum: a channel near 0 is all noise in its logarithm.
     off = np.log(np.exp(log_rho).sum(1, keepdims=True) / np.exp(middle).sum(1, keepdims=True))
-    surprise = off**2 - (SURPRISE * error) ** 2
+    surprise = off**2 - (params.surprise * error) ** 2
     wide = np.maximum(width**2, surprise)
     trust = (wide / (wide + error**2)).astype(np.float32)
     if "albedo-prior" in without:

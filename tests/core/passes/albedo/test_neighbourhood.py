@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.passes.albedo import neighbourhood
 from addon.core.passes.albedo.albedo import FILLED, MEASURED, fill
-from addon.core.passes.albedo.neighbourhood import EDGE_ERROR, FEW, LEAST_ERROR, SURE, relative_error, shrink
+from addon.core.passes.albedo.neighbourhood import relative_error, shrink
+from addon.core.passes.albedo.params import PRIOR
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.visibility import CLEAN, EDGE, SATURATED
 from tests.core.rooms import make_room, quad
 
-GOOD, POOR, NONE = LEAST_ERROR, 0.8, np.inf
+GOOD, POOR, NONE = PRIOR.least_error, 0.8, np.inf
 
 
 @pytest.fixture(scope="module")
@@ -194,17 +194,17 @@ def of_one(lit: LitDiffuse) -> np.ndarray:
 def test_doubt_falls_with_observations_and_rises_with_spread():
     by_count = of_one(observed(5.0, 0.3, [3, 10, 100], CLEAN))
     assert (np.diff(by_count) < 0).all()
-    assert by_count[1] == pytest.approx(np.hypot(1.25 * 0.3 / np.sqrt(10), LEAST_ERROR), rel=1e-3)
+    assert by_count[1] == pytest.approx(np.hypot(1.25 * 0.3 / np.sqrt(10), PRIOR.least_error), rel=1e-3)
     by_spread = of_one(observed(5.0, [0.01, 0.3, 1.0], 10, CLEAN))
-    assert (np.diff(by_spread) > 0).all() and by_spread[0] < SURE
+    assert (np.diff(by_spread) > 0).all() and by_spread[0] < PRIOR.sure
     assert np.allclose(of_one(observed(5e-3, 0.3, 10, CLEAN)), of_one(observed(5e3, 0.3, 10, CLEAN)))
 
 
 def test_one_or_two_observations_are_no_certainty():
     """Their quartiles coincide, which is no sign of agreement."""
     few = of_one(observed(1.0, 0.0, [1, 2, 3], CLEAN))
-    assert few[0] == pytest.approx(np.hypot(1.25 * FEW, LEAST_ERROR)) and SURE < few[1] < few[0]
-    assert few[2] == pytest.approx(LEAST_ERROR)
+    assert few[0] == pytest.approx(np.hypot(1.25 * PRIOR.single, PRIOR.least_error)) and PRIOR.sure < few[1] < few[0]
+    assert few[2] == pytest.approx(PRIOR.least_error)
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.08, 0.5])
@@ -212,14 +212,14 @@ def test_a_single_observation_is_as_unsure_as_the_object_s_others(spread):
     """Within bounds; what is known of one object says nothing of another."""
     lit = observed(1.0, [spread] * 40 + [0.0, 0.0], [20] * 40 + [1, 1], CLEAN)
     own, other = relative_error(lit, np.int32([7] * 41 + [2]))[-2:]
-    expected = np.clip(neighbourhood.TIMES * spread, neighbourhood.LEAST_FEW, FEW)
-    assert own == pytest.approx(np.hypot(1.25 * expected, LEAST_ERROR), rel=0.01)
-    assert other == pytest.approx(np.hypot(1.25 * FEW, LEAST_ERROR))
+    expected = np.clip(PRIOR.single_factor * spread, PRIOR.least_single, PRIOR.single)
+    assert own == pytest.approx(np.hypot(1.25 * expected, PRIOR.least_error), rel=0.01)
+    assert other == pytest.approx(np.hypot(1.25 * PRIOR.single, PRIOR.least_error))
 
 
 def test_edges_and_saturation_are_in_doubt():
     clean, edge, saturated = of_one(observed(1.0, 0.1, 20, [CLEAN, EDGE, SATURATED]))
-    assert edge == pytest.approx(clean + EDGE_ERROR) and saturated > edge > SURE > clean
+    assert edge == pytest.approx(clean + PRIOR.edge_error) and saturated > edge > PRIOR.sure > clean
 
 
 def test_what_nobody_saw_is_no_measurement():

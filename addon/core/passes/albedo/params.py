@@ -1,0 +1,84 @@
+"""What the albedo's prior is told; what each part gains: docs/ablation.md."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class PriorParams:
+    """Of `neighbourhood` (`albedo-prior` in the ablation).
+
+    Attributes
+    ----------
+    neighbours : int
+        Elements that a prior is made of. With 64, two kitchens have .8 and .4 dB less of albedo, a bedroom .4, a study,
+        bathrooms and the living room .2, hall and office .0.
+    alike : float
+        Widths of the prior, by which the median of a wider neighbourhood may differ to stand for it (`wide-prior`).
+    references : int
+        Well-measured elements of an object that neighbours are sought among: a thinned set reaches further around.
+    cell : float
+        Texels, edge of the cells that share one prior.
+    least_error : float
+        Relative standard error that even the best measured element has: irradiance, texels against pixels.
+    sure : float
+        Relative standard error below which an element may speak for its neighbourhood.
+    single, least_single : float
+        Bounds of the relative standard error of a single observation, whose spread can't be known.
+    single_quantile, single_factor : float
+        It is taken for so many times this quantile (one standard deviation of a normal distribution) of the spreads
+        that its object's other elements have (`object-spread`). Single observations are made where little is seen, so
+        for more than theirs.
+    enough_others : int
+        Elements that tell such a quantile.
+    edge_error : float
+        Added to the relative standard error of observations at depth edges, where another surface is mixed in.
+    surprise : float
+        Standard errors of an element's own up to which a deviation is taken for error.
+    """
+
+    neighbours: int = 128
+    alike: float = 0.7
+    references: int = 4096
+    cell: float = 6.0
+    least_error: float = 0.06
+    sure: float = 0.15
+    single: float = 0.35
+    least_single: float = 0.1
+    single_quantile: float = 0.84
+    single_factor: float = 2.0
+    enough_others: int = 30
+    edge_error: float = 0.3
+    surprise: float = 3.0
+
+
+@dataclass(frozen=True)
+class SecondColourParams:
+    """Of `minority` (`second-colour` in the ablation).
+
+    Attributes
+    ----------
+    far : float
+        Widths of its prior that a neighbour of another colour lies off; 2.5 tells fewer of a bathroom's joints.
+    far_of_error : float
+        Standard errors of its own, as well: where E is uncertain, as along a moulding, its faults lie in lines too.
+    by_chance : float
+        Share of the neighbours that may lie so far off by chance. With 1/8 nothing is gained in bathrooms.
+    local : float
+        Of an element's standard error this share is its own; the rest, E's above all, its neighbours have too.
+    apart : float
+        Relative difference between elements of one colour.
+    unexplained : float
+        Probability density below which neither colour tells what an element is; the plain prior decides.
+    """
+
+    far: float = 2.0
+    far_of_error: float = 2.0
+    by_chance: float = 1 / 16
+    local: float = 0.5
+    apart: float = 0.03
+    unexplained: float = 1e-4
+
+
+PRIOR, SECOND_COLOUR = PriorParams(), SecondColourParams()
