@@ -5,42 +5,42 @@ from __future__ import annotations
 
 def classes() -> tuple[type, ...]:
     """Everything that Blender has to know: property groups, preferences, operators, panels. Each part adds its own."""
-    from .accumulate import SCAN_RELIGHT_OT_accumulate
-    from .assets import SCAN_RELIGHT_OT_mark_assets
-    from .capture_from_scene import SCAN_RELIGHT_OT_capture_from_scene
-    from .check_capture import SCAN_RELIGHT_OT_check_capture
-    from .clear_cache import SCAN_RELIGHT_OT_clear_cache
-    from .correct_register import correct_groups, correct_operators, correct_panels
-    from .files import (
+    from .base.job_operator import SCAN_RELIGHT_OT_stop
+    from .correct.register import correct_groups, correct_operators, correct_panels
+    from .manual import SCAN_RELIGHT_OT_manual
+    from .menus import SCAN_RELIGHT_MT_all
+    from .preferences import ScanRelightPreferences
+    from .recover.accumulate import SCAN_RELIGHT_OT_accumulate
+    from .recover.assets import SCAN_RELIGHT_OT_mark_assets
+    from .recover.capture_from_scene import SCAN_RELIGHT_OT_capture_from_scene
+    from .recover.check_capture import SCAN_RELIGHT_OT_check_capture
+    from .recover.files import (
         SCAN_RELIGHT_FH_json,
         SCAN_RELIGHT_OT_drop,
         SCAN_RELIGHT_OT_open_capture,
         SCAN_RELIGHT_OT_open_result,
         SCAN_RELIGHT_OT_use_folder,
     )
-    from .find_result import SCAN_RELIGHT_OT_find_result, SCAN_RELIGHT_PT_missing
-    from .fit import SCAN_RELIGHT_OT_fit
-    from .import_capture import SCAN_RELIGHT_OT_import_capture
-    from .job_operator import SCAN_RELIGHT_OT_stop
-    from .link_room import SCAN_RELIGHT_OT_link_room
-    from .look import SCAN_RELIGHT_OT_look
-    from .manual import SCAN_RELIGHT_OT_manual
-    from .menus import SCAN_RELIGHT_MT_all
-    from .move_results import SCAN_RELIGHT_OT_move_results
-    from .open_report import SCAN_RELIGHT_OT_open_report
-    from .panel_capture import SCAN_RELIGHT_PT_capture
-    from .panel_look import SCAN_RELIGHT_PT_look, SCAN_RELIGHT_PT_own_scene
-    from .panel_recover import SCAN_RELIGHT_PT_recover
-    from .panel_results import SCAN_RELIGHT_PT_results, SCAN_RELIGHT_PT_stages, SCAN_RELIGHT_UL_results
-    from .preferences import ScanRelightPreferences
-    from .recover import SCAN_RELIGHT_OT_recover
-    from .relight_register import relight_groups, relight_operators, relight_panels
-    from .restore_materials import SCAN_RELIGHT_OT_restore_materials
-    from .run import SCAN_RELIGHT_OT_run
-    from .scene_props import ScanRelightReading, ScanRelightScene, ScanRelightSettings
-    from .select_result_object import SCAN_RELIGHT_OT_select_result_object
-    from .shade import SCAN_RELIGHT_OT_shade
-    from .write import SCAN_RELIGHT_OT_write
+    from .recover.fit import SCAN_RELIGHT_OT_fit
+    from .recover.import_capture import SCAN_RELIGHT_OT_import_capture
+    from .recover.link_room import SCAN_RELIGHT_OT_link_room
+    from .recover.panel_capture import SCAN_RELIGHT_PT_capture
+    from .recover.panel_recover import SCAN_RELIGHT_PT_recover
+    from .recover.recover import SCAN_RELIGHT_OT_recover
+    from .recover.restore_materials import SCAN_RELIGHT_OT_restore_materials
+    from .recover.run import SCAN_RELIGHT_OT_run
+    from .recover.scene_props import ScanRelightReading, ScanRelightScene, ScanRelightSettings
+    from .recover.shade import SCAN_RELIGHT_OT_shade
+    from .recover.write import SCAN_RELIGHT_OT_write
+    from .relight.register import relight_groups, relight_operators, relight_panels
+    from .results.clear_cache import SCAN_RELIGHT_OT_clear_cache
+    from .results.find import SCAN_RELIGHT_OT_find_result, SCAN_RELIGHT_PT_missing
+    from .results.look import SCAN_RELIGHT_OT_look
+    from .results.move import SCAN_RELIGHT_OT_move_results
+    from .results.open_report import SCAN_RELIGHT_OT_open_report
+    from .results.panel import SCAN_RELIGHT_PT_results, SCAN_RELIGHT_PT_stages, SCAN_RELIGHT_UL_results
+    from .results.panel_look import SCAN_RELIGHT_PT_look, SCAN_RELIGHT_PT_own_scene
+    from .results.select import SCAN_RELIGHT_OT_select_result_object
 
     return (
         # Property groups: those that others point to come first.
@@ -72,9 +72,9 @@ def pointers() -> tuple[tuple[type, str, type], ...]:
     """Blender type, name and property group of everything that hangs on Blender's own data."""
     import bpy
 
-    from .correct_register import correct_pointers
-    from .relight_register import relight_pointers
-    from .scene_props import ScanRelightScene
+    from .correct.register import correct_pointers
+    from .recover.scene_props import ScanRelightScene
+    from .relight.register import relight_pointers
 
     return ((bpy.types.Scene, "scan_relight", ScanRelightScene), *relight_pointers(), *correct_pointers())
 
@@ -83,10 +83,11 @@ def register():
     """Register every class and hang the property groups up."""
     import bpy
 
-    from . import find_result, keymaps, manual, menus, translations
-    from .correct_register import register_handlers
-    from .job_operator import forget_job
-    from .panel_results import active_row_property
+    from . import keymaps, manual, menus, translations
+    from .base.job_operator import forget_job
+    from .correct.register import register_handlers
+    from .results import find
+    from .results.panel import active_row_property
 
     for cls in classes():
         bpy.utils.register_class(cls)
@@ -94,9 +95,9 @@ def register():
         setattr(owner, name, bpy.props.PointerProperty(type=group))
     bpy.types.Scene.scan_relight_row = active_row_property()
     bpy.app.handlers.load_pre.append(forget_job)
-    bpy.app.handlers.load_post.append(find_result.look_for_results)
-    bpy.app.handlers.save_pre.append(find_result.keep_images)
-    bpy.app.handlers.save_post.append(find_result.found_is_kept)
+    bpy.app.handlers.load_post.append(find.look_for_results)
+    bpy.app.handlers.save_pre.append(find.keep_images)
+    bpy.app.handlers.save_post.append(find.found_is_kept)
     register_handlers()
     translations.register()
     menus.register()
@@ -110,9 +111,12 @@ def unregister():
 
     from ..addon.bridge.corrections import corrections
     from ..addon.bridge.job import job
-    from . import find_result, findings, keymaps, light_pictures, manual, menus, results, translations
-    from .correct_register import unregister_handlers
-    from .job_operator import forget_job
+    from . import keymaps, manual, menus, translations
+    from .base.job_operator import forget_job
+    from .correct.register import unregister_handlers
+    from .recover import findings
+    from .relight import light_pictures
+    from .results import find, told
 
     bpy.utils.unregister_manual_map(manual.manual_map)
     keymaps.unregister()
@@ -121,11 +125,11 @@ def unregister():
     unregister_handlers()
     corrections.forget()
     bpy.app.handlers.load_pre.remove(forget_job)
-    bpy.app.handlers.load_post.remove(find_result.look_for_results)
-    bpy.app.handlers.save_pre.remove(find_result.keep_images)
-    bpy.app.handlers.save_post.remove(find_result.found_is_kept)
+    bpy.app.handlers.load_post.remove(find.look_for_results)
+    bpy.app.handlers.save_pre.remove(find.keep_images)
+    bpy.app.handlers.save_post.remove(find.found_is_kept)
     findings.forget()
-    results.forget()
+    told.forget()
     light_pictures.forget()
     del bpy.types.Scene.scan_relight_row
     job.forget()

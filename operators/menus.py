@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .job_operator import active, bar
+from .base.job_operator import active, bar
 
 NEED_MORE = ("restore_lamp", "select_result_object")
 """Operators that say nothing without what a list has chosen; all others are in the menu, where F3 finds them."""

@@ -94,7 +94,7 @@ def play(story: Story, options, home: Path, full: Path) -> None:
     story.agree()
     window.actions.clear()  # counted from the startup file with the extension installed
     story.drag_in(options.capture)
-    window.wait_for("isinstance(module('operators.findings').look(bpy.context.scene.scan_relight), dict)")
+    window.wait_for("isinstance(module('operators.recover.findings').look(bpy.context.scene.scan_relight), dict)")
     story.popup()
     picture("drag")
     story.run()
@@ -102,7 +102,7 @@ def play(story: Story, options, home: Path, full: Path) -> None:
     time.sleep(5)
     picture("progress")
     story.finished()
-    window.wait_for("isinstance(module('operators.findings').look(bpy.context.scene.scan_relight), dict)")
+    window.wait_for("isinstance(module('operators.recover.findings').look(bpy.context.scene.scan_relight), dict)")
     picture("recovered", rendered=True)
     window.ask(f"bpy.ops.wm.save_as_mainfile(filepath={str(home / 'recovered.blend')!r}, copy=True)")
     story.lamp_off()

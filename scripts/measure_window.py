@@ -118,9 +118,9 @@ def begin() -> float | None:
     """Open the tab, choose, start."""
     if not opened():
         return 0.3
-    timed(module("operators.job_operator").JobOperator, "modal")
-    timed(module("operators.panel_capture").SCAN_RELIGHT_PT_capture, "draw")
-    timed(module("operators.panel_recover").SCAN_RELIGHT_PT_recover, "draw")
+    timed(module("operators.base.job_operator").JobOperator, "modal")
+    timed(module("operators.recover.panel_capture").SCAN_RELIGHT_PT_capture, "draw")
+    timed(module("operators.recover.panel_recover").SCAN_RELIGHT_PT_recover, "draw")
     bpy.app.timers.register(watch, persistent=True)
     tell("begin", scenario=options.scenario, process=os.getpid())
     if options.scenario != "idle":

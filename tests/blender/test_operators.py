@@ -146,7 +146,7 @@ def test_used_up_memory_is_told(ops, package, grey_capture, tmp_path, monkeypatc
 @pytest.mark.parametrize("name", NAMES)
 def test_missing_packages_are_told(ops, name, package, monkeypatch):
     monkeypatch.setattr(
-        importlib.import_module("scan_relight.operators.settings_props"),
+        importlib.import_module("scan_relight.operators.recover.settings_props"),
         "missing_packages",
         lambda: ("scipy", "OpenEXR"),
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 from tests.window.driver import Window
 
 JOB = "module('addon.bridge.job.job').current()"
-ACTIVE = "module('operators.job_operator').active()"
+ACTIVE = "module('operators.base.job_operator').active()"
 LAMPS = "module('addon.bridge.light.lamps')"
 OWN_SCENES = "[one.name for one in bpy.data.scenes if one.get('scan_relight_own')]"
 ADDON = "[name for name in bpy.context.preferences.addons.keys() if name.endswith('.scan_relight')]"

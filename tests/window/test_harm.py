@@ -63,7 +63,7 @@ with bpy.context.temp_override(**place()):
     window.wait_for("len(bpy.data.objects) == 3")
     assert window.ask(f"{JOB}.running") and not goes(process, patience=0.3)
     window.click("scan_relight.stop(")
-    window.wait_for("module('operators.job_operator').active() is None")
+    window.wait_for("module('operators.base.job_operator').active() is None")
     assert window.ask(f"{JOB}.state") == "stopped" and goes(process)
 
 

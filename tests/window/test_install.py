@@ -37,8 +37,8 @@ def test_a_folder_that_is_typed_in_is_read_at_once(window, tiny_capture, picture
     window.write(str(tiny_capture))
     window.press("Return")
     assert window.ask("bpy.context.scene.scan_relight.capture_folder").rstrip("/") == str(tiny_capture)
-    window.wait_for("isinstance(module('operators.findings').look(bpy.context.scene.scan_relight), dict)")
-    found = window.ask("module('operators.findings').look(bpy.context.scene.scan_relight)")
+    window.wait_for("isinstance(module('operators.recover.findings').look(bpy.context.scene.scan_relight), dict)")
+    found = window.ask("module('operators.recover.findings').look(bpy.context.scene.scan_relight)")
     assert found["frames"] == 10 and len(found["instances"]) == 15
     window.picture(pictures / "02-capture-sidebar.png", sidebar=True)
 
@@ -49,12 +49,14 @@ def test_a_bad_capture_says_what_is_wrong_and_what_to_do(window, grey_capture, t
     window.ask(f"setattr(bpy.context.scene.scan_relight, 'capture_folder', {str(bad)!r})")
     told = window.wait_for(
         "(lambda found: found if isinstance(found, str) else None)"
-        "(module('operators.findings').look(bpy.context.scene.scan_relight))"
+        "(module('operators.recover.findings').look(bpy.context.scene.scan_relight))"
     )
     assert "mesh" in told and str(bad) in told
     window.picture(pictures / "03-bad-capture-sidebar.png", sidebar=True)
     shutil.copy(grey_capture / "mesh.ply", bad)
     (bad / "transforms.json").write_text("{")
     window.click("scan_relight.check_capture")
-    window.wait_for("'transforms.json' in str(module('operators.findings').look(bpy.context.scene.scan_relight))")
+    window.wait_for(
+        "'transforms.json' in str(module('operators.recover.findings').look(bpy.context.scene.scan_relight))"
+    )
     window.picture(pictures / "03-bad-poses-sidebar.png", sidebar=True)

@@ -10,7 +10,7 @@ from PIL import Image
 from tests.window.story import VISIBLE, Story
 
 LAMPS = "module('addon.bridge.light.lamps')"
-ACTIVE = "module('operators.job_operator').active()"
+ACTIVE = "module('operators.base.job_operator').active()"
 LOOK = "module('addon.bridge.results.look').current(bpy.context.scene)"
 
 
@@ -43,7 +43,7 @@ bpy.context.view_layer.objects.active = None
     chosen = window.wait_for("getattr(bpy.context.view_layer.objects.active, 'name', '')", patience=30)
     assert window.ask("[one.name for one in bpy.context.view_layer.objects.selected]") == [chosen]
     known = window.ask(
-        "[module('operators.results').result_of(bpy.context.scene).objects[bpy.data.objects[name]"
+        "[module('operators.results.told').result_of(bpy.context.scene).objects[bpy.data.objects[name]"
         f"['object_id']]['model'] for name in {[chosen]!r}]"
     )
     assert set(known) <= {"lambertian", "specular", "metal", "emitter", "transparent"}

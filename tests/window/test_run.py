@@ -9,7 +9,7 @@ import time
 import pytest
 
 JOB = "module('addon.bridge.job.job').current()"
-ACTIVE = "module('operators.job_operator').active()"
+ACTIVE = "module('operators.base.job_operator').active()"
 ROOM = "sum('object_id' in thing for thing in bpy.data.objects)"
 RAYS = 256
 """So many that a run is not over before ESC arrives."""

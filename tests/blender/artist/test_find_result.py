@@ -64,7 +64,7 @@ def said():
     from tests.blender.panel.conftest import Layout
 
     bridge("results.find").forget()
-    module = importlib.import_module("scan_relight.operators.find_result")
+    module = importlib.import_module("scan_relight.operators.results.find")
     panel = module.SCAN_RELIGHT_PT_missing
     if not panel.poll(bpy.context):
         return ""

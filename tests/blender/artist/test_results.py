@@ -51,7 +51,7 @@ RUN, LATER = "0123456789abcdef", "fedcba9876543210"
 @pytest.fixture
 def results(ops):
     """The registered package's module, with nothing read yet."""
-    module = importlib.import_module("scan_relight.operators.results")
+    module = importlib.import_module("scan_relight.operators.results.told")
     module.forget()
     return module
 
@@ -104,7 +104,7 @@ def test_facts_name_what_is_known(results):
     ],
 )
 def test_orders(scene, results, order, names):
-    key = importlib.import_module("scan_relight.operators.panel_results").order_key
+    key = importlib.import_module("scan_relight.operators.results.panel").order_key
     known = results.result_of(scene).objects
     things = [thing for thing in scene.objects if "object_id" in thing]
     assert [thing.name for thing in sorted(things, key=lambda t: key(t.name, known[t["object_id"]], order))] == names
@@ -119,7 +119,7 @@ def test_read_again_when_the_file_changes_and_only_then(scene, results, tmp_path
 
 
 def test_the_list_shows_roughness_and_f0(results):
-    columns = importlib.import_module("scan_relight.operators.panel_results").columns
+    columns = importlib.import_module("scan_relight.operators.results.panel").columns
     assert [columns(one) for one in OBJECTS] == [(".30", ".04"), ("", ""), (".20", ".60"), ("", "")]
 
 
@@ -243,7 +243,7 @@ def test_the_button_brings_in_what_lies_in_the_objects_own_folder(scene, ops, tm
         def template_list(self, *_, **__):
             """Nothing to remember."""
 
-    panels = importlib.import_module("scan_relight.operators.panel_results")
+    panels = importlib.import_module("scan_relight.operators.results.panel")
 
     def drawn():
         layout, cls = Shown(), panels.SCAN_RELIGHT_PT_results

@@ -108,4 +108,4 @@ def no_job_is_left(request):
     yield
     if "package" in request.fixturenames:
         importlib.import_module("scan_relight.addon.bridge.job.job").forget()
-        importlib.import_module("scan_relight.operators.findings").forget()
+        importlib.import_module("scan_relight.operators.recover.findings").forget()

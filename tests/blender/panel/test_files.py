@@ -33,12 +33,12 @@ def result(tmp_path):
 
 @pytest.fixture
 def panel(module):
-    return module("operators.panel_capture").SCAN_RELIGHT_PT_capture
+    return module("operators.recover.panel_capture").SCAN_RELIGHT_PT_capture
 
 
 @pytest.fixture
 def recover(module):
-    return module("operators.panel_recover").SCAN_RELIGHT_PT_recover
+    return module("operators.recover.panel_recover").SCAN_RELIGHT_PT_recover
 
 
 def drop(path, **more):

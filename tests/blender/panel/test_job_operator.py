@@ -36,7 +36,7 @@ class Manager:
 @pytest.fixture
 def stage(module, ops):
     """An operator with a job, and a way to send it events."""
-    job_operator = module("operators.job_operator")
+    job_operator = module("operators.base.job_operator")
 
     class Operator(job_operator.JobOperator):
         bl_label = "Recover"

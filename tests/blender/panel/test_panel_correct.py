@@ -16,7 +16,7 @@ def room(ops, tmp_path, module):
 
 @pytest.fixture
 def panels(module):
-    found = module("operators.panel_correct")
+    found = module("operators.correct.panel")
     return [getattr(found, f"SCAN_RELIGHT_PT_correct{name}") for name in ("", "_scale", "_unseen", "_smooth")]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-PANELS = (("panel_capture", "SCAN_RELIGHT_PT_capture"), ("panel_recover", "SCAN_RELIGHT_PT_recover"))
+PANELS = (("recover.panel_capture", "SCAN_RELIGHT_PT_capture"), ("recover.panel_recover", "SCAN_RELIGHT_PT_recover"))
 DEAF = [sys.executable, "-c", "import time; time.sleep(60)"]
 TELLS = (
     'print(\'{"event": "progress", "stage": "shading", "share": 0.42, "overall": 0.5, '
@@ -26,12 +26,12 @@ def panels(module):
 
 @pytest.fixture
 def capture(module):
-    return module("operators.panel_capture").SCAN_RELIGHT_PT_capture
+    return module("operators.recover.panel_capture").SCAN_RELIGHT_PT_capture
 
 
 @pytest.fixture
 def recover(module):
-    return module("operators.panel_recover").SCAN_RELIGHT_PT_recover
+    return module("operators.recover.panel_recover").SCAN_RELIGHT_PT_recover
 
 
 @pytest.fixture
@@ -113,7 +113,7 @@ def test_a_warning_is_shown(draw, capture, choices, grey_capture, tmp_path):
 
 def test_facts_of_further_readers_are_shown(draw, capture, choices, module):
     choices.capture_folder = "/somewhere"
-    module("operators.findings").put(
+    module("operators.recover.findings").put(
         choices,
         {
             "frames": 2,
@@ -128,7 +128,7 @@ def test_facts_of_further_readers_are_shown(draw, capture, choices, module):
 
 @pytest.mark.slow
 def test_a_check_beside_the_window(draw, capture, choices, module, grey_capture):
-    findings = module("operators.findings")
+    findings = module("operators.recover.findings")
     choices.capture_folder = str(grey_capture)
     findings.begin(choices)
     assert "Reading the capture" in draw(capture).words
@@ -141,9 +141,9 @@ def test_a_check_beside_the_window(draw, capture, choices, module, grey_capture)
 def test_every_setting_has_its_place(draw, recover, module):
     from addon.settings_info import setting_infos
 
-    placed = [name for _, names in module("operators.panel_recover").groups() for name in names]
+    placed = [name for _, names in module("operators.recover.panel_recover").groups() for name in names]
     assert sorted(placed) == sorted(info.name for info in setting_infos())
-    words, labels = draw(recover).words, module("operators.settings_words").words
+    words, labels = draw(recover).words, module("operators.recover.settings_words").words
     assert all(labels(info).label in words for info in setting_infos())
 
 
@@ -234,12 +234,12 @@ def test_no_state_of_a_run_is_saved(begin, choices, tmp_path, module, grey_captu
 
 
 def test_long_words_are_cut_and_nothing_is_lost(module):
-    lines = module("operators.text").lines
+    lines = module("operators.base.text").lines
     sentence = "Frame '/a/very/long/path/that/does/not/end/anywhere/at/all/frame_0001.exr' is damaged; write it again."
     for width in (40, 120, 260, 2000):
         found = lines(sentence, width, 11.0)
         assert "".join(found).replace(" ", "") == sentence.replace(" ", "")
-        assert all(module("operators.text").measure(line, 11.0) <= width or len(line) <= 4 for line in found)
+        assert all(module("operators.base.text").measure(line, 11.0) <= width or len(line) <= 4 for line in found)
     assert lines(sentence, 2000, 11.0) == (sentence,) and lines("", 100, 11.0) == ("",)
 
 
@@ -247,7 +247,7 @@ def test_reading_options_match_the_command_line(choices, module):
     """Each property becomes an option that the command line knows, and the same `Reading`."""
     from addon.cli import make_parser
 
-    reading_props = module("operators.reading_props")
+    reading_props = module("operators.recover.reading_props")
     owner = choices.reading
     assert reading_props.options(owner) == []
     owner.reading_format, owner.reading_outside, owner.reading_transfer = "nerfstudio", True, "srgb"

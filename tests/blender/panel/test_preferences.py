@@ -79,7 +79,7 @@ def test_threads_and_memory_reach_a_run(preferences, module, ops, monkeypatch, t
         "run",
         lambda capture, result, settings, *rest, **where: asked.append(settings) or {"warnings": []},
     )
-    props = module("operators.settings_props")
+    props = module("operators.recover.settings_props")
     guard = props.MemoryGuard
     monkeypatch.setattr(props, "MemoryGuard", lambda limit: limits.append(limit) or guard(0))
     ops.accumulate(capture_folder="a", result_folder=str(tmp_path))

@@ -101,7 +101,7 @@ def test_labels_are_title_case(package, ops):
     assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("path", sorted(OPERATORS.glob("*.py")), ids=lambda path: path.name)
+@pytest.mark.parametrize("path", sorted(OPERATORS.rglob("*.py")), ids=lambda path: path.name)
 def test_no_animation_dots(path):
     """Wherever a layout splits label and value, Blender would draw a dot for keyframes beside it."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -117,6 +117,6 @@ def test_the_settings_words_are_of_settings_that_there_are(module):
     from addon.settings_info import setting_infos
 
     known = {info.name: set(info.choices) for info in setting_infos()}
-    told = module("operators.settings_words").WORDS
+    told = module("operators.recover.settings_words").WORDS
     assert set(told) <= set(known)
     assert all(set(words.choices) == known[name] for name, words in told.items())

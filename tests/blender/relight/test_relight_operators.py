@@ -50,7 +50,7 @@ def test_every_operator_and_property_says_what_it_does(package, name):
 
 @pytest.mark.parametrize("group", ["ScanRelightLamp", "ScanRelightOutside", "ScanRelightStudio"])
 def test_every_choice_has_a_tooltip(package, group):
-    props = importlib.import_module("scan_relight.operators.relight_props")
+    props = importlib.import_module("scan_relight.operators.relight.props")
     for one in getattr(props, group).bl_rna.properties:
         if one.identifier not in ("rna_type", "name"):
             assert one.description and not one.description.endswith("."), one.identifier

@@ -1,0 +1,1 @@
+"""What the artist says of objects, and the refit that follows."""

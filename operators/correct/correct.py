@@ -1,0 +1,173 @@
+"""`bpy.ops.scan_relight.*` by which an artist says what an object is, and has it fitted again under that."""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import bpy
+
+from ...addon.bridge.corrections import corrections
+from ...addon.bridge.marks import OBJECT_ID
+from ...addon.core.errors import BadInputError
+from ..base import poll
+from .base import CorrectOperator, RefitOperator, chosen
+from .props import SMOOTH_ANGLE, STATEMENTS
+
+_KEYS = {"model": "model", "roughness": "roughness", "f0": "F0", "base_color": "colour", "same_as": "likeness"}
+
+
+class SCAN_RELIGHT_OT_refit(RefitOperator, bpy.types.Operator):
+    """Fit objects again."""
+
+    bl_idname = "scan_relight.refit"
+    bl_label = "Refit"
+    bl_description = (
+        "Fit the selected objects again under what is given of them, the rest of the room held; takes "
+        "seconds. What is given is kept in the result folder's overrides.json"
+    )
+    always = True
+
+
+class SCAN_RELIGHT_OT_this_is(RefitOperator, bpy.types.Operator):
+    """Say what the selected objects are."""
+
+    bl_idname = "scan_relight.this_is"
+    bl_label = "This Is"
+    bl_description = "Say what the selected objects are made of, and fit them again under that"
+
+    model: bpy.props.EnumProperty(name="Model", description="What they are", items=STATEMENTS)
+    asks_for = "model"
+
+    @classmethod
+    def description(cls, context, properties):
+        """The tooltip."""
+        item = next(item for item in STATEMENTS if item[0] == properties.model)
+        return f"The selected objects are: {item[1].lower()}. {item[2]}"
+
+    def state(self, context, things):
+        """Give the model."""
+        for thing in things:
+            corrections.give(thing, model=self.model)
+        return things
+
+
+class SCAN_RELIGHT_OT_same_as(RefitOperator, bpy.types.Operator):
+    """Say that objects have the same surface as another one."""
+
+    bl_idname = "scan_relight.same_as"
+    bl_label = "The Same As"
+    bl_description = (
+        "The selected objects have the same highlight as another one, each with its own colours: the one "
+        "that is chosen in the panel, else the active object"
+    )
+
+    object_id: bpy.props.IntProperty(
+        name="Object",
+        description="Number of the other object in the capture; -1 takes the active one",
+        default=-1,
+        min=-1,
+        options={"SKIP_SAVE"},
+    )
+
+    @classmethod
+    def poll(cls, context):
+        """As for all, and there has to be another object."""
+        return super().poll(context) and poll.check(
+            cls,
+            len(chosen(context)) > 1 or context.scene.scan_relight_correct.like is not None,
+            "Choose the other object, or select it too, last of all.",
+        )
+
+    def state(self, context, things):
+        """Give the likeness."""
+        other = context.view_layer.objects.active if len(things) > 1 else context.scene.scan_relight_correct.like
+        if self.object_id >= 0:
+            other = corrections.by_id(things[0], self.object_id)
+        if not corrections.correctable(other):
+            raise BadInputError("The other object is none of this room's recovered objects; choose one of those.")
+        others = [thing for thing in things if thing != other]
+        if not others:
+            raise BadInputError(f"'{other.name}' is the other object itself; select the ones that are like it.")
+        if corrections.result_folder(other) != corrections.folder_for(others):
+            raise BadInputError(f"'{other.name}' belongs to another result; choose an object of the same room.")
+        for thing in others:
+            corrections.give(thing, same_as=other[OBJECT_ID])
+        return others
+
+
+class SCAN_RELIGHT_OT_take_back(RefitOperator, bpy.types.Operator):
+    """Go back to what was found."""
+
+    bl_idname = "scan_relight.take_back"
+    bl_label = "Back to What Was Found"
+    bl_description = "Take back what is given of the selected objects: show, and fit, what the frames say"
+
+    key: bpy.props.EnumProperty(
+        name="Value",
+        description="What is taken back",
+        default="all",
+        items=[
+            ("all", "All", "Everything"),
+            *((key, name.capitalize(), f"The {name} alone") for key, name in _KEYS.items()),
+        ],
+    )
+
+    @classmethod
+    def description(cls, context, properties):
+        """The tooltip."""
+        what = "everything that is given" if properties.key == "all" else f"the {_KEYS[properties.key]} that is given"
+        return f"Take back {what} of the selected objects: show, and fit, what the frames say"
+
+    @classmethod
+    def poll(cls, context):
+        """Only where anything is given."""
+        return super().poll(context) and poll.check(
+            cls, any(map(corrections.given, chosen(context))), "Nothing is given of the selected objects."
+        )
+
+    def state(self, context, things):
+        """Take it back; only what a refit was made with asks for another one."""
+        things = [thing for thing in things if corrections.given(thing)]
+        self._made = any(corrections.entry(thing).get("given") for thing in things)
+        for thing in things:
+            corrections.take_back(thing, *(() if self.key == "all" else (self.key,)))
+        return things
+
+    def refit(self, context, things):
+        """Only where the result was made with what is taken back."""
+        return super().refit(context, things) if self._made else {"FINISHED"}
+
+
+class SCAN_RELIGHT_OT_smooth_by_angle(CorrectOperator, bpy.types.Operator):
+    """Shade recovered objects smooth."""
+
+    bl_idname = "scan_relight.smooth_by_angle"
+    bl_label = "Smooth by Angle"
+    bl_description = (
+        "Shade recovered objects smooth, with edges above an angle sharp; 0 makes them flat again. It "
+        "stays when the room is recovered again"
+    )
+
+    angle: SMOOTH_ANGLE
+    everything: bpy.props.BoolProperty(
+        name="Whole Room", description="All recovered objects of the scene, not the selected ones alone"
+    )
+
+    @classmethod
+    def poll(cls, context):
+        """Only with recovered objects in the scene."""
+        return (
+            poll.has_scene(cls, context)
+            and poll.object_mode(cls, context)
+            and poll.check(
+                cls, any(map(corrections.correctable, context.scene.objects)), "The scene holds no recovered object."
+            )
+        )
+
+    def work(self, context, things):
+        """Shade them."""
+        from ...addon.bridge.corrections.smoothing import smooth
+
+        if self.everything:
+            things = [thing for thing in context.scene.objects if corrections.correctable(thing)]
+        if not things:
+            raise BadInputError("No recovered object is selected; select some, or choose the whole room.")
+        count = smooth(things, self.angle)
+        return [f"{count} object{'s' * (count != 1)} shaded {'smooth' if self.angle else 'flat'}"]

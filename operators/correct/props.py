@@ -1,0 +1,154 @@
+"""What the panel Correct shows: an object's values as they are, and what was chosen for the next click.
+
+The properties of objects hold nothing: they read and write what the bridge keeps with object and material.
+"""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+from math import radians
+
+import bpy
+
+from ...addon.bridge.corrections import corrections
+from ...addon.core.brdf.lambertian import LAMBERTIAN
+from ...addon.core.brdf.registry import models, shown
+from ...addon.core.errors import ScanRelightError
+
+_GIVEN = [one for one in models() if one.can_be_given]
+_SHOWN = sorted(_GIVEN, key=lambda one: (one.gives_light, one.has_diffuse, not one.has_lobe))
+STATEMENTS = [(one.name, one.label, one.text) for one in _SHOWN]
+_ITEMS = [
+    (one.name, one.label, one.text, number)
+    for number, one in enumerate((*_GIVEN, *(one for one in models() if not one.can_be_given)))
+]
+SMOOTH_ANGLE = bpy.props.FloatProperty(
+    name="Angle",
+    description="Edges where faces meet at a greater angle stay sharp",
+    subtype="ANGLE",
+    min=0.0,
+    max=radians(180),
+    default=radians(30),
+)
+ALBEDO = bpy.props.FloatVectorProperty(
+    name="Albedo",
+    description="Share of the light that it reflects, for each channel, linear: white wall paint has "
+    "about 0.80, a grey card 0.18",
+    subtype="COLOR",
+    size=3,
+    min=0.01,
+    max=1.0,
+    default=(0.8, 0.8, 0.8),
+)
+
+
+def targets(context, thing: bpy.types.Object) -> list[bpy.types.Object]:
+    """The objects that a change of one in the panel means: all selected ones, where it is the active one of those."""
+    chosen = [one for one in getattr(context, "selected_objects", ()) if corrections.correctable(one)]
+    everyone = context.scene.scan_relight_correct.all_selected and thing == context.view_layer.objects.active
+    return chosen if everyone and thing in chosen else [thing]
+
+
+def _value(group, key: str, otherwise):
+    thing = group.id_data
+    value = corrections.effective(thing).get(key) if corrections.correctable(thing) else None
+    return otherwise if value is None else value
+
+
+def _give(group, **values) -> None:
+    for thing in targets(bpy.context, group.id_data):
+        if corrections.correctable(thing):
+            try:
+                corrections.give(thing, **values)
+            except ScanRelightError:
+                continue  # a lamp has no roughness: the panel shows no such property, and a script sees no change
+
+
+def _f0(group) -> float:
+    value = _value(group, "f0", 0.0)
+    return sum(value) / 3 if hasattr(value, "__len__") else value
+
+
+def _colour(group):
+    bare = shown(_value(group, "model", "")).lobe_alone
+    value = _value(group, "f0" if bare else "base_color", (0.5, 0.5, 0.5))
+    return tuple(value) if hasattr(value, "__len__") else (value,) * 3
+
+
+def _give_colour(group, value) -> None:
+    colour = list(value)
+    for thing in targets(bpy.context, group.id_data):
+        if corrections.correctable(thing):
+            brdf = shown(corrections.effective(thing)["model"])
+            corrections.give(thing, **{"f0" if brdf.lobe_alone else "base_color": colour})
+
+
+class ScanRelightCorrection(bpy.types.PropertyGroup):
+    """`Object.scan_relight_correct`."""
+
+    model: bpy.props.EnumProperty(
+        name="Model",
+        description="How the surface reflects",
+        items=_ITEMS,
+        get=lambda self: next(item[3] for item in _ITEMS if item[0] == _value(self, "model", LAMBERTIAN.name)),
+        set=lambda self, value: value < len(_GIVEN) and _give(self, model=_ITEMS[value][0]),
+    )
+    roughness: bpy.props.FloatProperty(
+        name="Roughness",
+        description="Of the highlight: 0 is a mirror, 1 hardly shows any",
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        precision=3,
+        get=lambda self: _value(self, "roughness", 0.5),
+        set=lambda self, value: _give(self, roughness=value),
+    )
+    f0: bpy.props.FloatProperty(
+        name="F0",
+        description="Share of the light that the surface mirrors when looked at straight on; most plastics, "
+        "lacquers and woods have 0.04",
+        min=0.0,
+        max=0.9,
+        soft_max=0.2,
+        precision=3,
+        step=0.5,
+        get=_f0,
+        set=lambda self, value: _give(self, f0=value),
+    )
+    colour: bpy.props.FloatVectorProperty(
+        name="Base Color",
+        description="Mean colour of the object, linear; a texture keeps its detail and is scaled. "
+        "Of a metal the colour of its reflection",
+        subtype="COLOR",
+        size=3,
+        min=0.0,
+        max=1.0,
+        get=_colour,
+        set=_give_colour,
+    )
+
+
+def _recovered(self, thing) -> bool:
+    return corrections.correctable(thing)
+
+
+class ScanRelightCorrecting(bpy.types.PropertyGroup):
+    """`Scene.scan_relight_correct`."""
+
+    refit_automatically: bpy.props.BoolProperty(
+        name="Refit Automatically",
+        description="After a statement such as This Is Metal fit the objects again at "
+        "once; values set by hand wait for Refit",
+        default=True,
+    )
+    all_selected: bpy.props.BoolProperty(
+        name="All Selected",
+        description="A value that is set here goes to all selected objects, not to the active one alone",
+        default=True,
+    )
+    like: bpy.props.PointerProperty(
+        name="Like",
+        description="The object whose highlight the selected ones have",
+        type=bpy.types.Object,
+        poll=_recovered,
+    )
+    albedo: ALBEDO
+    smooth_angle: SMOOTH_ANGLE

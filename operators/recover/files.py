@@ -1,0 +1,271 @@
+"""`bpy.ops.scan_relight.*` for what lies on disk: File > Import, files that are dropped, finished results."""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+from functools import partial
+from pathlib import Path
+
+import bpy
+
+from ...addon.core.errors import BadInputError, ScanRelightError
+from ...addon.core.io import folder as folders
+from ..base import poll
+from ..base.at_once import AtOnce
+from ..base.panel import SidebarPanel
+from ..translations import OWN
+from . import room_window
+from .settings_props import preset_items
+
+NEXT = (
+    ("CHOOSE", "Choose Only", "Choose it in the sidebar; the panel shows what is in it"),
+    ("IMPORT", "Import", "Bring objects, cameras and frames into the scene as they were scanned"),
+    ("RUN", "Recover", "Run the recovery beside this window"),
+)
+FILTER = "transforms*.json;materials.json;*.ply;*.obj;*.glb;*.gltf;cameras.bin;cameras.txt;scene.blend"
+
+
+def show_tab(context) -> None:
+    """Open the sidebar of the window's 3D views at our tab."""
+    for area in context.screen.areas if context.screen else ():
+        if area.type != "VIEW_3D":
+            continue
+        area.spaces.active.show_region_ui = True
+        if not _to_front(area) and not bpy.app.background:
+            bpy.app.timers.register(partial(_later, context.window, area.as_pointer()), first_interval=0.1)
+
+
+def _to_front(area) -> bool:
+    """Show our tab in an area's sidebar; one that was never drawn has no tabs yet."""
+    region = next((one for one in area.regions if one.type == "UI"), None)
+    try:
+        region.active_panel_category = SidebarPanel.bl_category
+    except (AttributeError, TypeError):
+        return False
+    return True
+
+
+def _later(window, pointer: int) -> None:
+    """Once more after the sidebar was drawn; windows and areas may be gone by then."""
+    if window in bpy.context.window_manager.windows[:]:
+        for area in window.screen.areas:
+            if area.as_pointer() == pointer:
+                _to_front(area)
+
+
+def given_path(operator) -> Path:
+    """The path in the properties that Blender fills: `filepath`, or `directory` with the first of `files`."""
+    if operator.filepath:
+        return Path(bpy.path.abspath(operator.filepath))
+    names = [one.name for one in operator.files if one.name]
+    if operator.directory:
+        return Path(bpy.path.abspath(operator.directory), *names[:1])
+    raise BadInputError("Choose the folder of a scan first, or one of its files.")
+
+
+class FileOperator:
+    """Takes a path to a scan or to a result; errors become one sentence."""
+
+    filepath: bpy.props.StringProperty(
+        name="File or Folder",
+        description="Folder of a scan or of a result, or a file in one",
+        subtype="FILE_PATH",
+        options={"SKIP_SAVE"},
+    )
+    directory: bpy.props.StringProperty(
+        name="Folder", description="Folder that the files lie in", subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"}
+    )
+    files: bpy.props.CollectionProperty(
+        name="Files",
+        description="Names of files in the folder",
+        type=bpy.types.OperatorFileListElement,
+        options={"HIDDEN", "SKIP_SAVE"},
+    )
+    then: bpy.props.EnumProperty(name="Then", description="What is done with a scan", items=NEXT)
+    preset: bpy.props.EnumProperty(
+        name="Preset",
+        description="What all settings of a recovery start from",
+        items=preset_items(),
+        translation_context=OWN,
+        default="normal",
+    )
+
+    @classmethod
+    def poll(cls, context):
+        """As everything that changes the scene."""
+        return poll.has_scene(cls, context) and poll.object_mode(cls, context) and poll.no_run(cls)
+
+    def execute(self, context):
+        """Open a result; choose a scan, and do what was asked for with it."""
+        try:
+            content = folders.of_path(given_path(self))
+            if content.kind == folders.RESULT:
+                return bpy.ops.scan_relight.open_result(folder=str(content.folder))
+            choose(context, content)
+        except ScanRelightError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if self.then == "CHOOSE":
+            self.report({"INFO"}, f"Scan '{content.name}' is chosen; see the sidebar (N), tab 'Scan Relight'.")
+            return {"FINISHED"}
+        if self.properties.is_property_set("preset"):
+            context.scene.scan_relight.preset = self.preset
+        target = "import_capture" if self.then == "IMPORT" else "recover"
+        try:
+            return bpy.ops.scan_relight.run(target=target)
+        except RuntimeError as error:  # reported already, and again by Blender as an exception
+            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
+            return {"CANCELLED"}
+
+
+def choose(context, content: folders.Content) -> None:
+    """Choose a scan in the panel and show it; raises `BadInputError` with what is wrong with another folder."""
+    if content.kind == folders.WAY and len(content.captures) == 1 and not content.results:
+        content = folders.look_into(content.captures[0])
+    if content.kind != folders.CAPTURE:
+        raise BadInputError(content.sentence)
+    context.scene.scan_relight.capture_folder = str(content.folder)
+    show_tab(context)
+
+
+class SCAN_RELIGHT_OT_open_capture(FileOperator, bpy.types.Operator):
+    """File > Import."""
+
+    bl_idname = "scan_relight.open_capture"
+    bl_label = "Import Scan Relight Capture"
+    bl_description = "Choose the folder of a scan, or of a finished result, by itself or by one of its files"
+    bl_options = {"REGISTER", "UNDO", "PRESET"}
+
+    filter_glob: bpy.props.StringProperty(
+        name="Filter", description="Which files are shown", default=FILTER, options={"HIDDEN"}
+    )
+
+    def invoke(self, context, event):
+        """Choose it."""
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def draw(self, context):
+        """The file browser's options."""
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        layout.prop(self, "then", expand=True)
+        column = layout.column()
+        column.enabled = self.then == "RUN"
+        column.prop(self, "preset")
+
+
+class SCAN_RELIGHT_OT_drop(FileOperator, bpy.types.Operator):
+    """What a file that is dropped into the 3D view does."""
+
+    bl_idname = "scan_relight.drop"
+    bl_label = "Open Scan or Result"
+    bl_description = "Choose the scan, or open the finished result, that the dropped file belongs to"
+    bl_options = {"UNDO", "INTERNAL"}
+
+    def invoke(self, context, event):
+        """A result is opened at once; a scan is chosen, and running it is offered."""
+        try:
+            content = folders.of_path(given_path(self))
+            if content.kind == folders.RESULT:
+                return self.execute(context)
+            choose(context, content)
+        except ScanRelightError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        self.then, self.preset = "RUN", context.scene.scan_relight.preset
+        return context.window_manager.invoke_props_dialog(
+            self, title=f"Recover '{content.name}'?", confirm_text="Run", width=320
+        )
+
+    def draw(self, context):
+        """The dialog."""
+        self.layout.prop(self, "preset", expand=True)
+
+
+class SCAN_RELIGHT_FH_json(bpy.types.FileHandler):
+    """A scan's transforms.json or a result's materials.json dropped into a 3D view."""
+
+    bl_idname = "SCAN_RELIGHT_FH_json"
+    bl_label = "Scan Relight"
+    bl_import_operator = "scan_relight.drop"
+    bl_file_extensions = ".json"
+
+    @classmethod
+    def poll_drop(cls, context):
+        """Into 3D views."""
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+class SCAN_RELIGHT_OT_use_folder(bpy.types.Operator):
+    """Take the folder that is offered."""
+
+    bl_idname = "scan_relight.use_folder"
+    bl_label = "Use This Folder"
+    bl_description = "Choose this folder as the capture"
+    bl_options = {"UNDO", "INTERNAL"}
+
+    folder: bpy.props.StringProperty(name="Folder", description="Folder of a scan", subtype="DIR_PATH")
+
+    @classmethod
+    def poll(cls, context):
+        """Not while a run uses the one that is chosen."""
+        return poll.has_scene(cls, context) and poll.no_run(cls)
+
+    def execute(self, context):
+        """Choose it."""
+        context.scene.scan_relight.capture_folder = self.folder
+        return {"FINISHED"}
+
+
+class SCAN_RELIGHT_OT_open_result(AtOnce, bpy.types.Operator):
+    """Bring a finished result in."""
+
+    bl_idname = "scan_relight.open_result"
+    bl_label = "Open Scan Relight Result"
+    bl_description = "Bring the recovered room of a finished result into this file, as a scene of its own"
+    bl_options = {"REGISTER", "UNDO"}
+
+    folder: bpy.props.StringProperty(
+        name="Folder", description="Result folder of a finished run", subtype="DIR_PATH", options={"SKIP_SAVE"}
+    )
+    directory: bpy.props.StringProperty(
+        name="Folder", description="What the file browser chooses", subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"}
+    )
+    filter_folder: bpy.props.BoolProperty(
+        name="Folders", description="Only folders are shown", default=True, options={"HIDDEN", "SKIP_SAVE"}
+    )
+
+    @classmethod
+    def poll(cls, context):
+        """As everything that changes the scene."""
+        return poll.has_scene(cls, context) and poll.object_mode(cls, context) and poll.no_run(cls)
+
+    def invoke(self, context, event):
+        """Choose the folder where none is given."""
+        if self.folder:
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def work(self, context):
+        """Bring it in, and show it in the panel."""
+        folder = Path(bpy.path.abspath(self.folder or self.directory))
+        if not (self.folder or self.directory):
+            raise BadInputError("Choose the folder of a finished result first.")
+        content = folders.of_path(folder)
+        if content.kind != folders.RESULT:
+            raise BadInputError(
+                f"Folder '{folder.name}' holds no finished result; run the recovery to its end "
+                "first, or choose another."
+            )
+        return self.bring(context, content.folder)
+
+    def bring(self, context, folder: Path) -> tuple[str, ...]:
+        """The room into this file; the panel of its scene is about this result. What is to be told of it."""
+        from ...addon.bridge.room.bring import bringing
+        from ...addon.bridge.slices import whole
+
+        brought = whole(bringing(folder))
+        room_window.show(context.scene, brought.scene)
+        brought.scene.scan_relight.result_folder = str(folder)
+        show_tab(context)
+        return brought.warnings

@@ -1,0 +1,56 @@
+"""`bpy.ops.scan_relight.import_capture`: a capture's objects, cameras and frames into the scene."""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import shutil
+import tempfile
+
+import bpy
+
+from . import findings, reading_props, room_window
+from .settings_props import INTO, CaptureOperator
+
+
+class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
+    """Import a capture."""
+
+    bl_idname = "scan_relight.import_capture"
+    bl_label = "Import Capture"
+    bl_description = "Bring a capture's objects, cameras and frames into a scene of their own, as they were scanned"
+
+    into: INTO
+
+    def work(self, context):
+        """Read, then build."""
+        from ...addon.bridge.slices import whole
+        from ...addon.core.io.read import read_capture
+
+        capture = read_capture(self.folder("capture_folder"), reading_props.reading(self))
+        return (*capture.warnings, *whole(self.change(context.scene, capture)))
+
+    def begin(self, context):
+        """Read it beside the window; large captures take a while."""
+        from ...addon.bridge.job.command import command
+
+        capture, scratch = self.folder("capture_folder"), tempfile.mkdtemp(prefix="scan-relight-")
+        words = ["info", capture, "--json", "--room", scratch, "--stop-with-stdin", *reading_props.options(self)]
+        return self.start(context, command(words), title=self.bl_label, capture_folder=capture, scratch=scratch)
+
+    def load(self, job):
+        """The capture as it was read."""
+        from ...addon.core.results.room_file import read_capture_file
+
+        job.warnings.extend(findings.facts(job)["warnings"])
+        return read_capture_file(job.facts["scratch"])[0]
+
+    def tidy(self, job):
+        """What was read is not needed any more."""
+        shutil.rmtree(job.facts["scratch"], ignore_errors=True)
+
+    def change(self, scene, loaded):
+        """Build the objects."""
+        from ...addon.bridge.room.scanned import importing
+
+        brought = yield from importing(loaded, scene if self.into == "SCENE" else None)
+        if self.into == "OWN":
+            room_window.show(scene, brought.scene)
+        return brought.warnings

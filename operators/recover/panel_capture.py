@@ -1,0 +1,120 @@
+"""The tab's first part: which capture, what was found in it, and what is wrong with it."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...addon.bridge.job import job as jobs
+from ...addon.core.naming import object_name
+from ..base.panel import SidebarPanel
+from . import findings, reading_props
+
+SHOWN = 12
+"""Objects that are listed before the rest is counted."""
+TOLD = (
+    "capture",
+    "format",
+    "triangles",
+    "vertices",
+    "area_m2",
+    "bounds_m",
+    "extent_m",
+    "frames",
+    "resolutions",
+    "masks",
+    "instances",
+    "warnings",
+)
+
+
+class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
+    """Choose a capture and see what it holds."""
+
+    bl_idname = "SCAN_RELIGHT_PT_capture"
+    bl_label = "Capture"
+    manual = "panel#capture"
+    bl_order = 0
+
+    def draw(self, context):
+        """The folder, and what was found there."""
+        layout, choices = self.layout, context.scene.scan_relight
+        layout.prop(choices, "capture_folder", text="")
+        if not choices.capture_folder:
+            self.say(layout, context, "Choose the folder of a scan: its mesh, its HDR frames and their poses.", "INFO")
+        header, body = layout.panel("scan_relight_reading", default_closed=True)
+        header.label(text="How it is read")
+        if body is not None:
+            body.use_property_split, body.use_property_decorate = True, False
+            reading_props.draw(body, choices.reading)
+        wrong = findings.wrong_folder(choices)
+        if wrong is not None:
+            self.wrong(layout, context, wrong)
+            return
+        found = findings.look(choices) if choices.capture_folder else None
+        row = layout.row()
+        row.enabled = not isinstance(found, jobs.Job)
+        row.operator("scan_relight.check_capture", text="Check" if found is None else "Check Again", icon="VIEWZOOM")
+        row.operator("scan_relight.run", text="Import", icon="IMPORT").target = "import_capture"
+        if isinstance(found, jobs.Job):
+            layout.progress(factor=0.0, text="Reading the capture", type="RING")
+        elif isinstance(found, str):
+            self.say(layout, context, found, "CANCEL")
+        elif found is not None:
+            self.facts(layout, context, found)
+
+    def wrong(self, layout, context, content) -> None:
+        """Why the folder is no capture, and a button for each that is meant perhaps."""
+        column = layout.column()
+        self.say(column, context, content.sentence, "INFO" if content.captures or content.results else "CANCEL")
+        for folder in content.captures:
+            column.operator(
+                "scan_relight.use_folder", text=f"Use '{folder.name}'", icon="FILE_FOLDER", translate=False
+            ).folder = str(folder)
+        for folder in content.results:
+            text = "Open It" if folder == content.folder else f"Open Result '{folder.name}'"
+            column.operator("scan_relight.open_result", text=text, icon="IMPORT").folder = str(folder)
+
+    def facts(self, layout, context, found: dict) -> None:
+        """What `describe` tells of a capture; keys that are not known here are shown as they come."""
+        warnings = found.get("warnings", ())
+        if not warnings:
+            self.say(layout, context, "Nothing is wrong with it.", "CHECKMARK")
+        for sentence in warnings:
+            self.say(layout, context, sentence, "ERROR")
+        sizes = ", ".join(f"{count} of {size}" for size, count in found.get("resolutions", {}).items())
+        masks = f", {found['masks']} with a mask" if found.get("masks") else ""
+        self.say(
+            layout,
+            context,
+            f"{found.get('frames', 0)} frames ({found.get('format', '')}): {sizes}{masks}",
+            "CAMERA_DATA",
+        )
+        extent = " x ".join(f"{length:.2f}" for length in found.get("extent_m", ()))
+        self.say(
+            layout,
+            context,
+            f"{found.get('triangles', 0):,} triangles, {found.get('area_m2', 0):.1f} m\u00b2, {extent} m",
+            "MESH_DATA",
+        )
+        for name, value in found.items():
+            if name not in TOLD:
+                self.other(layout, context, name, value)
+        instances = found.get("instances", ())
+        header, body = layout.panel("scan_relight_objects", default_closed=True)
+        header.label(text=f"{len(instances)} objects")
+        if body is not None:
+            column = body.column(align=True)
+            column.scale_y = 0.8
+            for one in instances[:SHOWN]:
+                column.label(text=f"{object_name(one['class_name'], one['object_id'])}: {one['triangles']:,} triangles")
+            if len(instances) > SHOWN:
+                column.label(text=f"and {len(instances) - SHOWN} more")
+
+    def other(self, layout, context, name: str, value) -> None:
+        """A fact that a reader adds."""
+        label = name.replace("_", " ").capitalize()
+        if isinstance(value, (list, tuple)) and all(isinstance(one, str) for one in value):
+            for sentence in value:
+                self.say(layout, context, sentence, "INFO")
+        elif isinstance(value, (str, int, float)) and value not in ("", 0, None) and not isinstance(value, bool):
+            self.say(layout, context, f"{label}: {value}", "INFO")

@@ -1,0 +1,91 @@
+"""What the artist chose, kept in the scene: plain choices only. What a run does at the moment is nobody's to save."""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+from contextlib import suppress
+from dataclasses import replace
+
+import bpy
+
+from ...addon.core.settings import PRESETS, Settings
+from ...addon.settings_info import setting_infos
+from ..translations import OWN
+from . import findings
+from .reading_props import with_reading
+from .settings_props import COPIES, IMAGES, preset_items, setting_value, with_settings
+
+
+def preset_chosen(choices, context) -> None:
+    """Lay the preset's values into the settings, keeping what says how and not what is computed."""
+    choices.settings.take(
+        replace(PRESETS[choices.preset], threads=choices.settings.threads, seed=choices.settings.seed)
+    )
+
+
+def capture_chosen(choices, context) -> None:
+    """Have a look at the folder at once, beside the window."""
+    if choices.capture_folder and not bpy.app.background and findings.wrong_folder(choices) is None:
+        with suppress(OSError):  # then the button says why
+            findings.begin(choices)
+
+
+@with_settings
+class ScanRelightSettings(bpy.types.PropertyGroup):
+    """One property for each field of `Settings`."""
+
+    def value(self) -> Settings:
+        """The settings as chosen; raises `BadInputError` on one that can't be."""
+        return Settings(**{info.name: setting_value(self, info) for info in setting_infos()})
+
+    def take(self, settings: Settings) -> None:
+        """Show `settings`."""
+        for info in setting_infos():
+            setattr(self, info.name, getattr(settings, info.name))
+
+    def changed(self, preset: str) -> list[str]:
+        """Names of the settings that differ from the preset's."""
+        wanted = PRESETS[preset]
+        same = {bool: bool.__eq__, int: int.__eq__, str: str.__eq__, float: lambda a, b: abs(a - b) <= 1e-5}
+        return [
+            info.name
+            for info in setting_infos()
+            if info.name not in ("threads", "seed")
+            and not same[info.kind](getattr(self, info.name), getattr(wanted, info.name))
+        ]
+
+
+@with_reading
+class ScanRelightReading(bpy.types.PropertyGroup):
+    """How the capture is to be read."""
+
+
+class ScanRelightScene(bpy.types.PropertyGroup):
+    """`Scene.scan_relight`."""
+
+    capture_folder: bpy.props.StringProperty(
+        name="Capture",
+        description="Folder of the scan: its mesh, its frames and their cameras",
+        subtype="DIR_PATH",
+        update=capture_chosen,
+    )
+    reading: bpy.props.PointerProperty(
+        name="How It Is Read", description="How the capture is to be read", type=ScanRelightReading
+    )
+    result_folder: bpy.props.StringProperty(
+        name="Result",
+        description="Folder for the recovered scene and the finished stages; empty takes one beside "
+        "the saved .blend, or in the preferences' results folder",
+        subtype="DIR_PATH",
+    )
+    preset: bpy.props.EnumProperty(
+        name="Preset",
+        description="What all settings start from",
+        items=preset_items(),
+        default="normal",
+        translation_context=OWN,
+        update=preset_chosen,
+    )
+    settings: bpy.props.PointerProperty(
+        name="Settings", description="All settings of a recovery", type=ScanRelightSettings
+    )
+    images: IMAGES
+    copies: COPIES

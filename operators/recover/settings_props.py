@@ -1,0 +1,344 @@
+"""The settings as properties of an operator, made from the `Settings` dataclass; and what all operators share."""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import contextlib
+import importlib.util
+import inspect
+from dataclasses import replace
+from functools import cache
+
+import bpy
+
+from ...addon.bridge.results import home
+from ...addon.core.errors import BadInputError
+from ...addon.core.settings import PRESETS, Settings
+from ...addon.core.stages import LABELS, RUN_STAGES, WRITE
+from ...addon.leash import MemoryGuard
+from ...addon.settings_info import SettingInfo, setting_infos
+from .. import preferences
+from ..base import poll
+from ..base.at_once import OneSentence
+from ..base.job_operator import JobOperator
+from ..translations import OWN
+from . import reading_props, room_window
+from .reading_props import with_reading
+from .settings_words import words
+
+PRESET_TEXTS = {
+    "draft": "A first look: coarse texels, few rays",
+    "normal": "Texels as fine as the frames, rays enough for most rooms",
+    "fine": "Finer texels and three times the rays; takes several times as long",
+    "paper": "The published method, for comparison; very slow",
+}
+TARGETS = [
+    ("AUTO", "What Was Captured", "Imported objects of a scan; your own objects where they were captured"),
+    ("IMPORTED", "Imported Objects", "The objects that Import Capture made"),
+    (
+        "SELECTED",
+        "Your Own Objects",
+        "The objects that were selected when the scene was captured; what they wear now is kept and can be restored",
+    ),
+]
+IMAGES = bpy.props.EnumProperty(
+    name="Images",
+    description="Where the recovered images are kept",
+    items=[
+        ("RESULT", "In the Result Folder", "Refer to the images where they are"),
+        ("FOLDER", "Beside the File", "Copy the images into a folder beside the saved .blend"),
+        ("PACK", "Packed", "Keep the images within the .blend"),
+    ],
+)
+INTO = bpy.props.EnumProperty(
+    name="Into",
+    description="Where the room goes",
+    items=[
+        ("OWN", "A Scene of Its Own", "With its light, exposure and cameras; your scenes stay as they are"),
+        ("SCENE", "This Scene", "Only link the room into this scene; its world, exposure, engine and camera stay"),
+    ],
+)
+COPIES = bpy.props.BoolProperty(
+    name="Make Copies",
+    description="Where modifiers or instances make an object's faces, put the material onto a "
+    "copy of it and hide the object; without this such objects are left as they are",
+    default=False,
+)
+FROM_STAGE = bpy.props.EnumProperty(
+    name="Again From",
+    description="Do this stage and all later ones anew, though they are stored",
+    items=[
+        ("NONE", "Nothing", "Go on from what is stored"),
+        *((name, LABELS[name], f"From '{LABELS[name]}' on") for name in RUN_STAGES),
+    ],
+)
+PACKAGES = ("scipy", "embreex", "OpenEXR")
+
+
+def property_for(info: SettingInfo):
+    """The Blender property that holds one setting."""
+    name, text, choices = words(info)
+    if info.choices:
+        items = [(choice, *choices[choice]) for choice in info.choices]
+        return bpy.props.EnumProperty(name=name, description=text, items=items, default=info.default)
+    make = {bool: bpy.props.BoolProperty, int: bpy.props.IntProperty, float: bpy.props.FloatProperty}[info.kind]
+    extra = {} if info.kind is bool else {"min": 0}
+    if info.kind is float:
+        extra["precision"] = 3
+    return make(name=name, description=text, default=info.default, **extra)
+
+
+def with_settings(operator):
+    """Class decorator: give an operator one property for each field of `Settings`."""
+    own = inspect.get_annotations(operator)
+    operator.__annotations__ = own | {info.name: property_for(info) for info in setting_infos()}
+    return operator
+
+
+def setting_value(owner, info: SettingInfo):
+    """What `owner` has chosen. Blender keeps floats in single precision; six digits are what was typed."""
+    value = getattr(owner, info.name)
+    return float(f"{value:.6g}") if info.kind is float else value
+
+
+@cache
+def missing_packages() -> tuple[str, ...]:
+    """The bundled packages that are not there."""
+    return tuple(name for name in PACKAGES if importlib.util.find_spec(name) is None)
+
+
+def can_start(operator, context) -> bool:
+    """What everything asks in `poll` that reads a capture; also those that only start another operator."""
+    missing = missing_packages()
+    return (
+        poll.check(operator, not missing, f"{' and '.join(missing)} missing: install the extension again.")
+        and poll.has_scene(operator, context)
+        and poll.object_mode(operator, context)
+        and poll.no_run(operator)
+    )
+
+
+def preset_items() -> list[tuple[str, str, str]]:
+    """Items of an enumeration of the presets."""
+    return [(name, name.capitalize(), PRESET_TEXTS.get(name, "")) for name in PRESETS]
+
+
+@with_reading
+class CaptureOperator(OneSentence, JobOperator):
+    """What every operator has: a capture folder, and errors that become one sentence.
+
+    With a window the work is a job of its own that `modal` follows; in the background `execute` does it itself.
+    """
+
+    bl_options = {"UNDO", "PRESET"}
+    capture_folder: bpy.props.StringProperty(
+        name="Capture",
+        description="Folder with transforms.json, mesh.ply and the frames",
+        subtype="DIR_PATH",
+        options={"SKIP_PRESET"},
+    )
+    ask: bpy.props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"}, description="Ask for the folders first")
+
+    @classmethod
+    def poll(cls, context):
+        """Whether the operator can run now; where not, one sentence says what is missing."""
+        return can_start(cls, context)
+
+    def invoke(self, context, event):
+        """Ask for the folders and settings."""
+        if not self.ask:
+            return self.execute(context)
+        choices = context.scene.scan_relight
+        for name in ("capture_folder", "result_folder"):
+            if name in self.properties.bl_rna.properties and not getattr(self, name):
+                setattr(self, name, getattr(choices, name))
+        return context.window_manager.invoke_props_dialog(self, width=420)
+
+    def execute(self, context):
+        """Do the work, or start it."""
+
+        def work() -> set[str]:
+            if not bpy.app.background:
+                return self.begin(context)
+            for sentence in self.work(context):
+                self.report({"WARNING"}, sentence)
+            return {"FINISHED"}
+
+        return self.attempt(work, bpy.path.abspath(getattr(self, "result_folder", "")))
+
+    def folder(self, name: str):
+        """The absolute path in the property `name`; raises where it is empty."""
+        value = getattr(self, name)
+        if not value:
+            raise BadInputError(f"Choose the {name.replace('_', ' ')} first.")
+        folder = bpy.path.abspath(value)
+        if name == "result_folder":
+            home.check(folder)
+        return folder
+
+
+class StageOperator(CaptureOperator):
+    """An operator that runs stages of the method: also a result folder and the settings."""
+
+    result_folder: bpy.props.StringProperty(
+        name="Result",
+        description="Folder for the recovered scene and the finished stages",
+        subtype="DIR_PATH",
+        options={"SKIP_PRESET"},
+    )
+    preset: bpy.props.EnumProperty(
+        name="Preset",
+        description="What the settings that are not given start from",
+        items=preset_items(),
+        translation_context=OWN,
+        default="normal",
+    )
+    from_stage: FROM_STAGE
+    paper: bpy.props.BoolProperty(
+        name="As in the Paper", description="The published method; the other settings are not looked at", default=False
+    )
+
+    def work(self, context) -> list[str]:
+        """Run the stages up to the operator's own; returns warnings."""
+        return self.run(context, self.until)
+
+    def draw(self, context):
+        """The dialog: what is to be decided; all else comes from the preset or from who calls."""
+        layout = self.layout
+        layout.use_property_split, layout.use_property_decorate = True, False
+        for name in ("capture_folder", "result_folder", "preset", "from_stage"):
+            layout.prop(self, name)
+
+    def settings(self) -> Settings:
+        """The preset with every setting that was given; threads are the preferences' where they are not."""
+        given = {
+            info.name: setting_value(self, info)
+            for info in setting_infos()
+            if self.properties.is_property_set(info.name)
+        }
+        if self.paper:
+            given = {name: given[name] for name in ("threads", "seed") if name in given}
+        ours = preferences.preferences()
+        if not given.get("threads") and ours is not None:
+            given["threads"] = ours.threads
+        return replace(PRESETS["paper" if self.paper else self.preset], **given)
+
+    def run(self, context, until: str, **where) -> list[str]:
+        """Run the stages up to `until` here; returns the report's warnings. `where` goes to `bridge.job.run.run`."""
+        from ...addon.bridge.job.run import run
+        from ...addon.core.pipeline.run import progress_for  # not earlier: Blender's start should not wait for it
+
+        settings = self.settings()
+        guard = MemoryGuard(self.memory_limit())
+        with contextlib.closing(guard):
+            report = run(
+                self.folder("capture_folder"),
+                self.folder("result_folder"),
+                settings,
+                progress_for(settings, should_stop=guard),
+                until,
+                reading=reading_props.reading(self),
+                from_stage=None if self.from_stage == "NONE" else self.from_stage,
+                **where,
+            )
+        return report["warnings"]
+
+    @staticmethod
+    def memory_limit() -> float:
+        """Gigabytes that a run may take; 0 for no limit."""
+        ours = preferences.preferences()
+        return ours.memory_limit if ours is not None else 0.0
+
+    def begin(self, context):
+        """Start the run as a job; the command line's own, so that its result is the same."""
+        from ...addon.bridge.job.command import command
+
+        capture, result, settings = self.folder("capture_folder"), self.folder("result_folder"), self.settings()
+        words = [
+            "recover",
+            capture,
+            "--out",
+            result,
+            *reading_props.options(self),
+            "--until",
+            self.until,
+            "--progress",
+            "json",
+            "--stop-with-stdin",
+            "--memory-limit",
+            str(self.memory_limit()),
+        ]
+        if self.from_stage != "NONE":
+            words += ["--from-stage", self.from_stage]
+        for info in setting_infos():
+            value, option = getattr(settings, info.name), info.name.replace("_", "-")
+            words += [f"--{'' if value else 'no-'}{option}"] if info.kind is bool else [f"--{option}", str(value)]
+        return self.start(
+            context, command(words), title=self.bl_label, capture_folder=capture, result_folder=result, until=self.until
+        )
+
+
+class SceneStageOperator(StageOperator):
+    """A stage operator whose end also changes the scene, in one undo step."""
+
+    until = WRITE
+    import_first = True
+    target: bpy.props.EnumProperty(name="Onto", description="Which objects the materials go onto", items=TARGETS)
+    images: IMAGES
+    copies: COPIES
+    into: INTO
+
+    def work(self, context):
+        """Run, then bring the room, so that a failed run leaves the file alone."""
+        scene = context.scene
+        warnings = self.run(
+            context,
+            self.until,
+            scene=scene,
+            import_first=self.import_first,
+            target=self.target,
+            images=self.images,
+            copies=self.copies,
+            into=self.into,
+        )
+        if self.into == "OWN":
+            room_window.show_own(scene, self.folder("capture_folder"))
+        return warnings
+
+    def begin(self, context):
+        """Start the run; where the capture should be in the file, its absence is told now and not afterwards."""
+        from ...addon.bridge.own_scene.capture import check_own
+        from ...addon.bridge.own_scene.write_back import is_own
+        from ...addon.bridge.results import images as result_images
+        from ...addon.bridge.scene.parts import imported
+
+        result_images.check(self.images)
+        capture = self.folder("capture_folder")
+        if is_own(capture, self.target):
+            check_own(capture)
+        elif not self.import_first:
+            imported(capture)
+        return super().begin(context)
+
+    def load(self, job):
+        """The room that the run has left."""
+        from ...addon.core.results.room_file import read_room
+
+        return read_room(job.facts["result_folder"])
+
+    def change(self, scene, loaded):
+        """Bring the room, or put the materials onto the artist's own objects."""
+        from ...addon.bridge.own_scene.write_back import is_own, writing_back
+        from ...addon.bridge.room.bring import bringing
+
+        if is_own(loaded.capture.root, self.target):
+            return (
+                yield from writing_back(
+                    scene, loaded.capture, loaded.atlas_uv, loaded.materials, loaded.folder, self.images, self.copies
+                )
+            )
+        brought = yield from bringing(
+            loaded.folder, scene if self.into == "SCENE" else None, self.images, known=not self.import_first
+        )
+        if self.into == "OWN":
+            room_window.show(scene, brought.scene)
+        self.job.facts["room"] = brought.scene.name
+        return brought.warnings

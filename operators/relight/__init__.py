@@ -1,0 +1,1 @@
+"""New light, exposure, cameras, things set in, before and after, export."""

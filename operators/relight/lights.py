@@ -1,0 +1,189 @@
+"""`bpy.ops.scan_relight.*` for the light: switch and restore lamps, add lights, another picture around the room."""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import bpy
+
+from ...addon.bridge.light import lamps, outside
+from ...addon.bridge.relight import lights, state
+from ...addon.core.errors import BadInputError
+from ..base import poll
+from ..results.select import make_active
+from .base import RelightOperator
+from .exposure import follow
+from .light_pictures import PRESETS
+from .props import AIMS, UNITS
+
+
+class SCAN_RELIGHT_OT_switch_lamps(RelightOperator, bpy.types.Operator):
+    """Switch every lamp of the scan."""
+
+    bl_idname = "scan_relight.switch_lamps"
+    bl_label = "Switch All Lamps"
+    bl_description = "Switch all lamps of the scan on or off; their strength and colour stay"
+
+    on: bpy.props.BoolProperty(name="On", description="On or off", default=False)
+
+    def work(self, context):
+        """All of them."""
+        for lamp in lamps.find_lamps(context.scene):
+            lamps.set_on(lamp, self.on)
+        follow(context.scene)
+
+
+class SCAN_RELIGHT_OT_restore_lamp(RelightOperator, bpy.types.Operator):
+    """Make one lamp what the scan found."""
+
+    bl_idname = "scan_relight.restore_lamp"
+    bl_label = "Restore Lamp"
+    bl_description = "Make this lamp exactly what the scan found"
+
+    name: bpy.props.StringProperty(name="Lamp", description="Name of its material, or its class")
+
+    def work(self, context):
+        """By its name."""
+        for lamp in lamps.lamp_named(context.scene, self.name):
+            lamps.restore(lamp)
+        follow(context.scene)
+
+
+class SCAN_RELIGHT_OT_restore_light(RelightOperator, bpy.types.Operator):
+    """Back to the captured light."""
+
+    bl_idname = "scan_relight.restore_light"
+    bl_label = "Restore Captured Light"
+    bl_description = "Make lamps and outside exactly what was recovered, and remove the lights that were added here"
+
+    @classmethod
+    def poll(cls, context):
+        """Only where anything differs."""
+        return super().poll(context) and poll.check(
+            cls, state.is_relit(context.scene), "The light is as it was captured."
+        )
+
+    def work(self, context):
+        """All of it."""
+        state.restore_captured(context.scene)
+        follow(context.scene)
+
+
+class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
+    """Add a light inside the room."""
+
+    bl_idname = "scan_relight.add_light"
+    bl_label = "Add Light"
+
+    preset: bpy.props.EnumProperty(name="Light", description="What kind of light", items=PRESETS)
+    strength: bpy.props.FloatProperty(
+        name="Strength",
+        description="In the unit below; of the room's light 1 keeps the scene's exposure readable",
+        min=0.0,
+        soft_max=4.0,
+        default=1.0,
+    )
+    unit: bpy.props.EnumProperty(name="Strength In", description="What the strength is given in", items=UNITS)
+    kelvin: bpy.props.FloatProperty(
+        name="Temperature",
+        description="Of its colour; 0 takes the preset's own",
+        subtype="TEMPERATURE",
+        min=0.0,
+        max=20000.0,
+        default=0.0,
+    )
+    aim: bpy.props.EnumProperty(name="Aim At", description="What the light is aimed at", items=AIMS)
+
+    @classmethod
+    def description(cls, context, properties):
+        """The preset's own words."""
+        text = next(text for name, _, text in PRESETS if name == properties.preset)
+        return f"{text}; stands inside the room, as strong as the room's own light asks for"
+
+    def work(self, context):
+        """Add it and make it the active object."""
+        light = lights.add_light(
+            context.scene, self.preset, self.strength, self.aim, context.object, self.kelvin or None, self.unit
+        )
+        make_active(context, light)
+        follow(context.scene)
+
+
+class SCAN_RELIGHT_OT_remove_lights(RelightOperator, bpy.types.Operator):
+    """Remove what was added."""
+
+    bl_idname = "scan_relight.remove_lights"
+    bl_label = "Remove New Lights"
+    bl_description = "Remove all lights that were added here"
+
+    @classmethod
+    def poll(cls, context):
+        """Only where there are any."""
+        return super().poll(context) and poll.check(
+            cls, bool(lights.added_lights(context.scene)), "No light was added here."
+        )
+
+    def work(self, context):
+        """All of them."""
+        lights.remove_lights(context.scene)
+        follow(context.scene)
+
+
+def put_around(scene, picture: str) -> list[str]:
+    """Put a picture around the room, scaled to a day outside such a room; returns warnings."""
+    outside.use_hdri(scene, picture, outside.usual_radiance(scene))
+    return outside.remarks(scene)
+
+
+class SCAN_RELIGHT_OT_use_hdri(RelightOperator, bpy.types.Operator):
+    """Put a picture around the room."""
+
+    bl_idname = "scan_relight.use_hdri"
+    bl_label = "Picture Around the Room"
+    bl_description = "Put an equirectangular HDR picture around the room; the recovered outside is kept"
+
+    filepath: bpy.props.StringProperty(
+        name="Picture", description="EXR or HDR file", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
+    filter_glob: bpy.props.StringProperty(default="*.exr;*.hdr;*.png;*.jpg", options={"HIDDEN"})
+
+    def invoke(self, context, event):
+        """Choose the file."""
+        if self.filepath:
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
+
+    def work(self, context):
+        """The chosen file."""
+        if not self.filepath:
+            raise BadInputError("Choose the picture first.")
+        return put_around(context.scene, bpy.path.abspath(self.filepath))
+
+
+_items: list[tuple[str, str, str]] = []  # Blender keeps no reference to what a callback returns
+
+
+def _studio_items(operator, context):
+    _items[:] = [
+        (str(path), path.stem.capitalize(), f"Blender's own picture '{path.stem}'") for path in outside.studio_lights()
+    ]
+    return _items
+
+
+class SCAN_RELIGHT_OT_use_studio_light(RelightOperator, bpy.types.Operator):
+    """One of Blender's own pictures around the room."""
+
+    bl_idname = "scan_relight.use_studio_light"
+    bl_label = "Blender's Pictures"
+    bl_description = "Put one of the HDR pictures that come with Blender around the room"
+
+    picture: bpy.props.EnumProperty(name="Picture", description="Which one", items=_studio_items)
+
+    @classmethod
+    def poll(cls, context):
+        """Some builds have none."""
+        return super().poll(context) and poll.check(
+            cls, bool(outside.studio_lights()), "This Blender comes without its HDR pictures; choose a file instead."
+        )
+
+    def work(self, context):
+        """As any other picture."""
+        return put_around(context.scene, self.picture)

@@ -1,0 +1,290 @@
+"""What the panels Relight and Export show: lamps and outside as they are, and what was chosen for the next click.
+
+The properties of lamps and outside hold nothing: they read and write what the bridge keeps with material and world.
+"""
+
+# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import bpy
+
+from ...addon.bridge.data.cameras import frame_cameras
+from ...addon.bridge.light import lamps, outside, units
+from ...addon.bridge.light.kelvin import HIGHEST, LOWEST
+from ...addon.bridge.relight import match_frame
+from ...addon.bridge.relight import setup as relight_setup
+from ..results.panel import active_row, choose_row
+from ..translations import OWN
+from .exposure import follow, follow_soon
+
+UNITS = (
+    ("ROOM", "Room's Light", "Relative to the light that the room was scanned in, so that the exposure can stay"),
+    ("WATT", "Watts", "Radiant power, as Blender's own lamps have it; a sun: for each square metre"),
+    ("LUMEN", "Lumens", "683 lm for each radiant watt of white light; a sun: lux"),
+)
+AIMS = (
+    ("VIEW", "View", "What the middle of the camera's picture shows"),
+    ("CURSOR", "3D Cursor", "Where the 3D cursor is"),
+    ("OBJECT", "Object", "The active object"),
+)
+PLACES = AIMS[:2]
+LOOKS = (
+    ("MATTE", "Matte", "Grey, like chalk"),
+    ("GLOSSY", "Glossy", "Red lacquer"),
+    ("MIRROR", "Mirror", "Polished metal, to see the room's light in"),
+)
+
+
+# Shared by the panel's choices and the operators that they go to.
+SHAPE = bpy.props.EnumProperty(
+    name="Shape",
+    description="What is set into the room",
+    items=(("SPHERE", "Sphere", "A ball"), ("CUBE", "Cube", "A cube"), ("MONKEY", "Suzanne", "Blender's monkey")),
+)
+LOOK = bpy.props.EnumProperty(
+    name="Material", description="Of the new object", items=LOOKS, default="MIRROR", translation_context=OWN
+)
+SIZE = bpy.props.FloatProperty(
+    name="Size", description="Its largest extent", subtype="DISTANCE", min=0.001, soft_max=2.0, default=0.3
+)
+ENGINE = bpy.props.EnumProperty(
+    name="Engine",
+    description="Renders the two pictures",
+    items=(
+        ("CYCLES", "Cycles", "Path tracing: the room's own light bounces"),
+        ("EEVEE", "EEVEE", "Quick; indirect light and large lamps are only approximate"),
+    ),
+)
+
+
+def _lamp(group):
+    return group.id_data if lamps.is_lamp(group.id_data) else None
+
+
+def _change(change, group, value) -> None:
+    """Change a lamp or the outside, and have the exposure follow; nothing where `change` is None."""
+    if change:
+        change(group.id_data, value)
+        follow_soon()
+
+
+class ScanRelightLamp(bpy.types.PropertyGroup):
+    """`Material.scan_relight_lamp`."""
+
+    on: bpy.props.BoolProperty(
+        name="On",
+        description="Whether this lamp shines",
+        get=lambda self: bool(_lamp(self)) and lamps.is_on(self.id_data),
+        set=lambda self, value: _change(_lamp(self) and lamps.set_on, self, value),
+    )
+    factor: bpy.props.FloatProperty(
+        name="Strength x",
+        description="Times the radiance that the scan found; 1 is the lamp as captured",
+        min=0.0,
+        max=lamps.MAX_FACTOR,
+        soft_max=4.0,
+        step=5,
+        precision=2,
+        get=lambda self: lamps.factor(self.id_data),
+        set=lambda self, value: _change(_lamp(self) and lamps.set_factor, self, value),
+    )
+    colour: bpy.props.FloatVectorProperty(
+        name="Colour",
+        description="Colour of its light",
+        subtype="COLOR",
+        size=3,
+        min=0.0,
+        soft_max=1.0,
+        get=lambda self: (_lamp(self) and lamps.colour(self.id_data)) or (1.0, 1.0, 1.0),
+        set=lambda self, value: _change(_lamp(self) and lamps.set_colour, self, value),
+    )
+
+    kelvin: bpy.props.FloatProperty(
+        name="Temperature",
+        description="Colour of its light as a temperature, at the same luminance: 2700 a warm bulb, 6500 daylight",
+        subtype="TEMPERATURE",
+        min=LOWEST,
+        max=HIGHEST,
+        step=10000,
+        precision=0,
+        get=lambda self: lamps.kelvin(self.id_data) if _lamp(self) else 6500.0,
+        set=lambda self, value: _change(_lamp(self) and lamps.set_kelvin, self, value),
+    )
+
+
+class ScanRelightLight(bpy.types.PropertyGroup):
+    """`Light.scan_relight_light`: a lamp of Blender's in lumens."""
+
+    lumens: bpy.props.FloatProperty(
+        name="Lumens",
+        description="Luminous flux in lumens, a sun's in lux: 683 for each radiant watt of white light",
+        min=0.0,
+        soft_max=100000.0,
+        step=1000,
+        precision=0,
+        get=lambda self: units.lumens(self.id_data),
+        set=lambda self, value: _change(units.set_lumens, self, value),
+    )
+
+
+class ScanRelightOutside(bpy.types.PropertyGroup):
+    """`World.scan_relight_outside`."""
+
+    on: bpy.props.BoolProperty(
+        name="Light from Outside",
+        description="Whether light comes in from outside the scanned room",
+        get=lambda self: outside.is_on(self.id_data),
+        set=lambda self, value: _change(outside.set_on, self, value),
+    )
+    factor: bpy.props.FloatProperty(
+        name="Strength",
+        description="Times the light from outside that was recovered, or the picture's",
+        min=0.0,
+        max=outside.MAX_FACTOR,
+        soft_max=4.0,
+        step=5,
+        precision=2,
+        get=lambda self: outside.factor(self.id_data),
+        set=lambda self, value: _change(outside.set_factor, self, value),
+    )
+    rotation: bpy.props.FloatProperty(
+        name="Rotation",
+        description="Turns the outside about the vertical, anticlockwise from above",
+        subtype="ANGLE",
+        soft_min=-3.141593,
+        soft_max=3.141593,
+        step=100,
+        get=lambda self: outside.rotation(self.id_data),
+        set=lambda self, value: _change(outside.set_rotation, self, value),
+    )
+
+
+def look_through(studio, index: int, size: bool = False) -> str:
+    """Make the scene's camera that of a frame, its picture shown as chosen; returns what `match_frame` says."""
+    return match_frame.match_frame(
+        studio.id_data,
+        index,
+        studio.show_frame,
+        studio.frame_alpha,
+        studio.frame_front,
+        bpy.path.abspath(studio.id_data.scan_relight.capture_folder),
+        size or studio.match_size,
+    )
+
+
+def _set_frame(studio, index):
+    look_through(studio, min(max(index, 0), max(len(frame_cameras(studio.id_data)) - 1, 0)))
+
+
+def _frame_changed(studio, context):
+    index = match_frame.current(studio.id_data)
+    if index >= 0:
+        look_through(studio, index)
+
+
+class ScanRelightStudio(bpy.types.PropertyGroup):
+    """`Scene.scan_relight_studio`."""
+
+    lamp: bpy.props.IntProperty(
+        name="Lamp",
+        description="Click to select the lamp in the scene",
+        get=lambda self: active_row(self.id_data),
+        set=lambda self, row: choose_row(self.id_data, row),
+    )
+    frame: bpy.props.IntProperty(
+        name="Frame",
+        description="Look through the camera of this frame of the capture",
+        get=lambda self: max(match_frame.current(self.id_data), 0),
+        set=_set_frame,
+    )
+    match_size: bpy.props.BoolProperty(
+        name="Match Render Size",
+        description="Going to a frame also sets the render size and the shape of the pixels to the frame's",
+        update=_frame_changed,
+    )
+    show_frame: bpy.props.BoolProperty(
+        name="Show Its Picture",
+        description="Lay the frame's picture behind the scene, under the scene's exposure",
+        default=True,
+        update=_frame_changed,
+    )
+    frame_front: bpy.props.BoolProperty(
+        name="In Front", description="Lay the picture before the scene instead of behind", update=_frame_changed
+    )
+    frame_alpha: bpy.props.FloatProperty(
+        name="Opacity",
+        description="Of the frame's picture",
+        min=0.0,
+        max=1.0,
+        default=1.0,
+        subtype="FACTOR",
+        update=_frame_changed,
+    )
+    follow: bpy.props.BoolProperty(
+        name="Follow",
+        description="Set the exposure after each change of the light here, by an estimate, good to "
+        "about a stop; nothing is rendered",
+        default=False,
+        update=lambda self, context: follow(self.id_data),
+    )
+    setup: bpy.props.StringProperty(
+        name="Set-Up",
+        description="The present light as a preset keeps it",
+        options={"SKIP_SAVE"},
+        get=lambda self: relight_setup.setup_of(self.id_data),
+        set=lambda self, text: relight_setup.apply_setup(self.id_data, text),
+    )
+    aim: bpy.props.EnumProperty(name="Aim At", description="What a new light is aimed at", items=AIMS)
+    unit: bpy.props.EnumProperty(name="Strength In", description="What a new light's strength is given in", items=UNITS)
+    strength: bpy.props.FloatProperty(
+        name="Strength x",
+        description="Of a new light, times what keeps the scene's exposure readable",
+        min=0.0,
+        soft_max=4.0,
+        default=1.0,
+        step=5,
+        precision=2,
+    )
+    watts: bpy.props.FloatProperty(
+        name="Power",
+        description="Radiant power of a new light, as Blender's own lamps have it; of a sun for each square metre",
+        subtype="POWER",
+        unit="POWER",
+        min=0.0,
+        soft_max=1000.0,
+        default=10.0,
+    )
+    lumens: bpy.props.FloatProperty(
+        name="Lumens",
+        description="Luminous flux of a new light: 683 lm for each radiant watt of white; of a sun in lux",
+        min=0.0,
+        soft_max=100000.0,
+        default=800.0,
+        step=1000,
+        precision=0,
+    )
+    kelvin: bpy.props.FloatProperty(
+        name="Temperature",
+        description="Colour of a new light: 2700 a warm bulb, 6500 daylight; 0 takes what suits its kind",
+        subtype="TEMPERATURE",
+        min=0.0,
+        max=HIGHEST,
+        default=0.0,
+        step=10000,
+        precision=0,
+    )
+    place: bpy.props.EnumProperty(name="Place", description="Where an object is set down", items=PLACES)
+    shape: SHAPE
+    look: LOOK
+    size: SIZE
+    engine: ENGINE
+    samples: bpy.props.IntProperty(
+        name="Samples", description="For each pixel; more is calmer and slower", min=1, soft_max=4096, default=64
+    )
+    percentage: bpy.props.IntProperty(
+        name="Size",
+        description="Of the scene's render size",
+        subtype="PERCENTAGE",
+        min=1,
+        soft_max=100,
+        max=1000,
+        default=100,
+    )

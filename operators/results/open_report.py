@@ -1,0 +1,34 @@
+"""`bpy.ops.scan_relight.open_report`: the result's page in the browser."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..base import poll
+from . import told
+
+
+class SCAN_RELIGHT_OT_open_report(bpy.types.Operator):
+    """Open the result's page."""
+
+    bl_idname = "scan_relight.open_report"
+    bl_label = "Open Report"
+    bl_description = "Open the page with figures, pictures and doubts of this result in the browser"
+
+    @classmethod
+    def poll(cls, context):
+        """Whether there is a page."""
+        folder = told.folder_of(context.scene) if context.scene else None
+        return poll.check(
+            cls,
+            folder is not None and (folder / told.PAGE).is_file(),
+            "There is no report yet; run the recovery to its end first.",
+        )
+
+    def execute(self, context):
+        """Open it; in the background only say where it lies."""
+        page = told.folder_of(context.scene) / told.PAGE
+        if bpy.app.background:
+            self.report({"INFO"}, str(page))
+            return {"FINISHED"}
+        return bpy.ops.wm.path_open(filepath=str(page))
