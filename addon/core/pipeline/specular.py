@@ -11,20 +11,14 @@ import numpy as np
 
 from ..brdf.lambertian import LAMBERTIAN
 from ..brdf.material import ObjectMaterial, from_json
-from ..fit.problem import Problem
 from ..light.field import LightField
 from ..light.lamps import Lamp
 from ..light.lobes import GRID
-from ..paper.target_frame import frame_scores, target_frame
 from ..parallel import ordered_map
 from ..passes.glossy_light.glossy_light import Excess, glossy_light
-from ..passes.see_through.see_through import is_sure, judge, look_behind
-from ..passes.specular.by_looks import coated_by_looks, metal_by_looks
+from ..passes.see_through.see_through import look_behind
 from ..passes.specular.describe import as_given, described, flat_mirror, lamp_material
-from ..passes.specular.given import fit_given, given_note, same_material
-from ..passes.specular.intervals import gloss_interval
-from ..passes.specular.models import MIN_ELEMENTS, Choice, adopt_from_class, choose_model, set_apart
-from ..passes.specular.one_colour import compare, compare_coat
+from ..passes.specular.given import given_note, same_material
 from ..passes.specular.problems import Problems
 from ..passes.specular.separate import specular_in_median, spread_over_object
 from ..progress import Progress
@@ -32,6 +26,7 @@ from ..results.overrides import NOTHING, Given, Overrides
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance
 from ..scene.samples import Samples
+from .choose_models import Chosen, Room, choose_models
 from .frames import STAGE as FRAMES
 from .published.targets import fit_targets
 from .shading import STAGE as SHADING
@@ -39,18 +34,6 @@ from .stage import Stage
 from .surface import STAGE as SURFACE
 
 STAGE = Stage("specular", Path(__file__), (SURFACE, FRAMES, SHADING), ("specular", "specular_rays", "refine", "seed"))
-FIT_ELEMENTS = 350
-FIT_VIEWS = 12
-"""Elements of an object that the fit looks at, and views of each."""
-SCREEN_ELEMENTS = 200
-SCREEN_RAYS = 4
-"""The first look is at fewer elements and with so many times fewer rays; it drops what a lobe makes much worse."""
-HOPELESS = 1.15
-"""A lobe that raises the cost by this factor in the first look needs no second."""
-LOOKS_VIEWS = 4
-"""Views of each element for the question whether an object looks like a metal or coated all over (`by_looks`)."""
-LOOKS_LIKE_NONE = 1.5
-"""A metal whose spread is so many times the other's in the first look needs no second."""
 SEPARATE_ELEMENTS = 2500
 SEPARATE_VIEWS = 9
 SEPARATE_RAYS = 8
@@ -139,20 +122,12 @@ def fit_specular(
         From `progress`.
     """
     given = given or {}
-    glowing, mirrors = {lamp.object_id: lamp for lamp in lamps}, {mirror.object_id: mirror for mirror in field.mirrors}
     # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
     maker = Problems(field, samples, threads=1, seed=seed, without=without)
     refine = 0 if "specular-in-median" in without else min(refine, 1) if "glossy-light" in without else refine
-    # What is given goes before what the shading stage found.
-    taken = {i for i, one in given.items() if one.same_as is not None}
-    settled = {i for i in (*glowing, *mirrors) if i not in given} | taken
-    wanted = [i.object_id for i in instances if i.object_id not in settled]
-    if held is not None:
-        # Where nothing is given of an object, others of its class have their say.
-        alike = {i.class_name for i in instances if i.object_id in held.only and i.object_id not in given}
-        class_of = {i.object_id: i.class_name for i in instances}
-        wanted = [i for i in wanted if i in held.only or i not in given and class_of[i] in alike]
-
+    found_before = {lamp.object_id for lamp in lamps} | {mirror.object_id for mirror in field.mirrors}
+    wanted = _wanted(instances, found_before, given, held)
+    room = Room(instances, field, lit_diffuse, irradiance, samples, frame_names, noise)
     told: dict[int, ObjectMaterial] = {}
     if as_published:
         others = [i for i in instances if i.object_id in wanted and i.object_id not in given]
@@ -160,147 +135,104 @@ def fit_specular(
             others, field, lit_diffuse, samples, frame_names, rays=rays, threads=threads, seed=seed, progress=progress
         )
         wanted = [i for i in wanted if i not in told]
-
-    def look(object_id: int) -> tuple[Choice, Problem | None, int]:
-        if object_id in given:
-            return *fit_given(given[object_id], maker, object_id, irradiance, rays), -1
-        choice, problem, index = _by_frames(maker, object_id, rays, "first-look" not in without)
-        where = field.atlas.position[samples.element[index]], field.atlas.normal[samples.element[index]]
-        scores = frame_scores(field, *where, samples.direction[index], samples.frame[index], len(frame_names))
-        if problem is not None and choice.fit is not None and "see-through" not in without:
-            element, direction = samples.element[index], samples.direction[index]
-            behind = look_behind(field, lit_diffuse.seen, element, direction, object_id, noise)
-            lobe = choice.fit if choice.model.has_lobe else None
-            scale = max(1.4826 * choice.fit.residual, 1e-4)
-            shown = judge(problem, behind, lobe, scale)
-            if shown is not None:
-                choice = set_apart(choice, shown, is_sure(shown))
-        if choice.model.has_albedo:
-            choice, problem = _by_looks(maker, object_id, choice, problem, irradiance, rays, without)
-        return choice, problem, target_frame(scores)
-
-    problems, choices, targets = {}, {}, {}
-    for object_id, found in zip(wanted, ordered_map(look, wanted, threads, ahead=len(wanted)), strict=True):
-        choices[object_id], problem, targets[object_id] = found
-        if problem is not None:
-            problems[object_id] = problem
-        if progress is not None:
-            progress.update(0.7 * len(choices) / len(wanted))
-    if "class-lobes" not in without:
-        reflecting = {i: choice for i, choice in choices.items() if not choice.model.gives_light}
-        adopted = adopt_from_class(reflecting, problems, {i.object_id: i.class_name for i in instances})
-        choices |= {i: choice for i, choice in adopted.items() if i not in given}
-
-    intervals = ordered_map(lambda i: gloss_interval(choices[i], problems.get(i)), wanted, threads)
-    sure = dict(zip(wanted, intervals, strict=True))
-
-    names = {i.object_id: i.name for i in instances}
-
-    def describe(i: Instance) -> ObjectMaterial:
-        if i.object_id in told:
-            return told[i.object_id]
-        own, choice = field.atlas.object_id == i.object_id, choices.get(i.object_id)
-        if choice is not None and choice.model.gives_light:
-            seen = np.median(field.radiance[own], 0) if own.any() else np.zeros(3)
-            return lamp_material(i, seen, irradiance[own], given_note(given[i.object_id]))
-        if choice is not None:
-            target, problem = targets[i.object_id], problems.get(i.object_id)
-            name = frame_names[target] if target >= 0 else None
-            found = described(i, choice, problem, name, sure[i.object_id])
-            return as_given(found, given[i.object_id], choice, sure[i.object_id]) if i.object_id in given else found
-        if i.object_id in glowing and i.object_id not in given:
-            known = glowing[i.object_id]
-            return lamp_material(i, known.radiance, irradiance[own], known.note(names))
-        if i.object_id in mirrors and i.object_id not in given:
-            seen = int((field.atlas.object_id[samples.element] == i.object_id).sum())
-            return flat_mirror(i, mirrors[i.object_id], seen)
-        return ObjectMaterial(i.object_id, i.class_name, LAMBERTIAN)  # the same as another, which is described first
+    chosen = choose_models(room, maker, wanted, given, rays, threads, without, progress)
 
     kept = {} if held is None else {m.object_id: m for m in held.found.materials if m.object_id not in held.only}
-    by_id = {i.object_id: kept.get(i.object_id) or describe(i) for i in instances}
+    lit_by = {lamp.object_id: lamp for lamp in lamps if lamp.object_id not in given}
+    by_id = {
+        i.object_id: kept.get(i.object_id) or told.get(i.object_id) or _describe(i, room, chosen, lit_by, given)
+        for i in instances
+    }
+    _same_as(by_id, given, set(kept))
+    materials = tuple(by_id.values())
+
+    specular = np.zeros((len(field.atlas), 3), np.float32)
+    excess = np.zeros_like(specular)
+    if held is not None:
+        specular = np.where(np.isin(field.atlas.object_id, list(held.only))[:, None], specular, held.found.specular)
+        excess = held.found.excess
+    if refine:
+        apart = [m for m in materials if m.object_id not in kept]
+        _take_out(specular, apart, room, maker, max(rays // SEPARATE_RAYS, 16), threads, progress)
+    if refine > 1 and held is None:
+        seen = np.flatnonzero(lit_diffuse.seen)
+        sent = Excess(field, materials, specular, seed)
+        excess[seen] = glossy_light(
+            sent, seen, irradiance[seen], threads=threads, seed=seed, progress=progress, share=(0.85, 1.0),
+            without=without,
+        )  # fmt: skip
+    return Specular(materials, specular, excess)
+
+
+def _wanted(
+    instances: tuple[Instance, ...], found_before: set[int], given: Mapping[int, Given], held: Held | None
+) -> list[int]:
+    """Objects that a model is to be chosen for. What is given goes before what the shading stage found."""
+    taken = {i for i, one in given.items() if one.same_as is not None}
+    settled = {i for i in found_before if i not in given} | taken
+    wanted = [i.object_id for i in instances if i.object_id not in settled]
+    if held is None:
+        return wanted
+    # Where nothing is given of an object, others of its class have their say.
+    alike = {i.class_name for i in instances if i.object_id in held.only and i.object_id not in given}
+    class_of = {i.object_id: i.class_name for i in instances}
+    return [i for i in wanted if i in held.only or i not in given and class_of[i] in alike]
+
+
+def _describe(
+    i: Instance, room: Room, chosen: Chosen, lamps: Mapping[int, Lamp], given: Mapping[int, Given]
+) -> ObjectMaterial:
+    """What is known of one object: a lamp, a flat mirror, or what its model was chosen to be."""
+    field, number = room.field, i.object_id
+    own, choice = field.atlas.object_id == number, chosen.choices.get(number)
+    if choice is not None and choice.model.gives_light:
+        seen = np.median(field.radiance[own], 0) if own.any() else np.zeros(3)
+        return lamp_material(i, seen, room.irradiance[own], given_note(given[number]))
+    if choice is not None:
+        target, sure = chosen.targets[number], chosen.intervals[number]
+        name = room.frame_names[target] if target >= 0 else None
+        found = described(i, choice, chosen.problems.get(number), name, sure)
+        return as_given(found, given[number], choice, sure) if number in given else found
+    if number in lamps:
+        note = lamps[number].note({one.object_id: one.name for one in room.instances})
+        return lamp_material(i, lamps[number].radiance, room.irradiance[own], note)
+    mirror = next((one for one in field.mirrors if one.object_id == number), None)
+    if mirror is not None and number not in given:
+        seen = int((field.atlas.object_id[room.samples.element] == number).sum())
+        return flat_mirror(i, mirror, seen)
+    return ObjectMaterial(number, i.class_name, LAMBERTIAN)  # the same as another, which is described first
+
+
+def _same_as(by_id: dict[int, ObjectMaterial], given: Mapping[int, Given], kept: set[int]) -> None:
+    """Give objects that are given as the same as another that one's description."""
     for i in by_id:
         if i not in kept and (source := given.get(i, NOTHING).same_as) is not None:
             while (further := given.get(source, NOTHING).same_as) is not None:
                 source = further
             by_id[i] = same_material(by_id[source], by_id[i])
-    materials = list(by_id.values())
 
-    specular = np.zeros((len(field.atlas), 3), np.float32)
-    if held is not None:
-        specular = np.where(np.isin(field.atlas.object_id, list(held.only))[:, None], specular, held.found.specular)
-    glass = [m for m in materials if m.surfaces is not None]
-    glossy = [m for m in materials if m.model.layered] + glass if refine else []
-    glossy = [m for m in glossy if m.object_id not in kept]
+
+def _take_out(
+    specular: np.ndarray,
+    materials: list[ObjectMaterial],
+    room: Room,
+    maker: Problems,
+    rays: int,
+    threads: int,
+    progress: Progress | None,
+) -> None:
+    """Put the specular part of L_d of all that is glossy or transparent into `specular`, (n, 3)."""
+    glossy = [m for m in materials if m.model.layered] + [m for m in materials if m.surfaces is not None]
 
     def separate(material: ObjectMaterial) -> tuple[np.ndarray, np.ndarray]:
         if material.model.see_through:
-            return _without_background(material, field, lit_diffuse.seen, maker, samples)
-        return _separate(material, field, maker, samples, max(rays // SEPARATE_RAYS, 16))
+            return _without_background(material, room.field, room.lit_diffuse.seen, maker, room.samples)
+        return _separate(material, room.field, maker, room.samples, rays)
 
     for done, (own, part) in enumerate(ordered_map(separate, glossy, threads)):
         specular[own] = part
         if progress is not None:
             progress.update(0.7 + 0.15 * (done + 1) / len(glossy))
-
-    excess = np.zeros_like(specular) if held is None else held.found.excess
-    if refine > 1 and held is None:
-        seen = np.flatnonzero(lit_diffuse.seen)
-        sent = Excess(field, tuple(materials), specular, seed)
-        excess[seen] = glossy_light(
-            sent, seen, irradiance[seen], threads=threads, seed=seed, progress=progress, share=(0.85, 1.0),
-            without=without,
-        )  # fmt: skip
-    return Specular(tuple(materials), specular, excess)
-
-
-def _by_frames(
-    maker: Problems, object_id: int, rays: int, first_look: bool
-) -> tuple[Choice, Problem | None, np.ndarray]:
-    """Choose a model; in two looks, as only some objects deserve the second. Last: which samples were looked at."""
-    index = maker.pick(object_id, SCREEN_ELEMENTS, FIT_VIEWS)
-    if not len(index):
-        return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
-    screen = maker.problem(index, max(rays // SCREEN_RAYS, 16), rough=True)
-    first = choose_model(screen)
-    fit = first.fit
-    hopeless = fit is None or fit.cost > HOPELESS * fit.cost_lambertian
-    if hopeless and not first.model.lobe_alone and first_look:
-        return first, screen, index
-    index = maker.pick(object_id, FIT_ELEMENTS, FIT_VIEWS, seed=1)
-    problem = maker.problem(index, rays)
-    return choose_model(problem), problem, index
-
-
-def _by_looks(
-    maker: Problems,
-    object_id: int,
-    choice: Choice,
-    problem: Problem | None,
-    irradiance: np.ndarray,
-    rays: int,
-    without: Collection[str],
-) -> tuple[Choice, Problem | None]:
-    """Ask whether an object looks like a metal or coated all over; choice and observations stay as they were if not."""
-    if problem is not None and len(np.unique(problem.element)) >= MIN_ELEMENTS:
-        first = compare(problem, irradiance)
-        if first is None:
-            return choice, problem
-        if first.ratio > LOOKS_LIKE_NONE:
-            coat = None if choice.model.has_lobe else compare_coat(problem, irradiance)
-            if coat is None or coat.ratio > 1:
-                return choice, problem
-    index = maker.pick(object_id, FIT_ELEMENTS, LOOKS_VIEWS, least=1, seed=1)
-    if not len(index):
-        return choice, problem
-    whole = maker.problem(index, rays)
-    looks = compare(whole, irradiance)
-    if looks is None:
-        return choice, problem
-    found = choice if "metal-by-looks" in without else metal_by_looks(choice, looks, whole)
-    coat = None if found.model.has_lobe or "coat-by-looks" in without else compare_coat(whole, irradiance)
-    if coat is not None:
-        found = coated_by_looks(found, coat)
-    return found, whole if found.looks is not None else problem
 
 
 def _separate(

@@ -1,0 +1,189 @@
+"""Which model and which lobe each object gets: by its views, by what is behind it, by its looks, by its class."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..brdf.lambertian import LAMBERTIAN
+from ..fit.problem import Problem
+from ..light.field import LightField
+from ..paper.target_frame import frame_scores, target_frame
+from ..parallel import ordered_map
+from ..passes.see_through.see_through import is_sure, judge, look_behind
+from ..passes.specular.by_looks import coated_by_looks, metal_by_looks
+from ..passes.specular.given import fit_given
+from ..passes.specular.intervals import GlossInterval, gloss_interval
+from ..passes.specular.models import MIN_ELEMENTS, Choice, adopt_from_class, choose_model, set_apart
+from ..passes.specular.one_colour import compare, compare_coat
+from ..passes.specular.problems import Problems
+from ..progress import Progress
+from ..results.overrides import Given
+from ..scene.lit_diffuse import LitDiffuse
+from ..scene.model import Instance
+from ..scene.samples import Samples
+
+FIT_ELEMENTS = 350
+FIT_VIEWS = 12
+"""Elements of an object that the fit looks at, and views of each."""
+SCREEN_ELEMENTS = 200
+SCREEN_RAYS = 4
+"""The first look is at fewer elements and with so many times fewer rays; it drops what a lobe makes much worse."""
+HOPELESS = 1.15
+"""A lobe that raises the cost by this factor in the first look needs no second."""
+LOOKS_VIEWS = 4
+"""Views of each element for the question whether an object looks like a metal or coated all over (`by_looks`)."""
+LOOKS_LIKE_NONE = 1.5
+"""A metal whose spread is so many times the other's in the first look needs no second."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """What the models are chosen by, for n elements.
+
+    Attributes
+    ----------
+    instances : tuple of Instance
+    field : LightField
+    lit_diffuse : LitDiffuse
+    irradiance : (n, 3) float32
+        E of each element, from L_d.
+    samples : Samples
+    frame_names : list of str
+    noise : float
+        What was taken out of the mesh, in metres.
+    """
+
+    instances: tuple[Instance, ...]
+    field: LightField
+    lit_diffuse: LitDiffuse
+    irradiance: np.ndarray
+    samples: Samples
+    frame_names: list[str]
+    noise: float
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """What was chosen for objects, by object_id each.
+
+    Attributes
+    ----------
+    choices : dict of Choice
+    problems : dict of Problem
+        The observations that decided; without objects of which there were none.
+    targets : dict of int
+        The target frame; -1 where there is none.
+    intervals : dict of GlossInterval
+    """
+
+    choices: dict[int, Choice]
+    problems: dict[int, Problem]
+    targets: dict[int, int]
+    intervals: dict[int, GlossInterval]
+
+
+def choose_models(
+    room: Room,
+    maker: Problems,
+    wanted: Sequence[int],
+    given: Mapping[int, Given],
+    rays: int,
+    threads: int,
+    without: Collection[str],
+    progress: Progress | None,
+) -> Chosen:
+    """Choose a model for each of the `wanted` objects; of those that are `given`, what is left to find."""
+
+    def look(object_id: int) -> tuple[Choice, Problem | None, int]:
+        if object_id in given:
+            return *fit_given(given[object_id], maker, object_id, room.irradiance, rays), -1
+        return _look(room, maker, object_id, rays, without)
+
+    problems, choices, targets = {}, {}, {}
+    for object_id, found in zip(wanted, ordered_map(look, wanted, threads, ahead=len(wanted)), strict=True):
+        choices[object_id], problem, targets[object_id] = found
+        if problem is not None:
+            problems[object_id] = problem
+        if progress is not None:
+            progress.update(0.7 * len(choices) / len(wanted))
+    if "class-lobes" not in without:
+        reflecting = {i: choice for i, choice in choices.items() if not choice.model.gives_light}
+        adopted = adopt_from_class(reflecting, problems, {i.object_id: i.class_name for i in room.instances})
+        choices |= {i: choice for i, choice in adopted.items() if i not in given}
+    intervals = ordered_map(lambda i: gloss_interval(choices[i], problems.get(i)), wanted, threads)
+    return Chosen(choices, problems, targets, dict(zip(wanted, intervals, strict=True)))
+
+
+def _look(
+    room: Room, maker: Problems, object_id: int, rays: int, without: Collection[str]
+) -> tuple[Choice, Problem | None, int]:
+    """What an object's own frames say: its model, the observations behind that, its target frame."""
+    field, samples = room.field, room.samples
+    choice, problem, index = _by_frames(maker, object_id, rays, "first-look" not in without)
+    element, direction = samples.element[index], samples.direction[index]
+    scores = frame_scores(
+        field, field.atlas.position[element], field.atlas.normal[element], direction, samples.frame[index],
+        len(room.frame_names),
+    )  # fmt: skip
+    if problem is not None and choice.fit is not None and "see-through" not in without:
+        behind = look_behind(field, room.lit_diffuse.seen, element, direction, object_id, room.noise)
+        lobe = choice.fit if choice.model.has_lobe else None
+        shown = judge(problem, behind, lobe, max(1.4826 * choice.fit.residual, 1e-4))
+        if shown is not None:
+            choice = set_apart(choice, shown, is_sure(shown))
+    if choice.model.has_albedo:
+        choice, problem = _by_looks(maker, object_id, choice, problem, room.irradiance, rays, without)
+    return choice, problem, target_frame(scores)
+
+
+def _by_frames(
+    maker: Problems, object_id: int, rays: int, first_look: bool
+) -> tuple[Choice, Problem | None, np.ndarray]:
+    """Choose a model; in two looks, as only some objects deserve the second. Last: which samples were looked at."""
+    index = maker.pick(object_id, SCREEN_ELEMENTS, FIT_VIEWS)
+    if not len(index):
+        return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
+    screen = maker.problem(index, max(rays // SCREEN_RAYS, 16), rough=True)
+    first = choose_model(screen)
+    fit = first.fit
+    hopeless = fit is None or fit.cost > HOPELESS * fit.cost_lambertian
+    if hopeless and not first.model.lobe_alone and first_look:
+        return first, screen, index
+    index = maker.pick(object_id, FIT_ELEMENTS, FIT_VIEWS, seed=1)
+    problem = maker.problem(index, rays)
+    return choose_model(problem), problem, index
+
+
+def _by_looks(
+    maker: Problems,
+    object_id: int,
+    choice: Choice,
+    problem: Problem | None,
+    irradiance: np.ndarray,
+    rays: int,
+    without: Collection[str],
+) -> tuple[Choice, Problem | None]:
+    """Ask whether an object looks like a metal or coated all over; choice and observations stay as they were if not."""
+    if problem is not None and len(np.unique(problem.element)) >= MIN_ELEMENTS:
+        first = compare(problem, irradiance)
+        if first is None:
+            return choice, problem
+        if first.ratio > LOOKS_LIKE_NONE:
+            coat = None if choice.model.has_lobe else compare_coat(problem, irradiance)
+            if coat is None or coat.ratio > 1:
+                return choice, problem
+    index = maker.pick(object_id, FIT_ELEMENTS, LOOKS_VIEWS, least=1, seed=1)
+    if not len(index):
+        return choice, problem
+    whole = maker.problem(index, rays)
+    looks = compare(whole, irradiance)
+    if looks is None:
+        return choice, problem
+    found = choice if "metal-by-looks" in without else metal_by_looks(choice, looks, whole)
+    coat = None if found.model.has_lobe or "coat-by-looks" in without else compare_coat(whole, irradiance)
+    if coat is not None:
+        found = coated_by_looks(found, coat)
+    return found, whole if found.looks is not None else problem
