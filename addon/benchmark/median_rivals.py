@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.paper.estimator import QUARTILES, Summary, between
-from ..core.paper.p_square import PSquare
+from ..core.paper.p_square import QUARTILES, PSquare, Summary, between
 
 DARKEST, BRIGHTEST = 1e-6, 1e4
 """Range of the logarithms; what is darker counts as darkest."""

@@ -9,9 +9,9 @@ import numpy as np
 
 from ..core.lit_diffuse.accumulate import frame_order
 from ..core.lit_diffuse.adaptive import Adaptive
+from ..core.lit_diffuse.estimator import Estimator
 from ..core.lit_diffuse.exact import Exact
 from ..core.lit_diffuse.medians import make_estimator
-from ..core.paper.estimator import Estimator
 from ..core.settings import PAPER, Settings
 from .median_rivals import LogPSquare, TwoPasses
 from .run import Options

@@ -34,7 +34,7 @@ CUTS = (0, 1, 2)
 
 def presets() -> dict[str, Settings]:
     """The named presets, the paper's in its smaller setting."""
-    return PRESETS | {"paper": dataclasses.replace(PRESETS["paper"], shading_rays=PAPER_RAYS)}
+    return PRESETS | {"paper": dataclasses.replace(PRESETS["paper"], shading_rays=PAPER_RAYS, specular_rays=PAPER_RAYS)}
 
 
 def cut_in_four(mesh: Mesh, times: int) -> Mesh:

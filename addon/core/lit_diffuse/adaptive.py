@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..paper.estimator import Summary
+from ..paper.p_square import Summary
 from .batched import Batched
 from .exact import Exact
 

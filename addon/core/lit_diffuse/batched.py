@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..paper.estimator import QUARTILES, Summary
+from ..paper.p_square import QUARTILES, Summary
 from ..parallel import blocks, ordered_map
 from .sorting import sort_planes
 

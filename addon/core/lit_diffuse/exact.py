@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..paper.estimator import QUARTILES, Summary, between
+from ..paper.p_square import QUARTILES, Summary, between
 from ..parallel import ordered_map
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..paper.estimator import Summary
+from ..paper.p_square import Summary
 
 
 class Mean:

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from ..paper.estimator import Estimator, Summary
-from ..paper.p_square import PSquare
+from ..paper.p_square import PSquare, Summary
 from .adaptive import Adaptive
 from .batched import Batched
+from .estimator import Estimator
 from .exact import Exact
 from .mean import Mean
 

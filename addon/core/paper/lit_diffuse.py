@@ -17,8 +17,7 @@ from ..scene.elements import triangle_geometry
 from ..scene.model import Frame, Mesh, Pixels
 from ..scene.rays import RayScene
 from ..scene.visibility import FrameView, Observations, observe, view_frame
-from .estimator import Summary
-from .p_square import PSquare
+from .p_square import PSquare, Summary
 
 Seen = tuple[int, FrameView, Pixels, Observations]
 """A frame's index, what its camera sees of the mesh, its pixels, and what it says of the elements."""

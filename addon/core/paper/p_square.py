@@ -1,10 +1,39 @@
-"""P-square, the paper's running median."""
+"""P-square, the running median (Haefner et al. 2021, sec. 3.1; Jain and Chlamtac, CACM 1985)."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from .estimator import QUARTILES, Summary, between
+QUARTILES = (0.25, 0.5, 0.75)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Typical values of n elements.
+
+    Attributes
+    ----------
+    median : (n, 3) float32
+        Or the mean, for `Mean`. NaN where `count` is 0.
+    lower, upper : (n, 3) float32
+        Quartiles (for `Mean`: one standard deviation below and above).
+    count : (n,) int32
+        Observations.
+    """
+
+    median: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    count: np.ndarray
+
+
+def between(ordered: np.ndarray, rank: float) -> np.ndarray:
+    """Linear interpolation in the last axis at a real-valued rank."""
+    low = int(np.floor(rank))
+    high = min(low + 1, ordered.shape[-1] - 1)
+    return ordered[..., low] + np.float32(rank - low) * (ordered[..., high] - ordered[..., low])
 
 
 class PSquare:

@@ -1,4 +1,4 @@
-"""The target frame of an object (Haefner et al. 2021, sec. 3.3): the one frame that its lobe is fitted to.
+"""The target frame of an object (Haefner et al. 2021, A1 and A2): the one frame that its lobe is fitted to.
 
 Assumption A1: a specular highlight of direct light is likely in it. Assumption A2: its pixels are valid and not
 saturated.
