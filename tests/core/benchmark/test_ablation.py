@@ -55,6 +55,7 @@ def asked(room, out, **more) -> Ablation:
     return Ablation((room.root,), out, (0,), ("sun", "crease-error", "coat"), "draft", unwrap=room.unwrap, **more)
 
 
+@pytest.mark.slow
 def test_runs_that_are_there_are_not_done_again(room, tmp_path):
     told = []
     path = run_ablation(asked(room, tmp_path), told.append)

@@ -121,6 +121,7 @@ def test_each_element_finds_its_light(lit, tmp_path, how):
         assert np.median(off) < (0.06 if made.size == 1 else 0.04) and off.max() < 0.6
 
 
+@pytest.mark.slow
 def test_info_tells_where_the_light_is(replica):
     told = describe(read_capture(replica.root))
     assert told["frames"] == 0 and any("no frames" in warning for warning in told["warnings"])
