@@ -46,6 +46,13 @@ FIGURES = (
     Figure("roughness_by_object", "by object, 1/1000", -1, 1000.0, 1),
     Figure("right", "right models", 1, 1.0, 1),
 )
+SHORT = {
+    "albedo": "albedo",
+    "rerender": "re-render",
+    "roughness_by_pixel": "roughness by pixel",
+    "roughness_by_object": "by object",
+    "right": "models",
+}
 
 
 @dataclass(frozen=True)
@@ -58,7 +65,7 @@ class Gain:
         Mean over the seeds.
     mean : float
     error : float or None
-        Standard error of the mean by the seeds alone; None where no room has two seeds.
+        Standard error of the mean by the seeds alone; None where no room in which the pass acts has two seeds.
     """
 
     by_room: dict[str, float]
@@ -85,11 +92,13 @@ def gain_of(figure: Figure, name: str, runs: Mapping[tuple, Line]) -> Gain | Non
     if not pairs:
         return None
     by_room = {room: float(np.mean(gains)) for room, gains in pairs.items()}
-    repeated = [gains for gains in pairs.values() if len(gains) > 1]
+    # Where a pass does nothing it has no deviation either: what a pair of seeds tells there is no measurement of it.
+    acting = [gains for gains in pairs.values() if any(gains)]
+    repeated = [gains for gains in acting or pairs.values() if len(gains) > 1]
     error = None
     if repeated:
         variance = float(np.mean([np.var(gains, ddof=1) for gains in repeated]))
-        error = float(np.sqrt(variance * sum(1 / len(gains) for gains in pairs.values()))) / len(pairs)
+        error = float(np.sqrt(variance * sum(1 / len(gains) for gains in acting))) / len(pairs)
     return Gain(by_room, float(np.mean(list(by_room.values()))), error)
 
 
@@ -112,10 +121,10 @@ def write_report(folder: Path, path: Path) -> None:
     BadInputError
         There are no lines.
     """
-    lines = read_lines(sorted(folder.glob("*.jsonl")))
+    lines = read_lines(sorted(folder.glob("ablation*.jsonl")))
     runs = {((one["room"], one["preset"]), one["seed"], one["without"]): one for one in lines}
     if not any(left_out == WHOLE for _, _, left_out in runs):
-        raise BadInputError(f"Folder '{folder}' holds no runs of the whole method (*.jsonl).")
+        raise BadInputError(f"Folder '{folder}' holds no runs of the whole method (ablation*.jsonl).")
     image = path.parent / "images" / f"{path.stem}.png"
     plotted = plots_are_possible()
     if plotted:
@@ -143,7 +152,12 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None) -> str:
         "more, as worst and best room show. Albedo: PSNR of Base Color over held-out views. Re-render: PSNR of those "
         "views in display values, predicted from albedo, irradiance and lobes without a renderer; the plain quotient "
         "gives L_d back whatever E is, so what corrects the albedo alone can lower it. Roughness: mean "
-        "absolute error of the square root of alpha. Seconds: processor time of the stages that were done again.",
+        "absolute error of the square root of alpha. Seconds: processor time of the stages that were done again. The "
+        "verdict names the figures in which the gain is more than twice its standard error, either way. Where one "
+        "object is taken for another kind of matter, all figures jump: gains of a single seed say little.",
+        "",
+        "What parts of the mesh denoising gain on meshes with known noise: "
+        "[benchmark/mesh_denoising.md](benchmark/mesh_denoising.md) (`scripts/measure_denoising.py`).",
         "",
         f"Rooms ({', '.join(presets)} preset): {', '.join(_room(one) for one in rooms)}. "
         f"Seeds: {', '.join(str(seed) for seed in sorted({seed for _, seed, _ in runs}))}.",
@@ -151,7 +165,7 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None) -> str:
     ]
     if image:
         lines += [f"![Gain of albedo against seconds]({image})", ""]
-    columns = ["pass", "rooms", *(f.column for f in FIGURES), "worst room, dB", "best room, dB", "seconds"]
+    columns = ["pass", "rooms", *(f.column for f in FIGURES), "worst room, dB", "best room, dB", "seconds", "verdict"]
     lines += ["## All rooms together", "", *_table(columns, [_summary(one.name, runs) for one in acting]), ""]
     head = ["pass", *(_room(room) for room in rooms)]
     lines += ["## Albedo by room, dB", "", *_table(head, [_by_room(one, rooms, runs) for one in acting]), ""]
@@ -203,7 +217,30 @@ def _summary(name: str, runs: Mapping[tuple, Line]) -> list[str]:
     by_room = getattr(gain_of(ALBEDO, name, runs), "by_room", None) or {}
     ends: list[Callable] = [min, max]
     extremes = [f"{_signed(end(by_room.values()))} {_room(end(by_room, key=by_room.get))}" for end in ends if by_room]
-    return [name, f"{len(acts)} of {len(of)}", *cells, *(extremes or ["", ""]), _seconds(name, runs)]
+    return [
+        name,
+        f"{len(acts)} of {len(of)}",
+        *cells,
+        *(extremes or ["", ""]),
+        _seconds(name, runs),
+        _verdict(name, runs),
+    ]
+
+
+def _verdict(name: str, runs: Mapping[tuple, Line]) -> str:
+    """The figures in which a pass gains or costs more than twice the standard error."""
+    gains = {figure.name: gain_of(figure, name, runs) for figure in FIGURES}
+    known = {key: gain for key, gain in gains.items() if gain is not None and gain.error is not None}
+    if not known:
+        return "one seed: open"
+    better = [key for key, gain in known.items() if gain.mean > 2 * gain.error + 1e-9]
+    worse = [key for key, gain in known.items() if gain.mean < -2 * gain.error - 1e-9]
+    words = [
+        f"{verb} {', '.join(SHORT[key] for key in some)}"
+        for verb, some in (("gains", better), ("costs", worse))
+        if some
+    ]
+    return "; ".join(words) or "open"
 
 
 def _by_room(one: Pass, rooms: Sequence[tuple[str, str]], runs: Mapping[tuple, Line]) -> list[str]:

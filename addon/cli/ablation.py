@@ -46,7 +46,7 @@ def add_ablation(commands, epilog: str) -> argparse.ArgumentParser:
         "--table",
         metavar="FILE",
         type=Path,
-        help="run nothing, and write the table of all OUT/*.jsonl as Markdown, with a plot beside it",
+        help="run nothing, and write the table of all OUT/ablation*.jsonl as Markdown, with a plot beside it",
     )
     return parser
 

@@ -118,14 +118,14 @@ def test_gains_and_their_error(tmp_path):
     assert np.isclose(gain_of(FIGURES[2], "sun", runs).mean, 25)  # 1/1000; less is better
     assert np.isclose(seconds_of("sun", runs), (1 + 1 + 3) / 3)
     assert gain_of(FIGURES[0], "coat", runs) is None
-    (tmp_path / "one.jsonl").write_text("\n".join(json.dumps(one) for one in lines[:3]))
-    (tmp_path / "two.jsonl").write_text("\n".join(json.dumps(one) for one in lines[3:]))
+    (tmp_path / "ablation-one.jsonl").write_text("\n".join(json.dumps(one) for one in lines[:3]))
+    (tmp_path / "ablation-two.jsonl").write_text("\n".join(json.dumps(one) for one in lines[3:]))
     write_report(tmp_path, tmp_path / "table.md")
     text = (tmp_path / "table.md").read_text()
     row = next(one for one in text.splitlines() if one.startswith("| sun | 2 of 2"))
-    assert "+1.00 ± 0.87" in row and "-1.00 b" in row and "+3.00 a" in row
+    assert row.endswith("| open |") and "+1.00 ± 0.87" in row and "-1.00 b" in row and "+3.00 a" in row
     assert "Taken out" not in text
-    (tmp_path / "three.jsonl").write_text(json.dumps(line("a", 0, "moonlight", 29.5, 0.1, {})))
+    (tmp_path / "ablation-three.jsonl").write_text(json.dumps(line("a", 0, "moonlight", 29.5, 0.1, {})))
     write_report(tmp_path, tmp_path / "table.md")
     _, _, gone = (tmp_path / "table.md").read_text().partition("## Taken out of the method since")
     assert "| moonlight | 1 of 1 | +0.50 |" in gone
