@@ -1,10 +1,9 @@
 """Light probes for EEVEE: the room's indirect light baked into a volume, so that a preview comes nearer to the picture.
 
-EEVEE knows of no light that bounces between surfaces, nor of what shines and is no lamp, unless it is baked. Measured
-in Blender 5.2 (median luminance beside that of Cycles): the demo's small room 2.4 stops darker before and 0.6 after,
-the living room 0.4 stops brighter, but a view of the demo's tiny result 1.8 darker: not within a stop everywhere, and
-why is not known; neither culling nor twice the places mend that view. What helped is that the volume goes beyond the
-walls, whose light it else mixes with the world's, and, where a world shines in, that the walls' backs count as such.
+EEVEE knows of no light that bounces between surfaces, nor of what shines and is no lamp, unless it is baked. The bake
+alone leaves some rooms two stops too dark, so the volume's intensity is then fitted to small pictures by Cycles (see
+docs/relighting.md). The volume goes beyond the walls, whose light it else mixes with the world's, and, where a world
+shines in, the walls' backs count as such.
 """
 
 from __future__ import annotations
