@@ -16,17 +16,33 @@ from ...luminance import LUMINANCE
 from ...scene.model import Pixels
 from ...scene.visibility import FrameView
 
-LEAST_EXCESS = 0.25
-"""Of the level at which the sensor clipped: fainter, a fringe says more of its surroundings than of the lamp."""
-LEAST_PIXELS = 4
-"""Smaller clipped spots may be glints."""
-LEAST_SHARE = 0.5
-"""Of a clipped spot that must show one object."""
-ENOUGH = 20
-"""Fringe pixels from which on their median is a colour."""
-NEAR, FAR = 2, 4
-"""Pixels from a clipped spot at which its surroundings begin and end."""
 AROUND = np.ones((3, 3), bool)
+
+
+@dataclass(frozen=True)
+class FringeParams:
+    """Of the colours of what was clipped (`fringe-colours` in docs/ablation.md).
+
+    Attributes
+    ----------
+    least_excess : float
+        Of the level at which the sensor clipped: fainter, a fringe says more of its surroundings than of the lamp.
+    least_pixels : int
+        Smaller clipped spots may be glints.
+    least_share : float
+        Of a clipped spot that must show one object.
+    enough : int
+        Fringe pixels from which on their median is a colour.
+    near, far : int
+        Pixels from a clipped spot at which its surroundings begin and end.
+    """
+
+    least_excess: float = 0.25
+    least_pixels: int = 4
+    least_share: float = 0.5
+    enough: int = 20
+    near: int = 2
+    far: int = 4
 
 
 @dataclass(frozen=True)
@@ -56,7 +72,8 @@ class Fringes:
 class FringeCollector:
     """Collects fringes frame by frame; give `add` to `accumulate(also=...)`."""
 
-    def __init__(self):
+    def __init__(self, params: FringeParams = FringeParams()):
+        self._params = params
         self._excess: dict[int, list[np.ndarray]] = {}
 
     def add(self, view: FrameView, pixels: Pixels) -> None:
@@ -66,14 +83,14 @@ class FringeCollector:
             return
         spots, _ = ndimage.label(clipped, AROUND)
         usable = pixels.valid & ~clipped
-        far_from_any = ~ndimage.binary_dilation(clipped, AROUND, NEAR)
+        far_from_any = ~ndimage.binary_dilation(clipped, AROUND, self._params.near)
         for index, box in enumerate(ndimage.find_objects(spots), 1):
             ids = view.object_id[box][spots[box] == index]
             owner = np.bincount(ids[ids >= 0], minlength=1)
-            if len(ids) < LEAST_PIXELS or owner.max() <= LEAST_SHARE * len(ids):
+            if len(ids) < self._params.least_pixels or owner.max() <= self._params.least_share * len(ids):
                 continue
-            around = tuple(slice(max(side.start - FAR, 0), side.stop + FAR) for side in box)
-            excess = _excess(
+            around = tuple(slice(max(side.start - self._params.far, 0), side.stop + self._params.far) for side in box)
+            excess = self._of_spot(
                 spots[around] == index, clipped[around] & (spots[around] != index), usable[around],
                 far_from_any[around] & usable[around], pixels.radiance[around],
             )  # fmt: skip
@@ -83,24 +100,23 @@ class FringeCollector:
     def result(self) -> Fringes:
         """Colours of the objects with enough fringe pixels: the median of each channel's share in the luminance."""
         found = {i: np.concatenate(parts) for i, parts in sorted(self._excess.items())}
-        found = {i: excess for i, excess in found.items() if len(excess) >= ENOUGH}
+        found = {i: excess for i, excess in found.items() if len(excess) >= self._params.enough}
         if not found:
             return Fringes.none()
         colour = np.array([np.median(excess / (excess @ LUMINANCE)[:, None], 0) for excess in found.values()])
         colour /= (colour @ LUMINANCE)[:, None]
         return Fringes(np.array(list(found), np.int32), colour.astype(np.float32))
 
-
-def _excess(
-    spot: np.ndarray, others: np.ndarray, usable: np.ndarray, behind: np.ndarray, radiance: np.ndarray
-) -> np.ndarray:
-    """What the pixels next to a clipped spot have above its surroundings, (p, 3) float64, where that is much."""
-    fringe = ndimage.binary_dilation(spot, AROUND) & usable & ~ndimage.binary_dilation(others, AROUND)
-    behind = behind & ndimage.binary_dilation(spot, AROUND, FAR)
-    if not fringe.any() or not behind.any():
-        return np.zeros((0, 3))
-    excess = radiance[fringe].astype(np.float64) - np.median(radiance[behind], 0)
-    # Clipped to inf, pixels have no value: the brightest of the fringe is all that is known of the sensor.
-    bound = (radiance[spot] @ LUMINANCE)[radiance[spot].any(1)]
-    level = float(bound.min()) if len(bound) else float((radiance[fringe] @ LUMINANCE).max())
-    return excess[(excess.min(1) >= 0) & (excess @ LUMINANCE >= LEAST_EXCESS * level)]
+    def _of_spot(
+        self, spot: np.ndarray, others: np.ndarray, usable: np.ndarray, behind: np.ndarray, radiance: np.ndarray
+    ) -> np.ndarray:
+        """What the pixels next to a clipped spot have above its surroundings, (p, 3) float64, where that is much."""
+        fringe = ndimage.binary_dilation(spot, AROUND) & usable & ~ndimage.binary_dilation(others, AROUND)
+        behind = behind & ndimage.binary_dilation(spot, AROUND, self._params.far)
+        if not fringe.any() or not behind.any():
+            return np.zeros((0, 3))
+        excess = radiance[fringe].astype(np.float64) - np.median(radiance[behind], 0)
+        # Clipped to inf, pixels have no value: the brightest of the fringe is all that is known of the sensor.
+        bound = (radiance[spot] @ LUMINANCE)[radiance[spot].any(1)]
+        level = float(bound.min()) if len(bound) else float((radiance[fringe] @ LUMINANCE).max())
+        return excess[(excess.min(1) >= 0) & (excess @ LUMINANCE >= self._params.least_excess * level)]
