@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -99,6 +102,19 @@ def test_the_digest_is_the_same_wherever_the_source_lies(copy):
         path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
     (copy / "pipeline" / "notes.txt").write_text("no source")
     assert sources(copy) == sources(CORE)
+
+
+def test_the_source_may_lie_behind_a_link(tmp_path):
+    """As an extension that is linked into Blender's folder."""
+    link = tmp_path / "link"
+    try:
+        link.symlink_to(CORE.parent.parent, target_is_directory=True)
+    except OSError:
+        pytest.skip("no links here")
+    told = "from addon.core.pipeline.stages import code; print(code())"
+    done = subprocess.run([sys.executable, "-P", "-c", told], env=os.environ | {"PYTHONPATH": str(link)},
+                          capture_output=True, text=True, check=True)  # fmt: skip
+    assert done.stdout.strip() == stages.code()
 
 
 @pytest.mark.parametrize(
