@@ -39,10 +39,11 @@ objects; no constant was chosen on it. Both are rendered by Mitsuba, so not by t
 5 mm and 0.2 degrees, vertices by up to 5 mm, 2 % noise, exposures over two stops, clipped lamps. Time on two cores.
 A dash: not measured. Two runs that differ by rounding alone differ by .1 to .3 dB.
 
-Elsewhere: estimators by themselves in [speed-against-error.md](speed-against-error.md), stated errors in
-[evidence.md](evidence.md), cases with a known answer in [hard_cases.md](hard_cases.md).
-`scripts/error_budget.py CAPTURE RESULT` says where an albedo's error comes from, `python -m scripts.qa_rooms` renders
-furnished rooms with truth, `scripts/perturb_capture.py` makes of a capture what a scanner would have.
+Elsewhere: what each pass gains in [ablation.md](ablation.md), estimators by themselves in
+[speed-against-error.md](speed-against-error.md), stated errors in [evidence.md](evidence.md), cases with a known
+answer in [hard_cases.md](hard_cases.md). `scripts/error_budget.py CAPTURE RESULT` says where an albedo's error
+comes from, `python -m scripts.qa_rooms` renders furnished rooms with truth, `scripts/perturb_capture.py` makes of a
+capture what a scanner would have.
 
 What is not measured: real captures with truth; more than two seeds of a perturbed room.
 """
