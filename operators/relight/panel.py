@@ -14,7 +14,7 @@ from . import light_pictures
 from .base import has_room
 from .exposure import look_soon
 
-NAME = 0.5
+NAME = 0.6
 """Share of a row of the lamps that their names have."""
 ICONS = {"WINDOW": "LIGHT_AREA", "SOFTBOX": "MESH_PLANE", "SPOT": "LIGHT_SPOT", "SUN": "LIGHT_SUN"}
 
@@ -41,7 +41,7 @@ class SCAN_RELIGHT_UL_lamps(NamedRows, bpy.types.UIList):
             value = row.row(align=True)
             value.enabled = lamp.on
             colour = value.row(align=True)
-            colour.scale_x = 0.4
+            colour.scale_x = 0.3
             colour.enabled = relight_lamps.colour(material) is not None
             colour.prop(lamp, "colour", text="")
             value.prop(lamp, "factor", text="")

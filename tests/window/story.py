@@ -129,10 +129,11 @@ for extra in bpy.context.window_manager.windows[1:]:
     def choose(self, row: int = 1) -> str:
         """Click on a row of the results, which are scrolled to where it shows; the chosen object's name."""
         x, y = self.window.ask("find(('scan_relight_row',), across=(0.3,))")
-        scrolled = min(self._scrolled, row) if row < self._scrolled + VISIBLE else row - VISIBLE + 1
-        self.window.turn_wheel(x, y, scrolled - self._scrolled)
-        self._scrolled = scrolled
-        self.window.click_at(x, y + 23 * (row - scrolled))
+        if self._scrolled:
+            self.window.turn_wheel(x, y, -2 - self._scrolled)  # to its top, where it ends
+        self._scrolled = max(row - VISIBLE + 1, 0)
+        self.window.turn_wheel(x, y, self._scrolled)
+        self.window.click_at(x, y + 23 * (row - self._scrolled))
         return self.window.wait_for("getattr(bpy.context.view_layer.objects.active, 'name', '')")
 
     def choose_in_view(self, name: str) -> None:
