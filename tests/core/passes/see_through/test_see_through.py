@@ -9,7 +9,7 @@ import pytest
 
 from addon.core.brdf.transparent import TRANSPARENT
 from addon.core.passes.see_through.see_through import look_behind
-from addon.core.pipeline import specular as reflect
+from addon.core.pipeline import choose_models
 from addon.core.pipeline.specular import fit_specular
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.samples import Samples
@@ -145,7 +145,7 @@ def test_a_few_elements_at_its_rim_do_not_make_it_glass(share, told, monkeypatch
         y = field.atlas.position[element, 1] - 0.8
         return replace(found, known=found.known & (y < share * 1.4))
 
-    monkeypatch.setattr(reflect, "look_behind", at_the_rim)
+    monkeypatch.setattr(choose_models, "look_behind", at_the_rim)
     room = Room()
     material, _, _ = room.recovered(0.1 + 0.5 * room.behind)
     assert (material.model == TRANSPARENT) == told
