@@ -113,6 +113,7 @@ def test_a_shift_is_measured_in_pixels(pixels):
     assert np.median(found.misaligned) < 0.15
 
 
+@pytest.mark.slow
 def test_a_single_frame_and_a_blank_one(room):
     capture, read = room
     alone = look(replace(capture, frames=capture.frames[:1]), read)

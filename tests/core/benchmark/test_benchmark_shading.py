@@ -49,6 +49,7 @@ def test_the_same_seed_gives_the_same_error(few):
     assert errors[0] == errors[1] > 0
 
 
+@pytest.mark.slow
 def test_rays_are_recorded_and_traced_again():
     room = make_room("lamp", SMALL, 0)
     scene = room.field.scene

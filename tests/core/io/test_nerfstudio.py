@@ -279,6 +279,7 @@ def test_a_mesh_named_in_the_file(capture):
     assert len(read_capture(capture.root).mesh.triangles) == 12
 
 
+@pytest.mark.slow
 def test_the_living_room_in_other_words(shared, tmp_path):
     """Split files, a moved world and per-frame intrinsics give the poses that the plain file gives."""
     folder = shared / "captures/living-room"

@@ -232,6 +232,7 @@ SPOILS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SPOILS)
 def test_what_is_wrong_is_one_sentence(replica, name):
     spoil, told = SPOILS[name]

@@ -89,6 +89,7 @@ def test_a_small_lamps_highlight(phi):
     assert np.allclose(found.A[..., 1], found.A[..., 0] / 2, rtol=1e-3, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_room_with_a_lamp():
     """A box with coloured walls, all phi at once, against the brute-force sum."""
     box = Box()

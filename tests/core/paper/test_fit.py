@@ -25,6 +25,7 @@ def parts(box, element, direction, rays=4000, grid=PHI):
     return reflected_parts(captured(box.room, box.field.radiance), *where, grid, rays, threads=2)
 
 
+@pytest.mark.slow
 def test_f_nd_is_reciprocal_and_takes_no_more_than_it_gets():
     """Swapping w and wo changes nothing; under a white sky no lobe sends back more than what came."""
     rng = np.random.default_rng(0)

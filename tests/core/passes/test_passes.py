@@ -41,6 +41,7 @@ def test_only_its_own_stage_has_it_in_its_key():
     assert left_out_of("surface", ("sun",)) == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("left_out", "kept"), [(("coat",), 4), (("caustics",), 3), (("sun",), 2)])
 def test_stages_before_it_are_taken_from_the_store(disk, tmp_path, left_out, kept):
     disk.run(tmp_path)
@@ -48,6 +49,7 @@ def test_stages_before_it_are_taken_from_the_store(disk, tmp_path, left_out, kep
     assert found.stored == {stage: i < kept for i, stage in enumerate(STAGES)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stage", RUN_STAGES)
 def test_a_room_is_recovered_without_any_pass_of_a_stage(disk, tmp_path, stage):
     found = disk.run(tmp_path, replace(CHEAP, without=tuple(one.name for one in PASSES if one.stage == stage)))

@@ -145,6 +145,7 @@ def test_noise_of_a_mesh_is_measured_and_curvature_is_none():
     assert np.median(tilt(with_vertices(bent), 0.004)) == pytest.approx(0.6 * 0.004 / (0.05 / np.sqrt(2)), rel=0.3)
 
 
+@pytest.mark.slow
 def test_poses_are_put_right_stored_and_told(tmp_path, monkeypatch):
     monkeypatch.setattr(poses_found, "LEAST_SHIFT", 0.25)  # the pictures are tiny
     far = np.array([4e5, 5e5, 300.0])

@@ -113,6 +113,7 @@ def test_as_a_whole_run_with_the_same_corrections(disk, finished, result, tmp_pa
         assert np.median(np.abs(images["albedo_error"][mine] - wholes["albedo_error"][mine])) < 0.01
 
 
+@pytest.mark.slow
 def test_all_else_is_held(finished, result):
     run = refit(result, told=GIVEN)
     atlas, before, after = run.surface().atlas, pictures(finished), pictures(result)
@@ -166,6 +167,7 @@ def test_a_lamp_given_and_taken_back(finished, result):
     assert np.abs(pictures(finished)["albedo"] - pictures(result)["albedo"]).max() < 0.01
 
 
+@pytest.mark.slow
 def test_a_white_makes_all_of_it_anew(finished, result):
     mean = materials(finished)[4]["evidence"]["albedo"]
     refit(result, told={"white": {"object": 4, "albedo": [x / 1.2 for x in mean]}})

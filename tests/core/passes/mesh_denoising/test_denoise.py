@@ -96,6 +96,7 @@ def test_a_cube_is_flat_again_with_sharp_edges():
     assert rms(found.vertices - true.vertices) < 0.5 * rms(off.vertices - true.vertices)
 
 
+@pytest.mark.slow
 def test_a_sphere_keeps_its_radius():
     true = sphere()
     found = smoothed(noisy(true))
