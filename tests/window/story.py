@@ -36,8 +36,8 @@ if found:
 """
 
 
-VISIBLE = 6
-"""Rows of the results that are seen at once."""
+ROW, VISIBLE = 20, 6
+"""Pixels of a row of the results, and how many are seen at once."""
 
 
 class Story:
@@ -133,7 +133,7 @@ for extra in bpy.context.window_manager.windows[1:]:
             self.window.turn_wheel(x, y, -2 - self._scrolled)  # to its top, where it ends
         self._scrolled = max(row - VISIBLE + 1, 0)
         self.window.turn_wheel(x, y, self._scrolled)
-        self.window.click_at(x, y + 23 * (row - self._scrolled))
+        self.window.click_at(x, y + ROW * (row - self._scrolled))
         return self.window.wait_for("getattr(bpy.context.view_layer.objects.active, 'name', '')")
 
     def choose_in_view(self, name: str) -> None:
