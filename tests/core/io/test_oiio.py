@@ -21,8 +21,8 @@ from addon.core.io.pixels import read_pixels
 from addon.core.io.png import SIGNATURE, write_png
 from addon.core.io.read import read_capture
 from tests.core.io.conftest import HEIGHT, JPEG, WIDTH
+from tests.core.io.hostile.cases import ADAM7, png_content, tiff_content
 from tests.core.io.hostile.cases import CODES as FRAME_CODES
-from tests.core.io.hostile.cases import png_content, tiff_content
 
 CODES = np.random.default_rng(0).integers(0, 200, (HEIGHT, WIDTH, 3), np.uint8)
 
@@ -105,15 +105,7 @@ def test_interlaced(tmp_path, size, bits):
     width, height = size
     values = np.random.default_rng(4).integers(0, 1 << bits, (height, width), np.uint8)
     lines = b""
-    for y, x, down, right in (
-        (0, 0, 8, 8),
-        (0, 4, 8, 8),
-        (4, 0, 8, 4),
-        (0, 2, 4, 4),
-        (2, 0, 4, 2),
-        (0, 1, 2, 2),
-        (1, 0, 2, 1),
-    ):
+    for y, x, down, right in ADAM7:
         part = values[y::down, x::right]
         if part.size:
             part = np.packbits(part, axis=1) if bits == 1 else part

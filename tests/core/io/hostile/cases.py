@@ -120,6 +120,10 @@ def hdr_content() -> bytes:
     return f"#?RADIANCE\nEXPOSURE=2\nFORMAT=32-bit_rle_rgbe\n\n-Y {HEIGHT} +X {WIDTH}\n".encode() + body
 
 
+ADAM7 = ((0, 0, 8, 8), (0, 4, 8, 8), (4, 0, 8, 4), (0, 2, 4, 4), (2, 0, 4, 2), (0, 1, 2, 2), (1, 0, 2, 1))
+"""Passes of an interlaced PNG: first row and column, and steps of both."""
+
+
 def png_content() -> bytes:
     """16 bits, interlaced, all filters."""
 
@@ -127,15 +131,7 @@ def png_content() -> bytes:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
     lines = b""
-    for y, x, down, right in (
-        (0, 0, 8, 8),
-        (0, 4, 8, 8),
-        (4, 0, 8, 4),
-        (0, 2, 4, 4),
-        (2, 0, 4, 2),
-        (0, 1, 2, 2),
-        (1, 0, 2, 1),
-    ):
+    for y, x, down, right in ADAM7:
         part = CODES[y::down, x::right].astype(">u2")
         lines += b"".join(bytes((k % 5,)) + line.tobytes() for k, line in enumerate(part) if part.size)
     header = struct.pack(">IIBBBBB", WIDTH, HEIGHT, 16, 2, 0, 0, 1)
