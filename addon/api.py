@@ -16,7 +16,7 @@ from .core.errors import BadInputError, InterruptedRun, ScanRelightError
 from .core.io.layout import AS_FOUND, Layout, RawMesh, Reader, Reading
 from .core.io.read import read_capture
 from .core.io.readers import register_reader
-from .core.pipeline.run import Run, SceneWriter, check_run, progress_for
+from .core.pipeline.run import Run, SceneWriter, check_run, progress_of_run
 from .core.progress import Progress, ProgressEvent
 from .core.scene.model import Camera, Capture, Frame, Mesh
 from .core.scene.unwrap import Unwrap, by_xatlas, own_coordinates
@@ -204,7 +204,8 @@ def recover(
     ScanRelightError
         One sentence on what is wrong; `BadInputError` where it is with what was given.
     """
-    told = progress_for(settings or Settings(), progress, should_stop)
+    check_run(capture.root if isinstance(capture, Capture) else Path(capture), Path(folder))
+    told = progress_of_run(progress, should_stop)
     run, lay_out = _read(capture, Path(folder), settings or Settings(), told, unwrap, reading, overrides)
     with run:
         run.stages(lay_out)
@@ -243,7 +244,6 @@ def _read(
 ) -> tuple[Run, Unwrap]:
     """The run over a capture, which is read now unless it was, and what lays out its atlas."""
     started = time.monotonic()
-    check_run(capture.root if isinstance(capture, Capture) else Path(capture), folder)
     lay_out = unwrapper(unwrap) if isinstance(unwrap, str) else unwrap
     progress.stage(READ)
     if not isinstance(capture, Capture):

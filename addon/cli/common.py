@@ -121,7 +121,7 @@ def add_common(parser: argparse.ArgumentParser, function, quiet: bool = True) ->
 
 @contextlib.contextmanager
 def console_run(arguments: argparse.Namespace, stream: TextIO):
-    """The listener and the wish to stop of a long command, as keywords of `run.progress_for`."""
+    """The listener and the wish to stop of a long command, as keywords of `run.progress_of_run`."""
     machine = getattr(arguments, "progress", "text") == "json"
     listener = JsonProgress(stream) if machine else ConsoleProgress(stream, quiet=arguments.quiet)
     guard = MemoryGuard(getattr(arguments, "memory_limit", 0.0), lambda text: os._exit(complain(text, EXIT_FAILURE)))

@@ -84,9 +84,9 @@ def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
             from ..api import run_without_scene as run
 
             how["unwrap"] = arguments.unwrap
-        from ..core.pipeline.run import progress_for
+        from ..core.pipeline.run import progress_of_run
     with console_run(arguments, stream) as console:
-        report = run(arguments.capture, arguments.out, settings, progress_for(settings, **console), **how)
+        report = run(arguments.capture, arguments.out, settings, progress_of_run(**console), **how)
     if isinstance(console["listener"], JsonProgress):
         for warning in report.get("warnings", ()):
             console["listener"].tell("warning", text=warning)

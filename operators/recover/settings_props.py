@@ -224,7 +224,7 @@ class StageOperator(CaptureOperator):
     def run(self, context, until: str, **where) -> list[str]:
         """Run the stages up to `until` here; returns the report's warnings. `where` goes to `bridge.job.run.run`."""
         from ...addon.bridge.job.run import run
-        from ...addon.core.pipeline.run import progress_for  # not earlier: Blender's start should not wait for it
+        from ...addon.core.pipeline.run import progress_of_run  # not earlier: Blender's start should not wait for it
 
         settings = self.settings()
         guard = MemoryGuard(self.memory_limit())
@@ -233,7 +233,7 @@ class StageOperator(CaptureOperator):
                 self.folder("capture_folder"),
                 self.folder("result_folder"),
                 settings,
-                progress_for(settings, should_stop=guard),
+                progress_of_run(should_stop=guard),
                 until,
                 reading=reading_props.reading(self),
                 from_stage=None if self.from_stage == "NONE" else self.from_stage,

@@ -37,12 +37,10 @@ SceneWriter = Callable[[Recovery, Capture], tuple[str, ...]]
 be; gives sentences on what is doubtful."""
 
 
-def progress_for(
-    settings: Settings,
-    listener: Callable[[ProgressEvent], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+def progress_of_run(
+    listener: Callable[[ProgressEvent], None] | None = None, should_stop: Callable[[], bool] | None = None
 ) -> Progress:
-    """A `Progress` that knows what the stages of a run cost under `settings`."""
+    """A `Progress` that knows what the stages of a run cost."""
     return Progress(listener, should_stop, WEIGHTS)
 
 
