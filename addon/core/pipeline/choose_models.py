@@ -16,27 +16,16 @@ from ..passes.see_through.see_through import is_sure, judge, look_behind
 from ..passes.specular.by_looks import coated_by_looks, metal_by_looks
 from ..passes.specular.given import fit_given
 from ..passes.specular.intervals import GlossInterval, gloss_interval
-from ..passes.specular.models import MIN_ELEMENTS, Choice, adopt_from_class, choose_model, set_apart
+from ..passes.specular.models import Choice, adopt_from_class, choose_model, set_apart
 from ..passes.specular.one_colour import compare, compare_coat
+from ..passes.specular.params import FIT
 from ..passes.specular.problems import Problems
 from ..progress import Progress
 from ..results.overrides import Given
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance
 from ..scene.samples import Samples
-
-FIT_ELEMENTS = 350
-FIT_VIEWS = 12
-"""Elements of an object that the fit looks at, and views of each."""
-SCREEN_ELEMENTS = 200
-SCREEN_RAYS = 4
-"""The first look is at fewer elements and with so many times fewer rays; it drops what a lobe makes much worse."""
-HOPELESS = 1.15
-"""A lobe that raises the cost by this factor in the first look needs no second."""
-LOOKS_VIEWS = 4
-"""Views of each element for the question whether an object looks like a metal or coated all over (`by_looks`)."""
-LOOKS_LIKE_NONE = 1.5
-"""A metal whose spread is so many times the other's in the first look needs no second."""
+from ..significance import LEVELS
 
 
 @dataclass(frozen=True)
@@ -143,16 +132,16 @@ def _by_frames(
     maker: Problems, object_id: int, rays: int, first_look: bool
 ) -> tuple[Choice, Problem | None, np.ndarray]:
     """Choose a model; in two looks, as only some objects deserve the second. Last: which samples were looked at."""
-    index = maker.pick(object_id, SCREEN_ELEMENTS, FIT_VIEWS)
+    index = maker.pick(object_id, FIT.screen_elements, FIT.views)
     if not len(index):
         return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
-    screen = maker.problem(index, max(rays // SCREEN_RAYS, 16), rough=True)
+    screen = maker.problem(index, max(rays // FIT.screen_rays, 16), rough=True)
     first = choose_model(screen)
     fit = first.fit
-    hopeless = fit is None or fit.cost > HOPELESS * fit.cost_lambertian
+    hopeless = fit is None or fit.cost > FIT.hopeless * fit.cost_lambertian
     if hopeless and not first.model.lobe_alone and first_look:
         return first, screen, index
-    index = maker.pick(object_id, FIT_ELEMENTS, FIT_VIEWS, seed=1)
+    index = maker.pick(object_id, FIT.elements, FIT.views, seed=1)
     problem = maker.problem(index, rays)
     return choose_model(problem), problem, index
 
@@ -167,15 +156,15 @@ def _by_looks(
     without: Collection[str],
 ) -> tuple[Choice, Problem | None]:
     """Ask whether an object looks like a metal or coated all over; choice and observations stay as they were if not."""
-    if problem is not None and len(np.unique(problem.element)) >= MIN_ELEMENTS:
+    if problem is not None and len(np.unique(problem.element)) >= LEVELS.few:
         first = compare(problem, irradiance)
         if first is None:
             return choice, problem
-        if first.ratio > LOOKS_LIKE_NONE:
+        if first.ratio > FIT.looks_like_none:
             coat = None if choice.model.has_lobe else compare_coat(problem, irradiance)
             if coat is None or coat.ratio > 1:
                 return choice, problem
-    index = maker.pick(object_id, FIT_ELEMENTS, LOOKS_VIEWS, least=1, seed=1)
+    index = maker.pick(object_id, FIT.elements, LEVELS.views, least=1, seed=1)
     if not len(index):
         return choice, problem
     whole = maker.problem(index, rays)

@@ -19,6 +19,7 @@ from ..passes.glossy_light.glossy_light import Excess, glossy_light
 from ..passes.see_through.see_through import look_behind
 from ..passes.specular.describe import as_given, described, flat_mirror, lamp_material
 from ..passes.specular.given import given_note, same_material
+from ..passes.specular.params import FIT
 from ..passes.specular.problems import Problems
 from ..passes.specular.separate import specular_in_median, spread_over_object
 from ..progress import Progress
@@ -34,10 +35,6 @@ from .stage import Stage
 from .surface import STAGE as SURFACE
 
 STAGE = Stage("specular", Path(__file__), (SURFACE, FRAMES, SHADING), ("specular", "specular_rays", "refine", "seed"))
-SEPARATE_ELEMENTS = 2500
-SEPARATE_VIEWS = 9
-SEPARATE_RAYS = 8
-"""Taking the lobe out of a median averages over views, and its width is known; so many times fewer rays do."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +150,7 @@ def fit_specular(
         excess = held.found.excess
     if refine:
         apart = [m for m in materials if m.object_id not in kept]
-        _take_out(specular, apart, room, maker, max(rays // SEPARATE_RAYS, 16), threads, progress)
+        _take_out(specular, apart, room, maker, max(rays // FIT.separate_rays, 16), threads, progress)
     if refine > 1 and held is None:
         seen = np.flatnonzero(lit_diffuse.seen)
         sent = Excess(field, materials, specular, seed)
@@ -240,7 +237,7 @@ def _separate(
 ) -> tuple[np.ndarray, np.ndarray]:
     """A glossy object's elements (n,), and the specular part of their L_d, (n, 3)."""
     own = np.flatnonzero(field.atlas.object_id == material.object_id)
-    index = maker.pick(material.object_id, SEPARATE_ELEMENTS, SEPARATE_VIEWS, least=1, seed=2)
+    index = maker.pick(material.object_id, FIT.separate_elements, FIT.separate_views, least=1, seed=2)
     if not len(index):
         return own, np.zeros((len(own), 3), np.float32)
     if material.alpha is None or material.f0 is None or material.model.microfacets is None:
@@ -255,7 +252,7 @@ def _without_background(
 ) -> tuple[np.ndarray, np.ndarray]:
     """A glass object's elements (n,), and the part of their L_d that came from behind, (n, 3)."""
     own = np.flatnonzero(field.atlas.object_id == material.object_id)
-    index = maker.pick(material.object_id, SEPARATE_ELEMENTS, SEPARATE_VIEWS, least=1, seed=2)
+    index = maker.pick(material.object_id, FIT.separate_elements, FIT.separate_views, least=1, seed=2)
     if not len(index):
         return own, np.zeros((len(own), 3), np.float32)
     behind = look_behind(field, seen, samples.element[index], samples.direction[index], material.object_id)

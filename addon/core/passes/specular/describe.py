@@ -17,9 +17,7 @@ from ...scene.model import Instance
 from .given import given_interval, given_note
 from .intervals import GlossInterval
 from .models import Choice, metal_f0
-
-UNRESOLVED = 0.17
-"""Roughness up to which the frames show a mirror: a lobe of phi 0.03 is as wide as a few pixels."""
+from .params import FIT
 
 
 def lamp_material(instance: Instance, radiance: np.ndarray, irradiance: np.ndarray, note: str) -> ObjectMaterial:
@@ -41,7 +39,7 @@ def flat_mirror(instance: Instance, mirror: Mirror, observations: int) -> Object
     note = "A flat mirror: the frames show the room in it." if observations else "A flat mirror, as the capture tells."
     return ObjectMaterial(
         instance.object_id, instance.class_name, METAL, alpha=0.0, f0=METAL.as_f0(mirror.f0),
-        observations=observations, roughness_low=0.0, roughness_high=UNRESOLVED if observations else 0.0, note=note,
+        observations=observations, roughness_low=0.0, roughness_high=FIT.unresolved if observations else 0.0, note=note,
     )  # fmt: skip
 
 

@@ -19,17 +19,12 @@ from ...fit.lobe_fit import LobeFit, fit_lobe
 from ...fit.problem import DenseProblem, Problem
 from ...light.lobes import GRID
 from ...results.overrides import Given
+from ...significance import LEVELS
 from .intervals import UNKNOWN, GlossInterval
-from .models import MIN_ELEMENTS, Choice, choose_model, metal_f0, metal_fit
+from .models import Choice, choose_model, metal_f0, metal_fit
 from .one_colour import compare, compare_coat
+from .params import FIT, GIVEN
 from .problems import Problems
-
-SURE = 1000.0
-"""Standard errors that a given model or lobe counts for when others of its class take over what is sure."""
-PLAUSIBLE_PHI = 0.25
-"""Of an object that no frame shows well enough: satin."""
-ELEMENTS, VIEWS, FEW_VIEWS = 350, 12, 4
-"""Elements and views that the fit looks at; views where an element may have a single one."""
 
 
 def fit_given(
@@ -47,7 +42,7 @@ def fit_given(
         Of each observation.
     """
     if given.brdf is not None and not given.brdf.has_lobe:
-        return Choice(given.brdf, None, sigmas=SURE), None
+        return Choice(given.brdf, None, sigmas=GIVEN.sure), None
     phi = None if given.roughness is None else given.roughness**2
     problem, enough = _problem(maker, object_id, rays, phi, (given.brdf or DIELECTRIC).microfacets or GGX)
     model = given.brdf or _model(given, problem, enough)
@@ -55,16 +50,16 @@ def fit_given(
     fit = _fit(model, phi, f0, problem, enough, irradiance)
     if phi is not None:
         fit = replace(fit, phi=phi)  # not the nearest that the grid has
-    return Choice(model, replace(fit, psi=fit.psi if f0 is None else f0), gain=0.0, sigmas=SURE), problem
+    return Choice(model, replace(fit, psi=fit.psi if f0 is None else f0), gain=0.0, sigmas=GIVEN.sure), problem
 
 
 def _problem(
     maker: Problems, object_id: int, rays: int, phi: float | None, microfacets: Microfacets
 ) -> tuple[Problem | None, bool]:
     """The object's observations, and whether they can tell what changes with the view."""
-    index, enough = maker.pick(object_id, ELEMENTS, VIEWS, seed=1), True
-    if len(np.unique(maker.element(index))) < MIN_ELEMENTS:
-        index, enough = maker.pick(object_id, ELEMENTS, FEW_VIEWS, least=1, seed=1), False
+    index, enough = maker.pick(object_id, FIT.elements, FIT.views, seed=1), True
+    if len(np.unique(maker.element(index))) < LEVELS.few:
+        index, enough = maker.pick(object_id, FIT.elements, LEVELS.views, least=1, seed=1), False
     if not len(index):
         return None, False
     width = None if phi is None else max(phi, float(GRID[0]))
@@ -95,7 +90,7 @@ def _fit(
     looks = None
     if problem is not None and phi is None:
         looks = (compare_coat if model.has_diffuse else compare)(problem, irradiance)
-    phi = phi if phi is not None else looks.phi if looks is not None else PLAUSIBLE_PHI
+    phi = phi if phi is not None else looks.phi if looks is not None else GIVEN.plausible_phi
     psi = np.broadcast_to(np.asarray(model.plausible_f0(), float), 3)
     if not model.has_diffuse and problem is not None:
         psi = metal_f0(problem, phi)

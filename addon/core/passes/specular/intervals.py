@@ -17,24 +17,7 @@ from ...brdf.model import Brdf
 from ...fit.lobe_fit import fit_lobe
 from ...fit.problem import DenseProblem, Problem
 from .models import Choice
-
-GROUPS = 6
-ROUGHNESS_SYSTEMATIC = 0.07
-"""Standard error of Blender's roughness that all elements share; the grid of phi alone has steps of 0.06. Of 24 glossy
-objects in eight rendered rooms (`tests/blender/evidence`) the 90 % intervals then hold 22, in the living room 23 of
-23; the jackknife alone says 0.02 in the median where 0.07 is true."""
-SPECULAR_SYSTEMATIC = 0.45
-"""The same of log psi: 23 of those 24 are held, in the living room 20 of 23; psi came out between 0.6 and 2.2 of the
-truth."""
-METAL_SYSTEMATIC = 0.15
-"""The same of log F0 of metals, measured on five in the living room only (0.89 to 1.15 of the truth)."""
-ADOPTED = 0.1
-"""Standard error of a roughness that was taken over from another object of the class."""
-
-LOOKS = 0.2
-"""The same of one that follows from how the object looks all over (`one_colour`), which is too broad as a rule: 13
-metals in three rooms came out -.01 to .25 above the truth (.13 in the root mean square); 3 of 6 in a fourth, rims of
-spots mixed with their lamps, .5. These intervals hold 16 of the 19."""
+from .params import INTERVALS
 
 
 @dataclass(frozen=True)
@@ -57,11 +40,11 @@ def gloss_interval(choice: Choice, problem: Problem | None) -> GlossInterval:
     if not choice.model.has_lobe or choice.fit is None:
         return UNKNOWN
     roughness, specular = float(np.sqrt(choice.fit.phi)), max(float(np.mean(choice.fit.psi)), 1e-4)
-    spread, known = (0.0, 0.0), ADOPTED if choice.looks is None else LOOKS
+    spread, known = (0.0, 0.0), INTERVALS.adopted if choice.looks is None else INTERVALS.by_looks
     if choice.sigmas > 0 and problem is not None and choice.looks is None:
-        spread, known = jackknife(problem, choice.model), ROUGHNESS_SYSTEMATIC
+        spread, known = jackknife(problem, choice.model), INTERVALS.roughness_systematic
     width = Z90 * float(np.hypot(spread[0], known))
-    systematic = METAL_SYSTEMATIC if choice.model.lobe_alone else SPECULAR_SYSTEMATIC
+    systematic = INTERVALS.metal_systematic if choice.model.lobe_alone else INTERVALS.specular_systematic
     factor = float(np.exp(Z90 * np.hypot(min(spread[1] / specular, 1.0), systematic)))
     return GlossInterval(
         (max(roughness - width, 0.0), min(roughness + width, 1.0)), (specular / factor, min(specular * factor, 1.0))
@@ -72,7 +55,7 @@ def jackknife(problem: Problem, model: Brdf) -> tuple[float, float]:
     """Standard errors of roughness and psi of a model's fit, as far as elements differ."""
     dense = DenseProblem(problem)
     count = dense.there.shape[1]
-    groups = min(GROUPS, count // 3)
+    groups = min(INTERVALS.groups, count // 3)
     if groups < 3:
         return 0.3, 0.3
     group = np.arange(count) * groups // count

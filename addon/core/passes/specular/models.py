@@ -15,31 +15,10 @@ from ...fit.lobe_fit import LobeFit, element_costs, fit_lobe, held_out_costs, hu
 from ...fit.problem import DenseProblem, Problem
 from ...fit.transmission import SeeThrough
 from ...light.lobes import nearest
+from ...significance import LEVELS
 from ...weighted import weighted_median
-from .one_colour import BROADEST_PHI, Coated, OneColour
-
-BARE = 2.0
-"""A metal has no diffuse part. Its lobe alone, with nothing of each element's own, may cost up to so many times what
-each element's own mean does (errors of the light field and of the mesh): metals in the living room had 0.1 to 1.4,
-dielectrics and matt things whose lobe looked like a metal's 2.4 to 60, there and in four small rooms."""
-BARE_AT_MOST, MUCH = 3.0, 0.2
-"""The same where a metal takes away more than this share of what a matt surface costs, and of what a dielectric does:
-thin legs of steel, 32 elements in 5 views, had 2.4."""
-MIN_GAIN = 0.02
-MIN_SIGMAS = 3.0
-"""A lobe must lower the cost on elements that its fit has not seen by this share, and by this many standard errors."""
-LARGE_GAIN, LARGE_SIGMAS, LARGE_ELEMENTS = 0.1, 2.0, 50
-"""A lobe that takes so much off needs fewer standard errors: few elements show a small highlight, but what they show
-nothing else explains (a bathroom's tiles, 38,000 pixels: gain .16, 2.2; of what is truly matt in the living room and
-its perturbed scan nothing gains a tenth with less than 3). Not of a handful of elements (a cord, a pixel wide at most),
-whose standard error is no better known than that."""
-SURELY_METAL = 2.0
-"""Standard errors by which a metal must also beat a dielectric over a diffuse part, once it has beaten a matt surface:
-that alone it does not stand or fall with, as it has to do without a diffuse part besides (`BARE`). Below `MIN_SIGMAS`
-others of its class decide: of 31 true metals in nine rooms two had less, a black keyboard had 1.9 or 2.1."""
-MIN_ELEMENTS = 12
-EXCLUDED = 0.1
-"""Rise of an object's cost from which on the lobe of its class is refused."""
+from .one_colour import Coated, OneColour
+from .params import CHOICE, FIT
 
 
 @dataclass(frozen=True)
@@ -97,12 +76,12 @@ def gain_of(fit: LobeFit, held: Problem) -> tuple[float, float]:
 
 def _dielectric(fit: LobeFit) -> bool:
     """Whether a dielectric can have this lobe, and frames can tell it from a diffuse part."""
-    return fit.psi[0] <= MOST_F0 and fit.phi <= BROADEST_PHI
+    return fit.psi[0] <= MOST_F0 and fit.phi <= FIT.broadest_phi
 
 
 def _metallic(fit: LobeFit) -> bool:
     """Whether this lobe is too strong for a dielectric, and frames can tell it from a diffuse part."""
-    return float(fit.psi.mean()) > MOST_F0 and fit.phi <= BROADEST_PHI
+    return float(fit.psi.mean()) > MOST_F0 and fit.phi <= FIT.broadest_phi
 
 
 def _bare_metal(
@@ -121,7 +100,7 @@ def metal_fit(problem: Problem, dense: DenseProblem) -> LobeFit:
     metal = fit_lobe(dense, constraints=METAL.constraints)
     if _metallic(metal):
         return metal
-    widths = dense.grid[dense.grid <= BROADEST_PHI] if len(dense.grid) > 1 else dense.grid
+    widths = dense.grid[dense.grid <= FIT.broadest_phi] if len(dense.grid) > 1 else dense.grid
     scale = max(1.4826 * metal.residual, 1e-4)
     return min((_bare_metal(problem, dense, phi, metal, scale) for phi in widths), key=lambda one: one[1].sum())[0]
 
@@ -140,12 +119,12 @@ def _of_class(own: LobeFit, of_class: LobeFit, model: Brdf, problem: Problem | N
         shared = replace(shared, psi=solved.psi[:, 0])
     (with_own, _), (with_shared, _) = (element_costs(dense, fit, scale) for fit in (own, shared))
     gain, sigmas = _gain(with_own, with_shared)
-    return own if gain > MIN_GAIN and sigmas > MIN_SIGMAS else shared
+    return own if gain > CHOICE.min_gain and sigmas > LEVELS.sigmas else shared
 
 
 def choose_model(problem: Problem) -> Choice:
     """The simplest model that the observations support, by two-fold cross-validation over the elements."""
-    if len(np.unique(problem.element)) < MIN_ELEMENTS:
+    if len(np.unique(problem.element)) < LEVELS.few:
         return Choice(LAMBERTIAN, None, note="Too few observations to look for a highlight.")
     dense = DenseProblem(problem)
     odd = (np.random.default_rng(0).permutation(dense.there.shape[1]) % 2).astype(bool)
@@ -161,8 +140,10 @@ def choose_model(problem: Problem) -> Choice:
     with_lobe, without = held_out(fit, DIELECTRIC)
     scores = {LAMBERTIAN.name: 1.0, DIELECTRIC.name: float(with_lobe.sum() / max(without.sum(), 1e-30))}
     gain, sigmas = _gain(with_lobe, without)
-    large = gain > LARGE_GAIN and dense.there.shape[1] >= LARGE_ELEMENTS
-    sure = gain > MIN_GAIN and sigmas > (LARGE_SIGMAS if large else MIN_SIGMAS) and fit.phi <= BROADEST_PHI
+    large = gain > CHOICE.large_gain and dense.there.shape[1] >= CHOICE.large_elements
+    sure = (
+        gain > CHOICE.min_gain and sigmas > (LEVELS.likely if large else LEVELS.sigmas) and fit.phi <= FIT.broadest_phi
+    )
     # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
     dielectric = replace(fit, psi=np.minimum(fit.psi, MOST_F0))
     metal, likely = fit_lobe(dense, constraints=METAL.constraints), None
@@ -171,11 +152,11 @@ def choose_model(problem: Problem) -> Choice:
         scores[METAL.name] = float(with_metal.sum() / max(matt.sum(), 1e-30))
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
         (less, by), (more, surely) = _gain(with_metal, matt), _gain(with_metal, with_lobe)
-        most = BARE_AT_MOST if min(less, more) > MUCH else BARE
+        most = CHOICE.bare_at_most if min(less, more) > CHOICE.much else CHOICE.bare
         alone = _bare_metal(problem, dense, metal.phi, metal, scale)[1].sum()
-        if min(less, more) > MIN_GAIN and alone <= most * matt.sum():
-            if by > MIN_SIGMAS and surely > SURELY_METAL:
-                other = dielectric if sure and surely < MIN_SIGMAS else None
+        if min(less, more) > CHOICE.min_gain and alone <= most * matt.sum():
+            if by > LEVELS.sigmas and surely > LEVELS.likely:
+                other = dielectric if sure and surely < LEVELS.sigmas else None
                 return Choice(METAL, metal, less, by, scores=scores, dielectric=other)
             likely = metal
     if sure:
@@ -205,7 +186,7 @@ def adopt_from_class(
 
     The class's model is that of the member with the strongest evidence, its lobe the median over the members of that
     model, weighted by evidence. Members keep their own lobe where their frames set it apart from that. Objects
-    whose own frames decide nothing take over the class's, but not where it raises their cost by more than `EXCLUDED`.
+    whose own frames decide nothing take over the class's, but not where it raises their cost by more than `excluded`.
     What is set apart neither gives nor takes. Among metals, one whose frames favour metal without being sure of it is
     one, as rough as the others unless its frames are sure of something else. Among dielectrics, one that is a metal no
     more surely than it is one of them is one of them.
@@ -249,12 +230,12 @@ def _together(members: dict[int, Choice]) -> dict[int, Choice]:
     """
     judged = {i: choice for i, choice in members.items() if choice.fit is not None}
     counted = [c.sigmas if _dielectric(c.lobe) else min(c.sigmas, 0) for c in judged.values()]
-    if len(judged) < 2 or sum(counted) / np.sqrt(len(judged)) <= MIN_SIGMAS:
+    if len(judged) < 2 or sum(counted) / np.sqrt(len(judged)) <= LEVELS.sigmas:
         return {}
     return {
         i: replace(choice, model=DIELECTRIC, note="Sure of its lobe together with others of its class.")
         for i, choice in judged.items()
-        if choice.gain > MIN_GAIN and _dielectric(choice.lobe)
+        if choice.gain > CHOICE.min_gain and _dielectric(choice.lobe)
     }
 
 
@@ -272,12 +253,12 @@ def _pooled(found: list[Choice], best: Choice) -> Choice:
 
 def _refused(lobe: LobeFit, own: LobeFit | None, problem: Problem | None) -> bool:
     """Whether an object's own frames speak against its class's lobe."""
-    if problem is None or len(np.unique(problem.element)) < MIN_ELEMENTS:
+    if problem is None or len(np.unique(problem.element)) < LEVELS.few:
         return False
     if own is not None:
         # How its diffuse part darkens is the object's own matter, with the class's lobe as without.
         lobe = replace(lobe, kappa=own.kappa, kappa_lambertian=own.kappa_lambertian, residual=own.residual)
-    return gain_of(lobe, problem)[0] < -EXCLUDED
+    return gain_of(lobe, problem)[0] < -CHOICE.excluded
 
 
 def metal_f0(problem: Problem, phi: float) -> np.ndarray:

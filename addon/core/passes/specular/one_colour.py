@@ -20,14 +20,8 @@ from ...brdf.dielectric import USUAL_F0
 from ...fit.lobe_fit import robust_scale
 from ...fit.problem import Problem
 from ...luminance import LUMINANCE
-
-BROADEST_PHI = 0.5
-"""A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface."""
-LEAST_OBSERVATIONS = 40
-TRIMMED = 3.0
-"""Residuals count up to so many spreads."""
-DARKEST = 0.02
-"""Below this share of the median radiance a channel's logarithm is all noise."""
+from ...significance import LEVELS
+from .params import FIT, LOOKS
 
 
 @dataclass(frozen=True)
@@ -100,7 +94,7 @@ def compare(problem: Problem, irradiance: np.ndarray) -> OneColour | None:
         return None
     usable, seen, E, element = told
     light, log_I = problem.light, np.log(seen @ LUMINANCE)
-    widths = np.flatnonzero(light.grid <= BROADEST_PHI)
+    widths = np.flatnonzero(light.grid <= FIT.broadest_phi)
 
     def residual(predicted: np.ndarray) -> np.ndarray:
         """log(I / predicted) about its median, (k,)."""
@@ -131,8 +125,8 @@ def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
     if told is None:
         return None
     usable, seen, E, element = told
-    widths = np.flatnonzero(problem.light.grid <= BROADEST_PHI)
-    least = DARKEST * np.median(seen)
+    widths = np.flatnonzero(problem.light.grid <= FIT.broadest_phi)
+    least = LOOKS.darkest * np.median(seen)
 
     def residual(predicted: np.ndarray) -> np.ndarray:
         """log(I / predicted), (k, 3); a factor common to all channels is free."""
@@ -151,7 +145,7 @@ def _told(problem: Problem, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndar
     """Which observations tell something, (m,) bool, and their radiance, E (k, 3) and element (k,); None if too few."""
     bright, E = problem.radiance @ LUMINANCE, irradiance[problem.element]
     usable = (bright > 1e-3 * np.median(bright)) & (E @ LUMINANCE > 0)
-    if usable.sum() < LEAST_OBSERVATIONS:
+    if usable.sum() < LOOKS.least_observations:
         return None
     return usable, problem.radiance[usable], E[usable], problem.element[usable]
 
@@ -169,7 +163,7 @@ def _one_colour(seen: np.ndarray, E: np.ndarray, coat: np.ndarray) -> np.ndarray
 
 def _sigmas(one: np.ndarray, other: np.ndarray, element: np.ndarray) -> float:
     """By how many standard errors over the elements residuals (k,) or (k, 3) of one kind are less than another's."""
-    most = TRIMMED * spread(other)
+    most = LEVELS.sigmas * spread(other)
     saved = np.minimum(np.abs(other), most) - np.minimum(np.abs(one), most)
     _, group, count = np.unique(element, return_inverse=True, return_counts=True)
     by_element = np.bincount(group, saved.reshape(len(element), -1).mean(1)) / count

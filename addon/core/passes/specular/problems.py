@@ -14,14 +14,8 @@ from ...light.emitters import bright_triangles
 from ...light.field import LightField
 from ...light.lobes import GRID, PROPOSALS, LobeLight, reflected_light
 from ...scene.samples import Samples
-from .one_colour import BROADEST_PHI
-
-NOISY, AGAIN, NARROWEST_PHI = 0.2, 8, 0.02
-"""Noise of a dielectric's lobe, as a share of the radiance, from which on an observation gets so many times more rays.
-Highlights of a bulb half hidden in its shade had .4: a desk's psi came out at .11 with 256 rays each, at .06 with 2048,
-where .04 is true. One observation in 70 of the living room, in 20 of a study with such lamps."""
-LEAST_VIEWS = 4
-"""Elements seen by fewer frames can't tell what changes with the view."""
+from ...significance import LEVELS
+from .params import FIT
 
 
 def pick(samples: Samples, of_object: np.ndarray, elements: int, views: int, least: int, seed: int) -> np.ndarray:
@@ -74,7 +68,7 @@ class Problems:
         order = np.argsort(owner, kind="stable")
         self._owner, self._usable = owner[order], usable[order]
 
-    def pick(self, object_id: int, elements: int, views: int, least: int = LEAST_VIEWS, seed: int = 0) -> np.ndarray:
+    def pick(self, object_id: int, elements: int, views: int, least: int = LEVELS.views, seed: int = 0) -> np.ndarray:
         """Indices into the samples of some of an object's observations, sorted by element."""
         first, last = np.searchsorted(self._owner, [object_id, object_id + 1])
         return pick(self._samples, self._usable[first:last], elements, views, least, self._seed + seed)
@@ -104,8 +98,8 @@ class Problems:
         found = light(index, rays)
         if rough or "more-rays" in self._without:
             return found
-        noisy = np.flatnonzero(_noise(found, self._samples.radiance[index]) > NOISY)
-        return found.replaced(noisy, light(index[noisy], AGAIN * rays)) if len(noisy) else found
+        noisy = np.flatnonzero(_noise(found, self._samples.radiance[index]) > FIT.noisy)
+        return found.replaced(noisy, light(index[noisy], FIT.again * rays)) if len(noisy) else found
 
     def element(self, index: np.ndarray) -> np.ndarray:
         """The elements of observations."""
@@ -130,6 +124,6 @@ class Problems:
 
 def _noise(light: LobeLight, radiance: np.ndarray) -> np.ndarray:
     """Noise of a dielectric's lobe as a share of the radiance, (m,), at the width that has most of it."""
-    widths = np.flatnonzero((light.grid >= NARROWEST_PHI) & (light.grid <= BROADEST_PHI))
+    widths = np.flatnonzero((light.grid >= FIT.narrowest_phi) & (light.grid <= FIT.broadest_phi))
     noise = USUAL_F0 * light.A_noise[:, widths] + light.B_noise[:, widths]
     return np.abs(noise).mean(2).max(1, initial=0) / np.maximum(radiance.mean(1), 1e-12)

@@ -1,0 +1,38 @@
+"""What counts as beyond chance, and how few are too few to tell, wherever that is asked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SignificanceParams:
+    """One set of levels for all passes.
+
+    Attributes
+    ----------
+    sigmas : float
+        Standard errors from which on a difference is no chance: three leave .3 % of a normal distribution. What lies
+        this many standard deviations out counts as an outlier, where such count no more than that.
+    likely : float
+        Standard errors from which on something is likely (5 % are chance), where something else speaks for it, too.
+    outlier : float
+        Standard deviations beyond which a residual weighs less in a robust fit (Huber). 1.5 to 2 is usual: 2 keeps 97 %
+        of least squares' efficiency under normal errors.
+    few : int
+        Elements of an object with which something may be fitted to it.
+    enough : int
+        Elements or observations that give a spread: its standard error is then 13 % of it.
+    views : int
+        Views of an element that tell what changes with the view.
+    """
+
+    sigmas: float = 3.0
+    likely: float = 2.0
+    outlier: float = 2.0
+    few: int = 12
+    enough: int = 30
+    views: int = 4
+
+
+LEVELS = SignificanceParams()
