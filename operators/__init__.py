@@ -4,101 +4,110 @@ from __future__ import annotations
 
 
 def classes() -> tuple[type, ...]:
-    """Everything that Blender has to know: property groups, preferences, operators, panels. Each part adds its own."""
-    from .base.job_operator import SCAN_RELIGHT_OT_stop
-    from .correct.register import correct_groups, correct_operators, correct_panels
-    from .manual import SCAN_RELIGHT_OT_manual
-    from .menus import SCAN_RELIGHT_MT_all
+    """Everything that Blender has to know, in the order in which menus and panels show it."""
+    from . import manual, menus
+    from .base import job_operator
+    from .correct import correct, paint, white
+    from .correct import panel as correct_panel
+    from .correct import props as correct_props
     from .preferences import ScanRelightPreferences
-    from .recover.accumulate import SCAN_RELIGHT_OT_accumulate
-    from .recover.assets import SCAN_RELIGHT_OT_mark_assets
-    from .recover.capture_from_scene import SCAN_RELIGHT_OT_capture_from_scene
-    from .recover.check_capture import SCAN_RELIGHT_OT_check_capture
-    from .recover.files import (
-        SCAN_RELIGHT_FH_json,
-        SCAN_RELIGHT_OT_drop,
-        SCAN_RELIGHT_OT_open_capture,
-        SCAN_RELIGHT_OT_open_result,
-        SCAN_RELIGHT_OT_use_folder,
+    from .recover import (
+        assets,
+        capture_from_scene,
+        check_capture,
+        files,
+        import_capture,
+        link_room,
+        panel_capture,
+        panel_recover,
+        restore_materials,
+        run,
+        scene_props,
+        stages,
     )
-    from .recover.fit import SCAN_RELIGHT_OT_fit
-    from .recover.import_capture import SCAN_RELIGHT_OT_import_capture
-    from .recover.link_room import SCAN_RELIGHT_OT_link_room
-    from .recover.panel_capture import SCAN_RELIGHT_PT_capture
-    from .recover.panel_recover import SCAN_RELIGHT_PT_recover
-    from .recover.recover import SCAN_RELIGHT_OT_recover
-    from .recover.restore_materials import SCAN_RELIGHT_OT_restore_materials
-    from .recover.run import SCAN_RELIGHT_OT_run
-    from .recover.scene_props import ScanRelightReading, ScanRelightScene, ScanRelightSettings
-    from .recover.shade import SCAN_RELIGHT_OT_shade
-    from .recover.write import SCAN_RELIGHT_OT_write
-    from .relight.register import relight_groups, relight_operators, relight_panels
-    from .results.clear_cache import SCAN_RELIGHT_OT_clear_cache
-    from .results.find import SCAN_RELIGHT_OT_find_result, SCAN_RELIGHT_PT_missing
-    from .results.look import SCAN_RELIGHT_OT_look
-    from .results.move import SCAN_RELIGHT_OT_move_results
-    from .results.open_report import SCAN_RELIGHT_OT_open_report
-    from .results.panel import SCAN_RELIGHT_PT_results, SCAN_RELIGHT_PT_stages, SCAN_RELIGHT_UL_results
-    from .results.panel_look import SCAN_RELIGHT_PT_look, SCAN_RELIGHT_PT_own_scene
-    from .results.select import SCAN_RELIGHT_OT_select_result_object
+    from .relight import before_after, export, exposure, lights, probe, setup, view, virtual
+    from .relight import panel as relight_panel
+    from .relight import props as relight_props
+    from .results import clear_cache, find, look, move, open_report, select
+    from .results import panel as results_panel
 
-    return (
-        # Property groups: those that others point to come first.
-        ScanRelightSettings, ScanRelightReading, ScanRelightScene, ScanRelightPreferences, *relight_groups(),
-        *correct_groups(),
-        # Operators, in the order of the method.
-        SCAN_RELIGHT_OT_check_capture, SCAN_RELIGHT_OT_import_capture,
-        SCAN_RELIGHT_OT_accumulate, SCAN_RELIGHT_OT_shade, SCAN_RELIGHT_OT_fit, SCAN_RELIGHT_OT_write,
-        SCAN_RELIGHT_OT_recover, SCAN_RELIGHT_OT_run, SCAN_RELIGHT_OT_stop, SCAN_RELIGHT_OT_clear_cache,
-        SCAN_RELIGHT_OT_link_room,
-        SCAN_RELIGHT_OT_move_results, SCAN_RELIGHT_OT_find_result,
-        SCAN_RELIGHT_OT_open_capture, SCAN_RELIGHT_OT_open_result, SCAN_RELIGHT_OT_use_folder, SCAN_RELIGHT_OT_drop,
-        SCAN_RELIGHT_FH_json,
-        # The artist's side.
-        SCAN_RELIGHT_OT_capture_from_scene, SCAN_RELIGHT_OT_restore_materials, SCAN_RELIGHT_OT_select_result_object,
-        SCAN_RELIGHT_OT_look, SCAN_RELIGHT_OT_open_report, *relight_operators(), *correct_operators(),
-        SCAN_RELIGHT_OT_mark_assets, SCAN_RELIGHT_OT_manual, SCAN_RELIGHT_MT_all,
-        # Panels, in the order of the work; a panel's parts come after it.
-        SCAN_RELIGHT_PT_missing, SCAN_RELIGHT_PT_capture, SCAN_RELIGHT_PT_own_scene,
-        SCAN_RELIGHT_PT_recover,
-        SCAN_RELIGHT_UL_results, SCAN_RELIGHT_PT_results, *correct_panels(),
-        SCAN_RELIGHT_PT_stages,
-        SCAN_RELIGHT_PT_look,
-        *relight_panels(),
-    )  # fmt: skip
+    def own(*modules, kinds: tuple[str, ...]) -> list[type]:
+        """The classes of some kinds of modules, in the order of their writing."""
+        starts = tuple(f"SCAN_RELIGHT_{kind}" for kind in kinds)
+        found = [(module, one) for module in modules for name, one in vars(module).items() if name.startswith(starts)]
+        return [one for module, one in found if one.__module__ == module.__name__]
+
+    operators = own(
+        *(check_capture, import_capture, stages, run, job_operator, clear_cache, link_room, move, find, files),
+        *(capture_from_scene, restore_materials, select, look, open_report),
+        *(lights, exposure, setup, probe, view, virtual, before_after, export, correct, white, paint),
+        *(assets, manual, menus),
+        kinds=("OT", "MT", "FH"),
+    )
+    panels = own(
+        *(find, panel_capture, panel_recover, results_panel, correct_panel, look, relight_panel, export),
+        kinds=("PT", "UL"),
+    )
+    groups = (
+        *(scene_props.ScanRelightSettings, scene_props.ScanRelightReading, scene_props.ScanRelightScene),
+        *(relight_props.ScanRelightLamp, relight_props.ScanRelightLight, relight_props.ScanRelightOutside),
+        *(relight_props.ScanRelightStudio, correct_props.ScanRelightCorrection, correct_props.ScanRelightCorrecting),
+    )
+    return *groups, ScanRelightPreferences, *operators, *panels
 
 
 def pointers() -> tuple[tuple[type, str, type], ...]:
     """Blender type, name and property group of everything that hangs on Blender's own data."""
-    import bpy
+    from bpy.types import Light, Material, Object, Scene, World
 
-    from .correct.register import correct_pointers
+    from .correct.props import ScanRelightCorrecting, ScanRelightCorrection
     from .recover.scene_props import ScanRelightScene
-    from .relight.register import relight_pointers
+    from .relight.props import ScanRelightLamp, ScanRelightLight, ScanRelightOutside, ScanRelightStudio
 
-    return ((bpy.types.Scene, "scan_relight", ScanRelightScene), *relight_pointers(), *correct_pointers())
+    return (
+        (Scene, "scan_relight", ScanRelightScene),
+        (Material, "scan_relight_lamp", ScanRelightLamp),
+        (Light, "scan_relight_light", ScanRelightLight),
+        (World, "scan_relight_outside", ScanRelightOutside),
+        (Scene, "scan_relight_studio", ScanRelightStudio),
+        (Object, "scan_relight_correct", ScanRelightCorrection),
+        (Scene, "scan_relight_correct", ScanRelightCorrecting),
+    )
+
+
+def handlers() -> tuple[tuple[list, object], ...]:
+    """Blender's lists of handlers, and ours."""
+    from bpy.app.handlers import load_post, load_pre, save_post, save_pre
+
+    from .base.job_operator import forget_job
+    from .correct.paint import keep_painted
+    from .results import find
+
+    return (
+        (load_pre, forget_job),
+        (load_post, find.look_for_results),
+        (save_pre, find.keep_images),
+        (save_post, find.found_is_kept),
+        (save_pre, keep_painted),
+    )
 
 
 def register():
-    """Register every class and hang the property groups up."""
+    """Register every class, an operator with its docstring as the tooltip, and hang the property groups up."""
     import bpy
 
     from . import keymaps, manual, menus, translations
-    from .base.job_operator import forget_job
-    from .correct.register import register_handlers
-    from .results import find
     from .results.panel import active_row_property
 
     for cls in classes():
+        if issubclass(cls, bpy.types.Operator):
+            cls.bl_description = " ".join(cls.__doc__.split())
         bpy.utils.register_class(cls)
     for owner, name, group in pointers():
         setattr(owner, name, bpy.props.PointerProperty(type=group))
     bpy.types.Scene.scan_relight_row = active_row_property()
-    bpy.app.handlers.load_pre.append(forget_job)
-    bpy.app.handlers.load_post.append(find.look_for_results)
-    bpy.app.handlers.save_pre.append(find.keep_images)
-    bpy.app.handlers.save_post.append(find.found_is_kept)
-    register_handlers()
+    for known, ours in handlers():
+        known.append(ours)
     translations.register()
     menus.register()
     keymaps.register()
@@ -112,28 +121,20 @@ def unregister():
     from ..addon.bridge.corrections import corrections
     from ..addon.bridge.job import job
     from . import keymaps, manual, menus, translations
-    from .base.job_operator import forget_job
-    from .correct.register import unregister_handlers
     from .recover import findings
     from .relight import light_pictures
-    from .results import find, told
+    from .results import told
 
     bpy.utils.unregister_manual_map(manual.manual_map)
     keymaps.unregister()
     menus.unregister()
     translations.unregister()
-    unregister_handlers()
-    corrections.forget()
-    bpy.app.handlers.load_pre.remove(forget_job)
-    bpy.app.handlers.load_post.remove(find.look_for_results)
-    bpy.app.handlers.save_pre.remove(find.keep_images)
-    bpy.app.handlers.save_post.remove(find.found_is_kept)
-    findings.forget()
-    told.forget()
-    light_pictures.forget()
-    del bpy.types.Scene.scan_relight_row
-    job.forget()
+    for known, ours in handlers():
+        known.remove(ours)
+    for one in (corrections, findings, told, light_pictures, job):
+        one.forget()
     job.end_all()
+    del bpy.types.Scene.scan_relight_row
     for owner, name, _ in pointers():
         delattr(owner, name)
     for cls in reversed(classes()):

@@ -57,11 +57,10 @@ def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
 
 
 class SCAN_RELIGHT_OT_manual(bpy.types.Operator):
-    """Open a page of the documentation."""
+    """Open the documentation in the browser; it came with the extension and needs no network"""
 
     bl_idname = "scan_relight.manual"
     bl_label = "Scan Relight Manual"
-    bl_description = "Open the documentation in the browser; it came with the extension and needs no network"
 
     page: bpy.props.StringProperty(
         name="Page", description="Which page, and which part of it", default="guide", options={"SKIP_SAVE"}

@@ -15,7 +15,6 @@ WIDTH = 14
 class SCAN_RELIGHT_MT_all(bpy.types.Menu):
     """Object > Scan Relight: every operator that makes sense without a list; the search (F3) looks into menus."""
 
-    bl_idname = "SCAN_RELIGHT_MT_all"
     bl_label = "Scan Relight"
 
     def draw(self, context):

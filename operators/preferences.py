@@ -43,7 +43,6 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
     )
 
     def draw(self, context):
-        """The choices."""
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(self, "results_folder")

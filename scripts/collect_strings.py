@@ -18,7 +18,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 TEXTS = {"label", "operator", "prop", "menu", "operator_menu_enum"}
 """Calls on a layout whose `text` is shown."""
-SENTENCES = {"say": 2, "check": 2, "poll_message_set": 0, "told": 0}
+SENTENCES = {"say": 2, "check": 2, "poll_message_set": 0, "told": 0, "needs": 1}
 """Calls that take a sentence, and where it stands among their arguments."""
 
 
@@ -95,6 +95,8 @@ def texts(node: ast.expr) -> list[str]:
     """The strings that an expression may be."""
     if isinstance(node, ast.Constant):
         return [node.value] if isinstance(node.value, str) else []
+    if isinstance(node, ast.Lambda):
+        return texts(node.body)
     if isinstance(node, ast.IfExp):
         return texts(node.body) + texts(node.orelse)
     if isinstance(node, ast.JoinedStr):

@@ -72,11 +72,7 @@ class JobOperator:
 
     def start(self, context, command: list[str], **facts) -> set[str]:
         """Start `command` as the current job and follow it; what `execute` or `invoke` returns."""
-        try:
-            self.job = jobs.begin(command, phase="run", scene=context.scene.session_uid, **facts)
-        except OSError as error:
-            self.report({"ERROR"}, f"The run can't be started ({error.strerror or error}); start Blender anew.")
-            return {"CANCELLED"}
+        self.job = jobs.begin(command, phase="run", scene=context.scene.session_uid, **facts)
         self._slices = self._loader = self._ready = self._said = self._state = None
         self._drawn = 0.0
         self._timer = context.window_manager.event_timer_add(PERIOD, window=context.window)
@@ -94,7 +90,6 @@ class JobOperator:
         return ()
 
     def modal(self, context, event):
-        """One look at the job."""
         if self._timer is None:  # it has ended, and a window that it opened has Blender ask once more
             return {"FINISHED"}
         job = self.job
@@ -244,15 +239,13 @@ def active() -> jobs.Job | None:
 
 
 class SCAN_RELIGHT_OT_stop(bpy.types.Operator):
-    """Stop the run."""
+    """Stop the run within a second; finished stages are kept and the next run goes on from them"""
 
     bl_idname = "scan_relight.stop"
     bl_label = "Stop Recovery"
-    bl_description = "Stop the run within a second; finished stages are kept and the next run goes on from them"
 
     @classmethod
     def poll(cls, context):
-        """Whether there is anything to stop."""
         if active() is None:
             cls.poll_message_set("No run is going on.")
             return False
@@ -261,9 +254,8 @@ class SCAN_RELIGHT_OT_stop(bpy.types.Operator):
     def execute(self, context):
         """Ask for it; the operator that follows the job sees its end."""
         job = active()
-        if job is not None:
-            job.stop()
-            job.facts["unwanted"] = True
+        job.stop()
+        job.facts["unwanted"] = True
         redraw(context)
         return {"FINISHED"}
 

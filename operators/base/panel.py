@@ -19,7 +19,6 @@ class SidebarPanel:
 
     @classmethod
     def poll(cls, context):
-        """Only where there is a scene to work in."""
         return context.scene is not None
 
     def draw_header_preset(self, context):

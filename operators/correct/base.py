@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
 from ...addon.bridge.corrections import corrections, refitted
 from ...addon.bridge.job import job as jobs
+from ...addon.bridge.slices import whole
+from ...addon.core.errors import ScanRelightError
 from ..base import poll
 from ..base.at_once import AtOnce, OneSentence
 from ..base.job_operator import JobOperator
@@ -21,26 +25,29 @@ def chosen(context) -> list[bpy.types.Object]:
     return found
 
 
+def on_selected(cls):
+    """Class decorator: for what is said of the selected objects."""
+    return poll.needs(chosen, "Select a recovered object first.")(poll.object_mode(poll.has_scene(cls)))
+
+
+def in_room(cls):
+    """Class decorator: for what is said of any object of the room."""
+    any_there = poll.needs(
+        lambda context: any(map(corrections.correctable, context.scene.objects)), "The scene holds no recovered object."
+    )
+    return any_there(poll.object_mode(poll.has_scene(cls)))
+
+
 class CorrectOperator(AtOnce):
     """Changes recovered objects at once, in one undo step; `work` returns remarks."""
 
-    bl_options = {"REGISTER", "UNDO"}
     remarks = "INFO"
 
-    @classmethod
-    def poll(cls, context):
-        """Only with a recovered object selected."""
-        return (
-            poll.has_scene(cls, context)
-            and poll.object_mode(cls, context)
-            and poll.check(cls, bool(chosen(context)), "Select a recovered object first.")
-        )
-
     def act(self, context):
-        """On what is selected."""
         return self.work(context, chosen(context))
 
 
+@poll.no_run
 class RefitOperator(OneSentence, JobOperator):
     """States something of the selected objects (`state`) and fits them again, all in one undo step."""
 
@@ -49,13 +56,7 @@ class RefitOperator(OneSentence, JobOperator):
     asks_for = ""
     """Property that is asked for where nobody gave it: from a menu or the search."""
 
-    @classmethod
-    def poll(cls, context):
-        """Only with a recovered object, and no other run."""
-        return CorrectOperator.poll.__func__(cls, context) and poll.no_run(cls)
-
     def invoke(self, context, event):
-        """Ask for what is missing."""
         if self.asks_for and not self.properties.is_property_set(self.asks_for):
             return context.window_manager.invoke_props_dialog(self)
         return self.execute(context)
@@ -78,7 +79,6 @@ class RefitOperator(OneSentence, JobOperator):
         return self._verdict(self.attempt(work))
 
     def refit(self, context, things):
-        """Fit `things` again; what `execute` returns."""
         from ...addon.bridge.job.command import command
 
         folder, words, before = refitted.words(context.scene, things)
@@ -89,26 +89,16 @@ class RefitOperator(OneSentence, JobOperator):
         job.wait()
         job.facts["phase"] = "end"
         if job.state != jobs.DONE:
-            self.report({"ERROR"}, job.sentence)
-            return {"CANCELLED"}
-        slices = self.change(context.scene, self.load(job))
-        while True:
-            try:
-                next(slices)
-            except StopIteration as end:
-                for sentence in (*job.warnings, *end.value):
-                    self.report({"WARNING"}, sentence)
-                return {"FINISHED"}
+            raise ScanRelightError(job.sentence)
+        for sentence in (*job.warnings, *whole(self.change(context.scene, self.load(job)))):
+            self.report({"WARNING"}, sentence)
+        return {"FINISHED"}
 
     def load(self, job):
-        """What the refit has left."""
-        from pathlib import Path
-
         folder = Path(job.facts["result_folder"])
         return folder, job.facts["before"], refitted.fitted(folder)
 
     def change(self, scene, loaded):
-        """Put it onto the objects."""
         warnings = yield from refitted.bringing(scene, *loaded)
         told.forget()
         return warnings

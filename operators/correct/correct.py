@@ -7,56 +7,54 @@ from ...addon.bridge.corrections import corrections
 from ...addon.bridge.marks import OBJECT_ID
 from ...addon.core.errors import BadInputError
 from ..base import poll
-from .base import CorrectOperator, RefitOperator, chosen
+from .base import CorrectOperator, RefitOperator, chosen, in_room, on_selected
 from .props import SMOOTH_ANGLE, STATEMENTS
 
 _KEYS = {"model": "model", "roughness": "roughness", "f0": "F0", "base_color": "colour", "same_as": "likeness"}
 
 
+@on_selected
 class SCAN_RELIGHT_OT_refit(RefitOperator, bpy.types.Operator):
-    """Fit objects again."""
+    """Fit the selected objects again under what is given of them, the rest of the room held; takes seconds. What is
+    given is kept in the result folder's overrides.json"""
 
     bl_idname = "scan_relight.refit"
     bl_label = "Refit"
-    bl_description = (
-        "Fit the selected objects again under what is given of them, the rest of the room held; takes "
-        "seconds. What is given is kept in the result folder's overrides.json"
-    )
     always = True
 
 
+@on_selected
 class SCAN_RELIGHT_OT_this_is(RefitOperator, bpy.types.Operator):
-    """Say what the selected objects are."""
+    """Say what the selected objects are made of, and fit them again under that"""
 
     bl_idname = "scan_relight.this_is"
     bl_label = "This Is"
-    bl_description = "Say what the selected objects are made of, and fit them again under that"
 
     model: bpy.props.EnumProperty(name="Model", description="What they are", items=STATEMENTS)
     asks_for = "model"
 
     @classmethod
     def description(cls, context, properties):
-        """The tooltip."""
         item = next(item for item in STATEMENTS if item[0] == properties.model)
         return f"The selected objects are: {item[1].lower()}. {item[2]}"
 
     def state(self, context, things):
-        """Give the model."""
         for thing in things:
             corrections.give(thing, model=self.model)
         return things
 
 
+@poll.needs(
+    lambda context: len(chosen(context)) > 1 or context.scene.scan_relight_correct.like is not None,
+    "Choose the other object, or select it too, last of all.",
+)
+@on_selected
 class SCAN_RELIGHT_OT_same_as(RefitOperator, bpy.types.Operator):
-    """Say that objects have the same surface as another one."""
+    """The selected objects have the same highlight as another one, each with its own colours: the one that is chosen in
+    the panel, else the active object"""
 
     bl_idname = "scan_relight.same_as"
     bl_label = "The Same As"
-    bl_description = (
-        "The selected objects have the same highlight as another one, each with its own colours: the one "
-        "that is chosen in the panel, else the active object"
-    )
 
     object_id: bpy.props.IntProperty(
         name="Object",
@@ -66,17 +64,7 @@ class SCAN_RELIGHT_OT_same_as(RefitOperator, bpy.types.Operator):
         options={"SKIP_SAVE"},
     )
 
-    @classmethod
-    def poll(cls, context):
-        """As for all, and there has to be another object."""
-        return super().poll(context) and poll.check(
-            cls,
-            len(chosen(context)) > 1 or context.scene.scan_relight_correct.like is not None,
-            "Choose the other object, or select it too, last of all.",
-        )
-
     def state(self, context, things):
-        """Give the likeness."""
         other = context.view_layer.objects.active if len(things) > 1 else context.scene.scan_relight_correct.like
         if self.object_id >= 0:
             other = corrections.by_id(things[0], self.object_id)
@@ -92,12 +80,13 @@ class SCAN_RELIGHT_OT_same_as(RefitOperator, bpy.types.Operator):
         return others
 
 
+@poll.needs(lambda context: any(map(corrections.given, chosen(context))), "Nothing is given of the selected objects.")
+@on_selected
 class SCAN_RELIGHT_OT_take_back(RefitOperator, bpy.types.Operator):
-    """Go back to what was found."""
+    """Take back what is given of the selected objects: show, and fit, what the frames say"""
 
     bl_idname = "scan_relight.take_back"
     bl_label = "Back to What Was Found"
-    bl_description = "Take back what is given of the selected objects: show, and fit, what the frames say"
 
     key: bpy.props.EnumProperty(
         name="Value",
@@ -111,16 +100,8 @@ class SCAN_RELIGHT_OT_take_back(RefitOperator, bpy.types.Operator):
 
     @classmethod
     def description(cls, context, properties):
-        """The tooltip."""
         what = "everything that is given" if properties.key == "all" else f"the {_KEYS[properties.key]} that is given"
         return f"Take back {what} of the selected objects: show, and fit, what the frames say"
-
-    @classmethod
-    def poll(cls, context):
-        """Only where anything is given."""
-        return super().poll(context) and poll.check(
-            cls, any(map(corrections.given, chosen(context))), "Nothing is given of the selected objects."
-        )
 
     def state(self, context, things):
         """Take it back; only what a refit was made with asks for another one."""
@@ -135,34 +116,20 @@ class SCAN_RELIGHT_OT_take_back(RefitOperator, bpy.types.Operator):
         return super().refit(context, things) if self._made else {"FINISHED"}
 
 
+@in_room
 class SCAN_RELIGHT_OT_smooth_by_angle(CorrectOperator, bpy.types.Operator):
-    """Shade recovered objects smooth."""
+    """Shade recovered objects smooth, with edges above an angle sharp; 0 makes them flat again. It stays when the room
+    is recovered again"""
 
     bl_idname = "scan_relight.smooth_by_angle"
     bl_label = "Smooth by Angle"
-    bl_description = (
-        "Shade recovered objects smooth, with edges above an angle sharp; 0 makes them flat again. It "
-        "stays when the room is recovered again"
-    )
 
     angle: SMOOTH_ANGLE
     everything: bpy.props.BoolProperty(
         name="Whole Room", description="All recovered objects of the scene, not the selected ones alone"
     )
 
-    @classmethod
-    def poll(cls, context):
-        """Only with recovered objects in the scene."""
-        return (
-            poll.has_scene(cls, context)
-            and poll.object_mode(cls, context)
-            and poll.check(
-                cls, any(map(corrections.correctable, context.scene.objects)), "The scene holds no recovered object."
-            )
-        )
-
     def work(self, context, things):
-        """Shade them."""
         from ...addon.bridge.corrections.smoothing import smooth
 
         if self.everything:

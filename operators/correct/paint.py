@@ -6,25 +6,22 @@ import bpy
 from ...addon.bridge.corrections import painting, unseen
 from ...addon.core.errors import BadInputError
 from ..base import poll
-from .base import CorrectOperator, chosen
+from .base import CorrectOperator, chosen, on_selected
 
 
+@on_selected
 class SCAN_RELIGHT_OT_paint_unseen(CorrectOperator, bpy.types.Operator):
-    """Make the active object ready for Texture Paint."""
+    """Paint what no frame saw of the active object in Texture Paint, on an image of your own that no run writes over;
+    what was seen is masked"""
 
     bl_idname = "scan_relight.paint_unseen"
     bl_label = "Paint"
-    bl_description = (
-        "Paint what no frame saw of the active object in Texture Paint, on an image of your own that no "
-        "run writes over; what was seen is masked"
-    )
 
     masked: bpy.props.BoolProperty(
         name="Only Unseen Spots", description="Protect what any frame saw by a stencil mask", default=True
     )
 
     def work(self, context, things):
-        """Canvas, mask, brush, mode."""
         thing = context.view_layer.objects.active
         if thing not in things:
             raise BadInputError("Make the object that is to be painted the active one: click on it.")
@@ -32,30 +29,30 @@ class SCAN_RELIGHT_OT_paint_unseen(CorrectOperator, bpy.types.Operator):
         return [f"Painting '{unseen.painted(thing).name}'; leave Texture Paint for object mode when done"]
 
 
+@on_selected
 class SCAN_RELIGHT_OT_fill_unseen(CorrectOperator, bpy.types.Operator):
-    """Fill what no frame saw."""
+    """Fill what no frame saw of the selected objects from the measured spots around, on an image of your own that no
+    run writes over"""
 
     bl_idname = "scan_relight.fill_unseen"
     bl_label = "Fill"
-    bl_description = (
-        "Fill what no frame saw of the selected objects from the measured spots around, on an image of "
-        "your own that no run writes over"
-    )
 
     def work(self, context, things):
-        """Fill them."""
         count, remarks = unseen.fill(things, context.scene.scan_relight.images)
         if not count:
             raise BadInputError(" ".join(remarks))
         return [f"{count} texels filled", *remarks]
 
 
+@poll.needs(
+    lambda context: any(map(unseen.painted, chosen(context))), "Nothing was painted or filled on the selected objects."
+)
+@on_selected
 class SCAN_RELIGHT_OT_restore_painted(CorrectOperator, bpy.types.Operator):
-    """Show what was found instead of what was painted."""
+    """Show what was found instead of what was painted or filled on the selected objects"""
 
     bl_idname = "scan_relight.restore_painted"
     bl_label = "Restore"
-    bl_description = "Show what was found instead of what was painted or filled on the selected objects"
 
     discard: bpy.props.BoolProperty(
         name="Forget What Was Painted",
@@ -63,15 +60,7 @@ class SCAN_RELIGHT_OT_restore_painted(CorrectOperator, bpy.types.Operator):
         default=False,
     )
 
-    @classmethod
-    def poll(cls, context):
-        """Only where anything was painted."""
-        return super().poll(context) and poll.check(
-            cls, any(map(unseen.painted, chosen(context))), "Nothing was painted or filled on the selected objects."
-        )
-
     def work(self, context, things):
-        """Restore them."""
         count = unseen.restore(things, self.discard)
         return [f"{count} object{'s' * (count != 1)} restored"]
 

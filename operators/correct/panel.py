@@ -23,18 +23,15 @@ def the_object(context) -> bpy.types.Object | None:
 class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
     """Correct the active object."""
 
-    bl_idname = "SCAN_RELIGHT_PT_correct"
     bl_parent_id = "SCAN_RELIGHT_PT_results"
     manual = "corrections"
     bl_label = "Correct"
 
     @classmethod
     def poll(cls, context):
-        """Only for a recovered object."""
         return super().poll(context) and the_object(context) is not None
 
     def draw(self, context):
-        """Statements, values, refit."""
         layout, thing = self.layout, the_object(context)
         choices, things = context.scene.scan_relight_correct, chosen(context)
         others = len([one for one in things if one != thing])
@@ -94,7 +91,6 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
             back.operator("scan_relight.take_back", text="", icon="LOOP_BACK" if pinned else "BLANK1").key = key
 
     def refit(self, layout, context, choices, thing) -> None:
-        """The button and its bar."""
         job = active()
         if job is not None and "before" in job.facts:
             share, text = bar(job)
@@ -113,13 +109,11 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
 class SCAN_RELIGHT_PT_correct_scale(SidebarPanel, bpy.types.Panel):
     """A known white."""
 
-    bl_idname = "SCAN_RELIGHT_PT_correct_scale"
     bl_parent_id = "SCAN_RELIGHT_PT_correct"
     bl_label = "Known White"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """What it is, and how bright."""
         layout, choices, thing = self.layout, context.scene.scan_relight_correct, the_object(context)
         self.say(layout, context, "An albedo that is known scales that of the whole room.")
         layout.prop(choices, "albedo")
@@ -139,13 +133,11 @@ class SCAN_RELIGHT_PT_correct_scale(SidebarPanel, bpy.types.Panel):
 class SCAN_RELIGHT_PT_correct_unseen(SidebarPanel, bpy.types.Panel):
     """What no frame saw."""
 
-    bl_idname = "SCAN_RELIGHT_PT_correct_unseen"
     bl_parent_id = "SCAN_RELIGHT_PT_correct"
     bl_label = "Unseen Spots"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """Paint, fill, back."""
         layout, thing = self.layout, the_object(context)
         row = layout.row(align=True)
         row.operator("scan_relight.paint_unseen", icon="BRUSH_DATA")
@@ -160,13 +152,11 @@ class SCAN_RELIGHT_PT_correct_unseen(SidebarPanel, bpy.types.Panel):
 class SCAN_RELIGHT_PT_correct_smooth(SidebarPanel, bpy.types.Panel):
     """Smooth shading."""
 
-    bl_idname = "SCAN_RELIGHT_PT_correct_smooth"
     bl_parent_id = "SCAN_RELIGHT_PT_correct"
     bl_label = "Smooth Shading"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """The angle, selected or all."""
         layout, angle = self.layout, context.scene.scan_relight_correct.smooth_angle
         layout.prop(context.scene.scan_relight_correct, "smooth_angle")
         row = layout.row(align=True)

@@ -2,32 +2,29 @@
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
-from bpy_extras import view3d_utils
 from mathutils import Vector
 
 from ...addon.bridge.corrections import corrections, known_white
 from ...addon.bridge.light.room import cast, depsgraph_of
 from ...addon.core.errors import BadInputError
 from ..base import poll
-from .base import RefitOperator
+from ..base.mouse import mouse_ray
+from .base import RefitOperator, in_room, on_selected
 from .props import ALBEDO
 
 
+@on_selected
 class SCAN_RELIGHT_OT_this_is_white(RefitOperator, bpy.types.Operator):
-    """Say what albedo the active object has."""
+    """The active object's albedo is known: the albedo of the whole room is scaled with it, channel by channel, and with
+    it the colour of the light"""
 
     bl_idname = "scan_relight.this_is_white"
     bl_label = "This Is White"
-    bl_description = (
-        "The active object's albedo is known: the albedo of the whole room is scaled with it, channel by "
-        "channel, and with it the colour of the light"
-    )
 
     albedo: ALBEDO
     asks_for = "albedo"
 
     def state(self, context, things):
-        """Give it."""
         thing = context.view_layer.objects.active
         thing = thing if thing in things else things[0]
         corrections.say_white(thing, self.albedo)
@@ -39,35 +36,26 @@ class SCAN_RELIGHT_OT_this_is_white(RefitOperator, bpy.types.Operator):
         return [thing]
 
 
+@poll.needs(lambda context: corrections.white_of(context.view_layer.objects.active) is not None, "No white is given.")
+@on_selected
 class SCAN_RELIGHT_OT_white_back(RefitOperator, bpy.types.Operator):
-    """Let the frames alone say the scale again."""
+    """Take back the known white: the frames alone say how bright the room's surfaces are"""
 
     bl_idname = "scan_relight.white_back"
     bl_label = "No Known White"
-    bl_description = "Take back the known white: the frames alone say how bright the room's surfaces are"
-
-    @classmethod
-    def poll(cls, context):
-        """Only where one is given."""
-        return super().poll(context) and poll.check(
-            cls, corrections.white_of(context.view_layer.objects.active) is not None, "No white is given."
-        )
 
     def state(self, context, things):
-        """Take it back."""
         corrections.take_white_back(context.view_layer.objects.active)
         return things[:1]
 
 
+@in_room
 class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
-    """Say what albedo a spot has, with a click on it."""
+    """Click on a spot of the room whose albedo is known, such as a grey card or white paint; the whole room's albedo is
+    scaled with it. ESC stops"""
 
     bl_idname = "scan_relight.pick_white"
     bl_label = "Pick White Spot"
-    bl_description = (
-        "Click on a spot of the room whose albedo is known, such as a grey card or white paint; the "
-        "whole room's albedo is scaled with it. ESC stops"
-    )
 
     albedo: ALBEDO
     origin: bpy.props.FloatVectorProperty(
@@ -81,20 +69,7 @@ class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
         name="Direction", description="Of the ray to the spot", size=3, subtype="DIRECTION", options={"SKIP_SAVE"}
     )
 
-    @classmethod
-    def poll(cls, context):
-        """Only with recovered objects in the scene, and no run."""
-        return (
-            poll.has_scene(cls, context)
-            and poll.object_mode(cls, context)
-            and poll.no_run(cls)
-            and poll.check(
-                cls, any(map(corrections.correctable, context.scene.objects)), "The scene holds no recovered object."
-            )
-        )
-
     def invoke(self, context, event):
-        """Wait for the click."""
         self._picking = True
         context.window_manager.modal_handler_add(self)
         context.window.cursor_modal_set("EYEDROPPER")
@@ -102,7 +77,6 @@ class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        """The click, then the refit."""
         if not getattr(self, "_picking", False):
             return super().modal(context, event)
         if event.type in {"ESC", "RIGHTMOUSE"}:
@@ -114,7 +88,7 @@ class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
                 if event.type in {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "MOUSEMOVE", "TIMER"}
                 else {"RUNNING_MODAL"}
             )
-        ray = _ray(context, event)
+        ray = mouse_ray(context, event)
         if ray is None:
             return {"RUNNING_MODAL"}
         self._end(context)
@@ -122,7 +96,6 @@ class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
         return self.execute(context)
 
     def state(self, context, things):
-        """What the ray hits has it."""
         hit = cast(context.scene, Vector(self.origin), Vector(self.direction)) if any(self.direction) else None
         if hit is None or not corrections.correctable(hit.thing):
             raise BadInputError("There is no recovered object at that spot; click on one.")
@@ -135,19 +108,3 @@ class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
         self._picking = False
         context.window.cursor_modal_restore()
         context.workspace.status_text_set(None)
-
-
-def _ray(context, event):
-    """Origin and direction of the ray under the mouse; None outside the 3D views."""
-    for area in context.screen.areas:
-        region = next((one for one in area.regions if one.type == "WINDOW"), None)
-        if area.type != "VIEW_3D" or region is None:
-            continue
-        at = event.mouse_x - region.x, event.mouse_y - region.y
-        if 0 <= at[0] < region.width and 0 <= at[1] < region.height:
-            view = area.spaces.active.region_3d
-            return (
-                view3d_utils.region_2d_to_origin_3d(region, view, at),
-                view3d_utils.region_2d_to_vector_3d(region, view, at),
-            )
-    return None

@@ -9,21 +9,22 @@ from ...addon.bridge.results import home
 from .. import preferences
 from ..base import poll
 from ..base.at_once import AtOnce
-from .settings_props import can_start
+from .settings_props import startable
 
 FOLDER = "scene_capture"
 
 
+@poll.needs(
+    lambda context: any(thing.type not in ("CAMERA", "LIGHT") for thing in context.selected_objects),
+    "Select the objects of the room first.",
+)
+@startable
 class SCAN_RELIGHT_OT_capture_from_scene(AtOnce, bpy.types.Operator):
-    """Make a capture of the open scene."""
+    """Make a capture of the selected objects: their faces are the mesh, and the pictures behind the cameras (EXR) are
+    the frames. Nothing in the scene is changed"""
 
     bl_idname = "scan_relight.capture_from_scene"
     bl_label = "Capture From Scene"
-    bl_description = (
-        "Make a capture of the selected objects: their faces are the mesh, and the pictures behind the "
-        "cameras (EXR) are the frames. Nothing in the scene is changed"
-    )
-    bl_options = {"REGISTER", "UNDO"}
 
     result_folder: bpy.props.StringProperty(
         name="Result",
@@ -56,23 +57,12 @@ class SCAN_RELIGHT_OT_capture_from_scene(AtOnce, bpy.types.Operator):
         name="Step", description="Frames from one that is taken to the next", default=1, min=1
     )
 
-    @classmethod
-    def poll(cls, context):
-        """Whether there is a mesh to capture."""
-        return can_start(cls, context) and poll.check(
-            cls,
-            any(thing.type not in ("CAMERA", "LIGHT") for thing in context.selected_objects),
-            "Select the objects of the room first.",
-        )
-
     def invoke(self, context, event):
-        """Ask which frames."""
         scene = context.scene
         self.frame_start, self.frame_end = scene.frame_start, scene.frame_end
         return context.window_manager.invoke_props_dialog(self, width=360)
 
     def draw(self, context):
-        """The dialog."""
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(self, "cameras")
@@ -84,7 +74,6 @@ class SCAN_RELIGHT_OT_capture_from_scene(AtOnce, bpy.types.Operator):
             layout.prop(self, "frame_step")
 
     def work(self, context):
-        """Write the folder and choose it in the panel."""
         from ...addon.bridge.own_scene.capture import capture_scene
 
         choices = context.scene.scan_relight

@@ -6,40 +6,31 @@ import bpy
 
 from ...addon.core.errors import ScanRelightError
 from ..base import poll
+from ..base.at_once import AtOnce
 from . import findings, reading_props
 
 
-class SCAN_RELIGHT_OT_check_capture(bpy.types.Operator):
-    """Check the capture that is chosen in the panel."""
+@poll.has_capture
+@poll.has_scene
+class SCAN_RELIGHT_OT_check_capture(AtOnce, bpy.types.Operator):
+    """Read the capture and show what it holds and what is wrong with it; nothing is changed"""
 
     bl_idname = "scan_relight.check_capture"
     bl_label = "Check Capture"
-    bl_description = "Read the capture and show what it holds and what is wrong with it; nothing is changed"
+    bl_options = {"REGISTER"}
 
-    @classmethod
-    def poll(cls, context):
-        """A folder is needed."""
-        return poll.has_capture(cls, context)
-
-    def execute(self, context):
+    def work(self, context):
         """With a window beside it; in the background at once."""
         choices = context.scene.scan_relight
         if not bpy.app.background:
-            try:
-                findings.begin(choices)
-            except OSError as error:
-                self.report({"ERROR"}, f"The check can't be started ({error.strerror or error}); start Blender anew.")
-                return {"CANCELLED"}
-            return {"FINISHED"}
+            findings.begin(choices)
+            return ()
         from ...addon.core.io.read import describe, read_capture
 
         try:
             facts = describe(read_capture(findings.key(choices)[0], reading_props.reading(choices.reading)))
         except ScanRelightError as error:
             findings.put(choices, str(error))
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            raise
         findings.put(choices, facts)
-        for sentence in facts["warnings"]:
-            self.report({"WARNING"}, sentence)
-        return {"FINISHED"}
+        return facts["warnings"]

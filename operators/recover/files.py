@@ -6,10 +6,10 @@ from pathlib import Path
 
 import bpy
 
-from ...addon.core.errors import BadInputError, ScanRelightError
+from ...addon.core.errors import BadInputError
 from ...addon.core.io import folder as folders
 from ..base import poll
-from ..base.at_once import AtOnce
+from ..base.at_once import AtOnce, OneSentence
 from ..base.panel import SidebarPanel
 from ..translations import OWN
 from . import room_window
@@ -61,7 +61,8 @@ def given_path(operator) -> Path:
     raise BadInputError("Choose the folder of a scan first, or one of its files.")
 
 
-class FileOperator:
+@poll.free_scene
+class FileOperator(OneSentence):
     """Takes a path to a scan or to a result; errors become one sentence."""
 
     filepath: bpy.props.StringProperty(
@@ -88,32 +89,21 @@ class FileOperator:
         default="normal",
     )
 
-    @classmethod
-    def poll(cls, context):
-        """As everything that changes the scene."""
-        return poll.has_scene(cls, context) and poll.object_mode(cls, context) and poll.no_run(cls)
-
     def execute(self, context):
+        return self.attempt(lambda: self.open(context))
+
+    def open(self, context) -> set[str]:
         """Open a result; choose a scan, and do what was asked for with it."""
-        try:
-            content = folders.of_path(given_path(self))
-            if content.kind == folders.RESULT:
-                return bpy.ops.scan_relight.open_result(folder=str(content.folder))
-            choose(context, content)
-        except ScanRelightError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        content = folders.of_path(given_path(self))
+        if content.kind == folders.RESULT:
+            return bpy.ops.scan_relight.open_result(folder=str(content.folder))
+        choose(context, content)
         if self.then == "CHOOSE":
             self.report({"INFO"}, f"Scan '{content.name}' is chosen; see the sidebar (N), tab 'Scan Relight'.")
             return {"FINISHED"}
         if self.properties.is_property_set("preset"):
             context.scene.scan_relight.preset = self.preset
-        target = "import_capture" if self.then == "IMPORT" else "recover"
-        try:
-            return bpy.ops.scan_relight.run(target=target)
-        except RuntimeError as error:  # reported already, and again by Blender as an exception
-            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
-            return {"CANCELLED"}
+        return bpy.ops.scan_relight.run(target="import_capture" if self.then == "IMPORT" else "recover")
 
 
 def choose(context, content: folders.Content) -> None:
@@ -127,11 +117,10 @@ def choose(context, content: folders.Content) -> None:
 
 
 class SCAN_RELIGHT_OT_open_capture(FileOperator, bpy.types.Operator):
-    """File > Import."""
+    """Choose the folder of a scan, or of a finished result, by itself or by one of its files"""
 
     bl_idname = "scan_relight.open_capture"
     bl_label = "Import Scan Relight Capture"
-    bl_description = "Choose the folder of a scan, or of a finished result, by itself or by one of its files"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
     filter_glob: bpy.props.StringProperty(
@@ -139,12 +128,10 @@ class SCAN_RELIGHT_OT_open_capture(FileOperator, bpy.types.Operator):
     )
 
     def invoke(self, context, event):
-        """Choose it."""
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def draw(self, context):
-        """The file browser's options."""
         layout = self.layout
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(self, "then", expand=True)
@@ -154,75 +141,64 @@ class SCAN_RELIGHT_OT_open_capture(FileOperator, bpy.types.Operator):
 
 
 class SCAN_RELIGHT_OT_drop(FileOperator, bpy.types.Operator):
-    """What a file that is dropped into the 3D view does."""
+    """Choose the scan, or open the finished result, that the dropped file belongs to"""
 
     bl_idname = "scan_relight.drop"
     bl_label = "Open Scan or Result"
-    bl_description = "Choose the scan, or open the finished result, that the dropped file belongs to"
     bl_options = {"UNDO", "INTERNAL"}
 
     def invoke(self, context, event):
+        return self.attempt(lambda: self.offer(context))
+
+    def offer(self, context) -> set[str]:
         """A result is opened at once; a scan is chosen, and running it is offered."""
-        try:
-            content = folders.of_path(given_path(self))
-            if content.kind == folders.RESULT:
-                return self.execute(context)
-            choose(context, content)
-        except ScanRelightError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        content = folders.of_path(given_path(self))
+        if content.kind == folders.RESULT:
+            return self.execute(context)
+        choose(context, content)
         self.then, self.preset = "RUN", context.scene.scan_relight.preset
         return context.window_manager.invoke_props_dialog(
             self, title=f"Recover '{content.name}'?", confirm_text="Run", width=320
         )
 
     def draw(self, context):
-        """The dialog."""
         self.layout.prop(self, "preset", expand=True)
 
 
 class SCAN_RELIGHT_FH_json(bpy.types.FileHandler):
     """A scan's transforms.json or a result's materials.json dropped into a 3D view."""
 
-    bl_idname = "SCAN_RELIGHT_FH_json"
     bl_label = "Scan Relight"
     bl_import_operator = "scan_relight.drop"
     bl_file_extensions = ".json"
 
     @classmethod
     def poll_drop(cls, context):
-        """Into 3D views."""
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
+@poll.no_run
+@poll.has_scene
 class SCAN_RELIGHT_OT_use_folder(bpy.types.Operator):
-    """Take the folder that is offered."""
+    """Choose this folder as the capture"""
 
     bl_idname = "scan_relight.use_folder"
     bl_label = "Use This Folder"
-    bl_description = "Choose this folder as the capture"
     bl_options = {"UNDO", "INTERNAL"}
 
     folder: bpy.props.StringProperty(name="Folder", description="Folder of a scan", subtype="DIR_PATH")
 
-    @classmethod
-    def poll(cls, context):
-        """Not while a run uses the one that is chosen."""
-        return poll.has_scene(cls, context) and poll.no_run(cls)
-
     def execute(self, context):
-        """Choose it."""
         context.scene.scan_relight.capture_folder = self.folder
         return {"FINISHED"}
 
 
+@poll.free_scene
 class SCAN_RELIGHT_OT_open_result(AtOnce, bpy.types.Operator):
-    """Bring a finished result in."""
+    """Bring the recovered room of a finished result into this file, as a scene of its own"""
 
     bl_idname = "scan_relight.open_result"
     bl_label = "Open Scan Relight Result"
-    bl_description = "Bring the recovered room of a finished result into this file, as a scene of its own"
-    bl_options = {"REGISTER", "UNDO"}
 
     folder: bpy.props.StringProperty(
         name="Folder", description="Result folder of a finished run", subtype="DIR_PATH", options={"SKIP_SAVE"}
@@ -234,20 +210,13 @@ class SCAN_RELIGHT_OT_open_result(AtOnce, bpy.types.Operator):
         name="Folders", description="Only folders are shown", default=True, options={"HIDDEN", "SKIP_SAVE"}
     )
 
-    @classmethod
-    def poll(cls, context):
-        """As everything that changes the scene."""
-        return poll.has_scene(cls, context) and poll.object_mode(cls, context) and poll.no_run(cls)
-
     def invoke(self, context, event):
-        """Choose the folder where none is given."""
         if self.folder:
             return self.execute(context)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def work(self, context):
-        """Bring it in, and show it in the panel."""
         folder = Path(bpy.path.abspath(self.folder or self.directory))
         if not (self.folder or self.directory):
             raise BadInputError("Choose the folder of a finished result first.")
@@ -257,15 +226,11 @@ class SCAN_RELIGHT_OT_open_result(AtOnce, bpy.types.Operator):
                 f"Folder '{folder.name}' holds no finished result; run the recovery to its end "
                 "first, or choose another."
             )
-        return self.bring(context, content.folder)
-
-    def bring(self, context, folder: Path) -> tuple[str, ...]:
-        """The room into this file; the panel of its scene is about this result. What is to be told of it."""
         from ...addon.bridge.room.bring import bringing
         from ...addon.bridge.slices import whole
 
-        brought = whole(bringing(folder))
+        brought = whole(bringing(content.folder))
         room_window.show(context.scene, brought.scene)
-        brought.scene.scan_relight.result_folder = str(folder)
+        brought.scene.scan_relight.result_folder = str(content.folder)
         show_tab(context)
         return brought.warnings

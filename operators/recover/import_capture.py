@@ -11,16 +11,14 @@ from .settings_props import INTO, CaptureOperator
 
 
 class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
-    """Import a capture."""
+    """Bring a capture's objects, cameras and frames into a scene of their own, as they were scanned"""
 
     bl_idname = "scan_relight.import_capture"
     bl_label = "Import Capture"
-    bl_description = "Bring a capture's objects, cameras and frames into a scene of their own, as they were scanned"
 
     into: INTO
 
     def work(self, context):
-        """Read, then build."""
         from ...addon.bridge.slices import whole
         from ...addon.core.io.read import read_capture
 
@@ -36,18 +34,15 @@ class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
         return self.start(context, command(words), title=self.bl_label, capture_folder=capture, scratch=scratch)
 
     def load(self, job):
-        """The capture as it was read."""
         from ...addon.core.results.room_file import read_capture_file
 
         job.warnings.extend(findings.facts(job)["warnings"])
         return read_capture_file(job.facts["scratch"])[0]
 
     def tidy(self, job):
-        """What was read is not needed any more."""
         shutil.rmtree(job.facts["scratch"], ignore_errors=True)
 
     def change(self, scene, loaded):
-        """Build the objects."""
         from ...addon.bridge.room.scanned import importing
 
         brought = yield from importing(loaded, scene if self.into == "SCENE" else None)

@@ -21,16 +21,15 @@ def others(operator, context) -> list[tuple[str, str, str]]:
     return _items
 
 
+@poll.needs(lambda context: len(bpy.data.scenes) > 1, "This file has no other scene to link the room into.")
+@poll.needs(lambda context: rooms(context.scene), "The scene holds no scanned room; run the recovery first.")
+@poll.has_scene
 class SCAN_RELIGHT_OT_link_room(AtOnce, bpy.types.Operator):
-    """Show the room in another scene."""
+    """Show the recovered room in another scene of this file as well: one room in two scenes, so that what is changed in
+    one is changed in the other"""
 
     bl_idname = "scan_relight.link_room"
     bl_label = "Link into Scene"
-    bl_description = (
-        "Show the recovered room in another scene of this file as well: one room in two scenes, so that "
-        "what is changed in one is changed in the other"
-    )
-    bl_options = {"REGISTER", "UNDO"}
     remarks = "INFO"
 
     scene: bpy.props.EnumProperty(name="Scene", description="Where the room is linked", items=others)
@@ -38,17 +37,7 @@ class SCAN_RELIGHT_OT_link_room(AtOnce, bpy.types.Operator):
         name="With Its Outside", description="Give that scene the room's world and exposure, too"
     )
 
-    @classmethod
-    def poll(cls, context):
-        """There is a room, and another scene."""
-        return (
-            poll.has_scene(cls, context)
-            and poll.check(cls, bool(rooms(context.scene)), "The scene holds no scanned room; run the recovery first.")
-            and poll.check(cls, len(bpy.data.scenes) > 1, "This file has no other scene to link the room into.")
-        )
-
     def work(self, context):
-        """Link all rooms of this scene."""
         from ...addon.bridge.room.bring import link_room
 
         target = bpy.data.scenes.get(self.scene)

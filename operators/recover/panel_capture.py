@@ -30,13 +30,11 @@ TOLD = (
 class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
     """Choose a capture and see what it holds."""
 
-    bl_idname = "SCAN_RELIGHT_PT_capture"
     bl_label = "Capture"
     manual = "panel#capture"
     bl_order = 0
 
     def draw(self, context):
-        """The folder, and what was found there."""
         layout, choices = self.layout, context.scene.scan_relight
         layout.prop(choices, "capture_folder", text="")
         if not choices.capture_folder:
@@ -118,3 +116,20 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
                 self.say(layout, context, sentence, "INFO")
         elif isinstance(value, (str, int, float)) and value not in ("", 0, None) and not isinstance(value, bool):
             self.say(layout, context, f"{label}: {value}", "INFO")
+
+
+class SCAN_RELIGHT_PT_own_scene(SidebarPanel, bpy.types.Panel):
+    """The open scene as a capture."""
+
+    bl_parent_id = "SCAN_RELIGHT_PT_capture"
+    bl_label = "This Scene"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout, choices = self.layout, context.scene.scan_relight
+        self.say(layout, context, "Select the room's objects; the EXR pictures behind the cameras are the frames.")
+        layout.operator("scan_relight.capture_from_scene", icon="SCENE_DATA")
+        column = layout.column()
+        column.use_property_split, column.use_property_decorate = True, False
+        column.prop(choices, "copies")
+        layout.operator("scan_relight.restore_materials", icon="LOOP_BACK")

@@ -40,13 +40,11 @@ def groups() -> list[tuple[str, list[str]]]:
 class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
     """Run the recovery."""
 
-    bl_idname = "SCAN_RELIGHT_PT_recover"
     bl_label = "Recover"
     manual = "panel#recover"
     bl_order = 1
 
     def draw(self, context):
-        """The choices and the run."""
         job = active()
         choices = self.layout.column()
         choices.enabled = job is None

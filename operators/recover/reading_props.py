@@ -1,7 +1,6 @@
 """How a capture is to be read, as properties of operators and of the scene; one for each field of `Reading`."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
-import inspect
 from pathlib import Path
 
 import bpy
@@ -11,83 +10,46 @@ from ...addon.core.io.layout import Reading
 from ..translations import OWN
 
 FOUND = "FOUND"
+FORMAT_ITEMS = [
+    (FOUND, "From the Folder", "Find the format from what the folder holds"),
+    *((name, name, f"Known by {wants}") for name, wants in FORMATS.items()),
+]
 CURVES = (
-    ("FOUND", "Not Given", "Pictures of 8 and 16 bits are refused, as their curve is unknown"),
+    (FOUND, "Not Given", "Pictures of 8 and 16 bits are refused, as their curve is unknown"),
     ("srgb", "sRGB", "The curve of screens and of most pictures of 8 bits"),
     ("linear", "Linear", "Stored numbers are proportional to light"),
 )
-NAMES = (
-    "reading_format",
-    "reading_mesh",
-    "reading_outside",
-    "reading_transfer",
-    "reading_exposures",
-    "reading_convention",
-)
 
 
-def format_items() -> list[tuple[str, str, str]]:
-    """Items of an enumeration of the formats."""
-    return [
-        (FOUND, "From the Folder", "Find the format from what the folder holds"),
-        *((name, name, f"Known by {wants}") for name, wants in FORMATS.items()),
-    ]
+class ReadingProps:
+    """The properties, for operators and property groups."""
 
-
-def with_reading(cls):
-    """Class decorator: give an operator or property group one property for each field of `Reading`."""
-    string, own = bpy.props.StringProperty, inspect.get_annotations(cls)
-    cls.__annotations__ = own | dict(
-        zip(
-            NAMES,
-            (
-                bpy.props.EnumProperty(
-                    name="Format", description="Layout of the capture's folder", items=format_items(), default=FOUND
-                ),
-                string(
-                    name="Mesh",
-                    description="The mesh, where it is not the one that the format names",
-                    subtype="FILE_PATH",
-                    translation_context=OWN,
-                ),
-                bpy.props.BoolProperty(
-                    name="Files Outside", description="Let the capture's files name others outside of its folder"
-                ),
-                bpy.props.EnumProperty(
-                    name="Picture Curve", description="Curve of pictures of 8 and 16 bits", items=CURVES
-                ),
-                string(
-                    name="Exposures",
-                    description="CSV file with the exposure of each frame: lines of name, exposure",
-                    subtype="FILE_PATH",
-                ),
-                string(
-                    name="Poses",
-                    description="Name of a correction of all poses, as the check of the capture proposes it",
-                ),
-            ),
-            strict=True,
-        )
+    reading_format: bpy.props.EnumProperty(
+        name="Format", description="Layout of the capture's folder", items=FORMAT_ITEMS, default=FOUND
     )
-    return cls
+    reading_mesh: bpy.props.StringProperty(
+        name="Mesh",
+        description="The mesh, where it is not the one that the format names",
+        subtype="FILE_PATH",
+        translation_context=OWN,
+    )
+    reading_outside: bpy.props.BoolProperty(
+        name="Files Outside", description="Let the capture's files name others outside of its folder"
+    )
+    reading_transfer: bpy.props.EnumProperty(
+        name="Picture Curve", description="Curve of pictures of 8 and 16 bits", items=CURVES
+    )
+    reading_exposures: bpy.props.StringProperty(
+        name="Exposures",
+        description="CSV file with the exposure of each frame: lines of name, exposure",
+        subtype="FILE_PATH",
+    )
+    reading_convention: bpy.props.StringProperty(
+        name="Poses", description="Name of a correction of all poses, as the check of the capture proposes it"
+    )
 
 
-def options(owner) -> list[str]:
-    """What `owner`'s properties are on the command line."""
-    words = []
-    if owner.reading_format != FOUND:
-        words += ["--format", owner.reading_format]
-    if owner.reading_mesh:
-        words += ["--mesh", bpy.path.abspath(owner.reading_mesh)]
-    if owner.reading_outside:
-        words.append("--outside")
-    if owner.reading_transfer != FOUND:
-        words += ["--transfer", owner.reading_transfer]
-    if owner.reading_exposures:
-        words += ["--exposures", bpy.path.abspath(owner.reading_exposures)]
-    if owner.reading_convention:
-        words += ["--convention", owner.reading_convention]
-    return words
+NAMES = tuple(ReadingProps.__annotations__)
 
 
 def reading(owner) -> Reading:
@@ -98,15 +60,26 @@ def reading(owner) -> Reading:
 
         return through_blender(path)
 
+    def file(path: str) -> Path | None:
+        return Path(bpy.path.abspath(path)) if path else None
+
     return Reading(
         "" if owner.reading_format == FOUND else owner.reading_format,
-        Path(bpy.path.abspath(owner.reading_mesh)) if owner.reading_mesh else None,
+        file(owner.reading_mesh),
         owner.reading_outside,
         "" if owner.reading_transfer == FOUND else owner.reading_transfer,
-        Path(bpy.path.abspath(owner.reading_exposures)) if owner.reading_exposures else None,
+        file(owner.reading_exposures),
         owner.reading_convention,
         import_mesh,
     )
+
+
+def options(owner) -> list[str]:
+    """What `owner`'s properties are on the command line."""
+    asked = reading(owner)
+    given = {name: getattr(asked, name) for name in ("format", "mesh", "transfer", "exposures", "convention")}
+    words = [word for name, value in given.items() if value for word in (f"--{name}", str(value))]
+    return [*words, "--outside"] if asked.outside else words
 
 
 def draw(layout, owner) -> None:

@@ -3,47 +3,36 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
+from ...addon.bridge.results import look
 from ..base import poll
+from ..base.at_once import AtOnce, NothingDone
 
 
-class SCAN_RELIGHT_OT_restore_materials(bpy.types.Operator):
-    """Give the objects back what they wore before."""
+def _wearing(context) -> bool:
+    from ...addon.bridge.own_scene.write_back import wearing
+
+    return context.scene is not None and bool(wearing(context.scene.objects))
+
+
+@poll.needs(_wearing, "No object of this scene wears a recovered material over its own.")
+@poll.object_mode
+class SCAN_RELIGHT_OT_restore_materials(AtOnce, bpy.types.Operator):
+    """Give your objects back the materials and UV maps that they had before the recovered ones; copies that were made
+    for recovered materials are removed"""
 
     bl_idname = "scan_relight.restore_materials"
     bl_label = "Restore Materials"
-    bl_description = (
-        "Give your objects back the materials and UV maps that they had before the recovered ones; "
-        "copies that were made for recovered materials are removed"
-    )
-    bl_options = {"REGISTER", "UNDO"}
 
     selected_only: bpy.props.BoolProperty(
         name="Selected Only", description="Leave the objects that are not selected as they are", default=False
     )
 
-    @classmethod
-    def poll(cls, context):
-        """Whether anything wears recovered materials over its own."""
-        from ...addon.bridge.own_scene.write_back import wearing
-
-        return poll.object_mode(cls, context) and poll.check(
-            cls,
-            context.scene is not None and bool(wearing(context.scene.objects)),
-            "No object of this scene wears a recovered material over its own.",
-        )
-
-    def execute(self, context):
-        """Give them back."""
+    def work(self, context):
         from ...addon.bridge.own_scene.write_back import restore
-        from ...addon.bridge.results import look
 
-        things = list(context.selected_objects if self.selected_only else context.scene.objects)
-        count, warnings = restore(things)
+        count, warnings = restore(list(context.selected_objects if self.selected_only else context.scene.objects))
         look.refresh(context.scene)
-        for sentence in warnings:
-            self.report({"WARNING"}, sentence)
         if not count:
-            self.report({"WARNING"}, "None of the selected objects wears a recovered material over its own.")
-            return {"CANCELLED"}
+            raise NothingDone("None of the selected objects wears a recovered material over its own.")
         self.report({"INFO"}, f"{count} object{'s' * (count > 1)} restored")
-        return {"FINISHED"}
+        return warnings

@@ -6,11 +6,11 @@ from pathlib import Path
 import bpy
 
 from ...addon.bridge.corrections.corrections import keep_for_run
-from ...addon.core.errors import ScanRelightError
 from .. import preferences
 from ..base import poll
+from ..base.at_once import OneSentence
 from . import reading_props
-from .settings_props import FROM_STAGE, can_start, setting_infos, setting_value
+from .settings_props import FROM_STAGE, setting_infos, setting_value, startable
 
 TARGETS = {
     "recover": "Recover the capture beside this window; what is finished already is not done again",
@@ -19,12 +19,13 @@ TARGETS = {
 }
 
 
-class SCAN_RELIGHT_OT_run(bpy.types.Operator):
-    """Run what the panel has chosen."""
+@poll.has_capture
+@startable
+class SCAN_RELIGHT_OT_run(OneSentence, bpy.types.Operator):
+    """Run what the panel has chosen"""
 
     bl_idname = "scan_relight.run"
     bl_label = "Run Recovery"
-    bl_description = "Run what the panel has chosen"
 
     target: bpy.props.EnumProperty(
         name="Operator",
@@ -36,34 +37,23 @@ class SCAN_RELIGHT_OT_run(bpy.types.Operator):
 
     @classmethod
     def description(cls, context, properties):
-        """The tooltip."""
         if properties.from_stage != "NONE":
             return "Do this stage and all later ones anew; those before it are taken as they are stored"
         return TARGETS[properties.target]
 
-    @classmethod
-    def poll(cls, context):
-        """As for what is run, and a capture has to be chosen."""
-        return can_start(cls, context) and poll.has_capture(cls, context)
-
     def execute(self, context):
-        """Hand the choices over."""
+        return self.attempt(lambda: self.start(context.scene))
+
+    def start(self, scene) -> set[str]:
+        """Hand the choices over; what the artist gave of a room that is run again goes to where the run heeds it."""
         operator = getattr(bpy.ops.scan_relight, self.target)
         how = "EXEC_DEFAULT" if bpy.app.background else "INVOKE_DEFAULT"
-        try:
-            chosen = self.chosen(context.scene.scan_relight)
-            if self.target != "import_capture":
-                self.keep_corrections(context.scene, chosen)
-            verdict = operator(how, ask=False, **chosen)
-        except (RuntimeError, ScanRelightError) as error:  # reported already, and again by Blender as an exception
-            self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
-            return {"CANCELLED"}
+        chosen = self.chosen(scene.scan_relight)
+        if self.target != "import_capture":
+            capture = Path(bpy.path.abspath(chosen["capture_folder"])).absolute()
+            keep_for_run(scene, Path(chosen["result_folder"]), capture)
+        verdict = operator(how, ask=False, **chosen)
         return {"FINISHED"} if verdict & {"FINISHED", "RUNNING_MODAL"} else {"CANCELLED"}
-
-    @staticmethod
-    def keep_corrections(scene, chosen) -> None:
-        """What the artist gave of a room that is run again goes to where the run heeds it."""
-        keep_for_run(scene, Path(chosen["result_folder"]), Path(bpy.path.abspath(chosen["capture_folder"])).absolute())
 
     def chosen(self, choices) -> dict:
         """The target's properties."""

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import bpy
 
+from ...addon.core.errors import StorageError
 from ...addon.core.settings import PRESETS, Settings
 from ...addon.settings_info import setting_infos
 from ..translations import OWN
 from . import findings
-from .reading_props import with_reading
+from .reading_props import ReadingProps
 from .settings_props import COPIES, IMAGES, preset_items, setting_value, with_settings
 
 
@@ -24,7 +25,7 @@ def preset_chosen(choices, context) -> None:
 def capture_chosen(choices, context) -> None:
     """Have a look at the folder at once, beside the window."""
     if choices.capture_folder and not bpy.app.background and findings.wrong_folder(choices) is None:
-        with suppress(OSError):  # then the button says why
+        with suppress(StorageError):  # then the button says why
             findings.begin(choices)
 
 
@@ -53,8 +54,7 @@ class ScanRelightSettings(bpy.types.PropertyGroup):
         ]
 
 
-@with_reading
-class ScanRelightReading(bpy.types.PropertyGroup):
+class ScanRelightReading(ReadingProps, bpy.types.PropertyGroup):
     """How the capture is to be read."""
 
 

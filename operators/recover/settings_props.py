@@ -21,7 +21,7 @@ from ..base.at_once import OneSentence
 from ..base.job_operator import JobOperator
 from ..translations import OWN
 from . import reading_props, room_window
-from .reading_props import with_reading
+from .reading_props import ReadingProps
 from .settings_words import words
 
 PRESET_TEXTS = {
@@ -105,15 +105,13 @@ def missing_packages() -> tuple[str, ...]:
     return tuple(name for name in PACKAGES if importlib.util.find_spec(name) is None)
 
 
-def can_start(operator, context) -> bool:
-    """What everything asks in `poll` that reads a capture; also those that only start another operator."""
-    missing = missing_packages()
-    return (
-        poll.check(operator, not missing, f"{' and '.join(missing)} missing: install the extension again.")
-        and poll.has_scene(operator, context)
-        and poll.object_mode(operator, context)
-        and poll.no_run(operator)
+def startable(operator):
+    """Class decorator: what everything asks in `poll` that reads a capture, or starts another operator that does."""
+    packages = poll.needs(
+        lambda context: not missing_packages(),
+        lambda: f"{' and '.join(missing_packages())} missing: install the extension again.",
     )
+    return poll.free_scene(packages(operator))
 
 
 def preset_items() -> list[tuple[str, str, str]]:
@@ -121,8 +119,8 @@ def preset_items() -> list[tuple[str, str, str]]:
     return [(name, name.capitalize(), PRESET_TEXTS.get(name, "")) for name in PRESETS]
 
 
-@with_reading
-class CaptureOperator(OneSentence, JobOperator):
+@startable
+class CaptureOperator(ReadingProps, OneSentence, JobOperator):
     """What every operator has: a capture folder, and errors that become one sentence.
 
     With a window the work is a job of its own that `modal` follows; in the background `execute` does it itself.
@@ -137,13 +135,7 @@ class CaptureOperator(OneSentence, JobOperator):
     )
     ask: bpy.props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"}, description="Ask for the folders first")
 
-    @classmethod
-    def poll(cls, context):
-        """Whether the operator can run now; where not, one sentence says what is missing."""
-        return can_start(cls, context)
-
     def invoke(self, context, event):
-        """Ask for the folders and settings."""
         if not self.ask:
             return self.execute(context)
         choices = context.scene.scan_relight
@@ -178,6 +170,7 @@ class CaptureOperator(OneSentence, JobOperator):
 class StageOperator(CaptureOperator):
     """An operator that runs stages of the method: also a result folder and the settings."""
 
+    bl_options = set()  # the scene stays as it is: no undo step
     result_folder: bpy.props.StringProperty(
         name="Result",
         description="Folder for the recovered scene and the finished stages",
@@ -197,7 +190,6 @@ class StageOperator(CaptureOperator):
     )
 
     def work(self, context) -> list[str]:
-        """Run the stages up to the operator's own; returns warnings."""
         return self.run(context, self.until)
 
     def draw(self, context):
@@ -279,6 +271,7 @@ class StageOperator(CaptureOperator):
 class SceneStageOperator(StageOperator):
     """A stage operator whose end also changes the scene, in one undo step."""
 
+    bl_options = {"UNDO", "PRESET"}
     until = WRITE
     import_first = True
     target: bpy.props.EnumProperty(name="Onto", description="Which objects the materials go onto", items=TARGETS)
@@ -319,7 +312,6 @@ class SceneStageOperator(StageOperator):
         return super().begin(context)
 
     def load(self, job):
-        """The room that the run has left."""
         from ...addon.core.results.room_file import read_room
 
         return read_room(job.facts["result_folder"])

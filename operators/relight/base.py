@@ -9,24 +9,18 @@ from ..base import poll
 from ..base.at_once import AtOnce
 
 
-class RelightOperator(AtOnce):
+@poll.object_mode
+@poll.has_scene
+class SceneOperator(AtOnce):
     """Works in the scene at once, in one undo step; `work` returns warnings."""
 
-    bl_options = {"REGISTER", "UNDO"}
-    needs_room = True
 
-    @classmethod
-    def poll(cls, context):
-        """Whether the operator can run now; where not, one sentence says what is missing."""
-        return (
-            poll.has_scene(cls, context)
-            and poll.object_mode(cls, context)
-            and poll.check(
-                cls,
-                not cls.needs_room or has_room(context.scene),
-                "The scene holds no scanned room yet; recover a capture or open a result's scene.blend.",
-            )
-        )
+@poll.needs(
+    lambda context: has_room(context.scene),
+    "The scene holds no scanned room yet; recover a capture or open a result's scene.blend.",
+)
+class RelightOperator(SceneOperator):
+    """The same in a scanned room."""
 
 
 def has_room(scene: bpy.types.Scene) -> bool:

@@ -10,7 +10,6 @@ import bpy
 
 from ...addon.bridge.relight import before_after, pictures
 from ...addon.bridge.render_device import told_device
-from ...addon.core.errors import ScanRelightError
 from ..base import poll
 from ..base.job_operator import JobOperator
 from .base import RelightOperator
@@ -19,12 +18,15 @@ from .props import ENGINE
 FILE = "before_after.png"
 
 
+@poll.no_run
+@poll.needs(
+    lambda context: context.scene.camera is not None, "The scene has no camera to render through; choose a frame first."
+)
 class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Operator):
-    """Render both pictures; beside a window in a process of its own."""
+    """Render this view under the captured and the present light, side by side, into an image and a file"""
 
     bl_idname = "scan_relight.before_after"
     bl_label = "Before and After"
-    bl_description = "Render this view under the captured and the present light, side by side, into an image and a file"
     bl_options = {"UNDO"}
 
     filepath: bpy.props.StringProperty(
@@ -39,19 +41,6 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         name="Size", description="Of the scene's render size", subtype="PERCENTAGE", min=1, max=1000, default=100
     )
 
-    @classmethod
-    def poll(cls, context):
-        """A camera is needed, and no other run."""
-        return (
-            super().poll(context)
-            and poll.check(
-                cls,
-                context.scene.camera is not None,
-                "The scene has no camera to render through; choose a frame first.",
-            )
-            and poll.no_run(cls)
-        )
-
     def target(self, scene) -> Path:
         """The file to write."""
         if self.filepath:
@@ -62,7 +51,6 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         return folder / FILE
 
     def work(self, context):
-        """In the background: here and now."""
         scene, out = context.scene, self.target(context.scene)
         with pictures.settings_kept(scene):
             pictures.prepare(scene, self.engine, self.samples, self.percentage)
@@ -73,16 +61,16 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         """Blocks in the background; else starts the job."""
         if bpy.app.background:
             return RelightOperator.execute(self, context)
+        return self.attempt(lambda: self.begin(context))
+
+    def begin(self, context) -> set[str]:
+        """Start the job."""
         from ...addon.bridge.job.command import command
 
-        try:
-            out = self.target(context.scene)
-            pictures.check_format(out)
-            self._folder = Path(tempfile.mkdtemp(prefix="scan_relight_"))
-            before_after.save_copy(self._folder)
-        except ScanRelightError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+        out = self.target(context.scene)
+        pictures.check_format(out)
+        self._folder = Path(tempfile.mkdtemp(prefix="scan_relight_"))
+        before_after.save_copy(self._folder)
         words = [
             "relight",
             str(self._folder),
@@ -106,7 +94,6 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         return self.start(context, command(words), title="Before and After", out=str(out), result_folder="")
 
     def load(self, job):
-        """Bring the picture to its place."""
         out = Path(job.facts["out"])
         out.parent.mkdir(parents=True, exist_ok=True)
         with pictures.saving(out) as temporary:
@@ -114,7 +101,6 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         return out
 
     def change(self, scene, loaded):
-        """Show it."""
         before_after.show_in_window(before_after.show(loaded))
         yield 1.0
         return ()

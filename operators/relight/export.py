@@ -1,4 +1,4 @@
-"""`bpy.ops.scan_relight.export`: the room as glTF or USD."""
+"""`bpy.ops.scan_relight.export` and the tab's last part: the room as glTF or USD."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 from pathlib import Path
@@ -9,7 +9,8 @@ from ...addon.bridge.export import export
 from ...addon.core.errors import BadInputError
 from ...addon.core.results.room_file import capture_name
 from ..base import poll
-from .base import RelightOperator, default_folder
+from ..base.panel import SidebarPanel
+from .base import SceneOperator, default_folder
 
 FORMATS = (
     (".glb", "glTF (.glb)", "One file; most viewers and game engines"),
@@ -24,14 +25,15 @@ SCOPES = (
 )
 
 
-class SCAN_RELIGHT_OT_export(RelightOperator, bpy.types.Operator):
-    """Take the room elsewhere."""
+@poll.needs(
+    lambda context: any(thing.type == "MESH" for thing in context.scene.objects), "The scene has no mesh to export."
+)
+class SCAN_RELIGHT_OT_export(SceneOperator, bpy.types.Operator):
+    """Write the room with plain materials that other programs understand; the scene stays as it is"""
 
     bl_idname = "scan_relight.export"
     bl_label = "Export Room"
-    bl_description = "Write the room with plain materials that other programs understand; the scene stays as it is"
     bl_options = {"REGISTER", "PRESET"}
-    needs_room = False
 
     filepath: bpy.props.StringProperty(
         name="File", description="What to write", subtype="FILE_PATH", options={"SKIP_SAVE"}
@@ -43,15 +45,7 @@ class SCAN_RELIGHT_OT_export(RelightOperator, bpy.types.Operator):
     lights: bpy.props.BoolProperty(name="Lights", description="Also the lights that were added", default=True)
     cameras: bpy.props.BoolProperty(name="Camera", description="Also the scene's camera", default=False)
 
-    @classmethod
-    def poll(cls, context):
-        """Something to export."""
-        return super().poll(context) and poll.check(
-            cls, any(thing.type == "MESH" for thing in context.scene.objects), "The scene has no mesh to export."
-        )
-
     def invoke(self, context, event):
-        """Choose the file."""
         if not self.filepath:
             folder = default_folder(context.scene)
             self.filepath = str(Path(folder, capture_name(folder) + self.format)) if folder else f"room{self.format}"
@@ -59,7 +53,6 @@ class SCAN_RELIGHT_OT_export(RelightOperator, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def work(self, context):
-        """Export; what the format can't hold is told."""
         if not self.filepath:
             raise BadInputError("Choose the file to write first.")
         path = Path(bpy.path.abspath(self.filepath))
@@ -68,3 +61,24 @@ class SCAN_RELIGHT_OT_export(RelightOperator, bpy.types.Operator):
         told = export.export(context.scene, path, self.scope, self.lights, self.cameras)
         self.report({"INFO"}, f"Exported '{path}'.")
         return told
+
+
+class SCAN_RELIGHT_PT_export(SidebarPanel, bpy.types.Panel):
+    """Take the room elsewhere."""
+
+    bl_label = "Export"
+    manual = "relighting#export"
+    bl_order = 5
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        for ending, text, _ in FORMATS:
+            problem = export.can_export(ending)
+            row = layout.row()
+            row.enabled = not problem
+            row.operator("scan_relight.export", text=text, icon="EXPORT").format = ending
+        for problem in dict.fromkeys(export.can_export(ending) for ending, _, _ in FORMATS):
+            if problem:
+                self.say(layout, context, problem, "INFO")
+        self.say(layout, context, "Pictures become 8-bit sRGB, materials plain: what other programs understand.")

@@ -16,29 +16,23 @@ _looked: dict = {"run": None}
 
 
 class SCAN_RELIGHT_OT_expose(RelightOperator, bpy.types.Operator):
-    """Set the scene's exposure to its light."""
+    """Measure the light in a small picture and set the exposure so that its median is middle grey; takes some
+    seconds"""
 
     bl_idname = "scan_relight.expose"
     bl_label = "Expose for This Light"
-    bl_description = (
-        "Measure the light in a small picture and set the exposure so that its median is middle grey; "
-        "takes some seconds"
-    )
 
     def work(self, context):
-        """Measure and set."""
         exposure.expose(context.scene)
 
 
 class SCAN_RELIGHT_OT_restore_exposure(RelightOperator, bpy.types.Operator):
-    """Back to the exposure of the capture."""
+    """Set the exposure back to what it was before it was measured"""
 
     bl_idname = "scan_relight.restore_exposure"
     bl_label = "Captured Exposure"
-    bl_description = "Set the exposure back to what it was before it was measured"
 
     def work(self, context):
-        """Put it back."""
         exposure.restore(context.scene)
 
 

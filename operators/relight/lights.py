@@ -15,59 +15,47 @@ from .props import AIMS, UNITS
 
 
 class SCAN_RELIGHT_OT_switch_lamps(RelightOperator, bpy.types.Operator):
-    """Switch every lamp of the scan."""
+    """Switch all lamps of the scan on or off; their strength and colour stay"""
 
     bl_idname = "scan_relight.switch_lamps"
     bl_label = "Switch All Lamps"
-    bl_description = "Switch all lamps of the scan on or off; their strength and colour stay"
 
     on: bpy.props.BoolProperty(name="On", description="On or off", default=False)
 
     def work(self, context):
-        """All of them."""
         for lamp in lamps.find_lamps(context.scene):
             lamps.set_on(lamp, self.on)
         follow(context.scene)
 
 
 class SCAN_RELIGHT_OT_restore_lamp(RelightOperator, bpy.types.Operator):
-    """Make one lamp what the scan found."""
+    """Make this lamp exactly what the scan found"""
 
     bl_idname = "scan_relight.restore_lamp"
     bl_label = "Restore Lamp"
-    bl_description = "Make this lamp exactly what the scan found"
 
     name: bpy.props.StringProperty(name="Lamp", description="Name of its material, or its class")
 
     def work(self, context):
-        """By its name."""
         for lamp in lamps.lamp_named(context.scene, self.name):
             lamps.restore(lamp)
         follow(context.scene)
 
 
+@poll.needs(lambda context: state.is_relit(context.scene), "The light is as it was captured.")
 class SCAN_RELIGHT_OT_restore_light(RelightOperator, bpy.types.Operator):
-    """Back to the captured light."""
+    """Make lamps and outside exactly what was recovered, and remove the lights that were added here"""
 
     bl_idname = "scan_relight.restore_light"
     bl_label = "Restore Captured Light"
-    bl_description = "Make lamps and outside exactly what was recovered, and remove the lights that were added here"
-
-    @classmethod
-    def poll(cls, context):
-        """Only where anything differs."""
-        return super().poll(context) and poll.check(
-            cls, state.is_relit(context.scene), "The light is as it was captured."
-        )
 
     def work(self, context):
-        """All of it."""
         state.restore_captured(context.scene)
         follow(context.scene)
 
 
 class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
-    """Add a light inside the room."""
+    """Add a light inside the room"""
 
     bl_idname = "scan_relight.add_light"
     bl_label = "Add Light"
@@ -93,12 +81,10 @@ class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
 
     @classmethod
     def description(cls, context, properties):
-        """The preset's own words."""
         text = next(text for name, _, text in PRESETS if name == properties.preset)
         return f"{text}; stands inside the room, as strong as the room's own light asks for"
 
     def work(self, context):
-        """Add it and make it the active object."""
         light = lights.add_light(
             context.scene, self.preset, self.strength, self.aim, context.object, self.kelvin or None, self.unit
         )
@@ -106,22 +92,14 @@ class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
         follow(context.scene)
 
 
+@poll.needs(lambda context: lights.added_lights(context.scene), "No light was added here.")
 class SCAN_RELIGHT_OT_remove_lights(RelightOperator, bpy.types.Operator):
-    """Remove what was added."""
+    """Remove all lights that were added here"""
 
     bl_idname = "scan_relight.remove_lights"
     bl_label = "Remove New Lights"
-    bl_description = "Remove all lights that were added here"
-
-    @classmethod
-    def poll(cls, context):
-        """Only where there are any."""
-        return super().poll(context) and poll.check(
-            cls, bool(lights.added_lights(context.scene)), "No light was added here."
-        )
 
     def work(self, context):
-        """All of them."""
         lights.remove_lights(context.scene)
         follow(context.scene)
 
@@ -133,11 +111,10 @@ def put_around(scene, picture: str) -> list[str]:
 
 
 class SCAN_RELIGHT_OT_use_hdri(RelightOperator, bpy.types.Operator):
-    """Put a picture around the room."""
+    """Put an equirectangular HDR picture around the room; the recovered outside is kept"""
 
     bl_idname = "scan_relight.use_hdri"
     bl_label = "Picture Around the Room"
-    bl_description = "Put an equirectangular HDR picture around the room; the recovered outside is kept"
 
     filepath: bpy.props.StringProperty(
         name="Picture", description="EXR or HDR file", subtype="FILE_PATH", options={"SKIP_SAVE"}
@@ -145,14 +122,12 @@ class SCAN_RELIGHT_OT_use_hdri(RelightOperator, bpy.types.Operator):
     filter_glob: bpy.props.StringProperty(default="*.exr;*.hdr;*.png;*.jpg", options={"HIDDEN"})
 
     def invoke(self, context, event):
-        """Choose the file."""
         if self.filepath:
             return self.execute(context)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def work(self, context):
-        """The chosen file."""
         if not self.filepath:
             raise BadInputError("Choose the picture first.")
         return put_around(context.scene, bpy.path.abspath(self.filepath))
@@ -168,22 +143,16 @@ def _studio_items(operator, context):
     return _items
 
 
+@poll.needs(
+    lambda context: outside.studio_lights(), "This Blender comes without its HDR pictures; choose a file instead."
+)
 class SCAN_RELIGHT_OT_use_studio_light(RelightOperator, bpy.types.Operator):
-    """One of Blender's own pictures around the room."""
+    """Put one of the HDR pictures that come with Blender around the room"""
 
     bl_idname = "scan_relight.use_studio_light"
     bl_label = "Blender's Pictures"
-    bl_description = "Put one of the HDR pictures that come with Blender around the room"
 
     picture: bpy.props.EnumProperty(name="Picture", description="Which one", items=_studio_items)
 
-    @classmethod
-    def poll(cls, context):
-        """Some builds have none."""
-        return super().poll(context) and poll.check(
-            cls, bool(outside.studio_lights()), "This Blender comes without its HDR pictures; choose a file instead."
-        )
-
     def work(self, context):
-        """As any other picture."""
         return put_around(context.scene, self.picture)

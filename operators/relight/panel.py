@@ -25,12 +25,9 @@ class SCAN_RELIGHT_UL_lamps(NamedRows, bpy.types.UIList):
     Not a list of materials: for each of those Blender renders a picture, and its shaders, before it draws the panel.
     """
 
-    bl_idname = "SCAN_RELIGHT_UL_lamps"
-
     lamps: dict = {}  # what the last `filter_items` found, as it comes before the rows
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index):
-        """Switch, name, colour, strength."""
         column = layout.column(align=True)
         for material in self.lamps.get(item.name, ()):
             lamp = material.scan_relight_lamp
@@ -60,20 +57,17 @@ class RelightPanel(SidebarPanel):
 
     @classmethod
     def poll(cls, context):
-        """With a room only."""
         return super().poll(context) and has_room(context.scene)
 
 
 class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
     """The lamps."""
 
-    bl_idname = "SCAN_RELIGHT_PT_relight"
     bl_label = "Relight"
     manual = "relighting"
     bl_order = 4
 
     def draw(self, context):
-        """The lamps as a list, the chosen one's numbers, the way back."""
         layout, scene = self.layout, context.scene
         if not has_room(scene):
             self.say(layout, context, "Recover a capture, or open a result's scene.blend, to light it anew.", "INFO")
@@ -117,13 +111,11 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
 class SCAN_RELIGHT_PT_outside(RelightPanel, bpy.types.Panel):
     """The world."""
 
-    bl_idname = "SCAN_RELIGHT_PT_outside"
     bl_label = "Outside"
     bl_parent_id = "SCAN_RELIGHT_PT_relight"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """On or off, strength, rotation, another picture."""
         layout, world = self.layout, context.scene.world
         layout.use_property_split, layout.use_property_decorate = True, False
         if not relight_outside.has_outside(context.scene):
@@ -144,12 +136,10 @@ class SCAN_RELIGHT_PT_outside(RelightPanel, bpy.types.Panel):
 class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):
     """Presets."""
 
-    bl_idname = "SCAN_RELIGHT_PT_new_lights"
     bl_label = "New Lights"
     bl_parent_id = "SCAN_RELIGHT_PT_relight"
 
     def draw(self, context):
-        """One button each."""
         layout, studio = self.layout, context.scene.scan_relight_studio
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.prop(studio, "aim")
@@ -185,12 +175,10 @@ class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):
 class SCAN_RELIGHT_PT_exposure(RelightPanel, bpy.types.Panel):
     """How bright it is shown, and by EEVEE."""
 
-    bl_idname = "SCAN_RELIGHT_PT_exposure"
     bl_label = "Exposure and Preview"
     bl_parent_id = "SCAN_RELIGHT_PT_relight"
 
     def draw(self, context):
-        """The exposure, what there is to say of it, the preview's light."""
         layout, scene = self.layout, context.scene
         layout.use_property_split, layout.use_property_decorate = True, False
         column = layout.column(align=True)
@@ -213,13 +201,11 @@ class SCAN_RELIGHT_PT_exposure(RelightPanel, bpy.types.Panel):
 class SCAN_RELIGHT_PT_view(SidebarPanel, bpy.types.Panel):
     """Frames."""
 
-    bl_idname = "SCAN_RELIGHT_PT_view"
     bl_label = "Camera"
     bl_parent_id = "SCAN_RELIGHT_PT_relight"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """A slider over the frames."""
         layout, scene = self.layout, context.scene
         cameras, studio = frame_cameras(scene), scene.scan_relight_studio
         layout.use_property_split, layout.use_property_decorate = True, False
@@ -245,13 +231,11 @@ class SCAN_RELIGHT_PT_view(SidebarPanel, bpy.types.Panel):
 class SCAN_RELIGHT_PT_virtual(RelightPanel, bpy.types.Panel):
     """Things that were not scanned."""
 
-    bl_idname = "SCAN_RELIGHT_PT_virtual"
     bl_label = "Objects"
     bl_parent_id = "SCAN_RELIGHT_PT_relight"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """A new one, or one's own."""
         layout, studio = self.layout, context.scene.scan_relight_studio
         layout.use_property_split, layout.use_property_decorate = True, False
         for name in ("place", "shape", "look", "size"):
@@ -268,12 +252,10 @@ class SCAN_RELIGHT_PT_virtual(RelightPanel, bpy.types.Panel):
 class SCAN_RELIGHT_PT_before_after(RelightPanel, bpy.types.Panel):
     """The preview."""
 
-    bl_idname = "SCAN_RELIGHT_PT_before_after"
     bl_label = "Before and After"
     bl_parent_id = "SCAN_RELIGHT_PT_relight"
 
     def draw(self, context):
-        """How, and the button."""
         layout, studio = self.layout, context.scene.scan_relight_studio
         layout.use_property_split, layout.use_property_decorate = True, False
         for name in ("engine", "samples", "percentage"):

@@ -14,15 +14,12 @@ from .base import RelightOperator
 
 
 class SCAN_RELIGHT_OT_bake_preview(RelightOperator, bpy.types.Operator):
-    """Bake light probes."""
+    """Bake how light bounces through the room for EEVEE, and make its preview about as bright as the picture by Cycles
+    through several of the cameras. Bake again after the light has changed. The status bar shows how far it is, ESC
+    ends it"""
 
     bl_idname = "scan_relight.bake_preview"
     bl_label = "Bake Preview Light"
-    bl_description = (
-        "Bake how light bounces through the room for EEVEE, and make its preview about as bright as the picture by "
-        "Cycles through several of the cameras. Bake again after the light has changed. The status bar shows how far "
-        "it is, ESC ends it"
-    )
 
     _wait = True
 
@@ -32,7 +29,6 @@ class SCAN_RELIGHT_OT_bake_preview(RelightOperator, bpy.types.Operator):
         return self.execute(context)
 
     def work(self, context):
-        """Renew the volume."""
         probe.bake(context.scene, self._wait)
         if self._wait:
             probe.fit(context.scene)
@@ -52,20 +48,12 @@ def _fit_when_baked(name: str) -> float | None:
     return None
 
 
+@poll.needs(lambda context: probe.probes(context.scene), "No preview light was baked here.")
 class SCAN_RELIGHT_OT_remove_preview(RelightOperator, bpy.types.Operator):
-    """Take the probes away."""
+    """Remove the light that was baked for EEVEE"""
 
     bl_idname = "scan_relight.remove_preview"
     bl_label = "Remove Preview Light"
-    bl_description = "Remove the light that was baked for EEVEE"
-
-    @classmethod
-    def poll(cls, context):
-        """Only where there is any."""
-        return super().poll(context) and poll.check(
-            cls, bool(probe.probes(context.scene)), "No preview light was baked here."
-        )
 
     def work(self, context):
-        """All of it."""
         probe.remove(context.scene)

@@ -14,7 +14,6 @@ FOLDER = "scan_relight/light"
 class SCAN_RELIGHT_MT_light_presets(bpy.types.Menu):
     """The set-ups that were saved."""
 
-    bl_idname = "SCAN_RELIGHT_MT_light_presets"
     bl_label = "My Lights"
     bl_description = "Light this room as another one was lit"
     preset_subdir = FOLDER
@@ -22,23 +21,15 @@ class SCAN_RELIGHT_MT_light_presets(bpy.types.Menu):
     draw = bpy.types.Menu.draw_preset
 
 
+@poll.needs(lambda context: has_room(context.scene), "The scene holds no scanned room to light.")
+@poll.has_scene
 class SCAN_RELIGHT_OT_light_preset_add(AddPresetBase, bpy.types.Operator):
-    """Save or remove a set-up."""
+    """Save the lights that were added, the lamps' factors and the outside under a name, to light other rooms the same
+    way"""
 
     bl_idname = "scan_relight.light_preset_add"
     bl_label = "Save This Light"
-    bl_description = (
-        "Save the lights that were added, the lamps' factors and the outside under a name, to light "
-        "other rooms the same way"
-    )
     preset_menu = "SCAN_RELIGHT_MT_light_presets"
     preset_subdir = FOLDER
     preset_defines = ["studio = bpy.context.scene.scan_relight_studio"]
     preset_values = ["studio.setup"]
-
-    @classmethod
-    def poll(cls, context):
-        """Only with a room."""
-        return poll.has_scene(cls, context) and poll.check(
-            cls, has_room(context.scene), "The scene holds no scanned room to light."
-        )

@@ -8,17 +8,18 @@ from ...addon.bridge.data.cameras import frame_cameras, use_camera
 from ...addon.bridge.relight import match_frame
 from ...addon.core.errors import BadInputError
 from ..base import poll
-from .base import RelightOperator
+from .base import SceneOperator
 from .props import look_through
 
 
-class SCAN_RELIGHT_OT_match_frame(RelightOperator, bpy.types.Operator):
-    """Look through a frame of the capture."""
+@poll.needs(
+    lambda context: frame_cameras(context.scene), "The scene has no camera of a capture; import a capture first."
+)
+class SCAN_RELIGHT_OT_match_frame(SceneOperator, bpy.types.Operator):
+    """Look and render through the camera of a frame of the capture"""
 
     bl_idname = "scan_relight.match_frame"
     bl_label = "Look Through Frame"
-    bl_description = "Look and render through the camera of a frame of the capture"
-    needs_room = False
 
     index: bpy.props.IntProperty(name="Frame", description="In the capture's order, from 0", min=0)
     size: bpy.props.BoolProperty(
@@ -26,15 +27,7 @@ class SCAN_RELIGHT_OT_match_frame(RelightOperator, bpy.types.Operator):
     )
     step: bpy.props.IntProperty(name="Step", description="So many frames on from the present one; 0 takes the frame")
 
-    @classmethod
-    def poll(cls, context):
-        """Only with cameras of a capture."""
-        return super().poll(context) and poll.check(
-            cls, bool(frame_cameras(context.scene)), "The scene has no camera of a capture; import a capture first."
-        )
-
     def work(self, context):
-        """Set the camera; in a window, look through it."""
         scene = context.scene
         count = len(frame_cameras(scene))
         index = (match_frame.current(scene) + self.step) % count if self.step else self.index
@@ -45,28 +38,18 @@ class SCAN_RELIGHT_OT_match_frame(RelightOperator, bpy.types.Operator):
         return [told] if told else []
 
 
-class SCAN_RELIGHT_OT_follow_track(RelightOperator, bpy.types.Operator):
-    """Look through the camera that goes along the track."""
+@poll.needs(
+    lambda context: track_cameras(context.scene),
+    "The scene has no camera along a capture's track; bring a room of at least two frames in first.",
+)
+class SCAN_RELIGHT_OT_follow_track(SceneOperator, bpy.types.Operator):
+    """Look and render through a camera that goes where the capture's went: play the timeline, a frame of it for each of
+    the capture's"""
 
     bl_idname = "scan_relight.follow_track"
     bl_label = "Go Along the Track"
-    bl_description = (
-        "Look and render through a camera that goes where the capture's went: play the timeline, a frame "
-        "of it for each of the capture's"
-    )
-    needs_room = False
-
-    @classmethod
-    def poll(cls, context):
-        """Only with such a camera."""
-        return super().poll(context) and poll.check(
-            cls,
-            bool(track_cameras(context.scene)),
-            "The scene has no camera along a capture's track; bring a room of at least two frames in first.",
-        )
 
     def work(self, context):
-        """Make it the scene's camera; in a window, look through it."""
         use_camera(context.scene, track_cameras(context.scene)[0], size=False)
         see_through_camera(context)
 

@@ -8,6 +8,7 @@ import bpy
 from ...addon.bridge.results import home
 from .. import preferences
 from ..base import poll
+from ..base.at_once import AtOnce
 from . import told
 
 
@@ -20,23 +21,16 @@ def folders(scene: bpy.types.Scene | None) -> list[Path]:
     return [*below(preferences.results_folder()), *(below(beside) if beside else ()), *([own] if own else ())]
 
 
-class SCAN_RELIGHT_OT_clear_cache(bpy.types.Operator):
-    """Clear the finished stages of results."""
+@poll.no_run
+class SCAN_RELIGHT_OT_clear_cache(AtOnce, bpy.types.Operator):
+    """Delete the finished stages that further runs would go on from: of the results in the results folder, beside this
+    file, and of this scene's. The results themselves stay as they are"""
 
     bl_idname = "scan_relight.clear_cache"
     bl_label = "Clear Stages"
-    bl_description = (
-        "Delete the finished stages that further runs would go on from: of the results in the results "
-        "folder, beside this file, and of this scene's. The results themselves stay as they are"
-    )
-
-    @classmethod
-    def poll(cls, context):
-        """Not while a run may be writing there."""
-        return poll.no_run(cls)
+    bl_options = {"REGISTER"}
 
     def invoke(self, context, event):
-        """Ask first."""
         return context.window_manager.invoke_confirm(
             self,
             event,
@@ -46,17 +40,14 @@ class SCAN_RELIGHT_OT_clear_cache(bpy.types.Operator):
             icon="QUESTION",
         )
 
-    def execute(self, context):
-        """Delete, and say how much is free again."""
+    def work(self, context):
         from ...addon.core.results.cache import clear
 
         done = clear(folders(context.scene))
         preferences.forget_size()
-        for sentence in done.left:
-            self.report({"WARNING"}, sentence)
         self.report(
             {"INFO"},
             f"{preferences.amount(done.freed)} of stages deleted; {done.results} "
             f"result{'s' * (done.results != 1)} kept.",
         )
-        return {"FINISHED"}
+        return done.left

@@ -16,14 +16,10 @@ _found: list[str] = []
 
 
 class SCAN_RELIGHT_OT_find_result(AtOnce, bpy.types.Operator):
-    """Point to a result that was moved."""
+    """Choose where the result folder lies now: all pictures, objects and looks that came from it are pointed there"""
 
     bl_idname = "scan_relight.find_result"
     bl_label = "Find It"
-    bl_description = (
-        "Choose where the result folder lies now: all pictures, objects and looks that came from it are pointed there"
-    )
-    bl_options = {"REGISTER", "UNDO"}
 
     missing: bpy.props.StringProperty(
         name="Missing",
@@ -42,12 +38,10 @@ class SCAN_RELIGHT_OT_find_result(AtOnce, bpy.types.Operator):
     )
 
     def invoke(self, context, event):
-        """Choose it."""
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def work(self, context):
-        """Point everything there."""
         one = self.wanted()
         if not self.directory:
             raise BadInputError("Choose the folder that the result lies in now.")
@@ -75,18 +69,15 @@ class SCAN_RELIGHT_OT_find_result(AtOnce, bpy.types.Operator):
 class SCAN_RELIGHT_PT_missing(SidebarPanel, bpy.types.Panel):
     """What the file misses, above all else."""
 
-    bl_idname = "SCAN_RELIGHT_PT_missing"
     bl_label = "Missing"
     bl_options = {"HIDE_HEADER"}
     bl_order = 0
 
     @classmethod
     def poll(cls, context):
-        """Only where there is something to say."""
         return context.scene is not None and bool(_found or find.known_missing() or find.known_overtaken())
 
     def draw(self, context):
-        """Each missing result with its button; what was found again."""
         layout = self.layout
         for one in find.known_missing():
             self.say(layout, context, one.sentence, "ERROR")

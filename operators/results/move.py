@@ -9,23 +9,15 @@ from .. import preferences
 from ..base import poll
 
 
+@poll.needs(lambda context: home.earlier_results(), "No result lies in the extension's own folder.")
+@poll.no_run
 class SCAN_RELIGHT_OT_move_results(bpy.types.Operator):
-    """Move results out of the extension's folder."""
+    """Move the results of earlier versions out of the extension's own folder into the results folder, so that removing
+    the extension can't delete them; this file's images are pointed there"""
 
     bl_idname = "scan_relight.move_results"
     bl_label = "Move Out"
-    bl_description = (
-        "Move the results of earlier versions out of the extension's own folder into the results folder, "
-        "so that removing the extension can't delete them; this file's images are pointed there"
-    )
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        """Not while a run may be writing there."""
-        return poll.no_run(cls) and poll.check(
-            cls, bool(home.earlier_results()), "No result lies in the extension's own folder."
-        )
 
     def execute(self, context):
         """Move each; one that can't be moved stays whole where it is, and is told."""

@@ -9,15 +9,13 @@ from . import told
 
 
 class SCAN_RELIGHT_OT_open_report(bpy.types.Operator):
-    """Open the result's page."""
+    """Open the page with figures, pictures and doubts of this result in the browser"""
 
     bl_idname = "scan_relight.open_report"
     bl_label = "Open Report"
-    bl_description = "Open the page with figures, pictures and doubts of this result in the browser"
 
     @classmethod
     def poll(cls, context):
-        """Whether there is a page."""
         folder = told.folder_of(context.scene) if context.scene else None
         return poll.check(
             cls,

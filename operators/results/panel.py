@@ -1,6 +1,7 @@
 """The tab's third part: what was found of each object, how sure it is, and the stages that led there."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
@@ -8,6 +9,7 @@ import bpy
 from ...addon.bridge.results import file
 from ...addon.console import duration
 from ...addon.core.brdf.registry import find, models
+from ...addon.core.errors import BadInputError
 from ...addon.core.naming import in_order
 from ...addon.core.stages import LABELS, RUN_STAGES
 from .. import preferences
@@ -32,14 +34,11 @@ ORDERS = [
 class SCAN_RELIGHT_UL_results(NamedRows, bpy.types.UIList):
     """The recovered objects; the rows are the scene's own objects, so nothing of this is saved."""
 
-    bl_idname = "SCAN_RELIGHT_UL_results"
-
     known: dict = {}  # by name; what the last `filter_items` found, as it comes before the rows
     model: bpy.props.EnumProperty(name="Model", description="Which objects are listed", items=MODELS)
     order: bpy.props.EnumProperty(name="Order", description="How the list is sorted", items=ORDERS)
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index=0, flt_flag=0):
-        """Name, roughness, specular, certainty."""
         one = self.known.get(item.name, {})
         text = "  ".join(filter(None, columns(one)))
         split = layout.split(factor=NAME if text else 0.9)  # long names may use what stays empty
@@ -50,7 +49,6 @@ class SCAN_RELIGHT_UL_results(NamedRows, bpy.types.UIList):
         row.label(text="", icon=SIGNS[results.certainty(one)])
 
     def draw_filter(self, context, layout):
-        """Name, model, order."""
         layout.prop(self, "filter_name", text="", icon="VIEWZOOM")
         row = layout.row(align=True)
         row.prop(self, "model", text="")
@@ -101,7 +99,8 @@ def active_row(scene) -> int:
 def choose_row(scene, row: int) -> None:
     """A click on a row selects its object."""
     if 0 <= row < len(scene.objects) and bpy.context.scene == scene and bpy.context.mode == "OBJECT":
-        select(bpy.context, scene.objects[row])
+        with suppress(BadInputError):  # one that is hidden is not selected
+            select(bpy.context, scene.objects[row])
 
 
 def active_row_property():
@@ -118,13 +117,11 @@ def active_row_property():
 class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
     """What was found."""
 
-    bl_idname = "SCAN_RELIGHT_PT_results"
     bl_label = "Results"
     manual = "panel#results"
     bl_order = 2
 
     def draw(self, context):
-        """The list, the chosen object, the page."""
         layout, scene = self.layout, context.scene
         rows, refused = file.rows(scene.objects), results.refused(scene.objects)
         for sentence, folder in refused:
@@ -186,19 +183,17 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
 class SCAN_RELIGHT_PT_stages(SidebarPanel, bpy.types.Panel):
     """The stages of the run."""
 
-    bl_idname = "SCAN_RELIGHT_PT_stages"
     bl_parent_id = "SCAN_RELIGHT_PT_results"
     bl_label = "Stages"
+    bl_order = 1  # below Correct
     bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context):
-        """Only where a run left word of its stages."""
         found = results.result_of(context.scene) if context.scene else None
         return found is not None and bool(found.stages)
 
     def draw(self, context):
-        """Each stage with its time, and a button to do it and the later ones again."""
         stages = results.result_of(context.scene).stages
         self.say(self.layout, context, "Run again from a stage on; those before it are taken as they are stored.")
         column = self.layout.column(align=True)

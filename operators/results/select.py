@@ -4,7 +4,9 @@
 import bpy
 
 from ...addon.bridge.marks import OBJECT_ID
+from ...addon.core.errors import BadInputError
 from ..base import poll
+from ..base.at_once import AtOnce
 
 
 def result_objects(scene) -> dict[int, bpy.types.Object]:
@@ -25,42 +27,30 @@ def make_active(context, thing: bpy.types.Object, extend: bool = False) -> None:
     context.view_layer.objects.active = thing
 
 
-def select(context, thing: bpy.types.Object, extend: bool = False) -> str:
-    """Select an object and make it the active one; '' or the sentence that says why it can't be."""
+def select(context, thing: bpy.types.Object, extend: bool = False) -> None:
+    """Select an object and make it the active one; raises `BadInputError` where it can't be."""
     if thing.name not in context.view_layer.objects:
-        return f"Object '{thing.name}' is not in this view layer; include its collection first."
+        raise BadInputError(f"Object '{thing.name}' is not in this view layer; include its collection first.")
     if not thing.visible_get():
-        return f"Object '{thing.name}' is hidden; show it first."
+        raise BadInputError(f"Object '{thing.name}' is hidden; show it first.")
     make_active(context, thing, extend)
-    return ""
 
 
-class SCAN_RELIGHT_OT_select_result_object(bpy.types.Operator):
-    """Select a recovered object."""
+@poll.object_mode
+@poll.has_scene
+class SCAN_RELIGHT_OT_select_result_object(AtOnce, bpy.types.Operator):
+    """Select this object in the scene"""
 
     bl_idname = "scan_relight.select_result_object"
     bl_label = "Select Object"
-    bl_description = "Select this object in the scene"
-    bl_options = {"REGISTER", "UNDO"}
 
     object_id: bpy.props.IntProperty(name="Object", description="Number of the object in the capture", min=0)
     extend: bpy.props.BoolProperty(
         name="Extend", description="Keep what is selected", default=False, options={"SKIP_SAVE"}
     )
 
-    @classmethod
-    def poll(cls, context):
-        """Only in object mode."""
-        return poll.object_mode(cls, context) and context.scene is not None
-
-    def execute(self, context):
-        """Select it."""
+    def work(self, context):
         thing = result_objects(context.scene).get(self.object_id)
         if thing is None:
-            self.report({"ERROR"}, f"Object {self.object_id} is not in this scene; import the capture first.")
-            return {"CANCELLED"}
-        sentence = select(context, thing, self.extend)
-        if sentence:
-            self.report({"ERROR"}, sentence)
-            return {"CANCELLED"}
-        return {"FINISHED"}
+            raise BadInputError(f"Object {self.object_id} is not in this scene; import the capture first.")
+        select(context, thing, self.extend)

@@ -16,7 +16,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 
-from ...core.errors import EXIT_INTERRUPTED, EXIT_OK
+from ...core.errors import EXIT_INTERRUPTED, EXIT_OK, StorageError
 
 GRACE = 0.5
 """Seconds between the polite wish to stop and the end of the process: finished stages are whole files by then."""
@@ -68,9 +68,12 @@ class Job:
         flags = {"start_new_session": True}
         if os.name == "nt":
             flags = {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS}
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **flags
-        )
+        try:
+            self._process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **flags
+            )
+        except OSError as error:
+            raise StorageError(f"The run can't be started ({error.strerror or error}); start Blender anew.") from error
         _alive.add(self)
         self._readers = [
             threading.Thread(target=target, name=f"scan relight {name}", daemon=True)
