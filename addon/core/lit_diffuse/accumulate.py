@@ -13,8 +13,9 @@ from ..progress import Progress, Rounds
 from ..scene.atlas import Atlas
 from ..scene.element_groups import ElementGroups
 from ..scene.elements import triangle_geometry
-from ..scene.lit_diffuse import ENOUGH, LitDiffuse
+from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Frame, Mesh, Pixels
+from ..scene.params import VISIBILITY
 from ..scene.rays import RayScene
 from ..scene.visibility import CLEAN, EDGE, SATURATED, FrameView, Observations, observe, view_frame
 from .medians import Summary, make_estimator
@@ -29,7 +30,12 @@ def _choose(tiers: dict[int, Summary]) -> LitDiffuse:
     """For each element the best tier that has enough, else the best that has any."""
     clean, edge, saturated = tiers[CLEAN], tiers[EDGE], tiers[SATURATED]
     tier = np.select(
-        [clean.count >= ENOUGH, (edge.count > 0) & (edge.count >= clean.count), clean.count > 0, saturated.count > 0],
+        [
+            clean.count >= VISIBILITY.enough,
+            (edge.count > 0) & (edge.count >= clean.count),
+            clean.count > 0,
+            saturated.count > 0,
+        ],
         [CLEAN, EDGE, CLEAN, SATURATED],
         -1,
     ).astype(np.int8)

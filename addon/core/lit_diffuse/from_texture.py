@@ -10,8 +10,9 @@ from ..parallel import blocks
 from ..progress import Progress
 from ..scene.atlas import Atlas
 from ..scene.elements import triangle_geometry
-from ..scene.lit_diffuse import ENOUGH, LitDiffuse
+from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import LitTiles, Mesh
+from ..scene.params import VISIBILITY
 from ..scene.visibility import CLEAN, SATURATED
 
 TEXELS_AT_ONCE = 1 << 22
@@ -75,7 +76,7 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
     radiance[seen] = sums[seen, :3] / weight[seen, None]
     share = np.where(seen, clipped / np.maximum(weight, 1e-30), 0).astype(np.float32)
     tier = np.where(seen, np.where(share > 0.5, SATURATED, CLEAN), -1).astype(np.int8)
-    return LitDiffuse(radiance, radiance, radiance, np.where(seen, ENOUGH, 0).astype(np.int32), tier, share)
+    return LitDiffuse(radiance, radiance, radiance, np.where(seen, VISIBILITY.enough, 0).astype(np.int32), tier, share)
 
 
 def _tiles(mesh: Mesh, lit: LitTiles) -> tuple[np.ndarray, np.ndarray]:

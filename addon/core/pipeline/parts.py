@@ -20,9 +20,10 @@ from ..passes.sharpening.sharpen import FLOOR, MOST, sharpened
 from ..progress import Rounds
 from ..scene.atlas import Atlas
 from ..scene.elements import ElementLookup, make_atlas
-from ..scene.lit_diffuse import ENOUGH, LitDiffuse
+from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Camera, Mesh
 from ..scene.pages import OBJECT, Pages, lay_out
+from ..scene.params import VISIBILITY
 from ..scene.surface import Surface
 from ..scene.visibility import CLEAN
 from .corrected import Corrected
@@ -159,7 +160,7 @@ def look_closer(run: Corrected) -> Parting:
     atlas = make_atlas(part, sheet.sheet_uv, sheet.size)
     if stored is None or dict(meta["finer"]) != finer:
         found = _looked(run, part, atlas, chosen)
-        told = (found.tier == CLEAN) & (found.count >= ENOUGH)
+        told = (found.tier == CLEAN) & (found.count >= VISIBILITY.enough)
         stored = {"radiance": np.where(told[:, None], found.radiance, np.nan).astype(np.float32)}
         run.store.save(STAGE, own, stored, {"wanted": [*wanted.items()], "finer": [*finer.items()]})
     return Parting(pages, Closer(sheet, atlas, stored["radiance"]))
@@ -233,7 +234,7 @@ def write_parts(run: Corrected, parting: Parting, base_color: np.ndarray) -> Par
 def finer_detail(run: Corrected, closer: Closer) -> np.ndarray:
     """What base colour is multiplied by on the finer objects' sheet, (size, size, 3) float32."""
     surface, lit, atlas = run.surface(), run.lit_diffuse(), closer.atlas
-    good = (lit.tier == CLEAN) & (lit.count >= ENOUGH) & (run.albedo.origin == MEASURED)
+    good = (lit.tier == CLEAN) & (lit.count >= VISIBILITY.enough) & (run.albedo.origin == MEASURED)
     known = np.concatenate([np.where(good[:, None], lit.radiance, 0), good[:, None]], 1).astype(np.float32)
     room = closer.sheet.image(surface.atlas.image(known), _owner(run)).reshape(-1, 4)[atlas.texel]
     floor = np.float32(max(FLOOR * run.median_radiance(), 1e-30))

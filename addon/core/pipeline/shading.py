@@ -22,9 +22,10 @@ from ..passes.unseen_light.unseen_light import Light
 from ..progress import Progress
 from ..scene.atlas import Atlas
 from ..scene.creases import crease_error
-from ..scene.lit_diffuse import ENOUGH, LitDiffuse
+from ..scene.lit_diffuse import LitDiffuse
 from ..scene.mesh_noise import tilt
 from ..scene.model import Capture, Instance, Mesh
+from ..scene.params import VISIBILITY
 from ..scene.rays import RayScene
 from ..scene.surface import Surface
 from ..scene.two_sides import fronts
@@ -192,7 +193,7 @@ def with_all_light(
         `turned_by_noise`.
     """
     atlas, seen, tier = field.atlas, lit_diffuse.seen, lit_diffuse.tier
-    good = seen & (((tier == CLEAN) & (lit_diffuse.count >= ENOUGH)) | (tier == SATURATED))
+    good = seen & (((tier == CLEAN) & (lit_diffuse.count >= VISIBILITY.enough)) | (tier == SATURATED))
     real = atlas.area > 0
     unseen = np.setdiff1d(atlas.object_id[real], atlas.object_id[real & seen]).tolist()
     unseen = [] if "unseen-lamps" in without else unseen

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-TURNED = 0.2
-"""Metres: so far apart count two elements whose normals differ by a radian (`Atlas.place`)."""
+from .params import SURFACE
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ class Atlas:
 
     def place(self, index: np.ndarray) -> np.ndarray:
         """Elements (m,) as points (m, 6) whose nearest neighbours lie close and face the same way."""
-        return np.concatenate([self.position[index], TURNED * self.normal[index]], 1)
+        return np.concatenate([self.position[index], SURFACE.turned * self.normal[index]], 1)
 
     def image(self, values: np.ndarray, empty: float = 0.0) -> np.ndarray:
         """Spread values of the elements ((n,) or (n, c)) over the image, islands padded: (size, size[, c])."""

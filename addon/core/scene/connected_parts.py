@@ -7,26 +7,21 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from .params import SURFACE
 from .weld import same_place
-
-WELD = 1e-6
-"""Share of the room's diagonal within which vertices are one: at seams and between triangles they are listed twice."""
-TINY = 1e-3
-"""A part of less than this share of the surface is a crumb of a scan, no object."""
-MOST = 64
-"""More parts are not told apart: the greatest remain."""
 
 
 def weld(vertices: np.ndarray) -> np.ndarray:
     """A number for each place that vertices ((v, 3), finite) lie at, (v,) int64."""
     low, high = vertices.min(0), vertices.max(0)
-    return same_place(vertices - low, max(WELD * float(np.linalg.norm(high - low)), 1e-12))[1]
+    return same_place(vertices - low, max(SURFACE.weld * float(np.linalg.norm(high - low)), 1e-12))[1]
 
 
 def connected_parts(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """The part that each triangle belongs to, (t,) int64 from 0, the greatest surface first.
 
-    Triangles that share a vertex are of one part. Crumbs, and what goes beyond `MOST`, join the nearest other part.
+    Triangles that share a vertex are of one part. Crumbs join the nearest other part, and so does what is
+    beyond `SURFACE.most_parts`.
 
     Parameters
     ----------
@@ -44,7 +39,7 @@ def connected_parts(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     surface = np.bincount(part, area)
     order = np.argsort(-surface, kind="stable")
-    kept = order[: max(int((surface[order[:MOST]] >= TINY * surface.sum()).sum()), 1)]
+    kept = order[: max(int((surface[order[: SURFACE.most_parts]] >= SURFACE.tiny * surface.sum()).sum()), 1)]
     number = np.full(len(surface), -1)
     number[kept] = np.arange(len(kept))
     part = number[part]

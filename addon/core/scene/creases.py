@@ -7,20 +7,9 @@ import numpy as np
 from .atlas import Atlas
 from .elements import triangle_geometry
 from .model import Mesh
+from .params import CREASES
 from .two_sides import fronts, other_way
 from .weld import welded
-
-WELD = 1e-5
-"""Metres."""
-REACH = 1.5
-"""Texels from the edge up to which it is felt, less and less."""
-KNEE = 0.1
-"""Radians from which on a crease has its full effect: a facet of a curved moulding is no smoother than a corner."""
-THIN = 1e-3
-"""A triangle of less height, relative to its longest edge, faces no sure way: an edge with it tells of no bend."""
-MOST_ERROR = 0.3
-"""Relative standard error of the irradiance right at a crease. Living room, white panelling: 0.25 to 0.4 there and
-0.07 to 0.12 on flat parts."""
 
 
 def edge_angles(mesh: Mesh) -> np.ndarray:
@@ -30,11 +19,11 @@ def edge_angles(mesh: Mesh) -> np.ndarray:
     if mesh.backs is not None:
         angle = edge_angles(fronts(mesh)[0])
         return np.concatenate([angle, other_way(angle[mesh.backs])])
-    points, faces, _ = welded(mesh, WELD)
+    points, faces, _ = welded(mesh, CREASES.weld)
     normal, area = triangle_geometry(mesh)
     corners = mesh.vertices[mesh.triangles]
     longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
-    sliver = np.repeat(2 * area < THIN * longest**2, 3)
+    sliver = np.repeat(2 * area < CREASES.thin * longest**2, 3)
     ends = np.sort(np.stack([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]], 1), 2).reshape(-1, 2)
     _, edge, count = np.unique(ends[:, 0] * len(points) + ends[:, 1], return_inverse=True, return_counts=True)
     edge = edge.ravel()
@@ -63,7 +52,7 @@ def crease_error(mesh: Mesh, atlas: Atlas, texel: float) -> np.ndarray:
     angles = edge_angles(mesh)
     relative_error = np.zeros(len(atlas), np.float32)
     corners = mesh.vertices[mesh.triangles].astype(np.float32)
-    bent = np.flatnonzero((angles[atlas.triangle] > 0.01 * KNEE).any(1))
+    bent = np.flatnonzero((angles[atlas.triangle] > 0.01 * CREASES.knee).any(1))
     triangle, position = atlas.triangle[bent], atlas.position[bent]
     for k in range(3):
         a, b = corners[triangle, (k + 1) % 3], corners[triangle, (k + 2) % 3]
@@ -71,7 +60,7 @@ def crease_error(mesh: Mesh, atlas: Atlas, texel: float) -> np.ndarray:
         way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
         off = position - a
         off -= (off * way).sum(1, keepdims=True) * way
-        near = np.maximum(1 - np.linalg.norm(off, axis=1) / (REACH * texel), 0)
-        felt = MOST_ERROR * np.minimum(angles[triangle, k] * near / KNEE, 1)
+        near = np.maximum(1 - np.linalg.norm(off, axis=1) / (CREASES.reach * texel), 0)
+        felt = CREASES.most_error * np.minimum(angles[triangle, k] * near / CREASES.knee, 1)
         relative_error[bent] = np.maximum(relative_error[bent], felt)
     return relative_error

@@ -6,8 +6,9 @@ import numpy as np
 
 from .atlas import Atlas
 from .model import Camera
+from .params import VISIBILITY
 from .pixel_rays import widest_angle
-from .visibility import MIN_COSINE, FrameView
+from .visibility import FrameView
 
 CELL = 16
 """Edge of a group in elements."""
@@ -61,7 +62,7 @@ class ElementGroups:
         cosine = np.einsum("ij,ij->i", to_camera, self._axis) / distance
         # The smallest angle that any normal of the cone can make with the way from any point of the ball.
         least = np.arccos(np.clip(cosine, -1, 1)) - self._opening - np.arcsin(np.minimum(self._radius / distance, 1))
-        keep &= (least < np.arccos(MIN_COSINE) + SLACK) | (distance <= self._radius)
+        keep &= (least < np.arccos(VISIBILITY.min_cosine) + SLACK) | (distance <= self._radius)
         return np.flatnonzero(keep[self._group]).astype(np.int32)
 
     def _in_frustum(self, camera: Camera) -> np.ndarray:

@@ -6,9 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-ENOUGH = 3
-"""Clean observations from which on an element does without those at edges."""
-
 
 @dataclass(frozen=True)
 class LitDiffuse:

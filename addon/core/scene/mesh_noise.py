@@ -6,17 +6,8 @@ import numpy as np
 from scipy import sparse
 
 from .model import Mesh
+from .params import NOISE
 from .weld import point_normals, ring_of, welded
-
-LEAST_NOISE = 0.001
-"""Metres. Below, what is measured may be shape: a modelled living room has 0.13 mm."""
-LEAST_VERTICES = 100
-TILT = 1.2
-"""Radians by which a triangle of height 1 is tilted by vertices off by 1: each of three vertices adds its share."""
-MOST = 3.0
-LEFT = 0.5
-"""Share of a tilt that is left once the noise is taken out (`denoise`): in the living room 0.2 to 0.3 in the median,
-0.6 to 0.9 in the root mean square, as triangles lower than the noise stay wrong."""
 
 
 def noise_of(mesh: Mesh) -> float:
@@ -29,7 +20,7 @@ def noise_of(mesh: Mesh) -> float:
     ring = ring_of(faces, len(points))
     degree = np.asarray(ring.sum(1))[:, 0]
     inner = degree >= 4
-    if inner.sum() < LEAST_VERTICES:
+    if inner.sum() < NOISE.least_vertices:
         return 0.0
     share = sparse.diags(1 / np.maximum(degree, 1)) @ ring
     normal = point_normals(points, faces)
@@ -46,10 +37,10 @@ def tilt(mesh: Mesh, taken_out: float = 0.0) -> np.ndarray:
     `taken_out` is the noise in metres that the mesh had before it was denoised; 0: it was not.
     That is about the relative error of the irradiance there: of light from one side, E changes with the cosine.
     """
-    noise = LEFT * taken_out if taken_out else noise_of(mesh)
-    if not taken_out and noise < LEAST_NOISE:
+    noise = NOISE.left * taken_out if taken_out else noise_of(mesh)
+    if not taken_out and noise < NOISE.least_noise:
         return np.zeros(len(mesh.triangles), np.float32)
     corners = mesh.vertices[mesh.triangles]
     longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return np.minimum(TILT * noise * longest / np.maximum(area, 1e-30), MOST).astype(np.float32)
+    return np.minimum(NOISE.tilt * noise * longest / np.maximum(area, 1e-30), NOISE.most).astype(np.float32)

@@ -8,13 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .model import Camera, Mesh
+from .params import SIDES
 from .rays import RayScene
 from .two_sides import two_sided, worth_it
-
-PIXEL_STEP = 4
-"""Every fourth pixel in x and y votes."""
-LEAST_SHARE, LEAST_VOTES = 0.1, 4
-"""A triangle is seen from both sides if this share of its votes, and so many, are for the other one."""
 
 
 class Sides(NamedTuple):
@@ -47,9 +43,9 @@ def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequenc
     """
     votes = np.zeros(len(mesh.triangles))
     sides = np.zeros((2, len(votes)), np.int64)  # rays that met the front, and the back
-    footprints = []
+    footprints, step = [], SIDES.pixel_step
     for camera in cameras:
-        y, x = np.mgrid[PIXEL_STEP // 2 : camera.height : PIXEL_STEP, PIXEL_STEP // 2 : camera.width : PIXEL_STEP]
+        y, x = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
         pixels = np.stack([x.ravel() + 0.5, y.ravel() + 0.5], -1)
         directions, seen = camera.rays(pixels)
         if not seen.all():
@@ -70,7 +66,7 @@ def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequenc
     sign = np.where(votes != 0, np.sign(votes), np.where(by_object[mesh.object_id] < 0, -1.0, 1.0))
     together = np.concatenate(footprints) if footprints else np.zeros(0, np.float32)
     footprint = float(np.percentile(together, 25)) if len(together) else 0.0
-    both = sides.min(0) >= np.maximum(LEAST_SHARE * sides.sum(0), LEAST_VOTES)
+    both = sides.min(0) >= np.maximum(SIDES.least_votes_share * sides.sum(0), SIDES.least_rays)
     if sides[0].any() and sides[1].any():
         sheets, turned = two_sided(mesh, sides)
         both = worth_it(mesh, both | sheets)

@@ -12,13 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from .params import SURFACE
 from .uv_islands import boxes, connected, corner_ids
 
 OBJECT, UDIM = "object", "udim"
-MARGIN = 1
-"""Texels of the room's atlas around each island that show it too, for what lies between texels."""
-SHAPES = (1.0, 1.1, 1.25, 1.5)
-STEP = 64
 
 
 @dataclass(frozen=True)
@@ -153,8 +150,8 @@ def lay_out(
     first = np.unique(island, return_index=True)[1]
     owner = object_id[first].astype(np.int64)
     low, high = (edge.astype(np.float64) * size for edge in boxes(uv, island))
-    corner = np.floor(low) - MARGIN
-    extent = np.ceil(high) + MARGIN - corner
+    corner = np.floor(low) - SURFACE.page_margin
+    extent = np.ceil(high) + SURFACE.page_margin - corner
     numbers = np.unique(owner).tolist()
     scale = {number: float(scale.get(number, 1.0)) for number in numbers}
     blocks, place, box = {}, np.zeros((len(first), 2)), np.zeros((len(first), 2))
@@ -172,7 +169,7 @@ def lay_out(
     else:
         page, tile, offset = _in_few_tiles(blocks, place, box, largest)
     edge = max(one.x + one.width for one in page), max(one.y + one.height for one in page)
-    sheet = -(-max(edge) // STEP) * STEP
+    sheet = -(-max(edge) // SURFACE.step) * SURFACE.step
     place += np.array([(page[k].x, page[k].y) for k in tile]) + offset
     factor = np.array([scale[int(number)] for number in owner])
     on_sheet = (uv * size - corner[island][:, None]) * factor[island][:, None, None] + place[island][:, None]
@@ -213,7 +210,10 @@ def _shelves(box: np.ndarray, width: int) -> tuple[np.ndarray, int, int]:
 def _block(box: np.ndarray, largest: int) -> tuple[np.ndarray, int, int]:
     """The rectangles in a block that is nearly square and small: lower left corners, width and height."""
     side = np.sqrt(box.prod(1).sum())
-    widths = {int(np.clip(np.ceil(side * shape), box[:, 0].max(), max(largest, box[:, 0].max()))) for shape in SHAPES}
+    widths = {
+        int(np.clip(np.ceil(side * shape), box[:, 0].max(), max(largest, box[:, 0].max())))
+        for shape in SURFACE.page_shapes
+    }
     found = [_shelves(box, width) for width in sorted(widths)]
     return min(found, key=lambda one: (max(one[1:]) > largest, one[1] * one[2]))
 
@@ -233,12 +233,12 @@ def _in_few_tiles(blocks, place, box, largest):
     """One tile that is no larger than it has to be, else several of the largest."""
     needed = max(max(width, height) for _, width, height in blocks.values())
     total = sum(width * height for _, width, height in blocks.values())
-    edge = -(-int(max(needed, np.sqrt(total))) // STEP) * STEP
+    edge = -(-int(max(needed, np.sqrt(total))) // SURFACE.step) * SURFACE.step
     while edge < largest:
         found = _in_tiles(blocks, place.copy(), box, edge)
         if len(found[0]) == 1:
             return found
-        edge += STEP
+        edge += SURFACE.step
     return _in_tiles(blocks, place, box, largest)
 
 

@@ -10,12 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .atlas import Atlas
+from .params import SAMPLES
 from .visibility import CLEAN, SATURATED, Observations
-
-ELEMENTS_AN_OBJECT = 4000
-ELEMENTS_IN_ALL = 150_000
-FRAMES_IN_FULL = 200
-"""With more frames, each observation is kept with the chance that this many frames would leave of it."""
 
 
 @dataclass(frozen=True)
@@ -47,15 +43,15 @@ class Samples:
 
 
 def choose_elements(atlas: Atlas, seed: int) -> np.ndarray:
-    """Elements to keep observations of: up to `ELEMENTS_AN_OBJECT` for each object, at random, sorted."""
+    """Elements to keep observations of: up to `of_object` for each object, at random, sorted."""
     rng = np.random.default_rng(seed)
     key = rng.random(len(atlas))
     order = np.lexsort((key, atlas.object_id))
     objects = atlas.object_id[order]
     start = np.concatenate([[0], np.flatnonzero(np.diff(objects)) + 1])
     rank = np.arange(len(order)) - np.repeat(start, np.diff(np.concatenate([start, [len(order)]])))
-    limit = ELEMENTS_AN_OBJECT
-    while limit > 16 and np.minimum(np.diff(np.concatenate([start, [len(order)]])), limit).sum() > ELEMENTS_IN_ALL:
+    limit = SAMPLES.of_object
+    while limit > 16 and np.minimum(np.diff(np.concatenate([start, [len(order)]])), limit).sum() > SAMPLES.in_all:
         limit //= 2
     return np.sort(order[rank < limit])
 
@@ -66,7 +62,7 @@ class SampleCollector:
     def __init__(self, atlas: Atlas, frames: int, seed: int):
         self._chosen = np.zeros(len(atlas), bool)
         self._chosen[choose_elements(atlas, seed)] = True
-        self._keep = min(1.0, FRAMES_IN_FULL / max(frames, 1))
+        self._keep = min(1.0, SAMPLES.frames / max(frames, 1))
         self._seed = seed
         self._parts: list[Samples] = []
 

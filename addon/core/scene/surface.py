@@ -12,12 +12,9 @@ from .atlas import Atlas
 from .elements import Covered, make_atlas, triangle_geometry, uv_scale
 from .model import Camera, Mesh
 from .orientation import Sides, seen_sides
+from .params import SURFACE
 from .rays import RayScene
 from .two_sides import with_backs
-
-EXPECTED_FILL = 0.55
-"""Share of the atlas that islands usually cover; only the unwrapping's margin depends on it."""
-SMALLEST, STEP = 64, 64
 
 
 @dataclass(frozen=True)
@@ -85,8 +82,13 @@ def facing(mesh: Mesh, sign: np.ndarray) -> Mesh:
 
 def atlas_size(area: float, texel: float, largest: int) -> int:
     """Edge of an atlas whose texels measure `texel` metres on `area` square metres, within bounds."""
-    wanted = np.sqrt(area / EXPECTED_FILL) / max(texel, 1e-12)
-    return int(np.clip(np.ceil(wanted / STEP) * STEP, SMALLEST, largest // STEP * STEP))
+    return _whole_steps(np.sqrt(area / SURFACE.expected_fill) / max(texel, 1e-12), largest)
+
+
+def _whole_steps(edge: float, largest: int) -> int:
+    """An atlas' edge of at least so many texels, if that is not above `largest`."""
+    step = SURFACE.step
+    return int(np.clip(np.ceil(edge / step) * step, step, largest // step * step))
 
 
 def build_surface(
@@ -132,8 +134,7 @@ def build_surface(
     uv = unwrap(mesh, size)
     # The islands' true scale sets the size that makes a texel as large as wished.
     scale = uv_scale(mesh, uv)
-    size = int(np.clip(np.ceil(1 / max(texel * scale, 1e-12) / STEP) * STEP, SMALLEST, largest // STEP * STEP))
-    return from_uv(mesh, sides.sign, uv, size)
+    return from_uv(mesh, sides.sign, uv, _whole_steps(1 / max(texel * scale, 1e-12), largest))
 
 
 def from_uv(

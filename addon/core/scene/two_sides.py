@@ -16,20 +16,8 @@ from scipy.sparse.csgraph import connected_components
 
 from .elements import triangle_geometry
 from .model import Mesh
+from .params import SIDES
 from .weld import point_normals, welded
-
-LEAST_SHARE, LEAST_RAYS = 0.05, 4
-"""A sheet is given two sides if this share of the rays that met it, and so many, met the side that is seen less."""
-LESS_SHARE, MORE_RAYS = 0.025, 12
-"""Or this share, where they are so many: a floor lamp's shade had 17 of 590, and threw its inner side's light at the
-wall behind it. Bent tubes have 4 to 10 of some hundred at their ends, and second sides would halve what shows them."""
-LEAST_OF_OBJECT, LEAST_OF_ROOM = 0.1, 0.01
-"""Sheets that are less of their object's surface, and of the room's, are left as they are: single leaves of a plant,
-whose two sides are alike, only cost elements, and views that its other elements would be judged by."""
-GAP = 4e-5
-"""Between a sheet's two sides where it is rendered, as a share of the room's diagonal: 0.3 mm in a room of 7 m."""
-UPRIGHT = 0.3
-"""A triangle's corners go along the sheet's normals where these agree with its own at least by this cosine."""
 
 
 def other_way(corners: np.ndarray) -> np.ndarray:
@@ -82,8 +70,8 @@ def two_sided(mesh: Mesh, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     one_surface = np.ones(2 * count, bool)
     one_surface[sheet[up == down]] = False  # such as Moebius' strip
     less, rays_on = np.minimum(front, back), front + back
-    seen = less >= np.maximum(LEAST_SHARE * rays_on, LEAST_RAYS)
-    seen |= less >= np.maximum(LESS_SHARE * rays_on, MORE_RAYS)
+    seen = less >= np.maximum(SIDES.least_share * rays_on, SIDES.least_rays)
+    seen |= less >= np.maximum(SIDES.less_share * rays_on, SIDES.more_rays)
     both = (seen & bordered & one_surface)[sheet]
     return both, np.where(front >= back, 1, -1)[sheet] * ways.astype(np.float32)
 
@@ -93,7 +81,7 @@ def worth_it(mesh: Mesh, both: np.ndarray) -> np.ndarray:
     _, area = triangle_geometry(mesh)
     count = int(mesh.object_id.max()) + 1
     own, sheets = (np.bincount(mesh.object_id, weight, count) for weight in (area, area * both))
-    large = (sheets >= LEAST_OF_OBJECT * own) | (sheets >= LEAST_OF_ROOM * area.sum())
+    large = (sheets >= SIDES.least_of_object * own) | (sheets >= SIDES.least_of_room * area.sum())
     return both & large[mesh.object_id]
 
 
@@ -158,12 +146,12 @@ def laid_apart(mesh: Mesh, vertices: np.ndarray) -> Mesh:
     own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     own /= np.maximum(np.linalg.norm(own, axis=1, keepdims=True), 1e-30)
     way = point_normals(points, faces)[faces]
-    upright = (np.einsum("tkj,tj->tk", way, own) >= UPRIGHT).all(1)
+    upright = (np.einsum("tkj,tj->tk", way, own) >= SIDES.upright).all(1)
     way[~upright] = own[~upright, None]
     low, high = vertices.min(0), vertices.max(0)
     # Far from the origin float32, which renderers work in, is coarser than that.
     coarse = float(np.spacing(np.float32(np.abs([low, high]).max())))
-    gap = max(GAP * float(np.linalg.norm(high - low)), 8 * coarse)
+    gap = max(SIDES.gap * float(np.linalg.norm(high - low)), 8 * coarse)
     count = len(mesh.triangles) - len(mesh.backs)
     backs = np.arange(len(vertices), len(vertices) + 3 * len(mesh.backs)).reshape(-1, 3)
     return replace(

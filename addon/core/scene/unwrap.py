@@ -8,14 +8,11 @@ import numpy as np
 
 from ..errors import BadInputError
 from .model import Mesh
+from .params import SURFACE
 from .uv_overlap import overlapping_pairs
 
 Unwrap = Callable[[Mesh, int], np.ndarray]
 """Atlas coordinates, (t, 3, 2) float32 in [0, 1] without overlap, for a mesh and an atlas's edge in texels."""
-OVERLAP_TEXELS = 0.02
-"""Triangles may penetrate each other by this much; far less than what moves a texel's centre, more than rounding."""
-MARGIN = 2
-"""Texels between two charts."""
 
 
 def own_coordinates(mesh: Mesh, size: int) -> np.ndarray:
@@ -32,7 +29,7 @@ def own_coordinates(mesh: Mesh, size: int) -> np.ndarray:
     if not np.isfinite(uv).all() or uv.min(initial=0) < 0 or uv.max(initial=0) > 1:
         raise BadInputError(f"The mesh's own texture coordinates lie outside of 0 to 1, as tiled ones do; {OTHERWISE}.")
     first = len(uv) - (0 if mesh.backs is None else len(mesh.backs))
-    pairs = overlapping_pairs(uv[:first], OVERLAP_TEXELS / size)
+    pairs = overlapping_pairs(uv[:first], SURFACE.overlap_texels / size)
     if len(pairs):
         raise BadInputError(
             f"The mesh's own texture coordinates overlap ({len(pairs)} pairs of triangles), so that a texel would "
@@ -65,7 +62,7 @@ def by_xatlas(mesh: Mesh, size: int) -> np.ndarray:
         mesh.vertices[names % len(mesh.vertices)].astype(np.float32), corners.reshape(-1, 3).astype(np.uint32)
     )
     packing = xatlas.PackOptions()
-    packing.resolution, packing.padding = size, MARGIN
+    packing.resolution, packing.padding = size, SURFACE.margin
     atlas.generate(xatlas.ChartOptions(), packing)
     _, triangles, uv = atlas[0]
     edge = max(atlas.width, atlas.height, 1)  # its units are the two edges, which may differ

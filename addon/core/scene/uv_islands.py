@@ -6,9 +6,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-_FULL = 0.6
-_HOPELESS = 0.25
-_ROUNDS = 10
+from .params import SURFACE
 
 
 def corner_ids(triangles: np.ndarray, uv: np.ndarray) -> np.ndarray:
@@ -95,12 +93,12 @@ def cut_sparse(
     count = np.maximum(np.bincount(face), 1)
     centre = np.stack([(np.bincount(face, centre[:, k]) / count)[face] for k in (0, 1)], -1)
     settled = np.zeros(len(uv), bool)
-    for _ in range(_ROUNDS):
+    for _ in range(SURFACE.rounds):
         low, high = boxes(uv, island)
         width = (high - low).astype(np.float64)
         fill = np.bincount(island, area) / np.maximum(width.prod(1), 1e-12)
         count = np.bincount(island)
-        worth = (fill < _FULL) & (width.min(1) > 4 * margin) & (count > 1)
+        worth = (fill < SURFACE.full) & (width.min(1) > 4 * margin) & (count > 1)
         chosen = np.flatnonzero(worth[island] & ~settled)
         if not len(chosen):
             break
@@ -108,7 +106,7 @@ def cut_sparse(
         before = (width + 2 * margin).prod(1)
         better = np.bincount(parent, cost, len(width)) < 1.02 * before
         # A ring of a few long triangles gains nothing from one straight cut: take it apart.
-        apart = ~better & (fill < _HOPELESS) & (count <= 64)
+        apart = ~better & (fill < SURFACE.hopeless) & (count <= 64)
         accepted = better[island[chosen]]
         settled[chosen[~accepted]] = True
         finer = island.copy()

@@ -9,14 +9,9 @@ import numpy as np
 
 from .atlas import Atlas
 from .model import Camera, Mesh, Pixels
+from .params import VISIBILITY
 from .pixel_rays import pixel_rays
 from .rays import RayScene
-
-MIN_COSINE = 0.2
-"""Views more grazing than this are dropped: their pixel covers too much surface."""
-DEPTH_TOLERANCE = 0.02
-"""A neighbouring pixel whose hit lies further than this share of the distance off the pixel's own plane lies beyond
-a depth edge."""
 
 CLEAN, EDGE, SATURATED = 0, 1, 2
 """Tiers of an observation. CLEAN: the pixel and its eight neighbours show one surface. EDGE: the pixel's centre shows
@@ -24,8 +19,6 @@ the element's object, but a neighbour shows something else, which a filter or a 
 SATURATED: the sensor clipped; a lower bound."""
 NOTHING = -2
 """No object's id, and not that of a ray that escapes."""
-EDGE_MARGIN = 0.5
-"""Pixels around the frame's border that are not looked up: half of each lies beyond the outermost centres."""
 FAR = 1e9
 """Pixels; what a lens throws further out than this overflows nothing."""
 
@@ -114,7 +107,7 @@ def view_frame(camera: Camera, mesh: Mesh, scene: RayScene, triangle_normal: np.
     normal = np.where(hit, triangle_normal.take(triangle, 0).T, -rays)
     distance = np.where(hit, hits.distance, np.float32(0))
     offset = (distance * _dot(normal, rays)).reshape(height, width)
-    tolerance = (DEPTH_TOLERANCE * np.maximum(distance, 1e-6)).reshape(height, width)
+    tolerance = (VISIBILITY.depth_tolerance * np.maximum(distance, 1e-6)).reshape(height, width)
     distance = distance.reshape(height, width)
     normal, rays = normal.reshape(3, height, width), rays.reshape(3, height, width)
     clean = np.ones((height, width), bool)
@@ -183,7 +176,7 @@ def observe(
 ) -> Observations:
     """What a frame says of the surface elements.
 
-    Rejected: out of the lens's reach, outside the frame, n.v < `MIN_COSINE`, occluded (embree), pixel of another
+    Rejected: out of the lens's reach, outside the frame, n.v < `min_cosine`, occluded (embree), pixel of another
     object, invalid pixels.
 
     Parameters
@@ -200,7 +193,7 @@ def observe(
     np.subtract(atlas.position.take(index, 0).T, centre[:, None], out=away)
     x, y, inside = _projected(camera, away)
     for position, extent in ((x, camera.width), (y, camera.height)):
-        inside &= (position >= EDGE_MARGIN) & (position < extent - EDGE_MARGIN)
+        inside &= (position >= VISIBILITY.edge_margin) & (position < extent - VISIBILITY.edge_margin)
     at = np.flatnonzero(inside)
     x, y = x.take(at), y.take(at)
     pixel = y.astype(np.int32) * camera.width + x.astype(np.int32)
@@ -211,7 +204,7 @@ def observe(
     distance = np.sqrt(_dot(away, away))
     direction = away / -np.maximum(distance, np.float32(1e-12))
     normal = atlas.normal.take(index.take(at), 0)
-    angle = np.flatnonzero(_dot(direction, normal.T) >= MIN_COSINE)
+    angle = np.flatnonzero(_dot(direction, normal.T) >= VISIBILITY.min_cosine)
     at, keep, normal = at.take(angle), keep.take(angle), normal.take(angle, 0)
     index = index.take(at)
     to_camera = np.empty((len(at), 3), np.float32)

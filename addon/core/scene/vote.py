@@ -12,10 +12,9 @@ from scipy.spatial import cKDTree
 from ..errors import BadInputError
 from .connected_parts import weld
 from .model import Frame
+from .params import SIDES
 from .rays import RayScene
 
-MAX_RAYS = 20_000_000
-"""Rays over all frames; of larger captures every second, third ... pixel votes."""
 PACK = 8
 """Frames whose votes are summed at once; bounds the memory."""
 
@@ -48,7 +47,7 @@ def vote(
     frames = [frame for frame in frames if frame.id_path is not None]
     scene = RayScene(vertices, triangles)
     total = sum(frame.camera.width * frame.camera.height for frame in frames)
-    step = max(int(np.ceil(np.sqrt(total / MAX_RAYS))), 1)
+    step = max(int(np.ceil(np.sqrt(total / SIDES.max_rays))), 1)
     problems: list[str] = []
     votes: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     packed: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []

@@ -15,8 +15,9 @@ from addon.core.io.exr import write_exr
 from addon.core.io.id_pictures import read_ids
 from addon.core.io.png import write_png
 from addon.core.io.read import read_capture
-from addon.core.scene.connected_parts import MOST, connected_parts
+from addon.core.scene.connected_parts import connected_parts
 from addon.core.scene.model import Frame
+from addon.core.scene.params import SURFACE
 from addon.core.scene.rays import RayScene
 from addon.core.scene.vote import vote
 from tests.core.rooms import all_round, lit_box, make_room
@@ -47,8 +48,8 @@ def test_the_greatest_part_comes_first_and_crumbs_join_the_nearest():
 
 
 def test_the_number_of_parts_is_bounded():
-    part = connected_parts(*boxes(*((3.0 * i, 0, 0) for i in range(MOST + 9))))
-    assert np.unique(part).tolist() == list(range(MOST))
+    part = connected_parts(*boxes(*((3.0 * i, 0, 0) for i in range(SURFACE.most_parts + 9))))
+    assert np.unique(part).tolist() == list(range(SURFACE.most_parts))
 
 
 def test_a_capture_of_loose_parts_gets_an_object_for_each(capture, text_of_ply):

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from addon.core.scene.atlas import Atlas
-from addon.core.scene.creases import MOST_ERROR, REACH, crease_error, edge_angles
+from addon.core.scene.creases import crease_error, edge_angles
 from addon.core.scene.model import Mesh
+from addon.core.scene.params import CREASES
 
 TEXEL = 0.01
 
@@ -54,10 +55,10 @@ def test_three_sheets_at_one_edge_have_no_flat_one():
 
 def test_doubt_is_full_at_a_crease_and_gone_beyond_its_reach():
     mesh = folded(np.pi / 2)
-    off = np.array([0.0, 0.5, 0.99 * REACH, 1.01 * REACH, 20]) * TEXEL
+    off = np.array([0.0, 0.5, 0.99 * CREASES.reach, 1.01 * CREASES.reach, 20]) * TEXEL
     atlas = elements([(1 - x, 0.4, 0) for x in off], [0] * 5)
     relative_error = crease_error(mesh, atlas, TEXEL)
-    assert relative_error[0] == pytest.approx(MOST_ERROR) and (np.diff(relative_error) <= 0).all()
+    assert relative_error[0] == pytest.approx(CREASES.most_error) and (np.diff(relative_error) <= 0).all()
     assert relative_error[2] > 0 and (relative_error[3:] == 0).all()
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from addon.core.passes.specular.problems import pick
 from addon.core.passes.specular.separate import grouped_median, specular_in_median, spread_over_object
 from addon.core.scene import samples as module
+from addon.core.scene.params import SAMPLES
 from addon.core.scene.samples import SampleCollector, Samples, choose_elements
 from addon.core.scene.visibility import CLEAN, EDGE, SATURATED, Observations
 from tests.core.rooms import box_sides, make_room, quad
@@ -19,14 +22,14 @@ def atlas():
 
 
 def test_chosen_elements_are_few_sorted_and_the_same_again(atlas, monkeypatch):
-    monkeypatch.setattr(module, "ELEMENTS_AN_OBJECT", 300)
+    monkeypatch.setattr(module, "SAMPLES", replace(SAMPLES, of_object=300))
     chosen = choose_elements(atlas, 0)
     assert (np.diff(chosen) > 0).all() and np.array_equal(chosen, choose_elements(atlas, 0))
     assert np.array_equal(np.bincount(atlas.object_id[chosen]), [300] * 6)
     assert not np.array_equal(chosen, choose_elements(atlas, 1))
     floor = chosen[atlas.object_id[chosen] == 0]
     assert np.allclose(atlas.position[floor].mean(0), (2, 1.5, 0), atol=0.25)  # spread out
-    monkeypatch.setattr(module, "ELEMENTS_IN_ALL", 500)
+    monkeypatch.setattr(module, "SAMPLES", replace(SAMPLES, in_all=500))
     assert len(choose_elements(atlas, 0)) <= 500
 
 
@@ -55,7 +58,7 @@ def test_what_is_collected(atlas):
 
 
 def test_many_frames_are_thinned(atlas, monkeypatch):
-    monkeypatch.setattr(module, "FRAMES_IN_FULL", 10)
+    monkeypatch.setattr(module, "SAMPLES", replace(SAMPLES, frames=10))
     collectors = [SampleCollector(atlas, 100, 0) for _ in range(2)]
     frames = list(range(100))
     for collector, order in zip(collectors, (frames, frames[::-1]), strict=True):

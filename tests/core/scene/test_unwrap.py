@@ -9,8 +9,9 @@ import pytest
 
 from addon.core.errors import BadInputError
 from addon.core.scene.model import Mesh
+from addon.core.scene.params import SURFACE
 from addon.core.scene.two_sides import with_backs
-from addon.core.scene.unwrap import OVERLAP_TEXELS, by_xatlas, own_coordinates
+from addon.core.scene.unwrap import by_xatlas, own_coordinates
 from addon.core.scene.uv_islands import areas
 from addon.core.scene.uv_overlap import overlapping_pairs
 from tests.core.rooms import lit_box, make_room
@@ -28,7 +29,7 @@ def mesh() -> Mesh:
 def check(mesh: Mesh, uv: np.ndarray):
     assert uv.shape == (len(mesh.triangles), 3, 2) and uv.dtype == np.float32
     assert uv.min() >= 0 and uv.max() <= 1 and (areas(uv) > 0).all()
-    assert not len(overlapping_pairs(uv, OVERLAP_TEXELS / SIZE))
+    assert not len(overlapping_pairs(uv, SURFACE.overlap_texels / SIZE))
 
 
 def test_own_coordinates_stay(mesh):

@@ -31,8 +31,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from ...scene.mesh_noise import LEAST_NOISE, noise_of
+from ...scene.mesh_noise import noise_of
 from ...scene.model import Mesh
+from ...scene.params import NOISE
 from ...scene.weld import point_normals, ring_of, welded
 from .cracks import closed
 from .planes import onto_sheets
@@ -175,7 +176,7 @@ def _large(points: np.ndarray, faces: np.ndarray, least: float) -> np.ndarray:
 def without_noise(mesh: Mesh, without: Collection[str] = ()) -> tuple[Mesh, float]:
     """The mesh denoised, and the noise that was found; one with too little to tell from shape is given back itself."""
     noise = noise_of(mesh)
-    if noise < LEAST_NOISE:
+    if noise < NOISE.least_noise:
         return mesh, 0.0
     return replace(mesh, vertices=denoised(mesh, noise, without)), noise
 

@@ -20,8 +20,9 @@ from scipy.ndimage import uniform_filter
 from ...lit_diffuse.accumulate import accumulate
 from ...scene.atlas import Atlas
 from ...scene.elements import ElementLookup
-from ...scene.lit_diffuse import ENOUGH, LitDiffuse
+from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Camera, Frame, Pixels
+from ...scene.params import VISIBILITY
 from ...scene.surface import Surface
 from ...scene.visibility import CLEAN
 
@@ -67,7 +68,7 @@ def sharpened(
     atlas = surface.atlas
     lookup = lookup or ElementLookup(surface.mesh, atlas)
     floor = np.float32(max(FLOOR * float(np.median(lit.radiance[lit.seen])), 1e-30))
-    good = (lit.tier == CLEAN) & (lit.count >= ENOUGH) & _detailed(lit, atlas)
+    good = (lit.tier == CLEAN) & (lit.count >= VISIBILITY.enough) & _detailed(lit, atlas)
 
     def ratios(frame: Frame) -> Pixels:
         pixels = read(frame)
@@ -77,7 +78,7 @@ def sharpened(
         return replace(pixels, radiance=ratio.astype(np.float32), valid=pixels.valid & known)
 
     found = accumulate(surface.mesh, atlas, surface.scene, frames, ratios, only=good, **how)
-    told = good & (found.tier == CLEAN) & (found.count >= ENOUGH)
+    told = good & (found.tier == CLEAN) & (found.count >= VISIBILITY.enough)
     ratio = np.where(told[:, None], np.clip(found.radiance, 1 / MOST, MOST), 1).astype(np.float32)
     return replace(lit, radiance=lit.radiance * ratio, lower=lit.lower * ratio, upper=lit.upper * ratio)
 

@@ -14,8 +14,7 @@ class FitParams:
     elements, views : int
         Elements of an object that the fit looks at, and views of each.
     screen_elements, screen_rays : int
-        The first look is at fewer elements and with so many times fewer rays; it drops what a lobe makes much
-        worse.
+        The first look is at fewer elements and with so many times fewer rays; it drops what a lobe makes much worse.
     hopeless : float
         A lobe that raises the cost by this factor in the first look needs no second.
     looks_like_none : float
@@ -24,10 +23,9 @@ class FitParams:
         The same for what is taken out of a median (`specular-in-median`): it averages over views and the lobe's width
         is known, so so many times fewer rays do.
     noisy, again, narrowest_phi : float, int, float
-        Noise of a dielectric's lobe, as a share of the radiance, from which on an observation gets so many
-        times more rays. Highlights of a bulb half hidden in its shade had .4: a desk's psi came out at .11 with
-        256 rays each, at .06 with 2048, where .04 is true. One observation in 70 of the living room, in 20 of a
-        study with such lamps.
+        Noise of a dielectric's lobe, as a share of the radiance, from which on an observation gets so many times more
+        rays. Highlights of a bulb half hidden in its shade had .4: a desk's psi came out at .11 with 256 rays each, at
+        .06 with 2048, where .04 is true. One observation in 70 of the living room, in 20 of a study with such lamps.
     broadest_phi : float
         A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface.
     neighbours : int
@@ -63,24 +61,23 @@ class ChoiceParams:
     Attributes
     ----------
     bare : float
-        A metal has no diffuse part. Its lobe alone, with nothing of each element's own, may cost up to so many
-        times what each element's own mean does (errors of the light field and of the mesh): metals in the
-        living room had 0.1 to 1.4, dielectrics and diffuse things whose lobe looked like a metal's 2.4 to 60,
-        there and in four small rooms.
+        A metal has no diffuse part. Its lobe alone, with nothing of each element's own, may cost up to so many times
+        what each element's own mean does (errors of the light field and of the mesh): metals in the living room had 0.1
+        to 1.4, dielectrics and diffuse things whose lobe looked like a metal's 2.4 to 60, there and in four small
+        rooms.
     bare_at_most, much : float
-        The same where a metal takes away more than this share of what a diffuse surface costs, and of what a
-        dielectric does: thin legs of steel, 32 elements in 5 views, had 2.4.
+        The same where a metal takes away more than this share of what a diffuse surface costs, and of what a dielectric
+        does: thin legs of steel, 32 elements in 5 views, had 2.4.
     min_gain : float
-        A lobe must lower the cost on elements that its fit has not seen by this share, and by this many
-        standard errors (`LEVELS.sigmas`). A metal must also beat a dielectric over a diffuse part, by
-        `LEVELS.likely`: that alone it does not stand or fall with, as it has to do without a diffuse part besides.
-        Below three others of its class decide: of 31 true metals in nine rooms two had less, a black keyboard 1.9
-        or 2.1.
+        A lobe must lower the cost on elements that its fit has not seen by this share, and by this many standard errors
+        (`LEVELS.sigmas`). A metal must also beat a dielectric over a diffuse part, by `LEVELS.likely`: that alone it
+        does not stand or fall with, as it has to do without a diffuse part besides. Below three others of its class
+        decide: of 31 true metals in nine rooms two had less, a black keyboard 1.9 or 2.1.
     large_gain, large_elements : float, int
-        A lobe that takes so much off need only be likely (`LEVELS.likely`): few elements show a small highlight, but what
-        they show nothing else explains (a bathroom's tiles, 38,000 pixels: gain .16, 2.2; of what is truly diffuse
-        in the living room and its perturbed scan nothing gains a tenth with less than 3). Not of a handful of
-        elements (a cord, a pixel wide at most), whose standard error is no better known than that.
+        A lobe that takes so much off need only be likely (`LEVELS.likely`): few elements show a small highlight, but
+        what they show nothing else explains (a bathroom's tiles, 38,000 pixels: gain .16, 2.2; of what is truly diffuse
+        in the living room and its perturbed scan nothing gains a tenth with less than 3). Not of a handful of elements
+        (a cord, a pixel wide at most), whose standard error is no better known than that.
     excluded : float
         Rise of an object's cost from which on the lobe of its class is refused.
     """
@@ -105,22 +102,22 @@ class LooksParams:
     ----------
     ratio : float
         An object of one colour is metal, or coated, if that leaves less than this share of the spread that diffuse and
-        dielectric leave, by this many standard errors. Of 166 objects in the living room and five others,
-        metals had 0.2 to 1.1 (the half of them below 0.8), everything else 0.92 and more, but for what
-        `metal_spread` leaves out and a pane of glass (0.58); reddish wood in a perturbed scan had 0.78 and an
-        F0 that no metal has (`metal_by_looks`).
+        dielectric leave, by this many standard errors. Of 166 objects in the living room and five others, metals had
+        0.2 to 1.1 (the half of them below 0.8), everything else 0.92 and more, but for what `metal_spread` leaves out
+        and a pane of glass (0.58); reddish wood in a perturbed scan had 0.78 and an F0 that no metal has
+        (`metal_by_looks`).
     likely_sigmas : float
         With so many it is metal if others of its class are.
     metal_spread : float
         What follows diffuse light as closely as this says nothing against it: errors of E and A are of that size.
     coated_sigmas : float
-        An object is coated by this many standard errors. Of what was called Lambertian in six rooms and two perturbed scans, fourteen
-        coated things had less (black tubes 0.42, a hand rail 0.74, soap 0.75, a plant pot 0.89); what is truly
-        diffuse had 0.94 and more, but for what `coated_spread` says.
+        An object is coated by this many standard errors. Of what was called Lambertian in six rooms and two perturbed
+        scans, fourteen coated things had less (black tubes 0.42, a hand rail 0.74, soap 0.75, a plant pot 0.89); what
+        is truly diffuse had 0.94 and more, but for what `coated_spread` says.
     coated_spread : tuple[float, float]
-        What follows diffuse light as closely as the first says nothing against it (a bath mat: 0.04); what does
-        not follow coated light to the second is not explained (a cord as thick as a pixel: 0.65 diffuse, 0.40
-        coated; of a table 0.35).
+        What follows diffuse light as closely as the first says nothing against it (a bath mat: 0.04); what does not
+        follow coated light to the second is not explained (a cord as thick as a pixel: 0.65 diffuse, 0.40 coated; of a
+        table 0.35).
     least_observations : int
         With fewer nothing is said.
     darkest : float
@@ -165,20 +162,20 @@ class IntervalParams:
     Attributes
     ----------
     groups, roughness_systematic : int, float
-        Standard error of Blender's roughness that all elements share; the grid of phi alone has steps of 0.06.
-        Of 24 glossy objects in eight rendered rooms (`tests/blender/evidence`) the 90 % intervals then hold 22,
-        in the living room 23 of 23; the jackknife alone says 0.02 in the median where 0.07 is true.
+        Standard error of Blender's roughness that all elements share; the grid of phi alone has steps of 0.06. Of 24
+        glossy objects in eight rendered rooms (`tests/blender/evidence`) the 90 % intervals then hold 22, in the living
+        room 23 of 23; the jackknife alone says 0.02 in the median where 0.07 is true.
     specular_systematic : float
-        The same of log psi: 23 of those 24 are held, in the living room 20 of 23; psi came out between 0.6 and
-        2.2 of the truth.
+        The same of log psi: 23 of those 24 are held, in the living room 20 of 23; psi came out between 0.6 and 2.2 of
+        the truth.
     metal_systematic : float
         The same of log F0 of metals, measured on five in the living room only (0.89 to 1.15 of the truth).
     adopted : float
         Standard error of a roughness that was taken over from another object of the class.
     by_looks : float
-        The same of one that follows from how the object looks all over (`one_colour`), which is too broad as a
-        rule: 13 metals in three rooms came out -.01 to .25 above the truth (.13 in the root mean square); 3 of
-        6 in a fourth, rims of spots mixed with their lamps, .5. These intervals hold 16 of the 19.
+        The same of one that follows from how the object looks all over (`one_colour`), which is too broad as a rule: 13
+        metals in three rooms came out -.01 to .25 above the truth (.13 in the root mean square); 3 of 6 in a fourth,
+        rims of spots mixed with their lamps, .5. These intervals hold 16 of the 19.
     """
 
     groups: int = 6

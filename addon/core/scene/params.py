@@ -1,0 +1,203 @@
+"""What the geometry is told: what counts as seen, as a side, as a crease, as noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class VisibilityParams:
+    """What of a frame counts as seen, and how sure (`visibility`, `lit_diffuse`).
+
+    Attributes
+    ----------
+    min_cosine : float
+        Views more grazing than this are dropped: their pixel covers too much surface.
+    depth_tolerance : float
+        A neighbouring pixel whose hit lies further than this share of the distance off the pixel's own plane lies
+        beyond a depth edge.
+    edge_margin : float
+        Pixels around the frame's border that are not looked up: half of each lies beyond the outermost centres.
+    enough : int
+        Clean observations from which on an element does without those at edges.
+    """
+
+    min_cosine: float = 0.2
+    depth_tolerance: float = 0.02
+    edge_margin: float = 0.5
+    enough: int = 3
+
+
+VISIBILITY = VisibilityParams()
+
+
+@dataclass(frozen=True)
+class SampleParams:
+    """Observations that are kept one by one (`samples`).
+
+    Attributes
+    ----------
+    of_object, in_all : int
+        Elements whose observations are kept, of one object and together.
+    frames : int
+        With more frames, each observation is kept with the chance that this many frames would leave of it.
+    """
+
+    of_object: int = 4000
+    in_all: int = 150_000
+    frames: int = 200
+
+
+SAMPLES = SampleParams()
+
+
+@dataclass(frozen=True)
+class SidesParams:
+    """What is given a second side, and which side faces the room (`two_sides`, `orientation`, `vote`).
+
+    Attributes
+    ----------
+    least_share, least_rays : float, int
+        A sheet is given two sides if this share of the rays that met it, and so many, met the side that is seen less.
+    less_share, more_rays : float, int
+        Or this share, where they are so many: a floor lamp's shade had 17 of 590, and threw its inner side's light at
+        the wall behind it. Bent tubes have 4 to 10 of some hundred at their ends, and second sides would halve what
+        shows them.
+    least_of_object, least_of_room : float
+        Sheets that are less of their object's surface, and of the room's, are left as they are: single leaves of a
+        plant, whose two sides are alike, only cost elements, and views that its other elements would be judged by.
+    gap : float
+        Between a sheet's two sides where it is rendered, as a share of the room's diagonal: 0.3 mm in a room of 7 m.
+    upright : float
+        A triangle's corners go along the sheet's normals where these agree with its own at least by this cosine.
+    pixel_step : int
+        Every fourth pixel in x and y votes.
+    least_votes_share : float, int
+        A triangle is seen from both sides if this share of its votes, and so many, are for the other one.
+    max_rays : int
+        Rays over all frames; of larger captures every second, third ... pixel votes.
+    """
+
+    least_share: float = 0.05
+    least_rays: int = 4
+    less_share: float = 0.025
+    more_rays: int = 12
+    least_of_object: float = 0.1
+    least_of_room: float = 0.01
+    gap: float = 4e-5
+    upright: float = 0.3
+    pixel_step: int = 4
+    least_votes_share: float = 0.1
+    max_rays: int = 20_000_000
+
+
+SIDES = SidesParams()
+
+
+@dataclass(frozen=True)
+class CreaseParams:
+    """How much less sure irradiance is beside creases (`creases`).
+
+    Attributes
+    ----------
+    weld : float
+        Metres within which two vertices are one.
+    reach : float
+        Texels from the edge up to which it is felt, less and less.
+    knee : float
+        Radians from which on a crease has its full effect: a facet of a curved moulding is no smoother than a corner.
+    thin : float
+        A triangle of less height, relative to its longest edge, faces no sure way: an edge with it tells of no bend.
+    most_error : float
+        Relative standard error of the irradiance right at a crease. Living room, white panelling: 0.25 to 0.4 there and
+        0.07 to 0.12 on flat parts.
+    """
+
+    weld: float = 1e-5
+    reach: float = 1.5
+    knee: float = 0.1
+    thin: float = 1e-3
+    most_error: float = 0.3
+
+
+CREASES = CreaseParams()
+
+
+@dataclass(frozen=True)
+class NoiseParams:
+    """A scan's noise (`mesh_noise`).
+
+    Attributes
+    ----------
+    least_noise : float
+        Metres. Below, what is measured may be shape: a modelled living room has 0.13 mm.
+    least_vertices : int
+        A median of fewer curvatures says nothing.
+    tilt : float
+        Radians by which a triangle of height 1 is tilted by vertices off by 1: each of three vertices adds its share.
+    most : float
+        Radians; what is tilted by so much faces any way.
+    left : float
+        Share of a tilt that is left once the noise is taken out (`denoise`): in the living room 0.2 to 0.3 in the
+        median, 0.6 to 0.9 in the root mean square, as triangles lower than the noise stay wrong.
+    """
+
+    least_noise: float = 0.001
+    least_vertices: int = 100
+    tilt: float = 1.2
+    most: float = 3.0
+    left: float = 0.5
+
+
+NOISE = NoiseParams()
+
+
+@dataclass(frozen=True)
+class SurfaceParams:
+    """How the surface is laid out in texels, and its parts told apart.
+
+    Attributes
+    ----------
+    expected_fill : float
+        Share of the atlas that islands usually cover; only the unwrapping's margin depends on it.
+    step : int
+        Edges of atlases and pages are multiples of it.
+    page_margin : int
+        Texels of the room's atlas around each island that show it too, for what lies between texels.
+    page_shapes : tuple of float
+        Widths that are tried for a block of islands, of the edge of the square that would hold their area.
+    turned : float
+        Metres: so far apart count two elements whose normals differ by a radian (`Atlas.place`).
+    weld : float
+        Share of the room's diagonal within which vertices are one: at seams and between triangles they are listed
+        twice.
+    tiny : float
+        A part of less than this share of the surface is a crumb of a scan, no object.
+    most_parts : int
+        More parts are not told apart: the greatest remain.
+    overlap_texels : float
+        Triangles may penetrate each other by this much; far less than what moves a texel's centre, more than rounding.
+    margin : int
+        Texels between two charts.
+    full, hopeless : float
+        Islands that fill less of their rectangle are cut in two, or all apart where a cut gains nothing.
+    rounds : int
+        Such cuts in a row.
+    """
+
+    expected_fill: float = 0.55
+    step: int = 64
+    page_margin: int = 1
+    page_shapes: tuple[float, ...] = (1.0, 1.1, 1.25, 1.5)
+    turned: float = 0.2
+    weld: float = 1e-6
+    tiny: float = 1e-3
+    most_parts: int = 64
+    overlap_texels: float = 0.02
+    margin: int = 2
+    full: float = 0.6
+    hopeless: float = 0.25
+    rounds: int = 10
+
+
+SURFACE = SurfaceParams()
