@@ -45,7 +45,6 @@ def mark(owner, folder: Path | str, run: str, capture: Path | str | None = None)
 
     Parameters
     ----------
-    owner : bpy.types.Object or bpy.types.Collection
     folder : Path or str
         The result folder.
     run : str

@@ -29,7 +29,6 @@ def use_device(scene: bpy.types.Scene, told: str) -> str:
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     told : str
         'CPU'; 'GPU', which is all graphics cards of the first kind of `TYPES` that there is; one of `TYPES`; or what
         `told_device` gave. Whatever the case, but for ids.

@@ -31,11 +31,6 @@ def of_object(
         The spot, on its surface; world, metres.
     albedo : (3,) tuple of float
         Known, linear Rec.709.
-    depsgraph : bpy.types.Depsgraph
-
-    Returns
-    -------
-    list of three floats
 
     Raises
     ------

@@ -25,9 +25,9 @@ from ..data.materials import (
     SPECULAR_LEVEL,
     brdf_of,
     f0_of,
-    mix_node,
     principled,
 )
+from ..data.nodes import mix_node
 from ..marks import FOUND
 
 WORN = "scan_relight_worn"
@@ -85,7 +85,6 @@ def show(thing: bpy.types.Object, wanted: dict[str, Any], entry: dict[str, Any])
 
     Parameters
     ----------
-    thing : bpy.types.Object
     wanted : dict
         `model`, `roughness`, `f0`, `base_color` as they are to be; what the run made is brought back exactly.
     entry : dict

@@ -17,7 +17,6 @@ def begin(context: bpy.types.Context, thing: bpy.types.Object, where: str, maske
     ----------
     context : bpy.types.Context
         `thing` is its active object.
-    thing : bpy.types.Object
     where : str
         Where the canvas goes, see `unseen.own_image`.
     masked : bool

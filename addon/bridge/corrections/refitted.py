@@ -8,13 +8,14 @@ from pathlib import Path
 
 import bpy
 
-from ...core.errors import MissingStageError, StorageError
+from ...core.errors import MissingStageError
 from ...core.results.room_file import material
 from ..data.images import tiles_of
 from ..data.materials import dress
 from ..data.mesh_objects import is_open
 from ..light import lamps
 from ..marks import IMAGE, OBJECT_ID, RESULT, UV_MAP, mark
+from ..refused import refused
 from ..results import changes, file
 from ..results import images as result_images
 from ..scene.as_made import is_corrected, stamp_tree
@@ -31,7 +32,6 @@ def words(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> tuple[P
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     things : iterable of bpy.types.Object
         At least these are fitted again; they are of one room.
 
@@ -76,10 +76,8 @@ def bringing(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     folder : Path
         The result folder.
-    before : dict of int to dict
     after : result_file.Result
         What `words` and `fitted` gave.
     """
@@ -114,8 +112,7 @@ def bringing(
 
 def _own_image(thing: bpy.types.Object) -> bpy.types.Image | None:
     """The image of an object's own part of the atlas that its material shows; None where that is the room's."""
-    worn = worn_material(thing)
-    nodes = worn.node_tree.nodes if worn is not None and worn.node_tree else ()
+    nodes = worn_material(thing).node_tree.nodes
     images = (node.image for node in nodes if node.type == "TEX_IMAGE" and node.image)
     return next((image for image in images if UV_MAP in image), None)
 
@@ -155,19 +152,12 @@ def _renew_images(folder: Path) -> bpy.types.Image | None:
                 if shown.is_relative_to(folder / result_images.KEPT):
                     result_images.link(part, shown.parent / part.name)
                 elif shown != source:
-                    _copy(part, shown.parent / part.name if part != source else shown)
+                    target = shown.parent / part.name if part != source else shown
+                    with refused(f"'{target}' can't be written", "free some space and refit again"):
+                        shutil.copyfile(part, target)
             one.reload()
         one[IMAGE] = str(source)
         found = one if source.name == BASE_COLOR else found
     if found is None and (folder / BASE_COLOR).is_file():
         found = result_images.image(folder, BASE_COLOR)
     return found
-
-
-def _copy(source: Path, target: Path) -> None:
-    try:
-        shutil.copyfile(source, target)
-    except OSError as error:
-        raise StorageError(
-            f"'{target}' can't be written ({error.strerror or error}); free some space and refit again."
-        ) from error

@@ -13,13 +13,16 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.errors import BadInputError, StorageError
+from ...core.errors import BadInputError
 from ...core.scene.atlas import Atlas
 from ...core.scene.model import Mesh
+from ..data.arrays import layer_of, triangles_of, vertices_of
 from ..data.images import array_image, image_array, load_image
 from ..data.materials import BASE_COLOR, principled
 from ..data.mesh_objects import ATLAS_UV
+from ..data.nodes import image_node
 from ..marks import IMAGE, OBJECT_ID, PAINTED, RESULT, RUN
+from ..refused import refused
 from ..results import images
 from ..scene.as_made import our_own
 from .material import worn_material
@@ -36,16 +39,7 @@ MASK = "unseen"
 def texture_node(thing: bpy.types.Object) -> bpy.types.ShaderNode | None:
     """The node whose image an object's Base Color shows; None where it shows one colour."""
     shader = principled(worn_material(thing))
-    waiting, seen = ([shader.inputs[BASE_COLOR]] if shader else []), set()
-    while waiting:
-        for link in waiting.pop().links:
-            node = link.from_node
-            if node.type == "TEX_IMAGE" and node.image:
-                return node
-            if node not in seen:
-                seen.add(node)
-                waiting.extend(node.inputs)
-    return None
+    return image_node(shader.inputs[BASE_COLOR]) if shader else None
 
 
 def painted(thing: bpy.types.Object) -> bpy.types.Image | None:
@@ -58,7 +52,6 @@ def own_image(thing: bpy.types.Object, where: str = images.PACK) -> bpy.types.Im
 
     Parameters
     ----------
-    thing : bpy.types.Object
     where : str
         `results.images.FOLDER`: a file beside the saved .blend; else packed into it.
 
@@ -293,18 +286,9 @@ def _elements(things: list[bpy.types.Object], size: int) -> Atlas:
     vertices, triangles, uv, number, first = [], [], [], [], 0
     for k, thing in enumerate(things):
         data = thing.data
-        data.calc_loop_triangles()
-        place = np.empty(3 * len(data.vertices), np.float32)
-        data.vertices.foreach_get("co", place)
-        corner, loop = (np.empty(3 * len(data.loop_triangles), np.int32) for _ in range(2))
-        data.loop_triangles.foreach_get("vertices", corner)
-        data.loop_triangles.foreach_get("loops", loop)
-        flat = np.empty(2 * len(data.loops), np.float32)
-        data.uv_layers[ATLAS_UV].uv.foreach_get("vector", flat)
-        matrix = np.array(thing.matrix_world, np.float32)
-        vertices.append(place.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3])
-        triangles.append(corner.reshape(-1, 3) + first)
-        uv.append(flat.reshape(-1, 2)[loop].reshape(-1, 3, 2))
+        vertices.append(vertices_of(data, thing.matrix_world).astype(np.float32))
+        triangles.append(triangles_of(data) + first)
+        uv.append(layer_of(data, ATLAS_UV)[triangles_of(data, "loops")])
         number.append(np.full(len(triangles[-1]), k, np.int32))
         first += len(data.vertices)
     return make_atlas(Mesh(*map(np.concatenate, (vertices, triangles, number))), np.concatenate(uv), size)
@@ -326,16 +310,11 @@ def _renew(image, source, thing) -> None:
 def _save_beside(image) -> None:
     saved = Path(bpy.data.filepath)
     path = saved.parent / f"{saved.stem} images" / f"{bpy.path.clean_name(image.name)}.exr"
-    try:
+    with refused(f"'{path}' can't be written", "free some space or save the file elsewhere"):
         path.parent.mkdir(exist_ok=True)
         image.unpack(method="REMOVE") if image.packed_file else None
         image.filepath_raw, image.file_format = str(path), "OPEN_EXR"
         image.save()
-    except (OSError, RuntimeError) as error:
-        raise StorageError(
-            f"'{path}' can't be written ({getattr(error, 'strerror', None) or error}); free some space "
-            "or save the file elsewhere."
-        ) from error
 
 
 def path_of(image: bpy.types.Image) -> str:
@@ -345,6 +324,4 @@ def path_of(image: bpy.types.Image) -> str:
 
 
 def _digest(data: bpy.types.Mesh) -> str:
-    flat = np.empty(2 * len(data.loops), np.float32)
-    data.uv_layers[ATLAS_UV].uv.foreach_get("vector", flat)
-    return hashlib.sha256(flat.tobytes()).hexdigest()[:16]
+    return hashlib.sha256(layer_of(data, ATLAS_UV).tobytes()).hexdigest()[:16]

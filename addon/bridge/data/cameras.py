@@ -38,8 +38,6 @@ def make_cameras(frames: Iterable[Frame], collection: bpy.types.Collection, firs
 
     Parameters
     ----------
-    frames : iterable of Frame
-    collection : bpy.types.Collection
     first : int
         Place of the first of `frames` in the capture's order.
 

@@ -119,15 +119,10 @@ def array_image(name: str, pixels: np.ndarray, colour_space: str = RADIANCE) -> 
 
     Parameters
     ----------
-    name : str
     pixels : (h, w), (h, w, 3) or (h, w, 4) float
         Row 0 at the bottom. Linear Rec.709 for `RADIANCE`.
     colour_space : str
         `RADIANCE` or `DATA`.
-
-    Returns
-    -------
-    bpy.types.Image
     """
     height, width = pixels.shape[:2]
     image = bpy.data.images.new(name, width, height, float_buffer=True, is_data=colour_space == DATA)

@@ -14,27 +14,12 @@ import numpy as np
 from ...core.errors import BadInputError
 from ...core.io.layout import RawMesh
 from ...core.io.self_contained import copy_gltf, copy_obj
+from ..refused import reason_of
+from .arrays import layer_of, triangles_of, vertices_of
+from .scene_data import Made
 
 NUMBERED = re.compile(r"^(.*?)(?:\.(\d{3,}))?$", re.DOTALL)
 """Blender's ending of a name that was taken already."""
-OWNED = (
-    "objects",
-    "meshes",
-    "materials",
-    "images",
-    "textures",
-    "collections",
-    "scenes",
-    "actions",
-    "armatures",
-    "cameras",
-    "lights",
-    "curves",
-    "node_groups",
-    "texts",
-    "worlds",
-    "shape_keys",
-)
 
 
 def import_mesh(path: Path) -> RawMesh:
@@ -96,20 +81,20 @@ def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> None:
                 addon_utils.enable("io_scene_gltf2")
             bpy.ops.import_scene.gltf(filepath=str(copy), import_shading="FLAT", merge_vertices=False)
         except (RuntimeError, AttributeError) as error:  # how an operator tells of anything that went wrong
-            reason = " ".join(str(error).split()).removeprefix("Error: ")[-150:]
-            raise BadInputError(f"Mesh '{path}' can't be read by Blender ({reason}); export it again.") from error
+            raise BadInputError(
+                f"Mesh '{path}' can't be read by Blender ({reason_of(error)[-150:]}); export it again."
+            ) from error
 
 
 @contextlib.contextmanager
 def _scene_apart() -> Iterator[bpy.types.Scene]:
     """A scene of its own; it goes with all that came into it, and nothing else changes."""
-    before = {kind: {one.session_uid for one in getattr(bpy.data, kind)} for kind in OWNED}
+    made = Made()
     scene = bpy.data.scenes.new("Scan Relight import")
     try:
         yield scene
     finally:
-        new = [one for kind in OWNED for one in getattr(bpy.data, kind) if one.session_uid not in before[kind]]
-        bpy.data.batch_remove(new)
+        made.remove()
 
 
 def _parts(scene: bpy.types.Scene) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray | None]]:
@@ -127,23 +112,12 @@ def _parts(scene: bpy.types.Scene) -> list[tuple[str, np.ndarray, np.ndarray, np
 
 def _geometry(mesh: bpy.types.Mesh, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
     """World positions ((v, 3) float64), triangles ((t, 3) int32) and texture coordinates of their corners."""
-    mesh.calc_loop_triangles()
-    co = np.empty(3 * len(mesh.vertices), np.float32)
-    mesh.vertices.foreach_get("co", co)
-    triangles = np.empty(3 * len(mesh.loop_triangles), np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles)
-    triangles, uv = triangles.reshape(-1, 3), None
-    if mesh.uv_layers.active is not None:
-        loops = np.empty(triangles.size, np.int32)
-        mesh.loop_triangles.foreach_get("loops", loops)
-        at = np.empty(2 * len(mesh.loops), np.float32)
-        mesh.uv_layers.active.data.foreach_get("uv", at)
-        uv = at.reshape(-1, 2)[loops].reshape(-1, 3, 2)
-    vertices = co.reshape(-1, 3).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    triangles, layer = triangles_of(mesh), mesh.uv_layers.active
+    uv = None if layer is None else layer_of(mesh, layer.name)[triangles_of(mesh, "loops")]
     if np.linalg.det(matrix[:3, :3]) < 0:  # a mirrored object's triangles are wound the other way
         triangles = triangles[:, [0, 2, 1]]
         uv = None if uv is None else uv[:, [0, 2, 1]]
-    return vertices, triangles, uv
+    return vertices_of(mesh, matrix), triangles, uv
 
 
 def _joined(parts: list, name: str) -> RawMesh:

@@ -9,6 +9,7 @@ from ...core.brdf.model import Brdf
 from ...core.brdf.registry import find
 from ..marks import UV_MAP
 from .mesh_objects import ATLAS_UV
+from .nodes import find_node, fresh_tree, mix_node
 
 MODEL = "scan_relight_model"
 """Custom property of each recovered material: the name of its description's model."""
@@ -53,7 +54,6 @@ def make_material(
 
     Parameters
     ----------
-    description : ObjectMaterial
     base_color : bpy.types.Image, optional
         Of what has a diffuse part: Base Color over the atlas, linear Rec.709 (`core.brdf.material.base_colors`).
         Without it the colour is mid-grey.
@@ -110,8 +110,7 @@ def dress(
 
 def principled(material: bpy.types.Material | None) -> bpy.types.ShaderNode | None:
     """A material's Principled node; None where it has none."""
-    nodes = material.node_tree.nodes if material and material.node_tree else ()
-    return next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
+    return find_node(material, "BSDF_PRINCIPLED")
 
 
 def opacity(material: bpy.types.Material) -> float:
@@ -175,20 +174,6 @@ def _front_only(nodes, links, socket):
     links.new(mixed, socket)
 
 
-def mix_node(nodes):
-    """A node that mixes two colours, and its sockets: factor, the colours where that is 0 and 1, result."""
-    mix = nodes.new("ShaderNodeMix")
-    mix.data_type = "RGBA"
-    # By type, as the node has sockets of the same name for each of its data types.
-    colours = [s for s in mix.inputs if s.type == "RGBA"]
-    return (
-        mix,
-        next(s for s in mix.inputs if s.type == "VALUE"),
-        *colours,
-        next(s for s in mix.outputs if s.type == "RGBA"),
-    )
-
-
 def _texture(nodes, links, image, place):
     """Colour output of an image over the atlas, or its part of it."""
     coordinates = nodes.new("ShaderNodeUVMap")
@@ -204,11 +189,7 @@ def _texture(nodes, links, image, place):
 
 def _fresh_tree(material):
     """Nodes, links and the Principled node of an otherwise empty tree."""
-    if material.node_tree is None:
-        # From 5.0 on every material has its tree and the switch is deprecated.
-        material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    nodes.clear()
+    nodes, links = fresh_tree(material)
     principled = nodes.new("ShaderNodeBsdfPrincipled")
     output = nodes.new("ShaderNodeOutputMaterial")
     output.location = (300, 0)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.scene.model import Instance, Mesh
 from ..marks import OBJECT_ID
+from .arrays import make_mesh, read, set_layer
 
 ATLAS_UV = "ScanRelight"
 """Name of the texture coordinates that the recovered images use."""
@@ -35,7 +36,6 @@ def make_objects(
         One without triangles gets no object.
     atlas_uv : (t, 3, 2) float32
         Atlas coordinates of each triangle's corners, in [0, 1].
-    collection : bpy.types.Collection
     parts_uv : (t, 3, 2) float32, optional
         See `PARTS_UV`; then these are the active ones.
 
@@ -63,14 +63,14 @@ def each_object(
         if first == last:
             continue
         own = order[first:last]
-        vertices, triangles = _compact(mesh.vertices, mesh.triangles[own])
+        # Triangles that repeat a vertex are dropped by no one: they show nothing.
+        used, corners = np.unique(mesh.triangles[own].ravel(), return_inverse=True)
+        vertices = mesh.vertices[used]
         middle = (vertices.min(0) + vertices.max(0)) / 2
-        data = mesh_data(instance.name, vertices - middle, triangles)
-        _add_uv(data, ATLAS_UV, atlas_uv[own])
-        if mesh.uv is not None:
-            _add_uv(data, CAPTURE_UV, mesh.uv[own])
-        if parts_uv is not None:
-            _add_uv(data, PARTS_UV, parts_uv[own])
+        data = make_mesh(instance.name, vertices - middle, corners.reshape(-1, 3))
+        for name, uv in ((ATLAS_UV, atlas_uv), (CAPTURE_UV, mesh.uv), (PARTS_UV, parts_uv)):
+            if uv is not None:
+                set_layer(data, name, uv[own])
         shown = data.uv_layers[ATLAS_UV if parts_uv is None else PARTS_UV]
         data.uv_layers.active, shown.active_render = shown, True
         thing = bpy.data.objects.new(instance.name, data)
@@ -82,44 +82,5 @@ def each_object(
 
 def is_open(data: bpy.types.Mesh) -> bool:
     """Whether a mesh is a sheet: has edges with one face only."""
-    edge = np.empty(len(data.loops), np.int32)
-    data.loops.foreach_get("edge_index", edge)
-    return bool((np.bincount(edge, minlength=len(data.edges)) == 1).any())
-
-
-def mesh_data(name: str, vertices: np.ndarray, triangles: np.ndarray) -> bpy.types.Mesh:
-    """Make a flat-shaded mesh.
-
-    Parameters
-    ----------
-    name : str
-    vertices : (v, 3) float
-        Metres.
-    triangles : (t, 3) int
-
-    Returns
-    -------
-    bpy.types.Mesh
-        Loop k of triangle i is loop 3 i + k.
-    """
-    data = bpy.data.meshes.new(name)
-    data.vertices.add(len(vertices))
-    data.vertices.foreach_set("co", np.ascontiguousarray(vertices, np.float32).ravel())
-    data.loops.add(triangles.size)
-    data.loops.foreach_set("vertex_index", np.ascontiguousarray(triangles, np.int32).ravel())
-    data.polygons.add(len(triangles))
-    data.polygons.foreach_set("loop_start", np.arange(0, triangles.size, 3, dtype=np.int32))
-    data.shade_flat()
-    data.update(calc_edges=True)
-    return data
-
-
-def _compact(vertices, triangles):
-    """Only the vertices in use, renumbered. Triangles that repeat a vertex are dropped by no one: they show nothing."""
-    used, corners = np.unique(triangles.ravel(), return_inverse=True)
-    return vertices[used], corners.reshape(-1, 3)
-
-
-def _add_uv(data, name, uv):
-    layer = data.uv_layers.new(name=name, do_init=False)
-    layer.data.foreach_set("uv", np.ascontiguousarray(uv, np.float32).ravel())
+    edges = read(data.loops, "edge_index", kind=np.int32)
+    return bool((np.bincount(edges, minlength=len(data.edges)) == 1).any())

@@ -6,7 +6,10 @@ from collections.abc import Iterable
 
 import bpy
 
-KINDS = ("scenes", "collections", "objects", "meshes", "cameras", "materials", "worlds", "images", "actions")
+KINDS = tuple(
+    "scenes collections objects meshes curves armatures cameras lights shape_keys materials worlds node_groups images "
+    "textures actions texts".split()
+)
 """Owners come before what they own."""
 
 

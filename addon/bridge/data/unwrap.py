@@ -15,6 +15,7 @@ import numpy as np
 from ...core.scene.model import Mesh
 from ...core.scene.uv_islands import areas, connected, corner_ids, cut_sparse
 from ...core.scene.uv_overlap import layers, overlapping_pairs
+from .arrays import layer_of, make_mesh, set_layer
 
 OVERLAP_TEXELS = 0.02
 """Triangles may penetrate each other by this much; far less than what moves a texel's centre, more than rounding."""
@@ -54,7 +55,6 @@ def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0, polygons: P
 
     Parameters
     ----------
-    mesh : Mesh
     size : int
         Edge of the atlas in texels; margin and tolerance count in these.
     margin_texels : float
@@ -130,7 +130,7 @@ def _projected(points, vertex, start):
             correct_aspect=False,
             scale_to_bounds=False,
         )
-        return np.nan_to_num(_layout(data), nan=0.0, posinf=0.0, neginf=0.0)
+        return np.nan_to_num(layer_of(data, _LAYER), nan=0.0, posinf=0.0, neginf=0.0)
 
 
 def _faces(face, pairs):
@@ -153,7 +153,7 @@ def _packed(points, corners, uv, size, margin_texels):
         wanted = margin = margin_texels / 2 / size
         for _ in range(3):
             with _temporary(points, corners.ravel(), 3 * np.arange(len(corners))) as data:
-                data.uv_layers[0].data.foreach_set("uv", uv.ravel())
+                set_layer(data, _LAYER, uv)
                 _operate(
                     data,
                     bpy.ops.uv.pack_islands,
@@ -165,7 +165,7 @@ def _packed(points, corners, uv, size, margin_texels):
                     shape_method="AABB",
                     udim_source="CLOSEST_UDIM",
                 )
-                packed = np.nan_to_num(_layout(data).reshape(-1, 3, 2), nan=0.0, posinf=0.0, neginf=0.0)
+                packed = np.nan_to_num(layer_of(data, _LAYER).reshape(-1, 3, 2), nan=0.0, posinf=0.0, neginf=0.0)
             border = packed.min()
             if border >= 0.97 * wanted or border <= 0:
                 break
@@ -202,16 +202,9 @@ def _temporary(points, vertex, start):
     Its faces are given by the vertex of each corner and the first corner of each face.
     """
     scene = bpy.data.scenes.new("Scan Relight unwrap")
-    data = bpy.data.meshes.new("Scan Relight unwrap")
+    data = make_mesh("Scan Relight unwrap", points, vertex, start)
     thing = bpy.data.objects.new("Scan Relight unwrap", data)
     try:
-        data.vertices.add(len(points))
-        data.vertices.foreach_set("co", np.ascontiguousarray(points, np.float32).ravel())
-        data.loops.add(len(vertex))
-        data.loops.foreach_set("vertex_index", np.ascontiguousarray(vertex, np.int32))
-        data.polygons.add(len(start))
-        data.polygons.foreach_set("loop_start", np.ascontiguousarray(start, np.int32))
-        data.update(calc_edges=True)
         data.uv_layers.new(name=_LAYER)
         scene.collection.objects.link(thing)
         scene.tool_settings.use_uv_select_sync = True
@@ -245,10 +238,3 @@ def _operate(data, operator, **settings):
     finally:
         with bpy.context.temp_override(**context):
             bpy.ops.object.mode_set(mode="OBJECT")
-
-
-def _layout(data):
-    """The mesh's texture coordinates, (c, 2) float32."""
-    uv = np.empty(len(data.loops) * 2, np.float32)
-    data.uv_layers[_LAYER].data.foreach_get("uv", uv)
-    return uv.reshape(-1, 2)

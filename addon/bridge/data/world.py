@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 
 from .images import load_image
+from .nodes import fresh_tree
 
 
 def set_world(scene: bpy.types.Scene, environment: Path | str | None, strength: float = 1.0) -> bpy.types.World:
@@ -14,16 +15,11 @@ def set_world(scene: bpy.types.Scene, environment: Path | str | None, strength: 
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     environment : Path, str or None
         Equirectangular radiance, linear Rec.709, as docs/architecture.md states: u = 0.5 - atan2(y, x) / (2 pi),
         v = 0.5 + asin(z) / pi. None: black.
     strength : float
         Factor on the radiance.
-
-    Returns
-    -------
-    bpy.types.World
 
     Raises
     ------
@@ -31,12 +27,14 @@ def set_world(scene: bpy.types.Scene, environment: Path | str | None, strength: 
         The file is missing or is no image.
     """
     image = None if environment is None else load_image(environment, "Scan Relight environment", keep=False)
-    world = bpy.data.worlds.new("Scan Relight")
-    if world.node_tree is None:
-        # From 5.0 on every world has its tree and the switch is deprecated.
-        world.use_nodes = True
-    nodes, links = world.node_tree.nodes, world.node_tree.links
-    nodes.clear()
+    scene.world = make_world("Scan Relight", image, strength)
+    return scene.world
+
+
+def make_world(name: str, image: bpy.types.Image | None, strength: float) -> bpy.types.World:
+    """A world that shows an equirectangular picture, or black."""
+    world = bpy.data.worlds.new(name)
+    nodes, links = fresh_tree(world)
     background, output = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
     output.location = (300, 0)
     links.new(background.outputs[0], output.inputs["Surface"])
@@ -44,9 +42,6 @@ def set_world(scene: bpy.types.Scene, environment: Path | str | None, strength: 
     background.inputs["Strength"].default_value = strength
     if image is not None:
         texture = nodes.new("ShaderNodeTexEnvironment")
-        texture.location = (-300, 0)
-        texture.projection = "EQUIRECTANGULAR"
-        texture.image = image
+        texture.location, texture.image = (-300, 0), image
         links.new(texture.outputs[0], background.inputs["Color"])
-    scene.world = world
     return world

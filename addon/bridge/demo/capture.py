@@ -23,8 +23,6 @@ def write_all_but_frames(folder: Path, things: tuple[Thing, ...], poses: np.ndar
 
     Parameters
     ----------
-    folder : Path
-    things : tuple of Thing
     poses : (n, 4, 4) float
         Camera to world.
     size : tuple of int

@@ -13,6 +13,7 @@ from ...core.io.read import read_capture
 from ...core.passes.albedo.albedo import MEASURED
 from ...core.scene.model import Capture
 from ...core.scene.rays import RayScene
+from ..data.arrays import layer_of, read
 from ..data.images import image_array
 from ..data.materials import (
     BASE_COLOR,
@@ -23,6 +24,7 @@ from ..data.materials import (
     alpha_of,
     brdf_of,
     f0_of,
+    principled,
 )
 from ..data.mesh_objects import ATLAS_UV
 from ..marks import OBJECT_ID
@@ -87,7 +89,7 @@ def number(value) -> str:
 def describe(thing, measured: np.ndarray) -> dict:
     """What the material of a recovered object says: model, mean base colour, roughness, F0, radiance."""
     material = thing.data.materials[0]
-    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    shader = principled(material)
     brdf = brdf_of(material)
     glossy = alpha_of(material) is not None
     emission = shader.inputs[EMISSION_COLOR].default_value[:3]
@@ -106,10 +108,7 @@ def mean_base_color(thing, socket, measured: np.ndarray) -> np.ndarray:
     if not socket.links:
         return np.array(socket.default_value[:3])
     pixels = image_array(socket.links[0].from_node.image)
-    mesh = thing.data
-    uv = np.empty(len(mesh.loops) * 2, np.float32)
-    mesh.uv_layers[ATLAS_UV].uv.foreach_get("vector", uv)
-    area = np.array([polygon.area for polygon in mesh.polygons])
+    uv, area = layer_of(thing.data, ATLAS_UV), read(thing.data.polygons, "area")
     corners = np.array([(a, b, 8 - a - b) for a in range(9) for b in range(9 - a)]) / 8
     at = np.einsum("tkc,wk->twc", uv.reshape(-1, 3, 2), 0.97 * corners + 0.01)  # clear of the islands' edges
     size = np.array(pixels.shape[1::-1])

@@ -15,8 +15,12 @@ from ...core.brdf.compensation import ior_of
 from ...core.errors import BadInputError, StorageError
 from ...core.io.exr import read_header
 from ...core.progress import Progress
+from ..data.arrays import set_layer
 from ..data.images import array_image
 from ..data.materials import BASE_COLOR, IOR, ROUGHNESS, SPECULAR_LEVEL
+from ..data.nodes import fresh_tree
+from ..data.scene_data import Made
+from ..refused import reason_of
 from ..relight.pictures import can_denoise
 from .capture import FIELD_OF_VIEW, frame_path, write_all_but_frames
 from .room import Paint, Thing, room, tour
@@ -37,7 +41,6 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
         only the demo's comparison reads.
     size : str
         One of `SIZES`.
-    progress : Progress, optional
 
     Returns
     -------
@@ -59,7 +62,7 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
         shutil.rmtree(folder, ignore_errors=True)
         os.replace(part, folder)
     except (OSError, RuntimeError, BadInputError) as error:  # Blender's failures to write are RuntimeErrors, or silent
-        reason = " ".join(str(getattr(error, "strerror", None) or error).split()).removeprefix("Error: ").rstrip(".")
+        reason = reason_of(error)
         raise StorageError(
             f"The demo's capture can't be written to '{folder}' ({reason}); free some space or choose another folder."
         ) from error
@@ -83,7 +86,7 @@ def stamp_of(size: str) -> dict:
 
 def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int], samples: int, progress: Progress):
     """Render the room from every pose into the capture `folder`, as half-float EXR in linear Rec.709."""
-    before = {kind: set(getattr(bpy.data, kind)) for kind in KINDS}
+    made = Made()
     scene = bpy.data.scenes.new("demo")
     try:
         for thing in things:
@@ -103,13 +106,7 @@ def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int]
             read_header(folder / frame_path(k))  # raises where it is absent or cut off
         progress.update(1.0)
     finally:
-        bpy.data.scenes.remove(scene)
-        for kind in KINDS:
-            for block in set(getattr(bpy.data, kind)) - before[kind]:
-                getattr(bpy.data, kind).remove(block)
-
-
-KINDS = ("objects", "meshes", "cameras", "materials", "images")
+        made.remove()
 
 
 def set_up_cycles(scene, size: tuple[int, int], samples: int) -> None:
@@ -134,7 +131,7 @@ def build(thing: Thing):
     vertices, faces, uv, slot = thing.faces()
     mesh = bpy.data.meshes.new(thing.class_name)
     mesh.from_pydata(vertices.tolist(), [], faces.tolist())
-    mesh.uv_layers.new(name="uv").uv.foreach_set("vector", uv.astype(np.float32).ravel())
+    set_layer(mesh, "uv", uv)
     mesh.polygons.foreach_set("material_index", slot.astype(np.int32))
     for paint in thing.paints:
         mesh.materials.append(material(thing.class_name, paint))
@@ -144,10 +141,7 @@ def build(thing: Thing):
 def material(name: str, paint: Paint):
     """The paint as a Cycles material: emission, or a Principled."""
     made = bpy.data.materials.new(name)
-    if made.node_tree is None:  # before Blender 5.0
-        made.use_nodes = True
-    nodes, links = made.node_tree.nodes, made.node_tree.links
-    nodes.clear()
+    nodes, links = fresh_tree(made)
     output = nodes.new("ShaderNodeOutputMaterial")
     if paint.emission:
         shader = nodes.new("ShaderNodeEmission")

@@ -43,10 +43,8 @@ def run_demo(
 
     Parameters
     ----------
-    out : path
     size : str
         One of `demo.render.SIZES`.
-    settings : Settings
     listener, should_stop
         See `Progress`.
 

@@ -30,7 +30,6 @@ def mark(things: Iterable[bpy.types.Object], previews: bool = False) -> int:
 
     Parameters
     ----------
-    things : iterable of bpy.types.Object
     previews : bool
         Have Blender render previews, beside the window; it renders none in the background.
     """

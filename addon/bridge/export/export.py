@@ -15,10 +15,13 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.errors import BadInputError, StorageError
+from ...core.errors import BadInputError
+from ..data.arrays import faces_of, layer_of
 from ..data.materials import opacity
 from ..data.mesh_objects import PARTS_UV
+from ..data.scene_data import Made
 from ..marks import OBJECT_ID
+from ..refused import refused
 from .files import put, textures_of
 from .material import plain_copy
 from .names import Names, own_name, unique
@@ -49,7 +52,6 @@ def export(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     path : path
         The ending decides on the format, see `FORMATS`.
     scope : str
@@ -89,17 +91,10 @@ def export(
         # Blender's USD exporter can be told no folder for its textures, but it can leave them where they are.
         textures = made / textures_of(path) if ending in _BESIDE else folder / "textures"
         with copies(scene, things, extra, textures, FORMATS[ending] != "USD") as collection:
-            try:
+            with refused(f"'{path}' can't be exported", "choose another format, or fewer objects"):
                 _write(made / path.name, ending, collection)
-            except RuntimeError as error:
-                reason = " ".join(str(error).split()).removeprefix("Error: ").rstrip(".")
-                raise StorageError(f"'{path}' can't be exported ({reason[:300]}).") from error
-        try:
+        with refused(f"'{path}' can't be written", "free some space or choose another folder"):
             put(made, path)
-        except OSError as error:
-            raise StorageError(
-                f"'{path}' can't be written ({error.strerror or error}); free some space or choose another folder."
-            ) from error
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     return remarks(ending, things, extra, scene)
@@ -152,9 +147,7 @@ def copies(
 
     `textures` gets the 8-bit sRGB pictures that the materials show; for `level` see `plain_copy`.
     """
-    kinds = ("objects", "materials", "images", "collections", "meshes", "worlds")
-    world, names = scene.world, Names()
-    before = {kind: set(getattr(bpy.data, kind)) for kind in kinds}
+    world, names, made = scene.world, Names(), Made()
     try:
         textures.mkdir(parents=True)
         collection = bpy.data.collections.new(_COLLECTION)
@@ -190,10 +183,7 @@ def copies(
         yield collection
     finally:
         scene.world = world
-        for kind in ("collections", "objects", "materials", "images", "meshes"):
-            new = [item for item in getattr(bpy.data, kind) if item not in before[kind]]
-            if new:
-                bpy.data.batch_remove(new)
+        made.remove()
         names.put_back()
 
 
@@ -202,12 +192,9 @@ def _tiles(thing: bpy.types.Object) -> frozenset[int]:
     layer = thing.data.uv_layers.get(PARTS_UV)
     if layer is None or not len(layer.uv):
         return frozenset()
-    uv = np.empty(2 * len(layer.uv), np.float32)
-    layer.uv.foreach_get("vector", uv)
     # By the middles of faces: a corner may lie on an edge.
-    start = np.empty(len(thing.data.polygons), np.int32)
-    thing.data.polygons.foreach_get("loop_start", start)
-    middle = np.add.reduceat(uv.reshape(-1, 2), start) / np.diff(np.r_[start, len(layer.uv)])[:, None]
+    starts, uv = faces_of(thing.data)[0], layer_of(thing.data, PARTS_UV)
+    middle = np.add.reduceat(uv, starts[:-1]) / np.diff(starts)[:, None]
     column, row = np.floor(middle).astype(int).T
     return frozenset((1001 + column + 10 * row).tolist())
 

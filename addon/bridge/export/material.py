@@ -23,7 +23,9 @@ from ..data.materials import (
     ROUGHNESS,
     SPECULAR_LEVEL,
     plain_material,
+    principled,
 )
+from ..data.nodes import image_node
 from ..light import lamps
 from ..marks import IMAGE, UV_MAP
 
@@ -60,13 +62,12 @@ def plain_copy(
     bpy.types.Material
         Culled from behind where the original shines on one side only: glTF then has it single-sided.
     """
-    shader = (
-        next((n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED"), None) if material.node_tree else None
-    )
+    shader = principled(material)
     if shader is None:
         return plain_material(material.name)
     value = shader.inputs
-    image = _image(value[BASE_COLOR])
+    node = image_node(value[BASE_COLOR])
+    image = node.image if node else None
     ior, specular = value[IOR].default_value, value[SPECULAR_LEVEL].default_value
     if not level:
         ior, specular = ior_of(2 * specular * ((ior - 1) / (ior + 1)) ** 2), 0.5
@@ -92,24 +93,9 @@ def emission(material: bpy.types.Material) -> tuple[float, float, float]:
     """Radiance that a material emits to its front, linear Rec.709; (0, 0, 0) for none."""
     if lamps.is_lamp(material):
         return lamps.radiance(material)
-    shader = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+    shader = principled(material)
     strength = shader.inputs[EMISSION_STRENGTH].default_value
     return tuple(strength * c for c in shader.inputs[EMISSION_COLOR].default_value[:3])
-
-
-def _image(socket) -> bpy.types.Image | None:
-    """The image that a colour socket shows, through whatever nodes lie between (the first that is found)."""
-    waiting, seen = [socket], set()
-    while waiting:
-        for link in waiting.pop().links:
-            node = link.from_node
-            if node in seen:
-                continue
-            seen.add(node)
-            if node.type == "TEX_IMAGE":
-                return node.image
-            waiting.extend(node.inputs)
-    return None
 
 
 def _one_tile(image: bpy.types.Image, tiles: frozenset[int]) -> tuple[bpy.types.Image, int]:

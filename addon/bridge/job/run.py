@@ -51,11 +51,8 @@ def run(
 
     Parameters
     ----------
-    capture_folder : path
     out_folder : path
         Made where absent.
-    settings : Settings
-    progress : Progress
     until : str
         One of `stages.RUN_STAGES`; `WRITE` for all of them, the images and scene.blend.
     scene : bpy.types.Scene, optional

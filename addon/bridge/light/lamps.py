@@ -10,7 +10,7 @@ import bpy
 
 from ...core.errors import BadInputError
 from ...core.naming import in_order, numbered
-from ..data.materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, brdf_of
+from ..data.materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, brdf_of, principled
 from .kelvin import HIGHEST, LOWEST, kelvin_of, luminance, rgb_of
 
 _STRENGTH, _COLOUR, _BASE = (f"scan_relight_recovered_{name}" for name in ("strength", "colour", "base"))
@@ -26,7 +26,7 @@ _DARK = ("window", "screen", "monitor", "tv", "television", "display", "laptop")
 def is_lamp(material: bpy.types.Material | None) -> bool:
     """Whether a material is a recovered lamp's."""
     brdf = brdf_of(material)
-    return brdf is not None and brdf.gives_light and _principled(material) is not None
+    return brdf is not None and brdf.gives_light and principled(material) is not None
 
 
 def find_lamps(scene: bpy.types.Scene) -> list[bpy.types.Material]:
@@ -120,7 +120,7 @@ def set_kelvin(material: bpy.types.Material, value: float) -> None:
 
 def recovered_radiance(material: bpy.types.Material) -> tuple[float, float, float]:
     """What the scan found, linear Rec.709 in the frames' unit."""
-    node, socket = _principled(material), _colour_socket(material)
+    node, socket = principled(material), _colour_socket(material)
     strength = material.get(_STRENGTH, node.inputs[EMISSION_STRENGTH].default_value)
     tint = material.get(_COLOUR) or (socket.default_value[:3] if socket is not None else (1.0, 1.0, 1.0))
     return tuple(float(strength) * float(c) for c in tint)
@@ -128,7 +128,7 @@ def recovered_radiance(material: bpy.types.Material) -> tuple[float, float, floa
 
 def radiance(material: bpy.types.Material) -> tuple[float, float, float]:
     """What the lamp emits now, linear Rec.709 in the frames' unit."""
-    strength = _principled(material).inputs[EMISSION_STRENGTH].default_value
+    strength = principled(material).inputs[EMISSION_STRENGTH].default_value
     return tuple(strength * c for c in colour(material) or (1.0, 1.0, 1.0))
 
 
@@ -148,14 +148,13 @@ def restore(material: bpy.types.Material) -> None:
     """Make a lamp exactly what was recovered."""
     if _STRENGTH not in material:
         return
-    inputs, socket = _principled(material).inputs, _colour_socket(material)
+    inputs, socket = principled(material).inputs, _colour_socket(material)
     inputs[EMISSION_STRENGTH].default_value = material[_STRENGTH]
     inputs[BASE_COLOR].default_value = material[_BASE]
     if socket is not None:
         socket.default_value = (*material[_COLOUR], 1)
     for name in (_STRENGTH, _COLOUR, _BASE, _OFF, _FACTOR):
-        if name in material:
-            del material[name]
+        material.pop(name, None)
 
 
 def snapshot(material: bpy.types.Material) -> dict:
@@ -192,7 +191,7 @@ def state_sockets(material: bpy.types.Material) -> list[bpy.types.NodeSocket]:
     """The inputs that show a lamp's state; none while it is as recovered."""
     if _STRENGTH not in material or not is_lamp(material):
         return []
-    inputs = _principled(material).inputs
+    inputs = principled(material).inputs
     return [one for one in (inputs[EMISSION_STRENGTH], inputs[BASE_COLOR], _colour_socket(material)) if one is not None]
 
 
@@ -200,7 +199,7 @@ def _keep(material):
     """Note what was recovered, before the first change."""
     if _STRENGTH in material:
         return
-    inputs, tint = _principled(material).inputs, colour(material)
+    inputs, tint = principled(material).inputs, colour(material)
     material[_STRENGTH] = inputs[EMISSION_STRENGTH].default_value
     material[_BASE] = tuple(inputs[BASE_COLOR].default_value)
     if tint is not None:
@@ -209,20 +208,15 @@ def _keep(material):
 
 def _show(material):
     """Bring the node tree in line with the state."""
-    inputs, on = _principled(material).inputs, is_on(material)
+    inputs, on = principled(material).inputs, is_on(material)
     inputs[EMISSION_STRENGTH].default_value = material[_STRENGTH] * factor(material) * on
     grey = 0.02 if numbered(material.name.casefold())[0] in _DARK else UNLIT_GREY
     inputs[BASE_COLOR].default_value = material[_BASE] if on else (grey, grey, grey, 1)
 
 
-def _principled(material):
-    tree = material.node_tree
-    return next((n for n in tree.nodes if n.type == "BSDF_PRINCIPLED"), None) if tree else None
-
-
 def _colour_socket(material):
     """The socket that holds the colour: the shader's own, or that of the node that blackens a lamp's back."""
-    socket = _principled(material).inputs[EMISSION_COLOR]
+    socket = principled(material).inputs[EMISSION_COLOR]
     if socket.links and socket.links[0].from_node.type == "MIX":
         socket = next(s for s in socket.links[0].from_node.inputs if s.type == "RGBA")
     return None if socket.links else socket

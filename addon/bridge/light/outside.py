@@ -14,6 +14,9 @@ from mathutils import Vector
 
 from ...core.errors import BadInputError
 from ..data.images import RADIANCE, image_array
+from ..data.nodes import find_node
+from ..data.world import make_world
+from .kelvin import LUMINANCE
 from .room import bounds, leaves, room_light
 
 RECOVERED = "scan_relight_recovered_world"
@@ -30,7 +33,7 @@ which shows through openings that cover a small part of what any spot of the roo
 
 def has_outside(scene: bpy.types.Scene) -> bool:
     """Whether the scene's world shows a picture or any colour but black."""
-    node = _background(scene.world)
+    node = find_node(scene.world, "BACKGROUND")
     return node is not None and bool(node.inputs["Color"].links or any(node.inputs["Color"].default_value[:3]))
 
 
@@ -66,7 +69,7 @@ def rotation(world: bpy.types.World) -> float:
 
 def set_rotation(world: bpy.types.World, angle: float) -> None:
     """Turn the outside to `angle` (radians about +Z); without effect where it shows no picture."""
-    texture = _texture(world)
+    texture = find_node(world, "TEX_ENVIRONMENT")
     if texture is None:
         return
     nodes, links = world.node_tree.nodes, world.node_tree.links
@@ -91,7 +94,6 @@ def use_hdri(scene: bpy.types.Scene, path: Path | str, mean: float | None = None
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     path : path
         EXR, HDR or any picture that Blender reads.
     mean : float, optional
@@ -121,38 +123,24 @@ def use_hdri(scene: bpy.types.Scene, path: Path | str, mean: float | None = None
         strength = mean / found if found > 0 else 1.0
     if HDRI not in (scene.world or {}) and scene.world is not None:
         scene[RECOVERED] = scene.world
-    world = bpy.data.worlds.new(f"Scan Relight {path.stem}")
-    if world.node_tree is None:  # before Blender 5.0
-        world.use_nodes = True
-    nodes, links = world.node_tree.nodes, world.node_tree.links
-    nodes.clear()
-    texture, background, output = (
-        nodes.new(f"ShaderNode{name}") for name in ("TexEnvironment", "Background", "OutputWorld")
-    )
-    texture.image, texture.location, output.location = image, (-300, 0), (300, 0)
-    background.inputs["Strength"].default_value = strength
-    links.new(texture.outputs[0], background.inputs["Color"])
-    links.new(background.outputs[0], output.inputs["Surface"])
-    world[HDRI] = str(path)
-    scene.world = world
-    return world
+    scene.world = make_world(f"Scan Relight {path.stem}", image, strength)
+    scene.world[HDRI] = str(path)
+    return scene.world
 
 
 def restore(scene: bpy.types.Scene) -> None:
     """Make the outside exactly what was recovered."""
     if scene.get(RECOVERED) is not None:
         scene.world = scene[RECOVERED]
-    if RECOVERED in scene:
-        del scene[RECOVERED]
+    scene.pop(RECOVERED, None)
     world = scene.world
     if world is None:
         return
     set_rotation(world, 0.0)
     if _KEPT in world:
-        _background(world).inputs["Strength"].default_value = world[_KEPT]
+        find_node(world, "BACKGROUND").inputs["Strength"].default_value = world[_KEPT]
     for name in (_KEPT, _OFF, _FACTOR):
-        if name in world:
-            del world[name]
+        world.pop(name, None)
 
 
 def recovered_world(scene: bpy.types.Scene) -> bpy.types.World | None:
@@ -172,7 +160,7 @@ def is_changed(scene: bpy.types.Scene) -> bool:
 
 def strength(world: bpy.types.World | None) -> float:
     """What the world's picture or colour is multiplied by now; 0 without a world."""
-    node = _background(world)
+    node = find_node(world, "BACKGROUND")
     return 0.0 if node is None else float(node.inputs["Strength"].default_value)
 
 
@@ -218,7 +206,7 @@ def mean_radiance(image: bpy.types.Image) -> float:
     pixels = image_array(image)[::4, ::4, :3]
     height = len(pixels)
     weight = np.cos((np.arange(height) + 0.5) / height * math.pi - math.pi / 2)
-    luminance = np.nan_to_num(pixels, posinf=0.0).clip(0) @ (0.2126, 0.7152, 0.0722)
+    luminance = np.nan_to_num(pixels, posinf=0.0).clip(0) @ LUMINANCE
     return float((luminance.mean(1) * weight).sum() / weight.sum())
 
 
@@ -241,28 +229,18 @@ def put_back(world: bpy.types.World | None, state: dict) -> None:
 
 def state_sockets(world: bpy.types.World) -> list[bpy.types.NodeSocket]:
     """The inputs that show the state of the light from outside."""
-    texture = _texture(world)
+    texture = find_node(world, "TEX_ENVIRONMENT")
     turned = [texture.inputs["Vector"]] if texture is not None and rotation(world) else []
-    return turned + ([_background(world).inputs["Strength"]] if _KEPT in world else [])
+    return turned + ([find_node(world, "BACKGROUND").inputs["Strength"]] if _KEPT in world else [])
 
 
 def _keep(world):
-    node = _background(world)
+    node = find_node(world, "BACKGROUND")
     if node is not None and _KEPT not in world:
         world[_KEPT] = node.inputs["Strength"].default_value
 
 
 def _show(world):
-    node = _background(world)
+    node = find_node(world, "BACKGROUND")
     if node is not None:
         node.inputs["Strength"].default_value = world[_KEPT] * factor(world) * is_on(world)
-
-
-def _background(world):
-    tree = world.node_tree if world else None
-    return next((n for n in tree.nodes if n.type == "BACKGROUND"), None) if tree else None
-
-
-def _texture(world):
-    tree = world.node_tree if world else None
-    return next((n for n in tree.nodes if n.type == "TEX_ENVIRONMENT"), None) if tree else None

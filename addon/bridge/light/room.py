@@ -13,6 +13,7 @@ from ...core.errors import BadInputError
 from ..data.images import image_array
 from ..data.materials import opacity
 from ..marks import OBJECT_ID
+from .kelvin import LUMINANCE
 
 ROOM_LIGHT = "scan_relight_room_light"
 """Custom property of the scene: median irradiance of the scanned room, in the frames' unit."""
@@ -86,11 +87,9 @@ def target_of(scene: bpy.types.Scene, kind: str = VIEW, thing: bpy.types.Object 
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     kind : str
         `VIEW`: the surface in the middle of the camera's picture, or the room's middle without a camera; `CURSOR`:
         the 3D cursor; `OBJECT`: the middle of `thing`'s box.
-    thing : bpy.types.Object, optional
 
     Raises
     ------
@@ -149,6 +148,6 @@ def _median_shading() -> float | None:
     image = next((i for i in bpy.data.images if bpy.path.basename(i.filepath) == "shading.exr"), None)
     if image is None or not all(image.size):
         return None
-    values = image_array(image)[::8, ::8, :3] @ (0.2126, 0.7152, 0.0722)
+    values = image_array(image)[::8, ::8, :3] @ LUMINANCE
     values = values[np.isfinite(values) & (values > 0)]
     return float(np.median(values)) if len(values) else None

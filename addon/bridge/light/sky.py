@@ -9,6 +9,7 @@ import numpy as np
 from mathutils import Vector
 
 from ..data.images import image_array
+from ..data.nodes import find_node
 from .kelvin import LUMINANCE
 
 _ROWS, _COLUMNS = 16, 32
@@ -20,13 +21,12 @@ def sky(world: bpy.types.World, direction: Vector, turn: float) -> float:
 
     Parameters
     ----------
-    world : bpy.types.World
     direction : Vector
         Unit, from the room outwards.
     turn : float
         Radians by which the picture is turned about +Z, anticlockwise from above.
     """
-    node = next((n for n in world.node_tree.nodes if n.type == "BACKGROUND"), None) if world.node_tree else None
+    node = find_node(world, "BACKGROUND")
     if node is None:
         return 0.0
     socket = node.inputs["Color"]

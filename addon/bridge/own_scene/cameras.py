@@ -166,7 +166,6 @@ def views(
     ----------
     scene : bpy.types.Scene
         With `ANIMATION` its frame is changed; the caller sets it back.
-    depsgraph : bpy.types.Depsgraph
     things : list of bpy.types.Object
         See `cameras_with_pictures`.
     how : str

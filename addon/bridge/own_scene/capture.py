@@ -19,7 +19,7 @@ from zipfile import BadZipFile
 import bpy
 import numpy as np
 
-from ...core.errors import BadInputError, MissingStageError, StorageError
+from ...core.errors import BadInputError, MissingStageError
 from ...core.io.layout import RawMesh
 from ...core.io.mesh_repair import repair
 from ...core.io.nerfstudio_camera import OWN_LENS
@@ -27,6 +27,7 @@ from ...core.io.ply_write import ply_bytes
 from ...core.scene.lenses_told import told_lens
 from ...core.scene.model import Mesh
 from ..data.unwrap import Polygons
+from ..refused import refused
 from . import cameras as scene_cameras
 from .mesh import Part, SceneMesh, gather, joined
 
@@ -167,16 +168,12 @@ def _write_whole(folder: Path, write) -> None:
     """Let `write` fill a folder beside `folder` and put it in its place."""
     part = folder.with_name(folder.name + ".part")
     try:
-        shutil.rmtree(part, ignore_errors=True)
-        part.mkdir(parents=True)
-        write(part)
-        shutil.rmtree(folder, ignore_errors=True)
-        os.replace(part, folder)
-    except OSError as error:
-        raise StorageError(
-            f"The scene can't be captured into '{folder}' ({error.strerror or error}); free some space "
-            "or choose another folder."
-        ) from error
+        with refused(f"The scene can't be captured into '{folder}'", "free some space or choose another folder"):
+            shutil.rmtree(part, ignore_errors=True)
+            part.mkdir(parents=True)
+            write(part)
+            shutil.rmtree(folder, ignore_errors=True)
+            os.replace(part, folder)
     finally:
         shutil.rmtree(part, ignore_errors=True)
 

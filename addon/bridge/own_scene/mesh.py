@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import BadInputError
+from ..data.arrays import faces_of, make_mesh, triangles_of, vertices_of
 from ..data.unwrap import Polygons
 
 KINDS = ("MESH", "CURVE", "SURFACE", "FONT", "EMPTY")
@@ -55,16 +56,7 @@ class Part:
     def mesh(self) -> bpy.types.Mesh:
         """Its faces as a mesh of their own, in world coordinates, flat."""
         one = joined([self])
-        data = bpy.data.meshes.new(self.name)
-        data.vertices.add(len(one.vertices))
-        data.vertices.foreach_set("co", one.vertices.astype(np.float32).ravel())
-        data.loops.add(len(one.polygons.vertex))
-        data.loops.foreach_set("vertex_index", one.polygons.vertex)
-        data.polygons.add(len(one.polygons.start) - 1)
-        data.polygons.foreach_set("loop_start", one.polygons.start[:-1])
-        data.shade_flat()
-        data.update(calc_edges=True)
-        return data
+        return make_mesh(self.name, one.vertices, one.polygons.vertex, one.polygons.start[:-1])
 
 
 @dataclass(frozen=True)
@@ -142,22 +134,12 @@ def gather(depsgraph: bpy.types.Depsgraph, things: Iterable[bpy.types.Object]) -
 def same_topology(one: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
     """Whether two meshes have the same faces in the same order, wherever their vertices are."""
     return len(one.vertices) == len(other.vertices) and all(
-        np.array_equal(a, b) for a, b in zip(topology(one), topology(other))
+        np.array_equal(a, b) for a, b in zip(faces_of(one), faces_of(other))
     )
 
 
-def topology(data: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """First corner of each face, and the end, (f + 1,); vertex of each corner, (c,); both int32."""
-    starts = np.empty(len(data.polygons) + 1, np.int32)
-    data.polygons.foreach_get("loop_start", starts[:-1])
-    starts[-1] = len(data.loops)
-    corners = np.empty(len(data.loops), np.int32)
-    data.loops.foreach_get("vertex_index", corners)
-    return starts, corners
-
-
 def topology_hash(pieces: Iterable[tuple[np.ndarray, np.ndarray]]) -> str:
-    """A hash of `topology`'s arrays, piece by piece."""
+    """A hash of what `faces_of` gives, piece by piece."""
     digest = hashlib.sha256()
     for starts, corners in pieces:
         digest.update(np.int64([len(starts), len(corners)]).tobytes() + starts.tobytes() + corners.tobytes())
@@ -165,16 +147,10 @@ def topology_hash(pieces: Iterable[tuple[np.ndarray, np.ndarray]]) -> str:
 
 
 def _piece(data, matrix):
-    starts, corners = topology(data)
-    local = np.empty((len(data.vertices), 3), np.float32)
-    data.vertices.foreach_get("co", local.ravel())
-    vertices = local.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-    data.calc_loop_triangles()
-    loops = np.empty((len(data.loop_triangles), 3), np.int32)
-    data.loop_triangles.foreach_get("loops", loops.ravel())
+    loops = triangles_of(data, "loops")
     if np.linalg.det(matrix[:3, :3]) < 0:  # mirrored: front is where the other order of corners says
         loops = loops[:, [0, 2, 1]]
-    return vertices, starts, corners, loops
+    return vertices_of(data, matrix), *faces_of(data), loops
 
 
 def joined(parts: Iterable[Part]) -> SceneMesh:

@@ -18,13 +18,14 @@ from ...core.brdf.material import ObjectMaterial, undescribed
 from ...core.errors import BadInputError, MissingStageError
 from ...core.results.room_file import run_of
 from ...core.scene.model import Capture
+from ..data.arrays import faces_of, read, set_layer, vertices_of
 from ..data.materials import MODEL, make_material
 from ..data.mesh_objects import ATLAS_UV
 from ..light.room import depsgraph_of
 from ..marks import OBJECT_ID, RESULT, RUN, mark
 from ..results import images
 from .capture import Source, check_own, few, polygons_of, sharing, sources
-from .mesh import Part, gather, same_topology, topology
+from .mesh import Part, gather, same_topology
 from .mesh import topology_hash as hash_of
 
 BEFORE = "scan_relight_before"
@@ -58,12 +59,9 @@ def writing_back(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     capture : Capture
         Made by `capture_scene`.
     atlas_uv : (t, 3, 2) float32
-    materials : iterable of ObjectMaterial
-    result_folder : path
     where : str
         Where the images go: see `results.images`.
     copies : bool
@@ -104,7 +102,7 @@ def writing_back(
         own = corner_uv[source.corner_start :]
         if not source.own:
             made.append((source, thing, description, own))
-        elif thing.type != "MESH" or hash_of([topology(thing.data)]) != source.topology:
+        elif thing.type != "MESH" or hash_of([faces_of(thing.data)]) != source.topology:
             edited.append(source.name)
         else:
             work.dress(thing, source, description, own[: len(thing.data.loops)])
@@ -153,11 +151,8 @@ class _Work:
                 before["aside"] = True
                 thing.data.uv_layers[ATLAS_UV].name = ASIDE
             thing[BEFORE] = before
-        layers = thing.data.uv_layers
-        layer = layers.get(ATLAS_UV) or layers.new(name=ATLAS_UV, do_init=False)
-        if layer is None:
+        if set_layer(thing.data, ATLAS_UV, uv) is None:
             raise BadInputError(f"Object '{thing.name}' has no room for another UV map; take one away.")
-        layer.uv.foreach_set("vector", np.ascontiguousarray(uv).ravel())
         material = make_material(description, self.base_color)
         if not thing.material_slots:
             thing.data.materials.append(material)
@@ -203,7 +198,7 @@ class _Work:
             data = bpy.data.meshes.new_from_object(
                 thing.evaluated_get(depsgraph), preserve_all_data_layers=True, depsgraph=depsgraph
             )
-            if hash_of([topology(data)]) != part.topology:  # its one piece is an instance
+            if hash_of([faces_of(data)]) != part.topology:  # its one piece is an instance
                 bpy.data.meshes.remove(data)
                 data = None
         if data is None:
@@ -295,19 +290,12 @@ def undo_copies(thing: bpy.types.Object) -> None:
 
 def same_shape(one: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
     """Whether two meshes have the same faces and vertices at the same places."""
-    if not same_topology(one, other):
-        return False
-    places = []
-    for data in (one, other):
-        places.append(np.empty(3 * len(data.vertices), np.float32))
-        data.vertices.foreach_get("co", places[-1])
-    return np.array_equal(*places)
+    return same_topology(one, other) and np.array_equal(vertices_of(one), vertices_of(other))
 
 
 def _without_slot(data: bpy.types.Mesh) -> None:
     """Take the one slot away; the faces keep the slot numbers that they have."""
-    number = np.empty(len(data.polygons), np.int32)
-    data.polygons.foreach_get("material_index", number)
+    number = read(data.polygons, "material_index", kind=np.int32)
     data.materials.clear()
     if number.any():  # else an attribute would appear that was not there
         data.polygons.foreach_set("material_index", number)

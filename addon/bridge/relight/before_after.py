@@ -15,10 +15,11 @@ from pathlib import Path
 import bpy
 
 from ...core.atomic import TEMPORARY
-from ...core.errors import BadInputError, StorageError
+from ...core.errors import BadInputError
 from ...core.progress import Progress
 from ...core.results.room_file import MATERIALS
 from ..marks import RESULT
+from ..refused import refused
 from .pictures import beside, check_format, seconds_expected, shoot, ticking
 from .state import captured_light
 
@@ -34,11 +35,9 @@ def render_pair(scene: bpy.types.Scene, out: Path, progress: Progress | None = N
     if scene.camera is None:
         raise BadInputError("The scene has no camera to render through; choose a frame of the capture first.")
     progress = progress or Progress()
-    try:
+    with refused(f"'{out}' can't be written", "choose another folder"):
         out.parent.mkdir(parents=True, exist_ok=True)
         folder = Path(tempfile.mkdtemp(prefix=f"{TEMPORARY}{os.getpid()}-", dir=out.parent))
-    except OSError as error:
-        raise StorageError(f"'{out}' can't be written ({error.strerror or error}); choose another folder.") from error
     try:
         before, after = folder / f"before{ending}", folder / f"after{ending}"
         progress.stage("before")
@@ -89,11 +88,8 @@ def save_copy(folder: Path) -> None:
     StorageError
         The copy can't be written.
     """
-    try:
+    with refused(f"A copy of the scene can't be saved to '{folder}'", "free some space"):
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / COPY), copy=True, compress=False, relative_remap=True)
-    except RuntimeError as error:
-        reason = " ".join(str(error).split()).removeprefix("Error: ").rstrip(".")
-        raise StorageError(f"A copy of the scene can't be saved to '{folder}' ({reason}); free some space.") from error
 
 
 def show(path: Path) -> bpy.types.Image:

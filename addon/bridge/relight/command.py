@@ -67,7 +67,6 @@ def relight(
     ----------
     result : Path
         A result folder.
-    light : Light
     out : Path
         Ends in .png, .jpg or .exr.
     camera : str, optional
@@ -80,7 +79,6 @@ def relight(
         Two pictures beside each other: the captured light, the new one.
     percentage : int
         Of the frame's size.
-    progress : Progress, optional
     device : str, optional
         See `render_device.use_device`; by default the file's, on which Cycles may have no say without preferences.
     of : str, optional

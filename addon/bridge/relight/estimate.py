@@ -17,6 +17,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from ..data.arrays import triangles_of, vertices_of
 from ..light import lamps as relight_lamps
 from ..light import outside
 from ..light.kelvin import luminance
@@ -167,13 +168,7 @@ def _lamps(scene) -> dict[str, tuple]:
     found: dict[str, tuple] = {}
     for name, lamps in relight_lamps.lamps_by_object(scene).items():
         thing = scene.objects[name]
-        mesh, pose = thing.data, thing.matrix_world
-        mesh.calc_loop_triangles()
-        corners = np.empty(3 * len(mesh.vertices), np.float32)
-        mesh.vertices.foreach_get("co", corners)
-        index = np.empty(3 * len(mesh.loop_triangles), np.int32)
-        mesh.loop_triangles.foreach_get("vertices", index)
-        three = (corners.reshape(-1, 3) @ np.array(pose.to_3x3()).T + np.array(pose.translation))[index.reshape(-1, 3)]
+        three = vertices_of(thing.data, thing.matrix_world)[triangles_of(thing.data)]
         across = np.cross(three[:, 1] - three[:, 0], three[:, 2] - three[:, 0]) / 2
         areas = np.linalg.norm(across, axis=1)
         if not areas.sum() > 0:

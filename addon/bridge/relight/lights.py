@@ -21,7 +21,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.errors import BadInputError
-from ..data.own_collection import own_collection
+from ..data.own_collection import own_collection, remove_own
 from ..light.room import room_light
 from ..light.units import ROOM, UNITS, set_strength
 from .aim import Placement, softbox_place, spot_place, sun_place, window_place
@@ -57,7 +57,6 @@ def add_light(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     preset : str
         One of `PRESETS`.
     strength : float
@@ -110,14 +109,7 @@ def added_lights(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 def remove_lights(scene: bpy.types.Scene) -> int:
     """Take all added lights away; returns how many."""
-    lights = added_lights(scene)
-    data = {light.data for light in lights}
-    bpy.data.batch_remove(lights)
-    bpy.data.batch_remove([one for one in data if not one.users])
-    part = next((c for c in scene.collection.children if c.name.split(".")[0] == COLLECTION), None)
-    if part and not part.all_objects:
-        bpy.data.collections.remove(part)
-    return len(lights)
+    return remove_own(scene, COLLECTION, added_lights(scene))
 
 
 def _lamp(preset: str, place: Placement, distance: float, irradiance: float, radius: float = 0.6) -> bpy.types.Light:

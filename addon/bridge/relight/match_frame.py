@@ -23,7 +23,6 @@ def match_frame(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     index : int
         In the capture's order, clamped to what there is.
     background : bool

@@ -15,10 +15,11 @@ import bpy
 import numpy as np
 
 from ...core.atomic import replacing
-from ...core.errors import BadInputError, InterruptedRun, StorageError
+from ...core.errors import BadInputError, InterruptedRun
 from ...core.progress import Progress
 from ..data.images import image_array
 from ..light.kelvin import LUMINANCE
+from ..refused import refused
 
 FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32"), ".jpg": ("JPEG", "8"), ".jpeg": ("JPEG", "8")}
 """By ending: Blender's name of the format and its depth."""
@@ -108,7 +109,6 @@ def prepare(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 0, perc
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     engine : str
         `CYCLES` or `EEVEE`.
     samples : int
@@ -237,7 +237,7 @@ def _is_black(path: Path) -> bool:
 @contextmanager
 def saving(path: Path) -> Iterator[Path]:
     """A temporary name beside `path` that Blender saves a picture to, moved over it; one sentence where that fails."""
-    try:
+    with refused(f"'{path}' can't be written", "free some space or choose another result folder"):
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as temporary:
             yield temporary
@@ -245,11 +245,6 @@ def saving(path: Path) -> Iterator[Path]:
             whole = content[-8:-4] == b"IEND" if path.suffix.lower() == ".png" else len(content) > 100
             if not whole:  # Blender does not always notice a full disk
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    except (OSError, RuntimeError) as error:
-        reason = " ".join(str(getattr(error, "strerror", None) or error).split()).removeprefix("Error: ").rstrip(".")
-        raise StorageError(
-            f"'{path}' can't be written ({reason}); free some space or choose another result folder."
-        ) from error
 
 
 def beside(left: Path, right: Path, out: Path) -> None:

@@ -19,8 +19,9 @@ from mathutils import Matrix
 
 from ...core.errors import BadInputError, ScanRelightError
 from ..data.cameras import frame_cameras
-from ..data.own_collection import own_collection
+from ..data.own_collection import own_collection, remove_own
 from ..light.room import bounds, room_objects
+from ..refused import reason_of
 from .pictures import CYCLES, EEVEE, prepare, settings_kept, shoot, small_median
 
 COLLECTION = "Preview Light"
@@ -85,7 +86,6 @@ def bake(scene: bpy.types.Scene, wait: bool = True) -> bpy.types.Object:
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     wait : bool
         Return when it is done; else, in a window, Blender bakes on, with a bar in its status line, and ESC ends that.
 
@@ -113,7 +113,7 @@ def bake(scene: bpy.types.Scene, wait: bool = True) -> bpy.types.Object:
         }
         reason = ""
     except RuntimeError as error:
-        done, reason = False, " ".join(str(error).split()).removeprefix("Error: ").rstrip(".")
+        done, reason = False, reason_of(error)
     finally:
         layer.objects.active = active
     if not done:
@@ -196,13 +196,7 @@ def _try_eevee(scene) -> None:
 
 def remove(scene: bpy.types.Scene) -> int:
     """Take away the volumes that were baked here; returns how many."""
-    found = probes(scene)
-    data = {thing.data for thing in found}
-    bpy.data.batch_remove([*found, *data])
-    part = next((c for c in scene.collection.children if c.name.split(".")[0] == COLLECTION), None)
-    if part is not None and not part.all_objects:
-        bpy.data.collections.remove(part)
-    return len(found)
+    return remove_own(scene, COLLECTION, probes(scene))
 
 
 def _set(owner, **values) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ...core.errors import BadInputError
+from ..data.arrays import vertices_of
 from ..data.materials import plain_material
 from ..data.own_collection import own_collection
 from ..light.room import Hit, bounds, cast, depsgraph_of, picture_ray
@@ -40,7 +41,6 @@ def add_virtual(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     shape : str
         One of `SHAPES`.
     size : float
@@ -73,8 +73,7 @@ def add_virtual(
     thing = bpy.data.objects.new(NAMES[shape], mesh)
     if shape == MONKEY:
         thing.modifiers.new("Smooth", "SUBSURF").render_levels = 2
-    points = np.array([vertex.co for vertex in mesh.vertices])
-    thing.scale = (size / float(np.ptp(points, axis=0).max()),) * 3
+    thing.scale = (size / float(np.ptp(vertices_of(mesh), axis=0).max()),) * 3
     own_collection(scene, COLLECTION).objects.link(thing)
     set_look(thing, look)
     if shape == MONKEY and scene.camera:
@@ -99,7 +98,6 @@ def stand(scene: bpy.types.Scene, thing: bpy.types.Object, at: Hit | None = None
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     thing : bpy.types.Object
         Its rotation and scale stay.
     at : Hit, optional
@@ -204,10 +202,7 @@ def _points(scene, thing) -> np.ndarray:
     if thing.type != "MESH":
         return np.array([thing.matrix_world @ Vector(c) for c in thing.bound_box])
     evaluated = thing.evaluated_get(depsgraph_of(scene))
-    points = np.empty(len(evaluated.data.vertices) * 3, np.float32)
-    evaluated.data.vertices.foreach_get("co", points)
-    matrix = np.array(evaluated.matrix_world)
-    return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+    return vertices_of(evaluated.data, evaluated.matrix_world)
 
 
 def _clear_of_walls(scene, place: Vector, radius: float, tall: float) -> Vector:

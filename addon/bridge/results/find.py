@@ -16,12 +16,13 @@ from pathlib import Path
 
 import bpy
 
-from ...core.errors import BadInputError, StorageError
+from ...core.errors import BadInputError
 from ...core.results.place import BESIDE, captures, free_folder, write_capture
 from ...core.results.room_file import MATERIALS, layout_of, run_of
 from ...core.results.store import Store
 from ..data.images import relative_to, result_of
 from ..marks import IMAGE, LAYOUT, OBJECT_ID, RESULT, RUN
+from ..refused import refused
 from . import file
 from .home import shown
 from .images import KEPT, is_there, kept_path, of_results, path_of
@@ -266,7 +267,7 @@ def move(folder: Path, home: Path) -> Path:
         pass  # no run is writing it
     known = captures(folder)
     target = free_folder(home, known[0].name if known else folder.name)
-    try:
+    with refused(f"'{folder}' can't be moved to '{target}'", "free some space or choose another results folder"):
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.exists():
             target.rmdir()  # it is empty
@@ -274,11 +275,6 @@ def move(folder: Path, home: Path) -> Path:
             os.rename(folder, target)
         except OSError:  # another disk
             _copy(folder, target)
-    except OSError as error:
-        raise StorageError(
-            f"'{folder}' can't be moved to '{target}' ({error.strerror or error}); free some space or "
-            "choose another results folder."
-        ) from error
     if known:
         write_capture(target, known[0])
     repoint(folder, target)

@@ -16,6 +16,7 @@ from ...core.errors import BadInputError, StorageError
 from ...core.results.room_file import capture_name, layout_of
 from ..data.images import DATA, RADIANCE, image_name, load_image, relative_to, result_of, tiles_of
 from ..marks import IMAGE, LAYOUT
+from ..refused import refused
 from ..scene.write import ALBEDO, BASE_COLOR, SCENE_FILES, SHADING
 
 RESULT, FOLDER, PACK = "RESULT", "FOLDER", "PACK"
@@ -183,10 +184,8 @@ def link(source: Path, target: Path) -> None:
     """Make `target` a further name of a file, or a copy where that can't be; raises `StorageError`."""
     if target.exists() and filecmp.cmp(source, target):
         return
-    try:
+    with refused(f"'{target.parent}' can't be made", "check its rights"):
         target.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StorageError(f"'{target.parent}' can't be made ({error.strerror or error}).") from error
     with replacing(target) as temporary:
         try:
             os.link(source, temporary)
@@ -231,12 +230,8 @@ def _beside(source: Path) -> Path:
     }
     names = (f"{saved.stem} images{f' {number}' if number > 1 else ''}" for number in count(1))
     target = next(one for one in (saved.parent / name / layout for name in names) if one not in theirs) / source.name
-    try:
+    with refused(f"'{target}' can't be written", "free some space or save the file elsewhere"):
         target.parent.mkdir(parents=True, exist_ok=True)
         for one in tiles_of(source) or [source]:
             shutil.copyfile(one, target.parent / one.name)
-    except OSError as error:
-        raise StorageError(
-            f"'{target}' can't be written ({error.strerror or error}); free some space or save the file elsewhere."
-        ) from error
     return target

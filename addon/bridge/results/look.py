@@ -16,8 +16,8 @@ import bpy
 
 from ...core.errors import BadInputError
 from ..data.images import RADIANCE
-from ..data.materials import mix_node
 from ..data.mesh_objects import ATLAS_UV
+from ..data.nodes import fresh_tree, mix_node
 from ..marks import OBJECT_ID, RESULT
 from .file import FITS, standings
 from .images import image
@@ -113,7 +113,6 @@ def set_look(scene: bpy.types.Scene, look: str) -> int:
 
     Parameters
     ----------
-    scene : bpy.types.Scene
     look : str
         One of `LOOKS`.
 
@@ -216,11 +215,8 @@ def _material(scene: bpy.types.Scene, look: str, folder: Path) -> bpy.types.Mate
     """The image as pure emission."""
     material = bpy.data.materials.new(f"{NAME}: {LOOKS[look].label}")
     material[MARK] = look
-    if material.node_tree is None:
-        # From 5.0 on every material has its tree and the switch is deprecated.
-        material.use_nodes = True
+    fresh_tree(material)
     tree = material.node_tree
-    tree.nodes.clear()
     output, shine = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new("ShaderNodeEmission")
     tree.links.new(shine.outputs[0], output.inputs["Surface"])
     strength = 1.0

@@ -73,10 +73,6 @@ def bringing(
     known : bool
         Only update a room that is there.
 
-    Returns
-    -------
-    Brought
-
     Raises
     ------
     MissingStageError
@@ -214,7 +210,6 @@ def link_room(top: bpy.types.Collection, scene: bpy.types.Scene, outside: bpy.ty
     ----------
     top : bpy.types.Collection
         The room's.
-    scene : bpy.types.Scene
     outside : bpy.types.Scene, optional
         Give `scene` the world and the exposure of this one, too.
     """

@@ -27,14 +27,9 @@ def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generat
 
     Parameters
     ----------
-    capture : Capture
     scene : bpy.types.Scene, optional
         Link it into this scene; by default it has one of its own. A room of the capture that the file has already
         stays as it is, and only comes into the scene.
-
-    Returns
-    -------
-    Brought
     """
     top = find_room(capture.root)
     if top is not None:

@@ -13,6 +13,7 @@ from pathlib import Path
 import bpy
 
 from ..corrections import corrections
+from ..data.arrays import layer_of, set_layer
 from ..data.camera_track import NO_FRAME
 from ..data.cameras import FRAME_INDEX
 from ..light import lamps as relight_lamps
@@ -20,7 +21,7 @@ from ..marks import CAPTURE, OBJECT_ID, RESULT, RUN
 from ..own_scene.capture import few
 from ..scene.as_made import NAME, PLACE, SHAPE, is_corrected, is_edited, is_ours, is_renamed, made_at
 from ..scene.parts import LAMPS, PART, ROOM, part_of
-from .atlas_transfer import atlas_onto, layer_values, set_layer
+from .atlas_transfer import atlas_onto
 
 KNOWN = "scan_relight_known"
 """Of a room's collection: all things that were brought, as JSON; one that is gone was deleted by the artist."""
@@ -195,7 +196,7 @@ def _dress(pair: Pair, meshes: dict, used: set, steps: Steps) -> None:
         atlas_onto(data, made_at(old) if PLACE in old else old.matrix_basis, new.data, made_at(new))
     elif pair.same_shape:
         for layer in new.data.uv_layers:
-            set_layer(data, layer_values(new.data, layer.name), layer.name)
+            set_layer(data, layer.name, layer_of(new.data, layer.name)).active_render = layer.active_render
     else:
         if data not in meshes:
             # The mesh of another duplicate stays another mesh.

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
-import numpy as np
 from mathutils import Matrix
 
+from ..data.arrays import faces_of, vertices_of
 from ..data.materials import MODEL
 from ..data.mesh_objects import ATLAS_UV, CAPTURE_UV
 from ..light import lamps, outside
@@ -65,14 +65,9 @@ def made_at(thing: bpy.types.Object) -> Matrix:
 
 def shape(data: bpy.types.Mesh) -> str:
     """Digest of a mesh's vertices and faces."""
-    places = np.empty(3 * len(data.vertices), np.float32)
-    data.vertices.foreach_get("co", places)
-    corners = np.empty(len(data.loops), np.int32)
-    data.loops.foreach_get("vertex_index", corners)
-    starts = np.empty(len(data.polygons), np.int32)
-    data.polygons.foreach_get("loop_start", starts)
+    starts, corners = faces_of(data)
     digest = hashlib.sha1(usedforsecurity=False)
-    for values in (places, corners, starts):
+    for values in (vertices_of(data), corners, starts[:-1]):
         digest.update(values.tobytes())
     return digest.hexdigest()
 

@@ -16,7 +16,6 @@ import bpy
 import numpy as np
 
 from ...core.brdf.material import ObjectMaterial, undescribed
-from ...core.errors import StorageError
 from ...core.results.room_file import run_of
 from ...core.scene.model import Capture
 from ..data.camera_track import make_track
@@ -27,6 +26,7 @@ from ..data.mesh_objects import is_open, make_objects
 from ..data.scene_data import Made
 from ..data.world import set_world
 from ..marks import OWN_SCENE, mark
+from ..refused import refused
 from .as_made import stamp, stamp_tree
 from .parts import CAMERAS, LAMPS, ROOM, hide_cameras, new_room, part_of, scene_name
 from .settings import EXPOSURE
@@ -81,8 +81,6 @@ def build_scene(
 
     Parameters
     ----------
-    scene : bpy.types.Scene
-    capture : Capture
     atlas_uv : (t, 3, 2) float32
         What `unwrap` gave.
     materials : iterable of ObjectMaterial
@@ -97,10 +95,6 @@ def build_scene(
         The mesh's normals face the frames: a lamp that is an open sheet then shines on that side only, as it was seen.
     parts : Parts, optional
         Images that the materials show instead of the room's one; that is there all the same.
-
-    Returns
-    -------
-    BuiltScene
 
     Raises
     ------
@@ -238,19 +232,16 @@ def _save_whole(path: Path, save: Callable[[str], None]) -> None:
     """Save beside `path` and put the whole file in its place."""
     writing = path.parent / _WRITING
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        writing.unlink(missing_ok=True)
-        save(str(writing))
-        if not is_whole(writing):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        writing.replace(path)
-    except (OSError, RuntimeError) as error:
+        with refused(f"{path} can't be saved", "free some space or choose another folder"):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            writing.unlink(missing_ok=True)
+            save(str(writing))
+            if not is_whole(writing):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            writing.replace(path)
+    finally:
         with suppress(OSError):
             writing.unlink(missing_ok=True)
-        reason = getattr(error, "strerror", None) or str(error).strip().removeprefix("Error: ").rstrip(".")
-        raise StorageError(
-            f"{path} can't be saved ({' '.join(reason.split())}); free some space or choose another folder."
-        ) from error
 
 
 def is_whole(path: Path) -> bool:

@@ -3,8 +3,8 @@
 import bpy
 import numpy as np
 
+from addon.bridge.data.arrays import make_mesh
 from addon.bridge.data.materials import make_material
-from addon.bridge.data.mesh_objects import mesh_data
 from addon.bridge.marks import OBJECT_ID
 from addon.core.brdf.emitter import EMITTER
 from addon.core.brdf.lambertian import LAMBERTIAN
@@ -16,7 +16,7 @@ def sheet(scene, name, size, place, rotation=(0, 0, 0), object_id=0, emission=No
     h = size / 2
     thing = bpy.data.objects.new(
         name,
-        mesh_data(name, np.array([[-h, -h, 0], [h, -h, 0], [h, h, 0], [-h, h, 0]]), np.array([[0, 1, 2], [0, 2, 3]])),
+        make_mesh(name, np.array([[-h, -h, 0], [h, -h, 0], [h, h, 0], [-h, h, 0]]), np.array([[0, 1, 2], [0, 2, 3]])),
     )
     model = LAMBERTIAN if emission is None else EMITTER
     material = make_material(ObjectMaterial(object_id, name, model, emission=emission), one_sided=one_sided)

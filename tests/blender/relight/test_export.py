@@ -11,9 +11,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from addon.bridge.data.arrays import make_mesh  # noqa: E402
 from addon.bridge.data.images import image_array, load_image  # noqa: E402
 from addon.bridge.data.materials import make_material  # noqa: E402
-from addon.bridge.data.mesh_objects import ATLAS_UV, PARTS_UV, mesh_data  # noqa: E402
+from addon.bridge.data.mesh_objects import ATLAS_UV, PARTS_UV  # noqa: E402
 from addon.bridge.data.world import set_world  # noqa: E402
 from addon.bridge.export import export as exporting  # noqa: E402
 from addon.bridge.light import lamps  # noqa: E402
@@ -52,7 +53,7 @@ def a_room(scene, folder, name):
     image = load_image(folder / f"{name}.exr", f"{name} base color")
     first = len(bpy.data.objects)
     for known in KNOWN:
-        mesh = mesh_data(known.name, np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]]), np.array([[0, 1, 2]]))
+        mesh = make_mesh(known.name, np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0]]), np.array([[0, 1, 2]]))
         mesh.uv_layers.new(name=ATLAS_UV).data.foreach_set("uv", UV.ravel())
         mesh.materials.append(make_material(known, image, one_sided=known.object_id == 5))
         thing = bpy.data.objects.new(known.name, mesh)
