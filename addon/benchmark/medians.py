@@ -9,11 +9,11 @@ import numpy as np
 
 from ..core.lit_diffuse.accumulate import frame_order
 from ..core.lit_diffuse.adaptive import Adaptive
+from ..core.lit_diffuse.batched import Batched
 from ..core.lit_diffuse.estimator import Estimator
 from ..core.lit_diffuse.exact import Exact
 from ..core.lit_diffuse.medians import make_estimator
 from ..core.settings import PAPER, Settings
-from .median_rivals import LogPSquare, TwoPasses
 from .run import Options
 from .sequences import SEQUENCES
 from .table import BASELINE, Curves, Table
@@ -44,10 +44,7 @@ RIVALS = {
     "mean": _named("mean", "capture"),
     PAPERS: _named(PAPER.median, "capture"),
     "P-square, shuffled": _named("p2", "shuffled"),
-    "P-square of logs, 15 exact, shuffled": Rival(LogPSquare, "shuffled"),
-    "two counting passes": Rival(TwoPasses, "capture"),
-    "batched, as filmed": _named("batched", "capture"),
-    "batched, shuffled": _named("batched", "shuffled"),
+    "summary, as filmed": Rival(Batched, "capture"),
     DEFAULT: _named(Settings().median, "shuffled"),
     "exact": _named("exact", "capture"),
 }
@@ -62,11 +59,8 @@ def run(options: Options) -> Iterator[Table]:
 def feed(rival: Rival, x: np.ndarray, seed: int) -> Estimator:
     """An estimator that has seen the observations `x` ((n, elements, 3)) in the rival's order."""
     estimator, every = rival.make(x.shape[1]), np.arange(x.shape[1], dtype=np.int32)
-    for second in range(1 + isinstance(estimator, TwoPasses)):
-        if second:
-            estimator.turn()
-        for frame in frame_order(len(x), seed) if rival.order == "shuffled" else range(len(x)):
-            estimator.add(every, x[frame])
+    for frame in frame_order(len(x), seed) if rival.order == "shuffled" else range(len(x)):
+        estimator.add(every, x[frame])
     return estimator
 
 
@@ -117,7 +111,6 @@ def _errors(options: Options) -> Table:
             "Where nothing shines, both are far below the noise.",
             "3 % noise; a video's highlights are in one stretch of the frames. 'shuffled' means a fixed pseudo-random "
             "order of the frames.",
-            "Two counting passes need every frame twice.",
         ),
         Curves("sequence", "alternative", "observations", "RMS log error"),
     )  # fmt: skip

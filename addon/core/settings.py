@@ -31,9 +31,9 @@ class Settings:
         Put frames right that lie beside what all of them show together. Good poses stay as they are, and so do cameras
         in your own scene.
     median : str
-        'adaptive' (exact for short videos, batched beyond), 'batched' (exact for a spot's first 20 observations, close
-        beyond, in fixed memory), 'exact' (all observations go to disk), 'p2' (as in the paper: P-square over all
-        observations, in the order of the video) or 'mean'.
+        'adaptive' (exact for short videos; beyond, exact for a spot's first 20 observations and close from then on),
+        'exact' (all observations go to disk), 'p2' (as in the paper: P-square over all observations, in the order of
+        the video) or 'mean'.
     sharpen : bool
         Put back onto the lit diffuse texture what its blur took from it and the frames still show; one more look at
         every frame.
@@ -92,7 +92,7 @@ class Settings:
 
     CHOICES = {
         "atlas": (ROOM, "object", "udim"),
-        "median": ("adaptive", "batched", "exact", "p2", "mean"),
+        "median": ("adaptive", "exact", "p2", "mean"),
         "shading": ("aimed", "uniform"),
         "specular": ("frames", "target"),
     }

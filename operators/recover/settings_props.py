@@ -70,6 +70,8 @@ FROM_STAGE = bpy.props.EnumProperty(
         *((name, LABELS[name], f"From '{LABELS[name]}' on") for name in RUN_STAGES),
     ],
 )
+SAVED_AS = {"median": (0, 2, 3, 4)}
+"""Numbers by which saved files know choices, where some have gone: 1 was 'batched'."""
 PACKAGES = ("scipy", "embreex", "OpenEXR")
 
 
@@ -77,7 +79,8 @@ def property_for(info: SettingInfo):
     """The Blender property that holds one setting."""
     name, text, choices = words(info)
     if info.choices:
-        items = [(choice, *choices[choice]) for choice in info.choices]
+        numbers = SAVED_AS.get(info.name, range(len(info.choices)))
+        items = [(choice, *choices[choice], number) for choice, number in zip(info.choices, numbers)]
         return bpy.props.EnumProperty(name=name, description=text, items=items, default=info.default)
     make = {bool: bpy.props.BoolProperty, int: bpy.props.IntProperty, float: bpy.props.FloatProperty}[info.kind]
     extra = {} if info.kind is bool else {"min": 0}
@@ -94,8 +97,11 @@ def with_settings(operator):
 
 
 def setting_value(owner, info: SettingInfo):
-    """What `owner` has chosen. Blender keeps floats in single precision; six digits are what was typed."""
+    """What `owner` has chosen; of a choice that has gone, the default. Blender keeps floats in single precision; six
+    digits are what was typed."""
     value = getattr(owner, info.name)
+    if info.choices:
+        return value or info.default
     return float(f"{value:.6g}") if info.kind is float else value
 
 

@@ -74,9 +74,9 @@ def accumulate(
     read : callable
         Gives a frame's pixels.
     median : str
-        'adaptive', 'batched', 'exact', 'p2' or 'mean'; see `medians`.
+        'adaptive', 'exact', 'p2' or 'mean'; see `medians`.
     folder : Path, optional
-        Where the exact median keeps observations meanwhile.
+        Where the exact median, and at first the adaptive one, keeps observations meanwhile.
     edge_tier : bool
         Observations at depth edges count only where there are too few others.
     only : (n,) bool, optional

@@ -49,7 +49,6 @@ PASSES = (
         pose_refinement="Puts frames right that lie beside what all of them show together.",
         sharpening="Takes the projection's blur out of the lit diffuse texture.",
         edge_tier="Uses observations at depth edges only where there are too few others.",
-        exact_median="Takes the exact median for as long as the observations are few.",
     ),
     *_of(
         "shading",

@@ -139,9 +139,8 @@ def lit_diffuse(
     where, threads = (surface.mesh, surface.atlas, surface.scene, frames, read), settings.threads
     if "lit_diffuse" in settings.published:
         return running_lit_diffuse(*where, threads=threads, also=also, progress=progress)
-    median = "batched" if settings.median == "adaptive" and "exact-median" in settings.without else settings.median
     return accumulate(
-        *where, median=median, edge_tier="edge-tier" not in settings.without, seed=settings.seed, threads=threads,
+        *where, median=settings.median, edge_tier="edge-tier" not in settings.without, seed=settings.seed, threads=threads,
         folder=folder, also=also, progress=progress,
     )  # fmt: skip
 

@@ -72,9 +72,11 @@ class Result:
 
     @property
     def settings(self) -> Settings:
-        """The settings that the result was made with."""
-        known = {field.name for field in dataclasses.fields(Settings)}
-        return Settings(**{name: value for name, value in self.report["settings"].items() if name in known})
+        """The settings that the result was made with; what is no longer offered is at its default."""
+        told = self.report["settings"]
+        known = {field.name for field in dataclasses.fields(Settings)} & told.keys()
+        offered = {name for name in known if told[name] in Settings.CHOICES.get(name, (told[name],))}
+        return Settings(**{name: told[name] for name in offered})
 
     @property
     def given(self) -> dict[int, dict]:

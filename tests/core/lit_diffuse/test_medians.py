@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.lit_diffuse.batched import KNOTS, SLOTS, knot_ranks
-from addon.core.lit_diffuse.medians import Adaptive, Batched, Exact, Mean, PSquare, make_estimator
+from addon.core.lit_diffuse.batched import KNOTS, SLOTS, Batched, knot_ranks
+from addon.core.lit_diffuse.medians import Adaptive, Exact, Mean, PSquare, make_estimator
 from addon.core.lit_diffuse.sorting import comparators, sort_planes
 
 ARTICLE = [0.02, 0.15, 0.74, 3.39, 0.83, 22.37, 10.15, 15.43, 38.62, 15.92,
@@ -85,7 +85,7 @@ def test_exact_takes_zeros_of_either_sign():
     assert one_by_one(Exact(1), [-0.0, -0.0, 1.0]).median[0, 0] == 0
 
 
-@pytest.mark.parametrize("name", ["adaptive", "batched", "exact", "p2", "mean"])
+@pytest.mark.parametrize("name", ["adaptive", "exact", "p2", "mean"])
 def test_nothing_added_gives_nothing(name):
     result = make_estimator(name, 3).result()
     assert result.count.tolist() == [0, 0, 0] and np.isnan(result.median).all()
@@ -188,18 +188,16 @@ def test_mean_and_deviation():
     assert np.isnan(result.median[4]).all() and result.count.tolist() == [50] * 4 + [0]
 
 
-def held_bytes(estimator) -> int:
-    """Bytes of all arrays that an estimator's attributes hold."""
-
-    def size(value) -> int:
-        if isinstance(value, np.ndarray):
-            return value.nbytes
-        return sum(map(size, value)) if isinstance(value, (list, tuple)) else 0
-
-    return sum(size(value) for value in vars(estimator).values())
+def held_bytes(value) -> int:
+    """Bytes of all arrays that an estimator, or what it has handed over to, holds."""
+    if isinstance(value, np.ndarray):
+        return value.nbytes
+    if isinstance(value, (Adaptive, Exact, Batched, PSquare, Mean)):
+        value = list(vars(value).values())
+    return sum(map(held_bytes, value)) if isinstance(value, (list, tuple)) else 0
 
 
-@pytest.mark.parametrize("name", ["batched", "exact", "p2", "mean"])
+@pytest.mark.parametrize("name", ["adaptive", "exact", "p2", "mean"])
 def test_memory_does_not_grow_with_the_observations(name, monkeypatch, tmp_path):
     monkeypatch.setattr(Exact, "HELD", 1000)
     estimator, every = make_estimator(name, 100, tmp_path), np.arange(100, dtype=np.int32)
@@ -208,10 +206,7 @@ def test_memory_does_not_grow_with_the_observations(name, monkeypatch, tmp_path)
         estimator.add(every, np.ones((100, 3), np.float32))
         sizes.append(held_bytes(estimator))
     assert max(sizes[100:]) <= max(sizes[:100]) + 100 * 16 * 20  # of Exact some words for each flush
-    if name != "exact":
-        assert len(set(sizes)) == 1
-    else:
-        assert max(sizes) < 1.5 * 1000 * 16
+    assert max(sizes) < (1.5 * 1000 * 16 if name == "exact" else 248 * 100)
     assert estimator.result().count.tolist() == [200] * 100
 
 
@@ -252,10 +247,6 @@ def test_batched_is_the_exact_median_while_observations_fit():
     assert found.count.tolist() == counts.tolist()
     for name in ("lower", "median", "upper"):
         assert np.array_equal(getattr(found, name)[few], getattr(wanted, name)[few], equal_nan=True), name
-
-
-def test_batched_holds_its_bytes():
-    assert sum(a.nbytes for a in vars(Batched(1000)).values() if isinstance(a, np.ndarray)) <= 2 * 124 * 1000
 
 
 @pytest.mark.parametrize("share", [0.2, 0.4])
