@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from addon.core.passes.unseen_light import unseen_light
+from addon.core.passes.unseen_light.params import UNSEEN
 from tests.core.on_disk import OnDisk
 
 
 @pytest.fixture
 def few_samples(monkeypatch):
     """The search for lamps looks at fewer elements than it would in a real room."""
-    monkeypatch.setattr(unseen_light, "SAMPLES", 1500)
+    monkeypatch.setattr(unseen_light, "UNSEEN", replace(UNSEEN, samples=1500))
 
 
 @pytest.fixture(scope="module")

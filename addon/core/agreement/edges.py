@@ -10,13 +10,8 @@ from scipy.ndimage import maximum_filter
 
 from ..scene.model import Camera, Mesh
 from ..scene.rays import RayScene
+from .params import AGREEMENT
 from .views import SmallView
-
-JUMP = 0.05
-"""Relative step in distance that counts as an edge."""
-BEND = 0.85
-"""Cosine between two neighbouring pixels' normals below which there is an edge."""
-LEAST_EDGES = 50
 
 
 class Shown(NamedTuple):
@@ -46,9 +41,9 @@ def shown(camera: Camera, mesh: Mesh, normal: np.ndarray, scene: RayScene) -> Sh
         both = hit[own] & hit[other]
         near, far = (f(distance[own], distance[other]) for f in (np.minimum, np.maximum))
         with np.errstate(invalid="ignore"):
-            step = far > (1 + JUMP) * near
+            step = far > (1 + AGREEMENT.jump) * near
         # a triangle's normal has no side: scans are wound as it happens
-        bent = np.abs((facing[own] * facing[other]).sum(-1)) < BEND
+        bent = np.abs((facing[own] * facing[other]).sum(-1)) < AGREEMENT.bend
         edge[own] |= (both & bent) | step | (hit[own] != hit[other])
     return Shown(triangle, distance, edge)
 
@@ -72,6 +67,6 @@ def edge_score(views: Sequence[SmallView], seen: Sequence[Shown]) -> float:
         at.append(rank[one.edge & known])
         off.append(rank[~one.edge & known])
     a, b = np.concatenate(at or [np.zeros(0)]), np.sort(np.concatenate(off or [np.zeros(0)]))
-    if len(a) < LEAST_EDGES or len(b) < LEAST_EDGES:
+    if len(a) < AGREEMENT.least_edges or len(b) < AGREEMENT.least_edges:
         return float("nan")
     return float(np.searchsorted(b, a).mean() / len(b))

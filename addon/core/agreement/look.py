@@ -13,25 +13,9 @@ from ..scene.model import Capture, Frame, Pixels
 from ..scene.rays import RayScene
 from .edges import Shown, edge_score, shown
 from .misalignment import misalignments
+from .params import AGREEMENT
 from .photometric import consistency
 from .views import SmallView, small_views
-
-AGREE = 0.755
-"""Quality from which on the poses are taken as right. Over nine rooms: right 0.78 to 0.91, wrong up to 0.73."""
-BETTER = 0.08
-"""By how much another convention has to be better."""
-LEAST_HIT = 0.05
-"""Share of rays that meet the mesh, below which nothing can be said for a convention."""
-COARSE = 6
-"""Views that all candidates are tried on: pairs of views grow with the square of their number."""
-FINALISTS = 6
-"""Candidates of which all views and the edges are looked at."""
-PLAUSIBLE = 5.0
-"""A scale is tried if it spreads the cameras over a third of the mesh, within this factor."""
-TIE = 0.01
-UPRIGHT = 0.7
-"""Mean cosine from which on an axis is taken as the one that points up."""
-LEAST_VIEWS = 2
 
 
 @dataclass(frozen=True)
@@ -58,7 +42,7 @@ class Fit:
     def quality(self) -> float:
         """Mean of what is known of `colour` and `edge`; 0 where nothing is."""
         known = [value for value in (self.colour, self.edge) if np.isfinite(value)]
-        return float(np.mean(known)) if known and self.hit >= LEAST_HIT else 0.0
+        return float(np.mean(known)) if known and self.hit >= AGREEMENT.least_hit else 0.0
 
 
 @dataclass(frozen=True)
@@ -87,7 +71,7 @@ class Agreement:
     @property
     def fits(self) -> bool:
         """Whether the poses, as read, fit the mesh."""
-        return self.best is None and self.as_read.quality >= AGREE
+        return self.best is None and self.as_read.quality >= AGREEMENT.agree
 
     @property
     def unknown(self) -> bool:
@@ -172,13 +156,13 @@ def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True)
     )
     seen = scene.shown(Convention())
     plain = replace(scene.colour(Convention()), edge=edge_score(scene.views, seen))
-    if plain.quality >= AGREE:
+    if plain.quality >= AGREEMENT.agree:
         moved = misalignments(scene.views, [v.camera for v in scene.views], seen, scene.rays)
         return Agreement(plain, None, moved, False, _up(scene.views, Convention()))
-    if not search or len(scene.views) < LEAST_VIEWS:
+    if not search or len(scene.views) < AGREEMENT.least_views:
         return Agreement(plain, None, np.zeros(0), False, _up(scene.views, Convention()))
     best = _search(scene)
-    if best is not None and best.quality < max(AGREE, plain.quality + BETTER):
+    if best is not None and best.quality < max(AGREEMENT.agree, plain.quality + AGREEMENT.better):
         best = None
     chosen = Convention() if best is None else best.convention
     return Agreement(plain, best, np.zeros(0), True, _up(scene.views, chosen))
@@ -190,20 +174,22 @@ def _up(views: Sequence[SmallView], convention: Convention) -> str:
         return "+z"
     mean = np.mean([camera.camera_to_world[:3, 1] for camera in convention.cameras([v.camera for v in views])], 0)
     axis = int(np.abs(mean).argmax())
-    return "" if abs(mean[axis]) < UPRIGHT else ("+" if mean[axis] > 0 else "-") + "xyz"[axis]
+    return "" if abs(mean[axis]) < AGREEMENT.upright else ("+" if mean[axis] > 0 else "-") + "xyz"[axis]
 
 
 def _search(scene: _Scene) -> Fit | None:
     """The convention that fits best: colours first, edges for the best few, the simplest among equals."""
     best: Fit | None = None
     for scale in (1.0, *_likely(scene)):
-        every = max(1, len(scene.views) // COARSE)
+        every = max(1, len(scene.views) // AGREEMENT.coarse)
         found = [scene.colour(replace(one, scale=scale), every) for one in alternatives()]
-        found = sorted((fit for fit in found if fit.quality > 0), key=lambda fit: -fit.quality)[:FINALISTS]
+        found = sorted((fit for fit in found if fit.quality > 0), key=lambda fit: -fit.quality)[: AGREEMENT.finalists]
         for fit in (scene.whole(scene.colour(fit.convention)) for fit in found):
-            if best is None or fit.quality > best.quality + TIE * np.sign(fit.convention.parts - best.convention.parts):
+            if best is None or fit.quality > best.quality + AGREEMENT.tie * np.sign(
+                fit.convention.parts - best.convention.parts
+            ):
                 best = fit
-        if best is not None and best.quality >= AGREE:
+        if best is not None and best.quality >= AGREEMENT.agree:
             break
     return best
 
@@ -214,4 +200,4 @@ def _likely(scene: _Scene) -> list[float]:
     extent = float(np.ptp(scene.capture.mesh.vertices[scene.capture.mesh.triangles.ravel()], axis=0).max())
     spread = max(float(np.ptp(centres, axis=0).max()), 1e-9)
     off = {scale: abs(np.log(scale * spread / (extent / 3))) for scale in SCALES}
-    return sorted((scale for scale in SCALES if off[scale] < np.log(PLAUSIBLE)), key=off.__getitem__)
+    return sorted((scale for scale in SCALES if off[scale] < np.log(AGREEMENT.plausible)), key=off.__getitem__)

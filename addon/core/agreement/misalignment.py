@@ -9,19 +9,8 @@ import numpy as np
 from ..scene.model import Camera
 from ..scene.rays import RayScene
 from .edges import Shown
+from .params import MISALIGNMENT
 from .views import SmallView, sees
-
-OTHERS = 6
-"""Views whose median is taken as what a spot looks like."""
-LEAST_VIEWS = 2
-ROUNDS = 12
-LARGEST = 4.0
-"""Pixels of the small view; a shift beyond is not found by following gradients."""
-LEAST_SPOTS = 100
-LEAST_TEXTURE = 1e-3
-"""Mean square gradient below which a shift in that direction can't be seen."""
-TUNING, LEAST_RESIDUAL = 3.0, 0.02
-"""Residuals beyond so many times their median, or this if that is more, count as highlights or occlusion."""
 
 
 def predicted(index: int, views: Sequence[SmallView], cameras: Sequence[Camera], seen: Sequence[Shown],
@@ -32,12 +21,12 @@ def predicted(index: int, views: Sequence[SmallView], cameras: Sequence[Camera],
     at = np.flatnonzero((own.triangle >= 0).ravel())
     points = camera.centre + own.distance.ravel()[at, None].astype(np.float64) * directions[at]
     way = [np.linalg.norm(eye.centre - camera.centre) for eye in cameras]
-    nearest = [j for j in np.argsort(way, kind="stable") if j != index][:OTHERS]
+    nearest = [j for j in np.argsort(way, kind="stable") if j != index][: MISALIGNMENT.others]
     said = np.full((len(nearest), len(at)), np.nan, np.float32)
     for row, j in enumerate(nearest):
         inside, pixels = sees(cameras[j], points, scene, margin=1)
         said[row, inside] = bilinear(views[j].log.mean(-1), pixels - 0.5)
-    enough = np.isfinite(said).sum(0) >= LEAST_VIEWS
+    enough = np.isfinite(said).sum(0) >= MISALIGNMENT.least_views
     image = np.full(camera.height * camera.width, np.nan, np.float32)
     image[at[enough]] = np.nanmedian(said[:, enough], 0)
     return image.reshape(camera.height, camera.width)
@@ -60,19 +49,19 @@ def shift(image: np.ndarray, reference: np.ndarray) -> np.ndarray | None:
     dy, dx = np.gradient(reference)
     slope = np.stack([dx.ravel(), dy.ravel()], 1)
     moved = np.zeros(2)
-    for _ in range(ROUNDS):
+    for _ in range(MISALIGNMENT.rounds):
         off = bilinear(image, grid + moved) - reference.ravel()
         good = np.isfinite(off) & np.isfinite(slope).all(1)
-        if good.sum() < LEAST_SPOTS:
+        if good.sum() < MISALIGNMENT.least_spots:
             return None
         J, r = slope[good], off[good] - np.median(off[good])
-        scale = max(float(np.median(np.abs(r))), LEAST_RESIDUAL) * TUNING
+        scale = max(float(np.median(np.abs(r))), MISALIGNMENT.least_residual) * MISALIGNMENT.tuning
         weight = np.minimum(1, scale / np.maximum(np.abs(r), 1e-12))
         A = J.T @ (weight[:, None] * J)
-        if np.linalg.eigvalsh(A)[0] < LEAST_TEXTURE * good.sum():
+        if np.linalg.eigvalsh(A)[0] < MISALIGNMENT.least_texture * good.sum():
             return None
         moved -= np.linalg.solve(A, J.T @ (weight * r))
-        if np.abs(moved).max() > LARGEST:
+        if np.abs(moved).max() > MISALIGNMENT.largest:
             return None
     return moved
 

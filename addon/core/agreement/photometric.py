@@ -9,12 +9,8 @@ import numpy as np
 
 from ..scene.model import Camera
 from ..scene.rays import RayScene
+from .params import AGREEMENT
 from .views import SmallView, sees
-
-GRID = 20
-"""Rays along an edge of each view."""
-LEAST_PAIRS = 200
-"""Fewer pairs of observations say nothing."""
 
 
 class Consistency(NamedTuple):
@@ -46,7 +42,9 @@ def consistency(views: Sequence[SmallView], cameras: Sequence[Camera], scene: Ra
     rng = np.random.default_rng(seed)
     near, far, hits, rays = [], [], 0, 0
     for i, (view, camera) in enumerate(zip(views, cameras, strict=True)):
-        x, y = (np.unique(np.linspace(0, n - 1, GRID).round().astype(int)) for n in (camera.width, camera.height))
+        x, y = (
+            np.unique(np.linspace(0, n - 1, AGREEMENT.grid).round().astype(int)) for n in (camera.width, camera.height)
+        )
         column, row = (a.ravel() for a in np.meshgrid(x, y))
         directions = camera.directions(np.stack([column + 0.5, row + 0.5], -1))
         found = scene.intersect(np.broadcast_to(np.float32(camera.centre), directions.shape), directions)
@@ -68,7 +66,7 @@ def consistency(views: Sequence[SmallView], cameras: Sequence[Camera], scene: Ra
                 near.append(np.abs(own[inside] - theirs).mean(1))
                 far.append(np.abs(own[inside] - theirs[rng.permutation(len(inside))]).mean(1))
     pairs = sum(map(len, near))
-    if pairs < LEAST_PAIRS:
+    if pairs < AGREEMENT.least_pairs:
         return Consistency(float("nan"), hits / max(rays, 1), pairs)
     a, b = np.concatenate(near), np.concatenate(far)
     return Consistency(float((a < b).mean() + (a == b).mean() / 2), hits / max(rays, 1), pairs)

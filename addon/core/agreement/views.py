@@ -10,11 +10,7 @@ import numpy as np
 from ..errors import BadInputError
 from ..scene.model import Camera, Frame, Pixels
 from ..scene.rays import RayScene
-
-COUNT = 16
-"""Frames that are looked at, spread evenly."""
-WIDTH = 160
-"""About so many pixels across are enough to tell a wrong convention, and cheap."""
+from .params import AGREEMENT
 
 
 @dataclass(frozen=True)
@@ -38,7 +34,9 @@ class SmallView:
     step: int
 
 
-def small_views(frames: Sequence[Frame], read: Callable[[Frame], Pixels], count: int = COUNT) -> list[SmallView]:
+def small_views(
+    frames: Sequence[Frame], read: Callable[[Frame], Pixels], count: int = AGREEMENT.count
+) -> list[SmallView]:
     """`count` of the frames, evenly spread; those that can't be read are left out."""
     chosen = np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int)) if frames else ()
     views = []
@@ -47,7 +45,7 @@ def small_views(frames: Sequence[Frame], read: Callable[[Frame], Pixels], count:
             pixels = read(frame)
         except BadInputError:  # it will be told of where frames are read for good
             continue
-        step = max(1, round(frame.camera.width / WIDTH))
+        step = max(1, round(frame.camera.width / AGREEMENT.width))
         camera = frame.camera.coarser(step)
         views.append(SmallView(frame.name, camera, _small(pixels, step), step))
     return views

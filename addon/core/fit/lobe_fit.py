@@ -19,15 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..brdf.model import Constraints
+from .params import LOBE_FIT
 from .problem import DenseProblem, Problem
 
-HUBER = 2.0
-"""Residuals beyond this many (robust) standard deviations weigh less: misregistration, edges, texture."""
-ROUNDS = 3
-KAPPAS = (0.0, 0.15, 0.3, 0.45, 0.6)
-LEAST_SIGNAL = 0.1
-"""Share of <A, A> that must be left once the noise's is taken out; where less is, psi rests on nothing, and is only
-prevented from growing without bound."""
 FREE = Constraints()
 
 
@@ -91,7 +85,7 @@ def solve(
     *,
     psi: np.ndarray | None = None,
     constraints: Constraints = FREE,
-    rounds: int = ROUNDS,
+    rounds: int = LOBE_FIT.rounds,
 ) -> Solution:
     """psi, robust cost and residuals for some phi, or one phi and several kappa: iteratively reweighted least squares.
 
@@ -141,12 +135,12 @@ def solve(
                     # errors of one element's channels and views go together: they count once
                     sure = 3 * dense.views * (scale / prior.sigma) ** 2
                     up, down, clean = up + sure * prior.psi, down + sure, clean + sure
-                values = np.clip(up / np.maximum(np.maximum(clean, LEAST_SIGNAL * down), 1e-30), least_psi, 1)
+                values = np.clip(up / np.maximum(np.maximum(clean, LOBE_FIT.least_signal * down), 1e-30), least_psi, 1)
             each = values[:, :, None, None]
             rest = R - each * A
             rest -= ((SR - values[..., None] * SA) / below)[:, :, None] * t
         size = np.sqrt(np.einsum("chvg,chvg->hvg", rest, rest) / 3) * dense.inflate
-        weight = dense.there * np.minimum(1, HUBER * scale / np.maximum(size, 1e-12))
+        weight = dense.there * np.minimum(1, LOBE_FIT.huber * scale / np.maximum(size, 1e-12))
     cost = huber(size, scale)
     if lobe is not None:
         noise = (each * (each * lobe.AA + 2 * lobe.AB) + lobe.BB).sum(0)
@@ -162,7 +156,7 @@ def solve(
 def huber(size: np.ndarray, scale: float) -> np.ndarray:
     """Huber cost of residual sizes, in units of scale^2."""
     x = size / scale
-    return np.where(x <= HUBER, x * x / 2, HUBER * (x - HUBER / 2))
+    return np.where(x <= LOBE_FIT.huber, x * x / 2, LOBE_FIT.huber * (x - LOBE_FIT.huber / 2))
 
 
 def robust_scale(size: np.ndarray) -> float:
@@ -185,7 +179,7 @@ def fit_lobe(
     """
     dense = problem if isinstance(problem, DenseProblem) else DenseProblem(problem)
     solved = functools.partial(solve, dense, constraints=constraints, psi=psi)
-    kappas = KAPPAS if "grazing" not in dense.without else (0.0,)
+    kappas = LOBE_FIT.kappas if "grazing" not in dense.without else (0.0,)
     flat = solve(dense, None, kappas, 1.0).size
     scale = robust_scale(dense.seen(flat[0]))
     kappa = kappas[len(kappas) // 2]

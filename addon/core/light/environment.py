@@ -9,10 +9,8 @@ from scipy import ndimage
 
 from ..scene.model import Pixels
 from ..scene.visibility import FrameView
+from .params import SKY
 
-MAX_HEIGHT = 512
-PROFILE, STEEPEST = 3.0, 3.0
-"""Degrees over which the sky's change with the height is smoothed, and how far it may go either way."""
 NEAR = np.radians(8)
 """Angle over which what was seen of the sky says something of its surroundings."""
 
@@ -115,9 +113,9 @@ class Environment:
             return np.ones(height, np.float32)
         level = [np.median(self.radiance[row, known[row]].mean(1)) for row in rows]
         profile = np.interp(np.arange(height), rows, level)
-        profile = ndimage.gaussian_filter1d(profile, np.radians(PROFILE) / np.pi * height, mode="nearest")
+        profile = ndimage.gaussian_filter1d(profile, np.radians(SKY.profile) / np.pi * height, mode="nearest")
         middle = max(float(np.median(profile[rows])), 1e-12)
-        return np.clip(profile / middle, 1 / STEEPEST, STEEPEST).astype(np.float32)
+        return np.clip(profile / middle, 1 / SKY.steepest, SKY.steepest).astype(np.float32)
 
     def clipped_zone(self) -> Zone:
         """The directions of which only a lower bound is known."""
@@ -190,12 +188,12 @@ class EnvironmentAccumulator:
     Parameters
     ----------
     pixel_angle : float
-        Radians that one pixel of the frames covers; sets the map's resolution (at most `MAX_HEIGHT` rows).
+        Radians that one pixel of the frames covers; sets the map's resolution (at most `max_height` rows).
     """
 
     def __init__(self, pixel_angle: float):
         wanted = np.pi / max(pixel_angle, 1e-6)
-        self._height = int(min(MAX_HEIGHT, 2 ** np.round(np.log2(max(wanted, 16)))))
+        self._height = int(min(SKY.max_height, 2 ** np.round(np.log2(max(wanted, 16)))))
         cells = 2 * self._height**2
         self._sum = np.zeros((cells, 3))
         self._count = np.zeros(cells, np.int64)

@@ -6,19 +6,14 @@ import numpy as np
 
 from ..luminance import LUMINANCE
 from ..parallel import for_blocks
-from .emitters import BRIGHT, bright_triangles
+from .emitters import bright_triangles
 from .environment import Environment
 from .field import LightField
 from .irradiance import direct, gather
-from .lamps import EMITTER_ALBEDO
+from .params import GATHER, LIGHT_FIT
 from .portals import find_portals
 from .sun import sunlight
 
-LEAST = 30
-"""Elements with which a solution can be tried."""
-LAMP_ELEMENTS = 500
-"""Of an unseen object, at which what it could reflect is looked at."""
-RAYS, EMITTER_RAYS, PORTAL_RAYS = 256, 64, 64
 ELEMENTS_AT_ONCE = 1 << 10
 
 
@@ -39,7 +34,7 @@ def steady(field: LightField, good: np.ndarray, flat: np.ndarray) -> np.ndarray:
     """The good elements, (n,) bool: of an object with enough on flat spots, those."""
     object_id = field.atlas.object_id
     count = np.bincount(object_id, good & flat)
-    return good & (flat | (count < LEAST)[object_id])
+    return good & (flat | (count < LIGHT_FIT.least)[object_id])
 
 
 def barely_seen(field: LightField, good: np.ndarray) -> np.ndarray:
@@ -49,7 +44,7 @@ def barely_seen(field: LightField, good: np.ndarray) -> np.ndarray:
     """
     luminance, atlas = field.radiance @ LUMINANCE, field.atlas
     seen = (luminance > 0) & ~np.isin(atlas.object_id, atlas.object_id[good])
-    level = BRIGHT * float((luminance * atlas.area).sum() / max(atlas.area.sum(), 1e-30))
+    level = GATHER.bright * float((luminance * atlas.area).sum() / max(atlas.area.sum(), 1e-30))
     objects = np.unique(atlas.object_id[seen])
     bright = [i for i in objects if np.median(luminance[seen & (atlas.object_id == i)]) > level]
     return seen & np.isin(atlas.object_id, bright)
@@ -74,8 +69,10 @@ def irradiance_at(field: LightField, element: np.ndarray, seed: int) -> np.ndarr
 
     def run(part: slice) -> None:
         p, n, own = position[part], normal[part], seed + part.start
-        around, _, _ = gather(field, bright, p, n, RAYS, EMITTER_RAYS, own, portals, PORTAL_RAYS)
-        E[part] = around + direct(field, bright, p, n, RAYS, EMITTER_RAYS, own + 1)[0]
+        around, _, _ = gather(
+            field, bright, p, n, LIGHT_FIT.rays, LIGHT_FIT.emitter_rays, own, portals, LIGHT_FIT.portal_rays
+        )
+        E[part] = around + direct(field, bright, p, n, LIGHT_FIT.rays, LIGHT_FIT.emitter_rays, own + 1)[0]
 
     for_blocks(run, len(element), ELEMENTS_AT_ONCE, 0)
     return E + from_sun(field, element)
@@ -98,5 +95,5 @@ def thrown_by_object(field: LightField, element: np.ndarray, object_id: int, see
 
 def most_reflected(field: LightField, object_id: int, seed: int) -> float:
     """Luminance that an object would send out at an albedo of `EMITTER_ALBEDO`, in the median over its elements."""
-    own = pick(field, field.atlas.object_id == object_id, seed, LAMP_ELEMENTS)
-    return EMITTER_ALBEDO / np.pi * float(np.median(irradiance_at(field, own, seed) @ LUMINANCE))
+    own = pick(field, field.atlas.object_id == object_id, seed, LIGHT_FIT.lamp_elements)
+    return LIGHT_FIT.emitter_albedo / np.pi * float(np.median(irradiance_at(field, own, seed) @ LUMINANCE))

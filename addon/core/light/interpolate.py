@@ -2,7 +2,7 @@
 
 The gathered part of E varies slowly: a value at x_i holds out to a share of the harmonic mean distance R_i of what
 surrounds it. The error made at (x, n) is bounded by e_i = |x - x_i| / R_i + sqrt(1 - n . n_i). Points are laid out
-coarse to fine: every element whose bound is above `ALLOWED` asks for a new one nearby, half as far apart as before.
+coarse to fine: every element whose bound is above `allowed` asks for a new one nearby, half as far apart as before.
 """
 
 from __future__ import annotations
@@ -14,18 +14,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..parallel import for_blocks
+from .params import GATHER
 
-ALLOWED = 0.2
-"""Error bound (Ward's epsilon) under which an element is interpolated."""
-REACH = 2 * ALLOWED
+REACH = 2 * GATHER.allowed
 """Error bound at which a point's weight has fallen to 0."""
-CONTRAST = 0.15
-"""Mean relative deviation between an element's neighbours up to which it is interpolated."""
-NEIGHBOURS = 8
-TURN = 1.5
-COARSEST = 0.01
-"""First spacing, as a share of the elements' extent (root of the bounding box's largest face). Starting coarser saves
-little and misses what is small: from 0.15 the living room's mean error was 0.094, from 0.01 it is 0.08."""
 BLOCK = 1 << 15
 
 
@@ -60,7 +52,7 @@ def _bound(points: _Points, index: np.ndarray, position: np.ndarray, normal: np.
     away = points.position[index] - position[:, None]
     distance = np.sqrt(np.einsum("nkj,nkj->nk", away, away))
     turned = np.maximum(1 - np.einsum("nkj,nj->nk", points.normal[index], normal), 0)
-    return distance / np.minimum(points.radius[index], 2 * spacing / ALLOWED) + np.sqrt(turned)
+    return distance / np.minimum(points.radius[index], 2 * spacing / GATHER.allowed) + np.sqrt(turned)
 
 
 def interpolated(
@@ -90,7 +82,7 @@ def interpolated(
         Mean relative deviation between the points around each element: how far its value may be off.
     """
     extent = np.sort(np.ptp(position, axis=0))
-    spacing = max(COARSEST * float(np.sqrt(extent[1] * extent[2])), finest)
+    spacing = max(GATHER.coarsest * float(np.sqrt(extent[1] * extent[2])), finest)
     todo = np.arange(len(position))
     chosen = np.zeros(0, np.int64)
     points: _Points | None = None
@@ -100,7 +92,7 @@ def interpolated(
         new = todo[_one_per_cell(position[todo], normal[todo], spacing)]
         value, radius = evaluate(new)
         # A lone close hit must not ask for endless points.
-        radius = np.maximum(radius, finest / ALLOWED)
+        radius = np.maximum(radius, finest / GATHER.allowed)
         batch = _Points(position[new], normal[new], value, radius)
         names = ("position", "normal", "value", "radius")
         points = batch if points is None else _Points(
@@ -134,14 +126,14 @@ def _spread(
     Done level by level: where the points are this dense, the nearest few surround an element on all sides.
     """
     # Distance in place and in orientation as one space: a turn by 40 degrees counts like one spacing.
-    tree = cKDTree(np.concatenate([points.position / spacing, points.normal * TURN], 1))
-    k = min(NEIGHBOURS, len(points.radius))
+    tree = cKDTree(np.concatenate([points.position / spacing, points.normal * GATHER.turn], 1))
+    k = min(GATHER.neighbours, len(points.radius))
     covered = np.zeros(len(todo), bool)
 
     def fill(part: slice) -> None:
         at = todo[part]
         p, n = position[at], normal[at]
-        _, index = tree.query(np.concatenate([p / spacing, n * TURN], 1), k=k)
+        _, index = tree.query(np.concatenate([p / spacing, n * GATHER.turn], 1), k=k)
         index = index.reshape(len(p), k)
         bound = _bound(points, index, p, n, spacing)
         weight = np.maximum(1 - bound / REACH, 0) ** 2
@@ -155,7 +147,7 @@ def _spread(
         level = near[..., :3].mean(2)
         mean = np.einsum("nk,nk->n", weight, level)
         contrast[at] = np.einsum("nk,nk->n", weight, np.abs(level - mean[:, None])) / np.maximum(mean, 1e-20)
-        covered[part] = (bound.min(1) <= ALLOWED) & (contrast[at] <= CONTRAST)
+        covered[part] = (bound.min(1) <= GATHER.allowed) & (contrast[at] <= GATHER.contrast)
 
     for_blocks(fill, len(todo), BLOCK, threads)
     return covered

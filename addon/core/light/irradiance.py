@@ -14,12 +14,10 @@ from .directions import PATTERNS, cosine_patterns, shifted, sobol, turned
 from .emitters import BrightTriangles, aimed_at, sample_bright
 from .field import LightField
 from .over_mirrors import direct_over_mirrors
+from .params import GATHER
 from .portals import Portals
 
 RAYS_AT_ONCE = 1 << 16
-BOTH_HALVES = 0.75
-"""Two halves of well-spread rays are better together than two that know nothing of each other (living room: the
-halves' difference is 1.35 times the scatter over seeds)."""
 
 
 def gather(
@@ -152,7 +150,7 @@ def direct(
         Radiance * steradian.
     noise : (n,) float32
         Its standard error, mean of the channels: how far the first half of the rays is from the second, less
-        `BOTH_HALVES`. One place's own says little.
+        `both_halves`. One place's own says little.
     """
     total, noise = np.zeros((len(position), 3), np.float32), np.zeros(len(position), np.float32)
     if not len(bright) or not emitter_rays:
@@ -192,5 +190,5 @@ def direct(
         shown = light[pattern]
         total[part] = np.matmul(weight[:, None], shown)[:, 0]
         weight[:, emitter_rays // 2 :] *= -1
-        noise[part] = BOTH_HALVES * np.abs(np.matmul(weight[:, None], shown)[:, 0]).mean(1)
+        noise[part] = GATHER.both_halves * np.abs(np.matmul(weight[:, None], shown)[:, 0]).mean(1)
     return total, noise

@@ -8,12 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..luminance import LUMINANCE
-
-EMITTER_ALBEDO = 2.0
-"""An object whose median albedo would have to be above this gives light of its own. 1 is the physical bound; the rest
-is room for missing light and for noise."""
-AGREES = 0.25
-"""Luminances that lie this near each other (relative) count as the same."""
+from .params import LIGHT_FIT
 
 
 @dataclass(frozen=True)
@@ -64,7 +59,7 @@ class Lamp:
 
 
 def find_seen(object_id: np.ndarray, radiance: np.ndarray, irradiance: np.ndarray) -> list[Lamp]:
-    """Objects whose albedo pi L_d / E would have to be above `EMITTER_ALBEDO`.
+    """Objects whose albedo pi L_d / E would have to be above `emitter_albedo`.
 
     Parameters
     ----------
@@ -77,7 +72,7 @@ def find_seen(object_id: np.ndarray, radiance: np.ndarray, irradiance: np.ndarra
     lamps = []
     for one in np.unique(object_id):
         own = object_id == one
-        if np.median(np.pi * luminance[own] / np.maximum(received[own], 1e-12)) > EMITTER_ALBEDO:
+        if np.median(np.pi * luminance[own] / np.maximum(received[own], 1e-12)) > LIGHT_FIT.emitter_albedo:
             lamps.append(Lamp(int(one), np.median(radiance[own], 0), True))
     return lamps
 
@@ -86,6 +81,6 @@ def twin(object_id: int, luminance: float, class_of: dict[int, str], seen: list[
     """A seen lamp of the object's class with about the luminance that was solved for the object."""
     for other in seen:
         if class_of.get(other.object_id) == class_of.get(object_id):
-            if abs(luminance / float(other.radiance @ LUMINANCE) - 1) < AGREES:
+            if abs(luminance / float(other.radiance @ LUMINANCE) - 1) < LIGHT_FIT.agrees:
                 return other
     return None

@@ -9,17 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-CELL = 0.12
-"""Metres."""
-GRIDS = 3
-LEAST = 12
-"""Elements in a cell below which nothing is taken out."""
-TURNED = 4
-"""Steps in which the normal's components are told apart."""
+from .params import LESS_NOISE
 
 
 def less_noise(
-    position: np.ndarray, normal: np.ndarray, light: np.ndarray, noise: np.ndarray, size: float = CELL
+    position: np.ndarray, normal: np.ndarray, light: np.ndarray, noise: np.ndarray, size: float = LESS_NOISE.cell
 ) -> tuple[np.ndarray, np.ndarray]:
     """Light with less noise, and how noisy it was around each place.
 
@@ -45,21 +39,23 @@ def less_noise(
         Root mean square over the cells around.
     """
     result, around = np.zeros_like(light), np.zeros(len(light))
-    for k in range(GRIDS):
-        group, count = cells(position, normal, k / GRIDS, size)
+    for k in range(LESS_NOISE.grids):
+        group, count = cells(position, normal, k / LESS_NOISE.grids, size)
         fitted = _planes(position, light, group, count, size)
         rest = (light - fitted).mean(1)
         n2, v = (np.bincount(group, x.astype(np.float64) ** 2, len(count)) / count for x in (noise, rest))
-        keep = np.where(count >= LEAST, np.maximum(v - n2, 0) / np.maximum(v, 1e-30), 1)
+        keep = np.where(count >= LESS_NOISE.least, np.maximum(v - n2, 0) / np.maximum(v, 1e-30), 1)
         result += fitted + keep[group, None].astype(np.float32) * (light - fitted)
         around += n2[group]
-    return (result / np.float32(GRIDS)), np.sqrt(around / GRIDS).astype(np.float32)
+    return (result / np.float32(LESS_NOISE.grids)), np.sqrt(around / LESS_NOISE.grids).astype(np.float32)
 
 
-def cells(position: np.ndarray, normal: np.ndarray, shift: float, size: float = CELL) -> tuple[np.ndarray, np.ndarray]:
+def cells(
+    position: np.ndarray, normal: np.ndarray, shift: float, size: float = LESS_NOISE.cell
+) -> tuple[np.ndarray, np.ndarray]:
     """Cell of each element, by place and by the way that it faces, (m,) int; and the elements in each."""
     place = np.floor(position / size + shift).astype(np.int64)
-    facing = np.round(normal * TURNED / 2).astype(np.int64) + TURNED
+    facing = np.round(normal * LESS_NOISE.turned / 2).astype(np.int64) + LESS_NOISE.turned
     key = np.zeros(len(position), np.int64)
     for part in (*place.T, *facing.T):
         part = part - part.min(initial=0)

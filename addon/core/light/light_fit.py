@@ -13,40 +13,18 @@ import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
 from ..scene.atlas import Atlas
-
-COARSE = 1.0
-"""The cap under which a light is looked for: far from the solution, everything deviates."""
-CAP = 0.5
-"""The cap under which all is refined. Texture, highlights and shadows of small things deviate by more than light does
-and draw a solution down under the coarse cap (two clipped lamps of 26.2 in the living room: 19 and 22 under 1). Of
-0.07, 0.12, 0.25 and 0.5, tried on that room alone with both lamps scaled in steps of 15 %, only 0.5 had its least at
-the truth both with and without a perturbed mesh; with it, the smaller ones had theirs above."""
-CLIPPED_CAP = 0.25
-"""The same where lamps are clipped, and objects of one paint tell of them together (`kinds_of`): two lamps of four
-perturbed living rooms, eight runs, came to .964 +- .024 of their true luminance under 0.5, .982 +- .017 under 0.35,
-.994 +- .012 under 0.25, 1.004 +- .013 under 0.18 and 1.009 +- .015 under 0.12."""
-FLAT_CELL = 0.08
-"""Edge in metres of the cells in which normals must agree."""
-FLAT = 0.99
-"""Least length of a cell's mean normal (8 degrees). E of a bumpy spot is uncertain, and more so that from a small
-light: as an error of the regressor it draws the light's radiance down. The same two lamps, mesh off by 5 mm, under a
-cap of 1: 10 and 15 with all elements, 21 and 22 with those on flat spots."""
-ALIKE, SAME_COLOUR = 0.25, 0.1
-"""Log albedo, of all channels together and apart, by which objects of one class may differ to be of one kind. Lamps
-that are off by a tenth part objects under them from others under the sky by up to .1."""
-REACH = 3.0
-"""The refined radiance stays within this factor of where it started."""
+from .params import LIGHT_FIT
 
 
 def on_flat(atlas: Atlas) -> np.ndarray:
     """Elements around which the normals of their object agree, (n,) bool."""
-    cell = np.floor(atlas.position / FLAT_CELL).astype(np.int64)
+    cell = np.floor(atlas.position / LIGHT_FIT.flat_cell).astype(np.int64)
     cell -= cell.min(0, initial=0)
     extent = cell.max(0, initial=0) + 1
     key = ((cell[:, 0] * extent[1] + cell[:, 1]) * extent[2] + cell[:, 2]) * (int(atlas.object_id.max(initial=0)) + 1)
     _, group, count = np.unique(key + atlas.object_id, return_inverse=True, return_counts=True)
     total = np.stack([np.bincount(group, atlas.normal[:, k], len(count)) for k in range(3)], 1)
-    return (np.linalg.norm(total, axis=1) >= FLAT * count)[group]
+    return (np.linalg.norm(total, axis=1) >= LIGHT_FIT.flat * count)[group]
 
 
 class _Grouping:
@@ -81,8 +59,8 @@ def kinds_of(object_id: np.ndarray, log_albedo: np.ndarray, class_of: dict[int, 
     Returns
     -------
     (m,) int64
-        The same for elements of objects whose albedo is within `ALIKE` of their class's median, and its colour within
-        `SAME_COLOUR`; else the object's own.
+        The same for elements of objects whose albedo is within `alike` of their class's median, and its colour within
+        `same_colour`; else the object's own.
     """
     ids, group = np.unique(object_id, return_inverse=True)
     median = np.stack([np.median(log_albedo[group == k], 0) for k in range(len(ids))])
@@ -93,8 +71,8 @@ def kinds_of(object_id: np.ndarray, log_albedo: np.ndarray, class_of: dict[int, 
     for name in classes if len(classes) > 1 else ():
         own = np.flatnonzero(names == name)
         off = median[own] - np.median(median[own], 0)
-        alike = np.abs(off.mean(1)) < ALIKE
-        alike &= (np.abs(off - off.mean(1, keepdims=True)) < SAME_COLOUR).all(1)
+        alike = np.abs(off.mean(1)) < LIGHT_FIT.alike
+        alike &= (np.abs(off - off.mean(1, keepdims=True)) < LIGHT_FIT.same_colour).all(1)
         if alike.sum() > 1:
             kind[own[alike]] = kind[own[alike][0]]
     return kind[group]
@@ -126,7 +104,7 @@ class Sample:
     received: np.ndarray
     most: float = np.inf
     kind: np.ndarray | None = None
-    cap: float = CAP
+    cap: float = LIGHT_FIT.cap
 
     def __post_init__(self):
         _, self.group = np.unique(self.object_id, return_inverse=True)
@@ -135,7 +113,7 @@ class Sample:
         if self.kind is not None:
             self._groupings.append(_Grouping(np.unique(self.kind, return_inverse=True)[1], self._weight))
 
-    def spread(self, log_albedo: np.ndarray, cap: float = COARSE) -> float:
+    def spread(self, log_albedo: np.ndarray, cap: float = LIGHT_FIT.coarse) -> float:
         """Mean absolute deviation of log albedo ((m,)) from its object's median, each held at `cap`; with kinds, the
         mean of that and of the same from its kind's median.
         """
@@ -179,7 +157,7 @@ class Sample:
         start, least, most : (k,) float
         """
         sent = np.log(np.maximum(sent, 1e-9))
-        least, most = np.maximum(least, start / REACH), np.minimum(most, start * REACH)
+        least, most = np.maximum(least, start / LIGHT_FIT.reach), np.minimum(most, start * LIGHT_FIT.reach)
         bounds = np.log(np.stack([np.minimum(least, most), most], 1))
 
         def cost(x: np.ndarray) -> float:

@@ -23,9 +23,8 @@ from ..progress import Progress
 from ..scene.tangent_frame import tangent_frame
 from .emitters import BrightTriangles, aimed_density, sample_bright
 from .field import LightField
+from .params import GATHER
 
-PROPOSALS = (0.015, 0.06, 0.2, 0.6)
-"""Widths (phi) of the lobes that rays are drawn from."""
 GRID = np.array(
     [0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15, 0.2, 0.26, 0.33, 0.41, 0.5, 0.6, 0.72, 0.85, 1], np.float32
 )
@@ -85,7 +84,7 @@ def reflected_light(
     *,
     rays: int,
     grid: np.ndarray = GRID,
-    proposals: Sequence[float] = PROPOSALS,
+    proposals: Sequence[float] = GATHER.proposals,
     microfacets: Microfacets = ggx.GGX,
     threads: int = 0,
     seed: int = 0,

@@ -8,10 +8,9 @@ from .directions import shifted, sobol
 from .emitters import BrightTriangles, sample_bright
 from .field import LightField
 from .mirrors import reflect
+from .params import GATHER
 
 RAYS_AT_ONCE = 1 << 16
-FEWER = 4
-"""What comes by a mirror is little of the light: so many times fewer rays are aimed at it."""
 
 
 def direct_over_mirrors(
@@ -32,7 +31,7 @@ def direct_over_mirrors(
     total = np.zeros((len(position), 3), np.float32)
     if not len(bright) or not emitter_rays:
         return total
-    emitter_rays = max(emitter_rays // FEWER, 1)
+    emitter_rays = max(emitter_rays // GATHER.mirror_fewer, 1)
     step = max(RAYS_AT_ONCE // emitter_rays, 1)
     pattern = sobol(emitter_rays, seed, 3)
     for mirror in field.mirrors:

@@ -15,20 +15,15 @@ from .field import LightField
 from .interpolate import interpolated
 from .irradiance import direct, gather
 from .less_noise import less_noise
+from .params import GATHER
 from .portals import find_portals
 from .sun import Sun, sunlight
 from .texel_blocks import TexelBlocks
 
 ELEMENTS_AT_ONCE = 1 << 13
-FINEST_SHARE = 0.005
-"""Least distance of two gathering points, and edge of the texel blocks, as a share of the room; a texel where that is
-larger. Finer texels then cost look-ups, and rays only where the lamps' light changes; coarse ones are not interpolated
-over (texels of 4 cm in 2 by 2 blocks: relative RMSE 0.15 instead of 0.05)."""
-SMOOTH = 0.05
-"""Relative deviation of the lamps' light between a block's corners up to which it is interpolated."""
 
 
-def finest_spacing(atlas: Atlas, share: float = FINEST_SHARE) -> float:
+def finest_spacing(atlas: Atlas, share: float = GATHER.finest_share) -> float:
     """Least distance of two gathering points, metres."""
     extent = np.sort(np.ptp(atlas.position, axis=0))
     return max(atlas.texel_edge, share * float(np.sqrt(extent[1] * extent[2])))
@@ -157,14 +152,14 @@ def irradiance(
     total, escaped, contrast = value[:, :3].copy(), value[:, 3].copy(), value[:, 4]
     noise = np.zeros(len(total), np.float32)
     if lamp_rays:
-        lamps = blocks.evaluate(aim, step, SMOOTH, total.mean(1))
+        lamps = blocks.evaluate(aim, step, GATHER.smooth, total.mean(1))
         shown, noise = lamps[:, :3], lamps[:, 3]
         if smooth:
             shown, noise = less_noise(position, normal, shown, noise)
         total += shown
     unsure = np.hypot(contrast * value[:, :3].mean(1), noise)
     if field.sun is not None:
-        shone = blocks.evaluate(functools.partial(shine, field.sun), step, SMOOTH, total.mean(1))
+        shone = blocks.evaluate(functools.partial(shine, field.sun), step, GATHER.smooth, total.mean(1))
         total += shone[:, :3]
         unsure = np.hypot(unsure, shone[:, 3])
     return total, escaped, points, unsure / np.maximum(total.mean(1), 1e-20)

@@ -14,12 +14,7 @@ from ..luminance import LUMINANCE
 from ..scene.tangent_frame import to_world
 from .directions import cosine_hemisphere, shifted, sobol
 from .field import LightField
-
-CELLS = 24
-"""Cells along either axis of each of the box's six sides."""
-PILOT_POINTS, PILOT_RAYS = 4096, 64
-LEAST_ESCAPED = 16
-"""Of the pilot's rays; fewer lit ones are no opening worth aiming at."""
+from .params import GATHER
 
 
 @dataclass(frozen=True)
@@ -74,15 +69,15 @@ class Portals:
         n, k, _ = square.shape
         strata = (np.arange(k, dtype=np.float32) + rng.random((n, k), np.float32)) / np.float32(k)
         pick = self.cell[np.minimum(np.searchsorted(np.cumsum(self.chance), strata.ravel()), len(self) - 1)]
-        side, row, column = pick // CELLS**2, pick // CELLS % CELLS, pick % CELLS
+        side, row, column = pick // GATHER.cells**2, pick // GATHER.cells % GATHER.cells, pick % GATHER.cells
         flat = square.reshape(-1, 2)
         axis = side // 2
         first, second = (axis + 1) % 3, (axis + 2) % 3
         at = np.arange(len(pick))
         point = np.empty((len(pick), 3), np.float32)
         point[at, axis] = side % 2
-        point[at, first] = (row + flat[:, 0]) / CELLS
-        point[at, second] = (column + flat[:, 1]) / CELLS
+        point[at, first] = (row + flat[:, 0]) / GATHER.cells
+        point[at, second] = (column + flat[:, 1]) / GATHER.cells
         way = self.low + point * self.size - np.repeat(origins, k, 0)
         distance = np.sqrt(np.einsum("ij,ij->i", way, way))
         directions = way / np.maximum(distance, 1e-12)[:, None]
@@ -102,10 +97,10 @@ def _exits(
     distance = way[at, axis]
     point = (origins + distance[:, None] * directions - low) / size
     first, second = (axis + 1) % 3, (axis + 2) % 3
-    row = np.clip((point[at, first] * CELLS).astype(np.int64), 0, CELLS - 1)
-    column = np.clip((point[at, second] * CELLS).astype(np.int64), 0, CELLS - 1)
+    row = np.clip((point[at, first] * GATHER.cells).astype(np.int64), 0, GATHER.cells - 1)
+    column = np.clip((point[at, second] * GATHER.cells).astype(np.int64), 0, GATHER.cells - 1)
     side = 2 * axis + (directions[at, axis] > 0)
-    return (side * CELLS + row) * CELLS + column, distance, along[at, axis]
+    return (side * GATHER.cells + row) * GATHER.cells + column, distance, along[at, axis]
 
 
 def find_portals(field: LightField, seed: int = 0) -> Portals | None:
@@ -119,25 +114,27 @@ def find_portals(field: LightField, seed: int = 0) -> Portals | None:
     atlas = field.atlas
     rng = np.random.default_rng(seed)
     weight = np.cumsum(atlas.area.astype(np.float64))
-    start = np.searchsorted(weight, (np.arange(PILOT_POINTS) + rng.random(PILOT_POINTS)) / PILOT_POINTS * weight[-1])
+    start = np.searchsorted(
+        weight, (np.arange(GATHER.pilot_points) + rng.random(GATHER.pilot_points)) / GATHER.pilot_points * weight[-1]
+    )
     start = np.minimum(start, len(atlas) - 1)
     normal = atlas.normal[start]
-    local = cosine_hemisphere(shifted(sobol(PILOT_RAYS, seed), PILOT_POINTS, rng))
+    local = cosine_hemisphere(shifted(sobol(GATHER.pilot_rays, seed), GATHER.pilot_points, rng))
     directions = to_world(local, normal).reshape(-1, 3)
-    origins = np.repeat(field.scene.off_surface(atlas.position[start], normal), PILOT_RAYS, 0)
+    origins = np.repeat(field.scene.off_surface(atlas.position[start], normal), GATHER.pilot_rays, 0)
     out = np.flatnonzero(field.scene.intersect(origins, directions).triangle < 0)
     light = field.environment(directions[out]) @ LUMINANCE
     out, light = out[light > 0], light[light > 0]
-    if len(out) < LEAST_ESCAPED:
+    if len(out) < GATHER.least_escaped:
         return None
     margin = np.float32(2 * field.scene.offset)
     corners = field.mesh.vertices
     low = corners.min(0).astype(np.float32) - margin
     size = corners.max(0).astype(np.float32) + margin - low
     cell, _, _ = _exits(low, size, origins[out], directions[out])
-    chance = np.bincount(cell, light.astype(np.float64), 6 * CELLS**2)
-    side = np.repeat(np.arange(3), 2 * CELLS**2)
-    area = (size[(side + 1) % 3] * size[(side + 2) % 3] / CELLS**2).astype(np.float32)
+    chance = np.bincount(cell, light.astype(np.float64), 6 * GATHER.cells**2)
+    side = np.repeat(np.arange(3), 2 * GATHER.cells**2)
+    area = (size[(side + 1) % 3] * size[(side + 2) % 3] / GATHER.cells**2).astype(np.float32)
     found = np.flatnonzero(chance > 0)
     chance = chance / chance.sum()
     return Portals(low, size, found, chance[found], (chance / area).astype(np.float32))

@@ -16,20 +16,14 @@ from ..scene.rays import RayScene
 from ..scene.tangent_frame import tangent_frame
 from .directions import shifted, sobol
 from .environment import Environment
+from .params import SKY
 
 RADIUS = float(np.radians(0.27))
 """Of the sun's disc, as it is seen from the earth."""
 EDGE = float(np.radians(0.3))
 """A shadow's edge is told no better than this: the direction that was solved for, the poses, the mesh."""
-SHADOW_RAYS = 16
-ABOVE = 30.0
-"""How often brighter than the sky around it a seen sun must be."""
 WIDE, RING = float(np.radians(2.5)), float(np.radians(7.0))
 """It and its glare fit into a disc of the first radius; what lies on to the second is the sky around it."""
-LEAST_SHARE = 0.02
-"""Of the irradiance by all the sky: less is left in the map."""
-WRITTEN_ROWS = 512
-"""Least height of a map that a sun is put into: a texel of 0.35 degrees."""
 
 
 @dataclass(frozen=True)
@@ -99,15 +93,15 @@ def shadow(
     if len(facing):
         count = len(facing)
         rng = np.random.default_rng([seed, 2])
-        points = shifted(sobol(SHADOW_RAYS, seed, 4), min(64, count), rng)[rng.integers(0, min(64, count), count)]
+        points = shifted(sobol(SKY.shadow_rays, seed, 4), min(64, count), rng)[rng.integers(0, min(64, count), count)]
         way = around(sun.direction, _disc(points[..., :2], float(np.hypot(sun.radius, EDGE))))
         across, up = tangent_frame(normal[facing])
         off = np.float32(edge) * (points[..., 2:] - np.float32(0.5))
         start = scene.off_surface(position[facing], normal[facing])[:, None]
         start = start + off[..., :1] * across[:, None] + off[..., 1:] * up[:, None]
-        far = np.full(count * SHADOW_RAYS, np.inf, np.float32)
+        far = np.full(count * SKY.shadow_rays, np.inf, np.float32)
         hidden = scene.occluded(start.reshape(-1, 3), way.reshape(-1, 3), far)
-        visible[facing] = 1 - hidden.reshape(count, SHADOW_RAYS).mean(1)
+        visible[facing] = 1 - hidden.reshape(count, SKY.shadow_rays).mean(1)
     return cosine * visible, cosine * np.sqrt(visible * (1 - visible))
 
 
@@ -133,8 +127,8 @@ def _directions(height: int) -> tuple[np.ndarray, np.ndarray]:
 def taken_out(environment: Environment) -> tuple[Environment, Sun | None]:
     """The map without the sun that frames saw in it, and that sun.
 
-    It is what lies within `WIDE` of the middle of the brightest seen texels, if it is more than `ABOVE` times over the
-    sky around (the median from there to `RING`), nothing else in the map is, and it gives `LEAST_SHARE` of the light.
+    It is what lies within `WIDE` of the middle of the brightest seen texels, if it is more than `above` times over the
+    sky around (the median from there to `RING`), nothing else in the map is, and it gives `least_share` of the light.
     A clipped sun is none that was seen: its light is solved for.
     """
     luminance = environment.radiance @ LUMINANCE
@@ -153,14 +147,14 @@ def taken_out(environment: Environment) -> tuple[Environment, Sun | None]:
     if not beside.any():
         return environment, None
     sky = np.median(environment.radiance[beside], 0)
-    level = ABOVE * max(float(sky @ LUMINANCE), 1e-12)
+    level = SKY.above * max(float(sky @ LUMINANCE), 1e-12)
     bright = (luminance > level) & (environment.observations > 0)
     if not bright[near & seen].any() or (bright & ~near).any() or (bright & environment.clipped).any():
         return environment, None
     own = near & (luminance > 2 * float(sky @ LUMINANCE))
     flux = ((environment.radiance - sky) * solid[..., None])[own].sum(0)
     whole = float((luminance * solid).sum() / 4)  # a quarter: the mean over all ways that a surface may face
-    if float(flux @ LUMINANCE) / 4 < LEAST_SHARE * whole:
+    if float(flux @ LUMINANCE) / 4 < SKY.least_share * whole:
         return environment, None
     middle = (way * (luminance * solid * own)[..., None]).sum((0, 1))
     direction = (middle / np.linalg.norm(middle)).astype(np.float32)
@@ -170,14 +164,14 @@ def taken_out(environment: Environment) -> tuple[Environment, Sun | None]:
 
 
 def put_in(environment: Environment, sun: Sun | None) -> np.ndarray:
-    """Radiance of the map with the sun in it, (h, 2h, 3) float32; of at least `WRITTEN_ROWS` where there is one.
+    """Radiance of the map with the sun in it, (h, 2h, 3) float32; of at least `written_rows` where there is one.
 
     Points of its disc are shared out bilinearly between texel centres: who looks the map up bilinearly sees the sun at
     its place, and the irradiance is exact.
     """
     if sun is None:
         return environment.radiance
-    times = max(-(-WRITTEN_ROWS // len(environment.radiance)), 1)
+    times = max(-(-SKY.written_rows // len(environment.radiance)), 1)
     radiance = environment.radiance.repeat(times, 0).repeat(times, 1).astype(np.float64)
     height, width = radiance.shape[:2]
     way = around(sun.direction, _disc(sobol(256, 0), sun.radius)).astype(np.float64)

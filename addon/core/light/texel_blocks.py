@@ -13,13 +13,10 @@ import numpy as np
 
 from ..parallel import for_blocks
 from ..scene.atlas import Atlas
+from .params import GATHER
 
 BENT = np.cos(np.radians(15.0))
 """A texel turned further than this against a corner of its block is not served by it."""
-OFF_PLACE = 0.15
-"""How far a texel may lie from where its block's corners put it, as a share of the block's edge."""
-STRETCH = 3.0
-"""A block this many times larger on the surface than its texels should be spans a gap."""
 BLOCK = 1 << 16
 
 
@@ -61,7 +58,9 @@ class TexelBlocks:
         across = place[:, 3] - place[:, 0]
         edge = np.sqrt(np.einsum("kj,kj->k", across, across) / 2)
         off = np.einsum("kc,kcj->kj", weight, place) - self._position[index]
-        right = (np.einsum("kj,kj->k", off, off) <= (OFF_PLACE * edge) ** 2) & (edge <= STRETCH * step * self._edge)
+        right = (np.einsum("kj,kj->k", off, off) <= (GATHER.off_place * edge) ** 2) & (
+            edge <= GATHER.stretch * step * self._edge
+        )
         return index[right], corner[right], weight[right]
 
     def evaluate(

@@ -24,21 +24,11 @@ from ..passes.albedo.albedo import MEASURED, Albedo, albedo_of
 from ..passes.albedo.albedo import NONE as NO_ALBEDO
 from ..results.overrides import Overrides
 from ..scene.atlas import Atlas
+from .params import CORRECTED
 from .published import light as published_light
 from .stages import Stages
 
-ROUNDS = 4
-"""Albedo is clamped at 1 and shrunk towards its neighbours, so its mean follows E but roughly."""
-SPOTS = 600
 RAYS: RayCounts = {"rays": 64, "emitter_rays": 32, "portal_rays": 32}
-LEAST_LIGHT = 0.1
-"""Less than this of its light no lamp is left."""
-DOUBTFUL = 1.5
-"""A white that scales E by more than this, or its inverse, is more likely not that white."""
-DARK = 0.02
-"""Texture is kept as variation about its mean; below this a channel has none that could be told from noise."""
-COAT_F0, COAT_ROUGHNESS = 0.04, 0.5
-"""A plausible coat: what dielectrics of n = 1.5 reflect; satin where the room has no dielectric to learn from."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +167,7 @@ def white_scale(run: Corrected) -> WhiteScale | None:
     name = next(i.name for i in run.capture.instances if i.object_id == white.object_id)
     before, scale = run.irradiance_found, ones
     others = {i.object_id for i in run.capture.instances} - {white.object_id}
-    for _ in range(ROUNDS):
+    for _ in range(CORRECTED.rounds):
         albedo = run.albedo_under(before * scale, run.specular().specular, others)
         own = (atlas.object_id == white.object_id) & (albedo.origin == MEASURED)
         mean = np.average(albedo.rho[own], 0, atlas.area[own]) if own.any() else np.zeros(3)
@@ -186,9 +176,9 @@ def white_scale(run: Corrected) -> WhiteScale | None:
             return WhiteScale(ones, ones, told)
         scale = (scale * mean / np.asarray(white.albedo)).astype(np.float32)
     direct = _direct_share(run)
-    light = np.maximum(1 + (scale - 1) / direct, LEAST_LIGHT).astype(np.float32)
+    light = np.maximum(1 + (scale - 1) / direct, CORRECTED.least_light).astype(np.float32)
     warning = ""
-    if scale.max() > DOUBTFUL or scale.min() < 1 / DOUBTFUL:
+    if scale.max() > CORRECTED.doubtful or scale.min() < 1 / CORRECTED.doubtful:
         told = ", ".join(f"{one:.2f}" for one in scale)
         warning = f"The white of {name} scales the light by {told} (red, green, blue); that is much: is it that white?"
     return WhiteScale(scale, light, warning)
@@ -197,7 +187,7 @@ def white_scale(run: Corrected) -> WhiteScale | None:
 def _direct_share(run: Corrected) -> np.ndarray:
     """Share of E, (3,), that comes from lamps, sky and sun, over what was seen of the room."""
     field, seen = run.field, run.lit_diffuse().seen
-    chosen, _ = spots(field.atlas, seen, SPOTS, run.settings.seed)
+    chosen, _ = spots(field.atlas, seen, CORRECTED.spots, run.settings.seed)
     chosen = chosen[seen[chosen]]
     lamps = np.isin(field.atlas.object_id, [lamp.object_id for lamp in run.shading().lamps])
     direct = field.with_light(np.where(lamps[:, None], field.radiance, np.float32(0)))
@@ -229,9 +219,9 @@ def _coloured(rho: np.ndarray, told: np.ndarray, area: np.ndarray, colour: np.nd
     """Albedo (k, 3) brought to a mean `colour` over the elements `told`; flat where there is nothing to bring."""
     if not told.any():
         return np.broadcast_to(colour, rho.shape)
-    for _ in range(ROUNDS):  # what is clamped at 1 lowers the mean
+    for _ in range(CORRECTED.rounds):  # what is clamped at 1 lowers the mean
         mean = np.average(rho[told], 0, area[told])
-        rho = np.where(mean < DARK, colour, np.minimum(rho * (colour / np.maximum(mean, DARK)), 1))
+        rho = np.where(mean < CORRECTED.dark, colour, np.minimum(rho * (colour / np.maximum(mean, CORRECTED.dark)), 1))
     return rho.astype(np.float32)
 
 
@@ -267,8 +257,8 @@ def coated(materials: list[ObjectMaterial], albedo: Albedo, atlas: Atlas) -> lis
         plain = not m.model.has_lobe and m.model.has_albedo and not m.scores
         if plain and m.class_name not in matt and m.given.keys() <= {"base_color"}:
             own = atlas.object_id == m.object_id
-            roughness = float(np.median(rough.get(m.class_name) or everywhere or [COAT_ROUGHNESS]))
-            if own.any() and np.median(albedo.rho[own], 0).min() > layer_reflectance(COAT_F0, roughness**2):
-                m = replace(m, coat={"f0": COAT_F0, "roughness": roughness})
+            roughness = float(np.median(rough.get(m.class_name) or everywhere or [CORRECTED.coat_roughness]))
+            if own.any() and np.median(albedo.rho[own], 0).min() > layer_reflectance(CORRECTED.coat_f0, roughness**2):
+                m = replace(m, coat={"f0": CORRECTED.coat_f0, "roughness": roughness})
         result.append(m)
     return result

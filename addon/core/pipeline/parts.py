@@ -16,7 +16,8 @@ import numpy as np
 from ..json_values import key
 from ..parallel import ordered_map
 from ..passes.albedo.albedo import MEASURED
-from ..passes.sharpening.sharpen import FLOOR, MOST, sharpened
+from ..passes.sharpening.params import SHARPENING
+from ..passes.sharpening.sharpen import sharpened
 from ..progress import Rounds
 from ..scene.atlas import Atlas
 from ..scene.elements import ElementLookup, make_atlas
@@ -28,20 +29,9 @@ from ..scene.surface import Surface
 from ..scene.visibility import CLEAN
 from .corrected import Corrected
 from .frames import lit_diffuse
+from .params import PARTS
 
-FINEST = 4.0
-"""Times that an object's texels may be finer than the room's."""
-WORTH = 1.2
-"""Finer by less than this is not worth another look at the frames."""
-MOST_TEXELS = 25_000_000
-"""Of all parts together: one and a half times an atlas of 4096. Memory, a few gigabytes for this, ends there."""
-PIXEL_STEP = 8
-HALF = 0.5
-"""Of what lies around a spot on the room's atlas, this share has to be measured for detail to be told there."""
 STAGE = "detail"
-LOOKED = 0.3
-"""Share of the writing that the look at the frames takes."""
-NO_LIMIT = 1 << 30
 FOLDER = "objects"
 TILE = "base_color.<UDIM>.exr"
 
@@ -96,7 +86,10 @@ def footprints(surface: Surface, cameras: list[Camera]) -> dict[int, float]:
     """Edge in metres of the surface that a pixel covers, by object: the lower quartile over all views of it."""
     found: dict[int, list[np.ndarray]] = {}
     for camera in cameras:
-        y, x = np.mgrid[PIXEL_STEP // 2 : camera.height : PIXEL_STEP, PIXEL_STEP // 2 : camera.width : PIXEL_STEP]
+        y, x = np.mgrid[
+            PARTS.pixel_step // 2 : camera.height : PARTS.pixel_step,
+            PARTS.pixel_step // 2 : camera.width : PARTS.pixel_step,
+        ]
         pixels = np.stack([x.ravel() + 0.5, y.ravel() + 0.5], -1)
         directions, led = camera.rays(pixels)
         pixels, directions = pixels[led], directions[led]
@@ -122,12 +115,12 @@ def scales(run: Corrected) -> dict[int, float]:
         number: s.texel_size or edge / s.detail
         for number, edge in footprints(surface, [frame.camera for frame in run.frames]).items()
     }
-    finer = {number: float(np.clip(surface.texel_size / texel, 1, FINEST)) for number, texel in wanted.items()}
-    finer = {number: scale for number, scale in finer.items() if scale > WORTH}
+    finer = {number: float(np.clip(surface.texel_size / texel, 1, PARTS.finest)) for number, texel in wanted.items()}
+    finer = {number: scale for number, scale in finer.items() if scale > PARTS.worth}
     taken = np.bincount(surface.atlas.object_id) / max(len(surface.atlas), 1) * surface.atlas.size**2
-    while finer and taken.sum() + sum((scale**2 - 1) * taken[i] for i, scale in finer.items()) > MOST_TEXELS:
+    while finer and taken.sum() + sum((scale**2 - 1) * taken[i] for i, scale in finer.items()) > PARTS.most_texels:
         finer = {number: max(0.95 * scale, 1.0) for number, scale in finer.items()}
-    return {number: scale for number, scale in finer.items() if scale > WORTH}
+    return {number: scale for number, scale in finer.items() if scale > PARTS.worth}
 
 
 def look_closer(run: Corrected) -> Parting:
@@ -156,7 +149,7 @@ def look_closer(run: Corrected) -> Parting:
     # Their islands alone, on a sheet of their own: the time that this takes is theirs, not the room's.
     chosen = np.flatnonzero(np.isin(mesh.object_id, list(finer)))
     part = Mesh(mesh.vertices, mesh.triangles[chosen], mesh.object_id[chosen])
-    sheet = lay_out(OBJECT, part.triangles, uv[chosen], part.object_id, size, finer, NO_LIMIT)
+    sheet = lay_out(OBJECT, part.triangles, uv[chosen], part.object_id, size, finer, PARTS.no_limit)
     atlas = make_atlas(part, sheet.sheet_uv, sheet.size)
     if stored is None or dict(meta["finer"]) != finer:
         found = _looked(run, part, atlas, chosen)
@@ -185,7 +178,7 @@ def _looked(run: Corrected, part: Mesh, atlas: Atlas, chosen: np.ndarray) -> Lit
         element[there] = find(own[there], u[there], v[there])
         return element
 
-    rounds = Rounds(run.progress, 0, LOOKED)
+    rounds = Rounds(run.progress, 0, PARTS.looked)
     how = {"median": s.median, "seed": s.seed, "threads": s.threads, "folder": run.store.folder, "progress": rounds}
     finer = replace(surface, atlas=atlas)
     found = lit_diffuse(finer, run.frames, run.read, s, run.store.folder, rounds)
@@ -237,10 +230,10 @@ def finer_detail(run: Corrected, closer: Closer) -> np.ndarray:
     good = (lit.tier == CLEAN) & (lit.count >= VISIBILITY.enough) & (run.albedo.origin == MEASURED)
     known = np.concatenate([np.where(good[:, None], lit.radiance, 0), good[:, None]], 1).astype(np.float32)
     room = closer.sheet.image(surface.atlas.image(known), _owner(run)).reshape(-1, 4)[atlas.texel]
-    floor = np.float32(max(FLOOR * run.median_radiance(), 1e-30))
+    floor = np.float32(max(SHARPENING.floor * run.median_radiance(), 1e-30))
     level = room[:, :3] / np.maximum(room[:, 3:], 1e-6)
-    ratio = np.clip((closer.radiance + floor) / (level + floor), 1 / MOST, MOST)
-    ratio[(room[:, 3] < HALF) | ~np.isfinite(ratio).all(1)] = 1
+    ratio = np.clip((closer.radiance + floor) / (level + floor), 1 / SHARPENING.most, SHARPENING.most)
+    ratio[(room[:, 3] < PARTS.half) | ~np.isfinite(ratio).all(1)] = 1
     return atlas.image(ratio, 1.0)
 
 

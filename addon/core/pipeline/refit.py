@@ -31,6 +31,7 @@ from ..results.room_file import MATERIALS, Room, read_room
 from ..results.store import Store
 from ..scene.model import Mesh
 from ..settings import ROOM, Settings
+from .params import CORRECTED
 from .parts import STAGE as DETAIL
 from .parts import stored_key as detail_key
 from .recover import Recovery
@@ -42,9 +43,6 @@ from .stages import code
 REPORT = "report.json"
 IMAGES = ("albedo", "base_color", "coverage", "albedo_error")
 """What changes with an object's material."""
-DARK = 1e-3
-UNKNOWN_BEFORE = 0.1
-"""Relative error of an albedo, light aside, of an object whose own is not known as it had none before."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -284,9 +282,11 @@ class Refit(Recovery):
                 (now, mine, self.specular().specular),
             )
         )
-        relative = np.sqrt(np.maximum(np.square(error) - np.square(gloss_was), 0)) / np.maximum(before.rho, DARK)
+        relative = np.sqrt(np.maximum(np.square(error) - np.square(gloss_was), 0)) / np.maximum(
+            before.rho, CORRECTED.dark_refit
+        )
         bare = ~(error > 0).any(1, keepdims=True)
-        relative = np.where(bare, np.hypot(shading, UNKNOWN_BEFORE)[:, None], relative)
+        relative = np.where(bare, np.hypot(shading, CORRECTED.unknown_before)[:, None], relative)
         fresh = np.minimum(np.sqrt(np.square(relative * now.rho) + np.square(gloss)), NOTHING_KNOWN)
         known = {m.object_id for m in mine if m.model.gives_light or "base_color" in m.given}
         fresh = np.where(np.isin(atlas.object_id, list(known))[:, None], 0, fresh)

@@ -9,14 +9,15 @@ import numpy as np
 from ..light.few_elements import evened
 from ..light.field import LightField
 from ..light.over_surface import RayCounts, irradiance
-from ..passes.albedo.albedo import MAX_ALBEDO, fill, quotient
-from ..passes.unseen_light.shades import BOUNCES, strongly_lit
+from ..light.params import GATHER
+from ..passes.albedo.albedo import fill, quotient
+from ..passes.albedo.params import ALBEDO
+from ..passes.unseen_light.params import SHADES
+from ..passes.unseen_light.shades import strongly_lit
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance
 
 ROUGH: RayCounts = {"rays": 64, "emitter_rays": 4, "portal_rays": 8}
-COARSER = 8
-"""Times the finest spacing of gathering points."""
 
 
 def with_unseen_surfaces(
@@ -60,15 +61,15 @@ def with_unseen_surfaces(
         irradiance, **ROUGH, interpolate=True, smooth=smooth, threads=threads, seed=seed
     )  # fmt: skip
     E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
-    E[lit] = rough(field, lit, finest=COARSER * finest)[0]
-    E[dark], escaped[dark], _, _ = rough(field, dark, finest=COARSER * finest)
+    E[lit] = rough(field, lit, finest=GATHER.unseen_coarser * finest)[0]
+    E[dark], escaped[dark], _, _ = rough(field, dark, finest=GATHER.unseen_coarser * finest)
     rho, valid = quotient(lit_diffuse.radiance, E)
     guess = fill(atlas, rho, valid, {i.object_id: i.class_name for i in instances}, emitters).rho
     radiance = field.radiance.copy()
     radiance[dark] = guess[dark] * E[dark] / np.float32(np.pi)
     field = field.with_light(radiance)
     seen_as = evened(field)[dark]
-    for _ in range(BOUNCES - 1 if follow_shades else 0):
+    for _ in range(SHADES.bounces - 1 if follow_shades else 0):
         shades = strongly_lit(atlas, dark, field.radiance[dark], seen_as)
         if not shades:
             break
@@ -78,7 +79,7 @@ def with_unseen_surfaces(
             rho, valid = quotient(lit_diffuse.radiance[own], E[own])
             seen = lit_diffuse.seen[own]
             known = valid & seen
-            paint = np.clip(np.median(rho[known], 0), 0, MAX_ALBEDO) if known.any() else guess[own]
+            paint = np.clip(np.median(rho[known], 0), 0, ALBEDO.max_albedo) if known.any() else guess[own]
             radiance[own] = np.where(seen[:, None], radiance[own], paint * E[own] / np.float32(np.pi))
         field = field.with_light(radiance)
     return field, E, escaped

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from addon.benchmark.synthetic import synthetic_capture
-from addon.core.agreement.look import AGREE, look
+from addon.core.agreement.look import look
 from addon.core.agreement.overlay import LINE, overlay
+from addon.core.agreement.params import AGREEMENT
 from addon.core.errors import BadInputError
 from addon.core.io.conventions import Convention, matrix, parse
 from addon.core.scene.model import Capture, Instance, Pixels
@@ -63,7 +64,7 @@ def spoilt(capture: Capture, convention: Convention) -> Capture:
 
 def test_right_poses_are_left_alone(room):
     found = look(*room)
-    assert found.fits and not found.searched and found.best is None and found.as_read.quality > AGREE + 0.02
+    assert found.fits and not found.searched and found.best is None and found.as_read.quality > AGREEMENT.agree + 0.02
     assert found.up == "+z" and len(found.sentences()) == 1 and "fit the mesh" in found.sentence()
     assert np.median(found.misaligned) < 0.15
 

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from addon.core.light import interpolate
-from addon.core.light.interpolate import CONTRAST, interpolated
+from addon.core.light.interpolate import interpolated
+from addon.core.light.params import GATHER
 from tests.core.rooms import box_sides, make_room, quad
 
 FINEST = 0.1
-AS_IT_COMES = interpolate.COARSEST
 
 
 @pytest.fixture(autouse=True)
 def several_levels(monkeypatch):
     """In a room of few elements the first spacing would lie below the finest: start coarser, to have levels at all."""
-    monkeypatch.setattr(interpolate, "COARSEST", 0.15)
+    monkeypatch.setattr(interpolate, "GATHER", replace(GATHER, coarsest=0.15))
 
 
 @pytest.fixture(scope="module")
@@ -103,15 +105,15 @@ def test_light_refines_where_walls_are_far(atlas):
     apart = np.linalg.norm(atlas.position[:, :2] - (2.1, 1.4), axis=1)
     edge, away = floor & (np.abs(apart - 0.5) < 0.1), floor & (apart > 1.5)
     asked = {}
-    for strength in (1.0, CONTRAST / 2):
+    for strength in (1.0, GATHER.contrast / 2):
         value, points = run(atlas, spot(strength), radius=10)
         asked[strength] = np.isin(np.arange(len(atlas)), points)
         inside = floor & (apart < 0.3)
-        assert np.allclose(value[away], 1, rtol=CONTRAST / 2)
+        assert np.allclose(value[away], 1, rtol=GATHER.contrast / 2)
         if strength == 1:
-            assert np.allclose(value[inside], 2, rtol=CONTRAST) and np.abs(value[inside] / 2 - 1).mean() < 0.02
+            assert np.allclose(value[inside], 2, rtol=GATHER.contrast) and np.abs(value[inside] / 2 - 1).mean() < 0.02
     assert asked[1.0][edge].mean() > 4 * asked[1.0][away].mean()
-    assert asked[CONTRAST / 2][edge].mean() < 2 * asked[CONTRAST / 2][away].mean()
+    assert asked[GATHER.contrast / 2][edge].mean() < 2 * asked[GATHER.contrast / 2][away].mean()
 
 
 def test_coarse_points_do_not_outweigh_fine_ones(atlas):
@@ -129,12 +131,12 @@ def test_coarse_points_do_not_outweigh_fine_ones(atlas):
 
 def test_small_things_are_not_stepped_over(monkeypatch):
     """A patch of light of 3 % of the room's size, walls far off: found, as the first points lie 1 % apart."""
-    monkeypatch.setattr(interpolate, "COARSEST", AS_IT_COMES)
+    monkeypatch.setattr(interpolate, "GATHER", GATHER)
     atlas = make_room([quad((0, 0, 0), (4, 0, 0), (0, 4, 0), 0)], 0.02).atlas
     lit = (np.abs(atlas.position[:, :2] - (1.234, 2.345)) < 0.06).all(1)
     value, points = run(atlas, lambda p, n: spot_of(p), radius=10, finest=0.02)
     assert len(points) < len(atlas) / 3
-    assert np.abs(value[lit] / 5 - 1).mean() < CONTRAST
+    assert np.abs(value[lit] / 5 - 1).mean() < GATHER.contrast
     dark = (np.abs(atlas.position[:, :2] - (1.234, 2.345)) > 0.12).any(1)
     assert np.allclose(value[dark], 1, rtol=1e-3)
 

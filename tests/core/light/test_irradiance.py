@@ -11,6 +11,7 @@ from addon.core.light import emitters
 from addon.core.light.emitters import bright_triangles
 from addon.core.light.environment import Environment
 from addon.core.light.irradiance import direct, gather
+from addon.core.light.params import GATHER
 from tests.core.rooms import box_sides, lit_box, make_room, polygon_irradiance, quad
 
 LAMP_SIDE, HEIGHT = 0.4, 2.0
@@ -60,7 +61,7 @@ def test_a_furnace_gives_pi_l(furnace):
 @pytest.mark.parametrize("aimed_at", [{0}, {2, 3}, {1, 4}])
 def test_a_furnace_with_rays_aimed_at_some_of_its_walls(furnace, aimed_at, monkeypatch):
     """The walls aimed at are as bright as the rest: the weights alone must make the two parts one whole."""
-    monkeypatch.setattr(emitters, "BRIGHT", 1)
+    monkeypatch.setattr(emitters, "GATHER", replace(GATHER, bright=1))
     room, field = furnace
     bright = bright_triangles(room.field(room.by_object({i: 1000 for i in aimed_at}, default=1e-3)))
     assert len(bright) == 2 * len(aimed_at)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.light.less_noise import CELL, less_noise
+from addon.core.light.less_noise import less_noise
+from addon.core.light.params import LESS_NOISE
 
 SIDE, TEXEL = 100, 0.01
 
@@ -39,15 +40,15 @@ def test_the_noise_that_there_was_is_told_evenly():
     single = np.where(np.arange(len(noise)) % 4 == 0, 2 * noise, 0)
     single[position[:, 0] > 0.5] = 0
     _, told = less_noise(position, normal, seen, single.astype(np.float32))
-    np.testing.assert_allclose(told[position[:, 0] < 0.5 - CELL], 0.1, rtol=0.1)
-    assert not told[position[:, 0] > 0.5 + CELL].any()
+    np.testing.assert_allclose(told[position[:, 0] < 0.5 - LESS_NOISE.cell], 0.1, rtol=0.1)
+    assert not told[position[:, 0] > 0.5 + LESS_NOISE.cell].any()
 
 
 def test_a_shadows_edge_stays():
     half = np.where(np.mgrid[:SIDE, :SIDE][1] < 43, 1.0, 2.0)
     position, normal, clean, seen, noise = wall(half, 0.05)
     found, _ = less_noise(position, normal, seen, noise)
-    beside = np.abs(position[:, 0] - 0.43) < CELL / 2
+    beside = np.abs(position[:, 0] - 0.43) < LESS_NOISE.cell / 2
     assert error(found[beside], clean[beside]) < 0.06  # no more than the noise itself
     assert error(found[~beside], clean[~beside]) < 0.03
 

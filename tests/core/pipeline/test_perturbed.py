@@ -14,6 +14,7 @@ from addon.benchmark.pipeline import cut_in_four
 from addon.core.io.exr import read_exr
 from addon.core.io.read import read_capture
 from addon.core.passes.pose_refinement import poses as poses_found
+from addon.core.passes.pose_refinement.params import POSES
 from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
 from addon.core.results.store import Store
@@ -147,7 +148,7 @@ def test_noise_of_a_mesh_is_measured_and_curvature_is_none():
 
 @pytest.mark.slow
 def test_poses_are_put_right_stored_and_told(tmp_path, monkeypatch):
-    monkeypatch.setattr(poses_found, "LEAST_SHIFT", 0.25)  # the pictures are tiny
+    monkeypatch.setattr(poses_found, "POSES", replace(POSES, least_shift=0.25))  # the pictures are tiny
     far = np.array([4e5, 5e5, 300.0])
     disk = OnDisk(tmp_path / "true", light=lambda room: patches(room, 0.7), shift=far)
     off = read_capture(perturbed(disk, tmp_path / "off", "--poses", "20", "3"))

@@ -12,12 +12,7 @@ from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Instance
 from .neighbourhood import relative_error, shrink
-
-FLOOR = 1e-3
-"""Below this share of the room's median irradiance a quotient says nothing."""
-MAX_ALBEDO = 1.0
-UNKNOWN, LEAST_SPREAD = 0.7, 0.3
-"""Relative error of an albedo that was taken from other objects: where there are too few to tell, and at least."""
+from .params import ALBEDO
 
 MEASURED, FILLED, NONE = 2, 1, 0
 """How an element's albedo came about: measured; filled in from its object; no reflectance (an emitter, an object
@@ -58,11 +53,11 @@ def quotient(lit_diffuse: np.ndarray, irradiance: np.ndarray) -> tuple[np.ndarra
     """
     known = np.isfinite(lit_diffuse).all(1)
     lit = irradiance.mean(1)
-    floor = FLOOR * float(np.median(lit[known])) if known.any() else 0.0
+    floor = ALBEDO.floor * float(np.median(lit[known])) if known.any() else 0.0
     valid = known & (lit > max(floor, 1e-20))
     rho = np.full(lit_diffuse.shape, np.nan, np.float32)
     # A single channel may be dark under coloured light: it gets the floor, not a division by nothing.
-    rho[valid] = np.pi * lit_diffuse[valid] / np.maximum(irradiance[valid], FLOOR * lit[valid, None])
+    rho[valid] = np.pi * lit_diffuse[valid] / np.maximum(irradiance[valid], ALBEDO.floor * lit[valid, None])
     return rho, valid
 
 
@@ -73,7 +68,7 @@ def without_emitters(atlas: Atlas, told: np.ndarray, emitters: set[int]) -> np.n
 
 def above_one(rho: np.ndarray, reflecting: np.ndarray) -> float:
     """Share of the `reflecting` elements, (n,) bool, whose quotient is above 1: an alarm that light is missing."""
-    return float((rho[reflecting].max(1) > MAX_ALBEDO).mean()) if reflecting.any() else 0.0
+    return float((rho[reflecting].max(1) > ALBEDO.max_albedo).mean()) if reflecting.any() else 0.0
 
 
 def albedo_of(
@@ -128,7 +123,7 @@ def fill(
     """
     if error is not None:
         valid = valid & np.isfinite(error)
-    result = np.clip(np.nan_to_num(rho), 0, MAX_ALBEDO)
+    result = np.clip(np.nan_to_num(rho), 0, ALBEDO.max_albedo)
     origin = np.where(valid, MEASURED, FILLED).astype(np.int8)
     reflecting = without_emitters(atlas, valid, emitters)
     everywhere = np.median(result[reflecting], 0) if reflecting.any() else np.full(3, 0.5, np.float32)
@@ -144,7 +139,7 @@ def fill(
         if not valid[own].any():
             bare.append((object_id, own))
             continue
-        result[own], left[own] = shrink(atlas, own, result[own], error[own], most=MAX_ALBEDO, without=without)
+        result[own], left[own] = shrink(atlas, own, result[own], error[own], most=ALBEDO.max_albedo, without=without)
         by_class.setdefault(class_of.get(object_id, ""), []).append(np.median(result[own][valid[own]], 0))
     known = [middle for alike in by_class.values() for middle in alike]
     for object_id, own in bare:
@@ -152,7 +147,7 @@ def fill(
         result[own] = np.median(alike, 0) if alike else everywhere
         origin[own] = NONE
         left[own] = _spread(alike if alike and len(alike) > 2 else known)
-    return Albedo(np.clip(result, 0, MAX_ALBEDO).astype(np.float32), origin, left)
+    return Albedo(np.clip(result, 0, ALBEDO.max_albedo).astype(np.float32), origin, left)
 
 
 def _parts(atlas: Atlas, valid: np.ndarray) -> np.ndarray:
@@ -167,6 +162,6 @@ def _parts(atlas: Atlas, valid: np.ndarray) -> np.ndarray:
 def _spread(albedos: list[np.ndarray]) -> float:
     """Relative standard deviation of some objects' albedo, (3,) each; that of any two things where there are few."""
     if len(albedos) < 3:
-        return UNKNOWN
-    level = np.log(np.maximum(np.array(albedos).mean(1), FLOOR))
-    return max(1.4826 * float(np.median(np.abs(level - np.median(level)))), LEAST_SPREAD)
+        return ALBEDO.unknown
+    level = np.log(np.maximum(np.array(albedos).mean(1), ALBEDO.floor))
+    return max(1.4826 * float(np.median(np.abs(level - np.median(level)))), ALBEDO.least_spread)

@@ -18,9 +18,8 @@ from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.visibility import CLEAN, SATURATED
 from .minority import Surroundings, drawn_to_minority
-from .params import PRIOR, PriorParams
+from .params import ALBEDO, PRIOR, PriorParams
 
-DARK = 1e-3
 BLOCK = 1 << 11
 
 
@@ -163,7 +162,7 @@ def shrink(
     centre = np.stack([np.bincount(index, position[:, axis]) for axis in range(3)], 1) / count[:, None]
     todo = np.flatnonzero(error > 0)
     asked, index = np.unique(index[todo], return_inverse=True)
-    rho = np.maximum(rho, DARK)
+    rho = np.maximum(rho, ALBEDO.dark)
     reference, reference_error = rho[sure], error[sure]
     around = _prior(centre[asked], position[sure], np.log(reference), without, params)
     shrunk, left = rho.astype(np.float32), error.astype(np.float32)

@@ -82,3 +82,29 @@ class SecondColourParams:
 
 
 PRIOR, SECOND_COLOUR = PriorParams(), SecondColourParams()
+
+
+@dataclass(frozen=True)
+class AlbedoParams:
+    """Of `albedo`.
+
+    Attributes
+    ----------
+    floor : float
+        Below this share of the room's median irradiance a quotient says nothing.
+    max_albedo : float
+        What reflects more than it gets emits light.
+    unknown, least_spread : float
+        Relative error of an albedo that was taken from other objects: where there are too few to tell, and at least.
+    dark : float
+        Least albedo that a logarithm is taken of.
+    """
+
+    floor: float = 1e-3
+    max_albedo: float = 1.0
+    unknown: float = 0.7
+    least_spread: float = 0.3
+    dark: float = 1e-3
+
+
+ALBEDO = AlbedoParams()

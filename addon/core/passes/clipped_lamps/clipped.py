@@ -7,7 +7,7 @@ lamp that no frame looked at is (`unseen_light`); where that fails, the bound is
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,8 +17,21 @@ from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.visibility import SATURATED
 
-MOSTLY = 0.5
-"""Share of an object's seen area from which on it counts as clipped."""
+
+@dataclass(frozen=True)
+class ClippedParams:
+    """Of what counts as clipped (`clipped-lamps` in the ablation).
+
+    Attributes
+    ----------
+    mostly : float
+        Share of an object's seen area from which on it counts as clipped.
+    """
+
+    mostly: float = 0.5
+
+
+CLIPPED = ClippedParams()
 
 
 def clipped_objects(lit: LitDiffuse, atlas: Atlas) -> dict[int, float]:
@@ -27,7 +40,7 @@ def clipped_objects(lit: LitDiffuse, atlas: Atlas) -> dict[int, float]:
     for object_id in np.unique(atlas.object_id[lit.tier == SATURATED]):
         own = lit.seen & (atlas.object_id == object_id)
         clipped = own & (lit.tier == SATURATED)
-        if atlas.area[clipped].sum() > MOSTLY * atlas.area[own].sum():
+        if atlas.area[clipped].sum() > CLIPPED.mostly * atlas.area[own].sum():
             bounds[int(object_id)] = float(np.median(lit.radiance[clipped] @ LUMINANCE))
     return bounds
 

@@ -22,18 +22,14 @@ from ...brdf.model import Microfacets
 from ...light.directions import cosine_hemisphere, sobol
 from ...light.emitters import BrightTriangles, sample_bright
 from ...light.field import LightField
-from ...light.less_noise import CELL, GRIDS, cells
+from ...light.less_noise import cells
+from ...light.params import LESS_NOISE
 from ...paper.brdf import F
 from ...scene.atlas import Atlas
 from ...scene.tangent_frame import tangent_frame, to_world
+from .params import CAUSTICS
 
-PHOTONS = 1 << 18
-"""Kitchen with seven small lamps: 26.37 dB of albedo with half as many, 26.43 with these and with four times these."""
 AT_ONCE = 1 << 15
-BOUNCES = 4
-"""Glossy reflections in a row. Beside copper shades half of the light on a kitchen's wall came by no other way, and a
-third of that by more than one; its albedo with 1 and 4: 27.85, 28.51 dB, in coarser frames 27.71, 28.96; no more by 10.
-"""
 
 
 @dataclass(frozen=True)
@@ -82,7 +78,7 @@ class _Light:
 
 
 def caustics(
-    room: LightField, bright: BrightTriangles, gloss: Gloss, seed: int = 0, photons: int = PHOTONS
+    room: LightField, bright: BrightTriangles, gloss: Gloss, seed: int = 0, photons: int = CAUSTICS.photons
 ) -> np.ndarray:
     """E by way of glossy reflections of what bright triangles send, less what was taken for it.
 
@@ -116,7 +112,7 @@ def caustics(
         sent = _Light(origin, ways, np.concatenate([own, -gloss.inside[sender]], 1) * share)
         element, place, at = _met(room, sent)
         _let_fall(fallen, element, sent.power[at, 3:])
-        for _ in range(BOUNCES):
+        for _ in range(CAUSTICS.bounces):
             light = _Light(place, sent.direction[at], sent.power[at, :3])
             sent = _sent_on(room, gloss, element, light, rng)
             if not len(sent.origin):
@@ -164,8 +160,8 @@ def _over_cells(atlas: Atlas, halves: np.ndarray) -> np.ndarray:
     """Power over area, and its noise by the photons' halves, (n, 6): means over cells of several shifted grids."""
     a, b = halves
     held, area = np.zeros((6, len(atlas)), np.float32), np.zeros(len(atlas), np.float32)
-    for k in range(GRIDS):
-        group, _ = cells(atlas.position, atlas.normal, k / GRIDS, CELL)
+    for k in range(LESS_NOISE.grids):
+        group, _ = cells(atlas.position, atlas.normal, k / LESS_NOISE.grids, LESS_NOISE.cell)
         for row, values in zip(held, (*(a + b), *(a - b)), strict=True):
             row += np.bincount(group, values)[group]
         area += np.bincount(group, atlas.area)[group]

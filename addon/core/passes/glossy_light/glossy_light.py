@@ -27,18 +27,7 @@ from ...parallel import for_blocks
 from ...progress import Progress, Rounds
 from ...scene.rays import Hits
 from .caustics import Gloss, caustics
-
-RAYS, LOBE_RAYS = 32, 4
-"""Of each place, and of each of its rays that meets something glossy. 64 with 16 came to the same albedo within
-0.02 dB in the living room."""
-FINEST_SHARE = 0.02
-"""Least distance of two places, as a share of the room: four times that of all light. Albedo of a kitchen with .04,
-this and .01: 28.49, 28.64, 28.71 dB, of a bathroom 27.19, 27.22, 27.21; .01 takes 2 s longer in the living room."""
-SMOOTH = 1.0
-"""Metres: cells in which the rays' and photons' noise is taken out. A tiled bathroom had clouds of 5 to 10 % in its
-albedo: 26.81 dB without, 27.05, 27.14 and 27.21 with cells of .25, .5 and 1 m."""
-MOST_TAKEN = 0.5
-"""Of E that may be taken away, by noise or where a median was all highlight."""
+from .params import GLOSSY
 
 
 class Excess(LightField):
@@ -102,8 +91,8 @@ class Excess(LightField):
             at = met[alike]
             own = element[at]
             light = reflected_light(
-                self._room, self._bright, own, -directions[at], rays=LOBE_RAYS, grid=np.array([alpha], np.float32),
-                proposals=(alpha,), microfacets=microfacets, threads=1, seed=self._seed + int(at[0]) + len(at),
+                self._room, self._bright, own, -directions[at], rays=GLOSSY.lobe_rays,
+                grid=np.array([alpha], np.float32), proposals=(alpha,), microfacets=microfacets, threads=1, seed=self._seed + int(at[0]) + len(at),
             )  # fmt: skip
             taken = np.where(self._aimed[own, None], 0, self._inside[own])
             result[at] = self._f0[own] * light.A[:, 0] + light.B[:, 0] - taken
@@ -151,7 +140,7 @@ def glossy_light(
             at = index[part]
             here = seed + 7919 * steps["count"] + part.start
             (a, near, _), (b, also_near, _) = (
-                gather(excess, bright, position[at], normal[at], RAYS // 2, 0, here + (1 << 20) * half)
+                gather(excess, bright, position[at], normal[at], GLOSSY.rays // 2, 0, here + (1 << 20) * half)
                 for half in range(2)
             )
             value[part] = np.concatenate([level + (a + b) / 2, (a - b) / 2], 1)
@@ -162,7 +151,7 @@ def glossy_light(
         return value, radius
 
     def around(index: np.ndarray) -> np.ndarray:
-        finest = finest_spacing(atlas, FINEST_SHARE)
+        finest = finest_spacing(atlas, GLOSSY.finest_share)
         return interpolated(position[index], normal[index], lambda i: gathered(index[i]), finest, threads)[0]
 
     found = TexelBlocks(atlas, element, threads).evaluate(around, block_step(atlas), np.inf)
@@ -171,5 +160,5 @@ def glossy_light(
     # Spread like the light itself, the halves' difference has the noise that is left in it.
     found, noise = found[:, :3] - level, found[:, 3:].mean(1)
     if "glossy-smoothing" not in without:
-        found, _ = less_noise(position, normal, found, noise, SMOOTH)
-    return np.maximum(found, -MOST_TAKEN * irradiance).astype(np.float32)
+        found, _ = less_noise(position, normal, found, noise, GLOSSY.smooth)
+    return np.maximum(found, -GLOSSY.most_taken * irradiance).astype(np.float32)

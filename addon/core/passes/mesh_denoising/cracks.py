@@ -11,12 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-NEAR = 2.0
-"""Times the noise, how wide a crack may be."""
-LONG, HIGH = 10.0, 6.0
-"""Times the noise: shorter edges, and triangles lower than this on either side of a crack, are left alone. They are
-strips of mouldings, whose two borders lie as close together and whose triangles would be turned. Of the points taken in
-three perturbed living rooms (83, 55 and 57) .61, .78 and .86 truly lie on the edge; without HIGH .1 of 640 to 930."""
+from .params import CRACKS
 
 
 def border_edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -64,14 +59,14 @@ def _beside(
     length = np.linalg.norm(along, axis=1)
     arm = points[opposite] - start
     over = np.linalg.norm(np.cross(along, arm), axis=1) / np.maximum(length, 1e-30)
-    able = np.flatnonzero((length > LONG * noise) & (over > HIGH * noise))
+    able = np.flatnonzero((length > CRACKS.long * noise) & (over > CRACKS.high * noise))
     border = np.unique(edges)
-    border_able = border[height[border] > HIGH * noise]
+    border_able = border[height[border] > CRACKS.high * noise]
     none = np.zeros(0, int), np.zeros(0, int), np.zeros(0)
     if not len(able) or not len(border_able):
         return none
     # Places along each edge, so dense that no point so near it is farther from all of them than 1.5 times that.
-    near = NEAR * noise
+    near = CRACKS.near * noise
     places = np.ceil(length[able] / (2 * near)).astype(int) + 1
     of = np.repeat(able, places)
     share = (np.arange(len(of)) - np.repeat(np.cumsum(places) - places, places)) / (places.repeat(places) - 1)

@@ -36,29 +36,12 @@ from ...scene.model import Mesh
 from ...scene.params import NOISE
 from ...scene.weld import point_normals, ring_of, welded
 from .cracks import closed
+from .params import DENOISE
 from .planes import onto_sheets
 from .unfold import solved, unfolded
 
 SCALES = np.geomspace(0.5, 0.02, 8)
 """Radians, one for each step."""
-DRAWS = 6
-"""From each step's posterior. Without (0) the living room's objects are 2.13 mm and 7.3 degrees off under 2.9 mm of
-independent noise, with 3 2.06 mm and 7.1, with 6 2.06 mm and 7.0; half smooth 4.08 mm and 9.2, with 6 4.01 and 9.0."""
-ROUGHLY = 3e-2
-"""Of their linear solves: as good as 1e-3, in a third of the time."""
-FARTHEST = 3.0
-"""Times the noise, how far a point may go for the angles."""
-FLOOR = 1.0
-"""Times the noise: a triangle lower than this is taken for so high, as the noise folds it over and its angle says
-little."""
-TOO_SMALL = 4.0
-"""Times the noise: parts whose box has a shorter diagonal have no shape left to find, and stay as they are. (A finely
-scanned one of 7 times is found to a third of the noise.)"""
-WELD = 0.01
-"""Times the noise: points nearer than this are one."""
-HELD = 100.0
-"""Times more that a point in a crowd is held where the crowd has put it (`unfold`): angles there are mostly noise, and
-took a bottle cap's normals from 9 degrees back to 30."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +120,7 @@ def _linear(
 ) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix, sparse.csr_matrix]:  # fmt: skip
     """Angles, their weights, their change by each point's way along its normal, and the normal equations' matrix."""
     count = len(points)
-    theta, gradient = dihedral(points, hinges, FLOOR * noise)
+    theta, gradient = dihedral(points, hinges, DENOISE.floor * noise)
     weight = 1 / (scale**2 + theta**2 + variance)
     ends = (hinges.a, hinges.b, hinges.c, hinges.d)
     values = np.concatenate([(by * normal[at]).sum(1) for by, at in zip(gradient, ends)])
@@ -151,11 +134,11 @@ def _variance(
 ) -> np.ndarray:
     """What the angles' posterior variance is, (e,), by draws from it: the system's solution for noise as it expects."""
     total = np.zeros(len(weight))
-    for _ in range(DRAWS):
+    for _ in range(DENOISE.draws):
         by_points = np.sqrt(held) * rng.standard_normal(len(held))
         by_angles = change.T @ (np.sqrt(weight) * rng.standard_normal(len(weight)))
-        total += (change @ solved(system, by_points + by_angles, tolerance=ROUGHLY)) ** 2
-    return total / max(DRAWS, 1)
+        total += (change @ solved(system, by_points + by_angles, tolerance=DENOISE.roughly)) ** 2
+    return total / max(DENOISE.draws, 1)
 
 
 def _within(points: np.ndarray, measured: np.ndarray, farthest: float) -> np.ndarray:
@@ -196,10 +179,10 @@ def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndar
     """
     if not noise > 0:
         return mesh.vertices
-    measured, faces, place = welded(mesh, WELD * noise)
+    measured, faces, place = welded(mesh, DENOISE.weld * noise)
     # Welding makes triangles that are smaller than its grid into edges.
     real = (faces != np.roll(faces, 1, 1)).all(1)
-    real[real] = _large(measured, faces[real], TOO_SMALL * noise)
+    real[real] = _large(measured, faces[real], DENOISE.too_small * noise)
     faces = faces[real]
     if not len(faces):
         return mesh.vertices
@@ -207,8 +190,8 @@ def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndar
     points, crowded = measured, np.zeros(len(measured))
     if "unfolding" not in without:
         points, crowded = unfolded(measured, faces, noise)
-    points = _within(points, measured, FARTHEST * noise)
-    told, held = measured + crowded[:, None] * (points - measured), (1 + HELD * crowded) / noise**2
+    points = _within(points, measured, DENOISE.farthest * noise)
+    told, held = measured + crowded[:, None] * (points - measured), (1 + DENOISE.held * crowded) / noise**2
     variance, rng = np.zeros(len(hinges.a)), np.random.default_rng(0)
     for scale in SCALES:
         normal = point_normals(points, faces)
@@ -217,7 +200,7 @@ def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndar
         step = solved(system, -gone * held - change.T @ (weight * theta))
         # The angles are linear over small steps only.
         points = points + np.clip(step, -noise, noise)[:, None] * normal
-        points = _within(points, measured, FARTHEST * noise)
+        points = _within(points, measured, DENOISE.farthest * noise)
         if scale != SCALES[-1] and "angle-variance" not in without:
             variance = _variance(held, weight, change, system, rng)
     if "sheets" not in without:

@@ -19,50 +19,7 @@ import numpy as np
 from scipy import sparse
 
 from ...groups import by_label
-
-NEAR, REACH = 3.0, 4.5
-"""Times the noise (and the plane's own uncertainty), how far denoised points may lie off, of low triangles and of high
-ones: a scan's smooth error shows over large triangles, and a moulding's steps have low ones. Half smooth, half from
-vertex to vertex has 1.4 times what `noise_of` sees; no point goes farther than `REACH`."""
-HIGH = 10.0
-"""Times the noise."""
-TURN = 0.15
-"""Radians by which a large triangle may face another way than its plane, besides what noise tilts it by."""
-MOST_TURN = 0.8
-"""Radians, however low the triangle: front and sides of a thin plate are 1.6 apart."""
-KNOWN = 0.05
-"""Radians, standard error of the way that a plane faces. Known less well, it is no better than what is there: denoised
-triangles of a few times the noise are off by 0.05 to 0.2."""
-FILL = 0.3
-"""Of its extent a region covers as much, unless its own width tells enough: a moulding around a room is a ring that
-lies in a plane, whichever way it faces."""
-SPREAD = 1.6
-"""Times the noise, the points' distance from a plane (root mean square), for a scan's smooth error: 1.4 if half."""
-BENT = 24.0
-"""Chi squared with three degrees of freedom up to which a bend may be noise: twice 12, which chance exceeds once in
-130 times, for the smooth error."""
-GENTLE, UNSURE = 0.015, 0.045
-"""Radians, root mean square, by which a bend turns the normals of what is called flat: where the bend is sure, and
-where it may be noise (together with what the noise makes it by chance). Strips of a cylinder of 6 cm have 0.1 to 0.2
-and too few points to be sure; chamfers of 1.5 cm taken into a sofa's front 0.06."""
-MOST_BENT = 0.2
-"""The same of a bent sheet."""
-ENDS = 0.9
-"""Share of a bent sheet's outline at creases or borders. Sconces: 0.97 to 1.0. Parts of cushions: 0.2 to 0.9."""
-CREASE = 0.6
-"""Radians."""
-DETERMINED = 0.3
-"""Points tell a quadratic term by at least this much of what they would if spread at random."""
-STIFF = 50.0
-"""How much firmer a sheet holds its points than the denoised places do, as a ratio of standard deviations."""
-SHARE = 0.2
-"""Of the area around a point: a sheet with less of it does not hold it."""
-PARALLEL = 0.97
-"""Cosine of the angle from which on two sheets have no line in common: one of 14 degrees, or front and back."""
-AGAIN = 50
-"""Triangles after which a region may be known again."""
-SMOOTH = 3
-"""Rounds of adding up neighbours by which seeds are ordered."""
+from .params import PLANES
 
 
 @dataclass(frozen=True)
@@ -152,8 +109,8 @@ class Grower:
         self.normal, self.area = normal / np.maximum(double, 1e-30)[:, None], double / 2
         self.length = np.linalg.norm(np.roll(corners, -1, 1) - corners, axis=2)
         tilt = noise * self.length.max(1) / np.maximum(double, 1e-30)  # noise / height
-        self.least = np.cos(np.minimum(TURN + tilt, MOST_TURN))
-        self.reach = noise * np.where(tilt < 1 / HIGH, REACH, NEAR)
+        self.least = np.cos(np.minimum(PLANES.turn + tilt, PLANES.most_turn))
+        self.reach = noise * np.where(tilt < 1 / PLANES.high, PLANES.reach, PLANES.near)
         self.free, self.tried = np.ones(len(faces), bool), np.zeros(len(faces), bool)
         self._seen, self._met, self._run = np.zeros(len(faces), np.int64), np.zeros(len(points), np.int64), 0
 
@@ -164,7 +121,7 @@ class Grower:
         near = sparse.csr_matrix((self.alike.ravel()[inner].astype(float), (row, self.across.ravel()[inner])),
                                  (len(self.faces),) * 2) + sparse.eye(len(self.faces))  # fmt: skip
         way = self.normal * self.area[:, None]
-        for _ in range(SMOOTH):
+        for _ in range(PLANES.smooth):
             way = near @ way
         alike = (self.normal[:, None] * self.normal[self.across]).sum(2) * self.alike > self.least[self.across]
         able = np.flatnonzero((alike & (self.across >= 0)).any(1))
@@ -185,7 +142,7 @@ class Grower:
         while len(front):
             region.append(front)
             size, again = size + len(front), again + np.count_nonzero(self.tried[front])
-            if size > AGAIN and again > 0.8 * size:
+            if size > PLANES.again and again > 0.8 * size:
                 break
             new = np.unique(self.faces[front])
             new = new[self._met[new] != self._run]
@@ -215,7 +172,7 @@ class Grower:
         across = self.across[region]
         outer = (across < 0) | ~inside[across]
         along = (self.normal[region][:, None] * self.normal[across]).sum(2) * self.alike[region]
-        sharp = outer & ((across < 0) | (along < np.cos(CREASE)))
+        sharp = outer & ((across < 0) | (along < np.cos(PLANES.crease)))
         length = float(self.length[region][outer].sum())
         return length, float(self.length[region][sharp].sum()) / max(length, 1e-30)
 
@@ -231,10 +188,10 @@ def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: tuple
     moments.add(points)
     mean, axes, scatter = moments.plane()
     spread = np.sqrt(scatter[1:] / n)  # of y and x, metres
-    if n < 4 or noise > KNOWN * np.sqrt(scatter[1]):
+    if n < 4 or noise > PLANES.known * np.sqrt(scatter[1]):
         return None
     # A rectangle's sides are sqrt(12) times its standard deviations; a strip's width is twice its area by its outline.
-    if area < FILL * 12 * spread.prod() and noise * outline[0] > KNOWN * 4 * area:
+    if area < PLANES.fill * 12 * spread.prod() and noise * outline[0] > PLANES.known * 4 * area:
         return None
     z, y, x = ((points - mean) @ axes.T).T
     x, y = x / spread[1], y / spread[0]
@@ -242,7 +199,7 @@ def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: tuple
     bend = np.stack([x * x, x * y, y * y], 1)
     taken = np.linalg.lstsq(flat, bend, rcond=None)[0]
     u, s, vt = np.linalg.svd(bend - flat @ taken, full_matrices=False)
-    told = s > DETERMINED * np.sqrt(n)
+    told = s > PLANES.determined * np.sqrt(n)
     part = (u.T @ z)[told]
     # One in a row, by the metre: each determined term, alone.
     terms = np.concatenate([-(taken @ vt[told].T).T, vt[told]], 1)
@@ -263,12 +220,12 @@ def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: tuple
         """Whether chi squared is within three standard deviations."""
         return total < freedom + 3 * np.sqrt(2 * max(freedom, 1))
 
-    bent = explained > BENT * max(1, left / max(freedom, 1))
-    if likely((left + explained) / SPREAD**2, n - 3) and (
-        slope(c) < GENTLE if bent else np.hypot(slope(c), chance) < UNSURE
+    bent = explained > PLANES.bent * max(1, left / max(freedom, 1))
+    if likely((left + explained) / PLANES.spread**2, n - 3) and (
+        slope(c) < PLANES.gentle if bent else np.hypot(slope(c), chance) < PLANES.unsure
     ):
         return Sheet(mean, axes, np.zeros(6), region)
-    if bent and likely(left, freedom) and slope(c) < MOST_BENT and outline[1] > ENDS:
+    if bent and likely(left, freedom) and slope(c) < PLANES.most_bent and outline[1] > PLANES.ends:
         return Sheet(mean, axes, c, region)
     return None
 
@@ -302,7 +259,7 @@ def onto_sheets(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noi
 
         minimise  |x - smooth|^2 + STIFF^2 sum over sheets (distance of x)^2
 
-    Parameters as of `sheets_of`. A point that would go farther than `REACH` from where it was measured goes to its
+    Parameters as of `sheets_of`. A point that would go farther than `reach` from where it was measured goes to its
     largest sheet alone; one of no sheet, or too far even from that, is given back `smooth`. (p, 3) float.
     """
     sheets, grower = sheets_of(measured, smooth, faces, noise)
@@ -318,7 +275,7 @@ def onto_sheets(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noi
     largest = around.max(1).toarray().ravel()
     whole = np.bincount(faces.ravel(), np.repeat(grower.area, 3), len(measured))
     pair = around.tocoo()
-    keep = pair.data >= SHARE * whole[pair.row]
+    keep = pair.data >= PLANES.share * whole[pair.row]
     point, sheet = pair.row[keep], pair.col[keep]
     normal, gap = np.empty((len(point), 3)), np.empty(len(point))
     for part in by_label(sheet):
@@ -326,13 +283,13 @@ def onto_sheets(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noi
     facing = np.empty((len(measured), 3))
     main = sheet == first[point]
     facing[point[main]] = normal[main]
-    crossing = main | (np.abs((normal * facing[point]).sum(1)) < PARALLEL)
+    crossing = main | (np.abs((normal * facing[point]).sum(1)) < PLANES.parallel)
     for some in (main, crossing):  # last what all of a point's sheets ask for, where it may go there
-        p, n, g = point[some], STIFF * normal[some], STIFF * gap[some]
+        p, n, g = point[some], PLANES.stiff * normal[some], PLANES.stiff * gap[some]
         right = np.stack([np.bincount(p, -g * n[:, k], len(measured)) for k in range(3)], 1)
         system = np.stack([np.bincount(p, n[:, i] * n[:, j], len(measured)) for i in range(3) for j in range(3)], 1)
         way = np.linalg.solve(system.reshape(-1, 3, 3) + np.eye(3), right[..., None])[..., 0]
         there = smooth + way
-        fits = (largest >= SHARE * whole) & (np.linalg.norm(there - measured, axis=1) <= REACH * noise)
+        fits = (largest >= PLANES.share * whole) & (np.linalg.norm(there - measured, axis=1) <= PLANES.reach * noise)
         moved[fits] = there[fits]
     return moved

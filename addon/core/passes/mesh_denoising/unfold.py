@@ -14,22 +14,7 @@ from scipy.sparse.linalg import cg
 from scipy.spatial import cKDTree
 
 from ...scene.weld import ring_of
-
-STIFFEST = 4.0
-"""Of the first plate, as the noise over half an edge's length."""
-SHORTEST, AROUND = 0.25, 3
-"""Times the noise, edges are taken for no shorter; and rings of neighbours that their lengths are taken over. A bottle
-cap of 4 cm with edges of 2 mm under 4 to 5 mm of noise: normals off by 16 (half of it smooth) and 32 degrees in the
-median, 23 and 60 by the lengths as measured."""
-CROWD, NEAR = 8, 2.5
-"""A point is in a crowd with so many within that many times the noise, itself among them. A frame's thin profile has
-fewer: it would shrink to a line."""
-FINE, FINEST = 3.0, 4.0
-"""Times that the noise exceeds the length of edges, from where on a crowd counts, and where it does fully. The living
-room's bottle cap and skirting under 5 mm of independent noise: normals off by 31 and 2 degrees in the median, by 99
-and 73 for a tenth of the surface, without the second plate; by 10 and 2, 33 and 34 with it."""
-TOLERANCE, MOST_STEPS = 1e-3, 200
-"""Of each linear solve, by conjugate gradients."""
+from .params import UNFOLD
 
 
 def unfolded(points: np.ndarray, faces: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray]:
@@ -52,9 +37,9 @@ def unfolded(points: np.ndarray, faces: np.ndarray, noise: float) -> tuple[np.nd
     near = ring.tocoo()
     length = np.linalg.norm(points[near.row] - points[near.col], axis=1)
     by_length, by_shortest = (_mean(near, 1 / np.maximum(length, noise) ** power) for power in (1, 2))
-    stiff = np.minimum(2 * noise / _true(_usual_length(ring, near, length), noise), STIFFEST) ** 4
+    stiff = np.minimum(2 * noise / _true(_usual_length(ring, near, length), noise), UNFOLD.stiffest) ** 4
     fine = noise / _true(_shortest_length(near, length, by_shortest), noise)
-    crowded = _in_crowds(points, noise) * np.clip((fine - FINE) / (FINEST - FINE), 0, 1)
+    crowded = _in_crowds(points, noise) * np.clip((fine - UNFOLD.fine) / (UNFOLD.finest - UNFOLD.fine), 0, 1)
     system = sparse.eye(len(points))
     # Points of no triangle, as of parts too small to have a shape, have nothing to be drawn to.
     meant = sparse.diags(np.diff(ring.indptr) > 0, dtype=float)
@@ -66,11 +51,11 @@ def unfolded(points: np.ndarray, faces: np.ndarray, noise: float) -> tuple[np.nd
 
 
 def solved(
-    system: sparse.csr_matrix, right: np.ndarray, guess: np.ndarray | None = None, tolerance: float = TOLERANCE
+    system: sparse.csr_matrix, right: np.ndarray, guess: np.ndarray | None = None, tolerance: float = UNFOLD.tolerance
 ) -> np.ndarray:
     """The solution of a symmetric positive definite system, by conjugate gradients."""
     scaled = sparse.diags(1 / system.diagonal())
-    return cg(system, right, guess, rtol=tolerance, maxiter=MOST_STEPS, M=scaled)[0]
+    return cg(system, right, guess, rtol=tolerance, maxiter=UNFOLD.most_steps, M=scaled)[0]
 
 
 def _mean(near: sparse.coo_matrix, weight: np.ndarray) -> sparse.csr_matrix:
@@ -83,7 +68,7 @@ def _usual_length(ring: sparse.csr_matrix, near: sparse.coo_matrix, length: np.n
     """Root mean square of the edges around each point, (p,)."""
     degree = np.maximum(np.diff(ring.indptr), 1)
     squared = np.bincount(near.row, length**2, len(degree)) / degree
-    for _ in range(AROUND):
+    for _ in range(UNFOLD.around):
         squared = (squared + ring @ squared) / (1 + degree)
     return np.sqrt(squared)
 
@@ -99,10 +84,10 @@ def _shortest_length(near: sparse.coo_matrix, length: np.ndarray, mean: sparse.c
 
 def _true(length: np.ndarray, noise: float) -> np.ndarray:
     """What lengths are without the noise of both ends that is in them as measured."""
-    return np.sqrt(np.maximum(length**2 - 2 * noise**2, (SHORTEST * noise) ** 2))
+    return np.sqrt(np.maximum(length**2 - 2 * noise**2, (UNFOLD.shortest * noise) ** 2))
 
 
 def _in_crowds(points: np.ndarray, noise: float) -> np.ndarray:
-    """Points that have `CROWD` nearby, (p,) bool."""
-    distance, _ = cKDTree(points).query(points, [CROWD], distance_upper_bound=NEAR * noise)
+    """Points that have `crowd` nearby, (p,) bool."""
+    distance, _ = cKDTree(points).query(points, [UNFOLD.crowd], distance_upper_bound=UNFOLD.near * noise)
     return np.isfinite(distance[:, 0])

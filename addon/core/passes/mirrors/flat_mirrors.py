@@ -21,22 +21,7 @@ from ...light.mirrors import Mirror
 from ...scene.model import Instance
 from ...scene.samples import Samples
 from .mirrored import Views, sides_of, turned
-
-FLAT_SHARE = 0.8
-"""Share of an object's surface that must lie in one plane."""
-PLANE_SHARE = 0.02
-"""How far from that plane, as a share of the object's size."""
-ELEMENTS = 400
-TOGETHER = 0.6
-"""Least correlation, within the elements, of what they show and of what a mirror would."""
-LEAST_F0 = 0.2
-"""A black pane shows the room mirrored as well, as a dielectric: by 0.04 to 0.1 as it is looked at."""
-TELLS = 0.98
-"""Share of the deviation under the mesh's own plane that a turned one must come below. What a pane over a dark hearth
-shows tells nothing of its way: it was turned by a degree to take a hundredth off."""
-TILT, TILTS, FITTED = 0.01, 40, 6000
-"""Radians by which the plane is turned first to fit what is mirrored, how often, and observations for it: a scan's
-planes are off."""
+from .params import MIRRORS
 
 
 def plane_of(field: LightField, object_id: int) -> tuple[np.ndarray, np.ndarray] | None:
@@ -52,8 +37,8 @@ def plane_of(field: LightField, object_id: int) -> tuple[np.ndarray, np.ndarray]
     at = np.flatnonzero(index == largest)
     n, point = normal[at[0]], np.median(position[at], 0)
     size = float(np.linalg.norm(np.ptp(position, axis=0)))
-    within = (normal @ n > FLAT) & (np.abs((position - point) @ n) < PLANE_SHARE * size)
-    if area[within].sum() < FLAT_SHARE * area.sum():
+    within = (normal @ n > FLAT) & (np.abs((position - point) @ n) < MIRRORS.plane_share * size)
+    if area[within].sum() < MIRRORS.flat_share * area.sum():
         return None
     return point.astype(np.float32), n.astype(np.float32)
 
@@ -74,8 +59,8 @@ def find_mirrors(
         own = np.flatnonzero((owner == instance.object_id) & ~samples.saturated)
         own = own[field.atlas.normal[samples.element[own]] @ normal > FLAT]
         elements = np.unique(samples.element[own])
-        if len(elements) > ELEMENTS:
-            own = own[np.isin(samples.element[own], rng.choice(elements, ELEMENTS, replace=False))]
+        if len(elements) > MIRRORS.elements:
+            own = own[np.isin(samples.element[own], rng.choice(elements, MIRRORS.elements, replace=False))]
         found = _mirrored(Views.of(field, samples, own), field.atlas.normal[samples.element[own]], normal)
         if found is not None:
             mirrors.append(Mirror(instance.object_id, point, *found))
@@ -93,17 +78,17 @@ def _mirrored(views: Views, facing: np.ndarray, normal: np.ndarray) -> tuple[np.
         Of the mesh's plane.
     """
     off, own, together, f0 = views.compare(facing)
-    if not (off < own and together > TOGETHER and f0.mean() > LEAST_F0):
+    if not (off < own and together > MIRRORS.together and f0.mean() > MIRRORS.least_f0):
         return None
     sides = sides_of(normal)
-    few = views.part(np.arange(0, len(views), -(-len(views) // FITTED)))
+    few = views.part(np.arange(0, len(views), -(-len(views) // MIRRORS.fitted)))
     by = np.zeros(2)
     # What goes together finds the way from farther, what is least off tells it more closely.
     for cost in (lambda way: -few.compare(way)[2], few.off):
-        first = by + TILT * np.array([[0, 0], [1, 0], [0, 1]])
-        how = {"initial_simplex": first, "maxfev": TILTS, "xatol": 3e-4, "fatol": 1e-4}
+        first = by + MIRRORS.tilt * np.array([[0, 0], [1, 0], [0, 1]])
+        how = {"initial_simplex": first, "maxfev": MIRRORS.tilts, "xatol": 3e-4, "fatol": 1e-4}
         by = minimize(lambda x, cost=cost: cost(turned(normal, sides, x)), by, method="Nelder-Mead", options=how).x
     found = turned(normal, sides, by)
-    if not few.off(found) < TELLS * few.off(normal):
+    if not few.off(found) < MIRRORS.tells * few.off(normal):
         found = np.asarray(normal, np.float32)
     return found, np.clip(f0, 0.02, 1).astype(np.float32)

@@ -8,14 +8,7 @@ import numpy as np
 
 from ...light.field import LightField
 from ...scene.samples import Samples
-
-LEAST = 100
-"""Observations whose mirrored direction shows something that frames saw; with fewer nothing is said."""
-DARK = 1e-5
-"""What nobody saw is dark in the field so far."""
-MOST_OFF = 0.5
-"""Most that one observation counts for, in log radiance: beside an edge a ray of a slightly other way meets something
-else altogether."""
+from .params import MIRRORS
 
 
 @dataclass(frozen=True)
@@ -56,8 +49,8 @@ class Views:
         """Which observations ((k,) int) a mirror that faces `normals` shows something known in, and what ((k, 3))."""
         along = 2 * np.einsum("ij,ij->i", self.direction, np.broadcast_to(normals, self.direction.shape))[:, None]
         shown = self.field.along(self.origin, (along * normals - self.direction).astype(np.float32))[0]
-        known = np.flatnonzero(shown.mean(1) > DARK)
-        return None if len(known) < LEAST else (known, shown[known])
+        known = np.flatnonzero(shown.mean(1) > MIRRORS.dark)
+        return None if len(known) < MIRRORS.least else (known, shown[known])
 
     def off(self, normal: np.ndarray) -> float:
         """Mean absolute deviation of log radiance from a mirror that faces one way ((3,)); inf where too little is
@@ -67,8 +60,8 @@ class Views:
         if found is None:
             return np.inf
         known, shown = found
-        ratio = np.log(np.maximum(self.radiance[known].mean(1), DARK)) - np.log(shown.mean(1))
-        return float(np.minimum(np.abs(ratio - np.median(ratio)), MOST_OFF).mean())
+        ratio = np.log(np.maximum(self.radiance[known].mean(1), MIRRORS.dark)) - np.log(shown.mean(1))
+        return float(np.minimum(np.abs(ratio - np.median(ratio)), MIRRORS.most_off).mean())
 
     def compare(self, normals: np.ndarray) -> tuple[float, float, float, np.ndarray]:
         """How well a mirror that faces `normals` ((m, 3) or (3,)) explains what was seen.
@@ -86,12 +79,12 @@ class Views:
             return np.inf, 0.0, 0.0, np.zeros(3)
         known, shown = found
         seen = self.radiance[known]
-        a, b = (np.log(np.maximum(x.mean(1), DARK)) for x in (seen, shown))
+        a, b = (np.log(np.maximum(x.mean(1), MIRRORS.dark)) for x in (seen, shown))
         _, group, count = np.unique(self.element[known], return_inverse=True, return_counts=True)
         own_a, own_b = (x - (np.bincount(group, x) / count)[group] for x in (a, b))
         together = float(np.mean(own_a * own_b) / max(own_a.std() * own_b.std(), 1e-12))
         off = float(np.median(np.abs(a - b - np.median(a - b))))
-        return off, float(np.median(np.abs(own_a))), together, np.median(seen / np.maximum(shown, DARK), 0)
+        return off, float(np.median(np.abs(own_a))), together, np.median(seen / np.maximum(shown, MIRRORS.dark), 0)
 
 
 def sides_of(normal: np.ndarray) -> np.ndarray:

@@ -22,49 +22,13 @@ from ...parallel import ordered_map
 from ...progress import Progress, Rounds
 from ...scene.model import Camera, Frame, Pixels
 from ...weighted import weighted_median
+from .params import POSES
 
 if TYPE_CHECKING:
     from ...light.field import LightField
 
-CHECKED = 16
-"""Frames, evenly spread, that tell whether poses are off."""
-LEAST_SHIFT = 0.4
-"""Pixels of the small picture, median over the frames: less is what good poses show for highlights, texels and noise.
-Six rooms with their true poses have 0.05 to 0.23; the living room with poses off by 5 mm and 0.2 degrees has 0.7."""
-WIDTH = 480
-"""Pictures are made smaller to at most about so many pixels across."""
-PIXELS = 6000
-"""Those of the steepest gradients. Living room, poses off as above: 0.30 pixels left with 6,000 as with 12,000."""
-SAMPLES = 2
-"""Rays along an edge of each of these pixels, so that the texture's edges are as soft as the picture's."""
-BLUR = 1.0
-"""Pixels, standard deviation, that gradients are taken over."""
-BORDER = 3
-"""Pixels along the picture's edges that don't count."""
-LEAST_PIXELS = 200
-LEAST_GRADIENT = 0.01
-FLOOR = 0.1
-"""Share of the room's median radiance that is added before the logarithm: noise in the dark says nothing."""
-ROUNDS = 2
-REWEIGHTED = 8
-"""Rounds of robust weights within each."""
-TUNING = 2.0
-"""Residuals beyond so many times their spread count as highlights, occlusion, moved things."""
-LEAST_SPREAD = 0.05
-"""Of the logarithm: a picture of flat colours fits to the last bit but at its edges, all that there is to go by."""
-INDEPENDENT = 0.05
-"""Share of the pixels that err on their own: neighbours share what the texture has wrong."""
 ROTATION, WAY = np.radians(1.0), 0.03
 """Radians and metres, standard deviations that are expected: what the pictures don't tell stays as it is."""
-FARTHEST = 4.0
-"""Pixels; a longer shift is not found by following gradients, and the frame is left where it is."""
-STRAY = 4.0
-"""Times the median shift: so is a frame that would go farther than this. It shows mirrors, or something that moved."""
-WORSE = 1.05
-"""A frame goes back if it then fits this much worse. What it costs is mostly what the texture has wrong: without any
-slack a third of two rooms' frames went back, most of them from better places."""
-SKY = 100.0
-"""Times the room's diagonal, where rays that escape are taken to end."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +79,7 @@ class Texture:
     @cached_property
     def floor(self) -> float:
         """Radiance that is added before the logarithm."""
-        return max(FLOOR * float(np.median(self.field.radiance[self.seen])), 1e-30)
+        return max(POSES.floor * float(np.median(self.field.radiance[self.seen])), 1e-30)
 
     def shown(self, camera: Camera, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What a camera sees in pixels of columns `x` and rows `y` ((m,) int).
@@ -129,18 +93,21 @@ class Texture:
             All that it shows has an L_d.
         """
         radiance = np.zeros((len(x), 3))
-        distance = np.full(len(x), SKY * self.field.scene.diagonal)
+        distance = np.full(len(x), POSES.sky * self.field.scene.diagonal)
         known = np.ones(len(x), bool)
         origins = np.broadcast_to(camera.centre.astype(np.float32), (len(x), 3))
-        for part in range(SAMPLES**2):
-            at = np.stack([x + (part % SAMPLES + 0.5) / SAMPLES, y + (part // SAMPLES + 0.5) / SAMPLES], -1)
+        for part in range(POSES.samples**2):
+            at = np.stack(
+                [x + (part % POSES.samples + 0.5) / POSES.samples, y + (part // POSES.samples + 0.5) / POSES.samples],
+                -1,
+            )
             directions, led = camera.rays(at)
             hits = self.field.scene.intersect(origins, directions)
             element = self.field.elements(hits)
             radiance += self.field.arriving(hits, element, directions)
             distance = np.minimum(distance, hits.distance)
             known &= led & ((element < 0) | self.seen[element])
-        return radiance / SAMPLES**2, distance, known
+        return radiance / POSES.samples**2, distance, known
 
 
 @dataclass(frozen=True)
@@ -192,18 +159,23 @@ def step_of(camera: Camera, pixels: Pixels, texture: Texture) -> Step | None:
     """
     floor = texture.floor
     picture = np.log(np.maximum(pixels.radiance, 0) + floor).mean(-1).astype(np.float64)
-    good = minimum_filter(pixels.valid & ~pixels.saturated, 2 * round(2 * BLUR) + 1)
-    good[:BORDER], good[-BORDER:], good[:, :BORDER], good[:, -BORDER:] = False, False, False, False
-    dx, dy = (gaussian_filter(picture, BLUR, order=order) for order in ((0, 1), (1, 0)))
+    good = minimum_filter(pixels.valid & ~pixels.saturated, 2 * round(2 * POSES.blur) + 1)
+    good[: POSES.border], good[-POSES.border :], good[:, : POSES.border], good[:, -POSES.border :] = (
+        False,
+        False,
+        False,
+        False,
+    )
+    dx, dy = (gaussian_filter(picture, POSES.blur, order=order) for order in ((0, 1), (1, 0)))
     steep = np.where(good, np.hypot(dx, dy), 0)
-    count = min(PIXELS, steep.size - 1)
-    least = max(float(np.partition(steep.ravel(), -count)[-count]), LEAST_GRADIENT)
+    count = min(POSES.pixels, steep.size - 1)
+    least = max(float(np.partition(steep.ravel(), -count)[-count]), POSES.least_gradient)
     y, x = np.nonzero(steep >= least)
-    if len(x) < LEAST_PIXELS:
+    if len(x) < POSES.least_pixels:
         return None
     radiance, distance, known = texture.shown(camera, x, y)
     x, y = x[known], y[known]
-    if len(x) < LEAST_PIXELS:
+    if len(x) < POSES.least_pixels:
         return None
     residual = picture[y, x] - np.log(np.maximum(radiance[known], 0) + floor).mean(-1)
     directions = camera.directions(np.stack([x + 0.5, y + 0.5], -1)).astype(np.float64)
@@ -214,7 +186,7 @@ def step_of(camera: Camera, pixels: Pixels, texture: Texture) -> Step | None:
     way = _fit(np.column_stack([change, np.ones(len(x))]), residual, telling)
     far = float(np.sqrt(((flow @ way) ** 2).sum(1).mean()))
     left = np.abs(residual - weighted_median(residual, telling))
-    return Step(way, far, float(np.average(np.minimum(left, TUNING * LEAST_SPREAD), weights=telling)))
+    return Step(way, far, float(np.average(np.minimum(left, POSES.tuning * POSES.least_spread), weights=telling)))
 
 
 def _fit(change: np.ndarray, residual: np.ndarray, telling: np.ndarray) -> np.ndarray:
@@ -225,10 +197,10 @@ def _fit(change: np.ndarray, residual: np.ndarray, telling: np.ndarray) -> np.nd
     """
     prior = np.diag(np.r_[np.full(3, ROTATION**-2), np.full(3, WAY**-2), 0])
     way = np.zeros(7)
-    for _ in range(REWEIGHTED):
+    for _ in range(POSES.reweighted):
         left = residual - change @ way
-        spread = max(1.4826 * weighted_median(np.abs(left), telling), LEAST_SPREAD)
-        weight = INDEPENDENT / spread**2 / (1 + (left / (TUNING * spread)) ** 2)
+        spread = max(1.4826 * weighted_median(np.abs(left), telling), POSES.least_spread)
+        weight = POSES.independent / spread**2 / (1 + (left / (POSES.tuning * spread)) ** 2)
         weighted = change * weight[:, None]
         way = np.linalg.solve(weighted.T @ change + prior, weighted.T @ residual)
     return way[:6]
@@ -254,7 +226,7 @@ def refine_poses(
     Returns
     -------
     Poses
-        As read if the frames fit already (`LEAST_SHIFT`). Frames that show too little, or fit no better elsewhere,
+        As read if the frames fit already (`least_shift`). Frames that show too little, or fit no better elsewhere,
         stay where they are in any case.
 
     Raises
@@ -265,24 +237,24 @@ def refine_poses(
 
     def look(item: tuple[Frame, Camera]) -> Step | None:
         frame, camera = item
-        step = -(-camera.width // WIDTH)
+        step = -(-camera.width // POSES.width)
         return step_of(camera.coarser(step), read(frame).coarser(step), texture)
 
-    asked = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, CHECKED).round().astype(int))]
+    asked = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, POSES.checked).round().astype(int))]
     found = [step for step in ordered_map(look, [(frame, frame.camera) for frame in asked], threads) if step]
     shift = float(np.median([step.shift for step in found])) if found else float("nan")
-    if not shift >= LEAST_SHIFT:
+    if not shift >= POSES.least_shift:
         return Poses.as_read(frames, shift)
     cameras = [frame.camera for frame in frames]
-    cost, farthest = np.full(len(frames), np.inf), min(FARTHEST, STRAY * shift)
+    cost, farthest = np.full(len(frames), np.inf), min(POSES.farthest, POSES.stray * shift)
     moves = np.ones(len(frames), bool)
-    for turn in range(ROUNDS):
+    for turn in range(POSES.rounds):
         todo = np.flatnonzero(moves)
         steps = ordered_map(look, [(frames[i], cameras[i]) for i in todo], threads)
         for done, (i, step) in enumerate(zip(todo, steps, strict=True), 1):
             if progress is not None:
-                progress.update((turn + done / len(todo)) / ROUNDS)
-            if step is None or step.shift > farthest or step.cost > WORSE * cost[i]:
+                progress.update((turn + done / len(todo)) / POSES.rounds)
+            if step is None or step.shift > farthest or step.cost > POSES.worse * cost[i]:
                 cameras[i], moves[i] = frames[i].camera, False
             else:
                 cameras[i], cost[i] = moved(cameras[i], step.way), step.cost

@@ -16,27 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...fit.lobe_fit import HUBER, ROUNDS, LobeFit, huber
+from ...fit.lobe_fit import LobeFit, huber
+from ...fit.params import LOBE_FIT
 from ...fit.problem import DenseProblem, Problem
 from ...fit.transmission import SeeThrough
 from ...light.field import LightField
-
-SURFACES = 8
-"""Of one object, crossed by a ray, at most."""
-LEAST_VIEWS = 4
-LEAST_ELEMENTS, LEAST_TOLD = 12, 0.1
-"""At least so many elements, and this share of those that were looked at, must have a background that frames know. A
-brass pole three pixels wide passed for glass by 6 % of its elements, whose pixels truly mixed it with the wall behind;
-glass and foliage had 78 to 91 %."""
-LEAST_PASSED = 0.1
-"""Less than this share of the background, or of the elements with a hole, is nothing to set an object apart for."""
-MIN_GAIN, MIN_SIGMAS = 0.1, 3.0
-"""The held-out cost must fall by this share against the best opaque model, and by this many standard errors. Of opaque
-objects in the living room and four small rooms none gained more than 0.08, and none passed more than 0.02."""
-INSIDE = 3.0
-"""Times the mesh's noise that a ray must be from an object's outline, to tell whether the object lets through what is
-behind it. A bottle cap of 4 cm, inflated by a scan's error, passed for glass: its outermost centimetre truly showed
-the room behind."""
+from .params import SEE_THROUGH
 
 
 @dataclass(frozen=True)
@@ -79,7 +64,7 @@ def look_behind(
     radiance, known = np.zeros((len(element), 3), np.float32), np.zeros(len(element), bool)
     surfaces = np.ones(len(element), int)
     left = np.arange(len(element))
-    for _ in range(SURFACES):
+    for _ in range(SEE_THROUGH.surfaces):
         hits = scene.intersect(origin[left], onward[left])
         met = field.elements(hits)
         own = (met >= 0) & (field.mesh.object_id[hits.triangle] == object_id)
@@ -94,7 +79,7 @@ def look_behind(
         origin[left] += step[:, None] * onward[left]
         surfaces[left] += 1
     if noise > 0:
-        known &= _well_inside(field, element, direction, object_id, INSIDE * noise)
+        known &= _well_inside(field, element, direction, object_id, SEE_THROUGH.inside * noise)
     return Behind(radiance, known, surfaces)
 
 
@@ -126,8 +111,8 @@ def judge(problem: Problem, behind: Behind, lobe: LobeFit | None, scale: float) 
     """
     dense = DenseProblem(problem)
     there = dense.there * dense.each(behind.known[:, None].astype(np.float32))[0]
-    told = there.sum(0) >= LEAST_VIEWS
-    if told.sum() < max(LEAST_ELEMENTS, LEAST_TOLD * len(told)):
+    told = there.sum(0) >= SEE_THROUGH.least_views
+    if told.sum() < max(SEE_THROUGH.least_elements, SEE_THROUGH.least_told * len(told)):
         return None
     b = dense.relative(behind.radiance)[..., told]
     dense, there = dense.part(told), there[:, told]
@@ -168,7 +153,11 @@ def judge(problem: Problem, behind: Behind, lobe: LobeFit | None, scale: float) 
 
 def is_sure(found: SeeThrough) -> bool:
     """Whether the object is to be set apart."""
-    return found.transmission >= LEAST_PASSED and found.gain > MIN_GAIN and found.sigmas > MIN_SIGMAS
+    return (
+        found.transmission >= SEE_THROUGH.least_passed
+        and found.gain > SEE_THROUGH.min_gain
+        and found.sigmas > SEE_THROUGH.min_sigmas
+    )
 
 
 def _less_own(values: np.ndarray, train: np.ndarray) -> np.ndarray:
@@ -184,8 +173,8 @@ def _cost(rest: np.ndarray, views: np.ndarray, scale: float) -> np.ndarray:
 def _transmission(values: np.ndarray, behind: np.ndarray, train: np.ndarray, scale: float) -> float:
     """Share of the background in the values, by iteratively reweighted least squares."""
     tau, weight = 0.0, train
-    for _ in range(ROUNDS):
+    for _ in range(LOBE_FIT.rounds):
         tau = float(np.clip((weight * values * behind).sum() / max((weight * behind**2).sum(), 1e-20), 0, 1))
         size = np.sqrt(np.square(values - tau * behind).mean(0))
-        weight = train * np.minimum(1, HUBER * scale / np.maximum(size, 1e-12))
+        weight = train * np.minimum(1, LOBE_FIT.huber * scale / np.maximum(size, 1e-12))
     return tau

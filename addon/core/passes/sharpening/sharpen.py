@@ -25,16 +25,7 @@ from ...scene.model import Camera, Frame, Pixels
 from ...scene.params import VISIBILITY
 from ...scene.surface import Surface
 from ...scene.visibility import CLEAN
-
-MIDDLE, CORNER = 2 / 3, 1 / 12
-"""Weights of a pixel's middle and corners: together they give what is quadratic over the pixel its true mean."""
-FLOOR = 0.02
-"""Share of the room's median radiance that is added to both sides of the ratio: in the dark it is all noise."""
-DETAIL = 0.02
-"""Share of its radiance by which an element must differ from the mean of the texels around it: where L_d is even, there
-is nothing to make sharper."""
-MOST = 2.0
-"""Times that L_d may become brighter or darker."""
+from .params import SHARPENING
 
 
 def sharpened(
@@ -67,7 +58,7 @@ def sharpened(
     """
     atlas = surface.atlas
     lookup = lookup or ElementLookup(surface.mesh, atlas)
-    floor = np.float32(max(FLOOR * float(np.median(lit.radiance[lit.seen])), 1e-30))
+    floor = np.float32(max(SHARPENING.floor * float(np.median(lit.radiance[lit.seen])), 1e-30))
     good = (lit.tier == CLEAN) & (lit.count >= VISIBILITY.enough) & _detailed(lit, atlas)
 
     def ratios(frame: Frame) -> Pixels:
@@ -79,7 +70,7 @@ def sharpened(
 
     found = accumulate(surface.mesh, atlas, surface.scene, frames, ratios, only=good, **how)
     told = good & (found.tier == CLEAN) & (found.count >= VISIBILITY.enough)
-    ratio = np.where(told[:, None], np.clip(found.radiance, 1 / MOST, MOST), 1).astype(np.float32)
+    ratio = np.where(told[:, None], np.clip(found.radiance, 1 / SHARPENING.most, SHARPENING.most), 1).astype(np.float32)
     return replace(lit, radiance=lit.radiance * ratio, lower=lit.lower * ratio, upper=lit.upper * ratio)
 
 
@@ -91,7 +82,7 @@ def _detailed(lit: LitDiffuse, atlas: Atlas) -> np.ndarray:
     level[1, atlas.texel[known]] = 1
     total, count = (uniform_filter(part.reshape(atlas.size, -1), 3).ravel()[atlas.texel] for part in level)
     own = level[0, atlas.texel]
-    return np.abs(own - total / np.maximum(count, 1e-6)) > DETAIL * own
+    return np.abs(own - total / np.maximum(count, 1e-6)) > SHARPENING.detail * own
 
 
 def _shown(camera: Camera, surface: Surface, lookup: Callable, lit: LitDiffuse) -> np.ndarray:
@@ -118,4 +109,4 @@ def _shown(camera: Camera, surface: Surface, lookup: Callable, lit: LitDiffuse) 
     corner = np.full((height + 1, width + 1, 3), np.nan, np.float32)
     corner[wanted] = traced(np.argwhere(wanted)[:, ::-1].astype(float))
     around = corner[1:, 1:] + corner[1:, :-1] + corner[:-1, 1:] + corner[:-1, :-1]
-    return np.float32(MIDDLE) * middle + np.float32(CORNER) * around
+    return np.float32(SHARPENING.middle) * middle + np.float32(SHARPENING.corner) * around

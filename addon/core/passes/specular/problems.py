@@ -12,7 +12,8 @@ from ...brdf.model import Microfacets
 from ...fit.problem import Problem
 from ...light.emitters import bright_triangles
 from ...light.field import LightField
-from ...light.lobes import GRID, PROPOSALS, LobeLight, reflected_light
+from ...light.lobes import GRID, LobeLight, reflected_light
+from ...light.params import GATHER
 from ...scene.samples import Samples
 from ...significance import LEVELS
 from .params import FIT
@@ -86,7 +87,7 @@ class Problems:
         Those that come out noisy are done again with more rays, unless it need only be `rough`.
         """
         grid = GRID if phi is None else np.array([phi], np.float32)
-        proposals: Sequence[float] = PROPOSALS if phi is None else (phi,)
+        proposals: Sequence[float] = GATHER.proposals if phi is None else (phi,)
 
         def light(some: np.ndarray, count: int) -> LobeLight:
             element, direction = self._samples.element[some], self._samples.direction[some]

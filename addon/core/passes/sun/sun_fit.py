@@ -18,35 +18,16 @@ from ...light.environment import Environment
 from ...light.field import LightField
 from ...light.sun import Sun, around
 from ...luminance import LUMINANCE
-from .sun_spots import LIT, Edges, Guess, Spots, visible
+from .params import SUN
+from .sun_spots import Edges, Guess, Spots, visible
 
-FEWEST = 12
-"""With fewer in the sample that stand out, no sun is looked for."""
 GRID = float(np.radians(4.0))
-REACHED = 0.05
-"""Least share of what stands out that a direction must reach."""
-KEPT, TRIED = 160, 4
-"""Directions of the grid of which the whole sample is asked, and that are then refined."""
-POOL = 60_000
-NEAR, DENSE = 0.3, 2000
-"""Metres around what stands out; elements from there, and from elsewhere on the same objects, for the refinement."""
 SHARP = np.radians([2.0, 1.0, 0.5])
 """Steps of the direction, with a point-like sun."""
-EDGES = 2000
-"""Elements that the last refinement looks at: those over which the shadows' edges pass within `ASTRAY` of the
-direction."""
 ASTRAY = float(np.radians(2.5))
 SOFT = np.radians([0.8, 0.4, 0.2])
 RADII = np.radians([0.27, 0.5, 0.75, 1.0])
 """Discs that are tried: thin clouds, and pictures and meshes that are not sharp, soften the edges."""
-MIN_GAIN = 0.1
-"""The spread of log albedo around the patch, and the differences of neighbours along its edges, must each fall by at
-least this share. A bedroom with a sun: 0.28 to 0.39 and 0.25, with a striped blanket in it; a box with one: 0.63 and
-0.65. A living room without one: 0.01. Bright rectangles on a box's floor: up to 0.45, but no gain along the edges."""
-EXPLAINED = 0.5
-"""Share of the elements short of light within the patch that must not be so with the sun."""
-COLOUR = 1.6
-"""A channel's irradiance differs from the luminance by this factor at most: a low sun's is 1.4 and 0.65."""
 
 
 def _directions() -> np.ndarray:
@@ -75,13 +56,13 @@ def _on_grid(even: Spots, environment: Environment) -> list[Guess]:
     hidden = even.scene.occluded(start[spot], way[ray], np.full(len(spot), np.inf, np.float32))
     weight = np.clip(excess[out], 0, 3)
     reached = np.bincount(ray[~hidden], weight[spot[~hidden]], len(way)) / max(weight.sum(), 1e-9)
-    best = np.argsort(-reached, kind="stable")[:KEPT]
-    guesses = [even.explained(way[k]) for k in best if reached[k] > REACHED]
+    best = np.argsort(-reached, kind="stable")[: SUN.kept]
+    guesses = [even.explained(way[k]) for k in best if reached[k] > SUN.reached]
     chosen: list[Guess] = []
     for guess in sorted(guesses, key=lambda one: one.cost):
         if all(guess.direction @ one.direction < np.cos(1.5 * GRID) for one in chosen):
             chosen.append(guess)
-    return chosen[:TRIED]
+    return chosen[: SUN.tried]
 
 
 def _searched(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np.ndarray) -> Guess:
@@ -101,19 +82,19 @@ def _along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng
     position, normal = field.atlas.position[pool], field.atlas.normal[pool]
     lit = np.stack([visible(field.scene, way, position, normal) > 0.1 for way in ways])
     mixed = pool[lit.any(0) & ~lit.all(0)]
-    return np.sort(rng.choice(mixed, min(len(mixed), EDGES), replace=False))
+    return np.sort(rng.choice(mixed, min(len(mixed), SUN.edges), replace=False))
 
 
 def _pool(field: LightField, good: np.ndarray, even: Spots, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Elements of the objects on which something stands out ((k,)), and whether they lie `NEAR` that ((k,) bool)."""
+    """Elements of the objects on which something stands out ((k,)), and whether they lie `near` that ((k,) bool)."""
     atlas, out = field.atlas, even.stands_out()
     pool = np.flatnonzero(good & np.isin(atlas.object_id, even.sample.object_id[out]))
-    pool = np.sort(rng.choice(pool, min(len(pool), POOL), replace=False))
+    pool = np.sort(rng.choice(pool, min(len(pool), SUN.pool), replace=False))
 
     def key(element: np.ndarray) -> np.ndarray:
         return np.concatenate([atlas.position[element], 100.0 * atlas.object_id[element][:, None]], 1)
 
-    far, _ = cKDTree(key(even.sample.element[out])).query(key(pool), distance_upper_bound=NEAR)
+    far, _ = cKDTree(key(even.sample.element[out])).query(key(pool), distance_upper_bound=SUN.near)
     return pool, np.isfinite(far)
 
 
@@ -168,10 +149,10 @@ def find_sun(
         E by all known light at elements, (k,) int -> (k, 3) float64.
     """
     free = ~np.isin(field.atlas.object_id[element], lamps)
-    if free.sum() < FEWEST:
+    if free.sum() < SUN.fewest:
         return None
     even = Spots(field, element[free], received[free])
-    if even.stands_out().sum() < FEWEST:
+    if even.stands_out().sum() < SUN.fewest:
         return None
     guesses = _on_grid(even, field.environment)
     if not guesses or guesses[0].cost >= even.spread():
@@ -179,15 +160,15 @@ def find_sun(
     rng = np.random.default_rng([seed, 3])
     pool, near = _pool(field, good & ~np.isin(field.atlas.object_id, lamps), even, rng)
     chosen = [rng.choice(part, min(len(part), count), replace=False)
-              for part, count in ((pool[near], DENSE * 2 // 3), (pool[~near], DENSE // 3))]  # fmt: skip
+              for part, count in ((pool[near], SUN.dense * 2 // 3), (pool[~near], SUN.dense // 3))]  # fmt: skip
     dense = np.sort(np.concatenate(chosen))
     spots = Spots(field, dense, irradiance(dense))
     tried = [_searched(spots.explained, spots.explained(one.direction), SHARP) for one in guesses]
     best, before = min(tried, key=lambda one: one.cost), spots.spread()
-    if best.cost > (1 - MIN_GAIN) * before:
+    if best.cost > (1 - SUN.min_gain) * before:
         return None
     along = _along_edges(field, pool, best.direction, rng)
-    if len(along) < FEWEST:
+    if len(along) < SUN.fewest:
         return None
     edges = Edges(Spots(field, along, irradiance(along)))
     found = min((edges.explained(best.direction, best.strength, r) for r in RADII), key=lambda one: one.cost)
@@ -202,12 +183,12 @@ def find_sun(
         found = min((edges.explained(found.direction, strength, r) for r in RADII), key=lambda one: one.cost)
     thrown = spots.thrown(found.direction, found.radius)
     after = spots.spread(thrown, found.strength)
-    short = spots.over() & (thrown > LIT)
+    short = spots.over() & (thrown > SUN.lit)
     left = short & spots.over(thrown, found.strength)
     if (
-        found.cost > (1 - MIN_GAIN) * edges.differ()
-        or after > (1 - MIN_GAIN) * before
-        or left.sum() > (1 - EXPLAINED) * short.sum()
+        found.cost > (1 - SUN.min_gain) * edges.differ()
+        or after > (1 - SUN.min_gain) * before
+        or left.sum() > (1 - SUN.explained) * short.sum()
     ):
         return None
     return SolvedSun(_coloured(spots, found.direction, found.radius, before, after), spots, before, after)
@@ -218,7 +199,7 @@ def _coloured(spots: Spots, direction: np.ndarray, radius: float, before: float,
     thrown = spots.thrown(direction, radius)
     luminance = spots.strength(thrown)
     channels = np.array([spots.strength(thrown, np.eye(3)[c]) for c in range(3)])
-    channels = np.clip(channels, luminance / COLOUR, luminance * COLOUR)
+    channels = np.clip(channels, luminance / SUN.colour, luminance * SUN.colour)
     light = (channels * (luminance / float(channels @ LUMINANCE))).astype(np.float32)
     sun = Sun(np.asarray(direction, np.float32), light, radius)
     note = (

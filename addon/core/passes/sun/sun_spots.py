@@ -8,19 +8,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...light.field import LightField
-from ...light.light_fit import COARSE, Sample
+from ...light.light_fit import Sample
+from ...light.params import LIGHT_FIT
 from ...light.sun import Sun, shadow
 from ...luminance import LUMINANCE
 from ...scene.rays import RayScene
-
-OVER = 1.2
-"""Elements that reflect more than this share of what they get are short of light."""
-STANDS_OUT = 1.0
-"""So may be those whose log albedo is so far above their object's median (2.7 times)."""
-LIT = 0.02
-"""Cosine from which on something counts as lit by the sun."""
-PAIR = 0.12
-"""How far apart two elements may lie, in metres, to be compared."""
+from .params import SUN
 
 
 def visible(scene: RayScene, direction: np.ndarray, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -81,12 +74,12 @@ class Spots:
 
     def over(self, thrown: np.ndarray | float = 0.0, strength: float = 0.0) -> np.ndarray:
         """Elements short of light, (m,) bool."""
-        return self.log_albedo(thrown, strength) > np.log(OVER)
+        return self.log_albedo(thrown, strength) > np.log(SUN.over)
 
     def stands_out(self) -> np.ndarray:
         """Those, and what is much brighter than the rest of its object, (m,) bool."""
         value = self.log_albedo()
-        return self.over() | (value - self.medians(value, np.ones(len(self), bool)) > STANDS_OUT)
+        return self.over() | (value - self.medians(value, np.ones(len(self), bool)) > SUN.stands_out)
 
     def thrown(self, direction: np.ndarray, radius: float = 0.0) -> np.ndarray:
         """E at an irradiance of 1, (m,) float32; without a radius that of a point in the sky."""
@@ -106,7 +99,7 @@ class Spots:
 
     def strength(self, thrown: np.ndarray, weights=LUMINANCE) -> float:
         """Irradiance that makes what is lit as bright as it is, if its albedo is that of its object's shaded rest."""
-        lit = thrown > LIT
+        lit = thrown > SUN.lit
         rho = np.exp(self.medians(self.log_albedo(weights=weights), thrown <= 0))
         use = lit & np.isfinite(rho)
         if use.sum() < 3:
@@ -115,7 +108,7 @@ class Spots:
         return max(float(np.median((sent[use] / rho[use] - received[use]) / thrown[use])), 0.0)
 
     def spread(self, thrown: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
-        return self.sample.spread(self.log_albedo(thrown, strength), COARSE)
+        return self.sample.spread(self.log_albedo(thrown, strength), LIGHT_FIT.coarse)
 
     def explained(self, direction: np.ndarray) -> Guess:
         """The direction with its strength and the spread that it leaves."""
@@ -130,14 +123,14 @@ class Edges:
     def __init__(self, spots: Spots):
         self.spots = spots
         key = np.concatenate([spots.position, 0.2 * spots.normal, 100.0 * spots.sample.group[:, None]], 1)
-        far, other = cKDTree(key).query(key, k=min(9, len(key)), distance_upper_bound=PAIR)
+        far, other = cKDTree(key).query(key, k=min(9, len(key)), distance_upper_bound=SUN.pair)
         self.a, k = np.nonzero(np.isfinite(far[:, 1:]))
         self.b = other[:, 1:][self.a, k]
 
     def differ(self, thrown: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
         """Mean difference of log albedo between neighbours, each held at `COARSE`."""
         value = self.spots.log_albedo(thrown, strength)
-        return float(np.minimum(np.abs(value[self.a] - value[self.b]), COARSE).mean()) if len(self.a) else 0.0
+        return float(np.minimum(np.abs(value[self.a] - value[self.b]), LIGHT_FIT.coarse).mean()) if len(self.a) else 0.0
 
     def explained(self, direction: np.ndarray, strength: float, radius: float) -> Guess:
         return Guess(direction, self.differ(self.spots.thrown(direction, radius), strength), strength, radius)

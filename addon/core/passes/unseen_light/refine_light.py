@@ -6,20 +6,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...light.lamps import AGREES, Lamp, twin
+from ...light.lamps import Lamp, twin
 from ...light.light_fit import Sample
+from ...light.params import LIGHT_FIT
 from ...luminance import LUMINANCE
 from ...scene.model import Instance
-
-BELIEVED = 3.0
-"""Further than this factor from all that was seen of the sky a solution is not believed: it may stand for something
-else."""
-DARKER = 1.25
-"""Nor one that is darker by more than this, where frames saw some of that side of the horizon: noise in E and G draws
-solutions down. The living room's ground, .22 where it was seen, came out at .08 and took two clipped lamps down with it
-(two perturbed scans: .95 of their luminance; .97 under 1.5, .994 under 1.25, 1.03 under 1.1)."""
-BRIGHTEST = 30.0
-"""The same for a part of the sky that is clipped."""
+from .params import UNSEEN
 
 
 @dataclass
@@ -59,8 +51,8 @@ class Sky:
         """Least and greatest radiance that is believed, (3,) each."""
         guess = np.maximum(self.guess[i], 1e-12)
         if self._is_clipped(i):
-            return guess, BRIGHTEST * guess
-        return guess / (DARKER if self.told[i] else BELIEVED), np.full(3, BELIEVED * guess.max())
+            return guess, UNSEEN.brightest * guess
+        return guess / (UNSEEN.darker if self.told[i] else UNSEEN.believed), np.full(3, UNSEEN.believed * guess.max())
 
     def notes(self) -> list[str]:
         """One sentence for each part that was solved."""
@@ -184,7 +176,7 @@ def refined(
     if len(colour):
         by_channel = np.stack([solve(np.eye(3)[c], colour[:, c], bright) for c in range(3)], 1)
         share = by_channel @ LUMINANCE / luminance
-        colour = np.where(np.abs(share - 1)[:, None] < AGREES, by_channel / share[:, None], colour)
+        colour = np.where(np.abs(share - 1)[:, None] < LIGHT_FIT.agrees, by_channel / share[:, None], colour)
     for k, i in enumerate(parts, len(free)):
         sky.radiance[i] = np.clip(colour[k], *sky.bounds(i))
     done = {lamp.object_id: lamp for lamp in fixed}

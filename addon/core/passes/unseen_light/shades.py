@@ -17,17 +17,7 @@ from ...light.field import LightField
 from ...light.lamps import Lamp
 from ...luminance import LUMINANCE
 from ...scene.atlas import Atlas
-
-STRONGLY = 3.0
-"""What is lit so many times as strongly as what was seen of its object hangs by the lamp's light."""
-REACH = 12.0
-"""Radii of a ball of the lamp's surface within which a shade is looked for."""
-PLACES = 1000
-BOUNCES = 3
-"""Of light inside a shade; of paper of albedo .7 each passes a third on."""
-LEAST = 30
-UNKNOWN, DARKEST, LIGHTEST = 0.5, 0.05, 0.85
-"""Albedo of what no element tells of, and bounds for the others'."""
+from .params import SHADES
 
 
 def by_way_of_shade(
@@ -49,20 +39,20 @@ def by_way_of_shade(
     atlas = field.atlas
     own = atlas.object_id == lamp.object_id
     centre = np.average(atlas.position[own], 0, atlas.area[own])
-    reach = REACH * np.sqrt(atlas.area[own].sum() / (4 * np.pi))
+    reach = SHADES.reach * np.sqrt(atlas.area[own].sum() / (4 * np.pi))
     near = np.flatnonzero(~own & ~field.radiance.any(1) & (np.linalg.norm(atlas.position - centre, axis=1) < reach))
     nothing = np.zeros(len(element))
-    if len(near) < LEAST:
+    if len(near) < SHADES.least:
         return nothing
     rng = np.random.default_rng([seed, lamp.object_id])
-    places = rng.choice(near, min(PLACES, len(near)), replace=False)
+    places = rng.choice(near, min(SHADES.places, len(near)), replace=False)
     closest = cKDTree(atlas.place(places)).query(atlas.place(near), workers=-1)[1]
-    rho = np.clip([albedo.get(int(i), UNKNOWN) for i in atlas.object_id[near]], DARKEST, LIGHTEST)
+    rho = np.clip([albedo.get(int(i), SHADES.unknown) for i in atlas.object_id[near]], SHADES.darkest, SHADES.lightest)
     from_lamp = thrown_by_object(field, places, lamp.object_id, seed)
     bright = float(lamp.radiance @ LUMINANCE)
-    enough = STRONGLY * (even[near] @ LUMINANCE) / max(bright, 1e-12)
+    enough = SHADES.strongly * (even[near] @ LUMINANCE) / max(bright, 1e-12)
     sent, unlit = rho * from_lamp[closest] / np.pi, field.with_sun(None)
-    if (sent > enough).sum() < LEAST:
+    if (sent > enough).sum() < SHADES.least:
         return nothing
 
     def with_only(index: np.ndarray, radiance: np.ndarray) -> LightField:
@@ -71,7 +61,7 @@ def by_way_of_shade(
         values[index] = radiance[:, None]
         return unlit.with_light(values, Environment.dark(), ())
 
-    for bounce in range(BOUNCES - 1):
+    for bounce in range(SHADES.bounces - 1):
         from_shade = irradiance_at(with_only(near, sent), places, seed + bounce)[:, 0]
         sent = rho * (from_lamp + from_shade)[closest] / np.pi
     strong = sent > enough
@@ -91,6 +81,6 @@ def strongly_lit(atlas: Atlas, dark: np.ndarray, sent: np.ndarray, seen_as: np.n
     level = seen_as @ LUMINANCE
     level = np.where(level > 0, level, np.median(level[level > 0]) if level.any() else np.inf)
     side = atlas.side
-    strong = sent @ LUMINANCE > STRONGLY * level
+    strong = sent @ LUMINANCE > SHADES.strongly * level
     of_all, of_strong = (np.bincount(side[dark], weight, side.max() + 1) for weight in (None, strong))
-    return [np.flatnonzero(side == one) for one in np.flatnonzero(of_strong > np.maximum(of_all / 2, LEAST))]
+    return [np.flatnonzero(side == one) for one in np.flatnonzero(of_strong > np.maximum(of_all / 2, SHADES.least))]

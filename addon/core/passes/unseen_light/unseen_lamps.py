@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...light.lamps import AGREES, Lamp, twin
+from ...light.lamps import Lamp, twin
 from ...light.light_fit import Sample
+from ...light.params import LIGHT_FIT
 from ...luminance import LUMINANCE
+from .params import UNSEEN
 from .refine_light import Sky, all_light
-
-MIN_GAIN = 0.03
-"""A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share."""
-MIN_SKY = 0.01
-"""Part of the received light below which a part of the sky can't be solved for; its neighbours' radiance stays."""
-SWEEPS = 2
 
 
 def solve_lamps(sample: Sample, thrown, least, instances, seen, sky: Sky, base, colours) -> list[Lamp]:
-    """Unseen lamps, the one that explains most first; none once the gain falls below `MIN_GAIN`."""
+    """Unseen lamps, the one that explains most first; none once the gain falls below `lamp_gain`."""
     class_of = {i.object_id: i.class_name for i in instances}
     sent = sample.radiance @ LUMINANCE
     lamps: list[Lamp] = []
@@ -25,7 +21,9 @@ def solve_lamps(sample: Sample, thrown, least, instances, seen, sky: Sky, base, 
     while left:
         received = all_light(base, lamps, thrown, sky) @ LUMINANCE
         best = {i: sample.best(sent, received, G) for i, G in left.items()}
-        found = {i: f for i, f in best.items() if f is not None and f[2] < (1 - MIN_GAIN) * f[1] and f[0] > least[i]}
+        found = {
+            i: f for i, f in best.items() if f is not None and f[2] < (1 - UNSEEN.lamp_gain) * f[1] and f[0] > least[i]
+        }
         if not found:
             break
         object_id = min(found, key=lambda i: found[i][2])
@@ -46,14 +44,14 @@ def needed(sample: Sample, lamps: list[Lamp], thrown, sky: Sky, base, colours) -
     if not sky.thrown or len(shining) == len(lamps):
         return lamps, sky
     alone = Sky(sky.thrown, sky.guess, sky.clipped, sky.told)
-    for _ in range(SWEEPS):
+    for _ in range(UNSEEN.sweeps):
         solve_sky(sample, shining, thrown, alone, base)
     sent = np.log(np.maximum(sample.radiance @ LUMINANCE, 1e-9))
     with_lamps, without = (
         sample.spread(sent - np.log(all_light(base, some, thrown, above) @ LUMINANCE + 1e-12))
         for some, above in ((lamps, sky), (shining, alone))
     )
-    return (lamps, sky) if with_lamps < (1 - MIN_GAIN) * without else (shining, alone)
+    return (lamps, sky) if with_lamps < (1 - UNSEEN.lamp_gain) * without else (shining, alone)
 
 
 def _coloured(object_id, s, before, after, class_of, seen, received, by_channel, known) -> Lamp:
@@ -72,7 +70,7 @@ def _coloured(object_id, s, before, after, class_of, seen, received, by_channel,
     solved = [found[0] for found in by_channel if found is not None]
     if not alike and len(solved) == 3:
         colour = np.array(solved, np.float32)
-        if abs(float(colour @ LUMINANCE) / s - 1) < AGREES:
+        if abs(float(colour @ LUMINANCE) / s - 1) < LIGHT_FIT.agrees:
             return Lamp(int(object_id), colour, False, spread=spread)
     white = np.mean([lamp.radiance for lamp in alike or seen], 0) if seen else received.mean(0)
     radiance = (s * white / max(float(white @ LUMINANCE), 1e-12)).astype(np.float32)
@@ -83,7 +81,7 @@ def solve_sky(sample: Sample, lamps, thrown, sky: Sky, base) -> None:
     """Radiance of the sky's unknown parts, channel by channel, one after another."""
     for i, G in enumerate(sky.thrown):
         others = all_light(base, lamps, thrown, sky, without=i)
-        if (G[:, None] * sky.guess[i]).mean() < MIN_SKY * others.mean():
+        if (G[:, None] * sky.guess[i]).mean() < UNSEEN.least_sky * others.mean():
             continue
         found = [sample.best(sample.radiance[:, c], others[:, c], G) for c in range(3)]
         solved = [one[0] for one in found if one is not None]

@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...light.environment import Environment
-from ...light.few_elements import (  # fmt: skip
-    LEAST,
+from ...light.few_elements import (
     barely_seen,
     evened,
     from_sun,
@@ -26,25 +25,14 @@ from ...light.few_elements import (  # fmt: skip
 )
 from ...light.field import LightField
 from ...light.lamps import Lamp, find_seen
-from ...light.light_fit import CAP, CLIPPED_CAP, Sample, kinds_of, on_flat
+from ...light.light_fit import Sample, kinds_of, on_flat
+from ...light.params import LIGHT_FIT
 from ...scene.model import Instance
+from .params import UNSEEN
 from .refine_light import Sky, all_light, refined, shared_by_class
 from .shades import by_way_of_shade
-from .unseen_lamps import SWEEPS, needed, solve_lamps, solve_sky
+from .unseen_lamps import needed, solve_lamps, solve_sky
 from .whole_sky import with_whole_sky
-
-SAMPLES = 4000
-"""Elements that the test looks at, spread evenly over the objects. Noise in E or G draws the solved radiance to 0: few
-elements with many rays each find more of it than many with few (a sky of 1.7: 16,000 with 64 rays give 1.4)."""
-CLIPPED = 4
-"""Times as many where lamps are clipped, as then all albedos hang on the solution; no object counts for more than it
-does among `SAMPLES`. Lamps over the truth in perturbed living rooms, two seeds each: 0.99 +- 0.06 with 4,000 elements
-(seven scans), 1.01 +- 0.035 with 16,000 (six), 1.07 +- 0.02 where large objects count for more (three)."""
-MOST_TILTED = 0.14
-"""Radians (8 degrees, as cells that count as flat). The living room perturbed, four seeds: its clipped lamp of 26.2
-comes out at 26.4 +- 0.8, and at 25.7 +- 1.2 with all elements of such cells."""
-ENOUGH = 200
-"""Elements on flat spots from which on the others are left out."""
 
 
 @dataclass(frozen=True)
@@ -131,12 +119,12 @@ def find_light(
     """
     flat = on_flat(field.atlas)
     if tilted is not None:
-        flat &= tilted < MOST_TILTED
+        flat &= tilted < UNSEEN.most_tilted
     clipped = any(i in (colours or {}) for i in unseen_objects)
     usable = steady(field, good, flat) | barely_seen(field, good)
     # What a mirror shows is no albedo.
     usable &= ~np.isin(field.atlas.object_id, [mirror.object_id for mirror in field.mirrors])
-    element = pick(field, usable, seed, CLIPPED * SAMPLES if clipped else SAMPLES)
+    element = pick(field, usable, seed, UNSEEN.clipped * UNSEEN.samples if clipped else UNSEEN.samples)
     if not len(element):
         return Light((), field.environment, (), element, np.zeros((0, 3)))
     old = before.thrown if before is not None and field.environment.seen else None
@@ -165,13 +153,13 @@ def find_light(
     filled = received + sum(G[:, None] * s for G, s in zip(thrown_sky, guess, strict=True))
     seen = find_seen(atlas.object_id[element], field.radiance[element], filled)
     lit = ~np.isin(atlas.object_id[element], [lamp.object_id for lamp in seen])
-    if (lit & flat[element]).sum() >= ENOUGH:
+    if (lit & flat[element]).sum() >= UNSEEN.enough:
         lit &= flat[element]
-    if lit.sum() < LEAST:
+    if lit.sum() < LIGHT_FIT.least:
         return Light(tuple(seen), environment, found, element, filled)
     sent = field.radiance[element[lit]].astype(np.float64)
     # About half of the elements are on flat spots, of large objects as of small ones.
-    most = SAMPLES / len(np.unique(atlas.object_id[element])) / 2 if clipped else np.inf
+    most = UNSEEN.samples / len(np.unique(atlas.object_id[element])) / 2 if clipped else np.inf
     sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit], most)
     earlier = old if old is not None and np.array_equal(old.element, sample.element) else None
     if earlier is not None:
@@ -188,7 +176,7 @@ def find_light(
 
     def solve(thrown: dict[int, np.ndarray], sky: Sky) -> tuple[list[Lamp], Sky, np.ndarray]:
         """Lamps, the sky (changed in place, too) and log(L_d / E), (k, 3)."""
-        for _ in range(SWEEPS if zones else 1):
+        for _ in range(UNSEEN.sweeps if zones else 1):
             lamps = solve_lamps(sample, thrown, least, instances, seen, sky, received[lit], colours)
             solve_sky(sample, lamps, thrown, sky, received[lit])
         lamps, sky = needed(sample, lamps, thrown, sky, received[lit], colours)
@@ -201,7 +189,7 @@ def find_light(
         lamps, sky, log_albedo = solve(thrown, sky)
     class_of = {i.object_id: i.class_name for i in instances}
     kind = kinds_of(sample.object_id, log_albedo, class_of)
-    sample = replace(sample, kind=kind, cap=CLIPPED_CAP if clipped else CAP)
+    sample = replace(sample, kind=kind, cap=LIGHT_FIT.clipped_cap if clipped else LIGHT_FIT.cap)
     if "joint-light" not in without:
         lamps = refined(sample, lamps, thrown, least, instances, seen, sky, received[lit], colours)
     for zone, radiance in zip(zones, sky.radiance, strict=True):

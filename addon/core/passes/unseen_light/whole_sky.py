@@ -5,17 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from ...light.environment import Environment
-from ...light.few_elements import LEAST, evened, irradiance_at
+from ...light.few_elements import evened, irradiance_at
 from ...light.field import LightField
 from ...light.lamps import find_seen
 from ...light.light_fit import Sample
+from ...light.params import LIGHT_FIT
 from ...luminance import LUMINANCE
-
-MIN_GAIN = 0.1
-"""It is believed in when it lowers the spread of log albedo by at least this share: all albedos hang on it."""
-MIN_OPEN = 0.02
-"""Share of the received directions that must lead outside for such a sky to be looked for."""
-SWEEPS = 2
+from .params import UNSEEN
 
 
 def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[LightField, tuple[str, ...]]:
@@ -25,21 +21,21 @@ def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[L
     everywhere = Environment.only(np.ones((1, 2), np.float32))
     dark = field.with_sun(None).with_light(np.zeros_like(field.radiance), everywhere)
     thrown = irradiance_at(dark, element, seed)[:, 0]
-    if thrown.mean() < MIN_OPEN * np.pi:
+    if thrown.mean() < UNSEEN.least_open * np.pi:
         return field, ()
     received = irradiance_at(field.with_light(evened(field)), element, seed)
     object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
     left = np.ones(len(element), bool)
     found = None
-    for _ in range(SWEEPS):
+    for _ in range(UNSEEN.whole_sky_sweeps):
         sample = Sample(element[left], object_id[left], sent[left], received[left])
         found = sample.best(sent[left] @ LUMINANCE, received[left] @ LUMINANCE, thrown[left])
-        if found is None or found[2] > (1 - MIN_GAIN) * found[1]:
+        if found is None or found[2] > (1 - UNSEEN.whole_sky_gain) * found[1]:
             return field, ()
         # Lamps show themselves once the rest is lit; their albedo says nothing of the sky.
         lamps = find_seen(object_id, sent, received + found[0] * thrown[:, None])
         left = ~np.isin(object_id, [lamp.object_id for lamp in lamps])
-        if left.sum() < LEAST:
+        if left.sum() < LIGHT_FIT.least:
             return field, ()
     assert found is not None  # there was a sweep
     radiance = np.full(3, found[0])

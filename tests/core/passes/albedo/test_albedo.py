@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.passes.albedo.albedo import FILLED, FLOOR, MEASURED, NONE, above_one, fill, quotient, without_emitters
+from addon.core.passes.albedo.albedo import FILLED, MEASURED, NONE, above_one, fill, quotient, without_emitters
+from addon.core.passes.albedo.params import ALBEDO
 from tests.core.rooms import box_sides, make_room
 
 NAN = np.nan
@@ -25,11 +26,11 @@ def test_quotient():
 
 def test_darkness_says_nothing():
     """Elements below the floor are left out; a single dark channel is held at the floor."""
-    E = np.float32([[1, 1, 1]] * 8 + [[FLOOR / 2] * 3, [0, 0, 0], [1, 1, 0]])
+    E = np.float32([[1, 1, 1]] * 8 + [[ALBEDO.floor / 2] * 3, [0, 0, 0], [1, 1, 0]])
     rho, valid = quotient(np.full((11, 3), 0.1, np.float32), E)
     assert valid.tolist() == [True] * 8 + [False, False, True]
     assert np.isfinite(rho[valid]).all() and np.isnan(rho[8:10]).all()
-    assert rho[10, 2] <= 0.1 * np.pi / (FLOOR * 2 / 3) * 1.001
+    assert rho[10, 2] <= 0.1 * np.pi / (ALBEDO.floor * 2 / 3) * 1.001
 
 
 def test_quotient_of_nothing():

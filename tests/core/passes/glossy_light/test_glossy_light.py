@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from addon.core.brdf.material import ObjectMaterial
 from addon.core.brdf.metal import METAL
 from addon.core.passes.glossy_light import glossy_light as glossy_light_module
 from addon.core.passes.glossy_light.glossy_light import Excess, glossy_light
+from addon.core.passes.glossy_light.params import GLOSSY
 from addon.core.scene.tangent_frame import tangent_frame
 from tests.core.glossy_box import Box
 from tests.core.rooms import polygon_irradiance
@@ -59,7 +62,7 @@ def found(box: Box, materials, specular=0.0) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.slow
 def test_a_polished_floor(box, monkeypatch):
     """The lamp comes back from it to the ceiling and the walls, as from a lamp below the floor."""
-    monkeypatch.setattr(glossy_light_module, "RAYS", 256)  # next to no noise
+    monkeypatch.setattr(glossy_light_module, "GLOSSY", replace(GLOSSY, rays=256))  # next to no noise
     excess, element = found(box, polished())
     some = np.random.default_rng(0).choice(len(element), 150, replace=False)
     truth = over_the_floor(box, element[some], PSI)

@@ -41,7 +41,7 @@ def by_angles_alone(mesh: Mesh, noise: float = NOISE) -> Mesh:
 
 
 def found_in(mesh: Mesh, noise: float = NOISE):
-    points, faces, _ = welded(mesh, denoise.WELD * noise)
+    points, faces, _ = welded(mesh, denoise.DENOISE.weld * noise)
     return sheets_of(points, points, faces, noise)[0]
 
 

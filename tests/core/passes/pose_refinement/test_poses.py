@@ -9,7 +9,8 @@ import pytest
 
 from addon.core.errors import InterruptedRun
 from addon.core.lit_diffuse.accumulate import accumulate
-from addon.core.passes.pose_refinement.poses import LEAST_SHIFT, Poses, Texture, moved, refine_poses
+from addon.core.passes.pose_refinement.params import POSES
+from addon.core.passes.pose_refinement.poses import Poses, Texture, moved, refine_poses
 from addon.core.progress import Progress
 from addon.core.scene.model import Pixels
 from tests.core.lit_diffuse.test_accumulate import frames_of
@@ -76,7 +77,7 @@ def filmed() -> Filmed:
 
 def test_poses_that_are_off_are_put_right(filmed):
     poses = filmed.refined()
-    assert poses.moved.mean() > 0.8 and poses.shift > LEAST_SHIFT
+    assert poses.moved.mean() > 0.8 and poses.shift > POSES.least_shift
     found = [frame.camera for frame in poses.of(frames_of(filmed.told))]
     before, after = filmed.apart(filmed.told), filmed.apart(found)
     assert np.median(before) > 0.6
@@ -87,7 +88,7 @@ def test_poses_that_are_off_are_put_right(filmed):
 
 def test_good_poses_stay_to_the_last_bit(filmed):
     poses = filmed.refined(filmed.true)
-    assert not poses.moved.any() and poses.shift < 0.7 * LEAST_SHIFT
+    assert not poses.moved.any() and poses.shift < 0.7 * POSES.least_shift
     frames = frames_of(filmed.true)
     assert all(a is b for a, b in zip(poses.of(frames), frames))
 

@@ -1,0 +1,200 @@
+"""How light is gathered and solved for; what each part gains: docs/ablation.md."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class GatherParams:
+    """Of the irradiance: where rays start and where they are aimed.
+
+    Attributes
+    ----------
+    finest_share : float
+        Least distance of two gathering points, and edge of the texel blocks, as a share of the room; a texel where that
+        is larger. Finer texels then cost look-ups, and rays only where the lamps' light changes; coarse ones are not
+        interpolated over (texels of 4 cm in 2 by 2 blocks: relative RMSE 0.15 instead of 0.05).
+    smooth : float
+        Relative deviation of the lamps' light between a block's corners up to which it is interpolated.
+    allowed : float
+        Error bound (Ward's epsilon) under which an element is interpolated.
+    contrast : float
+        Mean relative deviation between an element's neighbours up to which it is interpolated.
+    neighbours : int
+        Gathered points, at most, that an element is interpolated from.
+    turn : float
+        Weight of the normals' difference, in Ward's error.
+    coarsest : float
+        First spacing, as a share of the elements' extent (root of the bounding box's largest face). Starting coarser
+        saves little and misses what is small: from 0.15 the living room's mean error was 0.094, from 0.01 it is 0.08.
+    off_place : float
+        How far a texel may lie from where its block's corners put it, as a share of the block's edge.
+    stretch : float
+        A block this many times larger on the surface than its texels should be spans a gap.
+    bright : float
+        A triangle is bright from this multiple of the surface's mean radiance on. Only the noise depends on it, not the
+        expectation: what is not aimed at is still gathered.
+    max_triangles : int
+        Finely meshed lamps have many: 24 of 512 triangles each, cut off at 4096, had an error of 0.74 instead of 0.06.
+    cells : int
+        Cells along either axis of each of the box's six sides.
+    pilot_points, pilot_rays : int
+        Points, and rays of each, that find the openings.
+    least_escaped : int
+        Of the pilot's rays; fewer lit ones are no opening worth aiming at.
+    both_halves : float
+        Two halves of well-spread rays are better together than two that know nothing of each other (living room: the
+        halves' difference is 1.35 times the scatter over seeds).
+    mirror_fewer : int
+        What comes by a mirror is little of the light: so many times fewer rays are aimed at it.
+    proposals : tuple[float, ...]
+        Widths (phi) of the lobes that rays are drawn from.
+    same_place : float
+        Metres within which two places are one.
+    unseen_coarser : int
+        Times the finest spacing of gathering points.
+    """
+
+    finest_share: float = 0.005
+    smooth: float = 0.05
+    allowed: float = 0.2
+    contrast: float = 0.15
+    neighbours: int = 8
+    turn: float = 1.5
+    coarsest: float = 0.01
+    off_place: float = 0.15
+    stretch: float = 3.0
+    bright: float = 8.0
+    max_triangles: int = 1 << 16
+    cells: int = 24
+    pilot_points: int = 4096
+    pilot_rays: int = 64
+    least_escaped: int = 16
+    both_halves: float = 0.75
+    mirror_fewer: int = 4
+    proposals: tuple[float, ...] = (0.015, 0.06, 0.2, 0.6)
+    same_place: float = 1e-5
+    unseen_coarser: int = 8
+
+
+GATHER = GatherParams()
+
+
+@dataclass(frozen=True)
+class LessNoiseParams:
+    """Of `less_noise` (`lamp-noise` in the ablation).
+
+    Attributes
+    ----------
+    cell : float
+        Metres, edge of the cells that a mean is taken over.
+    grids : int
+        Shifted grids of such cells, averaged.
+    least : int
+        Elements in a cell below which nothing is taken out.
+    turned : int
+        Steps in which the normal's components are told apart.
+    """
+
+    cell: float = 0.12
+    grids: int = 3
+    least: int = 12
+    turned: int = 4
+
+
+LESS_NOISE = LessNoiseParams()
+
+
+@dataclass(frozen=True)
+class LightFitParams:
+    """Of the lamps and skies that are solved for (`light_fit`, `few_elements`, `field`, `lamps`).
+
+    Attributes
+    ----------
+    coarse : float
+        The cap under which a light is looked for: far from the solution, everything deviates.
+    cap : float
+        The cap under which all is refined. Texture, highlights and shadows of small things deviate by more than light
+        does and draw a solution down under the coarse cap (two clipped lamps of 26.2 in the living room: 19 and 22
+        under 1). Of 0.07, 0.12, 0.25 and 0.5, tried on that room alone with both lamps scaled in steps of 15 %, only
+        0.5 had its least at the truth both with and without a perturbed mesh; with it, the smaller ones had theirs
+        above.
+    clipped_cap : float
+        The same where lamps are clipped, and objects of one paint tell of them together (`kinds_of`): two lamps of four
+        perturbed living rooms, eight runs, came to .964 +- .024 of their true luminance under 0.5, .982 +- .017 under
+        0.35, .994 +- .012 under 0.25, 1.004 +- .013 under 0.18 and 1.009 +- .015 under 0.12.
+    flat_cell : float
+        Edge in metres of the cells in which normals must agree.
+    flat : float
+        Least length of a cell's mean normal (8 degrees). E of a bumpy spot is uncertain, and more so that from a small
+        light: as an error of the regressor it draws the light's radiance down. The same two lamps, mesh off by 5 mm,
+        under a cap of 1: 10 and 15 with all elements, 21 and 22 with those on flat spots.
+    alike, same_colour : float
+        Log albedo, of all channels together and apart, by which objects of one class may differ to be of one kind.
+        Lamps that are off by a tenth part objects under them from others under the sky by up to .1.
+    reach : float
+        The refined radiance stays within this factor of where it started.
+    least : int
+        Elements with which a solution can be tried.
+    lamp_elements : int
+        Of an unseen object, at which what it could reflect is looked at.
+    rays, emitter_rays, portal_rays : int
+        Of each element that a solution looks at: into its hemisphere, at bright triangles, at openings.
+    emitter_albedo : float
+        An object whose median albedo would have to be above this gives light of its own. 1 is the physical bound; the
+        rest is room for missing light and for noise.
+    agrees : float
+        Luminances that lie this near each other (relative) count as the same.
+    """
+
+    coarse: float = 1.0
+    cap: float = 0.5
+    clipped_cap: float = 0.25
+    flat_cell: float = 0.08
+    flat: float = 0.99
+    alike: float = 0.25
+    same_colour: float = 0.1
+    reach: float = 3.0
+    least: int = 30
+    lamp_elements: int = 500
+    rays: int = 256
+    emitter_rays: int = 64
+    portal_rays: int = 64
+    emitter_albedo: float = 2.0
+    agrees: float = 0.25
+
+
+LIGHT_FIT = LightFitParams()
+
+
+@dataclass(frozen=True)
+class SkyParams:
+    """Of the environment map and the sun in it (`environment`, `sun`).
+
+    Attributes
+    ----------
+    max_height : int
+        Rows of a map.
+    profile, steepest : float
+        Degrees over which the sky's change with the height is smoothed, and how far it may go either way.
+    shadow_rays : int
+        Of each element, over the sun's disc.
+    above : float
+        How often brighter than the sky around it a seen sun must be.
+    least_share : float
+        Of the irradiance by all the sky: less is left in the map.
+    written_rows : int
+        Least height of a map that a sun is put into: a texel of 0.35 degrees.
+    """
+
+    max_height: int = 512
+    profile: float = 3.0
+    steepest: float = 3.0
+    shadow_rays: int = 16
+    above: float = 30.0
+    least_share: float = 0.02
+    written_rows: int = 512
+
+
+SKY = SkyParams()

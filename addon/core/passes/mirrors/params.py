@@ -1,0 +1,53 @@
+"""What it takes to believe in a flat mirror; what it gains: docs/ablation.md."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class MirrorsParams:
+    """Of `flat_mirrors` and `mirrored` (`mirrors` in the ablation).
+
+    Attributes
+    ----------
+    flat_share : float
+        Share of an object's surface that must lie in one plane.
+    plane_share : float
+        How far from that plane, as a share of the object's size.
+    elements : int
+        That a mirror is looked at by.
+    together : float
+        Least correlation, within the elements, of what they show and of what a mirror would.
+    least_f0 : float
+        A black pane shows the room mirrored as well, as a dielectric: by 0.04 to 0.1 as it is looked at.
+    tells : float
+        Share of the deviation under the mesh's own plane that a turned one must come below. What a pane over a dark
+        hearth shows tells nothing of its way: it was turned by a degree to take a hundredth off.
+    tilt, tilts, fitted : float, int
+        Radians by which the plane is turned first to fit what is mirrored, how often, and observations for it: a scan's
+        planes are off.
+    least : int
+        Observations whose mirrored direction shows something that frames saw; with fewer nothing is said.
+    dark : float
+        What nobody saw is dark in the field so far.
+    most_off : float
+        Most that one observation counts for, in log radiance: beside an edge a ray of a slightly other way meets
+        something else altogether.
+    """
+
+    flat_share: float = 0.8
+    plane_share: float = 0.02
+    elements: int = 400
+    together: float = 0.6
+    least_f0: float = 0.2
+    tells: float = 0.98
+    tilt: float = 0.01
+    tilts: int = 40
+    fitted: int = 6000
+    least: int = 100
+    dark: float = 1e-5
+    most_off: float = 0.5
+
+
+MIRRORS = MirrorsParams()

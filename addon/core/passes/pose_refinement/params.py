@@ -1,0 +1,79 @@
+"""When and how poses are refined; what it gains: docs/ablation.md."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class PoseParams:
+    """Of `poses` (`pose-refinement` in the ablation).
+
+    Attributes
+    ----------
+    checked : int
+        Frames, evenly spread, that tell whether poses are off.
+    least_shift : float
+        Pixels of the small picture, median over the frames: less is what good poses show for highlights, texels and
+        noise. Six rooms with their true poses have 0.05 to 0.23; the living room with poses off by 5 mm and 0.2 degrees
+        has 0.7.
+    width : int
+        Pictures are made smaller to at most about so many pixels across.
+    pixels : int
+        Those of the steepest gradients. Living room, poses off as above: 0.30 pixels left with 6,000 as with 12,000.
+    samples : int
+        Rays along an edge of each of these pixels, so that the texture's edges are as soft as the picture's.
+    blur : float
+        Pixels, standard deviation, that gradients are taken over.
+    border : int
+        Pixels along the picture's edges that don't count.
+    least_pixels : int
+        With fewer a frame is left where it is.
+    least_gradient : float
+        Of log radiance over a pixel; less tells of no shift.
+    floor : float
+        Share of the room's median radiance that is added before the logarithm: noise in the dark says nothing.
+    rounds : int
+        All frames are refined so often, each against the others as last refined.
+    reweighted : int
+        Rounds of robust weights within each.
+    tuning : float
+        Residuals beyond so many times their spread count as highlights, occlusion, moved things.
+    least_spread : float
+        Of the logarithm: a picture of flat colours fits to the last bit but at its edges, all that there is to go by.
+    independent : float
+        Share of the pixels that err on their own: neighbours share what the texture has wrong.
+    farthest : float
+        Pixels; a longer shift is not found by following gradients, and the frame is left where it is.
+    stray : float
+        Times the median shift: so is a frame that would go farther than this. It shows mirrors, or something that
+        moved.
+    worse : float
+        A frame goes back if it then fits this much worse. What it costs is mostly what the texture has wrong: without
+        any slack a third of two rooms' frames went back, most of them from better places.
+    sky : float
+        Times the room's diagonal, where rays that escape are taken to end.
+    """
+
+    checked: int = 16
+    least_shift: float = 0.4
+    width: int = 480
+    pixels: int = 6000
+    samples: int = 2
+    blur: float = 1.0
+    border: int = 3
+    least_pixels: int = 200
+    least_gradient: float = 0.01
+    floor: float = 0.1
+    rounds: int = 2
+    reweighted: int = 8
+    tuning: float = 2.0
+    least_spread: float = 0.05
+    independent: float = 0.05
+    farthest: float = 4.0
+    stray: float = 4.0
+    worse: float = 1.05
+    sky: float = 100.0
+
+
+POSES = PoseParams()

@@ -1,0 +1,32 @@
+"""How the projection's blur is taken out; what it gains: docs/ablation.md."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SharpeningParams:
+    """Of `sharpen` (`sharpening` in the ablation).
+
+    Attributes
+    ----------
+    middle, corner : float
+        Weights of a pixel's middle and corners: together they give what is quadratic over the pixel its true mean.
+    floor : float
+        Share of the room's median radiance that is added to both sides of the ratio: in the dark it is all noise.
+    detail : float
+        Share of its radiance by which an element must differ from the mean of the texels around it: where L_d is even,
+        there is nothing to make sharper.
+    most : float
+        Times that L_d may become brighter or darker.
+    """
+
+    middle: float = 2 / 3
+    corner: float = 1 / 12
+    floor: float = 0.02
+    detail: float = 0.02
+    most: float = 2.0
+
+
+SHARPENING = SharpeningParams()

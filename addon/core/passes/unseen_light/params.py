@@ -1,0 +1,100 @@
+"""What it takes to believe in light that no frame sees; what each part gains: docs/ablation.md."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class UnseenParams:
+    """Of `unseen_light`, `unseen_lamps`, `refine_light` and `whole_sky`, by their names in the ablation.
+
+    Attributes
+    ----------
+    samples : int
+        Elements that the test looks at, spread evenly over the objects. Noise in E or G draws the solved radiance to 0:
+        few elements with many rays each find more of it than many with few (a sky of 1.7: 16,000 with 64 rays give
+        1.4).
+    clipped : int
+        Times as many where lamps are clipped, as then all albedos hang on the solution; no object counts for more than
+        it does among `samples`. Lamps over the truth in perturbed living rooms, two seeds each: 0.99 +- 0.06 with 4,000
+        elements (seven scans), 1.01 +- 0.035 with 16,000 (six), 1.07 +- 0.02 where large objects count for more
+        (three).
+    most_tilted : float
+        Radians (8 degrees, as cells that count as flat). The living room perturbed, four seeds: its clipped lamp of
+        26.2 comes out at 26.4 +- 0.8, and at 25.7 +- 1.2 with all elements of such cells.
+    enough : int
+        Elements on flat spots from which on the others are left out.
+    lamp_gain : float
+        A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share.
+    least_sky : float
+        Part of the received light below which a part of the sky can't be solved for; its neighbours' radiance stays.
+    sweeps : int
+        Times that all parts of the sky are solved for in turn.
+    believed : float
+        Further than this factor from all that was seen of the sky a solution is not believed: it may stand for
+        something else.
+    darker : float
+        Nor one that is darker by more than this, where frames saw some of that side of the horizon: noise in E and G
+        draws solutions down. The living room's ground, .22 where it was seen, came out at .08 and took two clipped
+        lamps down with it (two perturbed scans: .95 of their luminance; .97 under 1.5, .994 under 1.25, 1.03 under
+        1.1).
+    brightest : float
+        The same for a part of the sky that is clipped.
+    whole_sky_gain : float
+        It is believed in when it lowers the spread of log albedo by at least this share: all albedos hang on it.
+    least_open : float
+        Share of the received directions that must lead outside for such a sky to be looked for.
+    whole_sky_sweeps : int
+        The same there.
+    """
+
+    samples: int = 4000
+    clipped: int = 4
+    most_tilted: float = 0.14
+    enough: int = 200
+    lamp_gain: float = 0.03
+    least_sky: float = 0.01
+    sweeps: int = 2
+    believed: float = 3.0
+    darker: float = 1.25
+    brightest: float = 30.0
+    whole_sky_gain: float = 0.1
+    least_open: float = 0.02
+    whole_sky_sweeps: int = 2
+
+
+UNSEEN = UnseenParams()
+
+
+@dataclass(frozen=True)
+class ShadesParams:
+    """Of `shades`.
+
+    Attributes
+    ----------
+    strongly : float
+        What is lit so many times as strongly as what was seen of its object hangs by the lamp's light.
+    reach : float
+        Radii of a ball of the lamp's surface within which a shade is looked for.
+    places : int
+        Elements of a shade that are looked at.
+    bounces : int
+        Of light inside a shade; of paper of albedo .7 each passes a third on.
+    least : int
+        Elements that tell a shade's albedo.
+    unknown, darkest, lightest : float
+        Albedo of what no element tells of, and bounds for the others'.
+    """
+
+    strongly: float = 3.0
+    reach: float = 12.0
+    places: int = 1000
+    bounces: int = 3
+    least: int = 30
+    unknown: float = 0.5
+    darkest: float = 0.05
+    lightest: float = 0.85
+
+
+SHADES = ShadesParams()

@@ -1,0 +1,77 @@
+"""What is made of the stages' results."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class CorrectedParams:
+    """Of what is made of the stages' results (`corrected`, `refit`).
+
+    Attributes
+    ----------
+    rounds : int
+        Albedo is clamped at 1 and shrunk towards its neighbours, so its mean follows E but roughly.
+    spots : int
+        Elements that such a white is looked at by.
+    least_light : float
+        Less than this of its light no lamp is left.
+    doubtful : float
+        A white that scales E by more than this, or its inverse, is more likely not that white.
+    dark : float
+        Texture is kept as variation about its mean; below this a channel has none that could be told from noise.
+    coat_f0, coat_roughness : float
+        A plausible coat: what dielectrics of n = 1.5 reflect; satin where the room has no dielectric to learn from.
+    dark_refit : float
+        Least albedo that a logarithm is taken of.
+    unknown_before : float
+        Relative error of an albedo, light aside, of an object whose own is not known as it had none before.
+    """
+
+    rounds: int = 4
+    spots: int = 600
+    least_light: float = 0.1
+    doubtful: float = 1.5
+    dark: float = 0.02
+    coat_f0: float = 0.04
+    coat_roughness: float = 0.5
+    dark_refit: float = 1e-3
+    unknown_before: float = 0.1
+
+
+CORRECTED = CorrectedParams()
+
+
+@dataclass(frozen=True)
+class PartsParams:
+    """Of textures in parts, one for each object (`parts`).
+
+    Attributes
+    ----------
+    finest : float
+        Times that an object's texels may be finer than the room's.
+    worth : float
+        Finer by less than this is not worth another look at the frames.
+    most_texels : int
+        Of all parts together: one and a half times an atlas of 4096. Memory, a few gigabytes for this, ends there.
+    pixel_step : int
+        Every so many pixels in x and y tell how fine an object was seen.
+    half : float
+        Of what lies around a spot on the room's atlas, this share has to be measured for detail to be told there.
+    looked : float
+        Share of the writing that the look at the frames takes.
+    no_limit : int
+        Edge of an atlas where nothing bounds it.
+    """
+
+    finest: float = 4.0
+    worth: float = 1.2
+    most_texels: int = 25_000_000
+    pixel_step: int = 8
+    half: float = 0.5
+    looked: float = 0.3
+    no_limit: int = 1 << 30
+
+
+PARTS = PartsParams()
