@@ -14,21 +14,19 @@ def classes() -> tuple[type, ...]:
     from .recover import (
         assets,
         capture_from_scene,
-        check_capture,
+        captures,
         files,
-        import_capture,
         link_room,
         panel_capture,
         panel_recover,
         restore_materials,
-        run,
         scene_props,
         stages,
     )
     from .relight import before_after, export, exposure, lights, probe, setup, view, virtual
     from .relight import panel as relight_panel
     from .relight import props as relight_props
-    from .results import clear_cache, find, look, move, open_report, select
+    from .results import find, folders, look, select
     from .results import panel as results_panel
 
     def own(*modules, kinds: tuple[str, ...]) -> list[type]:
@@ -38,8 +36,8 @@ def classes() -> tuple[type, ...]:
         return [one for module, one in found if one.__module__ == module.__name__]
 
     operators = own(
-        *(check_capture, import_capture, stages, run, job_operator, clear_cache, link_room, move, find, files),
-        *(capture_from_scene, restore_materials, select, look, open_report),
+        *(captures, stages, job_operator, link_room, folders, find, files),
+        *(capture_from_scene, restore_materials, select, look),
         *(lights, exposure, setup, probe, view, virtual, before_after, export, correct, white, paint),
         *(assets, manual, menus),
         kinds=("OT", "MT", "FH"),

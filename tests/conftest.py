@@ -26,8 +26,7 @@ def root() -> Path:
 @pytest.fixture(scope="session")
 def grey_capture(tmp_path_factory) -> Path:
     """The demo's room seen by three frames of flat grey: a valid capture, made in no time."""
-    from addon.bridge.demo.capture import frame_path, write_all_but_frames
-    from addon.bridge.demo.room import room, tour
+    from addon.bridge.demo.room import frame_path, room, tour, write_all_but_frames
     from addon.core.io.exr import write_exr
 
     folder = tmp_path_factory.mktemp("grey") / "capture"

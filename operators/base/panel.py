@@ -1,10 +1,75 @@
-"""What all panels of the sidebar's tab "Scan Relight" share."""
+"""What all panels of the sidebar's tab "Scan Relight" share; Blender cuts a label off at the panel's edge, so that
+sentences are laid over several lines.
+"""
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from ...addon.core.naming import numbered
 from .. import translations
-from . import text
+
+MARGIN = 68
+"""Pixels at an interface scale of 1 that the tabs, the panel's edges and paddings take."""
+ICON = 20
+
+
+def say(layout, context, sentence: str, icon: str = "NONE") -> None:
+    """Write `sentence` over as many lines as the region's width asks for; the icon stands before the first."""
+    sentence = translations.told(sentence)
+    scale = context.preferences.system.ui_scale or 1.0  # 0 where there was never a window
+    region = context.region
+    room = (region.width if region else 300) - (MARGIN + (ICON if icon != "NONE" else 0)) * scale
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for number, line in enumerate(lines(sentence, int(room), points(context) * scale)):
+        if icon == "NONE":
+            column.label(text=line)
+        else:
+            column.label(text=line, icon="BLANK1" if number else icon)
+
+
+def points(context) -> float:
+    """Size of the interface's letters."""
+    styles = context.preferences.ui_styles
+    return styles[0].widget.points if styles else 11.0
+
+
+@lru_cache(maxsize=512)
+def lines(sentence: str, width: int, size: float) -> tuple[str, ...]:
+    """`sentence` cut at spaces into lines of at most `width` pixels; a word that is longer is cut itself.
+
+    Parameters
+    ----------
+    sentence : str
+    width : int
+        In pixels.
+    size : float
+        Of the letters, in points times the interface's scale.
+    """
+    found, line = [], ""
+    for word in sentence.split():
+        longer = f"{line} {word}" if line else word
+        if measure(longer, size) <= width:
+            line = longer
+            continue
+        if line:
+            found.append(line)
+        while measure(word, size) > width and len(word) > 4:
+            fits = max(next((n for n in range(len(word), 0, -1) if measure(word[:n], size) <= width), 4), 4)
+            found.append(word[:fits])
+            word = word[fits:]
+        line = word
+    return (*found, line) if line or not found else tuple(found)
+
+
+def measure(words: str, size: float) -> float:
+    """Width of `words` in pixels."""
+    import blf
+
+    blf.size(0, size)
+    width = blf.dimensions(0, words)[0]
+    return width if width > 0 else 0.55 * size * len(words)  # no font is loaded where there is no window
 
 
 class SidebarPanel:
@@ -17,6 +82,8 @@ class SidebarPanel:
     manual = ""
     """Page of the documentation that "?" in the header opens; '' has none."""
 
+    say = staticmethod(say)
+
     @classmethod
     def poll(cls, context):
         return context.scene is not None
@@ -25,11 +92,6 @@ class SidebarPanel:
         """The way to the documentation."""
         if self.manual:
             self.layout.operator("scan_relight.manual", text="", icon="HELP", emboss=False).page = self.manual
-
-    @staticmethod
-    def say(layout, context, sentence: str, icon: str = "NONE") -> None:
-        """Write `sentence` over as many lines as the panel's width asks for."""
-        text.say(layout, context, sentence, icon)
 
 
 class NamedRows:

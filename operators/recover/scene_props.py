@@ -12,7 +12,7 @@ from ...addon.settings_info import setting_infos
 from ..translations import OWN
 from . import findings
 from .reading_props import ReadingProps
-from .settings_props import COPIES, IMAGES, preset_items, setting_value, with_settings
+from .settings_props import COPIES, IMAGES, SettingsProps, preset_items, setting_value
 
 
 def preset_chosen(choices, context) -> None:
@@ -29,9 +29,8 @@ def capture_chosen(choices, context) -> None:
             findings.begin(choices)
 
 
-@with_settings
-class ScanRelightSettings(bpy.types.PropertyGroup):
-    """One property for each field of `Settings`."""
+class ScanRelightSettings(SettingsProps, bpy.types.PropertyGroup):
+    """The settings as they are chosen."""
 
     def value(self) -> Settings:
         """The settings as chosen; raises `BadInputError` on one that can't be."""

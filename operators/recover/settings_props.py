@@ -3,7 +3,6 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import contextlib
 import importlib.util
-import inspect
 from dataclasses import replace
 from functools import cache
 
@@ -89,11 +88,10 @@ def property_for(info: SettingInfo):
     return make(name=name, description=text, default=info.default, **extra)
 
 
-def with_settings(operator):
-    """Class decorator: give an operator one property for each field of `Settings`."""
-    own = inspect.get_annotations(operator)
-    operator.__annotations__ = own | {info.name: property_for(info) for info in setting_infos()}
-    return operator
+class SettingsProps:
+    """One property for each field of `Settings`, for operators and property groups."""
+
+    __annotations__ = {info.name: property_for(info) for info in setting_infos()}
 
 
 def setting_value(owner, info: SettingInfo):
@@ -173,7 +171,7 @@ class CaptureOperator(ReadingProps, OneSentence, JobOperator):
         return folder
 
 
-class StageOperator(CaptureOperator):
+class StageOperator(SettingsProps, CaptureOperator):
     """An operator that runs stages of the method: also a result folder and the settings."""
 
     bl_options = set()  # the scene stays as it is: no undo step

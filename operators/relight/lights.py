@@ -4,7 +4,7 @@
 import bpy
 
 from ...addon.bridge.light import lamps, outside
-from ...addon.bridge.relight import lights, state
+from ...addon.bridge.relight import lights, setup
 from ...addon.core.errors import BadInputError
 from ..base import poll
 from ..results.select import make_active
@@ -42,7 +42,7 @@ class SCAN_RELIGHT_OT_restore_lamp(RelightOperator, bpy.types.Operator):
         follow(context.scene)
 
 
-@poll.needs(lambda context: state.is_relit(context.scene), "The light is as it was captured.")
+@poll.needs(lambda context: setup.is_relit(context.scene), "The light is as it was captured.")
 class SCAN_RELIGHT_OT_restore_light(RelightOperator, bpy.types.Operator):
     """Make lamps and outside exactly what was recovered, and remove the lights that were added here"""
 
@@ -50,7 +50,7 @@ class SCAN_RELIGHT_OT_restore_light(RelightOperator, bpy.types.Operator):
     bl_label = "Restore Captured Light"
 
     def work(self, context):
-        state.restore_captured(context.scene)
+        setup.restore_captured(context.scene)
         follow(context.scene)
 
 

@@ -3,8 +3,7 @@
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
-from ...addon.bridge.data.camera_track import track_cameras
-from ...addon.bridge.data.cameras import frame_cameras, use_camera
+from ...addon.bridge.data.cameras import frame_cameras, track_cameras, use_camera
 from ...addon.bridge.relight import match_frame
 from ...addon.core.errors import BadInputError
 from ..base import poll

@@ -12,8 +12,7 @@ from mathutils import Matrix
 
 from addon.bridge.data.materials import BASE_COLOR, METALLIC
 from addon.bridge.demo import render as demo_render
-from addon.bridge.demo.capture import FIELD_OF_VIEW, frame_path, write_all_but_frames
-from addon.bridge.demo.room import look_at
+from addon.bridge.demo.room import FIELD_OF_VIEW, frame_path, look_at, write_all_but_frames
 from addon.core.io.exr import write_exr
 from addon.core.scene.model import Camera
 from addon.core.scene.rays import RayScene

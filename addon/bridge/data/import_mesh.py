@@ -15,8 +15,8 @@ from ...core.errors import BadInputError
 from ...core.io.layout import RawMesh
 from ...core.io.self_contained import copy_gltf, copy_obj
 from ..refused import reason_of
+from .added import Made
 from .arrays import layer_of, triangles_of, vertices_of
-from .scene_data import Made
 
 NUMBERED = re.compile(r"^(.*?)(?:\.(\d{3,}))?$", re.DOTALL)
 """Blender's ending of a name that was taken already."""

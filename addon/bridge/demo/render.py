@@ -15,15 +15,14 @@ from ...core.brdf.compensation import ior_of
 from ...core.errors import BadInputError, StorageError
 from ...core.io.exr import read_header
 from ...core.progress import Progress
+from ..data.added import Made
 from ..data.arrays import set_layer
 from ..data.images import array_image
 from ..data.materials import BASE_COLOR, IOR, ROUGHNESS, SPECULAR_LEVEL
 from ..data.nodes import fresh_tree
-from ..data.scene_data import Made
 from ..refused import reason_of
 from ..relight.pictures import can_denoise
-from .capture import FIELD_OF_VIEW, frame_path, write_all_but_frames
-from .room import Paint, Thing, room, tour
+from .room import FIELD_OF_VIEW, Paint, Thing, frame_path, room, tour, write_all_but_frames
 
 SIZES = {"tiny": (10, 64, 48, 24), "small": (36, 160, 120, 24), "large": (64, 320, 240, 128)}
 """Frames, width, height and samples for each pixel."""

@@ -16,10 +16,10 @@ import bpy
 import numpy as np
 
 from ...core.errors import BadInputError
+from ..data.added import Made
 from ..data.arrays import faces_of, layer_of
 from ..data.materials import opacity
 from ..data.mesh_objects import PARTS_UV
-from ..data.scene_data import Made
 from ..marks import OBJECT_ID
 from ..refused import refused
 from .files import put, textures_of

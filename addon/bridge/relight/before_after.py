@@ -21,7 +21,7 @@ from ...core.results.room_file import MATERIALS
 from ..marks import RESULT
 from ..refused import refused
 from .pictures import beside, check_format, seconds_expected, shoot, ticking
-from .state import captured_light
+from .setup import captured_light
 
 NAME = "Before and After"
 """Name of the image in Blender."""

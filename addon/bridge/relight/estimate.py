@@ -21,8 +21,8 @@ from ..data.arrays import triangles_of, vertices_of
 from ..light import lamps as relight_lamps
 from ..light import outside
 from ..light.kelvin import luminance
+from ..light.outside import sky
 from ..light.room import bounds, cast, leaves, picture_ray
-from ..light.sky import sky
 from ..light.units import LUMENS_PER_WATT, efficacy
 
 _GRID, _AROUND, _ON_LAMP, _SKY = 9, 128, 6, 24

@@ -21,7 +21,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.errors import BadInputError
-from ..data.own_collection import own_collection, remove_own
+from ..data.added import own_collection, remove_own
 from ..light.room import room_light
 from ..light.units import ROOM, UNITS, set_strength
 from .aim import Placement, softbox_place, spot_place, sun_place, window_place

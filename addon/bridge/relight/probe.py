@@ -18,8 +18,8 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.errors import BadInputError, ScanRelightError
+from ..data.added import own_collection, remove_own
 from ..data.cameras import frame_cameras
-from ..data.own_collection import own_collection, remove_own
 from ..light.room import bounds, room_objects
 from ..refused import reason_of
 from .pictures import CYCLES, EEVEE, prepare, settings_kept, shoot, small_median

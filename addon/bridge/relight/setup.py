@@ -1,4 +1,4 @@
-"""A set-up of light as text, so that it can be kept as a preset and used in another room.
+"""The light as it was captured, for as long as a picture of it takes; a set-up of light as text, for other rooms.
 
 New lights are kept as seen by the camera, in units of the room's size and of its own light; lamps by their class, with
 the colour that the artist gave them; the outside by its factor and turn, a picture around the room by its path.
@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import bpy
 from mathutils import Matrix, Vector
 
 from ...core.errors import BadInputError
-from ..data.own_collection import own_collection
+from ..data.added import own_collection
 from ..light import lamps as relight_lamps
 from ..light import outside as relight_outside
 from ..light.room import bounds, cast, room_light, view_direction
@@ -170,3 +172,47 @@ def _within(scene, eye: Vector, place: Vector) -> Vector:
 def _class(lamp) -> str:
     """A lamp's class: its name without its number."""
     return lamp.name.casefold().rpartition(" ")[0] or lamp.name.casefold()
+
+
+@contextmanager
+def captured_light(scene: bpy.types.Scene) -> Iterator[None]:
+    """Within: recovered lamps and world, no other lamp of Blender's. Afterwards: the artist's light again, exactly."""
+    lamps = relight_lamps.find_lamps(scene)
+    world, kept_world = scene.world, scene.get(relight_outside.RECOVERED)
+    hidden = {thing: thing.hide_render for thing in scene.objects if thing.type == "LIGHT"}
+    states = [(lamp, relight_lamps.snapshot(lamp)) for lamp in lamps]
+    recovered = relight_outside.recovered_world(scene)
+    outside = relight_outside.snapshot(recovered)
+    try:
+        for lamp in lamps:
+            relight_lamps.restore(lamp)
+        relight_outside.restore(scene)
+        for thing in hidden:
+            thing.hide_render = True
+        yield
+    finally:
+        for lamp, state in states:
+            relight_lamps.put_back(lamp, state)
+        scene.world = world
+        relight_outside.put_back(recovered, outside)
+        if kept_world is not None:
+            scene[relight_outside.RECOVERED] = kept_world
+        for thing, was in hidden.items():
+            thing.hide_render = was
+
+
+def is_relit(scene: bpy.types.Scene) -> bool:
+    """Whether the scene's light differs from the captured one."""
+    return (
+        any(map(relight_lamps.is_changed, relight_lamps.find_lamps(scene)))
+        or relight_outside.is_changed(scene)
+        or any(not light.hide_render for light in added_lights(scene))
+    )
+
+
+def restore_captured(scene: bpy.types.Scene) -> None:
+    """Back to the captured light for good: lamps and outside restored, added lights removed."""
+    for lamp in relight_lamps.find_lamps(scene):
+        relight_lamps.restore(lamp)
+    relight_outside.restore(scene)
+    remove_lights(scene)

@@ -10,9 +10,9 @@ import numpy as np
 from mathutils import Matrix, Vector
 
 from ...core.errors import BadInputError
+from ..data.added import own_collection
 from ..data.arrays import vertices_of
 from ..data.materials import plain_material
-from ..data.own_collection import own_collection
 from ..light.room import Hit, bounds, cast, depsgraph_of, picture_ray
 
 KIND = "scan_relight_virtual"

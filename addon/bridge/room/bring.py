@@ -14,8 +14,8 @@ import bpy
 
 from ...core.errors import BadInputError, MissingStageError
 from ...core.results.room_file import ROOM, root_of, run_of
+from ..data.added import Made
 from ..data.cameras import show_camera
-from ..data.scene_data import Made
 from ..marks import IMAGE, OWN_SCENE, RESULT, UV_MAP, mark
 from ..results import changes as room_changes
 from ..results import images

@@ -8,10 +8,9 @@ import bpy
 import numpy as np
 
 from ...core.scene.model import Capture
-from ..data.camera_track import make_track
-from ..data.cameras import make_cameras, show_camera, use_camera
+from ..data.added import Made
+from ..data.cameras import make_cameras, make_track, show_camera, use_camera
 from ..data.mesh_objects import each_object
-from ..data.scene_data import Made
 from ..marks import CAPTURE, OWN_SCENE
 from ..relight.match_frame import show_picture
 from ..scene.as_made import stamp

@@ -14,8 +14,7 @@ import bpy
 
 from ..corrections import corrections
 from ..data.arrays import layer_of, set_layer
-from ..data.camera_track import NO_FRAME
-from ..data.cameras import FRAME_INDEX
+from ..data.cameras import FRAME_INDEX, NO_FRAME
 from ..light import lamps as relight_lamps
 from ..marks import CAPTURE, OBJECT_ID, RESULT, RUN
 from ..own_scene.capture import few

@@ -18,12 +18,11 @@ import numpy as np
 from ...core.brdf.material import ObjectMaterial, undescribed
 from ...core.results.room_file import run_of
 from ...core.scene.model import Capture
-from ..data.camera_track import make_track
-from ..data.cameras import best_view, differing, make_cameras, make_view, unlike, use_camera
+from ..data.added import Made
+from ..data.cameras import best_view, differing, make_cameras, make_track, make_view, unlike, use_camera
 from ..data.images import image_name, load_image, load_parts, relative_to
 from ..data.materials import make_material
 from ..data.mesh_objects import is_open, make_objects
-from ..data.scene_data import Made
 from ..data.world import set_world
 from ..marks import OWN_SCENE, mark
 from ..refused import refused

@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from addon.bridge.data.added import KINDS
 
 from addon.bridge.data.import_mesh import import_mesh
-from addon.bridge.data.scene_data import KINDS
 from addon.core.errors import BadInputError
 
 QUAD = "v 0 0 0\nv 1 0 0\nv 1 2 0\nv 0 2 3\n"

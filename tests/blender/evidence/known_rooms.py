@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from addon.bridge.demo.capture import write_all_but_frames
 from addon.bridge.demo.render import render_frames
-from addon.bridge.demo.room import SIZE, Paint, Thing, grid, look_at, room, tour
+from addon.bridge.demo.room import SIZE, Paint, Thing, grid, look_at, room, tour, write_all_but_frames
 from addon.core.brdf.compensation import layer_reflectance
 from addon.core.progress import Progress
 from addon.core.scene.atlas import Atlas

@@ -234,12 +234,12 @@ def test_no_state_of_a_run_is_saved(begin, choices, tmp_path, module, grey_captu
 
 
 def test_long_words_are_cut_and_nothing_is_lost(module):
-    lines = module("operators.base.text").lines
+    lines = module("operators.base.panel").lines
     sentence = "Frame '/a/very/long/path/that/does/not/end/anywhere/at/all/frame_0001.exr' is damaged; write it again."
     for width in (40, 120, 260, 2000):
         found = lines(sentence, width, 11.0)
         assert "".join(found).replace(" ", "") == sentence.replace(" ", "")
-        assert all(module("operators.base.text").measure(line, 11.0) <= width or len(line) <= 4 for line in found)
+        assert all(module("operators.base.panel").measure(line, 11.0) <= width or len(line) <= 4 for line in found)
     assert lines(sentence, 2000, 11.0) == (sentence,) and lines("", 100, 11.0) == ("",)
 
 

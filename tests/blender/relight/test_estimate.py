@@ -11,8 +11,9 @@ from addon.bridge.data.cameras import frame_cameras  # noqa: E402
 from addon.bridge.light import lamps as relight_lamps  # noqa: E402
 from addon.bridge.light import outside  # noqa: E402
 from addon.bridge.light.kelvin import LUMINANCE  # noqa: E402
-from addon.bridge.relight import estimate, lights, state  # noqa: E402
+from addon.bridge.relight import estimate, lights  # noqa: E402
 from addon.bridge.relight import exposure as relight_exposure  # noqa: E402
+from addon.bridge.relight import setup as state  # noqa: E402
 
 
 def rooms_lights(scene):

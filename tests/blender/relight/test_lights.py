@@ -12,7 +12,7 @@ from mathutils import Vector  # noqa: E402
 from addon.bridge.light.kelvin import LUMINANCE  # noqa: E402
 from addon.bridge.light.room import bounds, cast, room_light  # noqa: E402
 from addon.bridge.relight import lights as lights  # noqa: E402
-from addon.bridge.relight import state as state  # noqa: E402
+from addon.bridge.relight import setup as state  # noqa: E402
 from addon.bridge.relight.aim import Placement  # noqa: E402
 from addon.bridge.relight.subject import side_of, subject_of  # noqa: E402
 from addon.core.errors import BadInputError  # noqa: E402

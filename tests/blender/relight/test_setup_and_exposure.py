@@ -12,7 +12,7 @@ from mathutils import Matrix, Vector  # noqa: E402
 
 from addon.bridge.light import lamps, outside  # noqa: E402
 from addon.bridge.light import room as relight_room  # noqa: E402
-from addon.bridge.relight import exposure, lights, probe, setup, state  # noqa: E402
+from addon.bridge.relight import exposure, lights, probe, setup  # noqa: E402
 from addon.core.errors import BadInputError  # noqa: E402
 from tests.blender.relight.sheets import sheet  # noqa: E402
 
@@ -118,7 +118,7 @@ def test_a_setup_keeps_colours_and_the_picture_around(room, tmp_path):
     outside.use_hdri(room, tmp_path / "sky.exr", 2.0)
     outside.set_rotation(room.world, 0.5)
     told = setup.setup_of(room)
-    state.restore_captured(room)
+    setup.restore_captured(room)
     assert lamps.colour(lamp) != pytest.approx((0.2, 0.4, 1.0)) and room.world == recovered
     assert setup.apply_setup(room, told) == outside.remarks(room)
     assert lamps.colour(lamp) == pytest.approx((0.2, 0.4, 1.0))

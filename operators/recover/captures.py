@@ -1,4 +1,4 @@
-"""`bpy.ops.scan_relight.import_capture`: a capture's objects, cameras and frames into the scene."""
+"""`bpy.ops.scan_relight.*` for a capture as it is: what it holds and what is wrong with it, and into the scene."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import shutil
@@ -6,6 +6,9 @@ import tempfile
 
 import bpy
 
+from ...addon.core.errors import ScanRelightError
+from ..base import poll
+from ..base.at_once import AtOnce
 from . import findings, reading_props, room_window
 from .settings_props import INTO, CaptureOperator
 
@@ -49,3 +52,29 @@ class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
         if self.into == "OWN":
             room_window.show(scene, brought.scene)
         return brought.warnings
+
+
+@poll.has_capture
+@poll.has_scene
+class SCAN_RELIGHT_OT_check_capture(AtOnce, bpy.types.Operator):
+    """Read the capture and show what it holds and what is wrong with it; nothing is changed"""
+
+    bl_idname = "scan_relight.check_capture"
+    bl_label = "Check Capture"
+    bl_options = {"REGISTER"}
+
+    def work(self, context):
+        """With a window beside it; in the background at once."""
+        choices = context.scene.scan_relight
+        if not bpy.app.background:
+            findings.begin(choices)
+            return ()
+        from ...addon.core.io.read import describe, read_capture
+
+        try:
+            facts = describe(read_capture(findings.key(choices)[0], reading_props.reading(choices.reading)))
+        except ScanRelightError as error:
+            findings.put(choices, str(error))
+            raise
+        findings.put(choices, facts)
+        return facts["warnings"]
