@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+import bpy
+
 from ...addon.core.naming import numbered
 from .. import translations
 
@@ -14,12 +16,12 @@ MARGIN = 68
 ICON = 20
 
 
-def say(layout, context, sentence: str, icon: str = "NONE") -> None:
+def say(layout, sentence: str, icon: str = "NONE") -> None:
     """Write `sentence` over as many lines as the region's width asks for; the icon stands before the first."""
     sentence = translations.told(sentence)
+    context = bpy.context
     scale = context.preferences.system.ui_scale or 1.0  # 0 where there was never a window
-    region = context.region
-    room = (region.width if region else 300) - (MARGIN + (ICON if icon != "NONE" else 0)) * scale
+    room = region_width() - (MARGIN + (ICON if icon != "NONE" else 0)) * scale
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(lines(sentence, int(room), points(context) * scale)):
@@ -27,6 +29,12 @@ def say(layout, context, sentence: str, icon: str = "NONE") -> None:
             column.label(text=line)
         else:
             column.label(text=line, icon="BLANK1" if number else icon)
+
+
+def region_width() -> int:
+    """Pixels that the region is wide that is drawn."""
+    region = bpy.context.region
+    return region.width if region else 300
 
 
 def points(context) -> float:

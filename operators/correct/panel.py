@@ -103,7 +103,7 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
         row.operator("scan_relight.take_back", text="All Back", icon="LOOP_BACK").key = "all"
         layout.prop(choices, "refit_automatically")
         if job is None and corrections.given(thing) != (corrections.entry(thing).get("given") or {}):
-            self.say(layout, context, "Shown as given; Refit fits the rest of it to that.", "INFO")
+            self.say(layout, "Shown as given; Refit fits the rest of it to that.", "INFO")
 
 
 class SCAN_RELIGHT_PT_correct_scale(SidebarPanel, bpy.types.Panel):
@@ -115,7 +115,7 @@ class SCAN_RELIGHT_PT_correct_scale(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context):
         layout, choices, thing = self.layout, context.scene.scan_relight_correct, the_object(context)
-        self.say(layout, context, "An albedo that is known scales that of the whole room.")
+        self.say(layout, "An albedo that is known scales that of the whole room.")
         layout.prop(choices, "albedo")
         row = layout.row(align=True)
         row.operator("scan_relight.this_is_white", text="This Object").albedo = choices.albedo

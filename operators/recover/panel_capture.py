@@ -38,7 +38,7 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
         layout, choices = self.layout, context.scene.scan_relight
         layout.prop(choices, "capture_folder", text="")
         if not choices.capture_folder:
-            self.say(layout, context, "Choose the folder of a scan: its mesh, its HDR frames and their poses.", "INFO")
+            self.say(layout, "Choose the folder of a scan: its mesh, its HDR frames and their poses.", "INFO")
         header, body = layout.panel("scan_relight_reading", default_closed=True)
         header.label(text="How it is read")
         if body is not None:
@@ -56,14 +56,14 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
         if isinstance(found, jobs.Job):
             layout.progress(factor=0.0, text="Reading the capture", type="RING")
         elif isinstance(found, str):
-            self.say(layout, context, found, "CANCEL")
+            self.say(layout, found, "CANCEL")
         elif found is not None:
             self.facts(layout, context, found)
 
     def wrong(self, layout, context, content) -> None:
         """Why the folder is no capture, and a button for each that is meant perhaps."""
         column = layout.column()
-        self.say(column, context, content.sentence, "INFO" if content.captures or content.results else "CANCEL")
+        self.say(column, content.sentence, "INFO" if content.captures or content.results else "CANCEL")
         for folder in content.captures:
             column.operator(
                 "scan_relight.use_folder", text=f"Use '{folder.name}'", icon="FILE_FOLDER", translate=False
@@ -76,21 +76,15 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
         """What `describe` tells of a capture; keys that are not known here are shown as they come."""
         warnings = found.get("warnings", ())
         if not warnings:
-            self.say(layout, context, "Nothing is wrong with it.", "CHECKMARK")
+            self.say(layout, "Nothing is wrong with it.", "CHECKMARK")
         for sentence in warnings:
-            self.say(layout, context, sentence, "ERROR")
+            self.say(layout, sentence, "ERROR")
         sizes = ", ".join(f"{count} of {size}" for size, count in found.get("resolutions", {}).items())
         masks = f", {found['masks']} with a mask" if found.get("masks") else ""
-        self.say(
-            layout,
-            context,
-            f"{found.get('frames', 0)} frames ({found.get('format', '')}): {sizes}{masks}",
-            "CAMERA_DATA",
-        )
+        self.say(layout, f"{found.get('frames', 0)} frames ({found.get('format', '')}): {sizes}{masks}", "CAMERA_DATA")
         extent = " x ".join(f"{length:.2f}" for length in found.get("extent_m", ()))
         self.say(
             layout,
-            context,
             f"{found.get('triangles', 0):,} triangles, {found.get('area_m2', 0):.1f} m\u00b2, {extent} m",
             "MESH_DATA",
         )
@@ -113,9 +107,9 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
         label = name.replace("_", " ").capitalize()
         if isinstance(value, (list, tuple)) and all(isinstance(one, str) for one in value):
             for sentence in value:
-                self.say(layout, context, sentence, "INFO")
+                self.say(layout, sentence, "INFO")
         elif isinstance(value, (str, int, float)) and value not in ("", 0, None) and not isinstance(value, bool):
-            self.say(layout, context, f"{label}: {value}", "INFO")
+            self.say(layout, f"{label}: {value}", "INFO")
 
 
 class SCAN_RELIGHT_PT_own_scene(SidebarPanel, bpy.types.Panel):
@@ -127,7 +121,7 @@ class SCAN_RELIGHT_PT_own_scene(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context):
         layout, choices = self.layout, context.scene.scan_relight
-        self.say(layout, context, "Select the room's objects; the EXR pictures behind the cameras are the frames.")
+        self.say(layout, "Select the room's objects; the EXR pictures behind the cameras are the frames.")
         layout.operator("scan_relight.capture_from_scene", icon="SCENE_DATA")
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False

@@ -67,10 +67,10 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         layout.prop(choices, "result_folder")
         if not choices.result_folder and choices.capture_folder:
             folder = preferences.result_folder("", choices.capture_folder, context.scene)
-            self.say(layout, context, f"Goes into '{home.shown(folder)}'.", "FILE_FOLDER")
+            self.say(layout, f"Goes into '{home.shown(folder)}'.", "FILE_FOLDER")
         layout.prop(choices, "images")
         if choices.images == images.FOLDER and not bpy.data.filepath:
-            self.say(layout, context, images.NEVER_SAVED, "ERROR")
+            self.say(layout, images.NEVER_SAVED, "ERROR")
         header, body = layout.panel("scan_relight_settings", default_closed=True)
         header.label(text="Settings" + (f" ({len(changed)} changed)" if changed else ""))
         if body is not None:
@@ -96,7 +96,6 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         if stage:
             self.say(
                 self.layout,
-                context,
                 f"Goes on with: {LABELS[stage]}. What is finished is kept, where its settings are the same.",
             )
             again = self.layout.operator("scan_relight.run", text="Start Anew", icon="FILE_REFRESH")
@@ -122,7 +121,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
             header.label(text=f"{len(changes)} objects differ from the run before")
             if body is not None:
                 for one in changes[:CHANGES]:
-                    self.say(body, context, one["text"], "DOT")
+                    self.say(body, one["text"], "DOT")
         if len(bpy.data.scenes) > 1:
             layout.operator_menu_enum("scan_relight.link_room", "scene", icon="LINKED")
 
@@ -134,14 +133,14 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         layout = self.layout
         failed = job.facts.get("failed") or (job.sentence if job.state != jobs.DONE else "")
         if failed:
-            self.say(layout, context, failed, "INFO" if job.state == jobs.STOPPED else "CANCEL")
+            self.say(layout, failed, "INFO" if job.state == jobs.STOPPED else "CANCEL")
         elif job.facts.get("unwanted"):
-            self.say(layout, context, jobs.STOPPED_TEXT, "INFO")
+            self.say(layout, jobs.STOPPED_TEXT, "INFO")
         else:
-            self.say(layout, context, f"{job.facts.get('title', 'Run')}: done in {duration(job.seconds)}.", "CHECKMARK")
+            self.say(layout, f"{job.facts.get('title', 'Run')}: done in {duration(job.seconds)}.", "CHECKMARK")
         if job.warnings:
             header, body = layout.panel("scan_relight_warnings", default_closed=True)
             header.label(text=f"{len(job.warnings)} warning{'s' * (len(job.warnings) > 1)}")
             if body is not None:
                 for sentence in job.warnings:
-                    self.say(body, context, sentence, "ERROR")
+                    self.say(body, sentence, "ERROR")

@@ -80,5 +80,5 @@ class SCAN_RELIGHT_PT_export(SidebarPanel, bpy.types.Panel):
             row.operator("scan_relight.export", text=text, icon="EXPORT").format = ending
         for problem in dict.fromkeys(export.can_export(ending) for ending, _, _ in FORMATS):
             if problem:
-                self.say(layout, context, problem, "INFO")
-        self.say(layout, context, "Pictures become 8-bit sRGB, materials plain: what other programs understand.")
+                self.say(layout, problem, "INFO")
+        self.say(layout, "Pictures become 8-bit sRGB, materials plain: what other programs understand.")

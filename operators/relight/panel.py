@@ -70,7 +70,7 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         layout, scene = self.layout, context.scene
         if not has_room(scene):
-            self.say(layout, context, "Recover a capture, or open a result's scene.blend, to light it anew.", "INFO")
+            self.say(layout, "Recover a capture, or open a result's scene.blend, to light it anew.", "INFO")
             return
         studio, lamps = scene.scan_relight_studio, relight_lamps.lamps_by_object(scene)
         if lamps:
@@ -85,7 +85,7 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
             for lamp in lamps.get(chosen, ()):
                 self.numbers(layout, context, lamp)
         else:
-            self.say(layout, context, "The scan has no lamp.", "INFO")
+            self.say(layout, "The scan has no lamp.", "INFO")
         layout.operator("scan_relight.restore_light", icon="LOOP_BACK")
 
     def numbers(self, layout, context, lamp) -> None:
@@ -101,10 +101,10 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
             " ".join(f"{c:.3g}" for c in values)
             for values in (relight_lamps.radiance(lamp), relight_lamps.recovered_radiance(lamp))
         )
-        self.say(layout, context, f"{lamp.name}: radiance {now} (R G B, in the frames' unit)")
+        self.say(layout, f"{lamp.name}: radiance {now} (R G B, in the frames' unit)")
         if relight_lamps.is_changed(lamp):
             row = layout.row()
-            self.say(row.column(), context, f"Found: {found}")
+            self.say(row.column(), f"Found: {found}")
             row.operator("scan_relight.restore_lamp", text="", icon="LOOP_BACK").name = lamp.name
 
 
@@ -119,7 +119,7 @@ class SCAN_RELIGHT_PT_outside(RelightPanel, bpy.types.Panel):
         layout, world = self.layout, context.scene.world
         layout.use_property_split, layout.use_property_decorate = True, False
         if not relight_outside.has_outside(context.scene):
-            self.say(layout, context, "The scan saw no light from outside.", "INFO")
+            self.say(layout, "The scan saw no light from outside.", "INFO")
         else:
             outside = world.scan_relight_outside
             layout.prop(outside, "on")
@@ -190,7 +190,7 @@ class SCAN_RELIGHT_PT_exposure(RelightPanel, bpy.types.Panel):
         look_soon(scene)
         said = exposure.darkness(scene)
         if said:
-            self.say(layout, context, said, "INFO")
+            self.say(layout, said, "INFO")
         if exposure.CAPTURED in scene:
             layout.operator("scan_relight.restore_exposure", icon="LOOP_BACK")
         row = layout.row(align=True)
@@ -214,11 +214,11 @@ class SCAN_RELIGHT_PT_view(SidebarPanel, bpy.types.Panel):
         row.prop(studio, "frame", text="")
         row.operator("scan_relight.match_frame", text="", icon="TRIA_RIGHT").step = 1
         if not cameras:
-            self.say(layout, context, "The scene has no camera of a capture.", "INFO")
+            self.say(layout, "The scene has no camera of a capture.", "INFO")
             return
         index = match_frame.current(scene)
         name = cameras[index].name if index >= 0 else "The camera is none of the capture's."
-        self.say(layout, context, f"{name} ({index + 1} of {len(cameras)})" if index >= 0 else name)
+        self.say(layout, f"{name} ({index + 1} of {len(cameras)})" if index >= 0 else name)
         layout.operator("scan_relight.follow_track", icon="ANIM")
         layout.prop(studio, "match_size")
         layout.prop(studio, "show_frame")

@@ -80,19 +80,18 @@ class SCAN_RELIGHT_PT_missing(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         layout = self.layout
         for one in find.known_missing():
-            self.say(layout, context, one.sentence, "ERROR")
+            self.say(layout, one.sentence, "ERROR")
             layout.operator("scan_relight.find_result", icon="FILE_FOLDER").missing = str(one.folder)
         for folder in find.known_overtaken():
             self.say(
                 layout,
-                context,
                 f"'{folder.name}' was recovered anew with other textures since this file was saved: its objects show "
                 "wrong colours here until the new result is brought in.",
                 "ERROR",
             )
             layout.operator("scan_relight.open_result", text="Bring In", icon="IMPORT").folder = str(folder)
         for sentence in _found:
-            self.say(layout, context, sentence, "INFO")
+            self.say(layout, sentence, "INFO")
 
 
 @bpy.app.handlers.persistent

@@ -58,12 +58,7 @@ class SCAN_RELIGHT_PT_look(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         layout, scene = self.layout, context.scene
         if not look.recovered(scene):
-            self.say(
-                layout,
-                context,
-                "Shows albedo, light and coverage in the viewport, once materials are recovered.",
-                "INFO",
-            )
+            self.say(layout, "Shows albedo, light and coverage in the viewport, once materials are recovered.", "INFO")
             return
         shown = look.current(scene)
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
@@ -71,15 +66,10 @@ class SCAN_RELIGHT_PT_look(SidebarPanel, bpy.types.Panel):
             grid.operator("scan_relight.look", text=one.label, depress=name == shown).look = name
         if shown == look.MATERIAL:
             return
-        self.say(layout, context, f"{look.LOOKS[shown].text}.")
-        self.say(layout, context, "Renders show the materials all the same.", "RESTRICT_RENDER_OFF")
+        self.say(layout, f"{look.LOOKS[shown].text}.")
+        self.say(layout, "Renders show the materials all the same.", "RESTRICT_RENDER_OFF")
         if scene.view_settings.view_transform not in ("Standard", "Raw") and not look.LOOKS[shown].light:
-            self.say(
-                layout,
-                context,
-                "Colours are exact under the view transform Standard (Render, Color Management).",
-                "INFO",
-            )
+            self.say(layout, "Colours are exact under the view transform Standard (Render, Color Management).", "INFO")
         space = context.space_data
         if space is not None and space.type == "VIEW_3D" and space.shading.type in ("SOLID", "WIREFRAME"):
-            self.say(layout, context, "Visible in Material Preview.", "INFO")
+            self.say(layout, "Visible in Material Preview.", "INFO")

@@ -125,13 +125,12 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
         layout, scene = self.layout, context.scene
         rows, refused = file.rows(scene.objects), results.refused(scene.objects)
         for sentence, folder in refused:
-            self.say(layout, context, sentence, "ERROR")
+            self.say(layout, sentence, "ERROR")
             self.bring_in(layout, scene, folder)
         found = results.result_of(scene)
         if not rows and not refused and (found is None or not found.objects):
             self.say(
                 layout,
-                context,
                 "No result yet: run the recovery to its end, or choose the folder of one that is finished.",
                 "INFO",
             )
@@ -144,7 +143,6 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
         elif not refused:
             self.say(
                 layout,
-                context,
                 f"{len(found.objects)} objects in '{found.folder.name}'; none of them is in "
                 "this scene. Import the capture to see them.",
                 "INFO",
@@ -177,7 +175,7 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
             split.label(text=label)
             split.label(text=text)
         if one.get("note"):
-            self.say(layout, context, f"{one['note'][0].upper()}{one['note'][1:]}.".replace("..", "."))
+            self.say(layout, f"{one['note'][0].upper()}{one['note'][1:]}.".replace("..", "."))
 
 
 class SCAN_RELIGHT_PT_stages(SidebarPanel, bpy.types.Panel):
@@ -195,7 +193,7 @@ class SCAN_RELIGHT_PT_stages(SidebarPanel, bpy.types.Panel):
 
     def draw(self, context):
         stages = results.result_of(context.scene).stages
-        self.say(self.layout, context, "Run again from a stage on; those before it are taken as they are stored.")
+        self.say(self.layout, "Run again from a stage on; those before it are taken as they are stored.")
         column = self.layout.column(align=True)
         for name in RUN_STAGES:
             told = stages.get(name)

@@ -23,6 +23,7 @@ from ..marks import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, WHITE
 from ..results import file, look
 from ..scene.as_made import is_corrected, our_own
 from . import material, smoothing, unseen
+from .unseen import room_of
 
 ROUGHNESS = 0.3
 """What is shown until a refit, where nothing better is known."""
@@ -88,7 +89,7 @@ def give(thing: bpy.types.Object, **values) -> None:
         A value can't be, or objects would be the same as each other in a circle.
     """
     number = thing[OBJECT_ID]
-    room = {one[OBJECT_ID]: one for one in _room_of(thing)}
+    room = {one[OBJECT_ID]: one for one in room_of(thing)}
     newer = parse(
         {"objects": {str(number): {key: _plain(value) for key, value in values.items()}}},
         f"Object '{thing.name}'",
@@ -99,8 +100,9 @@ def give(thing: bpy.types.Object, **values) -> None:
     material.note(thing, entry(thing))
     thing[GIVEN] = json.dumps(said)
     show(thing)
-    for other in _followers(thing):
-        show(other)
+    for other in room_of(thing):
+        if other != thing and GIVEN in other and given(other).get("same_as") == number:
+            show(other)
 
 
 def take_back(thing: bpy.types.Object, *keys: str) -> None:
@@ -121,30 +123,7 @@ def _tuples(said: dict[str, Any]) -> dict[str, Any]:
 
 def by_id(thing: bpy.types.Object, number: int) -> bpy.types.Object | None:
     """Another object of the same room."""
-    folder = thing.get(RESULT)
-    return next(
-        (
-            one
-            for scene in thing.users_scene
-            for one in scene.objects
-            if one.get(OBJECT_ID) == number and one.get(RESULT) == folder and correctable(one)
-        ),
-        None,
-    )
-
-
-def _followers(thing: bpy.types.Object) -> list[bpy.types.Object]:
-    """Objects that are said to be the same as this one."""
-    return [
-        one
-        for scene in thing.users_scene
-        for one in scene.objects
-        if GIVEN in one
-        and one != thing
-        and given(one).get("same_as") == thing.get(OBJECT_ID)
-        and one.get(RESULT) == thing.get(RESULT)
-        and correctable(one)
-    ]
+    return next((one for one in room_of(thing) if one[OBJECT_ID] == number and correctable(one)), None)
 
 
 def found(thing: bpy.types.Object) -> dict[str, Any]:
@@ -222,33 +201,19 @@ def reapply(thing: bpy.types.Object) -> list[str]:
 def say_white(thing: bpy.types.Object, albedo) -> None:
     """Say what albedo an object has (number or three, 0...1), in place of any other of its room."""
     value = _plain(albedo if hasattr(albedo, "__len__") else [float(albedo)] * 3)
-    for other in _room_of(thing):
-        if WHITE in other:
-            del other[WHITE]
+    take_white_back(thing)
     thing[WHITE] = value
 
 
 def white_of(thing: bpy.types.Object) -> tuple[bpy.types.Object, list[float]] | None:
     """The object of a room whose albedo is given, and that albedo; None where none is."""
-    return next(((one, list(one[WHITE])) for one in _room_of(thing) if WHITE in one), None)
+    return next(((one, list(one[WHITE])) for one in room_of(thing) if WHITE in one), None)
 
 
 def take_white_back(thing: bpy.types.Object) -> None:
     """Let the frames alone say the room's scale again."""
-    for other in _room_of(thing):
-        if WHITE in other:
-            del other[WHITE]
-
-
-def _room_of(thing: bpy.types.Object) -> list[bpy.types.Object]:
-    return list(
-        {
-            one: None
-            for scene in thing.users_scene
-            for one in scene.objects
-            if OBJECT_ID in one and one.get(RESULT) == thing.get(RESULT)
-        }
-    )
+    for other in room_of(thing):
+        other.pop(WHITE, None)
 
 
 def folder_for(things: Iterable[bpy.types.Object]) -> Path:

@@ -264,19 +264,15 @@ def _fill(things, seen, where, passed) -> int:
     return int(filled.sum())
 
 
+def room_of(thing: bpy.types.Object) -> list[bpy.types.Object]:
+    """All objects of a room in the scenes that show one of them."""
+    everything = dict.fromkeys(one for scene in thing.users_scene for one in scene.objects)
+    return [one for one in everything if OBJECT_ID in one and one.get(RESULT) == thing.get(RESULT)]
+
+
 def _sharing(thing: bpy.types.Object) -> list[bpy.types.Object]:
     """All objects of the room whose texture coordinates lie in the same atlas."""
-    return list(
-        {
-            one: None
-            for scene in thing.users_scene
-            for one in scene.objects
-            if one.type == "MESH"
-            and OBJECT_ID in one
-            and one.get(RESULT) == thing.get(RESULT)
-            and ATLAS_UV in one.data.uv_layers
-        }
-    )
+    return [one for one in room_of(thing) if one.type == "MESH" and ATLAS_UV in one.data.uv_layers]
 
 
 def _elements(things: list[bpy.types.Object], size: int) -> Atlas:

@@ -103,15 +103,8 @@ def image_name(room: str, path: Path | str) -> str:
 
 
 def relative_to(image: bpy.types.Image, folder: Path | str) -> None:
-    """Give an image a path that starts at the .blend's folder (``//``), so that both can be moved together.
-
-    Paths on another drive stay absolute.
-    """
-    try:
-        relative = os.path.relpath(image.filepath, Path(folder).absolute())
-    except ValueError:
-        return
-    image.filepath = "//" + relative.replace(os.sep, "/")
+    """Give an image a path from the .blend's folder (``//``), so that both can be moved together; not across drives."""
+    image.filepath = bpy.path.relpath(image.filepath, start=str(Path(folder).absolute())).replace(os.sep, "/")
 
 
 def array_image(name: str, pixels: np.ndarray, colour_space: str = RADIANCE) -> bpy.types.Image:

@@ -166,7 +166,7 @@ def strength(world: bpy.types.World | None) -> float:
 
 def recovered_strength(world: bpy.types.World | None) -> float:
     """`strength` as it was recovered."""
-    return float(world[_KEPT]) if world is not None and _KEPT in world else strength(world)
+    return float(world.get(_KEPT, strength(world))) if world is not None else 0.0
 
 
 def usual_radiance(scene: bpy.types.Scene) -> float:

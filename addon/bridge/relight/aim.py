@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import product
 from typing import NamedTuple
 
 import bpy
@@ -23,18 +24,8 @@ _OFF_CEILING = 0.45
 """Metres below the room's top: a lamp closer to a ceiling burns its edge into it."""
 _AROUND = [
     Vector(one).normalized()
-    for one in (
-        (1, 0, 0),
-        (-1, 0, 0),
-        (0, 1, 0),
-        (0, -1, 0),
-        (0, 0, 1),
-        (0, 0, -1),
-        (1, 1, 0),
-        (1, -1, 0),
-        (-1, 1, 0),
-        (-1, -1, 0),
-    )
+    for one in product((-1, 0, 1), repeat=3)
+    if any(one) and (not one[2] or not any(one[:2]))  # level, straight up, straight down
 ]
 _ALMOST = 0.03
 """Metres by which a ray may end before a point and still count as reaching it."""
@@ -109,7 +100,8 @@ def sun_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
     low, high = bounds(scene)
     best = None
     starts = [Vector(p) + 0.02 * Vector(n) for p, n in zip(subject.points, subject.normals, strict=True)]
-    if _is_enclosed(scene, _before(scene, subject.target)):
+    # Without a roof a sun would light all of the room and not come in through an opening.
+    if cast(scene, _before(scene, subject.target), Vector((0, 0, 1))) is not None:
         for up in (14, 22, 30, 38):
             for side in range(-150, 180, 15):
                 if abs(side) < 15:
@@ -215,11 +207,6 @@ def _before(scene, target: Vector) -> Vector:
         return target
     way = picture_ray(scene)[0] - target
     return target + way * min(0.6 / max(way.length, 1e-6), 0.5)
-
-
-def _is_enclosed(scene, place: Vector) -> bool:
-    """Whether a place has a roof: else a sun would light all of the room and not come in through an opening."""
-    return cast(scene, place, Vector((0, 0, 1))) is not None
 
 
 def _towards(level: Vector, side: float, up: float) -> Vector:

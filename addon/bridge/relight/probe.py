@@ -68,19 +68,6 @@ def add_volume(scene: bpy.types.Scene) -> bpy.types.Object:
     return thing
 
 
-def prepare_eevee(scene: bpy.types.Scene) -> None:
-    """What EEVEE needs to show the room: rays on the screen, shadows, no clamping."""
-    _set(
-        scene.eevee,
-        use_raytracing=True,
-        use_shadows=True,
-        light_threshold=0.001,
-        clamp_surface_direct=0.0,
-        clamp_surface_indirect=0.0,
-        gi_irradiance_pool_size="64",
-    )
-
-
 def bake(scene: bpy.types.Scene, wait: bool = True) -> bpy.types.Object:
     """Bake the room's light.
 
@@ -99,7 +86,15 @@ def bake(scene: bpy.types.Scene, wait: bool = True) -> bpy.types.Object:
     if bpy.app.background:  # where a card may be missing, and baking says nothing of it
         _try_eevee(scene)
     thing = add_volume(scene)
-    prepare_eevee(scene)
+    _set(
+        scene.eevee,
+        use_raytracing=True,
+        use_shadows=True,
+        light_threshold=0.001,
+        clamp_surface_direct=0.0,
+        clamp_surface_indirect=0.0,
+        gi_irradiance_pool_size="64",
+    )
     for material in {slot.material for one in room_objects(scene) for slot in one.material_slots if slot.material}:
         # Places behind a wall count as within it then: they lend the wall neither the night nor the sun outside.
         material.use_backface_culling_lightprobe_volume = True

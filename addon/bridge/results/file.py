@@ -38,8 +38,6 @@ class Result:
         Entries of materials.json by `object_id`.
     stages : dict of str to dict
         Of report.json.
-    figures : dict
-        Of report.json.
     """
 
     folder: Path
@@ -47,7 +45,6 @@ class Result:
     layout: str
     objects: dict[int, dict[str, Any]]
     stages: dict[str, dict[str, Any]]
-    figures: dict[str, Any]
 
 
 _read: dict[Path, tuple[tuple, Result]] = {}
@@ -62,24 +59,21 @@ def read(folder: Path) -> Result | None:
         if len(_read) > 8:
             _read.clear()
         report, told = _json(folder / REPORT), _json(folder / MATERIALS)
-        run, layout = (one if isinstance(one := told.get(name), str) else "" for name in ("run", "layout"))
-        listed = told.get("objects")
-        objects = (
-            {one["object_id"]: renamed(one) for one in listed if isinstance(one, dict) and "object_id" in one}
-            if isinstance(listed, list)
-            else {}
+        listed = [one for one in _of_kind(told, "objects", list) if isinstance(one, dict) and "object_id" in one]
+        result = Result(
+            folder,
+            _of_kind(told, "run", str),
+            _of_kind(told, "layout", str),
+            {one["object_id"]: renamed(one) for one in listed},
+            _of_kind(report, "stages", dict),
         )
-        _read[folder] = (
-            stamp,
-            Result(
-                folder,
-                run,
-                layout,
-                objects,
-                *(report[key] if isinstance(report.get(key), dict) else {} for key in ("stages", "figures")),
-            ),
-        )
+        _read[folder] = stamp, result
     return _read[folder][1]
+
+
+def _of_kind(told: dict[str, Any], key: str, kind: type):
+    """What is told under `key`; nothing of its kind where that is absent or of another."""
+    return told[key] if isinstance(told.get(key), kind) else kind()
 
 
 def forget() -> None:

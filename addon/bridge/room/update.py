@@ -125,7 +125,7 @@ def _corrected(slot: bpy.types.MaterialSlot) -> bool:
 
 def commit(steps: Steps, top: bpy.types.Collection, fresh: bpy.types.Collection, shell: bpy.types.Scene) -> list[str]:
     """Do what was planned; sentences on what stays as the artist has it."""
-    lamps = {thing for thing in part_of(fresh, LAMPS).objects}
+    lamps = set(part_of(fresh, LAMPS).objects)
     for name in (RESULT, RUN, CAPTURE):
         top[name] = fresh[name]
     meshes: dict[bpy.types.Mesh, bpy.types.Mesh] = {}
@@ -148,7 +148,8 @@ def commit(steps: Steps, top: bpy.types.Collection, fresh: bpy.types.Collection,
     for thing in steps.added:
         part = next((one for one in thing.users_collection if PART in one), None)
         (part_of(top, part[PART]) if part is not None else top).objects.link(thing)
-    steps.replaced.extend(one.session_uid for thing in steps.removed for one in _data(thing))
+    owned = [one for thing in steps.removed for one in (thing.data, *(slot.material for slot in thing.material_slots))]
+    steps.replaced.extend(one.session_uid for one in owned if one is not None)
     if steps.removed:
         bpy.data.batch_remove(steps.removed)
     note_known(top, fresh.all_objects)
@@ -203,11 +204,13 @@ def _dress(pair: Pair, meshes: dict, used: set, steps: Steps) -> None:
             used.add(meshes[data])
         fresh = meshes[data]
         if pair.corrected or material is None:
-            _wear_same(data, fresh)
+            fresh.materials.clear()
+            for worn_by_it in data.materials:
+                fresh.materials.append(worn_by_it)
         elif fresh != new.data or not fresh.materials:
             fresh.materials.clear()
             fresh.materials.append(material)
-        if _is_smooth(data):
+        if any(polygon.use_smooth for polygon in data.polygons[:1]):  # as made it is flat
             fresh.shade_smooth()
         steps.replaced.append(data.session_uid)
         steps.names.append((fresh, data.name))
@@ -224,17 +227,6 @@ def _dress(pair: Pair, meshes: dict, used: set, steps: Steps) -> None:
             relight_lamps.carry(worn, material)
         steps.replaced.append(worn.session_uid)
         steps.names.append((material, worn.name))
-
-
-def _wear_same(data: bpy.types.Mesh, fresh: bpy.types.Mesh) -> None:
-    fresh.materials.clear()
-    for material in data.materials:
-        fresh.materials.append(material)
-
-
-def _is_smooth(data: bpy.types.Mesh) -> bool:
-    """Whether the artist shaded a mesh smooth: as made it is flat."""
-    return any(polygon.use_smooth for polygon in data.polygons[:1])
 
 
 def _sort(thing: bpy.types.Object, top: bpy.types.Collection, lamp: bool) -> None:
@@ -255,9 +247,3 @@ def _track(old: bpy.types.Object, new: bpy.types.Object, steps: Steps) -> None:
     animated.action = new.animation_data.action
     if hasattr(animated, "action_slot"):
         animated.action_slot = new.animation_data.action_slot
-
-
-def _data(thing: bpy.types.Object) -> list[bpy.types.ID]:
-    """What an object owns."""
-    found = [thing.data, *(slot.material for slot in thing.material_slots)]
-    return [one for one in found if one is not None]

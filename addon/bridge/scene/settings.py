@@ -16,14 +16,10 @@ _RENDER = ("engine", "resolution_x", "resolution_y", "resolution_percentage", "p
 def dress(scene: bpy.types.Scene) -> None:
     """Prepare a room's own scene for this artist: her graphics card, a viewport that calms down quickly."""
     scene[EXPOSURE] = scene.view_settings.exposure
-    scene.cycles.device = "GPU" if has_gpu() else "CPU"
-    scene.cycles.use_preview_denoising = True
-
-
-def has_gpu() -> bool:
-    """Whether the preferences give Cycles a device to compute on."""
     addon = bpy.context.preferences.addons.get("cycles")
-    return addon is not None and addon.preferences is not None and bool(addon.preferences.has_active_device())
+    card = addon is not None and addon.preferences is not None and addon.preferences.has_active_device()
+    scene.cycles.device = "GPU" if card else "CPU"
+    scene.cycles.use_preview_denoising = True
 
 
 def take_settings(scene: bpy.types.Scene, shell: bpy.types.Scene) -> list[str]:

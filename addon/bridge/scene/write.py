@@ -6,7 +6,7 @@ import errno
 import math
 import os
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -211,7 +211,7 @@ def write_scene(
         )
         for image in built.images:
             relative_to(image, path.parent)
-        _save_whole(path, lambda name: _save(name, scene, built, fresh))
+        _save_whole(path, scene, built, fresh)
     finally:
         if not fresh:
             made.remove()
@@ -227,14 +227,14 @@ def _save(name, scene, built, fresh):
         bpy.data.libraries.write(name, {scene, *built.images}, path_remap="NONE", compress=True, fake_user=False)
 
 
-def _save_whole(path: Path, save: Callable[[str], None]) -> None:
+def _save_whole(path: Path, scene: bpy.types.Scene, built: BuiltScene, fresh: bool) -> None:
     """Save beside `path` and put the whole file in its place."""
     writing = path.parent / _WRITING
     try:
         with refused(f"{path} can't be saved", "free some space or choose another folder"):
             path.parent.mkdir(parents=True, exist_ok=True)
             writing.unlink(missing_ok=True)
-            save(str(writing))
+            _save(str(writing), scene, built, fresh)
             if not is_whole(writing):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             writing.replace(path)

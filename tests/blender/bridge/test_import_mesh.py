@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
-from addon.bridge.data.added import KINDS
 
+from addon.bridge.data.added import KINDS
 from addon.bridge.data.import_mesh import import_mesh
 from addon.core.errors import BadInputError
 

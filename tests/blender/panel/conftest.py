@@ -89,14 +89,15 @@ def draw(ops):
             scene=bpy.context.scene,
             preferences=bpy.context.preferences,
             mode=bpy.context.mode,
-            region=SimpleNamespace(width=width),
             window_manager=bpy.context.window_manager,
             view_layer=bpy.context.view_layer,
             active_object=bpy.context.active_object,
             selected_objects=bpy.context.selected_objects,
         )
         assert cls.poll(context)
-        cls.draw(panel, context)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(importlib.import_module("scan_relight.operators.base.panel"), "region_width", lambda: width)
+            cls.draw(panel, context)
         return layout
 
     return drawn
