@@ -14,11 +14,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
+from .core.kinds import Shown
 from .core.progress import ProgressEvent
 
-LOG_SECONDS = 15.0
+LOG_SECONDS: Shown[float] = 15.0
 """A log gets a line at each stage's start and end, and after this many seconds within one."""
-TTY_SECONDS = 0.1
+TTY_SECONDS: Shown[float] = 0.1
 
 
 def duration(seconds: float) -> str:

@@ -10,15 +10,16 @@ from collections.abc import Callable
 from typing import TextIO
 
 from .core.errors import EXIT_INTERRUPTED, MemoryLimitError
+from .core.kinds import Shown, Unit
 from .core.memory import peak_memory
 from .core.progress import ProgressEvent
 
-EVENT_SECONDS = 0.1
+EVENT_SECONDS: Shown[float] = 0.1
 """Progress is told at most this often, and at each stage's start and end."""
 STOP = b"stop"
-GRACE = 5.0
+GRACE: Shown[float] = 5.0
 """Seconds after which a run that was let go ends at once instead of at its next safe point."""
-GIGABYTE = 1e9
+GIGABYTE: Unit[float] = 1e9
 
 
 class JsonProgress:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import bpy
 
+from ..addon.core.kinds import Shown
 from .base.job_operator import active, bar
 
 NEED_MORE = ("restore_lamp", "select_result_object")
 """Operators that say nothing without what a list has chosen; all others are in the menu, where F3 finds them."""
-WIDTH = 14
+WIDTH: Shown[int] = 14
 """Of the bar, in units of the interface."""
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 
 from ..addon.bridge.results import home
+from ..addon.core.kinds import Shown
 from . import keymaps
 
 PACKAGE = home.PACKAGE
@@ -86,7 +87,7 @@ def result_folder(chosen: str, capture_folder: str, scene: bpy.types.Scene | Non
     return home.result_folder(Path(bpy.path.abspath(capture_folder)).absolute(), results_folder(), scene)
 
 
-SIZE_SECONDS = 30.0
+SIZE_SECONDS: Shown[float] = 30.0
 """How old the size may be that the preferences show."""
 _size: dict = {"folder": None, "time": 0.0, "text": "", "thread": None}
 

@@ -1,10 +1,15 @@
 #!/usr/bin/env python3
-"""Numbers that somebody chose: module-level numeric constants, and numeric fields of `Params`, by folder.
+"""Numbers that somebody chose: fields of `...Params`, and numeric constants of modules, by folder.
 
     python scripts/count_constants.py [FOLDER] [--list]
 
-A tuple of numbers that is bound to several names counts once for each. What a physicist or a file format fixed counts,
-too: a reader can't tell it from what was tuned.
+A constant whose annotation names a kind of `addon/core/kinds.py` (a format's code, a unit, a bound for hostile files,
+a block's size, what is shown, a benchmark's workload) is counted apart: by kind, below. A tuple of numbers that is
+bound to several names counts once for each.
+
+`in code` counts the numbers that stand in functions as they are, but for whole numbers up to 4 and their halves,
+and what is told with `# fmt` or a formula: exponents, a unit's powers of ten below 1e-5 (which keep a quotient from
+dividing by 0). Most are a formula's; they are counted so that no constant gains by moving there.
 """
 
 from __future__ import annotations
@@ -16,6 +21,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+KINDS = [
+    node.targets[0].id
+    for node in ast.parse((ROOT / "addon" / "core" / "kinds.py").read_text(encoding="utf-8")).body
+    if isinstance(node, ast.Assign) and ast.unparse(node.value).startswith("Annotated[")
+]
+PLAIN = {value / 2 for value in range(9)}
+"""Numbers that say nothing when they stand in code: 0, 0.5, 1, ... 4."""
+LEAST = 1e-5
+"""Smaller ones keep quotients and logarithms finite."""
 
 
 def is_number(node: ast.expr) -> bool:
@@ -29,15 +43,17 @@ def is_number(node: ast.expr) -> bool:
     return isinstance(node, (ast.Tuple, ast.List)) and bool(node.elts) and all(is_number(one) for one in node.elts)
 
 
-def constants(tree: ast.Module) -> Iterator[str]:
-    """Names of the module's numeric constants."""
+def constants(tree: ast.Module) -> Iterator[tuple[str, str]]:
+    """Names of the module's numeric constants, and the kind of each: "" where it was chosen."""
     for node in tree.body:
         if isinstance(node, ast.AnnAssign) and node.value is not None and is_number(node.value):
-            yield ast.unparse(node.target)
+            kind = ast.unparse(node.annotation).split("[")[0]
+            yield ast.unparse(node.target), kind if kind in KINDS else ""
         if not isinstance(node, ast.Assign) or not is_number(node.value):
             continue
         for target in node.targets:
-            yield from (ast.unparse(one) for one in (target.elts if isinstance(target, ast.Tuple) else [target]))
+            for one in target.elts if isinstance(target, ast.Tuple) else [target]:
+                yield ast.unparse(one), ""
 
 
 def params(tree: ast.Module) -> Iterator[str]:
@@ -49,22 +65,38 @@ def params(tree: ast.Module) -> Iterator[str]:
                     yield f"{node.name}.{ast.unparse(one.target)}"
 
 
+def in_code(tree: ast.Module) -> Iterator[str]:
+    """Numbers that stand in functions, with their lines."""
+    for function in ast.walk(tree):
+        if isinstance(function, (ast.FunctionDef, ast.Lambda)):
+            for node in ast.walk(function):
+                if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+                    if abs(node.value) not in PLAIN and abs(node.value) > LEAST:
+                        yield f"{node.value:g} ({node.lineno})"
+
+
 def main(argv: list[str]) -> int:
     show = "--list" in argv
     folders = [one for one in argv if one != "--list"] or ["addon", "operators"]
-    loose, fields = Counter(), Counter()
+    loose, fields, inline, kinds = Counter(), Counter(), Counter(), Counter()
     for folder in folders:
         for path in sorted((ROOT / folder).rglob("*.py")):
             tree = ast.parse(path.read_text(encoding="utf-8"))
             where = path.parent.relative_to(ROOT).as_posix()
-            for count, names in ((loose, list(constants(tree))), (fields, list(params(tree)))):
+            found = list(constants(tree))
+            kinds.update(kind for _, kind in found if kind)
+            chosen = [name for name, kind in found if not kind]
+            for count, names in ((loose, chosen), (fields, list(params(tree))), (inline, sorted(set(in_code(tree))))):
                 count[where] += len(names)
                 if show and names:
                     print(f"{path.relative_to(ROOT)}: {', '.join(names)}")
+    print("loose Params in code")
     for where in sorted(loose):
         if loose[where] or fields[where]:
-            print(f"{loose[where]:5d} {fields[where]:5d}  {where}")
-    print(f"{sum(loose.values()):5d} {sum(fields.values()):5d}  together: module-level, in Params")
+            print(f"{loose[where]:5d} {fields[where]:6d} {inline[where]:7d}  {where}")
+    print(f"{sum(loose.values()):5d} {sum(fields.values()):6d} {sum(inline.values()):7d}  together")
+    print(f"Chosen: {sum(loose.values()) + sum(fields.values())}. Of a kind, not chosen by results:")
+    print(", ".join(f"{kinds[kind]} {kind}" for kind in KINDS))
     return 0
 
 

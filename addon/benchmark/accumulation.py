@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core.io.pixels import read_pixels
 from ..core.io.read import read_capture
+from ..core.kinds import Workload
 from ..core.lit_diffuse.accumulate import accumulate
 from ..core.memory import peak_memory
 from ..core.parallel import ordered_map
@@ -29,11 +30,14 @@ from .synthetic import synthetic_capture
 from .table import BASELINE, Curves, Table
 from .timing import Timing, alternately, once
 
-FRAMES = (12, 48, 192)
+FRAMES: Workload[tuple[int, int, int]] = (12, 48, 192)
 """x1, x4, x16 of the base size."""
 SCRATCH = "tmp-accumulation-"
-SIZE, ELEMENTS = (192, 128), 60_000
-LARGE_FRAMES, LARGE_SIZE, LARGE_ELEMENTS = 500, (1152, 768), 2_000_000
+SIZE: Workload[tuple[int, int]] = (192, 128)
+ELEMENTS: Workload[int] = 60_000
+LARGE_FRAMES: Workload[int] = 500
+LARGE_SIZE: Workload[tuple[int, int]] = (1152, 768)
+LARGE_ELEMENTS: Workload[int] = 2_000_000
 ALTERNATIVES = {"p2 (paper)": PAPER.median, "exact": "exact", "default": Settings().median}
 COLUMNS = ("capture", "frames", "elements", "alternative", BASELINE, "RMS log error", "seconds", "CPU seconds",
            "against the least", "observations", "rays")  # fmt: skip

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.kinds import Workload
 from ..core.light.environment import Environment
 from ..core.light.field import LightField
 from ..core.light.over_surface import finest_spacing, irradiance
@@ -14,10 +15,10 @@ from ..core.scene.rays import RayScene
 from .synthetic import box, tiled
 
 SIZE = np.array([5.0, 4.0, 2.6])
-BOXES = 10
-BOUNCES = 3
-LAMP_COUNT = 24
-WINDOW = ((0.3, 0.65), (0.35, 0.8))
+BOXES: Workload[int] = 10
+BOUNCES: Workload[int] = 3
+LAMP_COUNT: Workload[int] = 24
+WINDOW: Workload[tuple[tuple[float, float], tuple[float, float]]] = ((0.3, 0.65), (0.35, 0.8))
 """Shares of its wall's edges."""
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core.kinds import Workload
 from ..core.lit_diffuse.accumulate import frame_order
 from ..core.lit_diffuse.adaptive import Adaptive
 from ..core.lit_diffuse.batched import Batched
@@ -19,9 +20,12 @@ from .sequences import SEQUENCES
 from .table import BASELINE, Curves, Table
 from .timing import alternately
 
-COUNTS, LARGE_COUNTS = (5, 12, 30, 100, 400, 2000), (5, 12, 30, 100, 400, 2000, 5000)
-ELEMENTS, LARGE_ELEMENTS = 100, 1000
-TIMED_COUNTS, TIMED_ELEMENTS = (12, 100, 400), 4096
+COUNTS: Workload[tuple[int, ...]] = (5, 12, 30, 100, 400, 2000)
+LARGE_COUNTS: Workload[tuple[int, ...]] = (5, 12, 30, 100, 400, 2000, 5000)
+ELEMENTS: Workload[int] = 100
+LARGE_ELEMENTS: Workload[int] = 1000
+TIMED_COUNTS: Workload[tuple[int, int, int]] = (12, 100, 400)
+TIMED_ELEMENTS: Workload[int] = 4096
 TIMED = "video, 20 % highlights"
 SHINING = tuple(name for name in SEQUENCES if name.startswith("video") and " 0 %" not in name)
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.io.read import read_capture
+from ..core.kinds import Workload
 from ..core.memory import peak_memory
 from ..core.pipeline.recover import Recovery
 from ..core.progress import Progress
@@ -24,11 +25,11 @@ from .table import BASELINE, Curves, Table
 from .timing import once
 
 SCRATCH = "tmp-pipeline-"
-PAPER_RAYS = 100
+PAPER_RAYS: Workload[int] = 100
 """The smaller of the paper's two settings; its 10,000 rays at each texel would take hours."""
-DETAILS = (0.25, 0.5, 1.0)
+DETAILS: Workload[tuple[float, float, float]] = (0.25, 0.5, 1.0)
 """x1, x4, x16 texels of the default size; `--large` doubles them."""
-CUTS = (0, 1, 2)
+CUTS: Workload[tuple[int, int, int]] = (0, 1, 2)
 """How often every triangle is cut in four: x1, x4, x16."""
 
 

@@ -9,11 +9,12 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from ..core.atomic import replacing
+from ..core.kinds import Workload
 from .table import BASELINE, Table
 
-PANEL = 4.2
+PANEL: Workload[float] = 4.2
 """Edge of a panel in inches."""
-ACROSS = 3
+ACROSS: Workload[int] = 3
 """Panels side by side."""
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f", "#8c564b", "#b2a000", "#17202a")
 """Okabe and Ito's, which colour-blind readers can tell apart, and a few more."""

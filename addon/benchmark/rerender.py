@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.kinds import Workload
 from ..core.light.emitters import bright_triangles
 from ..core.light.lobes import GRID, reflected_light
 from ..core.pipeline.recover import Recovery
 
-PIXELS = 1500
+PIXELS: Workload[int] = 1500
 """Of each view."""
-RAYS = 64
-GREY = 0.18
+RAYS: Workload[int] = 64
+GREY: Workload[float] = 0.18
 
 
 def rerender_psnr(recovery: Recovery, seen: list[dict], seed: int = 0) -> float:

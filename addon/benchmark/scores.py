@@ -22,10 +22,12 @@ from ..core.brdf.metal import METAL
 from ..core.brdf.model import Brdf
 from ..core.io.exr import read_exr
 from ..core.io.read import read_capture
+from ..core.kinds import Workload
 from ..core.passes.albedo.albedo import MEASURED
 from .truth_views import albedo_psnr
 
-PICTURE, SAMPLES = (160, 120), 64
+PICTURE: Workload[tuple[int, int]] = (160, 120)
+SAMPLES: Workload[int] = 64
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-NOISE = 0.03
+from ..core.kinds import Workload
+
+NOISE: Workload[float] = 0.03
 """Relative, of every observation."""
-HIGHLIGHT = 3.25
+HIGHLIGHT: Workload[float] = 3.25
 """Mean of a highlight's radiance over the diffuse one."""
 
 

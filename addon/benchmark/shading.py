@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from ..core.kinds import Workload
 from ..core.light.directions import cosine_hemisphere, shifted, sobol
 from ..core.light.emitters import bright_triangles
 from ..core.light.field import LightField
@@ -17,13 +18,14 @@ from ..core.scene.tangent_frame import to_world
 from .lit_rooms import ROOMS, LitRoom, make_room
 from .run import Options
 from .shading_reference import looked_at, relative_error
+from .shading_surface import surface_tables
 from .table import BASELINE, Curves, Table
 from .timing import once
 
-ELEMENTS = 40_000
-POINTS = 1000
-PAPER = (100, 10_000)
-ASKED = 10_000
+ELEMENTS: Workload[int] = 40_000
+POINTS: Workload[int] = 1000
+PAPER: Workload[tuple[int, int]] = (100, 10_000)
+ASKED: Workload[int] = 10_000
 """Rays of the paper's finer setting, whose error the others are to reach."""
 
 
@@ -91,11 +93,12 @@ def _rays_for(rays: list[int], errors: list[float], wanted: float) -> float | No
 
 
 def run(options: Options) -> Iterator[Table]:
-    """Tables of single points, and of what reaches the paper's error."""
+    """Tables of single points, of what reaches the paper's error, and of the whole surface."""
     points = POINTS * (4 if options.large else 1)
     rows, needed = [], []
+    rooms = {}
     for done, name in enumerate(ROOMS):
-        room = make_room(name, ELEMENTS, options.seed, options.threads)
+        room = rooms[name] = make_room(name, ELEMENTS, options.seed, options.threads)
         element, true = looked_at(room, points, options)
         position, normal = room.atlas.position[element], room.atlas.normal[element]
         found: dict[str, tuple[list[int], list[float]]] = {}
@@ -120,7 +123,7 @@ def run(options: Options) -> Iterator[Table]:
         for alternative, (counts, errors) in found.items():
             rays = ASKED if alternative == "uniform" else _rays_for(counts, errors, wanted)
             needed.append((name, alternative, alternative == "uniform", wanted, rays, ASKED / rays if rays else None))
-        options.progress.update((done + 1) / len(ROOMS))
+        options.progress.update(0.4 * (done + 1) / len(ROOMS))
     yield Table(
         "shading", "Shading: error of E at single points",
         ("room", "estimator", BASELINE, "rays", "relative RMSE", "microseconds a point"), rows,
@@ -133,3 +136,4 @@ def run(options: Options) -> Iterator[Table]:
         ("room", "estimator", BASELINE, "error", "rays", "times fewer"), needed,
         ("No figure: not reached with the most rays tried.",),
     )  # fmt: skip
+    yield from surface_tables(rooms, options)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.kinds import Workload
 from ..core.light.directions import cosine_hemisphere, shifted, sobol
 from ..core.light.emitters import bright_triangles
 from ..core.light.irradiance import direct, gather
@@ -13,9 +14,9 @@ from ..core.scene.tangent_frame import to_world
 from .lit_rooms import LitRoom
 from .run import Options
 
-REFERENCE = (1 << 13, 1 << 11, 1 << 12)
+REFERENCE: Workload[tuple[int, int, int]] = (1 << 13, 1 << 11, 1 << 12)
 """Gather, lamp and portal rays of the reference."""
-HIDDEN = 0.02
+HIDDEN: Workload[float] = 0.02
 """Elements darker than this share of the median are not looked at."""
 
 

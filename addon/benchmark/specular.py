@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core.brdf import ggx as brdf
 from ..core.fit.problem import Problem
+from ..core.kinds import Workload
 from ..core.light.directions import shifted, sobol
 from ..core.light.emitters import bright_triangles
 from ..core.light.environment import Environment
@@ -28,13 +29,20 @@ from .synthetic import ROOM, synthetic_capture
 from .table import BASELINE, Curves, Table
 from .timing import once
 
-FLOOR, CEILING = 4, 5
+FLOOR: Workload[int] = 4
+CEILING: Workload[int] = 5
 """Objects of `synthetic_capture`."""
-LAMP = 30.0
-PHIS, F0S = (0.02, 0.1, 0.3, 0.9), (0.02, 0.04, 0.2, 0.9)
-LARGE_PHIS, LARGE_F0S = (0.02, 0.05, 0.1, 0.2, 0.4, 0.9), (0.02, 0.04, 0.1, 0.3, 0.9)
-ELEMENTS, VIEWS, LARGE_ELEMENTS, LARGE_VIEWS = 120, 12, 350, 30
-TRUE_RAYS, LARGE_TRUE_RAYS = 1024, 4096
+LAMP: Workload[float] = 30.0
+PHIS: Workload[tuple[float, float, float, float]] = (0.02, 0.1, 0.3, 0.9)
+F0S: Workload[tuple[float, float, float, float]] = (0.02, 0.04, 0.2, 0.9)
+LARGE_PHIS: Workload[tuple[float, ...]] = (0.02, 0.05, 0.1, 0.2, 0.4, 0.9)
+LARGE_F0S: Workload[tuple[float, ...]] = (0.02, 0.04, 0.1, 0.3, 0.9)
+ELEMENTS: Workload[int] = 120
+VIEWS: Workload[int] = 12
+LARGE_ELEMENTS: Workload[int] = 350
+LARGE_VIEWS: Workload[int] = 30
+TRUE_RAYS: Workload[int] = 1024
+LARGE_TRUE_RAYS: Workload[int] = 4096
 PAPERS = "paper: one frame, uniform rays"
 OURS = "default"
 

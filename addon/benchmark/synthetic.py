@@ -8,17 +8,18 @@ from pathlib import Path
 import numpy as np
 
 from ..core.io.exr import write_exr
+from ..core.kinds import Workload
 from ..core.scene.atlas import Atlas
 from ..core.scene.elements import make_atlas
 from ..core.scene.model import Camera, Frame, Mesh, Pixels
 from ..core.scene.rays import RayScene
 
-ROOM = (6.0, 5.0, 2.8)
-BOXES = 12
-TILES = 16
+ROOM: Workload[tuple[float, float, float]] = (6.0, 5.0, 2.8)
+BOXES: Workload[int] = 12
+TILES: Workload[int] = 16
 """Squares along a side's edge: the tree of triangles is then as deep as a scan's."""
-NOISE = 0.03
-GAP = 2
+NOISE: Workload[float] = 0.03
+GAP: Workload[int] = 2
 """Texels between two islands."""
 
 

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from ..core.atomic import write_bytes
+from ..core.kinds import Workload
 
 BASELINE = "baseline"
 """The column that says whether a row is the paper's setting, which every ratio of its case refers to."""
-DIGITS = 3
+DIGITS: Workload[int] = 3
 Cell = str | bool | int | float | None
 
 

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..core.brdf.material import ObjectMaterial
+from ..core.kinds import Workload
 
-LEAST_PIXELS = 100
+LEAST_PIXELS: Workload[int] = 100
 """In the held-out views, that an object is judged by."""
-UNTOLD = 0.5
+UNTOLD: Workload[float] = 0.5
 """Blender's Roughness where the result says none."""
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.io.exr import read_exr
 from ..core.io.read import read_capture
+from ..core.kinds import Workload
 from ..core.pipeline.recover import Recovery
 from ..core.progress import Progress
 from ..core.results.store import Store
@@ -16,7 +17,7 @@ from ..core.scene.elements import ElementLookup
 from ..core.scene.model import Camera
 from ..core.settings import Settings
 
-SHIFTS = ((-0.25, -0.25), (0.25, 0.25), (-0.25, 0.25), (0.25, -0.25))
+SHIFTS: Workload[tuple[tuple[float, float], ...]] = ((-0.25, -0.25), (0.25, 0.25), (-0.25, 0.25), (0.25, -0.25))
 
 
 def views(capture: Path, recovery: Recovery) -> list[dict]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-EXIT_OK = 0
-EXIT_FAILURE = 1
-EXIT_BAD_INPUT = 2
-EXIT_INTERRUPTED = 130
+from .kinds import Code, Shown
+
+EXIT_OK: Code[int] = 0
+EXIT_FAILURE: Code[int] = 1
+EXIT_BAD_INPUT: Code[int] = 2
+EXIT_INTERRUPTED: Code[int] = 130
 
 
-LONGEST = 2000
+LONGEST: Shown[int] = 2000
 """Characters of a sentence; what is longer holds a file's content, and is shown by its two ends."""
 
 

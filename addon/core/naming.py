@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-LONGEST = 48
+from .kinds import Code
+
+LONGEST: Code[int] = 48
 """Bytes of a name in UTF-8. Blender 4.5 cuts names at 63: this leaves room for ' base color' and its own '.001'."""
 
 

@@ -23,8 +23,16 @@ class SignificanceParams:
         Elements of an object with which something may be fitted to it.
     enough : int
         Elements or observations that give a spread: its standard error is then 13 % of it.
+    many : int
+        Pixels, vertices or pairs of observations that say something where all of them are looked at together.
     views : int
         Views of an element that tell what changes with the view.
+    gain : float
+        Share by which something that was not there before (a sun, a sky, a highlight, glass) must lower what is left
+        unexplained, besides that being beyond chance. Without a sun a living room gains .01, with one bedrooms .25 to
+        .39; opaque things taken for glass gain up to .08. What adds so much may be refused again.
+    dark : float
+        Of the room's median radiance: what is darker in a channel is all noise there.
     """
 
     sigmas: float = 3.0
@@ -32,7 +40,10 @@ class SignificanceParams:
     outlier: float = 2.0
     few: int = 12
     enough: int = 30
+    many: int = 100
     views: int = 4
+    gain: float = 0.1
+    dark: float = 0.02
 
 
 LEVELS = SignificanceParams()

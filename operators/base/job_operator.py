@@ -15,14 +15,15 @@ import bpy
 from ...addon.bridge.job import job as jobs
 from ...addon.console import duration, unexpected
 from ...addon.core.errors import ScanRelightError
+from ...addon.core.kinds import Shown
 from ...addon.core.stages import LABELS
 from ..translations import told
 
-PERIOD = 0.1
+PERIOD: Shown[float] = 0.1
 """Seconds between two looks at the job."""
-REDRAW = 0.5
+REDRAW: Shown[float] = 0.5
 """Seconds between two pictures of the progress bar, unless the stage changes: drawing is the window's time."""
-SLICE = 0.04
+SLICE: Shown[float] = 0.04
 """Seconds that the scene is worked at before the window is drawn again."""
 
 

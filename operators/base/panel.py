@@ -8,12 +8,13 @@ from functools import lru_cache
 
 import bpy
 
+from ...addon.core.kinds import Shown
 from ...addon.core.naming import numbered
 from .. import translations
 
-MARGIN = 68
+MARGIN: Shown[int] = 68
 """Pixels at an interface scale of 1 that the tabs, the panel's edges and paddings take."""
-ICON = 20
+ICON: Shown[int] = 20
 
 
 def say(layout, sentence: str, icon: str = "NONE") -> None:

@@ -6,12 +6,13 @@ import bpy
 
 from ...addon.bridge.corrections import corrections, unseen
 from ...addon.core.brdf.registry import named, shown
+from ...addon.core.kinds import Unit
 from ..base.job_operator import active, bar
 from ..base.panel import SidebarPanel
 from .base import chosen
 from .props import STATEMENTS
 
-GREY_CARD = 0.18
+GREY_CARD: Unit[float] = 0.18
 
 
 def the_object(context) -> bpy.types.Object | None:

@@ -9,11 +9,12 @@ import bpy
 
 from ...addon.bridge.job import job as jobs
 from ...addon.core.io.folder import CAPTURE, Content, look_into
+from ...addon.core.kinds import Shown
 from ..base.job_operator import redraw
 from . import reading_props
 
 _found: dict[tuple, jobs.Job | dict | str] = {}
-FRESH = 2.0
+FRESH: Shown[float] = 2.0
 """Seconds for which what a folder is stays known: panels are drawn often, disks are slow."""
 _contents: dict[str, tuple[float, Content]] = {}
 

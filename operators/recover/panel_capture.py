@@ -5,11 +5,12 @@ from __future__ import annotations
 import bpy
 
 from ...addon.bridge.job import job as jobs
+from ...addon.core.kinds import Shown
 from ...addon.core.naming import object_name
 from ..base.panel import SidebarPanel
 from . import findings, reading_props
 
-SHOWN = 12
+SHOWN: Shown[int] = 12
 """Objects that are listed before the rest is counted."""
 TOLD = (
     "capture",

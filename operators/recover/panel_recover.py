@@ -9,6 +9,7 @@ from ...addon.bridge.marks import OWN_SCENE
 from ...addon.bridge.results import changes as room_changes
 from ...addon.bridge.results import home, images
 from ...addon.console import duration
+from ...addon.core.kinds import Shown
 from ...addon.core.results.unfinished import goes_on_with
 from ...addon.core.stages import LABELS, STAGES
 from ...addon.settings_info import setting_infos
@@ -25,7 +26,7 @@ GROUPS = (
     ("Computer", ("threads", "seed")),
 )
 OTHER = "More"
-CHANGES = 8
+CHANGES: Shown[int] = 8
 """Objects that are listed as different since the run before."""
 
 

@@ -8,9 +8,11 @@ import bpy
 
 from ...addon.bridge.relight import estimate, exposure
 from ...addon.core.errors import ScanRelightError
+from ...addon.core.kinds import Shown
 from .base import RelightOperator
 
-_REST, _SLICE = 0.2, 0.02
+_REST: Shown[float] = 0.2
+_SLICE: Shown[float] = 0.02
 """Seconds that a slider stays still to count as let go; that looking takes of the window's time at once."""
 _looked: dict = {"run": None}
 

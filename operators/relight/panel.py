@@ -8,13 +8,14 @@ from ...addon.bridge.data.cameras import frame_cameras
 from ...addon.bridge.light import lamps as relight_lamps
 from ...addon.bridge.light import outside as relight_outside
 from ...addon.bridge.relight import exposure, lights, match_frame
+from ...addon.core.kinds import Shown
 from ...addon.core.naming import in_order
 from ..base.panel import NamedRows, SidebarPanel, places
 from . import light_pictures
 from .base import has_room
 from .exposure import look_soon
 
-NAME = 0.6
+NAME: Shown[float] = 0.6
 """Share of a row of the lamps that their names have."""
 ICONS = {"WINDOW": "LIGHT_AREA", "SOFTBOX": "MESH_PLANE", "SPOT": "LIGHT_SPOT", "SUN": "LIGHT_SUN"}
 

@@ -10,6 +10,7 @@ from ...addon.bridge.results import file
 from ...addon.console import duration
 from ...addon.core.brdf.registry import find, models
 from ...addon.core.errors import BadInputError
+from ...addon.core.kinds import Shown
 from ...addon.core.naming import in_order
 from ...addon.core.stages import LABELS, RUN_STAGES
 from .. import preferences
@@ -17,7 +18,7 @@ from ..base.panel import NamedRows, SidebarPanel, places
 from . import told as results
 from .select import select
 
-NAME = 0.62
+NAME: Shown[float] = 0.62
 """Share of a row that the name has where there are figures beside it."""
 SIGNS = {"sure": "CHECKMARK", "fair": "DOT", "unsure": "QUESTION", "unknown": "BLANK1"}
 MODELS = [

@@ -10,10 +10,12 @@ import bpy
 from ...addon.bridge.results import file, look
 from ...addon.bridge.results.file import EARLIER, FITS, MATERIALS, UNTOLD, Result, standing, standings
 from ...addon.core.brdf.registry import find, shown
+from ...addon.core.kinds import Shown
 from .. import preferences
 
 PAGE = "report.html"
-SURE, FAIR = 0.15, 0.4
+SURE: Shown[float] = 0.15
+FAIR: Shown[float] = 0.4
 """Interval width up to which an object counts as sure, and as fairly sure."""
 GIVEN = {"model": "model", "roughness": "roughness", "f0": "F0", "base_color": "colour", "same_as": "same as object"}
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.kinds import Unit
 from ..data.mesh_objects import ATLAS_UV
 from . import corrections, unseen
 
-_GAMMA = 1 / 2.4
+_GAMMA: Unit[float] = 1 / 2.4
 
 
 def begin(context: bpy.types.Context, thing: bpy.types.Object, where: str, masked: bool = True) -> None:

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
+from ...core.kinds import Code, Unit
 from ...core.scene.lens import Lens
 from ...core.scene.lenses import Cropped, Equirectangular
 from ...core.scene.lenses_told import lens_of, told_lens
@@ -25,7 +26,7 @@ LENS = "lens_model"
 """Custom property of cameras with a lens: the lens, fx, fy, cx and cy as JSON, which Blender has no settings for."""
 FRAME_INDEX = "frame_index"
 """Custom property of a frame's camera: its place in the capture's order, from 0."""
-_SENSOR = 36.0
+_SENSOR: Unit[float] = 36.0
 _WIDE = np.radians(80)
 """A lens that sees further than this from its axis is no perspective."""
 _TOLD = 0.5
@@ -272,7 +273,7 @@ def make_view(name: str, camera: Camera, collection: bpy.types.Collection) -> bp
 
 TRACK = "Scan Relight track"
 """Name of the camera."""
-NO_FRAME = -1
+NO_FRAME: Code[int] = -1
 """Its `FRAME_INDEX`: it is none of the frames' cameras."""
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.io.exr import read_exr
 from ...core.io.read import read_capture
+from ...core.kinds import Workload
 from ...core.passes.albedo.albedo import MEASURED
 from ...core.scene.model import Capture
 from ...core.scene.rays import RayScene
@@ -30,7 +31,7 @@ from ..data.mesh_objects import ATLAS_UV
 from ..marks import OBJECT_ID
 from .room import room
 
-MIN_COSINE = 0.2
+MIN_COSINE: Workload[float] = 0.2
 """More slanting views count as none, as in the method."""
 
 

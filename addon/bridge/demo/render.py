@@ -14,6 +14,7 @@ from mathutils import Matrix
 from ...core.brdf.compensation import ior_of
 from ...core.errors import BadInputError, StorageError
 from ...core.io.exr import read_header
+from ...core.kinds import Workload
 from ...core.progress import Progress
 from ..data.added import Made
 from ..data.arrays import set_layer
@@ -27,7 +28,9 @@ from .room import FIELD_OF_VIEW, Paint, Thing, frame_path, room, tour, write_all
 SIZES = {"tiny": (10, 64, 48, 24), "small": (36, 160, 120, 24), "large": (64, 320, 240, 128)}
 """Frames, width, height and samples for each pixel."""
 
-FORMAT = 3  # raise when the room or its rendering changes, so that an older capture is not taken for this one
+FORMAT: Workload[int] = (
+    3  # raise when the room or its rendering changes, so that an older capture is not taken for this one
+)
 
 
 def render_capture(folder: Path, size: str = "small", progress: Progress | None = None) -> Path:

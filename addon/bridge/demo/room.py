@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from ...core.io.ply_write import ply_bytes
+from ...core.kinds import Workload
 
-SIZE = (4.4, 3.6, 2.6)
+SIZE: Workload[tuple[float, float, float]] = (4.4, 3.6, 2.6)
 """The room's extent along x, y and z; its corner is the origin."""
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.atomic import write_bytes
+from ...core.kinds import Workload
 from ...core.pipeline.run import WEIGHTS
 from ...core.progress import Progress, ProgressEvent
 from ...core.results.store import Store
@@ -25,7 +26,7 @@ from .room import look_at
 PICTURES = {"tiny": (96, 72, 16), "small": (480, 360, 32), "large": (960, 720, 128)}
 """Width, height and samples of the before and the relit picture."""
 VIEW = look_at((0.42, 0.35, 1.62), (2.75, 2.5, 0.72))
-LIGHTS = (
+LIGHTS: Workload[tuple[tuple, ...]] = (
     ((2.9, 0.7, 2.3), (1.9, 2.9, 0.2), (1.0, 0.42, 0.14), 75.0),
     ((0.4, 2.3, 2.0), (3.0, 1.6, 0.4), (0.16, 0.36, 1.0), 60.0),
 )

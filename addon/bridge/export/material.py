@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.brdf.compensation import ior_of
 from ...core.io.png import write_png
+from ...core.kinds import Code
 from ...core.photo import encoded
 from ..data.images import UDIM, image_array, load_image
 from ..data.materials import (
@@ -31,7 +32,7 @@ from ..marks import IMAGE, UV_MAP
 
 WHOLE = "base_color.exr"
 """The room's one image, beside its tiles."""
-FIRST_TILE = 1001
+FIRST_TILE: Code[int] = 1001
 
 
 def plain_copy(

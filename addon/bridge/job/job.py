@@ -17,8 +17,9 @@ from collections import deque
 from collections.abc import Sequence
 
 from ...core.errors import EXIT_INTERRUPTED, EXIT_OK, StorageError
+from ...core.kinds import Shown
 
-GRACE = 0.5
+GRACE: Shown[float] = 0.5
 """Seconds between the polite wish to stop and the end of the process: finished stages are whole files by then."""
 RUNNING, STOPPED, DONE, FAILED = "running", "stopped", "done", "failed"
 STOPPED_TEXT = "Stopped; the finished stages are kept and the next run goes on from them."

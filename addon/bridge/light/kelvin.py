@@ -10,8 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.errors import BadInputError
+from ...core.kinds import Limit
 
-LOWEST, HIGHEST = 1700.0, 20000.0
+LOWEST: Limit[float] = 1700.0
+HIGHEST: Limit[float] = 20000.0
 """Kelvin that can be asked for: a match, the blue sky."""
 LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
 _TO_RGB = np.array(

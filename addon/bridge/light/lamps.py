@@ -9,6 +9,7 @@ from __future__ import annotations
 import bpy
 
 from ...core.errors import BadInputError
+from ...core.kinds import Limit
 from ...core.naming import in_order, numbered
 from ..data.materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, brdf_of, principled
 from .kelvin import HIGHEST, LOWEST, kelvin_of, luminance, rgb_of
@@ -16,7 +17,7 @@ from .kelvin import HIGHEST, LOWEST, kelvin_of, luminance, rgb_of
 _STRENGTH, _COLOUR, _BASE = (f"scan_relight_recovered_{name}" for name in ("strength", "colour", "base"))
 _OFF, _FACTOR = "scan_relight_lamp_off", "scan_relight_lamp_factor"
 
-MAX_FACTOR = 1000.0
+MAX_FACTOR: Limit[float] = 1000.0
 UNLIT_GREY = 0.5
 """Albedo of a lamp that is off. What its shade reflects can't be told from what it emits, so this is a guess."""
 _DARK = ("window", "screen", "monitor", "tv", "television", "display", "laptop")

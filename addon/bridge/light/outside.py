@@ -13,6 +13,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.errors import BadInputError
+from ...core.kinds import Limit
 from ..data.images import RADIANCE, image_array
 from ..data.nodes import find_node
 from ..data.world import make_world
@@ -25,7 +26,7 @@ HDRI = "scan_relight_hdri"
 """Custom property of a world of ours: the path of the picture that it shows."""
 _OFF, _FACTOR, _KEPT = "scan_relight_world_off", "scan_relight_world_factor", "scan_relight_recovered_strength"
 _TURN, _PLACE = "Scan Relight turn", "Scan Relight place"
-MAX_FACTOR = 1000.0
+MAX_FACTOR: Limit[float] = 1000.0
 _BRIGHTER = 4.0
 """Mean radiance of a picture put around the room, relative to that of the room's median surface: it is the outdoors,
 which shows through openings that cover a small part of what any spot of the room sees."""

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.kinds import Unit
 from .kelvin import luminance
 
-LUMENS_PER_WATT = 683.0
+LUMENS_PER_WATT: Unit[float] = 683.0
 ROOM, WATT, LUMEN = "ROOM", "WATT", "LUMEN"
 UNITS = (ROOM, WATT, LUMEN)
 """Of a new light's strength: relative to the light of the room, radiant watts, lumens."""

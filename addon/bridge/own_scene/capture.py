@@ -24,6 +24,7 @@ from ...core.io.layout import RawMesh
 from ...core.io.mesh_repair import repair
 from ...core.io.nerfstudio_camera import OWN_LENS
 from ...core.io.ply_write import ply_bytes
+from ...core.kinds import Shown
 from ...core.scene.lenses_told import told_lens
 from ...core.scene.model import Mesh
 from ..data.unwrap import Polygons
@@ -34,7 +35,7 @@ from .mesh import Part, SceneMesh, gather, joined
 FOLDER = "scene_capture"
 """Where a result folder keeps the capture that was made of the open scene."""
 OBJECTS, FACES = "scene.json", "faces.npz"
-MAX_TOLD = 3
+MAX_TOLD: Shown[int] = 3
 
 
 @dataclass(frozen=True)

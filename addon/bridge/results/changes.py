@@ -10,10 +10,12 @@ from typing import Any
 import bpy
 
 from ...core.brdf.material import renamed
+from ...core.kinds import Shown
 from ...core.results.room_file import DAMAGE, MATERIALS
 from ..marks import CHANGES, LAST_FOUND
 
-ROUGHNESS, ALBEDO = 0.1, 0.05
+ROUGHNESS: Shown[float] = 0.1
+ALBEDO: Shown[float] = 0.05
 """Differences from which on they can be seen: of Blender's roughness, and of the mean albedo."""
 
 

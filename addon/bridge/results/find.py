@@ -17,6 +17,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import BadInputError
+from ...core.kinds import Limit, Shown
 from ...core.results.place import BESIDE, captures, free_folder, write_capture
 from ...core.results.room_file import MATERIALS, layout_of, run_of
 from ...core.results.store import Store
@@ -27,11 +28,11 @@ from . import file
 from .home import shown
 from .images import KEPT, is_there, kept_path, of_results, path_of
 
-NAMED = 3
+NAMED: Shown[int] = 3
 """Images that a sentence names before it counts the rest."""
-LOOKED_AT = 200
+LOOKED_AT: Limit[int] = 200
 """Sub-folders of a chosen folder that are looked at."""
-FRESH = 2.0
+FRESH: Shown[float] = 2.0
 """Seconds for which what is missing is not looked up again: panels ask at each picture."""
 
 

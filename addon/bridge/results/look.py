@@ -15,6 +15,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import BadInputError
+from ...core.kinds import Shown
 from ..data.images import RADIANCE
 from ..data.mesh_objects import ATLAS_UV
 from ..data.nodes import fresh_tree, mix_node
@@ -33,13 +34,19 @@ MATERIAL, ALBEDO, SHADING, LIT_DIFFUSE, COVERAGE, CERTAINTY = (
 NAME = "Scan Relight look"
 MARK = "scan_relight_look"
 """Custom property of the look's node group and material: which look it is."""
-OFTEN = 256
+OFTEN: Shown[int] = 256
 """Observations from which on a spot counts as seen as often as can be wished."""
-DOUBTFUL = 0.5
+DOUBTFUL: Shown[float] = 0.5
 """Relative standard error of an albedo at the far end of the ramp."""
-NEVER = (0.35, 0.0, 0.25, 1.0)
+NEVER: Shown[tuple[float, float, float, float]] = (0.35, 0.0, 0.25, 1.0)
 """Colour of what no frame saw, linear Rec.709: on neither ramp."""
-RAMP = ((0.05, 0.03, 0.2), (0.03, 0.13, 0.27), (0.01, 0.28, 0.27), (0.1, 0.5, 0.15), (0.98, 0.8, 0.02))
+RAMP: Shown[tuple[tuple[float, float, float], ...]] = (
+    (0.05, 0.03, 0.2),
+    (0.03, 0.13, 0.27),
+    (0.01, 0.28, 0.27),
+    (0.1, 0.5, 0.15),
+    (0.98, 0.8, 0.02),
+)
 """Dark blue over green to yellow, linear Rec.709: its brightness grows all along, so it reads without colour too."""
 
 

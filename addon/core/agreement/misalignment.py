@@ -8,8 +8,9 @@ import numpy as np
 
 from ..scene.model import Camera
 from ..scene.rays import RayScene
+from ..significance import LEVELS
 from .edges import Shown
-from .params import MISALIGNMENT
+from .params import AGREEMENT, MISALIGNMENT
 from .views import SmallView, sees
 
 
@@ -26,7 +27,7 @@ def predicted(index: int, views: Sequence[SmallView], cameras: Sequence[Camera],
     for row, j in enumerate(nearest):
         inside, pixels = sees(cameras[j], points, scene, margin=1)
         said[row, inside] = bilinear(views[j].log.mean(-1), pixels - 0.5)
-    enough = np.isfinite(said).sum(0) >= MISALIGNMENT.least_views
+    enough = np.isfinite(said).sum(0) >= AGREEMENT.least_views
     image = np.full(camera.height * camera.width, np.nan, np.float32)
     image[at[enough]] = np.nanmedian(said[:, enough], 0)
     return image.reshape(camera.height, camera.width)
@@ -52,10 +53,10 @@ def shift(image: np.ndarray, reference: np.ndarray) -> np.ndarray | None:
     for _ in range(MISALIGNMENT.rounds):
         off = bilinear(image, grid + moved) - reference.ravel()
         good = np.isfinite(off) & np.isfinite(slope).all(1)
-        if good.sum() < MISALIGNMENT.least_spots:
+        if good.sum() < LEVELS.many:
             return None
         J, r = slope[good], off[good] - np.median(off[good])
-        scale = max(float(np.median(np.abs(r))), MISALIGNMENT.least_residual) * MISALIGNMENT.tuning
+        scale = max(float(np.median(np.abs(r))), MISALIGNMENT.least_residual) * LEVELS.sigmas
         weight = np.minimum(1, scale / np.maximum(np.abs(r), 1e-12))
         A = J.T @ (weight[:, None] * J)
         if np.linalg.eigvalsh(A)[0] < MISALIGNMENT.least_texture * good.sum():

@@ -7,17 +7,18 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..io.conventions import Convention
+from ..kinds import Shown
 from ..photo import photo
 from ..scene.elements import triangle_geometry
 from ..scene.model import Capture, Frame, Pixels
 from ..scene.rays import RayScene
 from .edges import shown
 
-ROWS = 3
-WIDTH = 640
+ROWS: Shown[int] = 3
+WIDTH: Shown[int] = 640
 """About so many pixels across for each frame."""
-LINE = (255, 90, 0)
-GAP = 8
+LINE: Shown[tuple[int, int, int]] = (255, 90, 0)
+GAP: Shown[int] = 8
 
 
 def overlay(capture: Capture, read: Callable[[Frame], Pixels], conventions: Sequence[Convention]) -> np.ndarray:

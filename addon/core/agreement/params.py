@@ -74,27 +74,20 @@ class MisalignmentParams:
     ----------
     others : int
         Views whose median is taken as what a spot looks like.
-    least_views : int
-        Of one spot, that can be compared.
     rounds : int
         Of Gauss and Newton's method.
     largest : float
         Pixels of the small view; a shift beyond is not found by following gradients.
-    least_spots : int
-        With fewer nothing is said.
     least_texture : float
         Mean square gradient below which a shift in that direction can't be seen.
-    tuning, least_residual : float
+    least_residual : float
         Residuals beyond so many times their median, or this if that is more, count as highlights or occlusion.
     """
 
     others: int = 6
-    least_views: int = 2
     rounds: int = 12
     largest: float = 4.0
-    least_spots: int = 100
     least_texture: float = 1e-3
-    tuning: float = 3.0
     least_residual: float = 0.02
 
 

@@ -17,6 +17,8 @@ USUAL_F0 = 0.04
 """What a dielectric of one colour reflects at normal incidence (n = 1.5)."""
 MOST_F0 = 0.12
 """No common dielectric reflects more (n = 2.06); what does is a metal or a mirror."""
+SATIN = 0.5
+"""Roughness of what no frame shows well enough: most paints, woods and plastics lie around it."""
 PRIOR = Prior(USUAL_F0, 0.01)
 """Plastics, lacquers, glass and woods have n = 1.4 to 1.6, F0 = 0.03 to 0.05. A broad lobe can be a little broader and
 much stronger for nearly the same frames (living room's panels: alpha 0.39 with F0 0.05 or 0.45 with 0.1): there this

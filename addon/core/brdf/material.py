@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from ..kinds import Unit
 from ..naming import object_name
 from .lambertian import LAMBERTIAN
 from .model import F0, Brdf
 from .registry import named
 from .transparent import opacity
 
-Z90 = 1.645
+Z90: Unit[float] = 1.645
 """A 90 % interval is the value -+ this many standard errors."""
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kinds import Shown
+
 HEAT = np.array(
     [(12, 8, 38), (75, 12, 107), (145, 38, 103), (207, 68, 70), (246, 125, 21), (251, 200, 60), (252, 255, 200)],
     np.float32,
 )
 """Dark to light, also in grey (anchors of the inferno map of matplotlib, CC0, rounded)."""
-NOTHING = (40, 40, 46)
+NOTHING: Shown[tuple[int, int, int]] = (40, 40, 46)
 
 
 def heat(values: np.ndarray, top: float) -> np.ndarray:

@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+from ..kinds import Unit
 from ..light.environment import Environment
 from ..light.field import LightField
 from ..light.over_surface import RayCounts, irradiance
@@ -19,17 +20,12 @@ from ..luminance import LUMINANCE
 from ..scene.atlas import Atlas
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.visibility import SATURATED
-from .calibration import CLIPPED_UNSURE, LAMP_UNSURE, ROUGH_LIGHT, SKY_UNSURE, SUN_UNSURE, SURFACES
+from .params import CALIBRATION
 
-SPOTS = 4000
 RAYS: RayCounts = {"rays": 128, "emitter_rays": 32, "portal_rays": 32}
 """Of one check. 2 x 4000 spots cost 1 s of CPU in the living room; an object's error is then known to 10 - 20 %."""
 SHARE_RAYS: RayCounts = {"rays": 64, "emitter_rays": 16, "portal_rays": 16}
-ONE_SIGMA = 0.683
-WORST = 1.0
-"""Where next to no light comes, the logarithm may be off by anything."""
-PRIOR_SPOTS = 10
-"""An object's own error counts as much as the room's from so many spots on."""
+ONE_SIGMA: Unit[float] = 0.683
 
 
 @dataclass(frozen=True)
@@ -98,14 +94,18 @@ def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, relative_
     solved = np.isin(field.atlas.object_id, [lamp.object_id for lamp in shading.lamps if not lamp.seen])
     clipped = lit.tier == SATURATED
     surface = (~lit.seen | clipped) & ~solved
-    off = np.where(clipped, CLIPPED_UNSURE, SURFACES * np.minimum(np.hypot(relative_error, ROUGH_LIGHT), 1))
-    kinds = [luminance * (surface | solved), luminance * surface * off, luminance * solved * LAMP_UNSURE]
+    off = np.where(
+        clipped,
+        CALIBRATION.poorly,
+        CALIBRATION.surfaces * np.minimum(np.hypot(relative_error, CALIBRATION.rough_light), 1),
+    )
+    kinds = [luminance * (surface | solved), luminance * surface * off, luminance * solved * CALIBRATION.solved]
     sky = (shading.environment.radiance @ LUMINANCE) * (shading.environment.observations == 0)
-    sky = np.stack([sky, np.zeros_like(sky), SKY_UNSURE * sky], -1).astype(np.float32)
+    sky = np.stack([sky, np.zeros_like(sky), CALIBRATION.solved_sky * sky], -1).astype(np.float32)
     sun = None
     if shading.sun is not None and not shading.sun.seen:
         level = float(shading.sun.irradiance @ LUMINANCE)
-        sun = replace(shading.sun, irradiance=np.array([level, 0, SUN_UNSURE * level], np.float32))
+        sun = replace(shading.sun, irradiance=np.array([level, 0, CALIBRATION.solved * level], np.float32))
     room = field.with_light(np.stack(kinds, 1), Environment(sky, shading.environment.observations))
     return room.with_sun(sun)
 
@@ -123,11 +123,11 @@ def light_evidence(
         Relative error of each element's albedo, the light aside.
     """
     atlas = field.atlas
-    chosen, nearest = spots(atlas, lit.seen, SPOTS, seed)
+    chosen, nearest = spots(atlas, lit.seen, CALIBRATION.spots, seed)
     again_at = partial(irradiance, interpolate=False, finest=1.0, threads=threads)
     kept = np.log(np.maximum(shading.irradiance[chosen].mean(1), 1e-20))
     again = [again_at(field, chosen, **RAYS, seed=seed + 100_003 * (k + 1))[0].mean(1) for k in range(2)]
-    a, b = (np.clip(np.log(np.maximum(E, 1e-20)) - kept, -WORST, WORST) for E in again)
+    a, b = (np.clip(np.log(np.maximum(E, 1e-20)) - kept, -CALIBRATION.worst, CALIBRATION.worst) for E in again)
     noise, bias = _by_group(2 * atlas.object_id[chosen] + lit.seen[chosen], a, b)
 
     hidden = unsure_light(field, shading, lit, relative_error)
@@ -163,7 +163,9 @@ def _by_group(group: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarr
         own = group == one
         count = int(own.sum())
         whole = of_kind[one % 2]
-        result[own] = np.sqrt((count * _variance(a[own], b[own]) + PRIOR_SPOTS * whole) / (count + PRIOR_SPOTS))
+        result[own] = np.sqrt(
+            (count * _variance(a[own], b[own]) + CALIBRATION.prior_spots * whole) / (count + CALIBRATION.prior_spots)
+        )
         if one % 2:
             offset[int(one) // 2] = float(np.median((a[own] + b[own]) / 2))
     return result, offset

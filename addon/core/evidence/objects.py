@@ -12,7 +12,7 @@ from ..luminance import rgb
 from ..passes.albedo.albedo import MEASURED, Albedo
 from ..scene.atlas import Atlas
 from ..scene.lit_diffuse import LitDiffuse
-from .calibration import OF_OBJECT
+from .params import CALIBRATION
 from .texel import TexelEvidence
 
 
@@ -64,7 +64,7 @@ def _one(own: np.ndarray, atlas: Atlas, lit: LitDiffuse, albedo: Albedo, texels:
     told = own[measured] if measured.any() else own
     weight = atlas.area[told] / max(float(atlas.area[told].sum()), 1e-30)
     mean = weight @ albedo.rho[told]
-    error = OF_OBJECT * np.sqrt(weight @ np.square(texels.albedo[told]))
+    error = CALIBRATION.of_object * np.sqrt(weight @ np.square(texels.albedo[told]))
     shown = own[seen] if seen.any() else own
     return ObjectEvidence(
         object_id=int(atlas.object_id[own[0]]),

@@ -11,6 +11,7 @@ from ..brdf.material import Z90, ObjectMaterial
 from ..brdf.registry import models
 from ..errors import BadInputError
 from ..io.png import data_address
+from ..kinds import Shown
 from ..photo import encoded
 from .collect import Evidence
 from .colours import heat_css
@@ -20,8 +21,8 @@ from .pictures import Picture, pictures_of
 from .style import STYLE
 from .views import choose_frames, view
 
-FRAMES = 3
-ROWS = 80
+FRAMES: Shown[int] = 3
+ROWS: Shown[int] = 80
 """Objects in the table; materials.json lists them all."""
 
 

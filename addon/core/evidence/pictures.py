@@ -7,18 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from ..kinds import Shown
 from ..photo import encoded, photo
 from .colours import NOTHING, gloss, heat
 from .findings import Findings
 from .texel import TexelEvidence
 from .views import View
 
-ERROR_TOP, RESIDUAL_TOP, VIEWS_TOP = 0.5, 0.5, 20
+ERROR_TOP: Shown[float] = 0.5
+RESIDUAL_TOP: Shown[float] = 0.5
+VIEWS_TOP: Shown[int] = 20
 """What lies at the bright end of the heat maps: relative errors, and the number of views."""
-WORST = 3
-BLOCK = 12
+WORST: Shown[int] = 3
+BLOCK: Shown[int] = 12
 """Edge in pixels of the squares among which the worst residuals are sought."""
-MARK = (0, 255, 200)
+MARK: Shown[tuple[int, int, int]] = (0, 255, 200)
 
 
 @dataclass(frozen=True)

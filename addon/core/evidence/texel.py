@@ -13,11 +13,8 @@ from ..passes.albedo.albedo import MEASURED, Albedo
 from ..scene.atlas import Atlas
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.visibility import EDGE
-from . import calibration as c
 from .light import LightEvidence
-
-AROUND = 5
-"""Edge in texels of the window over which texture is judged."""
+from .params import CALIBRATION
 
 
 @dataclass(frozen=True)
@@ -50,7 +47,7 @@ def contrast(atlas: Atlas, values: np.ndarray) -> np.ndarray:
     for one in (np.ones_like(level), level, level * level):
         image = np.zeros(atlas.size * atlas.size, np.float32)
         image[atlas.texel] = one
-        image = ndimage.uniform_filter(image.reshape(atlas.size, -1), AROUND, mode="constant")
+        image = ndimage.uniform_filter(image.reshape(atlas.size, -1), CALIBRATION.around, mode="constant")
         sums.append(image.ravel()[atlas.texel])
     count, total, squares = sums
     return np.sqrt(np.maximum(squares / count - np.square(total / count), 0))
@@ -63,12 +60,12 @@ def without_light(atlas: Atlas, lit: LitDiffuse, albedo: Albedo) -> np.ndarray:
     the object was measured.
     """
     measured = albedo.origin == MEASURED
-    texture = c.TEXTURE * contrast(atlas, albedo.rho.mean(1))
-    error = np.square(c.OWN * albedo.error) + np.square(texture)
-    error += np.where(lit.tier == EDGE, np.float32(c.AT_EDGES**2), 0)
+    texture = CALIBRATION.texture * contrast(atlas, albedo.rho.mean(1))
+    error = np.square(CALIBRATION.own * albedo.error) + np.square(texture)
+    error += np.where(lit.tier == EDGE, np.float32(CALIBRATION.poorly**2), 0)
     spread, common, share = by_object(atlas, albedo, error)
-    error += np.where(measured, 0, np.square(c.FILLED * spread) + c.FILLED_FLOOR**2 + common)
-    error += np.where(measured, 0, np.square(c.BARELY_SEEN * (1 - share) ** 2))
+    error += np.where(measured, 0, np.square(CALIBRATION.filled * spread) + CALIBRATION.filled_floor**2 + common)
+    error += np.where(measured, 0, np.square(CALIBRATION.barely_seen * (1 - share) ** 2))
     return np.sqrt(error).astype(np.float32)
 
 
@@ -91,16 +88,16 @@ def texel_evidence(
     specular : (n, 3) float32
         Part of each element's L_d that was taken out as specular.
     """
-    beside = np.square(light.unsure) + c.LIGHT_FLOOR**2
+    beside = np.square(light.unsure) + CALIBRATION.light_floor**2
     shading = np.sqrt(np.square(light.noise) + beside)
-    shrunk = np.sqrt(np.square(c.NOISE_LEFT * light.noise) + beside)
+    shrunk = np.sqrt(np.square(CALIBRATION.noise_left * light.noise) + beside)
     # What was filled in shares the error of the light on what it was filled in from.
     _, common, _ = by_object(atlas, albedo, shrunk)
     relative = np.square(own) + np.square(np.where(albedo.origin == MEASURED, shrunk, common))
     gloss = gloss_error(atlas, albedo, materials, specular, irradiance)
     error = np.sqrt(relative[:, None] * np.square(albedo.rho) + np.square(gloss)[:, None])
     # Of an albedo between 0 and 1 nothing worse can be said than that nothing is known.
-    error = np.minimum(error, c.NOTHING_KNOWN)
+    error = np.minimum(error, CALIBRATION.nothing_known)
     error[np.isin(atlas.object_id, [m.object_id for m in materials if m.model.gives_light])] = 0
     return TexelEvidence(shading.astype(np.float32), error.astype(np.float32), light.unseen, lit.clipped)
 
@@ -128,7 +125,7 @@ def gloss_error(
     atlas: Atlas, albedo: Albedo, materials: list[ObjectMaterial], specular: np.ndarray, irradiance: np.ndarray
 ) -> np.ndarray:
     """Error of albedo by what a highlight left in the median, or by taking too much out, (n,) float32, absolute."""
-    result = np.full(len(atlas), c.LEFT, np.float32)
+    result = np.full(len(atlas), CALIBRATION.left, np.float32)
     for m in materials:
         if m.model.layered:
             own = np.flatnonzero(atlas.object_id == m.object_id)
@@ -138,5 +135,5 @@ def gloss_error(
                 # Where hardly any light comes the ratio is wild; what was filled in came from what was measured.
                 middle = np.median(taken[known])
                 taken = np.where(known, np.minimum(taken, 3 * middle), middle)
-                result[own] = c.TAKEN * taken + c.TAKEN_FLOOR
+                result[own] = CALIBRATION.poorly * taken + CALIBRATION.left
     return result

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..io.pixels import read_pixels
+from ..kinds import Shown
 from ..light.emitters import bright_triangles
 from ..light.lobes import GRID, reflected_light
 from .findings import Findings
+from .params import CALIBRATION
 
-WIDTH = 240
+WIDTH: Shown[int] = 240
 """Pictures are this wide at most."""
-LOBE_RAYS = 24
-"""For each pixel of a glossy object."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def _add_lobes(found: Findings, predicted: np.ndarray, element: np.ndarray, dire
             continue
         alpha = max(float(m.alpha), float(GRID[0]))
         light = reflected_light(
-            room, bright, element[at], -directions[at], rays=LOBE_RAYS, grid=np.array([alpha], np.float32),
+            room, bright, element[at], -directions[at], rays=CALIBRATION.lobe_rays, grid=np.array([alpha], np.float32),
             proposals=(alpha,), microfacets=m.model.microfacets, threads=found.threads, seed=found.seed,
         )  # fmt: skip
         if not m.model.has_diffuse:

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..brdf.model import Constraints
+from ..significance import LEVELS
 from .params import LOBE_FIT
 from .problem import DenseProblem, Problem
 
@@ -140,7 +141,7 @@ def solve(
             rest = R - each * A
             rest -= ((SR - values[..., None] * SA) / below)[:, :, None] * t
         size = np.sqrt(np.einsum("chvg,chvg->hvg", rest, rest) / 3) * dense.inflate
-        weight = dense.there * np.minimum(1, LOBE_FIT.huber * scale / np.maximum(size, 1e-12))
+        weight = dense.there * np.minimum(1, LEVELS.outlier * scale / np.maximum(size, 1e-12))
     cost = huber(size, scale)
     if lobe is not None:
         noise = (each * (each * lobe.AA + 2 * lobe.AB) + lobe.BB).sum(0)
@@ -156,7 +157,7 @@ def solve(
 def huber(size: np.ndarray, scale: float) -> np.ndarray:
     """Huber cost of residual sizes, in units of scale^2."""
     x = size / scale
-    return np.where(x <= LOBE_FIT.huber, x * x / 2, LOBE_FIT.huber * (x - LOBE_FIT.huber / 2))
+    return np.where(x <= LEVELS.outlier, x * x / 2, LEVELS.outlier * (x - LEVELS.outlier / 2))
 
 
 def robust_scale(size: np.ndarray) -> float:

@@ -11,14 +11,11 @@ class LobeFitParams:
 
     Attributes
     ----------
-    huber : float
-        Residuals beyond this many (robust) standard deviations weigh less: misregistration, edges, texture.
     rounds, kappas, least_signal : int, tuple[float, ...], float
         Share of <A, A> that must be left once the noise's is taken out; where less is, psi rests on nothing, and is
         only prevented from growing without bound.
     """
 
-    huber: float = 2.0
     rounds: int = 3
     kappas: tuple[float, ...] = (0.0, 0.15, 0.3, 0.45, 0.6)
     least_signal: float = 0.1

@@ -7,13 +7,14 @@ import math
 from collections.abc import Iterator
 
 from ..errors import BadInputError
+from ..kinds import Limit
 from ..scene.model import Camera
 
-FOCAL = (1e-3, 1e6)
+FOCAL: Limit[tuple[float, float]] = (1e-3, 1e6)
 """Bounds of a focal length over the frame's longer side; a panorama has 0.16."""
-OFF = 100
+OFF: Limit[int] = 100
 """How many of the frame's sides the principal point may lie from its corner."""
-STRONGEST = 1e9
+STRONGEST: Limit[float] = 1e9
 """Bound of a lens's coefficients; those of a telephoto lens's high powers are large."""
 
 

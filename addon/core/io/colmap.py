@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Limit
 from ..scene.lenses_colmap import Intrinsics, intrinsics
 from ..scene.model import Camera, Frame
 from ..scene.pose import MAX_DISTANCE, check_pose
@@ -34,7 +35,7 @@ UP = (
     "COLMAP's world has no up of its own; +Z was taken as up and a unit as a metre. Align the model "
     "(colmap model_aligner) if the room lies on its side, or name the axis that points up (--convention up:-y)."
 )
-MAX_SIZE = 2**17
+MAX_SIZE: Limit[int] = 2**17
 
 
 def find_model(root: Path) -> Path | None:

@@ -15,10 +15,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..errors import BadInputError
+from ..kinds import Code, Limit
 from ..scene.lenses_colmap import COUNTS, NAMES
 
-LONGEST_NAME = 4096
-LEAST_CAMERA, LEAST_IMAGE = 24 + 2 * 8, 64 + 1 + 8
+LONGEST_NAME: Limit[int] = 4096
+LEAST_CAMERA: Code[int] = 24 + 2 * 8
+LEAST_IMAGE: Code[int] = 64 + 1 + 8
 """Bytes of the smallest records: counts that the file is too short for are told before anything is made of them."""
 
 

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Unit
 from ..scene.model import Camera, Frame
 from .layout import RawMesh
 
@@ -28,7 +29,7 @@ AS_READ = "as-read"
 NAMED = {"opengl": "camera:+x+y+z", "opencv": "camera:+x-y-z", "fipt": "camera:-x+y-z"}
 CAMERAS = ("+x+y+z", "+x-y-z", "-x+y-z", "-x-y+z")
 """Camera axes that formats use: OpenGL, OpenCV, FIPT's, and an upside-down one."""
-SCALES = (0.001, 0.01, 0.0254, 0.1, 0.3048, 10.0, 100.0, 1000.0)
+SCALES: Unit[tuple[float, ...]] = (0.001, 0.01, 0.0254, 0.1, 0.3048, 10.0, 100.0, 1000.0)
 """Millimetres, centimetres, inches, decimetres, feet, and the mesh in those."""
 
 

@@ -11,14 +11,17 @@ import struct
 from pathlib import Path
 
 from ..errors import BadInputError
+from ..kinds import Code, Limit
 
-EXIF = 0x8769
-EXPOSURE_TIME, F_NUMBER, ISO = 0x829A, 0x829D, 0x8827
+EXIF: Code[int] = 0x8769
+EXPOSURE_TIME: Code[int] = 0x829A
+F_NUMBER: Code[int] = 0x829D
+ISO: Code[int] = 0x8827
 ORDERS = {b"II*\0": "<", b"MM\0*": ">"}
 JPEG_MAGIC = b"\xff\xd8\xff"
-HEAD = 1 << 20
+HEAD: Limit[int] = 1 << 20
 """Bytes in which a JPEG's EXIF has to end; with a thumbnail it has some 64 thousand."""
-MAX_TAGS = 4096
+MAX_TAGS: Limit[int] = 4096
 TYPES = {3: ("H", 2), 4: ("I", 4), 5: ("II", 8), 11: ("f", 4), 12: ("d", 8)}  # short, long, rational, float, double
 
 

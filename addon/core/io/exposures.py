@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Limit
 from ..scene.model import Frame
 from . import exif
 from .oiio import JPEG, TIFF
@@ -33,7 +34,7 @@ TIME = (
 )
 F_NUMBER = ("f_number", "fnumber", "aperture", "f_stop")
 ISO = ("iso", "iso_speed", "isospeedratings", "photographicsensitivity")
-WIDEST = 1e9
+WIDEST: Limit[float] = 1e9
 """Ratio of two exposures that no camera has."""
 EQUAL = 1.01
 

@@ -10,13 +10,14 @@ import OpenEXR
 
 from ..atomic import write_bytes
 from ..errors import BadInputError, StorageError
+from ..kinds import Unit
 from .exr_header import ExrHeader, parse_headers, window_size
 from .exr_layers import ExrLayer, choose_layer
 from .luma_chroma import to_rgb
 from .picture import Picture
 from .primaries import REC709, to_rec709
 
-HALF_MAX = 65504.0
+HALF_MAX: Unit[float] = 65504.0
 
 
 def read_header(path: Path | str) -> tuple[int, int]:

@@ -15,19 +15,23 @@ from pathlib import Path
 from typing import BinaryIO
 
 from ..errors import BadInputError
+from ..kinds import Code, Limit
 from .paths import absence
 from .picture import MAX_PIXELS
 
 MAGIC = b"\x76\x2f\x31\x01"
-MAX_PARTS = 1024
-MAX_RATIO = 5000
+MAX_PARTS: Limit[int] = 1024
+MAX_RATIO: Limit[int] = 5000
 """No compression of OpenEXR makes a picture smaller than this; more claims a size that the file can't hold."""
-FREE_BYTES = 1 << 26
+FREE_BYTES: Limit[int] = 1 << 26
 """Below this many bytes of pixels the ratio is not looked at."""
-HEADER_BYTES = (1 << 18, 1 << 24)
+HEADER_BYTES: Limit[tuple[int, int]] = (1 << 18, 1 << 24)
 """How much is read in search of the header's end, and how much where the first did not hold it."""
 LINES_PER_CHUNK = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256, 10: 256, 11: 32, 12: 256, 13: 1}
-TILED, LONG_NAMES, DEEP, MULTIPART = 0x200, 0x400, 0x800, 0x1000
+TILED: Code[int] = 0x200
+LONG_NAMES: Code[int] = 0x400
+DEEP: Code[int] = 0x800
+MULTIPART: Code[int] = 0x1000
 PIXEL_BYTES = {0: 4, 1: 2, 2: 4}  # uint, half, float
 
 

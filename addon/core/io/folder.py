@@ -7,13 +7,15 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..kinds import Limit, Shown
+
 CAPTURE, RESULT, WAY, EMPTY, OTHER, ABSENT = "capture", "result", "way", "empty", "other", "absent"
 MATERIALS, REPORT, SCENE = "materials.json", "report.json", "scene.blend"
-ABOVE = 3
+ABOVE: Limit[int] = 3
 """Levels above a chosen file on which its capture may begin: `sparse/0/cameras.bin`."""
-LOOKED_AT = 200
+LOOKED_AT: Limit[int] = 200
 """Sub-folders that are looked into: a folder of everything is nobody's capture."""
-OFFERED = 6
+OFFERED: Shown[int] = 6
 """Sub-folders that are offered."""
 
 

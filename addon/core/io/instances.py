@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Limit
 from ..scene.model import Instance
 from .jsonfile import read_json
 
 FILE = "info_semantic.json"
-MAX_ID = 2**31 - 2
+MAX_ID: Limit[int] = 2**31 - 2
 
 
 def read_instances(path: Path | str) -> dict[int, str]:

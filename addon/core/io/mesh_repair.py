@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Limit
 from .layout import RawMesh
 
-MAX_COORDINATE = 1e6
+MAX_COORDINATE: Limit[float] = 1e6
 """Metres; beyond, single precision (rays, atlas) can't hold a room."""
 THIN = 1e-12
 """A triangle whose height is below this share of its longest edge has no area."""

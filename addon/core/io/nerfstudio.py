@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..json_values import is_number
+from ..kinds import Code
 from ..scene.model import Frame
 from ..scene.pose import check_pose
 from . import instances
@@ -30,7 +31,7 @@ FILE = "transforms.json"
 SPLITS = ("transforms_train.json", "transforms_val.json")
 """Read one after the other where `FILE` is absent; the test split is left alone."""
 TEST_SPLIT = "transforms_test.json"
-BEFORE = [[0.0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]]
+BEFORE: Code[list[list[float]]] = [[0.0, 1, 0, 0], [1, 0, 0, 0], [0, 0, -1, 0]]
 """What nerfstudio did to COLMAP's world before it wrote down `applied_transform`."""
 MOST, FEW = 0.9, 0.1
 """The mesh counts as one of the original world where, moved to the poses' world, its box holds more than `MOST` of the

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Code, Limit
 from .picture import MAX_PIXELS
 
 PNG, JPEG, TIFF = "PNG", "JPEG", "TIFF"
@@ -27,12 +28,12 @@ READERS = {"png", "jpeg", "tiff"}
 """The library's names of them: it goes by a file's name first, and so might take it for something else."""
 DEPTHS = {"uint8": 8, "uint16": 16, "half": 0, "float": 0}
 """Bits of a channel that is stored as codes; 0 for floats."""
-WHOLE_BYTES = (8, 16, 32)
-PALETTE = 3
+WHOLE_BYTES: Code[tuple[int, int, int]] = (8, 16, 32)
+PALETTE: Code[int] = 3
 """PNG's kind of colour."""
-MAX_RATIO = 1100
+MAX_RATIO: Limit[int] = 1100
 """No PNG packs more bytes of pixels than this into one of the file: deflate's limit is 1032."""
-LITTLE = 1 << 16
+LITTLE: Limit[int] = 1 << 16
 """A claim of fewer bytes is not doubted."""
 
 

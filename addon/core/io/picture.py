@@ -6,7 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-MAX_PIXELS = 1 << 27
+from ..kinds import Limit
+
+MAX_PIXELS: Limit[int] = 1 << 27
 """Largest picture that is read at all: 134 million pixels."""
 
 

@@ -14,12 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Block
 from .paths import absence
 from .ply_header import Element, parse_header
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 INDEX_NAMES = ("vertex_indices", "vertex_index")
-WINDOW = 1 << 20
+WINDOW: Block[int] = 1 << 20
 """Entries of the body that are looked at together; bounds the memory, as each takes some dozens of bytes."""
 
 

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from ..atomic import write_bytes
+from ..kinds import Code
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
-LEFT_NEIGHBOUR = 1  # filter type: each byte less that of the pixel to its left, which halves the size of photos
+LEFT_NEIGHBOUR: Code[int] = 1  # filter: each byte less that of the pixel to its left; halves the size of photos
 
 
 def png(image: np.ndarray) -> bytes:

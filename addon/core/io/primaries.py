@@ -9,13 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Code, Limit
 
-REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+REC709: Code[tuple[float, ...]] = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 """x and y of red, green, blue and white; what a file without chromaticities means."""
-CIE_XYZ = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+CIE_XYZ: Code[tuple[float, ...]] = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 """Primaries of pictures that hold X, Y and Z: their white is a unit, not what the picture's maker adapted to."""
 BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
-MAX_GAIN = 5000
+MAX_GAIN: Limit[int] = 5000
 """Primaries that need a greater factor span no colours."""
 
 

@@ -14,10 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Code
 
-THRESHOLD = 16
+THRESHOLD: Code[int] = 16
 """Up to so many elements are left to the final insertion sort."""
-SPREAD = (
+SPREAD: Code[tuple[tuple[int, int], ...]] = (
     (32, 0x1F00000000FFFF),
     (16, 0x1F0000FF0000FF),
     (8, 0x100F00F00F00F00F),

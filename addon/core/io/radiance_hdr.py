@@ -12,19 +12,20 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Code, Limit
 from .picture import MAX_PIXELS, Picture
 from .primaries import CIE_XYZ, to_rec709
 
 MAGIC = (b"#?RADIANCE", b"#?RGBE", b"#?AUTOPANO")
-HEADER_BYTES = 1 << 16
+HEADER_BYTES: Limit[int] = 1 << 16
 RGBE, XYZE = b"32-bit_rle_rgbe", b"32-bit_rle_xyze"
 XYZE_CHROMATICITIES = (*CIE_XYZ, 1 / 3, 1 / 3)
-WHITE_EFFICACY = 179.0
+WHITE_EFFICACY: Code[float] = 179.0
 """Lumens for a watt of white light: RGBE holds W/(sr m2), XYZE holds cd/m2 (`WHTEFFICACY` in color.h)."""
 RESOLUTION = re.compile(rb"([+-])([XY]) +(\d{1,9}) +([+-])([XY]) +(\d{1,9})[ \r]*\n")
-RUNS = 8, 0x7FFF
+RUNS: Code[tuple[int, int]] = (8, 0x7FFF)
 """Only lines of this many pixels may be stored channel by channel."""
-MAX_RATIO = 256
+MAX_RATIO: Limit[int] = 256
 """Pixels for a byte of the file; more claims a size that only a file made to fill memory holds."""
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError, one_line
+from ..kinds import Shown
 from ..scene.connected_parts import connected_parts
 from ..scene.model import Capture, Frame, Mesh
 from ..scene.vote import vote
@@ -29,7 +30,7 @@ from .readers import reader_for
 
 MAX_BAD_SHARE = 0.2
 """More bad frames than this share, and the capture is taken as broken instead of the frames as bad."""
-LISTED = 3
+LISTED: Shown[int] = 3
 """How many problems are told in full."""
 
 

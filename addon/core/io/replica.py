@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import BadInputError
 from ..json_values import is_number
+from ..kinds import Code, Limit
 from ..scene.model import KnownMirror, LitTiles
 from . import nerfstudio, traj
 from .instances import FILE, read_instances
@@ -29,8 +30,8 @@ from .replica_glass import mirrors_of, read_panes
 MESH, TEXTURES, PARAMETERS = "mesh.ply", "textures", "textures/parameters.json"
 SEMANTIC, NAMES, ORDER = "habitat/mesh_semantic.ply", "habitat/info_semantic.json", "habitat/sorted_faces.bin"
 PICTURE, LOW_RANGE = "{}-color-ptex.hdr", ("{}-color-ptex.rgb", "{}-color-ptex.dxt1")
-TEXEL_BYTES = 6
-MAX_TILE = 1 << 12
+TEXEL_BYTES: Code[int] = 6
+MAX_TILE: Limit[int] = 1 << 12
 CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
 """Where a quad's corners lie in its tile."""
 FAR = 3.0

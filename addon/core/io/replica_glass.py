@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..kinds import Limit
 from ..scene.model import KnownMirror
 from .layout import RawMesh
 
@@ -20,7 +21,7 @@ ALONG = 0.9
 """Cosine between their normals."""
 OWN_SHARE = 0.7
 """Share of an object's surface that lies in the pane from which on the object is that pane."""
-MAX_BYTES = 1 << 26
+MAX_BYTES: Limit[int] = 1 << 26
 
 
 @dataclass(frozen=True)

@@ -16,15 +16,16 @@ from typing import Any
 from urllib.parse import unquote
 
 from ..errors import BadInputError
+from ..kinds import Block, Limit
 
-MAX_JSON = 1 << 28
+MAX_JSON: Limit[int] = 1 << 28
 """Bytes of glTF's JSON part that are read at most."""
-MAX_BARE = 1 << 24
+MAX_BARE: Limit[int] = 1 << 24
 """Elements that an accessor without a buffer may claim: they are zeros that the importer makes up."""
 DROPPED = ("materials", "textures", "images", "samplers", "animations", "skins", "cameras", "extensions")
 COMPRESSED = "KHR_draco_mesh_compression"
 OBJ_DROPPED = re.compile(rb"^\s*(mtllib|usemtl|usemap|maplib|call|csh)\b")
-BLOCK = 1 << 20
+BLOCK: Block[int] = 1 << 20
 
 
 def copy_obj(path: Path, folder: Path) -> tuple[Path, bool]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..json_values import numbers
+from ..kinds import Limit
 from ..scene.model import Camera, Frame
 from ..scene.pose import check_pose
 from . import instances
@@ -27,7 +28,7 @@ POSES, PARAMETERS, FOLDER = "traj.txt", "cam_params.json", "results"
 TO_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 """From x right, y down, z forward to x right, y up, z backward."""
 PICTURE = re.compile(r"^frame(\d+)$", re.IGNORECASE)
-MAX_BYTES = 1 << 28
+MAX_BYTES: Limit[int] = 1 << 28
 
 
 def read(root: Path, reading: Reading) -> Layout:

@@ -12,9 +12,10 @@ import functools
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Limit
 
 SRGB, LINEAR = "srgb", "linear"
-GAMMAS = (0.1, 10.0)
+GAMMAS: Limit[tuple[float, float]] = (0.1, 10.0)
 """Bounds of a gamma that anyone can mean."""
 TOP = {8: 253.5 / 255, 16: 1 - 2.0**-12}
 """Share of the greatest code from which on a value counts as clipped: JPEG rings by a code or two, and 12 bits that

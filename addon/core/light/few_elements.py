@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kinds import Block
 from ..luminance import LUMINANCE
 from ..parallel import for_blocks
+from ..significance import LEVELS
 from .emitters import bright_triangles
 from .environment import Environment
 from .field import LightField
@@ -14,7 +16,7 @@ from .params import GATHER, LIGHT_FIT
 from .portals import find_portals
 from .sun import sunlight
 
-ELEMENTS_AT_ONCE = 1 << 10
+ELEMENTS_AT_ONCE: Block[int] = 1 << 10
 
 
 def pick(field: LightField, good: np.ndarray, seed: int, samples: int) -> np.ndarray:
@@ -34,7 +36,7 @@ def steady(field: LightField, good: np.ndarray, flat: np.ndarray) -> np.ndarray:
     """The good elements, (n,) bool: of an object with enough on flat spots, those."""
     object_id = field.atlas.object_id
     count = np.bincount(object_id, good & flat)
-    return good & (flat | (count < LIGHT_FIT.least)[object_id])
+    return good & (flat | (count < LEVELS.enough)[object_id])
 
 
 def barely_seen(field: LightField, good: np.ndarray) -> np.ndarray:
@@ -70,7 +72,7 @@ def irradiance_at(field: LightField, element: np.ndarray, seed: int) -> np.ndarr
     def run(part: slice) -> None:
         p, n, own = position[part], normal[part], seed + part.start
         around, _, _ = gather(
-            field, bright, p, n, LIGHT_FIT.rays, LIGHT_FIT.emitter_rays, own, portals, LIGHT_FIT.portal_rays
+            field, bright, p, n, LIGHT_FIT.rays, LIGHT_FIT.emitter_rays, own, portals, LIGHT_FIT.emitter_rays
         )
         E[part] = around + direct(field, bright, p, n, LIGHT_FIT.rays, LIGHT_FIT.emitter_rays, own + 1)[0]
 

@@ -13,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..kinds import Block
 from ..parallel import for_blocks
 from .params import GATHER
 
 REACH = 2 * GATHER.allowed
 """Error bound at which a point's weight has fallen to 0."""
-BLOCK = 1 << 15
+BLOCK: Block[int] = 1 << 15
 
 
 @dataclass

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kinds import Block
 from .directions import PATTERNS, cosine_patterns, shifted, sobol, turned
 from .emitters import BrightTriangles, aimed_at, sample_bright
 from .field import LightField
@@ -17,7 +18,7 @@ from .over_mirrors import direct_over_mirrors
 from .params import GATHER
 from .portals import Portals
 
-RAYS_AT_ONCE = 1 << 16
+RAYS_AT_ONCE: Block[int] = 1 << 16
 
 
 def gather(

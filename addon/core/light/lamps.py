@@ -81,6 +81,6 @@ def twin(object_id: int, luminance: float, class_of: dict[int, str], seen: list[
     """A seen lamp of the object's class with about the luminance that was solved for the object."""
     for other in seen:
         if class_of.get(other.object_id) == class_of.get(object_id):
-            if abs(luminance / float(other.radiance @ LUMINANCE) - 1) < LIGHT_FIT.agrees:
+            if abs(luminance / float(other.radiance @ LUMINANCE) - 1) < LIGHT_FIT.alike:
                 return other
     return None

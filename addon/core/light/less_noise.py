@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..significance import LEVELS
 from .params import LESS_NOISE
 
 
@@ -44,7 +45,7 @@ def less_noise(
         fitted = _planes(position, light, group, count, size)
         rest = (light - fitted).mean(1)
         n2, v = (np.bincount(group, x.astype(np.float64) ** 2, len(count)) / count for x in (noise, rest))
-        keep = np.where(count >= LESS_NOISE.least, np.maximum(v - n2, 0) / np.maximum(v, 1e-30), 1)
+        keep = np.where(count >= LEVELS.few, np.maximum(v - n2, 0) / np.maximum(v, 1e-30), 1)
         result += fitted + keep[group, None].astype(np.float32) * (light - fitted)
         around += n2[group]
     return (result / np.float32(LESS_NOISE.grids)), np.sqrt(around / LESS_NOISE.grids).astype(np.float32)

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..brdf import ggx
 from ..brdf.model import Microfacets
+from ..kinds import Block, Code
 from ..parallel import for_blocks
 from ..progress import Progress
 from ..scene.tangent_frame import tangent_frame
@@ -29,8 +30,8 @@ GRID = np.array(
     [0.01, 0.02, 0.035, 0.055, 0.08, 0.11, 0.15, 0.2, 0.26, 0.33, 0.41, 0.5, 0.6, 0.72, 0.85, 1], np.float32
 )
 """phi of the grid search: close to equal steps in its square root, which is what Blender's users see."""
-RAYS_AT_ONCE = 1 << 16
-ANY = -2
+RAYS_AT_ONCE: Block[int] = 1 << 16
+ANY: Code[int] = -2
 
 
 @dataclass(frozen=True)

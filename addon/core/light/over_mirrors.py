@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kinds import Block
 from .directions import shifted, sobol
 from .emitters import BrightTriangles, sample_bright
 from .field import LightField
 from .mirrors import reflect
 from .params import GATHER
 
-RAYS_AT_ONCE = 1 << 16
+RAYS_AT_ONCE: Block[int] = 1 << 16
 
 
 def direct_over_mirrors(

@@ -7,6 +7,7 @@ from typing import TypedDict
 
 import numpy as np
 
+from ..kinds import Block
 from ..parallel import for_blocks
 from ..progress import Progress, Rounds
 from ..scene.atlas import Atlas
@@ -20,7 +21,7 @@ from .portals import find_portals
 from .sun import Sun, sunlight
 from .texel_blocks import TexelBlocks
 
-ELEMENTS_AT_ONCE = 1 << 13
+ELEMENTS_AT_ONCE: Block[int] = 1 << 13
 
 
 def finest_spacing(atlas: Atlas, share: float = GATHER.finest_share) -> float:

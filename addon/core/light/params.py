@@ -50,8 +50,6 @@ class GatherParams:
         What comes by a mirror is little of the light: so many times fewer rays are aimed at it.
     proposals : tuple[float, ...]
         Widths (phi) of the lobes that rays are drawn from.
-    same_place : float
-        Metres within which two places are one.
     unseen_coarser : int
         Times the finest spacing of gathering points.
     """
@@ -74,7 +72,6 @@ class GatherParams:
     both_halves: float = 0.75
     mirror_fewer: int = 4
     proposals: tuple[float, ...] = (0.015, 0.06, 0.2, 0.6)
-    same_place: float = 1e-5
     unseen_coarser: int = 8
 
 
@@ -91,15 +88,12 @@ class LessNoiseParams:
         Metres, edge of the cells that a mean is taken over.
     grids : int
         Shifted grids of such cells, averaged.
-    least : int
-        Elements in a cell below which nothing is taken out.
     turned : int
         Steps in which the normal's components are told apart.
     """
 
     cell: float = 0.12
     grids: int = 3
-    least: int = 12
     turned: int = 4
 
 
@@ -135,17 +129,13 @@ class LightFitParams:
         Lamps that are off by a tenth part objects under them from others under the sky by up to .1.
     reach : float
         The refined radiance stays within this factor of where it started.
-    least : int
-        Elements with which a solution can be tried.
     lamp_elements : int
         Of an unseen object, at which what it could reflect is looked at.
-    rays, emitter_rays, portal_rays : int
+    rays, emitter_rays : int
         Of each element that a solution looks at: into its hemisphere, at bright triangles, at openings.
     emitter_albedo : float
         An object whose median albedo would have to be above this gives light of its own. 1 is the physical bound; the
         rest is room for missing light and for noise.
-    agrees : float
-        Luminances that lie this near each other (relative) count as the same.
     """
 
     coarse: float = 1.0
@@ -156,13 +146,10 @@ class LightFitParams:
     alike: float = 0.25
     same_colour: float = 0.1
     reach: float = 3.0
-    least: int = 30
     lamp_elements: int = 500
     rays: int = 256
     emitter_rays: int = 64
-    portal_rays: int = 64
     emitter_albedo: float = 2.0
-    agrees: float = 0.25
 
 
 LIGHT_FIT = LightFitParams()
@@ -184,8 +171,6 @@ class SkyParams:
         How often brighter than the sky around it a seen sun must be.
     least_share : float
         Of the irradiance by all the sky: less is left in the map.
-    written_rows : int
-        Least height of a map that a sun is put into: a texel of 0.35 degrees.
     """
 
     max_height: int = 512
@@ -194,7 +179,6 @@ class SkyParams:
     shadow_rays: int = 16
     above: float = 30.0
     least_share: float = 0.02
-    written_rows: int = 512
 
 
 SKY = SkyParams()

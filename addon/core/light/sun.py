@@ -171,7 +171,7 @@ def put_in(environment: Environment, sun: Sun | None) -> np.ndarray:
     """
     if sun is None:
         return environment.radiance
-    times = max(-(-SKY.written_rows // len(environment.radiance)), 1)
+    times = max(-(-SKY.max_height // len(environment.radiance)), 1)
     radiance = environment.radiance.repeat(times, 0).repeat(times, 1).astype(np.float64)
     height, width = radiance.shape[:2]
     way = around(sun.direction, _disc(sobol(256, 0), sun.radius)).astype(np.float64)

@@ -11,13 +11,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..kinds import Block
 from ..parallel import for_blocks
 from ..scene.atlas import Atlas
 from .params import GATHER
 
 BENT = np.cos(np.radians(15.0))
 """A texel turned further than this against a corner of its block is not served by it."""
-BLOCK = 1 << 16
+BLOCK: Block[int] = 1 << 16
 
 
 class TexelBlocks:

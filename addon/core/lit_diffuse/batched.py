@@ -17,15 +17,16 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..kinds import Block, Code
 from ..paper.p_square import QUARTILES, Summary
 from ..parallel import blocks, ordered_map
 from .sorting import sort_planes
 
 SLOTS, KNOTS = 20, 12
 BATCH = SLOTS - KNOTS
-SLOT_BITS = 5
-AT_ONCE = 1 << 14
-RENEWED_AT_ONCE = 1 << 11
+SLOT_BITS: Code[int] = 5
+AT_ONCE: Block[int] = 1 << 14
+RENEWED_AT_ONCE: Block[int] = 1 << 11
 """Elements summarised, and such whose knots are taken, at once: their places fit the processor's cache."""
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..io.exr import HALF_MAX
+from ..kinds import Block
 from ..parallel import blocks
 from ..progress import Progress
 from ..scene.atlas import Atlas
@@ -15,7 +16,7 @@ from ..scene.model import LitTiles, Mesh
 from ..scene.params import VISIBILITY
 from ..scene.visibility import CLEAN, SATURATED
 
-TEXELS_AT_ONCE = 1 << 22
+TEXELS_AT_ONCE: Block[int] = 1 << 22
 """Texels of the tiles that are looked at together; 160 bytes each."""
 
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kinds import Block
 from ..parallel import for_blocks
 from ..progress import Progress, Rounds
 from ..scene.tangent_frame import to_world
 from .captured_light import Light
 
-RAYS_AT_ONCE = 1 << 16
+RAYS_AT_ONCE: Block[int] = 1 << 16
 
 
 def uniform_hemisphere(square: np.ndarray) -> np.ndarray:

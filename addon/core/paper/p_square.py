@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-QUARTILES = (0.25, 0.5, 0.75)
+from ..kinds import Unit
+
+QUARTILES: Unit[tuple[float, float, float]] = (0.25, 0.5, 0.75)
 
 
 @dataclass(frozen=True)

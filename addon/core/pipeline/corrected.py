@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from ..brdf.compensation import layer_reflectance
+from ..brdf.dielectric import SATIN, USUAL_F0
 from ..brdf.material import ObjectMaterial, base_colors, with_metals
 from ..evidence.collect import Evidence, collect
 from ..evidence.findings import Findings
@@ -24,6 +25,7 @@ from ..passes.albedo.albedo import MEASURED, Albedo, albedo_of
 from ..passes.albedo.albedo import NONE as NO_ALBEDO
 from ..results.overrides import Overrides
 from ..scene.atlas import Atlas
+from ..significance import LEVELS
 from .params import CORRECTED
 from .published import light as published_light
 from .stages import Stages
@@ -221,7 +223,7 @@ def _coloured(rho: np.ndarray, told: np.ndarray, area: np.ndarray, colour: np.nd
         return np.broadcast_to(colour, rho.shape)
     for _ in range(CORRECTED.rounds):  # what is clamped at 1 lowers the mean
         mean = np.average(rho[told], 0, area[told])
-        rho = np.where(mean < CORRECTED.dark, colour, np.minimum(rho * (colour / np.maximum(mean, CORRECTED.dark)), 1))
+        rho = np.where(mean < LEVELS.dark, colour, np.minimum(rho * (colour / np.maximum(mean, LEVELS.dark)), 1))
     return rho.astype(np.float32)
 
 
@@ -257,8 +259,8 @@ def coated(materials: list[ObjectMaterial], albedo: Albedo, atlas: Atlas) -> lis
         plain = not m.model.has_lobe and m.model.has_albedo and not m.scores
         if plain and m.class_name not in matt and m.given.keys() <= {"base_color"}:
             own = atlas.object_id == m.object_id
-            roughness = float(np.median(rough.get(m.class_name) or everywhere or [CORRECTED.coat_roughness]))
-            if own.any() and np.median(albedo.rho[own], 0).min() > layer_reflectance(CORRECTED.coat_f0, roughness**2):
-                m = replace(m, coat={"f0": CORRECTED.coat_f0, "roughness": roughness})
+            roughness = float(np.median(rough.get(m.class_name) or everywhere or [SATIN]))
+            if own.any() and np.median(albedo.rho[own], 0).min() > layer_reflectance(USUAL_F0, roughness**2):
+                m = replace(m, coat={"f0": USUAL_F0, "roughness": roughness})
         result.append(m)
     return result

@@ -19,12 +19,6 @@ class CorrectedParams:
         Less than this of its light no lamp is left.
     doubtful : float
         A white that scales E by more than this, or its inverse, is more likely not that white.
-    dark : float
-        Texture is kept as variation about its mean; below this a channel has none that could be told from noise.
-    coat_f0, coat_roughness : float
-        A plausible coat: what dielectrics of n = 1.5 reflect; satin where the room has no dielectric to learn from.
-    dark_refit : float
-        Least albedo that a logarithm is taken of.
     unknown_before : float
         Relative error of an albedo, light aside, of an object whose own is not known as it had none before.
     """
@@ -33,10 +27,6 @@ class CorrectedParams:
     spots: int = 600
     least_light: float = 0.1
     doubtful: float = 1.5
-    dark: float = 0.02
-    coat_f0: float = 0.04
-    coat_roughness: float = 0.5
-    dark_refit: float = 1e-3
     unknown_before: float = 0.1
 
 
@@ -61,8 +51,6 @@ class PartsParams:
         Of what lies around a spot on the room's atlas, this share has to be measured for detail to be told there.
     looked : float
         Share of the writing that the look at the frames takes.
-    no_limit : int
-        Edge of an atlas where nothing bounds it.
     """
 
     finest: float = 4.0
@@ -71,7 +59,6 @@ class PartsParams:
     pixel_step: int = 8
     half: float = 0.5
     looked: float = 0.3
-    no_limit: int = 1 << 30
 
 
 PARTS = PartsParams()

@@ -8,6 +8,7 @@ base colour is multiplied by what this differs from the room's own lit diffuse t
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
@@ -27,6 +28,7 @@ from ..scene.pages import OBJECT, Pages, lay_out
 from ..scene.params import VISIBILITY
 from ..scene.surface import Surface
 from ..scene.visibility import CLEAN
+from ..significance import LEVELS
 from .corrected import Corrected
 from .frames import lit_diffuse
 from .params import PARTS
@@ -149,7 +151,7 @@ def look_closer(run: Corrected) -> Parting:
     # Their islands alone, on a sheet of their own: the time that this takes is theirs, not the room's.
     chosen = np.flatnonzero(np.isin(mesh.object_id, list(finer)))
     part = Mesh(mesh.vertices, mesh.triangles[chosen], mesh.object_id[chosen])
-    sheet = lay_out(OBJECT, part.triangles, uv[chosen], part.object_id, size, finer, PARTS.no_limit)
+    sheet = lay_out(OBJECT, part.triangles, uv[chosen], part.object_id, size, finer, sys.maxsize)
     atlas = make_atlas(part, sheet.sheet_uv, sheet.size)
     if stored is None or dict(meta["finer"]) != finer:
         found = _looked(run, part, atlas, chosen)
@@ -230,7 +232,7 @@ def finer_detail(run: Corrected, closer: Closer) -> np.ndarray:
     good = (lit.tier == CLEAN) & (lit.count >= VISIBILITY.enough) & (run.albedo.origin == MEASURED)
     known = np.concatenate([np.where(good[:, None], lit.radiance, 0), good[:, None]], 1).astype(np.float32)
     room = closer.sheet.image(surface.atlas.image(known), _owner(run)).reshape(-1, 4)[atlas.texel]
-    floor = np.float32(max(SHARPENING.floor * run.median_radiance(), 1e-30))
+    floor = np.float32(max(LEVELS.dark * run.median_radiance(), 1e-30))
     level = room[:, :3] / np.maximum(room[:, 3:], 1e-6)
     ratio = np.clip((closer.radiance + floor) / (level + floor), 1 / SHARPENING.most, SHARPENING.most)
     ratio[(room[:, 3] < PARTS.half) | ~np.isfinite(ratio).all(1)] = 1

@@ -18,13 +18,14 @@ import numpy as np
 
 from ..brdf.material import ObjectMaterial
 from ..errors import BadInputError, MissingStageError
-from ..evidence.calibration import NOTHING_KNOWN
 from ..evidence.collect import Evidence
 from ..evidence.light import LightEvidence
 from ..evidence.objects import object_evidence
+from ..evidence.params import CALIBRATION
 from ..evidence.texel import TexelEvidence, gloss_error
 from ..io.exr import read_exr
 from ..passes.albedo.albedo import MEASURED, Albedo
+from ..passes.albedo.params import ALBEDO
 from ..progress import Progress
 from ..results.overrides import Given, Overrides, heeded, parse
 from ..results.room_file import MATERIALS, Room, read_room
@@ -283,11 +284,11 @@ class Refit(Recovery):
             )
         )
         relative = np.sqrt(np.maximum(np.square(error) - np.square(gloss_was), 0)) / np.maximum(
-            before.rho, CORRECTED.dark_refit
+            before.rho, ALBEDO.floor
         )
         bare = ~(error > 0).any(1, keepdims=True)
         relative = np.where(bare, np.hypot(shading, CORRECTED.unknown_before)[:, None], relative)
-        fresh = np.minimum(np.sqrt(np.square(relative * now.rho) + np.square(gloss)), NOTHING_KNOWN)
+        fresh = np.minimum(np.sqrt(np.square(relative * now.rho) + np.square(gloss)), CALIBRATION.nothing_known)
         known = {m.object_id for m in mine if m.model.gives_light or "base_color" in m.given}
         fresh = np.where(np.isin(atlas.object_id, list(known))[:, None], 0, fresh)
         texels = TexelEvidence(shading, np.where(self._own[:, None], fresh, error).astype(np.float32), unseen, clipped)

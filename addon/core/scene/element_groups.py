@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kinds import Block, Unit
 from .atlas import Atlas
 from .model import Camera
 from .params import VISIBILITY
 from .pixel_rays import widest_angle
 from .visibility import FrameView
 
-CELL = 16
+CELL: Block[int] = 16
 """Edge of a group in elements."""
-SLACK = 1e-4
+SLACK: Unit[float] = 1e-4
 """What rounding may add to a sine or, as a share of the scene, to a length: a group that touches a limit stays in."""
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from ..kinds import Block
 from .atlas import Atlas
 from .model import Mesh
 from .rays import RayScene
@@ -17,7 +18,7 @@ SUBSAMPLES = np.array(
      [-0.45, -0.45], [0.45, 0.45], [-0.45, 0.45], [0.45, -0.45], [0, 0.45], [0, -0.45], [0.45, 0], [-0.45, 0]],
     np.float32,
 )  # fmt: skip
-ROWS_AT_ONCE = 128
+ROWS_AT_ONCE: Block[int] = 128
 
 
 def triangle_geometry(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..kinds import Unit
 from .lens import Lens, ahead
 
-TINY = 1e-12
+TINY: Unit[float] = 1e-12
 
 
 def _radius(points: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from ..significance import LEVELS
 from .model import Mesh
 from .params import NOISE
 from .weld import point_normals, ring_of, welded
@@ -20,7 +21,7 @@ def noise_of(mesh: Mesh) -> float:
     ring = ring_of(faces, len(points))
     degree = np.asarray(ring.sum(1))[:, 0]
     inner = degree >= 4
-    if inner.sum() < NOISE.least_vertices:
+    if inner.sum() < LEVELS.many:
         return 0.0
     share = sparse.diags(1 / np.maximum(degree, 1)) @ ring
     normal = point_normals(points, faces)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kinds import Shown
 from .model import Camera, Mesh
 from .rays import RayScene
 
-SIZE = 960, 640
+SIZE: Shown[tuple[int, int]] = (960, 640)
 WIDE = np.radians(75)
 """Horizontal angle of view."""
-EYES = 1.5
+EYES: Shown[float] = 1.5
 """Metres above the floor, or the middle of what is lower."""
-INWARD = 0.25, 0.5, 0.75
+INWARD: Shown[tuple[float, float, float]] = (0.25, 0.5, 0.75)
 """Where eyes are tried, as shares of the room's extent along x and y."""
-TRIED, SEEN = 16, 24
+TRIED: Shown[int] = 16
+SEEN: Shown[int] = 24
 """Directions that are tried from each, and rays along a picture's edge that judge the view."""
 
 

@@ -131,8 +131,6 @@ class NoiseParams:
     ----------
     least_noise : float
         Metres. Below, what is measured may be shape: a modelled living room has 0.13 mm.
-    least_vertices : int
-        A median of fewer curvatures says nothing.
     tilt : float
         Radians by which a triangle of height 1 is tilted by vertices off by 1: each of three vertices adds its share.
     most : float
@@ -143,7 +141,6 @@ class NoiseParams:
     """
 
     least_noise: float = 0.001
-    least_vertices: int = 100
     tilt: float = 1.2
     most: float = 3.0
     left: float = 0.5

@@ -6,6 +6,7 @@ import functools
 
 import numpy as np
 
+from ..kinds import Block
 from .lens import Lens
 from .model import Camera
 
@@ -22,7 +23,7 @@ def pixel_rays(camera: Camera) -> tuple[np.ndarray, np.ndarray | None]:
     return _pixel_rays(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.lens)
 
 
-KEPT = 4
+KEPT: Block[int] = 4
 """Lenses whose rays are kept: a rig's cameras, or one for each thread; 24 bytes a pixel each."""
 
 

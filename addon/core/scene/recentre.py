@@ -10,9 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..kinds import Unit
 from .model import Capture
 
-COARSE = 1e-6
+COARSE: Unit[float] = 1e-6
 """Step of float32, as a share of the room's diagonal, from which on the room is moved."""
 
 

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kinds import Block
+
 _LEVELS = 12
-_CANDIDATES_AT_ONCE = 1_500_000
+_CANDIDATES_AT_ONCE: Block[int] = 1_500_000
 
 
 def overlapping_pairs(uv: np.ndarray, depth: float, island: np.ndarray | None = None) -> np.ndarray:

@@ -7,19 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..kinds import Code, Limit
 from .atlas import Atlas
 from .model import Camera, Mesh, Pixels
 from .params import VISIBILITY
 from .pixel_rays import pixel_rays
 from .rays import RayScene
 
-CLEAN, EDGE, SATURATED = 0, 1, 2
+CLEAN: Code[int] = 0
+EDGE: Code[int] = 1
+SATURATED: Code[int] = 2
 """Tiers of an observation. CLEAN: the pixel and its eight neighbours show one surface. EDGE: the pixel's centre shows
 the element's object, but a neighbour shows something else, which a filter or a slightly wrong pose mixes in.
 SATURATED: the sensor clipped; a lower bound."""
-NOTHING = -2
+NOTHING: Code[int] = -2
 """No object's id, and not that of a ray that escapes."""
-FAR = 1e9
+FAR: Limit[float] = 1e9
 """Pixels; what a lens throws further out than this overflows nothing."""
 
 

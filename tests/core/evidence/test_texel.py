@@ -10,9 +10,9 @@ import pytest
 from addon.core.brdf.emitter import EMITTER
 from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.brdf.material import Z90, ObjectMaterial
-from addon.core.evidence import calibration as c
 from addon.core.evidence.light import LightEvidence, light_evidence, spots
 from addon.core.evidence.objects import object_evidence
+from addon.core.evidence.params import CALIBRATION
 from addon.core.evidence.texel import contrast, texel_evidence, without_light
 from addon.core.light.lamps import Lamp
 from addon.core.passes.albedo.albedo import FILLED, MEASURED, Albedo
@@ -58,9 +58,9 @@ def evidence(room, lit, albedo, light, models=None):
 
 def test_errors_add_up(box):
     found = evidence(box, known(box), grey(box, error=0.1), sure_light(box, 0.04, 0.03))
-    assert np.allclose(found.shading, np.sqrt(0.04**2 + 0.03**2 + c.LIGHT_FLOOR**2), rtol=1e-4)
-    shrunk = (c.NOISE_LEFT * 0.04) ** 2 + 0.03**2 + c.LIGHT_FLOOR**2
-    expected = np.sqrt(0.25 * ((c.OWN * 0.1) ** 2 + shrunk) + c.LEFT**2)
+    assert np.allclose(found.shading, np.sqrt(0.04**2 + 0.03**2 + CALIBRATION.light_floor**2), rtol=1e-4)
+    shrunk = (CALIBRATION.noise_left * 0.04) ** 2 + 0.03**2 + CALIBRATION.light_floor**2
+    expected = np.sqrt(0.25 * ((CALIBRATION.own * 0.1) ** 2 + shrunk) + CALIBRATION.left**2)
     assert np.median(found.albedo) == pytest.approx(expected, rel=1e-3)
 
 
@@ -99,7 +99,7 @@ def test_an_object_is_surer_than_its_texels_and_says_what_was_seen(box):
     floor, ceiling = object_evidence(box.atlas, lit, albedo, texels)[:2]
     assert floor.seen_share == pytest.approx(0.25, abs=0.01) and ceiling.seen_share == 1
     assert ceiling.albedo == pytest.approx((0.5, 0.5, 0.5))
-    half = Z90 * c.OF_OBJECT * float(texels.albedo[box.atlas.object_id == 1].mean())
+    half = Z90 * CALIBRATION.of_object * float(texels.albedo[box.atlas.object_id == 1].mean())
     assert ceiling.albedo_high[0] - 0.5 == pytest.approx(half, rel=0.05)
     assert ceiling.albedo_low[0] == pytest.approx(1 - ceiling.albedo_high[0], abs=1e-4)
 
@@ -145,4 +145,4 @@ def test_light_of_a_lamp_that_nobody_saw_is_unsure(lit_room):
     floor = lit_room.atlas.object_id == 0
     share = np.median(found.unseen[floor])
     assert 0.3 < share < 0.8
-    assert np.median(found.unsure[floor]) == pytest.approx(share * c.LAMP_UNSURE, rel=0.05)
+    assert np.median(found.unsure[floor]) == pytest.approx(share * CALIBRATION.solved, rel=0.05)

@@ -8,13 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...groups import by_label
+from ...kinds import Code
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Instance
 from .neighbourhood import relative_error, shrink
 from .params import ALBEDO
 
-MEASURED, FILLED, NONE = 2, 1, 0
+MEASURED: Code[int] = 2
+FILLED: Code[int] = 1
+NONE: Code[int] = 0
 """How an element's albedo came about: measured; filled in from its object; no reflectance (an emitter, an object
 nobody saw, or one that shows what is behind it)."""
 

@@ -12,10 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...kinds import Block
 from ...parallel import for_blocks
+from ...significance import LEVELS
 from .params import SECOND_COLOUR, SecondColourParams
 
-BLOCK = 1 << 11
+BLOCK: Block[int] = 1 << 11
 
 
 class Surroundings(NamedTuple):
@@ -66,11 +68,11 @@ def drawn_to_minority(
     """
     ground, width, near = np.exp(around.middle), around.width, around.near
     other = np.empty(near.shape, bool)
-    uncut, least = reference.max(1) < most, (params.far_of_error * reference_error) ** 2
+    uncut, least = reference.max(1) < most, (LEVELS.likely * reference_error) ** 2
 
     def far(part: slice) -> None:
         beside = near[part]
-        limit = (params.far * width[part, None]) ** 2 + least[beside]
+        limit = (LEVELS.likely * width[part, None]) ** 2 + least[beside]
         other[part] = (_apart(reference[beside], ground[part, None]) > limit) & uncut[beside]
 
     for_blocks(far, len(near), BLOCK, 0)

@@ -10,17 +10,20 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
+from scipy import special
 from scipy.spatial import cKDTree
 
 from ...groups import by_label
+from ...kinds import Block
 from ...parallel import for_blocks
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.visibility import CLEAN, SATURATED
+from ...significance import LEVELS
 from .minority import Surroundings, drawn_to_minority
 from .params import ALBEDO, PRIOR, PriorParams
 
-BLOCK = 1 << 11
+BLOCK: Block[int] = 1 << 11
 
 
 def relative_error(
@@ -56,11 +59,9 @@ def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray, params
     few = np.full(int(object_id.max()) + 1, params.single)
     ids, known = object_id[often], spread[often]
     for own in by_label(ids):
-        if len(own) >= params.enough_others:
+        if len(own) >= LEVELS.enough:
             few[ids[own[0]]] = np.clip(
-                params.single_factor * np.quantile(known[own], params.single_quantile),
-                params.least_single,
-                params.single,
+                params.single_factor * np.quantile(known[own], special.ndtr(1.0)), params.least_single, params.single
             )
     return few[object_id]
 
@@ -162,7 +163,7 @@ def shrink(
     centre = np.stack([np.bincount(index, position[:, axis]) for axis in range(3)], 1) / count[:, None]
     todo = np.flatnonzero(error > 0)
     asked, index = np.unique(index[todo], return_inverse=True)
-    rho = np.maximum(rho, ALBEDO.dark)
+    rho = np.maximum(rho, ALBEDO.floor)
     reference, reference_error = rho[sure], error[sure]
     around = _prior(centre[asked], position[sure], np.log(reference), without, params)
     shrunk, left = rho.astype(np.float32), error.astype(np.float32)
@@ -175,7 +176,7 @@ def shrink(
     # prior gets the width that makes this element likeliest.
     # One verdict for all channels, by their sum: a channel near 0 is all noise in its logarithm.
     off = np.log(np.exp(log_rho).sum(1, keepdims=True) / np.exp(middle).sum(1, keepdims=True))
-    surprise = off**2 - (params.surprise * error) ** 2
+    surprise = off**2 - (LEVELS.sigmas * error) ** 2
     wide = np.maximum(width**2, surprise)
     trust = (wide / (wide + error**2)).astype(np.float32)
     if "albedo-prior" in without:

@@ -26,16 +26,12 @@ class PriorParams:
         Relative standard error below which an element may speak for its neighbourhood.
     single, least_single : float
         Bounds of the relative standard error of a single observation, whose spread can't be known.
-    single_quantile, single_factor : float
+    single_factor : float
         It is taken for so many times this quantile (one standard deviation of a normal distribution) of the spreads
         that its object's other elements have (`object-spread`). Single observations are made where little is seen, so
         for more than theirs.
-    enough_others : int
-        Elements that tell such a quantile.
     edge_error : float
         Added to the relative standard error of observations at depth edges, where another surface is mixed in.
-    surprise : float
-        Standard errors of an element's own up to which a deviation is taken for error.
     """
 
     neighbours: int = 128
@@ -46,11 +42,8 @@ class PriorParams:
     sure: float = 0.15
     single: float = 0.35
     least_single: float = 0.1
-    single_quantile: float = 0.84
     single_factor: float = 2.0
-    enough_others: int = 30
     edge_error: float = 0.3
-    surprise: float = 3.0
 
 
 @dataclass(frozen=True)
@@ -59,10 +52,6 @@ class SecondColourParams:
 
     Attributes
     ----------
-    far : float
-        Widths of its prior that a neighbour of another colour lies off; 2.5 tells fewer of a bathroom's joints.
-    far_of_error : float
-        Standard errors of its own, as well: where E is uncertain, as along a moulding, its faults lie in lines too.
     by_chance : float
         Share of the neighbours that may lie so far off by chance. With 1/8 nothing is gained in bathrooms.
     local : float
@@ -73,15 +62,14 @@ class SecondColourParams:
         Probability density below which neither colour tells what an element is; the plain prior decides.
     """
 
-    far: float = 2.0
-    far_of_error: float = 2.0
     by_chance: float = 1 / 16
     local: float = 0.5
     apart: float = 0.03
     unexplained: float = 1e-4
 
 
-PRIOR, SECOND_COLOUR = PriorParams(), SecondColourParams()
+PRIOR = PriorParams()
+SECOND_COLOUR = SecondColourParams()
 
 
 @dataclass(frozen=True)
@@ -96,15 +84,12 @@ class AlbedoParams:
         What reflects more than it gets emits light.
     unknown, least_spread : float
         Relative error of an albedo that was taken from other objects: where there are too few to tell, and at least.
-    dark : float
-        Least albedo that a logarithm is taken of.
     """
 
     floor: float = 1e-3
     max_albedo: float = 1.0
     unknown: float = 0.7
     least_spread: float = 0.3
-    dark: float = 1e-3
 
 
 ALBEDO = AlbedoParams()

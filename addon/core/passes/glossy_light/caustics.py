@@ -19,6 +19,7 @@ import numpy as np
 
 from ...brdf.ggx import GGX, LEAST
 from ...brdf.model import Microfacets
+from ...kinds import Block
 from ...light.directions import cosine_hemisphere, sobol
 from ...light.emitters import BrightTriangles, sample_bright
 from ...light.field import LightField
@@ -29,7 +30,7 @@ from ...scene.atlas import Atlas
 from ...scene.tangent_frame import tangent_frame, to_world
 from .params import CAUSTICS
 
-AT_ONCE = 1 << 15
+AT_ONCE: Block[int] = 1 << 15
 
 
 @dataclass(frozen=True)

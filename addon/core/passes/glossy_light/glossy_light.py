@@ -92,7 +92,8 @@ class Excess(LightField):
             own = element[at]
             light = reflected_light(
                 self._room, self._bright, own, -directions[at], rays=GLOSSY.lobe_rays,
-                grid=np.array([alpha], np.float32), proposals=(alpha,), microfacets=microfacets, threads=1, seed=self._seed + int(at[0]) + len(at),
+                grid=np.array([alpha], np.float32), proposals=(alpha,), microfacets=microfacets, threads=1,
+                seed=self._seed + int(at[0]) + len(at),
             )  # fmt: skip
             taken = np.where(self._aimed[own, None], 0, self._inside[own])
             result[at] = self._f0[own] * light.A[:, 0] + light.B[:, 0] - taken

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .params import CRACKS
+from ...significance import LEVELS
+from .params import CRACKS, PLANES
 
 
 def border_edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -59,14 +60,14 @@ def _beside(
     length = np.linalg.norm(along, axis=1)
     arm = points[opposite] - start
     over = np.linalg.norm(np.cross(along, arm), axis=1) / np.maximum(length, 1e-30)
-    able = np.flatnonzero((length > CRACKS.long * noise) & (over > CRACKS.high * noise))
+    able = np.flatnonzero((length > PLANES.high * noise) & (over > CRACKS.high * noise))
     border = np.unique(edges)
     border_able = border[height[border] > CRACKS.high * noise]
     none = np.zeros(0, int), np.zeros(0, int), np.zeros(0)
     if not len(able) or not len(border_able):
         return none
     # Places along each edge, so dense that no point so near it is farther from all of them than 1.5 times that.
-    near = CRACKS.near * noise
+    near = LEVELS.likely * noise
     places = np.ceil(length[able] / (2 * near)).astype(int) + 1
     of = np.repeat(able, places)
     share = (np.arange(len(of)) - np.repeat(np.cumsum(places) - places, places)) / (places.repeat(places) - 1)

@@ -35,6 +35,7 @@ from ...scene.mesh_noise import noise_of
 from ...scene.model import Mesh
 from ...scene.params import NOISE
 from ...scene.weld import point_normals, ring_of, welded
+from ...significance import LEVELS
 from .cracks import closed
 from .params import DENOISE
 from .planes import onto_sheets
@@ -120,7 +121,7 @@ def _linear(
 ) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix, sparse.csr_matrix]:  # fmt: skip
     """Angles, their weights, their change by each point's way along its normal, and the normal equations' matrix."""
     count = len(points)
-    theta, gradient = dihedral(points, hinges, DENOISE.floor * noise)
+    theta, gradient = dihedral(points, hinges, noise)
     weight = 1 / (scale**2 + theta**2 + variance)
     ends = (hinges.a, hinges.b, hinges.c, hinges.d)
     values = np.concatenate([(by * normal[at]).sum(1) for by, at in zip(gradient, ends)])
@@ -190,7 +191,7 @@ def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndar
     points, crowded = measured, np.zeros(len(measured))
     if "unfolding" not in without:
         points, crowded = unfolded(measured, faces, noise)
-    points = _within(points, measured, DENOISE.farthest * noise)
+    points = _within(points, measured, LEVELS.sigmas * noise)
     told, held = measured + crowded[:, None] * (points - measured), (1 + DENOISE.held * crowded) / noise**2
     variance, rng = np.zeros(len(hinges.a)), np.random.default_rng(0)
     for scale in SCALES:
@@ -200,7 +201,7 @@ def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndar
         step = solved(system, -gone * held - change.T @ (weight * theta))
         # The angles are linear over small steps only.
         points = points + np.clip(step, -noise, noise)[:, None] * normal
-        points = _within(points, measured, DENOISE.farthest * noise)
+        points = _within(points, measured, LEVELS.sigmas * noise)
         if scale != SCALES[-1] and "angle-variance" not in without:
             variance = _variance(held, weight, change, system, rng)
     if "sheets" not in without:

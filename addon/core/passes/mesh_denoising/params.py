@@ -17,11 +17,6 @@ class DenoiseParams:
         and 9.0.
     roughly : float
         Of their linear solves: as good as 1e-3, in a third of the time.
-    farthest : float
-        Times the noise, how far a point may go for the angles.
-    floor : float
-        Times the noise: a triangle lower than this is taken for so high, as the noise folds it over and its angle says
-        little.
     too_small : float
         Times the noise: parts whose box has a shorter diagonal have no shape left to find, and stay as they are. (A
         finely scanned one of 7 times is found to a third of the noise.)
@@ -34,8 +29,6 @@ class DenoiseParams:
 
     draws: int = 6
     roughly: float = 3e-2
-    farthest: float = 3.0
-    floor: float = 1.0
     too_small: float = 4.0
     weld: float = 0.01
     held: float = 100.0
@@ -50,7 +43,7 @@ class PlanesParams:
 
     Attributes
     ----------
-    near, reach : float
+    reach : float
         Times the noise (and the plane's own uncertainty), how far denoised points may lie off, of low triangles and of
         high ones: a scan's smooth error shows over large triangles, and a moulding's steps have low ones. Half smooth,
         half from vertex to vertex has 1.4 times what `noise_of` sees; no point goes farther than `reach`.
@@ -71,7 +64,7 @@ class PlanesParams:
     bent : float
         Chi squared with three degrees of freedom up to which a bend may be noise: twice 12, which chance exceeds once
         in 130 times, for the smooth error.
-    gentle, unsure : float
+    gentle : float
         Radians, root mean square, by which a bend turns the normals of what is called flat: where the bend is sure, and
         where it may be noise (together with what the noise makes it by chance). Strips of a cylinder of 6 cm have 0.1
         to 0.2 and too few points to be sure; chamfers of 1.5 cm taken into a sofa's front 0.06.
@@ -95,7 +88,6 @@ class PlanesParams:
         Rounds of adding up neighbours by which seeds are ordered.
     """
 
-    near: float = 3.0
     reach: float = 4.5
     high: float = 10.0
     turn: float = 0.15
@@ -105,7 +97,6 @@ class PlanesParams:
     spread: float = 1.6
     bent: float = 24.0
     gentle: float = 0.015
-    unsure: float = 0.045
     most_bent: float = 0.2
     ends: float = 0.9
     crease: float = 0.6
@@ -163,17 +154,13 @@ class CracksParams:
 
     Attributes
     ----------
-    near : float
-        Times the noise, how wide a crack may be.
-    long, high : float
+    high : float
         Times the noise: shorter edges, and triangles lower than this on either side of a crack, are left alone. They
         are strips of mouldings, whose two borders lie as close together and whose triangles would be turned. Of the
         points taken in three perturbed living rooms (83, 55 and 57) .61, .78 and .86 truly lie on the edge; without
         HIGH .1 of 640 to 930.
     """
 
-    near: float = 2.0
-    long: float = 10.0
     high: float = 6.0
 
 

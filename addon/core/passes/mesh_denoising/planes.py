@@ -19,6 +19,7 @@ import numpy as np
 from scipy import sparse
 
 from ...groups import by_label
+from ...significance import LEVELS
 from .params import PLANES
 
 
@@ -110,7 +111,7 @@ class Grower:
         self.length = np.linalg.norm(np.roll(corners, -1, 1) - corners, axis=2)
         tilt = noise * self.length.max(1) / np.maximum(double, 1e-30)  # noise / height
         self.least = np.cos(np.minimum(PLANES.turn + tilt, PLANES.most_turn))
-        self.reach = noise * np.where(tilt < 1 / PLANES.high, PLANES.reach, PLANES.near)
+        self.reach = noise * np.where(tilt < 1 / PLANES.high, PLANES.reach, LEVELS.sigmas)
         self.free, self.tried = np.ones(len(faces), bool), np.zeros(len(faces), bool)
         self._seen, self._met, self._run = np.zeros(len(faces), np.int64), np.zeros(len(points), np.int64), 0
 
@@ -222,7 +223,7 @@ def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: tuple
 
     bent = explained > PLANES.bent * max(1, left / max(freedom, 1))
     if likely((left + explained) / PLANES.spread**2, n - 3) and (
-        slope(c) < PLANES.gentle if bent else np.hypot(slope(c), chance) < PLANES.unsure
+        slope(c) < PLANES.gentle if bent else np.hypot(slope(c), chance) < LEVELS.sigmas * PLANES.gentle
     ):
         return Sheet(mean, axes, np.zeros(6), region)
     if bent and likely(left, freedom) and slope(c) < PLANES.most_bent and outline[1] > PLANES.ends:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...light.field import LightField
 from ...scene.samples import Samples
+from ...significance import LEVELS
 from .params import MIRRORS
 
 
@@ -50,7 +51,7 @@ class Views:
         along = 2 * np.einsum("ij,ij->i", self.direction, np.broadcast_to(normals, self.direction.shape))[:, None]
         shown = self.field.along(self.origin, (along * normals - self.direction).astype(np.float32))[0]
         known = np.flatnonzero(shown.mean(1) > MIRRORS.dark)
-        return None if len(known) < MIRRORS.least else (known, shown[known])
+        return None if len(known) < LEVELS.many else (known, shown[known])
 
     def off(self, normal: np.ndarray) -> float:
         """Mean absolute deviation of log radiance from a mirror that faces one way ((3,)); inf where too little is

@@ -27,8 +27,6 @@ class MirrorsParams:
     tilt, tilts, fitted : float, int
         Radians by which the plane is turned first to fit what is mirrored, how often, and observations for it: a scan's
         planes are off.
-    least : int
-        Observations whose mirrored direction shows something that frames saw; with fewer nothing is said.
     dark : float
         What nobody saw is dark in the field so far.
     most_off : float
@@ -45,7 +43,6 @@ class MirrorsParams:
     tilt: float = 0.01
     tilts: int = 40
     fitted: int = 6000
-    least: int = 100
     dark: float = 1e-5
     most_off: float = 0.5
 

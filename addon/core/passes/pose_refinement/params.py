@@ -11,8 +11,6 @@ class PoseParams:
 
     Attributes
     ----------
-    checked : int
-        Frames, evenly spread, that tell whether poses are off.
     least_shift : float
         Pixels of the small picture, median over the frames: less is what good poses show for highlights, texels and
         noise. Six rooms with their true poses have 0.05 to 0.23; the living room with poses off by 5 mm and 0.2 degrees
@@ -37,14 +35,10 @@ class PoseParams:
         All frames are refined so often, each against the others as last refined.
     reweighted : int
         Rounds of robust weights within each.
-    tuning : float
-        Residuals beyond so many times their spread count as highlights, occlusion, moved things.
     least_spread : float
         Of the logarithm: a picture of flat colours fits to the last bit but at its edges, all that there is to go by.
     independent : float
         Share of the pixels that err on their own: neighbours share what the texture has wrong.
-    farthest : float
-        Pixels; a longer shift is not found by following gradients, and the frame is left where it is.
     stray : float
         Times the median shift: so is a frame that would go farther than this. It shows mirrors, or something that
         moved.
@@ -55,7 +49,6 @@ class PoseParams:
         Times the room's diagonal, where rays that escape are taken to end.
     """
 
-    checked: int = 16
     least_shift: float = 0.4
     width: int = 480
     pixels: int = 6000
@@ -67,10 +60,8 @@ class PoseParams:
     floor: float = 0.1
     rounds: int = 2
     reweighted: int = 8
-    tuning: float = 2.0
     least_spread: float = 0.05
     independent: float = 0.05
-    farthest: float = 4.0
     stray: float = 4.0
     worse: float = 1.05
     sky: float = 100.0

@@ -18,9 +18,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.ndimage import gaussian_filter, minimum_filter
 
+from ...agreement.params import AGREEMENT, MISALIGNMENT
 from ...parallel import ordered_map
 from ...progress import Progress, Rounds
 from ...scene.model import Camera, Frame, Pixels
+from ...significance import LEVELS
 from ...weighted import weighted_median
 from .params import POSES
 
@@ -186,7 +188,7 @@ def step_of(camera: Camera, pixels: Pixels, texture: Texture) -> Step | None:
     way = _fit(np.column_stack([change, np.ones(len(x))]), residual, telling)
     far = float(np.sqrt(((flow @ way) ** 2).sum(1).mean()))
     left = np.abs(residual - weighted_median(residual, telling))
-    return Step(way, far, float(np.average(np.minimum(left, POSES.tuning * POSES.least_spread), weights=telling)))
+    return Step(way, far, float(np.average(np.minimum(left, LEVELS.outlier * POSES.least_spread), weights=telling)))
 
 
 def _fit(change: np.ndarray, residual: np.ndarray, telling: np.ndarray) -> np.ndarray:
@@ -200,7 +202,7 @@ def _fit(change: np.ndarray, residual: np.ndarray, telling: np.ndarray) -> np.nd
     for _ in range(POSES.reweighted):
         left = residual - change @ way
         spread = max(1.4826 * weighted_median(np.abs(left), telling), POSES.least_spread)
-        weight = POSES.independent / spread**2 / (1 + (left / (POSES.tuning * spread)) ** 2)
+        weight = POSES.independent / spread**2 / (1 + (left / (LEVELS.outlier * spread)) ** 2)
         weighted = change * weight[:, None]
         way = np.linalg.solve(weighted.T @ change + prior, weighted.T @ residual)
     return way[:6]
@@ -240,13 +242,13 @@ def refine_poses(
         step = -(-camera.width // POSES.width)
         return step_of(camera.coarser(step), read(frame).coarser(step), texture)
 
-    asked = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, POSES.checked).round().astype(int))]
+    asked = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, AGREEMENT.count).round().astype(int))]
     found = [step for step in ordered_map(look, [(frame, frame.camera) for frame in asked], threads) if step]
     shift = float(np.median([step.shift for step in found])) if found else float("nan")
     if not shift >= POSES.least_shift:
         return Poses.as_read(frames, shift)
     cameras = [frame.camera for frame in frames]
-    cost, farthest = np.full(len(frames), np.inf), min(POSES.farthest, POSES.stray * shift)
+    cost, farthest = np.full(len(frames), np.inf), min(MISALIGNMENT.largest, POSES.stray * shift)
     moves = np.ones(len(frames), bool)
     for turn in range(POSES.rounds):
         todo = np.flatnonzero(moves)

@@ -21,6 +21,7 @@ from ...fit.params import LOBE_FIT
 from ...fit.problem import DenseProblem, Problem
 from ...fit.transmission import SeeThrough
 from ...light.field import LightField
+from ...significance import LEVELS
 from .params import SEE_THROUGH
 
 
@@ -79,7 +80,7 @@ def look_behind(
         origin[left] += step[:, None] * onward[left]
         surfaces[left] += 1
     if noise > 0:
-        known &= _well_inside(field, element, direction, object_id, SEE_THROUGH.inside * noise)
+        known &= _well_inside(field, element, direction, object_id, LEVELS.sigmas * noise)
     return Behind(radiance, known, surfaces)
 
 
@@ -111,8 +112,8 @@ def judge(problem: Problem, behind: Behind, lobe: LobeFit | None, scale: float) 
     """
     dense = DenseProblem(problem)
     there = dense.there * dense.each(behind.known[:, None].astype(np.float32))[0]
-    told = there.sum(0) >= SEE_THROUGH.least_views
-    if told.sum() < max(SEE_THROUGH.least_elements, SEE_THROUGH.least_told * len(told)):
+    told = there.sum(0) >= LEVELS.views
+    if told.sum() < max(LEVELS.few, SEE_THROUGH.least_told * len(told)):
         return None
     b = dense.relative(behind.radiance)[..., told]
     dense, there = dense.part(told), there[:, told]
@@ -153,11 +154,7 @@ def judge(problem: Problem, behind: Behind, lobe: LobeFit | None, scale: float) 
 
 def is_sure(found: SeeThrough) -> bool:
     """Whether the object is to be set apart."""
-    return (
-        found.transmission >= SEE_THROUGH.least_passed
-        and found.gain > SEE_THROUGH.min_gain
-        and found.sigmas > SEE_THROUGH.min_sigmas
-    )
+    return found.transmission >= SEE_THROUGH.least_told and found.gain > LEVELS.gain and found.sigmas > LEVELS.sigmas
 
 
 def _less_own(values: np.ndarray, train: np.ndarray) -> np.ndarray:
@@ -176,5 +173,5 @@ def _transmission(values: np.ndarray, behind: np.ndarray, train: np.ndarray, sca
     for _ in range(LOBE_FIT.rounds):
         tau = float(np.clip((weight * values * behind).sum() / max((weight * behind**2).sum(), 1e-20), 0, 1))
         size = np.sqrt(np.square(values - tau * behind).mean(0))
-        weight = train * np.minimum(1, LOBE_FIT.huber * scale / np.maximum(size, 1e-12))
+        weight = train * np.minimum(1, LEVELS.outlier * scale / np.maximum(size, 1e-12))
     return tau

@@ -13,8 +13,6 @@ class SharpeningParams:
     ----------
     middle, corner : float
         Weights of a pixel's middle and corners: together they give what is quadratic over the pixel its true mean.
-    floor : float
-        Share of the room's median radiance that is added to both sides of the ratio: in the dark it is all noise.
     detail : float
         Share of its radiance by which an element must differ from the mean of the texels around it: where L_d is even,
         there is nothing to make sharper.
@@ -24,7 +22,6 @@ class SharpeningParams:
 
     middle: float = 2 / 3
     corner: float = 1 / 12
-    floor: float = 0.02
     detail: float = 0.02
     most: float = 2.0
 

@@ -25,6 +25,7 @@ from ...scene.model import Camera, Frame, Pixels
 from ...scene.params import VISIBILITY
 from ...scene.surface import Surface
 from ...scene.visibility import CLEAN
+from ...significance import LEVELS
 from .params import SHARPENING
 
 
@@ -58,7 +59,7 @@ def sharpened(
     """
     atlas = surface.atlas
     lookup = lookup or ElementLookup(surface.mesh, atlas)
-    floor = np.float32(max(SHARPENING.floor * float(np.median(lit.radiance[lit.seen])), 1e-30))
+    floor = np.float32(max(LEVELS.dark * float(np.median(lit.radiance[lit.seen])), 1e-30))
     good = (lit.tier == CLEAN) & (lit.count >= VISIBILITY.enough) & _detailed(lit, atlas)
 
     def ratios(frame: Frame) -> Pixels:

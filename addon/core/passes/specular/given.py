@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...brdf.dielectric import DIELECTRIC, MOST_F0
+from ...brdf.dielectric import DIELECTRIC, MOST_F0, SATIN
 from ...brdf.ggx import GGX
 from ...brdf.material import ObjectMaterial
 from ...brdf.metal import METAL
@@ -90,7 +90,7 @@ def _fit(
     looks = None
     if problem is not None and phi is None:
         looks = (compare_coat if model.has_diffuse else compare)(problem, irradiance)
-    phi = phi if phi is not None else looks.phi if looks is not None else GIVEN.plausible_phi
+    phi = phi if phi is not None else looks.phi if looks is not None else SATIN**2
     psi = np.broadcast_to(np.asarray(model.plausible_f0(), float), 3)
     if not model.has_diffuse and problem is not None:
         psi = metal_f0(problem, phi)

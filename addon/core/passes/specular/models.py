@@ -140,7 +140,7 @@ def choose_model(problem: Problem) -> Choice:
     with_lobe, without = held_out(fit, DIELECTRIC)
     scores = {LAMBERTIAN.name: 1.0, DIELECTRIC.name: float(with_lobe.sum() / max(without.sum(), 1e-30))}
     gain, sigmas = _gain(with_lobe, without)
-    large = gain > CHOICE.large_gain and dense.there.shape[1] >= CHOICE.large_elements
+    large = gain > LEVELS.gain and dense.there.shape[1] >= CHOICE.large_elements
     sure = (
         gain > CHOICE.min_gain and sigmas > (LEVELS.likely if large else LEVELS.sigmas) and fit.phi <= FIT.broadest_phi
     )
@@ -258,7 +258,7 @@ def _refused(lobe: LobeFit, own: LobeFit | None, problem: Problem | None) -> boo
     if own is not None:
         # How its diffuse part darkens is the object's own matter, with the class's lobe as without.
         lobe = replace(lobe, kappa=own.kappa, kappa_lambertian=own.kappa_lambertian, residual=own.residual)
-    return gain_of(lobe, problem)[0] < -CHOICE.excluded
+    return gain_of(lobe, problem)[0] < -LEVELS.gain
 
 
 def metal_f0(problem: Problem, phi: float) -> np.ndarray:

@@ -126,7 +126,7 @@ def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
         return None
     usable, seen, E, element = told
     widths = np.flatnonzero(problem.light.grid <= FIT.broadest_phi)
-    least = LOOKS.darkest * np.median(seen)
+    least = LEVELS.dark * np.median(seen)
 
     def residual(predicted: np.ndarray) -> np.ndarray:
         """log(I / predicted), (k, 3); a factor common to all channels is free."""

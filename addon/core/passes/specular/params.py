@@ -73,22 +73,18 @@ class ChoiceParams:
         (`LEVELS.sigmas`). A metal must also beat a dielectric over a diffuse part, by `LEVELS.likely`: that alone it
         does not stand or fall with, as it has to do without a diffuse part besides. Below three others of its class
         decide: of 31 true metals in nine rooms two had less, a black keyboard 1.9 or 2.1.
-    large_gain, large_elements : float, int
+    large_elements : float, int
         A lobe that takes so much off need only be likely (`LEVELS.likely`): few elements show a small highlight, but
         what they show nothing else explains (a bathroom's tiles, 38,000 pixels: gain .16, 2.2; of what is truly diffuse
         in the living room and its perturbed scan nothing gains a tenth with less than 3). Not of a handful of elements
         (a cord, a pixel wide at most), whose standard error is no better known than that.
-    excluded : float
-        Rise of an object's cost from which on the lobe of its class is refused.
     """
 
     bare: float = 2.0
     bare_at_most: float = 3.0
     much: float = 0.2
     min_gain: float = 0.02
-    large_gain: float = 0.1
     large_elements: int = 50
-    excluded: float = 0.1
 
 
 CHOICE = ChoiceParams()
@@ -120,8 +116,6 @@ class LooksParams:
         table 0.35).
     least_observations : int
         With fewer nothing is said.
-    darkest : float
-        Below this share of the median radiance a channel's logarithm is all noise.
     """
 
     ratio: float = 0.9
@@ -130,7 +124,6 @@ class LooksParams:
     coated_sigmas: float = 4.0
     coated_spread: tuple[float, float] = (0.1, 0.37)
     least_observations: int = 40
-    darkest: float = 0.02
 
 
 LOOKS = LooksParams()
@@ -144,12 +137,9 @@ class GivenParams:
     ----------
     sure : float
         Standard errors that a given model or lobe counts for when others of its class take over what is sure.
-    plausible_phi : float
-        Of an object that no frame shows well enough: satin.
     """
 
     sure: float = 1000.0
-    plausible_phi: float = 0.25
 
 
 GIVEN = GivenParams()

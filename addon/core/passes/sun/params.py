@@ -11,8 +11,6 @@ class SunParams:
 
     Attributes
     ----------
-    fewest : int
-        With fewer in the sample that stand out, no sun is looked for.
     reached : float
         Least share of what stands out that a direction must reach.
     kept, tried : int
@@ -21,14 +19,6 @@ class SunParams:
         Elements, at most, that these are drawn from.
     near, dense : float, int
         Metres around what stands out; elements from there, and from elsewhere on the same objects, for the refinement.
-    edges : int
-        Elements that the last refinement looks at: those over which the shadows' edges pass within `ASTRAY` of the
-        direction.
-    min_gain : float
-        The spread of log albedo around the patch, and the differences of neighbours along its edges, must each fall by
-        at least this share. A bedroom with a sun: 0.28 to 0.39 and 0.25, with a striped blanket in it; a box with one:
-        0.63 and 0.65. A living room without one: 0.01. Bright rectangles on a box's floor: up to 0.45, but no gain
-        along the edges.
     explained : float
         Share of the elements short of light within the patch that must not be so with the sun.
     colour : float
@@ -39,25 +29,19 @@ class SunParams:
         So may be those whose log albedo is so far above their object's median (2.7 times).
     lit : float
         Cosine from which on something counts as lit by the sun.
-    pair : float
-        How far apart two elements may lie, in metres, to be compared.
     """
 
-    fewest: int = 12
     reached: float = 0.05
     kept: int = 160
     tried: int = 4
     pool: int = 60_000
     near: float = 0.3
     dense: int = 2000
-    edges: int = 2000
-    min_gain: float = 0.1
     explained: float = 0.5
     colour: float = 1.6
     over: float = 1.2
     stands_out: float = 1.0
     lit: float = 0.02
-    pair: float = 0.12
 
 
 SUN = SunParams()

@@ -18,6 +18,7 @@ from ...light.environment import Environment
 from ...light.field import LightField
 from ...light.sun import Sun, around
 from ...luminance import LUMINANCE
+from ...significance import LEVELS
 from .params import SUN
 from .sun_spots import Edges, Guess, Spots, visible
 
@@ -82,7 +83,7 @@ def _along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng
     position, normal = field.atlas.position[pool], field.atlas.normal[pool]
     lit = np.stack([visible(field.scene, way, position, normal) > 0.1 for way in ways])
     mixed = pool[lit.any(0) & ~lit.all(0)]
-    return np.sort(rng.choice(mixed, min(len(mixed), SUN.edges), replace=False))
+    return np.sort(rng.choice(mixed, min(len(mixed), SUN.dense), replace=False))
 
 
 def _pool(field: LightField, good: np.ndarray, even: Spots, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -149,10 +150,10 @@ def find_sun(
         E by all known light at elements, (k,) int -> (k, 3) float64.
     """
     free = ~np.isin(field.atlas.object_id[element], lamps)
-    if free.sum() < SUN.fewest:
+    if free.sum() < LEVELS.few:
         return None
     even = Spots(field, element[free], received[free])
-    if even.stands_out().sum() < SUN.fewest:
+    if even.stands_out().sum() < LEVELS.few:
         return None
     guesses = _on_grid(even, field.environment)
     if not guesses or guesses[0].cost >= even.spread():
@@ -165,10 +166,10 @@ def find_sun(
     spots = Spots(field, dense, irradiance(dense))
     tried = [_searched(spots.explained, spots.explained(one.direction), SHARP) for one in guesses]
     best, before = min(tried, key=lambda one: one.cost), spots.spread()
-    if best.cost > (1 - SUN.min_gain) * before:
+    if best.cost > (1 - LEVELS.gain) * before:
         return None
     along = _along_edges(field, pool, best.direction, rng)
-    if len(along) < SUN.fewest:
+    if len(along) < LEVELS.few:
         return None
     edges = Edges(Spots(field, along, irradiance(along)))
     found = min((edges.explained(best.direction, best.strength, r) for r in RADII), key=lambda one: one.cost)
@@ -186,8 +187,8 @@ def find_sun(
     short = spots.over() & (thrown > SUN.lit)
     left = short & spots.over(thrown, found.strength)
     if (
-        found.cost > (1 - SUN.min_gain) * edges.differ()
-        or after > (1 - SUN.min_gain) * before
+        found.cost > (1 - LEVELS.gain) * edges.differ()
+        or after > (1 - LEVELS.gain) * before
         or left.sum() > (1 - SUN.explained) * short.sum()
     ):
         return None

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from ...light.field import LightField
 from ...light.light_fit import Sample
-from ...light.params import LIGHT_FIT
+from ...light.params import LESS_NOISE, LIGHT_FIT
 from ...light.sun import Sun, shadow
 from ...luminance import LUMINANCE
 from ...scene.rays import RayScene
@@ -123,7 +123,7 @@ class Edges:
     def __init__(self, spots: Spots):
         self.spots = spots
         key = np.concatenate([spots.position, 0.2 * spots.normal, 100.0 * spots.sample.group[:, None]], 1)
-        far, other = cKDTree(key).query(key, k=min(9, len(key)), distance_upper_bound=SUN.pair)
+        far, other = cKDTree(key).query(key, k=min(9, len(key)), distance_upper_bound=LESS_NOISE.cell)
         self.a, k = np.nonzero(np.isfinite(far[:, 1:]))
         self.b = other[:, 1:][self.a, k]
 

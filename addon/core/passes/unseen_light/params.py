@@ -31,9 +31,6 @@ class UnseenParams:
         Part of the received light below which a part of the sky can't be solved for; its neighbours' radiance stays.
     sweeps : int
         Times that all parts of the sky are solved for in turn.
-    believed : float
-        Further than this factor from all that was seen of the sky a solution is not believed: it may stand for
-        something else.
     darker : float
         Nor one that is darker by more than this, where frames saw some of that side of the horizon: noise in E and G
         draws solutions down. The living room's ground, .22 where it was seen, came out at .08 and took two clipped
@@ -41,12 +38,8 @@ class UnseenParams:
         1.1).
     brightest : float
         The same for a part of the sky that is clipped.
-    whole_sky_gain : float
-        It is believed in when it lowers the spread of log albedo by at least this share: all albedos hang on it.
     least_open : float
         Share of the received directions that must lead outside for such a sky to be looked for.
-    whole_sky_sweeps : int
-        The same there.
     """
 
     samples: int = 4000
@@ -56,12 +49,9 @@ class UnseenParams:
     lamp_gain: float = 0.03
     least_sky: float = 0.01
     sweeps: int = 2
-    believed: float = 3.0
     darker: float = 1.25
     brightest: float = 30.0
-    whole_sky_gain: float = 0.1
     least_open: float = 0.02
-    whole_sky_sweeps: int = 2
 
 
 UNSEEN = UnseenParams()
@@ -81,9 +71,7 @@ class ShadesParams:
         Elements of a shade that are looked at.
     bounces : int
         Of light inside a shade; of paper of albedo .7 each passes a third on.
-    least : int
-        Elements that tell a shade's albedo.
-    unknown, darkest, lightest : float
+    darkest, lightest : float
         Albedo of what no element tells of, and bounds for the others'.
     """
 
@@ -91,8 +79,6 @@ class ShadesParams:
     reach: float = 12.0
     places: int = 1000
     bounces: int = 3
-    least: int = 30
-    unknown: float = 0.5
     darkest: float = 0.05
     lightest: float = 0.85
 

@@ -52,7 +52,7 @@ class Sky:
         guess = np.maximum(self.guess[i], 1e-12)
         if self._is_clipped(i):
             return guess, UNSEEN.brightest * guess
-        return guess / (UNSEEN.darker if self.told[i] else UNSEEN.believed), np.full(3, UNSEEN.believed * guess.max())
+        return guess / (UNSEEN.darker if self.told[i] else LIGHT_FIT.reach), np.full(3, LIGHT_FIT.reach * guess.max())
 
     def notes(self) -> list[str]:
         """One sentence for each part that was solved."""
@@ -176,7 +176,7 @@ def refined(
     if len(colour):
         by_channel = np.stack([solve(np.eye(3)[c], colour[:, c], bright) for c in range(3)], 1)
         share = by_channel @ LUMINANCE / luminance
-        colour = np.where(np.abs(share - 1)[:, None] < LIGHT_FIT.agrees, by_channel / share[:, None], colour)
+        colour = np.where(np.abs(share - 1)[:, None] < LIGHT_FIT.alike, by_channel / share[:, None], colour)
     for k, i in enumerate(parts, len(free)):
         sky.radiance[i] = np.clip(colour[k], *sky.bounds(i))
     done = {lamp.object_id: lamp for lamp in fixed}

@@ -11,12 +11,14 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ...brdf.emitter import LAMP_ALBEDO
 from ...light.environment import Environment
 from ...light.few_elements import irradiance_at, thrown_by_object
 from ...light.field import LightField
 from ...light.lamps import Lamp
 from ...luminance import LUMINANCE
 from ...scene.atlas import Atlas
+from ...significance import LEVELS
 from .params import SHADES
 
 
@@ -42,17 +44,17 @@ def by_way_of_shade(
     reach = SHADES.reach * np.sqrt(atlas.area[own].sum() / (4 * np.pi))
     near = np.flatnonzero(~own & ~field.radiance.any(1) & (np.linalg.norm(atlas.position - centre, axis=1) < reach))
     nothing = np.zeros(len(element))
-    if len(near) < SHADES.least:
+    if len(near) < LEVELS.enough:
         return nothing
     rng = np.random.default_rng([seed, lamp.object_id])
     places = rng.choice(near, min(SHADES.places, len(near)), replace=False)
     closest = cKDTree(atlas.place(places)).query(atlas.place(near), workers=-1)[1]
-    rho = np.clip([albedo.get(int(i), SHADES.unknown) for i in atlas.object_id[near]], SHADES.darkest, SHADES.lightest)
+    rho = np.clip([albedo.get(int(i), LAMP_ALBEDO) for i in atlas.object_id[near]], SHADES.darkest, SHADES.lightest)
     from_lamp = thrown_by_object(field, places, lamp.object_id, seed)
     bright = float(lamp.radiance @ LUMINANCE)
     enough = SHADES.strongly * (even[near] @ LUMINANCE) / max(bright, 1e-12)
     sent, unlit = rho * from_lamp[closest] / np.pi, field.with_sun(None)
-    if (sent > enough).sum() < SHADES.least:
+    if (sent > enough).sum() < LEVELS.enough:
         return nothing
 
     def with_only(index: np.ndarray, radiance: np.ndarray) -> LightField:
@@ -83,4 +85,4 @@ def strongly_lit(atlas: Atlas, dark: np.ndarray, sent: np.ndarray, seen_as: np.n
     side = atlas.side
     strong = sent @ LUMINANCE > SHADES.strongly * level
     of_all, of_strong = (np.bincount(side[dark], weight, side.max() + 1) for weight in (None, strong))
-    return [np.flatnonzero(side == one) for one in np.flatnonzero(of_strong > np.maximum(of_all / 2, SHADES.least))]
+    return [np.flatnonzero(side == one) for one in np.flatnonzero(of_strong > np.maximum(of_all / 2, LEVELS.enough))]

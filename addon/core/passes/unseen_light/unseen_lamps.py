@@ -70,7 +70,7 @@ def _coloured(object_id, s, before, after, class_of, seen, received, by_channel,
     solved = [found[0] for found in by_channel if found is not None]
     if not alike and len(solved) == 3:
         colour = np.array(solved, np.float32)
-        if abs(float(colour @ LUMINANCE) / s - 1) < LIGHT_FIT.agrees:
+        if abs(float(colour @ LUMINANCE) / s - 1) < LIGHT_FIT.alike:
             return Lamp(int(object_id), colour, False, spread=spread)
     white = np.mean([lamp.radiance for lamp in alike or seen], 0) if seen else received.mean(0)
     radiance = (s * white / max(float(white @ LUMINANCE), 1e-12)).astype(np.float32)

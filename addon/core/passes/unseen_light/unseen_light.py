@@ -28,6 +28,7 @@ from ...light.lamps import Lamp, find_seen
 from ...light.light_fit import Sample, kinds_of, on_flat
 from ...light.params import LIGHT_FIT
 from ...scene.model import Instance
+from ...significance import LEVELS
 from .params import UNSEEN
 from .refine_light import Sky, all_light, refined, shared_by_class
 from .shades import by_way_of_shade
@@ -155,7 +156,7 @@ def find_light(
     lit = ~np.isin(atlas.object_id[element], [lamp.object_id for lamp in seen])
     if (lit & flat[element]).sum() >= UNSEEN.enough:
         lit &= flat[element]
-    if lit.sum() < LIGHT_FIT.least:
+    if lit.sum() < LEVELS.enough:
         return Light(tuple(seen), environment, found, element, filled)
     sent = field.radiance[element[lit]].astype(np.float64)
     # About half of the elements are on flat spots, of large objects as of small ones.

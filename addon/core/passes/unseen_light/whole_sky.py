@@ -9,8 +9,8 @@ from ...light.few_elements import evened, irradiance_at
 from ...light.field import LightField
 from ...light.lamps import find_seen
 from ...light.light_fit import Sample
-from ...light.params import LIGHT_FIT
 from ...luminance import LUMINANCE
+from ...significance import LEVELS
 from .params import UNSEEN
 
 
@@ -27,15 +27,15 @@ def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[L
     object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
     left = np.ones(len(element), bool)
     found = None
-    for _ in range(UNSEEN.whole_sky_sweeps):
+    for _ in range(UNSEEN.sweeps):
         sample = Sample(element[left], object_id[left], sent[left], received[left])
         found = sample.best(sent[left] @ LUMINANCE, received[left] @ LUMINANCE, thrown[left])
-        if found is None or found[2] > (1 - UNSEEN.whole_sky_gain) * found[1]:
+        if found is None or found[2] > (1 - LEVELS.gain) * found[1]:
             return field, ()
         # Lamps show themselves once the rest is lit; their albedo says nothing of the sky.
         lamps = find_seen(object_id, sent, received + found[0] * thrown[:, None])
         left = ~np.isin(object_id, [lamp.object_id for lamp in lamps])
-        if left.sum() < LIGHT_FIT.least:
+        if left.sum() < LEVELS.enough:
             return field, ()
     assert found is not None  # there was a sweep
     radiance = np.full(3, found[0])
