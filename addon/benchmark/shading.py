@@ -18,7 +18,6 @@ from ..core.scene.tangent_frame import to_world
 from .lit_rooms import ROOMS, LitRoom, make_room
 from .run import Options
 from .shading_reference import looked_at, relative_error
-from .shading_surface import surface_tables
 from .table import BASELINE, Curves, Table
 from .timing import once
 
@@ -93,12 +92,11 @@ def _rays_for(rays: list[int], errors: list[float], wanted: float) -> float | No
 
 
 def run(options: Options) -> Iterator[Table]:
-    """Tables of single points, of what reaches the paper's error, and of the whole surface."""
+    """Tables of single points, and of what reaches the paper's error."""
     points = POINTS * (4 if options.large else 1)
     rows, needed = [], []
-    rooms = {}
     for done, name in enumerate(ROOMS):
-        room = rooms[name] = make_room(name, ELEMENTS, options.seed, options.threads)
+        room = make_room(name, ELEMENTS, options.seed, options.threads)
         element, true = looked_at(room, points, options)
         position, normal = room.atlas.position[element], room.atlas.normal[element]
         found: dict[str, tuple[list[int], list[float]]] = {}
@@ -123,7 +121,7 @@ def run(options: Options) -> Iterator[Table]:
         for alternative, (counts, errors) in found.items():
             rays = ASKED if alternative == "uniform" else _rays_for(counts, errors, wanted)
             needed.append((name, alternative, alternative == "uniform", wanted, rays, ASKED / rays if rays else None))
-        options.progress.update(0.4 * (done + 1) / len(ROOMS))
+        options.progress.update((done + 1) / len(ROOMS))
     yield Table(
         "shading", "Shading: error of E at single points",
         ("room", "estimator", BASELINE, "rays", "relative RMSE", "microseconds a point"), rows,
@@ -136,4 +134,3 @@ def run(options: Options) -> Iterator[Table]:
         ("room", "estimator", BASELINE, "error", "rays", "times fewer"), needed,
         ("No figure: not reached with the most rays tried.",),
     )  # fmt: skip
-    yield from surface_tables(rooms, options)
