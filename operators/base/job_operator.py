@@ -19,6 +19,8 @@ from ...addon.core.kinds import Shown
 from ...addon.core.stages import LABELS
 from ..translations import told
 
+FOLLOWED = {"progress": "json", "stop_with_stdin": True}
+"""Options of a command that an operator follows."""
 PERIOD: Shown[float] = 0.1
 """Seconds between two looks at the job."""
 REDRAW: Shown[float] = 0.5

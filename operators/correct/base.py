@@ -12,7 +12,7 @@ from ...addon.bridge.slices import whole
 from ...addon.core.errors import ScanRelightError
 from ..base import poll
 from ..base.at_once import AtOnce, OneSentence
-from ..base.job_operator import JobOperator
+from ..base.job_operator import FOLLOWED, JobOperator
 from ..results import told
 
 
@@ -84,8 +84,8 @@ class RefitOperator(OneSentence, JobOperator):
         folder, words, before = refitted.words(context.scene, things)
         facts = {"title": self.bl_label, "result_folder": str(folder), "before": before}
         if not bpy.app.background:
-            return self.start(context, command(words), **facts)
-        job = jobs.begin(command(words), phase="run", **facts)
+            return self.start(context, command(words, **FOLLOWED), **facts)
+        job = jobs.begin(command(words, **FOLLOWED), phase="run", **facts)
         job.wait()
         job.facts["phase"] = "end"
         if job.state != jobs.DONE:

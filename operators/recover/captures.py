@@ -33,8 +33,9 @@ class SCAN_RELIGHT_OT_import_capture(CaptureOperator, bpy.types.Operator):
         from ...addon.bridge.job.command import command
 
         capture, scratch = self.folder("capture_folder"), tempfile.mkdtemp(prefix="scan-relight-")
-        words = ["info", capture, "--json", "--room", scratch, "--stop-with-stdin", *reading_props.options(self)]
-        return self.start(context, command(words), title=self.bl_label, capture_folder=capture, scratch=scratch)
+        options = {"json": True, "room": scratch, "stop_with_stdin": True}
+        words = command(["info", capture, *reading_props.options(self)], **options)
+        return self.start(context, words, title=self.bl_label, capture_folder=capture, scratch=scratch)
 
     def load(self, job):
         from ...addon.core.results.room_file import read_capture_file

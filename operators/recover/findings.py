@@ -59,8 +59,8 @@ def begin(choices) -> None:
     for one in _found.values():
         if isinstance(one, jobs.Job):
             one.stop()  # the folder before: nobody waits for it any more
-    words = ["info", key(choices)[0], "--json", "--stop-with-stdin", *reading_props.options(choices.reading)]
-    found = _found[key(choices)] = jobs.Job(command(words))
+    folder, *options = key(choices)
+    found = _found[key(choices)] = jobs.Job(command(["info", folder, *options], json=True, stop_with_stdin=True))
 
     def watch():
         if found.running:

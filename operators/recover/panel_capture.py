@@ -12,20 +12,7 @@ from . import findings, reading_props
 
 SHOWN: Shown[int] = 12
 """Objects that are listed before the rest is counted."""
-TOLD = (
-    "capture",
-    "format",
-    "triangles",
-    "vertices",
-    "area_m2",
-    "bounds_m",
-    "extent_m",
-    "frames",
-    "resolutions",
-    "masks",
-    "instances",
-    "warnings",
-)
+TOLD = "capture format triangles vertices area_m2 bounds_m extent_m frames resolutions masks instances warnings".split()
 
 
 class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):

@@ -17,7 +17,7 @@ from ...addon.settings_info import SettingInfo, setting_infos
 from .. import preferences
 from ..base import poll
 from ..base.at_once import OneSentence
-from ..base.job_operator import JobOperator
+from ..base.job_operator import FOLLOWED, JobOperator
 from ..translations import OWN
 from . import reading_props, room_window
 from .reading_props import ReadingProps
@@ -232,10 +232,14 @@ class StageOperator(SettingsProps, CaptureOperator):
                 progress_of_run(should_stop=guard),
                 until,
                 reading=reading_props.reading(self),
-                from_stage=None if self.from_stage == "NONE" else self.from_stage,
+                from_stage=self.first_stage(),
                 **where,
             )
         return report["warnings"]
+
+    def first_stage(self) -> str | None:
+        """The stage that is done anew with all later ones; None goes on from what is stored."""
+        return None if self.from_stage == "NONE" else self.from_stage
 
     @staticmethod
     def memory_limit() -> float:
@@ -248,28 +252,17 @@ class StageOperator(SettingsProps, CaptureOperator):
         from ...addon.bridge.job.command import command
 
         capture, result, settings = self.folder("capture_folder"), self.folder("result_folder"), self.settings()
-        words = [
-            "recover",
-            capture,
-            "--out",
-            result,
-            *reading_props.options(self),
-            "--until",
-            self.until,
-            "--progress",
-            "json",
-            "--stop-with-stdin",
-            "--memory-limit",
-            str(self.memory_limit()),
-        ]
-        if self.from_stage != "NONE":
-            words += ["--from-stage", self.from_stage]
-        for info in setting_infos():
-            value, option = getattr(settings, info.name), info.name.replace("_", "-")
-            words += [f"--{'' if value else 'no-'}{option}"] if info.kind is bool else [f"--{option}", str(value)]
-        return self.start(
-            context, command(words), title=self.bl_label, capture_folder=capture, result_folder=result, until=self.until
+        words = command(
+            ["recover", capture, *reading_props.options(self)],
+            out=result,
+            until=self.until,
+            from_stage=self.first_stage(),
+            memory_limit=self.memory_limit(),
+            **{info.name: getattr(settings, info.name) for info in setting_infos()},
+            **FOLLOWED,
         )
+        facts = {"capture_folder": capture, "result_folder": result, "until": self.until}
+        return self.start(context, words, title=self.bl_label, **facts)
 
 
 class SceneStageOperator(StageOperator):

@@ -11,9 +11,9 @@ import bpy
 from ...addon.bridge.relight import before_after, pictures
 from ...addon.bridge.render_device import told_device
 from ..base import poll
-from ..base.job_operator import JobOperator
+from ..base.job_operator import FOLLOWED, JobOperator
 from .base import RelightOperator
-from .props import ENGINE
+from .props import ENGINE, PERCENTAGE, SAMPLES
 
 FILE = "before_after.png"
 
@@ -36,10 +36,8 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         options={"SKIP_SAVE"},
     )
     engine: ENGINE
-    samples: bpy.props.IntProperty(name="Samples", description="For each pixel; 0 takes the scene's", min=0, default=64)
-    percentage: bpy.props.IntProperty(
-        name="Size", description="Of the scene's render size", subtype="PERCENTAGE", min=1, max=1000, default=100
-    )
+    samples: SAMPLES
+    percentage: PERCENTAGE
 
     def target(self, scene) -> Path:
         """The file to write."""
@@ -71,27 +69,18 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         pictures.check_format(out)
         self._folder = Path(tempfile.mkdtemp(prefix="scan_relight_"))
         before_after.save_copy(self._folder)
-        words = [
-            "relight",
-            str(self._folder),
-            "--out",
-            str(self._folder / out.name),
-            "--before-after",
-            "--engine",
-            self.engine.lower(),
-            "--samples",
-            str(self.samples),
-            "--size",
-            str(self.percentage),
-            "--device",
-            told_device(context.scene),
-            "--scene",
-            context.scene.name,
-            "--progress",
-            "json",
-            "--stop-with-stdin",
-        ]
-        return self.start(context, command(words), title="Before and After", out=str(out), result_folder="")
+        words = command(
+            ["relight", self._folder],
+            out=self._folder / out.name,
+            before_after=True,
+            engine=self.engine.lower(),
+            samples=self.samples,
+            size=self.percentage,
+            device=told_device(context.scene),
+            scene=context.scene.name,
+            **FOLLOWED,
+        )
+        return self.start(context, words, title="Before and After", out=str(out), result_folder="")
 
     def load(self, job):
         out = Path(job.facts["out"])

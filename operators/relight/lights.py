@@ -11,7 +11,7 @@ from ..results.select import make_active
 from .base import RelightOperator
 from .exposure import follow
 from .light_pictures import PRESETS
-from .props import AIMS, UNITS
+from .props import AIM, KELVIN, UNIT
 
 
 class SCAN_RELIGHT_OT_switch_lamps(RelightOperator, bpy.types.Operator):
@@ -68,16 +68,9 @@ class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
         soft_max=4.0,
         default=1.0,
     )
-    unit: bpy.props.EnumProperty(name="Strength In", description="What the strength is given in", items=UNITS)
-    kelvin: bpy.props.FloatProperty(
-        name="Temperature",
-        description="Of its colour; 0 takes the preset's own",
-        subtype="TEMPERATURE",
-        min=0.0,
-        max=20000.0,
-        default=0.0,
-    )
-    aim: bpy.props.EnumProperty(name="Aim At", description="What the light is aimed at", items=AIMS)
+    unit: UNIT
+    kelvin: KELVIN
+    aim: AIM
 
     @classmethod
     def description(cls, context, properties):

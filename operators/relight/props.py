@@ -53,6 +53,30 @@ ENGINE = bpy.props.EnumProperty(
         ("EEVEE", "EEVEE", "Quick; indirect light and large lamps are only approximate"),
     ),
 )
+AIM = bpy.props.EnumProperty(name="Aim At", description="What a new light is aimed at", items=AIMS)
+UNIT = bpy.props.EnumProperty(name="Strength In", description="What a new light's strength is given in", items=UNITS)
+KELVIN = bpy.props.FloatProperty(
+    name="Temperature",
+    description="Colour of a new light: 2700 a warm bulb, 6500 daylight; 0 takes what suits its kind",
+    subtype="TEMPERATURE",
+    min=0.0,
+    max=HIGHEST,
+    step=10000,
+    precision=0,
+)
+PLACE = bpy.props.EnumProperty(name="Place", description="Where an object is set down", items=PLACES)
+SAMPLES = bpy.props.IntProperty(
+    name="Samples", description="For each pixel; 0 takes the scene's", min=0, soft_max=4096, default=64
+)
+PERCENTAGE = bpy.props.IntProperty(
+    name="Size",
+    description="Of the scene's render size",
+    subtype="PERCENTAGE",
+    min=1,
+    soft_max=100,
+    max=1000,
+    default=100,
+)
 
 
 def _lamp(group):
@@ -232,8 +256,8 @@ class ScanRelightStudio(bpy.types.PropertyGroup):
         get=lambda self: relight_setup.setup_of(self.id_data),
         set=lambda self, text: relight_setup.apply_setup(self.id_data, text),
     )
-    aim: bpy.props.EnumProperty(name="Aim At", description="What a new light is aimed at", items=AIMS)
-    unit: bpy.props.EnumProperty(name="Strength In", description="What a new light's strength is given in", items=UNITS)
+    aim: AIM
+    unit: UNIT
     strength: bpy.props.FloatProperty(
         name="Strength x",
         description="Of a new light, times what keeps the scene's exposure readable",
@@ -261,30 +285,11 @@ class ScanRelightStudio(bpy.types.PropertyGroup):
         step=1000,
         precision=0,
     )
-    kelvin: bpy.props.FloatProperty(
-        name="Temperature",
-        description="Colour of a new light: 2700 a warm bulb, 6500 daylight; 0 takes what suits its kind",
-        subtype="TEMPERATURE",
-        min=0.0,
-        max=HIGHEST,
-        default=0.0,
-        step=10000,
-        precision=0,
-    )
-    place: bpy.props.EnumProperty(name="Place", description="Where an object is set down", items=PLACES)
+    kelvin: KELVIN
+    place: PLACE
     shape: SHAPE
     look: LOOK
     size: SIZE
     engine: ENGINE
-    samples: bpy.props.IntProperty(
-        name="Samples", description="For each pixel; more is calmer and slower", min=1, soft_max=4096, default=64
-    )
-    percentage: bpy.props.IntProperty(
-        name="Size",
-        description="Of the scene's render size",
-        subtype="PERCENTAGE",
-        min=1,
-        soft_max=100,
-        max=1000,
-        default=100,
-    )
+    samples: SAMPLES
+    percentage: PERCENTAGE

@@ -14,7 +14,7 @@ from ..base.mouse import mouse_ray
 from ..results.select import make_active
 from ..translations import OWN
 from .base import RelightOperator
-from .props import LOOK, LOOKS, PLACES, SHAPE, SIZE
+from .props import LOOK, LOOKS, PLACE, SHAPE, SIZE
 
 
 def surface(scene, place: str, ignored=None):
@@ -31,7 +31,7 @@ class SCAN_RELIGHT_OT_add_virtual(RelightOperator, bpy.types.Operator):
     shape: SHAPE
     look: LOOK
     size: SIZE
-    place: bpy.props.EnumProperty(name="Place", description="Where it is set down", items=PLACES)
+    place: PLACE
 
     def work(self, context):
         thing = virtual.add_virtual(context.scene, self.shape, self.size, self.look, surface(context.scene, self.place))
@@ -54,7 +54,7 @@ class SCAN_RELIGHT_OT_place_object(OwnObject, bpy.types.Operator):
     bl_idname = "scan_relight.place_object"
     bl_label = "Set Down"
 
-    place: bpy.props.EnumProperty(name="Place", description="Where it is set down", items=PLACES)
+    place: PLACE
 
     def work(self, context):
         virtual.stand(context.scene, context.object, surface(context.scene, self.place, context.object))

@@ -55,8 +55,7 @@ def words(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> tuple[P
     folder = corrections.folder_for(things)
     numbers = corrections.keep(scene, folder) | {thing[OBJECT_ID] for thing in things}
     objects = [word for number in sorted(numbers) for word in ("--object", str(number))]
-    told = ["refit", str(folder), *objects, "--progress", "json", "--stop-with-stdin"]
-    return folder, told, corrections.made_by(folder)
+    return folder, ["refit", str(folder), *objects], corrections.made_by(folder)
 
 
 def fitted(folder: Path) -> file.Result:

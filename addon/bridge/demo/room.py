@@ -47,8 +47,6 @@ class Thing:
 
     Attributes
     ----------
-    object_id : int
-    class_name : str
     quads : (q, 4, 3) float64
         Corners, counter-clockwise from outside.
     uv : (q, 4, 2) float64

@@ -26,27 +26,26 @@ sys.exit(main(told["arguments"]))
 """
 
 
-def command(arguments: Sequence[str]) -> list[str]:
-    """The words of a command that runs `scan-relight ARGUMENTS`.
+def command(arguments: Sequence[str], **options: object) -> list[str]:
+    """The words of a command that runs `scan-relight ARGUMENTS`, with an option for each of `options` but for None.
 
     In Blender it is Blender itself, without a window and with factory settings: so no preference, startup file or other
     add-on has a say in the result, and it does not matter how this one was installed or enabled. Packages are looked
     for where this process finds them, in the same order. Where `bpy` is a Python module it is Python. It has a
     lower priority, so that the window gets the processor when it needs it.
     """
+    arguments = [str(one) for one in arguments]
+    for name, value in options.items():
+        option = name.replace("_", "-")
+        if isinstance(value, bool):
+            arguments.append(f"--{option}" if value else f"--no-{option}")
+        elif value is not None:
+            arguments += [f"--{option}", str(value)]
     scripts = bpy.utils.system_resource("SCRIPTS")  # the child's Blender puts them in place itself
     path = [one for one in sys.path if isinstance(one, str) and not (scripts and one.startswith(scripts))]
-    told = {"root": ROOT.as_posix(), "path": path, "arguments": [str(one) for one in arguments]}
+    told = {"root": ROOT.as_posix(), "path": path, "arguments": arguments}
     code = CHILD.format(told=ascii(json.dumps(told)))
     if bpy.app.binary_path:
-        return [
-            bpy.app.binary_path,
-            "--background",
-            "--factory-startup",
-            "-noaudio",
-            "--python-exit-code",
-            "1",
-            "--python-expr",
-            code,
-        ]
+        how = "--background --factory-startup -noaudio --python-exit-code 1 --python-expr"
+        return [bpy.app.binary_path, *how.split(), code]
     return [sys.executable, "-c", code]

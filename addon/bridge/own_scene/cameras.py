@@ -30,10 +30,8 @@ class View:
 
     Attributes
     ----------
-    name : str
     camera : Camera
         In the pixels of the picture; its pose in Blender's units.
-    path : Path
     exposure, saturation : float or None
         The camera's custom properties of these names; see `core.scene.model.Frame`.
     """

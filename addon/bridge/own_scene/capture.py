@@ -12,7 +12,7 @@ import os
 import shutil
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -44,8 +44,6 @@ class Source:
 
     Attributes
     ----------
-    object_id : int
-    name : str
     thing : str
         Name of the object that shows it, when it was captured.
     own : bool
@@ -206,21 +204,14 @@ def _write(folder: Path, mesh: SceneMesh, parts: list[Part], views: list[scene_c
             frame | {key: value for key in ("exposure", "saturation") if (value := getattr(view, key)) is not None}
         )
     _json(folder / "transforms.json", {"camera_model": "PINHOLE", "frames": frames})
-    objects = [
-        {
-            "object_id": part.object_id,
-            "name": part.name,
-            "thing": part.thing.name,
-            "own": part.own,
-            "topology": part.topology,
-            "corner_start": mesh.corner_start[part.object_id],
-        }
-        for part in parts
+    told = [
+        Source(one.object_id, one.name, one.thing.name, one.own, one.topology, mesh.corner_start[one.object_id])
+        for one in parts
     ]
     packed = io.BytesIO()
     np.savez(packed, **mesh.polygons._asdict())
     (folder / FACES).write_bytes(packed.getvalue())
-    _json(folder / OBJECTS, {"objects": objects})
+    _json(folder / OBJECTS, {"objects": [asdict(one) for one in told]})
 
 
 def _json(path: Path, value) -> None:

@@ -27,7 +27,6 @@ class Part:
 
     Attributes
     ----------
-    object_id : int
     name : str
         As the artist reads it.
     class_name : str

@@ -168,7 +168,10 @@ def set_lamps(scene: bpy.types.Scene, text: str) -> None:
         if not sign:
             raise BadInputError(f"Option --lamps takes on, off or NAME=FACTOR, separated by commas, not '{part}'.")
         lamps = relight_lamps.lamp_named(scene, name)
-        wanted.append((lamps, None if value == "off" else 1.0 if value == "on" else _factor(value)))
+        factor = {"off": None, "on": 1.0}
+        if value not in factor:
+            factor[value] = _number(value, f"Option --lamps takes factors of at least 0, not '{value}'.", 0.0)
+        wanted.append((lamps, factor[value]))
     for lamps, value in wanted:
         for lamp in lamps:
             relight_lamps.set_on(lamp, value is not None)
@@ -180,13 +183,7 @@ def world_rotation(text: str) -> float | None:
     """Degrees that the option ``--world`` asks for; None: off."""
     if text in ("on", "off"):
         return 0.0 if text == "on" else None
-    try:
-        angle = float(text)
-    except ValueError:
-        angle = math.nan
-    if not math.isfinite(angle):
-        raise BadInputError(f"Option --world takes on, off or an angle in degrees, not '{text}'.")
-    return angle
+    return _number(text, f"Option --world takes on, off or an angle in degrees, not '{text}'.")
 
 
 def camera_named(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
@@ -205,14 +202,14 @@ def camera_named(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
     return found
 
 
-def _factor(text: str) -> float:
-    """A lamp's factor from the option ``--lamps``: a number of at least 0."""
+def _number(text: str, otherwise: str, least: float = -math.inf) -> float:
+    """A number of at least `least` in an option; raises `BadInputError` with the sentence `otherwise` for all else."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not (math.isfinite(value) and value >= 0):
-        raise BadInputError(f"Option --lamps takes factors of at least 0, not '{text}'.")
+    if not (math.isfinite(value) and value >= least):
+        raise BadInputError(otherwise)
     return value
 
 

@@ -27,21 +27,9 @@ CYCLES, EEVEE = "CYCLES", "EEVEE"
 _SLOT = "Scan Relight"
 """Name of the slot of Blender's Render Result for pictures that only measure something."""
 _RENDER = (
-    "engine",
-    "filepath",
-    "resolution_x",
-    "resolution_y",
-    "resolution_percentage",
-    "pixel_aspect_x",
-    "pixel_aspect_y",
-    "use_border",
-    "use_file_extension",
-    "use_compositing",
-    "use_sequencer",
-    "use_overwrite",
-    "use_placeholder",
-    "film_transparent",
-)
+    "engine filepath resolution_x resolution_y resolution_percentage pixel_aspect_x pixel_aspect_y film_transparent "
+    "use_border use_file_extension use_compositing use_sequencer use_overwrite use_placeholder"
+).split()
 _IMAGE = ("media_type", "file_format", "color_mode", "color_depth", "color_management")
 _CYCLES = ("samples", "use_denoising", "use_adaptive_sampling", "device")
 _VIEW = ("view_transform", "look", "exposure", "gamma", "use_curve_mapping")

@@ -29,7 +29,6 @@ class Result:
 
     Attributes
     ----------
-    folder : Path
     run : str
         Key of the run; '' where it is older than such keys.
     layout : str

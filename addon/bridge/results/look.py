@@ -23,14 +23,8 @@ from ..marks import OBJECT_ID, RESULT
 from .file import FITS, standings
 from .images import image
 
-MATERIAL, ALBEDO, SHADING, LIT_DIFFUSE, COVERAGE, CERTAINTY = (
-    "MATERIAL",
-    "ALBEDO",
-    "SHADING",
-    "LIT_DIFFUSE",
-    "COVERAGE",
-    "CERTAINTY",
-)
+MATERIAL, ALBEDO, SHADING = "MATERIAL", "ALBEDO", "SHADING"
+LIT_DIFFUSE, COVERAGE, CERTAINTY = "LIT_DIFFUSE", "COVERAGE", "CERTAINTY"
 NAME = "Scan Relight look"
 MARK = "scan_relight_look"
 """Custom property of the look's node group and material: which look it is."""

@@ -55,7 +55,6 @@ class BuiltScene:
         In the capture's order.
     images : list of bpy.types.Image
         All that refer to files of the result folder.
-    warnings : tuple of str
     """
 
     collection: bpy.types.Collection
