@@ -47,7 +47,7 @@ def tiny_capture(tmp_path_factory) -> Path:
 
 SLOW_FIXTURES = {"archive", "office", "recovered", "same", "tiny_capture"}
 """Rooms that are rendered or recovered, and the built zip: whoever asks for them is slow."""
-ON_BOTH = ("tests/core/io/", "tests/core/pipeline/", "tests/core/results/")
+ON_BOTH = ("tests/core/io/", "tests/core/results/")
 """Parts of the core that depend on more than arithmetic."""
 
 

@@ -24,37 +24,12 @@ from addon.core import atomic
 from addon.core.io.exr import read_exr, write_exr
 from addon.core.io.ply import read_ply
 
-QUICK = (
-    "--shading-rays",
-    "8",
-    "--specular-rays",
-    "2",
-    "--emitter-rays",
-    "2",
-    "--refine",
-    "0",
-    "--texel-size",
-    "0.2",
-    "--atlas-size",
-    "256",
-)
+QUICK = "--shading-rays 8 --specular-rays 2 --emitter-rays 2 --refine 0 --texel-size 0.2 --atlas-size 256".split()
 FRAMES = 10
-RESULTS = {
-    "albedo.exr",
-    "albedo_error.exr",
-    "base_color.exr",
-    "capture.json",
-    "coverage.exr",
-    "environment.exr",
-    "evidence.exr",
-    "lit_diffuse.exr",
-    "materials.json",
-    "report.html",
-    "report.json",
-    "room.npz",
-    "scene.blend",
-    "shading.exr",
-}
+IMAGES = {"albedo", "albedo_error", "base_color", "coverage", "environment", "evidence", "lit_diffuse", "shading"}
+RESULTS = {f"{name}.exr" for name in IMAGES} | {
+    "capture.json", "materials.json", "report.html", "report.json", "room.npz", "scene.blend"
+}  # fmt: skip
 STAGES = ("surface", "lit_diffuse", "shading", "specular")
 
 
@@ -62,6 +37,14 @@ STAGES = ("surface", "lit_diffuse", "shading", "specular")
 def capture(tiny_capture, tmp_path) -> Path:
     """A copy of the rendered capture, to be broken."""
     return Path(shutil.copytree(tiny_capture, tmp_path / "capture"))
+
+
+@pytest.fixture(scope="module")
+def finished(tiny_capture, tmp_path_factory) -> Path:
+    """What a good run of the capture leaves."""
+    out = tmp_path_factory.mktemp("finished") / "out"
+    assert cli.main(["recover", str(tiny_capture), "--out", str(out), *QUICK]) == 0
+    return out
 
 
 @pytest.fixture
@@ -181,41 +164,19 @@ def unlabelled(v, t, o):
     return v, t, o
 
 
-def outside(v, t, o):
-    t[3, 1] = 10**6
-    return v, t, o
-
-
 def infinite_corner(v, t, o):
     v[3] = np.inf
     return v, t, o
 
 
-def replace_with_folder(path):
-    path.unlink()
-    path.mkdir()
-
-
-def nan_place(m):
-    m[0, 3] = np.nan
-    return m
-
-
-MIRROR, STRETCH = np.diag([-1.0, 1, 1, 1]), np.diag([1, 1.3, 1, 1])
+MIRROR = np.diag([-1.0, 1, 1, 1])
 ALL = range(FRAMES)
 
 FINISHED = {
     "a frame is missing": (lambda c: picture(c).unlink(), "1 of 10 frames .*frame_0002.exr' does not exist"),
-    "a frame is empty": (lambda c: picture(c).write_bytes(b""), "is empty"),
-    "a frame ends in its header": (lambda c: cut(c, 0.02), "ends within its header"),
     "a frame ends in its pixels": (lambda c: cut(c, 0.6), "is cut off"),
     "a frame's pixels are damaged": (garble, "is damaged .*left out"),
-    "a frame is a folder": (lambda c: replace_with_folder(picture(c)), "is not a file"),
-    "a frame has another size": (lambda c: write_exr(picture(c), np.ones((7, 9, 3))), "9 x 7 pixels.*64 x 48"),
-    "a pose is not finite": (lambda c: poses(c, nan_place), "pose that is not finite"),
     "a pose is mirrored": (lambda c: poses(c, lambda m: m @ MIRROR), "mirrored"),
-    "a pose is stretched": (lambda c: poses(c, lambda m: m @ STRETCH), "not rigid"),
-    "a pose is 3 x 3": (lambda c: poses(c, lambda m: m[:3, :3]), "no 4 x 4"),
     "triangles without area": (
         lambda c: mesh(c, lambda v, t, o: (v, np.concatenate([t, [[0, 0, 1], [2, 2, 2]]]), np.append(o, [0, 0]))),
         "2 triangles .*no area",
@@ -224,41 +185,24 @@ FINISHED = {
     "faces without object": (lambda c: mesh(c, unlabelled), "4 of .* belong to no object"),
     "no face has an object": (lambda c: mesh(c, lambda v, t, o: (v, t, None)), "Nothing tells the mesh.s objects"),
     "no frame sees an object": (far_object, r"No frame sees attic 99"),
-    "no names of objects": (lambda c: (c / "info_semantic.json").unlink(), "no info_semantic.json"),
     "a single frame": (lambda c: keep(c, 1), "a single frame"),
 }
 UNTOLD = {
-    "some pixels are NaN": lambda c: paint(c, np.nan, where=np.s_[5:9, 5:9]),
-    "some pixels are inf": lambda c: paint(c, np.inf, where=np.s_[5:9, 5:9]),
-    "some pixels are negative": lambda c: paint(c, -1, where=np.s_[5:9, 5:9]),
-    "a frame is all NaN": lambda c: paint(c, np.nan),
-    "a frame is all inf": lambda c: paint(c, np.inf),
+    "some pixels are NaN, infinite or negative": lambda c: [
+        paint(c, value, k, np.s_[5:9, 5:9]) for k, value in enumerate((np.nan, np.inf, -1))
+    ],
+    "a frame is all NaN and one all inf": lambda c: [paint(c, value, k) for k, value in enumerate((np.nan, np.inf))],
     "all frames are black": lambda c: [paint(c, 0, k) for k in ALL],
 }
 REFUSED = {
     "most frames are missing": (lambda c: [picture(c, k).unlink() for k in range(5)], "5 bad frames of 10"),
     "most frames are damaged": (lambda c: [garble(c, k) for k in range(5)], "frames can't be read"),
-    "all frames have another size": (
-        lambda c: [write_exr(picture(c, k), np.ones((7, 9, 3))) for k in ALL],
-        "9 x 7 pixels",
-    ),
     "all frames are NaN": (lambda c: [paint(c, np.nan, k) for k in ALL], "all pixels are invalid"),
-    "all poses are mirrored": (lambda c: poses(c, lambda m: m @ MIRROR, ALL), "mirrored"),
     "all poses are elsewhere": (
         lambda c: poses(c, lambda m: m + 1000 * np.eye(4, k=3), ALL),
         "No camera of the capture looks at the mesh",
     ),
-    "no frames": (lambda c: keep(c, 0), "lists no frames"),
-    "an empty mesh": (lambda c: mesh(c, lambda v, t, o: (v, t[:0], o[:0])), "has no triangles"),
-    "an empty mesh file": (lambda c: (c / "mesh.ply").write_bytes(b""), "is empty"),
-    "a cut mesh": (lambda c: (c / "mesh.ply").write_bytes((c / "mesh.ply").read_bytes()[:3000]), "cut off"),
-    "no triangle has an area": (lambda c: mesh(c, lambda v, t, o: (v * 0, t, o)), "no triangle with an area"),
-    "a face points nowhere": (lambda c: mesh(c, outside), "points to vertex 1000000"),
-    "no mesh": (lambda c: (c / "mesh.ply").unlink(), "mesh.ply' does not exist"),
-    "no poses": (lambda c: (c / "transforms.json").unlink(), "it needs one of: .*transforms.json"),
     "poses that are no JSON": (lambda c: (c / "transforms.json").write_text('{"frames": ['), "not valid JSON"),
-    "poses of another kind": (lambda c: (c / "transforms.json").write_text("[1]"), "no JSON object"),
-    "objects of another kind": (lambda c: (c / "info_semantic.json").write_text('{"objects": 3}'), "no list 'objects'"),
     "no capture": (shutil.rmtree, "does not exist"),
 }
 
@@ -282,22 +226,14 @@ def test_pixels_that_say_nothing_do_no_harm(name, capture, recover, tmp_path):
     UNTOLD[name](capture)
     assert recover() == (0, "")
     assert whole(tmp_path / "out")
-    for image in (
-        "albedo",
-        "base_color",
-        "shading",
-        "lit_diffuse",
-        "coverage",
-        "environment",
-        "evidence",
-        "albedo_error",
-    ):
+    for image in IMAGES:
         assert np.isfinite(read_exr(tmp_path / "out" / f"{image}.exr").rgb).all(), image
     albedo = read_exr(tmp_path / "out" / "albedo.exr").rgb
     assert 0 <= albedo.min() and albedo.max() <= 1
 
 
 @pytest.mark.slow
+@pytest.mark.once  # what is wrong with a capture is the core's matter
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_capture_is_refused(name, capture, recover, tmp_path):
     change, told = REFUSED[name]
@@ -364,17 +300,7 @@ NO_SPACE = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "full_at, done",
-    [
-        ("surface.npz", 0),
-        ("lit_diffuse.npz", 1),
-        ("shading.npz", 2),
-        ("specular.npz", 3),
-        ("albedo.exr", 4),
-        ("coverage.exr", 4),
-        ("materials.json", 4),
-        ("report.json", 4),
-    ],
+    "full_at, done", [("lit_diffuse.npz", 1), ("specular.npz", 3), ("coverage.exr", 4), ("report.json", 4)]
 )
 def test_a_disk_that_gets_full(full_at, done, recover, tmp_path, monkeypatch):
     """What was finished is kept, and the next run goes on from it."""
@@ -412,8 +338,8 @@ def test_a_disk_that_is_full_of_observations(recover, tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("share", [0.0, 0.5, 0.99])
-def test_half_a_scene_is_never_taken_for_a_whole_one(share, recover, tmp_path, monkeypatch):
+@pytest.mark.parametrize("share", [0.0, 0.99])
+def test_half_a_scene_is_never_taken_for_a_whole_one(share, finished, recover, tmp_path, monkeypatch):
     """Blender does not notice that a disk is full; the program does, and takes the last run's scene away too."""
     out, save = tmp_path / "out", scene_module._save
 
@@ -421,7 +347,7 @@ def test_half_a_scene_is_never_taken_for_a_whole_one(share, recover, tmp_path, m
         save(name, *others)
         os.truncate(name, int(share * os.path.getsize(name)))
 
-    recover()
+    shutil.copytree(finished, out)
     monkeypatch.setattr(scene_module, "_save", half)
     code, err = recover()
     assert code == 1 and "scene.blend can't be saved (No space left on device)" in err
@@ -433,9 +359,8 @@ def test_half_a_scene_is_never_taken_for_a_whole_one(share, recover, tmp_path, m
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="mounts a small file system")
 @pytest.mark.parametrize("left", ["a third", "all but a bit of the scene"])
-def test_a_disk_that_is_really_full(left, capture, recover, tmp_path, root):
-    recover()
-    sizes = {name: (tmp_path / "out" / name).stat().st_size for name in files(tmp_path / "out")}
+def test_a_disk_that_is_really_full(left, finished, recover, tmp_path):
+    sizes = {name: (finished / name).stat().st_size for name in files(finished)}
     room = (
         sum(sizes.values()) // 3
         if left == "a third"
@@ -467,8 +392,8 @@ def test_the_memory_is_used_up(recover, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_stage_that_was_damaged_is_done_again(recover, tmp_path):
-    recover()
+def test_a_stage_that_was_damaged_is_done_again(finished, recover, tmp_path):
+    shutil.copytree(finished, tmp_path / "out")
     stage = tmp_path / "out" / "stages" / "shading.npz"
     stage.write_bytes(stage.read_bytes()[:-1000])
     assert recover() == (0, "") and whole(tmp_path / "out")
@@ -479,21 +404,8 @@ def test_a_stage_that_was_damaged_is_done_again(recover, tmp_path):
 @pytest.mark.slow
 def test_interrupted_in_the_middle_and_gone_on(capture, tmp_path, root):
     out = tmp_path / "out"
-    slow = command(
-        "recover",
-        capture,
-        "--out",
-        out,
-        "--shading-rays",
-        "2048",
-        "--no-interpolate",
-        "--specular-rays",
-        "2",
-        "--refine",
-        "0",
-        "--texel-size",
-        "0.1",
-    )
+    options = "--shading-rays 2048 --no-interpolate --specular-rays 2 --refine 0 --texel-size 0.1".split()
+    slow = command("recover", capture, "--out", out, *options)
     process = subprocess.Popen(slow, cwd=root, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     for line in process.stdout:
         if line.startswith("shading"):

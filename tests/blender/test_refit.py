@@ -82,6 +82,7 @@ def test_what_is_wrong_is_one_sentence(result, tmp_path, capsys):
 
 
 @pytest.mark.slow
+@pytest.mark.once
 def test_later_runs_heed_what_is_kept(tiny_capture, tmp_path, capsys):
     result = tmp_path / "result"
     file = given(tmp_path, {"0": {"model": "metal", "roughness": 0.25}})
@@ -105,6 +106,7 @@ COARSE = [*FAST[: FAST.index("--texel-size")], "--atlas-size", "128"]
 
 
 @pytest.mark.slow
+@pytest.mark.once
 @pytest.mark.parametrize("kind", ["object", "udim"])
 def test_parts_of_an_atlas_are_renewed_without_the_capture(tiny_capture, tmp_path, capsys, kind):
     capture, result = shutil.copytree(tiny_capture, tmp_path / "capture"), tmp_path / "result"

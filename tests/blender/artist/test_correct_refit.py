@@ -75,6 +75,7 @@ def test_this_is_metal_refits_that_object_alone(room, ops):
 
 
 @pytest.mark.slow
+@pytest.mark.once
 def test_taken_back_it_is_found_again(room, ops):
     folder, things = room
     sofa = things["sofa"]
@@ -93,6 +94,7 @@ def test_taken_back_it_is_found_again(room, ops):
 
 
 @pytest.mark.slow
+@pytest.mark.once
 def test_values_that_were_set_by_hand_stay_and_the_rest_is_fitted(room, ops):
     folder, things = room
     ball = things["ball"]
@@ -105,6 +107,7 @@ def test_values_that_were_set_by_hand_stay_and_the_rest_is_fitted(room, ops):
 
 
 @pytest.mark.slow
+@pytest.mark.once
 def test_a_failed_refit_is_a_sentence_and_what_was_said_stays(room, ops):
     folder, things = room
     shutil.rmtree(folder / "stages")
@@ -164,6 +167,7 @@ def test_nodes_that_were_edited_by_hand_stay(ops, result, tmp_path):  # noqa: F8
 
 
 @pytest.mark.slow
+@pytest.mark.once
 def test_a_known_white_scales_the_room_in_the_scene(room, ops):
     """Albedo of all objects by the given over the found; lamps the other way."""
     folder, things = room

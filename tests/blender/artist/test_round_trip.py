@@ -241,7 +241,7 @@ def test_images_beside_a_file_that_was_never_saved(ops, room, tmp_path):
     assert state(room) == before
 
 
-def render_photos(folder, cameras, samples=64):
+def render_photos(folder, cameras, samples=16):
     """What the cameras see, as EXR, behind them."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
@@ -257,6 +257,7 @@ def render_photos(folder, cameras, samples=64):
 
 
 @pytest.mark.slow
+@pytest.mark.once
 def test_the_albedo_of_a_rendered_room(ops, room, tmp_path):
     """The paint that Cycles rendered with is what comes back onto each face, through n-gons, mirrors and instances."""
     cameras = [thing for thing in bpy.context.scene.objects if thing.type == "CAMERA"] + more_cameras()

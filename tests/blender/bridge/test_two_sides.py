@@ -71,6 +71,7 @@ def test_cycles_shows_each_side_on_its_own(scene, shoot, look, white_world, tmp_
 
 
 @pytest.mark.slow
+@pytest.mark.once
 def test_round_trip_of_a_sheet_between_two_rooms(scene, shoot, tmp_path):
     """The result shows either side of the sheet as the frames did, twenty times apart in light and two in albedo."""
     case = sheet_between_rooms()

@@ -17,25 +17,10 @@ from addon.bridge.job.command import command
 from addon.bridge.job.job import DONE, FAILED, STOPPED, Job
 from addon.core.results.room_file import read_room
 
-QUICK = [
-    "--shading-rays",
-    "16",
-    "--specular-rays",
-    "4",
-    "--emitter-rays",
-    "2",
-    "--portal-rays",
-    "0",
-    "--refine",
-    "0",
-    "--texel-size",
-    "0.12",
-    "--atlas-size",
-    "512",
-    "--no-mirrors",
-    "--threads",
-    "1",
-]
+QUICK = (
+    "--shading-rays 16 --specular-rays 4 --emitter-rays 2 --portal-rays 0 --refine 0 --texel-size 0.12 --atlas-size 512"
+    " --no-mirrors --threads 1"
+).split()
 DEAF = "import signal, sys, time; signal.signal(signal.SIGINT, signal.SIG_IGN); print('up', flush=True); time.sleep(60)"
 
 

@@ -13,19 +13,7 @@ from tests.blender.conftest import honest
 os.environ.setdefault("BLENDER_USER_EXTENSIONS", tempfile.mkdtemp())
 
 QUICK = (
-    "--shading-rays",
-    "16",
-    "--specular-rays",
-    "4",
-    "--emitter-rays",
-    "2",
-    "--refine",
-    "0",
-    "--texel-size",
-    "0.1",
-    "--atlas-size",
-    "512",
-    "--quiet",
+    "--shading-rays 16 --specular-rays 4 --emitter-rays 2 --refine 0 --texel-size 0.1 --atlas-size 512 --quiet".split()
 )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[4]
-COUNT, SEED = (int(os.environ.get(f"HOSTILE_{name}", usual)) for name, usual in (("EXAMPLES", "60"), ("SEED", "0")))
+COUNT, SEED = (int(os.environ.get(f"HOSTILE_{name}", usual)) for name, usual in (("EXAMPLES", "25"), ("SEED", "0")))
 READERS = {
     "exr": ("from addon.core.io.exr import exr_note, read_exr, read_header", "read_header, exr_note, read_exr"),
     "coded": (

@@ -27,7 +27,7 @@ from tests.core.io.hostile.cases import CASES, fresh
 from tests.core.io.hostile.spoiling import bytes_spoiled, json_spoiled
 
 WIDER = int(os.environ.get("HOSTILE_EXAMPLES", "0"))
-EXAMPLES = WIDER or 40
+EXAMPLES = WIDER or 15
 HANG = 10
 """Seconds from which on reading a file of a few thousand bytes is a hang."""
 MEMORY = 200 << 20
@@ -88,6 +88,7 @@ def check_sentence(text: str, root: Path, victim: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.once
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_spoiled(case, tmp_path):
     root = tmp_path / "capture"
@@ -129,6 +130,7 @@ def test_what_is_no_file(case, what, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.once
 def test_any_name_of_a_picture(tmp_path):
     root = tmp_path / "capture"
     victim, reading = fresh(CASES[0], root)
