@@ -53,16 +53,11 @@ def draw(layout, context) -> None:
     body.use_property_split = body.use_property_decorate = False
     left = list(zip(ENTRIES, LABELS, strict=True))
     for item in keymap.keymap_items:
-        fits = next(
-            (
-                one
-                for one in left
-                if one[0][0] == item.idname
-                and all(getattr(item.properties, name, None) == value for name, value in one[0][1].items())
-            ),
-            None,
-        )
-        if fits:
-            left.remove(fits)
-            body.label(text=fits[1])
-            rna_keymap_ui.draw_kmi([], known, keymap, item, body, 0)
+        for entry in left:
+            (operator, properties), label = entry
+            given = {name: getattr(item.properties, name, None) for name in properties}
+            if (operator, properties) == (item.idname, given):
+                left.remove(entry)
+                body.label(text=label)
+                rna_keymap_ui.draw_kmi([], known, keymap, item, body, 0)
+                break

@@ -17,7 +17,7 @@ from ...core.errors import BadInputError
 from ...core.scene.atlas import Atlas
 from ...core.scene.model import Mesh
 from ..data.arrays import layer_of, triangles_of, vertices_of
-from ..data.images import array_image, image_array, load_image
+from ..data.images import DATA, array_image, image_array, load_image
 from ..data.materials import BASE_COLOR, principled
 from ..data.mesh_objects import ATLAS_UV
 from ..data.nodes import image_node
@@ -71,14 +71,8 @@ def own_image(thing: bpy.types.Object, where: str = images.PACK) -> bpy.types.Im
     if source.source == "TILED":
         raise BadInputError(f"The colour of object '{thing.name}' lies in tiles; run with another atlas to paint it.")
     name, key = f"{source.name.removesuffix('.exr')} painted", path_of(source)
-    image = next(
-        (
-            one
-            for one in bpy.data.images
-            if one.get(PAINTED) == key and one.size[:] == source.size[:] and not one.library
-        ),
-        None,
-    )
+    own = [one for one in bpy.data.images if one.get(PAINTED) == key and not one.library]
+    image = next((one for one in own if one.size[:] == source.size[:]), None)
     if image is None:
         image = array_image(name, image_array(source))
         image[PAINTED], image[RUN] = key, thing.get(RUN, "")
@@ -151,10 +145,7 @@ def keep_painted() -> None:
 def unseen_mask(thing: bpy.types.Object) -> np.ndarray:
     """Where in its atlas no frame saw the surface, (h, w) bool, row 0 at the bottom.
 
-    Raises
-    ------
-    BadInputError
-        The result folder's coverage is gone, or of another size.
+    Raises `BadInputError`: the result folder's coverage is gone, or of another size.
     """
     return coverage(thing)[..., 0] < 0.5
 
@@ -179,17 +170,10 @@ def coverage(thing: bpy.types.Object) -> np.ndarray:
 
 def stencil(thing: bpy.types.Object) -> bpy.types.Image:
     """A picture for Texture Paint's stencil mask: white, that is protected, where any frame saw the surface."""
-    seen = ~unseen_mask(thing)
-    height, width = seen.shape
-    image = bpy.data.images.get(f"{painted(thing).name} {MASK}")
-    if image is None or image.size[:] != (width, height):
-        image = bpy.data.images.new(f"{painted(thing).name} {MASK}", width, height, is_data=True)
-    rgba = np.ones((height, width, 4), np.float32)
-    rgba[..., :3] = seen[..., None]
-    image.pixels.foreach_set(rgba.ravel())
-    image.update()
-    image.pack()
-    return image
+    name = f"{painted(thing).name} {MASK}"
+    if earlier := bpy.data.images.get(name):
+        bpy.data.images.remove(earlier)
+    return array_image(name, (~unseen_mask(thing)).astype(np.float32), DATA)
 
 
 def fill(things: Iterable[bpy.types.Object], where: str = images.PACK) -> tuple[int, list[str]]:
@@ -255,11 +239,8 @@ def _fill(things, seen, where, passed) -> int:
     if spots:
         texels = np.flatnonzero(filled[atlas.padding])  # the gutter beside them too
         flat[texels, :3] = value[atlas.padding[texels]]
-        image.pixels.foreach_set(flat.ravel())
-        image.update()
-        if image.packed_file:
-            image.pack()
-        else:
+        _show_pixels(image, flat)
+        if not image.packed_file:
             image.save()
     return int(filled.sum())
 
@@ -297,6 +278,11 @@ def _renew(image, source, thing) -> None:
     own = atlas.object_id[atlas.padding] == owners.index(thing)
     pixels = image_array(image)
     pixels.reshape(-1, pixels.shape[2])[own, :3] = image_array(source).reshape(len(own), -1)[own, :3]
+    _show_pixels(image, pixels)
+
+
+def _show_pixels(image, pixels) -> None:
+    """Give an image these pixels; one that is packed holds them at once."""
     image.pixels.foreach_set(pixels.ravel())
     image.update()
     if image.packed_file:

@@ -26,12 +26,8 @@ def import_mesh(path: Path) -> RawMesh:
     """Read an OBJ, glTF or GLB file: polygons as triangles, each object (or group) an instance of its name.
 
     An OBJ file's coordinates are taken as they are; glTF's, which are +Y up, are turned to +Z up. Materials and
-    pictures are not looked at. Where there is but one object, `object_id` is None.
-
-    Raises
-    ------
-    BadInputError
-        The file is absent, damaged, holds no surface, or names files elsewhere.
+    pictures are not looked at. Where there is but one object, `object_id` is None. Raises `BadInputError`: the file is
+    absent, damaged, holds no surface, or names files elsewhere.
     """
     path = Path(path)
     if not path.is_file():

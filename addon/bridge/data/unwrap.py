@@ -6,7 +6,6 @@ other become islands of their own, and islands that waste the square are cut.
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from typing import NamedTuple
 
 import bpy
@@ -120,17 +119,18 @@ def _unwrapped(vertices, triangles, object_id, size, margin_texels, polygons):
 
 def _projected(points, vertex, start):
     """Coordinates of each corner, (c, 2) float32, by Blender's projection of each face along one of few directions."""
-    with _temporary(points, vertex, start) as data:
-        _operate(
-            data,
-            bpy.ops.uv.smart_project,
-            angle_limit=_PROJECTION_ANGLE,
-            island_margin=0.0,
-            area_weight=0.0,
-            correct_aspect=False,
-            scale_to_bounds=False,
-        )
-        return np.nan_to_num(layer_of(data, _LAYER), nan=0.0, posinf=0.0, neginf=0.0)
+    return _laid_out(
+        points,
+        vertex,
+        start,
+        np.zeros((len(vertex), 2)),
+        bpy.ops.uv.smart_project,
+        angle_limit=_PROJECTION_ANGLE,
+        island_margin=0.0,
+        area_weight=0.0,
+        correct_aspect=False,
+        scale_to_bounds=False,
+    )
 
 
 def _faces(face, pairs):
@@ -152,20 +152,20 @@ def _packed(points, corners, uv, size, margin_texels):
         # Blender's margin is one before its own scaling: the scale is guessed, and mended once or twice.
         wanted = margin = margin_texels / 2 / size
         for _ in range(3):
-            with _temporary(points, corners.ravel(), 3 * np.arange(len(corners))) as data:
-                set_layer(data, _LAYER, uv)
-                _operate(
-                    data,
-                    bpy.ops.uv.pack_islands,
-                    rotate=True,
-                    rotate_method=turn,
-                    scale=True,
-                    margin=margin,
-                    margin_method="ADD",
-                    shape_method="AABB",
-                    udim_source="CLOSEST_UDIM",
-                )
-                packed = np.nan_to_num(layer_of(data, _LAYER).reshape(-1, 3, 2), nan=0.0, posinf=0.0, neginf=0.0)
+            packed = _laid_out(
+                points,
+                corners.ravel(),
+                3 * np.arange(len(corners)),
+                uv,
+                bpy.ops.uv.pack_islands,
+                rotate=True,
+                rotate_method=turn,
+                scale=True,
+                margin=margin,
+                margin_method="ADD",
+                shape_method="AABB",
+                udim_source="CLOSEST_UDIM",
+            ).reshape(-1, 3, 2)
             border = packed.min()
             if border >= 0.97 * wanted or border <= 0:
                 break
@@ -195,46 +195,34 @@ def _height(corners, island):
     return np.einsum("ij,ij->i", corners.mean(1), mean[island])
 
 
-@contextmanager
-def _temporary(points, vertex, start):
-    """A mesh on an object of a scene of its own; all gone afterwards.
+def _laid_out(points, vertex, start, uv, operator, **settings):
+    """Coordinates of each corner, (c, 2) float32, by a UV operator on a mesh in a scene of its own; all gone after it.
 
-    Its faces are given by the vertex of each corner and the first corner of each face.
+    Its faces are given by the vertex of each corner and the first corner of each face; `uv` is what it begins with.
     """
     scene = bpy.data.scenes.new("Scan Relight unwrap")
     data = make_mesh("Scan Relight unwrap", points, vertex, start)
     thing = bpy.data.objects.new("Scan Relight unwrap", data)
     try:
-        data.uv_layers.new(name=_LAYER)
+        set_layer(data, _LAYER, uv)
         scene.collection.objects.link(thing)
         scene.tool_settings.use_uv_select_sync = True
-        yield data
+        layer = scene.view_layers[0]
+        layer.objects.active = thing
+        thing.select_set(True, view_layer=layer)
+        chosen = {"object": thing, "active_object": thing, "selected_objects": [thing]}
+        context = {"scene": scene, "view_layer": layer, **chosen}
+        with bpy.context.temp_override(**context):
+            bpy.ops.object.mode_set(mode="EDIT")
+        try:
+            with bpy.context.temp_override(edit_object=thing, **context):
+                bpy.ops.mesh.select_all(action="SELECT")
+                operator(**settings)
+        finally:
+            with bpy.context.temp_override(**context):
+                bpy.ops.object.mode_set(mode="OBJECT")
+        return np.nan_to_num(layer_of(data, _LAYER), nan=0.0, posinf=0.0, neginf=0.0)
     finally:
         bpy.data.objects.remove(thing)
         bpy.data.meshes.remove(data)
         bpy.data.scenes.remove(scene)
-
-
-def _operate(data, operator, **settings):
-    """Run a UV operator on all of `data` in edit mode, in the context of its own scene."""
-    scene = next(s for s in bpy.data.scenes if any(o.data == data for o in s.collection.objects))
-    thing = scene.collection.objects[0]
-    layer = scene.view_layers[0]
-    layer.objects.active = thing
-    thing.select_set(True, view_layer=layer)
-    context = {
-        "scene": scene,
-        "view_layer": layer,
-        "object": thing,
-        "active_object": thing,
-        "selected_objects": [thing],
-    }
-    with bpy.context.temp_override(**context):
-        bpy.ops.object.mode_set(mode="EDIT")
-    try:
-        with bpy.context.temp_override(edit_object=thing, **context):
-            bpy.ops.mesh.select_all(action="SELECT")
-            operator(**settings)
-    finally:
-        with bpy.context.temp_override(**context):
-            bpy.ops.object.mode_set(mode="OBJECT")

@@ -16,11 +16,7 @@ def put(made: Path, path: Path) -> None:
     """Bring what was written into the folder `made` to its place beside `path`, `path` itself last.
 
     An earlier export of that very file is replaced with all its textures; nothing else is touched. Where it fails, what
-    was there before is there again.
-
-    Raises
-    ------
-    OSError
+    was there before is there again. Raises `OSError`.
     """
     if not (made / path.name).is_file() or not (made / path.name).stat().st_size:
         raise OSError(0, "Blender's exporter wrote nothing")

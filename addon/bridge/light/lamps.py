@@ -50,10 +50,7 @@ def lamps_by_object(scene: bpy.types.Scene) -> dict[str, list[bpy.types.Material
 def lamp_named(scene: bpy.types.Scene, name: str) -> list[bpy.types.Material]:
     """The lamps that a name means: that very material, or all of that class, whatever the case.
 
-    Raises
-    ------
-    BadInputError
-        There is none; the sentence lists the known ones.
+    Raises `BadInputError`: there is none; the sentence lists the known ones.
     """
     lamps = find_lamps(scene)
     wanted = name.strip().casefold()

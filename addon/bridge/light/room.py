@@ -31,13 +31,7 @@ class Hit(NamedTuple):
 
 
 def room_objects(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The objects that were scanned.
-
-    Raises
-    ------
-    BadInputError
-        The scene has none.
-    """
+    """The objects that were scanned. Raises `BadInputError`: the scene has none."""
     things = [thing for thing in scene.objects if OBJECT_ID in thing and thing.type == "MESH"]
     if not things:
         raise BadInputError(

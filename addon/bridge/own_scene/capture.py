@@ -236,10 +236,7 @@ def bring(source: Path, target: Path) -> None:
 def sources(folder: Path | str) -> tuple[Source, ...]:
     """The objects of a capture that was made of a scene; empty where it was not.
 
-    Raises
-    ------
-    BadInputError
-        The list is damaged.
+    Raises `BadInputError`: the list is damaged.
     """
     path = Path(folder) / OBJECTS
     if not path.is_file():

@@ -83,10 +83,7 @@ def picture_folder(scene: bpy.types.Scene, chosen: str = "") -> tuple[Path, bool
 def save_copy(folder: Path) -> None:
     """Save what is open as a copy that the command `relight` can open; what is open stays as it is.
 
-    Raises
-    ------
-    StorageError
-        The copy can't be written.
+    Raises `StorageError`: the copy can't be written.
     """
     with refused(f"A copy of the scene can't be saved to '{folder}'", "free some space"):
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / COPY), copy=True, compress=False, relative_remap=True)

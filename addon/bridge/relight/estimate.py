@@ -93,10 +93,7 @@ def is_known(scene: bpy.types.Scene) -> bool:
 def looking(scene: bpy.types.Scene) -> Iterator[None]:
     """Find what `stops` has to know, in small steps; without effect where it is known, or there is no camera.
 
-    Raises
-    ------
-    BadInputError
-        The scene holds no scanned room.
+    Raises `BadInputError`: the scene holds no scanned room.
     """
     if scene.camera is None:
         return

@@ -24,12 +24,7 @@ _GREY, _MOST = 0.18, 32.0
 def measure(scene: bpy.types.Scene) -> float:
     """The exposure in stops that shows the median of the present picture as middle grey.
 
-    Raises
-    ------
-    BadInputError
-        There is no camera, or no light at all.
-    StorageError
-        The small picture can't be written.
+    Raises `BadInputError`: there is no camera, or no light at all; `StorageError`: the small picture can't be written.
     """
     if scene.camera is None:
         raise BadInputError("The scene has no camera to measure the light through; choose a frame first.")

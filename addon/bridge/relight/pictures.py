@@ -148,12 +148,7 @@ def shoot(scene: bpy.types.Scene, path: Path | str) -> None:
 def small_median(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 16, width: int = 64) -> float:
     """Median luminance of a small picture through the scene's camera, linear; nothing of the scene's settings changes.
 
-    Raises
-    ------
-    BadInputError
-        EEVEE finds no graphics card.
-    StorageError
-        The picture can't be written.
+    Raises `BadInputError`: EEVEE finds no graphics card; `StorageError`: the picture can't be written.
     """
     from ...core.io.exr import read_exr  # not earlier: Blender's start should not wait for OpenEXR
 

@@ -121,12 +121,8 @@ def fit(scene: bpy.types.Scene) -> float:
     """Set the intensity of the baked volume so that EEVEE is as bright as Cycles; returns it, 1 where nothing tells.
 
     EEVEE's median luminance through a camera is about a + b * intensity, which two small pictures tell, and a third one
-    by Cycles what it should be. Of several cameras the logarithms of the ratios count, squared.
-
-    Raises
-    ------
-    StorageError
-        A small picture can't be written.
+    by Cycles what it should be. Of several cameras the logarithms of the ratios count, squared. Raises `StorageError`:
+    a small picture can't be written.
     """
     volumes, cameras = probes(scene), _views(scene)
     if not volumes or not cameras:

@@ -139,10 +139,7 @@ def stand(scene: bpy.types.Scene, thing: bpy.types.Object, at: Hit | None = None
 def place_in_view(scene: bpy.types.Scene, ignored: bpy.types.Object | None = None) -> Hit:
     """The surface to stand on that is nearest the middle of the picture, else below the 3D cursor or the room's middle.
 
-    Raises
-    ------
-    BadInputError
-        There is none.
+    Raises `BadInputError`: there is none.
     """
     hidden = ignored.hide_viewport if ignored else False
     if ignored:
@@ -215,13 +212,7 @@ def _clear_of_walls(scene, place: Vector, radius: float, tall: float) -> Vector:
             hit = cast(scene, place + Vector((0, 0, max(tall / 2, 0.02))), way, radius)
             if hit and hit.distance < radius:
                 need = way * -(radius - hit.distance + 0.005)
-                push = Vector(
-                    (
-                        need.x if abs(need.x) > abs(push.x) else push.x,
-                        need.y if abs(need.y) > abs(push.y) else push.y,
-                        0,
-                    )
-                )
+                push = Vector((max(push.x, need.x, key=abs), max(push.y, need.y, key=abs), 0))
         if not push.length:
             break
         place = place + push

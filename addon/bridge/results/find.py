@@ -187,10 +187,7 @@ def search(home: Path) -> list[str]:
 def find(one: Missing, chosen: Path) -> Path:
     """The result that is missing, in a chosen folder, or one level below or above it.
 
-    Raises
-    ------
-    BadInputError
-        It is not there, or another run's is.
+    Raises `BadInputError`: it is not there, or another run's is.
     """
     try:
         below = sorted(part for part in chosen.iterdir() if part.is_dir())[:LOOKED_AT]
@@ -257,12 +254,7 @@ def _show(image: bpy.types.Image, path: Path) -> None:
 def move(folder: Path, home: Path) -> Path:
     """Move a result into a folder of results and point the open file there; it is whole in one place at any time.
 
-    Raises
-    ------
-    BadInputError
-        A run is writing it.
-    StorageError
-        It can't be moved, and stays where it is.
+    Raises `BadInputError`: a run is writing it; `StorageError`: it can't be moved, and stays where it is.
     """
     with Store(folder):
         pass  # no run is writing it
