@@ -159,6 +159,8 @@ def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True)
     if plain.quality >= AGREEMENT.agree:
         moved = misalignments(scene.views, [v.camera for v in scene.views], seen, scene.rays)
         return Agreement(plain, None, moved, False, _up(scene.views, Convention()))
+    if _flat(scene.views):
+        return Agreement(replace(plain, colour=np.nan), None, np.zeros(0), False, _up(scene.views, Convention()))
     if not search or len(scene.views) < AGREEMENT.least_views:
         return Agreement(plain, None, np.zeros(0), False, _up(scene.views, Convention()))
     best = _search(scene)
@@ -166,6 +168,12 @@ def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True)
         best = None
     chosen = Convention() if best is None else best.convention
     return Agreement(plain, best, np.zeros(0), True, _up(scene.views, chosen))
+
+
+def _flat(views: Sequence[SmallView]) -> bool:
+    """Whether all that frames show is of one brightness and colour, such as black: no pose fits better than another."""
+    values = np.concatenate([np.zeros((0, 3)), *(view.log[np.isfinite(view.log).all(-1)] for view in views)])
+    return not len(values) or not np.ptp(values, axis=0).any()
 
 
 def _up(views: Sequence[SmallView], convention: Convention) -> str:

@@ -11,8 +11,7 @@ bpy = pytest.importorskip("bpy")
 
 from tests.blender.artist.artist_room import add_cameras, box, bridge, build_room, mesh_object, node_trees  # noqa: E402
 
-QUICK = {"shading_rays": 16, "specular_rays": 4, "emitter_rays": 2, "refine": 0, "texel_size": 0.08, "atlas_size": 512,
-         "reading_convention": "as-read"}  # fmt: skip
+QUICK = {"shading_rays": 16, "specular_rays": 4, "emitter_rays": 2, "refine": 0, "texel_size": 0.08, "atlas_size": 512}
 LOOKS = ("ALBEDO", "SHADING", "LIT_DIFFUSE", "COVERAGE", "CERTAINTY")
 
 
