@@ -18,7 +18,7 @@ from addon.core.results.store import Store  # noqa: E402
 from addon.core.settings import Settings  # noqa: E402
 from tests.blender.evidence.known_rooms import known_rooms  # noqa: E402
 
-pytestmark = [pytest.mark.slow, pytest.mark.once]
+pytestmark = [pytest.mark.slow, pytest.mark.arithmetic]
 
 FRAMES, SIZE, SAMPLES = 16, (72, 54), 16
 """So small that a lamp which is solved for comes out 8 % too bright: the intervals must know."""

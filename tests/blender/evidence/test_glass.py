@@ -19,7 +19,7 @@ from addon.core.results.store import Store  # noqa: E402
 from addon.core.settings import Settings  # noqa: E402
 from tests.blender.evidence.known_rooms import KnownRoom  # noqa: E402
 
-pytestmark = [pytest.mark.slow, pytest.mark.once]
+pytestmark = [pytest.mark.slow, pytest.mark.arithmetic]
 
 PANE = "pane"
 

@@ -96,29 +96,8 @@ def cards(kind):
 def test_progress_is_told_during_each_picture(result, tmp_path, capfd):
     """Not only at its ends, and never backwards."""
     capfd.readouterr()
-    assert (
-        cli.main(
-            [
-                "relight",
-                str(result),
-                "--out",
-                str(tmp_path / "a.png"),
-                "--before-after",
-                "--samples",
-                "128",
-                "--size",
-                "150",
-                "--lamps",
-                "off",
-                "--spot",
-                "--device",
-                "cpu",
-                "--progress",
-                "json",
-            ]
-        )
-        == 0
-    )
+    words = "--before-after --samples 128 --size 100 --lamps off --spot --device cpu --progress json".split()
+    assert cli.main(["relight", str(result), "--out", str(tmp_path / "a.png"), *words]) == 0
     sys.stdout.flush()
     told = [json.loads(line) for line in capfd.readouterr().out.splitlines() if line.startswith('{"event": "progress"')]
     for stage in ("before", "after"):

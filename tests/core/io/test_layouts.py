@@ -82,7 +82,7 @@ def test_a_named_format_is_taken(written):
     assert read_capture(root, replace(READING, format=name)).format == name
 
 
-@pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00", b"{", b"3\n1 2 3\n", b"x y z\n", b"[" * 9999])
+@pytest.mark.parametrize("content", [b"", b"\xff\xfe\x00", b"3\n1 2 3\n"])
 @pytest.mark.parametrize("path", ["train/transforms.json", "cam.txt", "K_list.txt", "traj.txt", "cam_params.json",
                                   "scans/segments.json", "scans/segments_anno.json", "dslr/train_test_lists.json",
                                   "dslr/colmap/cameras.txt", "dslr/colmap/images.txt"])  # fmt: skip

@@ -107,6 +107,7 @@ def test_spoiled(case, tmp_path):
     spoil()
 
 
+@pytest.mark.once
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 @pytest.mark.parametrize("what", ["folder", "loop", "absent", "dangling", "zeros", "pipe"])
 def test_what_is_no_file(case, what, tmp_path):
