@@ -29,22 +29,14 @@ SLICE: Shown[float] = 0.04
 """Seconds that the scene is worked at before the window is drawn again."""
 
 
-def stage_text(job: jobs.Job) -> str:
-    """What a job does now, in words."""
-    if job.stopping:
-        return told("Stopping")
-    if not job.stage:
-        return told("Starting")
-    return told(LABELS.get(job.stage, job.stage.replace("_", " ").capitalize()))
-
-
 def progress_text(job: jobs.Job) -> str:
     """Stage, its share, and the time left, for a progress bar."""
-    text = stage_text(job)
-    if job.stage and not job.stopping:
-        text += f" {job.share:.0%}"
-    left = job.seconds_left
-    return text if left is None or job.stopping else f"{text}, {told(f'{duration(left)} left')}"
+    if job.stopping:
+        return told("Stopping")
+    text, left = told("Starting"), job.seconds_left
+    if job.stage:
+        text = f"{told(LABELS.get(job.stage, job.stage.replace('_', ' ').capitalize()))} {job.share:.0%}"
+    return text if left is None else f"{text}, {told(f'{duration(left)} left')}"
 
 
 def redraw(context) -> None:

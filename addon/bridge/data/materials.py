@@ -45,10 +45,7 @@ def f0_of(material: bpy.types.Material) -> float | None:
 
 
 def make_material(
-    description: ObjectMaterial,
-    base_color: bpy.types.Image | None = None,
-    emission: bpy.types.Image | None = None,
-    one_sided: bool = False,
+    description: ObjectMaterial, base_color: bpy.types.Image | None = None, one_sided: bool = False
 ) -> bpy.types.Material:
     """Make the material of one object.
 
@@ -57,8 +54,6 @@ def make_material(
     base_color : bpy.types.Image, optional
         Of what has a diffuse part: Base Color over the atlas, linear Rec.709 (`core.brdf.material.base_colors`).
         Without it the colour is mid-grey.
-    emission : bpy.types.Image, optional
-        Emitter: radiance over the atlas; without it the description's one radiance.
     one_sided : bool
         Emitter: shine on the side of the normals only.
 
@@ -67,14 +62,13 @@ def make_material(
     bpy.types.Material
         Its custom properties ``scan_relight_model``, ``_alpha``, ``_f0``, ``_transmission`` tell what was fitted.
     """
-    return dress(bpy.data.materials.new(description.name), description, base_color, emission, one_sided)
+    return dress(bpy.data.materials.new(description.name), description, base_color, one_sided)
 
 
 def dress(
     material: bpy.types.Material,
     description: ObjectMaterial,
     base_color: bpy.types.Image | None = None,
-    emission: bpy.types.Image | None = None,
     one_sided: bool = False,
 ) -> bpy.types.Material:
     """`make_material` with a material that is there: its nodes go, its name and whoever wears it stay."""
@@ -91,11 +85,9 @@ def dress(
         if name in value:
             value[name].default_value = number
     if shown.base_color is None and base_color is not None:
-        links.new(_texture(nodes, links, base_color, (-400, 200)), value[BASE_COLOR])
+        _show_image(nodes, links, base_color, value[BASE_COLOR])
     if shown.emission is not None:
-        if emission is not None:  # it holds all that was seen, with what the lamp reflects
-            value[BASE_COLOR].default_value = (0, 0, 0, 1)
-        _emit(nodes, links, value, shown.emission, emission)
+        _emit(value, shown.emission)
         if one_sided:
             _front_only(nodes, links, value[EMISSION_COLOR])
     material[MODEL] = description.model.name
@@ -142,18 +134,14 @@ def plain_material(
     value[SPECULAR_LEVEL].default_value, value[IOR].default_value = specular, ior
     value[EMISSION_STRENGTH].default_value, value[ALPHA].default_value = 0.0, alpha
     if any(emission):
-        _emit(nodes, links, value, emission, None)
+        _emit(value, emission)
     if base_color is not None:
-        links.new(_texture(nodes, links, base_color, (-400, 200)), value[BASE_COLOR])
+        _show_image(nodes, links, base_color, value[BASE_COLOR])
     return material
 
 
-def _emit(nodes, links, value, radiance, image):
-    """Emit exactly `radiance`, or the image's: strength is the largest component, so that colours stay within 1."""
-    if image is not None:
-        links.new(_texture(nodes, links, image, (-400, -200)), value[EMISSION_COLOR])
-        value[EMISSION_STRENGTH].default_value = 1.0
-        return
+def _emit(value, radiance):
+    """Emit exactly `radiance`: strength is the largest component, so that colours stay within 1."""
     strength = max(max(radiance), 0.0)
     value[EMISSION_COLOR].default_value = (*(max(c, 0.0) / strength if strength else 1.0 for c in radiance), 1)
     value[EMISSION_STRENGTH].default_value = strength
@@ -166,25 +154,22 @@ def _front_only(nodes, links, socket):
     geometry = nodes.new("ShaderNodeNewGeometry")
     geometry.location = (-450, -350)
     links.new(geometry.outputs["Backfacing"], factor)
-    if socket.links:
-        links.new(socket.links[0].from_socket, front)
-    else:
-        front.default_value = tuple(socket.default_value)
+    front.default_value = tuple(socket.default_value)
     back.default_value = (0, 0, 0, 1)
     links.new(mixed, socket)
 
 
-def _texture(nodes, links, image, place):
-    """Colour output of an image over the atlas, or its part of it."""
+def _show_image(nodes, links, image, socket):
+    """Show an image over the atlas, or its part of it."""
     coordinates = nodes.new("ShaderNodeUVMap")
     coordinates.uv_map = image.get(UV_MAP, ATLAS_UV)
-    coordinates.location = (place[0] - 250, place[1])
+    coordinates.location = (-650, 200)
     texture = nodes.new("ShaderNodeTexImage")
     texture.image = image
     texture.extension = "REPEAT" if image.get(REPEATS) else "EXTEND"
-    texture.location = place
+    texture.location = (-400, 200)
     links.new(coordinates.outputs[0], texture.inputs[0])
-    return texture.outputs["Color"]
+    links.new(texture.outputs["Color"], socket)
 
 
 def _fresh_tree(material):

@@ -19,14 +19,14 @@ CAPTURE_UV = "Capture"
 """Name of the capture's own texture coordinates, where it has any."""
 
 
-def make_objects(
+def each_object(
     mesh: Mesh,
     instances: Iterable[Instance],
     atlas_uv: np.ndarray,
     collection: bpy.types.Collection,
     parts_uv: np.ndarray | None = None,
-) -> dict[int, bpy.types.Object]:
-    """Make one mesh object for each instance and link it to a collection.
+) -> Iterator[tuple[int, bpy.types.Object]]:
+    """Make one mesh object for each instance and link it to a collection, one by one: a window can be drawn in between.
 
     Parameters
     ----------
@@ -39,23 +39,12 @@ def make_objects(
     parts_uv : (t, 3, 2) float32, optional
         See `PARTS_UV`; then these are the active ones.
 
-    Returns
-    -------
-    dict of int to bpy.types.Object
-        By `object_id`. The origin lies in the middle of the object's box; shading is flat, because the scan's
-        geometric normals are what the light was divided by.
+    Yields
+    ------
+    int, bpy.types.Object
+        `object_id` and the object. The origin lies in the middle of the object's box; shading is flat, because the
+        scan's geometric normals are what the light was divided by.
     """
-    return dict(each_object(mesh, instances, atlas_uv, collection, parts_uv))
-
-
-def each_object(
-    mesh: Mesh,
-    instances: Iterable[Instance],
-    atlas_uv: np.ndarray,
-    collection: bpy.types.Collection,
-    parts_uv: np.ndarray | None = None,
-) -> Iterator[tuple[int, bpy.types.Object]]:
-    """`make_objects` one by one, so that a window can be drawn in between."""
     order = np.argsort(mesh.object_id, kind="stable")
     sorted_id = mesh.object_id[order]
     for instance in instances:

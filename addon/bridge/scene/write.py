@@ -22,7 +22,7 @@ from ..data.added import Made
 from ..data.cameras import best_view, differing, make_cameras, make_track, make_view, unlike, use_camera
 from ..data.images import image_name, load_image, load_parts, relative_to
 from ..data.materials import make_material
-from ..data.mesh_objects import is_open, make_objects
+from ..data.mesh_objects import each_object, is_open
 from ..data.world import set_world
 from ..marks import OWN_SCENE, mark
 from ..refused import refused
@@ -108,7 +108,7 @@ def build_scene(
     top = new_room(capture.root)
     room, lamps, eyes = (part_of(top, name) for name in (ROOM, LAMPS, CAMERAS))
     scene.collection.children.link(top)
-    objects = make_objects(capture.mesh, capture.instances, atlas_uv, room, parts and parts.uv)
+    objects = dict(each_object(capture.mesh, capture.instances, atlas_uv, room, parts and parts.uv))
     run = run_of(folder)
     for owner in (top, *objects.values()):
         mark(owner, folder, run, capture.root)

@@ -66,12 +66,11 @@ def build(folder):
         uv += [[low + square[i] for i in face] for face in ((0, 1, 2), (0, 2, 3))]
         owner += [entry["object_id"]] * 2
     mesh = Mesh(np.float32(vertices), np.int32(triangles), np.int32(owner))
-    objects = bridge("data.mesh_objects").make_objects(
-        mesh,
+    instances, collection = (
         [Instance(one["object_id"], one["class_name"]) for one in ENTRIES],
-        np.float32(uv),
         bpy.context.scene.collection,
     )
+    objects = dict(bridge("data.mesh_objects").each_object(mesh, instances, np.float32(uv), collection))
     image = bridge("results.images").image(folder, "base_color.exr")
     for entry in ENTRIES:
         thing = objects[entry["object_id"]]

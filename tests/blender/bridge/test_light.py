@@ -153,23 +153,19 @@ def test_lamp_over_a_plane(scene, shoot, look):
     np.testing.assert_allclose(got, irradiance * albedo / np.pi, rtol=0.01)
 
 
-@pytest.mark.parametrize("image", [False, True])
-def test_emission_is_exact_from_both_sides(scene, shoot, look, white_world, image):
+def test_emission_is_exact_from_both_sides(scene, shoot, look, white_world):
     radiance = (31.5, 7.25, 0.0)
-    reflected = 0.0 if image else LAMP_ALBEDO  # of the world's 1; an image holds all that was seen
-    description = ObjectMaterial(0, "Lamp", EMITTER, emission=radiance)
-    add("plane", make_material(description, emission=plain(radiance) if image else None), size=4)
+    add("plane", make_material(ObjectMaterial(0, "Lamp", EMITTER, emission=radiance)), size=4)
     for place, rotation in (((0, 0, 1), (0, 0, 0)), ((0, 0, -1), (np.pi, 0, 0))):
         look(place, rotation)
         got = shoot(4, 4, 4)[..., :3].reshape(-1, 3).mean(0)
-        np.testing.assert_allclose(got, np.add(radiance, reflected), rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(got, np.add(radiance, LAMP_ALBEDO), rtol=1e-5, atol=1e-6)
 
 
-@pytest.mark.parametrize("image", [False, True])
-def test_a_one_sided_lamp_is_dark_from_behind(scene, shoot, look, image):
+def test_a_one_sided_lamp_is_dark_from_behind(scene, shoot, look):
     radiance = (31.5, 7.25, 0.0)
     description = ObjectMaterial(0, "Lamp", EMITTER, emission=radiance)
-    add("plane", make_material(description, emission=plain(radiance) if image else None, one_sided=True), size=4)
+    add("plane", make_material(description, one_sided=True), size=4)
     for place, rotation, expected in (((0, 0, 1), (0, 0, 0), radiance), ((0, 0, -1), (np.pi, 0, 0), (0, 0, 0))):
         look(place, rotation)
         seen = shoot(4, 4, 4)[..., :3].reshape(-1, 3).mean(0)

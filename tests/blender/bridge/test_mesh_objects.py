@@ -7,7 +7,7 @@ from addon.core.scene.model import Instance, Mesh
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge.data.mesh_objects import ATLAS_UV, CAPTURE_UV, make_objects  # noqa: E402
+from addon.bridge.data.mesh_objects import ATLAS_UV, CAPTURE_UV, each_object  # noqa: E402
 
 INSTANCES = (Instance(2, "Sofa"), Instance(5, "Sofa"), Instance(7, "Wall"), Instance(8, "Ghost"))
 
@@ -31,7 +31,7 @@ def read(data, name):
 
 def test_triangles_and_coordinates_come_back(scene, mesh):
     atlas = np.random.default_rng(1).random((60, 3, 2)).astype(np.float32)
-    objects = make_objects(mesh, INSTANCES, atlas, scene.collection)
+    objects = dict(each_object(mesh, INSTANCES, atlas, scene.collection))
     bpy.context.view_layer.update()
     assert list(objects) == [2, 5, 7]
     for object_id, thing in objects.items():
@@ -51,10 +51,11 @@ def test_triangles_and_coordinates_come_back(scene, mesh):
 
 
 def test_names(scene, mesh):
-    objects = make_objects(mesh, INSTANCES, mesh.uv, scene.collection)
+    objects = dict(each_object(mesh, INSTANCES, mesh.uv, scene.collection))
     assert [o.name for o in objects.values()] == ["Sofa 2", "Sofa 5", "Wall 7"]
 
 
 def test_without_own_coordinates(scene, mesh):
     bare = Mesh(mesh.vertices, mesh.triangles, mesh.object_id)
-    assert [u.name for u in make_objects(bare, INSTANCES, mesh.uv, scene.collection)[2].data.uv_layers] == [ATLAS_UV]
+    objects = dict(each_object(bare, INSTANCES, mesh.uv, scene.collection))
+    assert [u.name for u in objects[2].data.uv_layers] == [ATLAS_UV]

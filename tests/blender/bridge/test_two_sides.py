@@ -18,7 +18,7 @@ bpy = pytest.importorskip("bpy")
 
 from addon.bridge.data.images import load_image  # noqa: E402
 from addon.bridge.data.materials import make_material  # noqa: E402
-from addon.bridge.data.mesh_objects import make_objects  # noqa: E402
+from addon.bridge.data.mesh_objects import each_object  # noqa: E402
 from addon.bridge.data.unwrap import Polygons, unwrap  # noqa: E402
 from addon.bridge.job.run import run  # noqa: E402
 from addon.core.progress import Progress  # noqa: E402
@@ -54,7 +54,7 @@ def test_cycles_shows_each_side_on_its_own(scene, shoot, look, white_world, tmp_
     cells[: len(uv)] = np.where(outside[:, None], np.float32([0, 0.8, 0]), np.float32([0.8, 0, 0]))
     image = cells.reshape(edge, edge, 3).repeat(16, 0).repeat(16, 1)
     write_exr(tmp_path / "base.exr", image[::-1])
-    [thing] = make_objects(mesh, [Instance(0, "shade")], uv, scene.collection).values()
+    [thing] = dict(each_object(mesh, [Instance(0, "shade")], uv, scene.collection)).values()
     described = ObjectMaterial(0, "shade", LAMBERTIAN)
     thing.data.materials.append(make_material(described, load_image(tmp_path / "base.exr")))
     scene.render.film_transparent = True
