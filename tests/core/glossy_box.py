@@ -17,6 +17,15 @@ WALLS = np.array([[0.3] * 3, [0.6] * 3, [0.8, 0.3, 0.2], [0.3, 0.7, 0.3], [0.5] 
 GLOW = np.array([30.0, 28.0, 25.0])
 
 
+def fresnel_rise(cosine):
+    """How Fresnel's reflectance of glass rises with the angle, 0 to 1: by the angles of Snell's law."""
+    outside = np.arccos(np.clip(cosine, 0, 1))
+    within = np.arcsin(np.sin(outside) / 1.5)
+    across = (np.cos(outside) - 1.5 * np.cos(within)) / (np.cos(outside) + 1.5 * np.cos(within))
+    along = (np.cos(within) - 1.5 * np.cos(outside)) / (np.cos(within) + 1.5 * np.cos(outside))
+    return ((across**2 + along**2) / 2 - 0.04) / 0.96
+
+
 class Box:
     """The floor is looked at from many places; walls of plain radiance, a lamp in the ceiling (object 6)."""
 
@@ -69,7 +78,7 @@ class Box:
         way = eyes[frame] - atlas.position[element]
         return element, (way / np.linalg.norm(way, axis=1, keepdims=True)).astype(np.float32), frame
 
-    def lobe(self, element, direction, phi: float, across: int = 40):
+    def lobe(self, element, direction, phi: float, across: int = 40, rise=fresnel_rise):
         """A and B, (m, 3) each: the normals' distribution cut into across * across cells of equal weight."""
         u, v = np.meshgrid(*[(np.arange(across) + 0.5) / across] * 2, indexing="ij")
         angle, turn = np.arctan(phi * np.sqrt(u.ravel() / (1 - u.ravel()))), 2 * np.pi * v.ravel()
@@ -88,7 +97,7 @@ class Box:
             # f cos dw = G2 F / (4 n.w n.wo) D n.w 4 (wo.h) dh, and D (n.h) dh is one cell
             share = masking(w[:, 2]) * masking(wo[2]) * c / (wo[2] * n_h) / across**2
             L = self.arriving(np.broadcast_to(position[i], w.shape), w)
-            s = (1 - c) ** 5
+            s = rise(c)
             A[i], B[i] = ((1 - s) * share) @ L, (s * share) @ L
         return A, B
 

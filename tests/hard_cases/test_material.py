@@ -15,7 +15,7 @@ from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.brdf.metal import METAL
 from addon.core.light.emitters import bright_triangles
 from addon.core.light.lobes import reflected_light
-from tests.core.glossy_box import GLOW, WALLS, Box
+from tests.core.glossy_box import GLOW, WALLS, Box, fresnel_rise
 from tests.core.rooms import box_sides, look_at, make_room, picture
 from tests.hard_cases.rooms import DEFAULT, PAPERS
 
@@ -69,7 +69,7 @@ class GlossyFloor:
             c = wo[at] @ h.T
             w = 2 * c[..., None] * h - wo[at, None]
             up = (w[..., 2] > 1e-4) & (c > 0)
-            s = (1 - np.clip(c, 0, 1)) ** 5
+            s = fresnel_rise(c)
             n_w, n_wo = np.maximum(w[..., 2], 1e-4), wo[at, 2:]
             share = np.where(up, masking(n_w) * masking(n_wo) * c / (n_wo * h[:, 2]), 0) / self.across**2
             L = self.box.arriving(np.repeat(where[at], len(h), 0), w.reshape(-1, 3)).reshape(*c.shape, 3)
@@ -83,7 +83,7 @@ class GlossyFloor:
 
 @pytest.mark.parametrize("cosine", [1.0, 0.5, 0.2, 0.05], ids=["straight on", "60 degrees", "78 degrees", "87 degrees"])
 def test_lobe_in_a_furnace(expect, cosine):
-    """All that arrives is 1. A mirror reflects F0 + (1 - F0) (1 - n.v)^5 of it; no lobe more than all."""
+    """All that arrives is 1. A mirror reflects F0 + (1 - F0) s of it, as Fresnel's term; no lobe more than all."""
     room = make_room(box_sides(), 0.25)
     field = room.field(np.ones((len(room.atlas), 3), np.float32))
     element = np.flatnonzero(room.atlas.object_id == 0)[:40]
@@ -95,8 +95,8 @@ def test_lobe_in_a_furnace(expect, cosine):
     assert np.isfinite(light.A).all() and np.isfinite(light.B).all() and min(light.A.min(), light.B.min()) >= 0
     A, B = light.A.mean((0, 2)), light.B.mean((0, 2))
     if cosine >= 0.2:  # beyond, even a lobe of alpha 0.01 is no mirror
-        fresnel = (1 - cosine) ** 5
-        expect("alpha 0.01, F0 0: (1 - n.v)^5, absolute", float(abs(B[0] - fresnel)), 0.01)
+        fresnel = fresnel_rise(cosine)
+        expect("alpha 0.01, F0 0: Fresnel's rise, absolute", float(abs(B[0] - fresnel)), 0.01)
         expect("alpha 0.01, F0 1: all of it, absolute", float(abs(A[0] + B[0] - 1)), 0.02)
     expect("more than all light, at any alpha", float(max((A + B).max() - 1, 0)), 0.02)
 

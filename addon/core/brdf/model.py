@@ -3,9 +3,9 @@
 A model is one file of this folder, or of another package (`registry`): a `Brdf` with a name. Nobody else compares
 names; who wants to know something of a model asks it.
 
-The specular part of a model is linear in F0, as Schlick's Fresnel term is:
+The specular part of a model is linear in F0, s being how Fresnel's term rises with the angle (`fresnel`):
 
-    f_s = (G D)(alpha) (F0 (1 - s) + s),   s = (1 - w.h)^5
+    f_s = (G D)(alpha) (F0 (1 - s) + s)
 
 so the light transport needs G D alone, of many widths at once (`Microfacets`), and the fit is linear least squares.
 """
@@ -18,7 +18,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..paper.brdf import F
+from .fresnel import fresnel
 
 F0 = float | tuple[float, float, float]
 """Reflectance at normal incidence, 0...1, linear Rec.709: one number, or three of a coloured one."""
@@ -229,7 +229,7 @@ class Brdf:
         if self.microfacets is not None and of.alpha is not None and of.f0 is not None:
             w, wo, sin2_h = (np.asarray(x, np.float32)[:, None] for x in (n_w, n_wo, (1 - n_h) * (1 + n_h)))
             lobe = self.microfacets.lobes(w, wo, sin2_h, np.array([of.alpha]))[:, 0]
-            result += lobe * F(np.asarray(w_h)[:, None], np.broadcast_to(of.f0, 3))
+            result += lobe * fresnel(np.asarray(w_h)[:, None], np.broadcast_to(of.f0, 3))
         return result
 
     def as_f0(self, value: Any) -> F0 | None:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..brdf import ggx
+from ..brdf.fresnel import rise
 from ..brdf.model import Microfacets
 from ..kinds import Block, Code
 from ..parallel import for_blocks
@@ -139,9 +140,7 @@ def reflected_light(
         along = np.einsum("amk,am->mk", w, local_wo)  # w.wo, from which |w + wo|, w.h and n.h follow
         h = w[:2] + local_wo[:2, :, None]
         sin2_h = np.minimum(np.einsum("amk,amk->mk", h, h) / np.maximum(2 + 2 * along, 1e-9), 1)
-        away = 1 - np.sqrt(np.clip((1 + along) / 2, 0, 1))
-        s = away * away
-        s *= s * away
+        s = rise(np.sqrt(np.clip((1 + along) / 2, 0, 1)))
         # G1(n.wo) D / 2 is the density of `ggx.visible_normal_density`
         for phi in proposals:
             a = np.float32(phi * phi)

@@ -95,7 +95,7 @@ class Corrected(Stages):
         """The same, but with none for some objects."""
         found = self.specular()
         apart = [m.object_id for m in found.materials if m.model.see_through]
-        albedo = self.albedo_under(self.irradiance, found.specular, without)
+        albedo = self.albedo_under(self.irradiance, found.taken, without)
         # What shows its background has no albedo that was measured.
         origin = np.where(np.isin(self.surface().atlas.object_id, apart), np.int8(NO_ALBEDO), albedo.origin)
         return with_base_colors(replace(albedo, origin=origin), self.surface().atlas, self.overrides)
@@ -170,7 +170,7 @@ def white_scale(run: Corrected) -> WhiteScale | None:
     before, scale = run.irradiance_found, ones
     others = {i.object_id for i in run.capture.instances} - {white.object_id}
     for _ in range(CORRECTED.rounds):
-        albedo = run.albedo_under(before * scale, run.specular().specular, others)
+        albedo = run.albedo_under(before * scale, run.specular().taken, others)
         own = (atlas.object_id == white.object_id) & (albedo.origin == MEASURED)
         mean = np.average(albedo.rho[own], 0, atlas.area[own]) if own.any() else np.zeros(3)
         if white.object_id in run.emitters or mean.min() <= 0:

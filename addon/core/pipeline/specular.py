@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,6 @@ from ..brdf.lambertian import LAMBERTIAN
 from ..brdf.material import ObjectMaterial, from_json
 from ..light.field import LightField
 from ..light.lamps import Lamp
-from ..light.lobes import GRID
 from ..parallel import ordered_map
 from ..passes.glossy_light.glossy_light import Excess, glossy_light
 from ..passes.see_through.see_through import look_behind
@@ -22,10 +21,11 @@ from ..passes.specular.given import given_note, same_material
 from ..passes.specular.params import FIT
 from ..passes.specular.problems import Problems
 from ..passes.specular.separate import specular_in_median, spread_over_object
-from ..progress import Progress
+from ..passes.specular_removal.removal import SpecularPart, without_specular
+from ..progress import Progress, Rounds
 from ..results.overrides import NOTHING, Given, Overrides
 from ..scene.lit_diffuse import LitDiffuse
-from ..scene.model import Instance
+from ..scene.model import Frame, Instance, Pixels
 from ..scene.samples import Samples
 from .choose_models import Chosen, Room, choose_models
 from .frames import STAGE as FRAMES
@@ -34,7 +34,9 @@ from .shading import STAGE as SHADING
 from .stage import Stage
 from .surface import STAGE as SURFACE
 
-STAGE = Stage("specular", Path(__file__), (SURFACE, FRAMES, SHADING), ("specular", "specular_rays", "refine", "seed"))
+STAGE = Stage(
+    "specular", Path(__file__), (SURFACE, FRAMES, SHADING), ("specular", "specular_rays", "refine", "median", "seed")
+)
 
 
 @dataclass(frozen=True)
@@ -49,21 +51,30 @@ class Specular:
         Part of each element's L_d that is specular, or came through it from behind.
     excess : (n, 3) float32
         What is to be added to E, as glossy things throw more on each element than their L_d says.
+    hidden : (n,) bool
+        In every view the specular part is more than what is left: L_d tells of no albedo.
     """
 
     materials: tuple[ObjectMaterial, ...]
     specular: np.ndarray
     excess: np.ndarray
+    hidden: np.ndarray
+
+    @property
+    def taken(self) -> np.ndarray:
+        """`specular`, NaN where it hides the diffuse part, (n, 3) float32."""
+        return np.where(self.hidden[:, None], np.float32(np.nan), self.specular)
 
     def to_store(self, overrides: Overrides) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """What is stored of it: arrays, and what JSON holds."""
         meta = {"materials": [m.as_dict() for m in self.materials], "overrides": overrides.as_dict()}
-        return {"specular": self.specular, "excess": self.excess}, meta
+        return {"specular": self.specular, "excess": self.excess, "hidden": self.hidden}, meta
 
     @staticmethod
     def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any]) -> Specular:
         """From the stage's arrays, and the descriptions as JSON has them."""
-        return Specular(tuple(from_json(one) for one in meta["materials"]), arrays["specular"], arrays["excess"])
+        materials = tuple(from_json(one) for one in meta["materials"])
+        return Specular(materials, arrays["specular"], arrays["excess"], arrays["hidden"])
 
 
 @dataclass(frozen=True)
@@ -72,6 +83,28 @@ class Held:
 
     found: Specular
     only: Collection[int]
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """The frames, as lobes are taken out of them.
+
+    Attributes
+    ----------
+    frames : sequence of Frame
+        All of the capture's, in the poses that they were found to have.
+    read : callable
+        Gives a frame's pixels.
+    median : str
+        As `accumulate` takes it.
+    folder : Path
+        Where the exact median keeps observations meanwhile.
+    """
+
+    frames: Sequence[Frame]
+    read: Callable[[Frame], Pixels]
+    median: str
+    folder: Path
 
 
 def fit_specular(
@@ -83,6 +116,7 @@ def fit_specular(
     samples: Samples,
     frame_names: list[str],
     *,
+    pictures: Pictures | None = None,
     rays: int = 256,
     refine: int = 2,
     threads: int = 0,
@@ -100,6 +134,8 @@ def fit_specular(
     ----------
     irradiance : (n, 3) float32
         E of each element, from L_d.
+    pictures : Pictures, optional
+        What lobes are taken out of; without, they stay in L_d.
     refine : int
         0 leaves L_d as the median gave it; 1 takes the lobes out of it; 2 also corrects E for what they really throw.
     noise : float
@@ -121,7 +157,7 @@ def fit_specular(
     given = given or {}
     # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
     maker = Problems(field, samples, threads=1, seed=seed, without=without)
-    refine = 0 if "specular-in-median" in without else min(refine, 1) if "glossy-light" in without else refine
+    refine = 0 if "specular-removal" in without else min(refine, 1) if "glossy-light" in without else refine
     found_before = {lamp.object_id for lamp in lamps} | {mirror.object_id for mirror in field.mirrors}
     wanted = _wanted(instances, found_before, given, held)
     room = Room(instances, field, lit_diffuse, irradiance, samples, frame_names, noise)
@@ -144,13 +180,16 @@ def fit_specular(
     materials = tuple(by_id.values())
 
     specular = np.zeros((len(field.atlas), 3), np.float32)
-    excess = np.zeros_like(specular)
+    excess, hidden = np.zeros_like(specular), np.zeros(len(specular), bool)
     if held is not None:
         specular = np.where(np.isin(field.atlas.object_id, list(held.only))[:, None], specular, held.found.specular)
         excess = held.found.excess
+        hidden = held.found.hidden & ~np.isin(field.atlas.object_id, list(held.only))
     if refine:
         apart = [m for m in materials if m.object_id not in kept]
-        _take_out(specular, apart, room, maker, max(rays // FIT.separate_rays, 16), threads, progress)
+        _without_backgrounds(specular, apart, room, maker, threads)
+        if pictures is not None:
+            hidden |= _remove(specular, apart, room, pictures, rays, threads, seed, progress)
     if refine > 1 and held is None:
         seen = np.flatnonzero(lit_diffuse.seen)
         sent = Excess(field, materials, specular, seed)
@@ -158,7 +197,7 @@ def fit_specular(
             sent, seen, irradiance[seen], threads=threads, seed=seed, progress=progress, share=(0.85, 1.0),
             without=without,
         )  # fmt: skip
-    return Specular(materials, specular, excess)
+    return Specular(materials, specular, excess, hidden)
 
 
 def _wanted(
@@ -209,42 +248,42 @@ def _same_as(by_id: dict[int, ObjectMaterial], given: Mapping[int, Given], kept:
             by_id[i] = same_material(by_id[source], by_id[i])
 
 
-def _take_out(
+def _remove(
     specular: np.ndarray,
     materials: list[ObjectMaterial],
     room: Room,
-    maker: Problems,
+    pictures: Pictures,
     rays: int,
     threads: int,
+    seed: int,
     progress: Progress | None,
+) -> np.ndarray:
+    """Put the specular part of glossy things' L_d into `specular`, (n, 3); where it hides the rest, (n,) bool."""
+    glossy, field, samples = [m for m in materials if m.model.layered], room.field, room.samples
+    own = np.isin(field.atlas.object_id, [m.object_id for m in glossy])
+    looking = np.unique(samples.frame[own[samples.element]])
+    if not len(looking):
+        return np.zeros(len(own), bool)
+    found = without_specular(
+        SpecularPart(field, glossy, rays, seed), field, room.lit_diffuse, own,
+        [pictures.frames[i] for i in looking], pictures.read, median=pictures.median, seed=seed, threads=threads,
+        folder=pictures.folder, progress=Rounds(progress, 0.7, 1.0),
+    )  # fmt: skip
+    specular[own] = found.specular[own]
+    return found.hidden
+
+
+def _without_backgrounds(
+    specular: np.ndarray, materials: list[ObjectMaterial], room: Room, maker: Problems, threads: int
 ) -> None:
-    """Put the specular part of L_d of all that is glossy or transparent into `specular`, (n, 3)."""
-    glossy = [m for m in materials if m.model.layered] + [m for m in materials if m.surfaces is not None]
+    """Put what came from behind glass into `specular`, (n, 3)."""
+    glass = [m for m in materials if m.surfaces is not None]
 
     def separate(material: ObjectMaterial) -> tuple[np.ndarray, np.ndarray]:
-        if material.model.see_through:
-            return _without_background(material, room.field, room.lit_diffuse.seen, maker, room.samples)
-        return _separate(material, room.field, maker, room.samples, rays)
+        return _without_background(material, room.field, room.lit_diffuse.seen, maker, room.samples)
 
-    for done, (own, part) in enumerate(ordered_map(separate, glossy, threads)):
+    for own, part in ordered_map(separate, glass, threads):
         specular[own] = part
-        if progress is not None:
-            progress.update(0.7 + 0.15 * (done + 1) / len(glossy))
-
-
-def _separate(
-    material: ObjectMaterial, field: LightField, maker: Problems, samples: Samples, rays: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """A glossy object's elements (n,), and the specular part of their L_d, (n, 3)."""
-    own = np.flatnonzero(field.atlas.object_id == material.object_id)
-    index = maker.pick(material.object_id, FIT.separate_elements, FIT.separate_views, least=1, seed=2)
-    if not len(index):
-        return own, np.zeros((len(own), 3), np.float32)
-    if material.alpha is None or material.f0 is None or material.model.microfacets is None:
-        raise ValueError(f"{material.name} has no lobe")
-    light = maker.light(index, rays, max(material.alpha, float(GRID[0])), microfacets=material.model.microfacets)
-    element, part = specular_in_median(samples, index, material.f0 * light.A[:, 0] + light.B[:, 0])
-    return own, spread_over_object(field.atlas, own, element, part)
 
 
 def _without_background(

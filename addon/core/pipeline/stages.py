@@ -33,7 +33,7 @@ from ..stages import WRITE
 from . import frames, shading, specular, surface
 from .frames import FrameReader, Observed
 from .source import digest
-from .specular import Held, Specular, fit_specular
+from .specular import Held, Pictures, Specular, fit_specular
 from .stage import Stage
 
 STAGES = (surface.STAGE, frames.STAGE, shading.STAGE, specular.STAGE)
@@ -237,6 +237,7 @@ class Stages:
         names = [frame.name for frame in self.capture.frames]
         return fit_specular(
             self.capture.instances, self.field, lit, light.irradiance, light.lamps, samples, names,
+            pictures=Pictures(self.frames, self.read, s.median, self.store.folder) if names else None,
             rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
             noise=self.surface().noise, given=self.overrides.lobes(), held=held, without=s.without,
             as_published="specular" in s.published, progress=self.progress,

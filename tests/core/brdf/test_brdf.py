@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from addon.core.brdf import ggx as brdf
+from addon.core.brdf.fresnel import fresnel, rise
 
 PHIS = [0.05, 0.2, 0.5, 1.0]
 
@@ -96,6 +97,20 @@ def test_sampled_normals_follow_the_density(phi, degrees):
             sampled = ((drawn[:, 2] < tilt) & ((drawn[:, 0] > 0) == (h[side][0, 0] > 0))).mean()
             assert sampled == pytest.approx(density[(h[:, 2] < tilt) & side].sum(), abs=0.012)
     assert abs(drawn[:, 1].mean()) < 0.01
+
+
+def test_fresnels_term_is_that_of_glass():
+    """By the angles of Snell's law; other F0 have the same curve between F0 and 1."""
+    cosine = np.linspace(0, 1, 50)
+    angle = np.arccos(cosine)
+    within = np.arcsin(np.sin(angle) / 1.5)
+    with np.errstate(invalid="ignore"):
+        across = (np.sin(angle - within) / np.sin(angle + within)) ** 2
+        along = (np.tan(angle - within) / np.tan(angle + within)) ** 2
+    expected = np.where(cosine < 1, (across + along) / 2, 0.04)
+    assert fresnel(cosine, 0.04) == pytest.approx(expected, abs=1e-6)
+    assert fresnel(cosine, 0.5) == pytest.approx(0.5 + 0.5 * (expected - 0.04) / 0.96, abs=1e-6)
+    assert (rise(np.float32([1, 1 - 1e-7])) >= 0).all()
 
 
 def test_f_nd_is_the_product_and_is_reciprocal():

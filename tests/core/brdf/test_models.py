@@ -21,7 +21,7 @@ from addon.core.light.lobes import reflected_light
 from addon.core.results.overrides import Given, parse
 from tests.core.brdf.test_brdf import sphere, tilted
 from tests.core.fit.test_fit import paint, steps
-from tests.core.glossy_box import Box
+from tests.core.glossy_box import Box, fresnel_rise
 from tests.core.passes.specular.test_given import Seen
 
 DOCS = Path(__file__).resolve().parents[3] / "docs" / "extending.md"
@@ -152,7 +152,7 @@ class BeckmannBox(Box):
             w, c, n_h = w[up], cosine[up], h[up, 2]
             share = masking(w[:, 2]) * masking(wo[2]) * c / (wo[2] * n_h) / across**2
             L = self.arriving(np.broadcast_to(position[i], w.shape), w)
-            s = (1 - c) ** 5
+            s = fresnel_rise(c)
             A[i], B[i] = ((1 - s) * share) @ L, (s * share) @ L
         return A, B
 

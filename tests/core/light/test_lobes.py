@@ -9,7 +9,7 @@ from addon.core.brdf import ggx as brdf
 from addon.core.light.emitters import bright_triangles
 from addon.core.light.lobes import GRID, reflected_light
 from tests.core.brdf.test_brdf import sphere
-from tests.core.glossy_box import Box
+from tests.core.glossy_box import Box, fresnel_rise
 from tests.core.rooms import box_sides, make_room, quad
 
 PHIS = np.float32([0.02, 0.09, 0.137, 0.3, 0.47, 0.8, 1.0])  # none of the proposals' widths
@@ -26,7 +26,8 @@ def albedo_of_lobe(cosine: float, phi: float) -> tuple[float, float]:
     up = (w_z > 0) & (c > 0)
     c, n_h, n_w = c[up], h[up, 2], w_z[up]
     share = brdf.G(n_w, np.full(len(n_w), cosine), phi) * 4 * c * n_w / n_h / len(h)
-    return float(((1 - (1 - c) ** 5) * share).sum()), float(((1 - c) ** 5 * share).sum())
+    s = fresnel_rise(c)
+    return float(((1 - s) * share).sum()), float((s * share).sum())
 
 
 @pytest.mark.parametrize("cosine", [0.95, 0.6, 0.3])
@@ -79,7 +80,7 @@ def test_a_small_lamps_highlight(phi):
         w /= np.sqrt(r2)[:, None]
         h = (w + wo) / np.linalg.norm(w + wo, axis=1, keepdims=True)
         f = brdf.G(w[:, 2], np.full(len(w), wo[2]), phi) * brdf.D(h[:, 2], phi)
-        s = (1 - (w * h).sum(1)) ** 5
+        s = fresnel_rise((w * h).sum(1))
         step = w[:, 2] * w[:, 2] / r2 * 100 * 0.01 / 400
         A[i], B[i] = (f * (1 - s) * step).sum(), (f * s * step).sum()
     bright = A > 0.02 * A.max()

@@ -14,6 +14,11 @@ from tests.core.paper.test_light import captured
 from tests.core.rooms import box_sides, make_room
 
 
+def schlick(cosine):
+    """The paper's rise of the reflectance with the angle."""
+    return (1 - cosine) ** 5
+
+
 @pytest.fixture(scope="module")
 def box():
     return Box()
@@ -52,7 +57,7 @@ def test_f_nd_is_reciprocal_and_takes_no_more_than_it_gets():
 def test_a_and_b_are_the_lobes_integrals(box, phi):
     element, direction, _ = box.views(40, 1)
     A, B = parts(box, element, direction, 40_000, np.float32([phi]))
-    true_A, true_B = box.lobe(element, direction, phi, 80)
+    true_A, true_B = box.lobe(element, direction, phi, 80, schlick)
     assert A[:, 0].mean(0) == pytest.approx(true_A.mean(0), rel=0.05)
     assert B[:, 0].mean(0) == pytest.approx(true_B.mean(0), rel=0.08)
 
@@ -82,7 +87,7 @@ def test_psi_stays_physical():
 @pytest.mark.parametrize(("phi", "psi"), [(0.11, 0.1), (0.2, 0.2), (0.41, 0.2), (0.2, 0.04)])
 def test_the_lobe_of_one_frame_comes_back(box, phi, psi):
     element, direction, _ = box.views(400, 1, seed=4)
-    A, B = box.lobe(element, direction, phi)
+    A, B = box.lobe(element, direction, phi, rise=schlick)
     seen = (psi * A + B) * np.exp(np.random.default_rng(0).normal(0, 0.02, A.shape))
     found = fit_lobe(*parts(box, element, direction), seen)
     steps = abs(int(np.argmin(np.abs(PHI - found.phi))) - int(np.argmin(np.abs(PHI - phi))))

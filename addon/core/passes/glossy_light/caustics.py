@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...brdf.fresnel import fresnel
 from ...brdf.ggx import GGX, LEAST
 from ...brdf.model import Microfacets
 from ...kinds import Block
@@ -25,7 +26,6 @@ from ...light.emitters import BrightTriangles, sample_bright
 from ...light.field import LightField
 from ...light.less_noise import cells
 from ...light.params import LESS_NOISE
-from ...paper.brdf import F
 from ...scene.atlas import Atlas
 from ...scene.tangent_frame import tangent_frame, to_world
 from .params import CAUSTICS
@@ -150,7 +150,7 @@ def _sent_on(room: LightField, gloss: Gloss, element: np.ndarray, light: _Light,
     for own, microfacets, alpha in gloss.alike(element):
         square = rng.random((2, len(own)), np.float32)
         gone[:, own], w_h, weight = microfacets.reflect(came[:, own], square, alpha)
-        share[own] = F(w_h[:, None], gloss.f0[element[own]]) * weight[:, None]
+        share[own] = fresnel(w_h[:, None], gloss.f0[element[own]]) * weight[:, None]
     alive = np.flatnonzero(share.any(1))
     ways = np.einsum("amj,am->mj", axes[:, alive], gone[:, alive]).astype(np.float32)
     origin = room.scene.off_surface(light.origin[alive], normal[alive])

@@ -19,9 +19,8 @@ class FitParams:
         A lobe that raises the cost by this factor in the first look needs no second.
     looks_like_none : float
         A metal whose spread is so many times the other's in the first look needs no second.
-    separate_elements, separate_views, separate_rays : int
-        The same for what is taken out of a median (`specular-in-median`): it averages over views and the lobe's width
-        is known, so so many times fewer rays do.
+    separate_elements, separate_views : int
+        The same for what is behind glass.
     noisy, again, narrowest_phi : float, int, float
         Noise of a dielectric's lobe, as a share of the radiance, from which on an observation gets so many times more
         rays. Highlights of a bulb half hidden in its shade had .4: a desk's psi came out at .11 with 256 rays each, at
@@ -42,7 +41,6 @@ class FitParams:
     looks_like_none: float = 1.5
     separate_elements: int = 2500
     separate_views: int = 9
-    separate_rays: int = 8
     noisy: float = 0.2
     again: int = 8
     narrowest_phi: float = 0.02

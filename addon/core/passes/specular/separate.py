@@ -1,8 +1,7 @@
-"""The median is not the diffuse part: takes the fitted lobe out of the observations and the median anew.
+"""What is behind glass, taken out of the observations of some elements and spread over the object.
 
-A broad lobe is in every view. Where the lobe is known, each observation gives I - I_nd, and the median of those is the
-diffuse part. That is done for the sampled elements; the others take over the difference to L_d from their neighbours,
-which varies slowly where texture does not.
+The elements that were not looked at take over the difference to L_d from their neighbours, which varies slowly where
+texture does not.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from addon.core.passes.glossy_light import glossy_light as glossy_light_module
 from addon.core.passes.glossy_light.glossy_light import Excess, glossy_light
 from addon.core.passes.glossy_light.params import GLOSSY
 from addon.core.scene.tangent_frame import tangent_frame
-from tests.core.glossy_box import Box
+from tests.core.glossy_box import Box, fresnel_rise
 from tests.core.rooms import polygon_irradiance
 
 PSI = 0.2
@@ -31,7 +31,7 @@ def polished(model: str = DIELECTRIC, psi: float = PSI) -> tuple[ObjectMaterial,
 
 
 def over_the_floor(box: Box, element: np.ndarray, psi: float, across: int = 120) -> np.ndarray:
-    """E by way of a mirror in the floor with Schlick's reflectance, from directions of equal weight, (m, 3)."""
+    """E by way of a mirror in the floor with glass's reflectance, from directions of equal weight, (m, 3)."""
     atlas = box.room.atlas
     u, v = np.meshgrid(*[(np.arange(across) + 0.5) / across] * 2, indexing="ij")
     r, turn = np.sqrt(u.ravel()), 2 * np.pi * v.ravel()
@@ -45,7 +45,7 @@ def over_the_floor(box: Box, element: np.ndarray, psi: float, across: int = 120)
         hit = p + w[down] * (p[2] / -w[down, 2:])
         inside = ((hit[:, :2] > 0) & (hit[:, :2] < (4.0, 3.0))).all(1)
         w, hit = w[down][inside], hit[inside]
-        s = (1 + w[:, 2:]) ** 5
+        s = fresnel_rise(-w[:, 2:])
         total[k] = np.pi * ((psi + (1 - psi) * s) * box.arriving(hit, w * (1, 1, -1))).sum(0) / across**2
     return total
 

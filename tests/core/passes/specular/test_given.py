@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -12,13 +14,15 @@ from addon.core.brdf.metal import METAL
 from addon.core.light.lamps import Lamp
 from addon.core.passes.specular.given import fit_given
 from addon.core.passes.specular.problems import Problems
-from addon.core.pipeline.specular import Held, fit_specular
+from addon.core.pipeline.specular import Held, Pictures, fit_specular
 from addon.core.results.overrides import Given
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.samples import Samples
 from addon.core.scene.visibility import CLEAN
 from tests.core.fit.test_fit import paint, steps
 from tests.core.glossy_box import GLOW, Box
+from tests.core.lit_diffuse.test_accumulate import frames_of
+from tests.core.rooms import look_at, pixels_of
 
 COPPER = np.array([0.9, 0.6, 0.3])
 RAYS = 256
@@ -46,6 +50,9 @@ class Seen:
                               np.zeros(n, np.float32))  # fmt: skip
         self.maker = Problems(self.field, self.samples, threads=2)
         self.irradiance = self.box.irradiance.astype(np.float32)
+        cameras = [look_at((0.5 + 0.3 * i, 1, 1.5), (2, 1.5, 0), 16, 12, 80) for i in range(10)]
+        grey = pixels_of(np.ones((12, 16, 3)))
+        self.pictures = Pictures(frames_of(cameras), lambda frame: grey, "adaptive", Path())
 
     def fit(self, given):
         return fit_given(given, self.maker, FLOOR, self.irradiance, RAYS)[0]
@@ -60,6 +67,7 @@ class Seen:
             (lamp,),
             self.samples,
             [f"{i:03d}" for i in range(10)],
+            pictures=self.pictures,
             rays=64,
             refine=1,
             threads=2,

@@ -1,0 +1,29 @@
+"""What the removal of specular parts is told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class RemovalParams:
+    """How the specular part is predicted, and when it is believed.
+
+    Attributes
+    ----------
+    fewer, least : int
+        So many times fewer rays a pixel than an observation has in the fit, and at least so many.
+    reach, width : int, float
+        Pixels whose rays are shared, and the standard deviation of their weights, in pixels.
+    most : float
+        Times what is left that the specular part may be.
+    """
+
+    fewer: int = 32
+    least: int = 8
+    reach: int = 2
+    width: float = 1.0
+    most: float = 3.0
+
+
+REMOVAL = RemovalParams()

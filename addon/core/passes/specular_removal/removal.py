@@ -1,0 +1,165 @@
+"""Specular removal: what a fitted lobe shows in a frame is taken out of that frame, and the median is of what is left.
+
+Once lobes are known the model I = I_d + I_nd gives every observation its diffuse part. The median of those is L_d where
+most views hold a highlight, too: a floor that mirrors a window from wherever one stands. Differences of medians, spread
+between samples, left such windows white there, and what lies beside them burnt.
+
+I_nd is predicted over whole pictures, by few rays in each pixel; pixels nearby on the same object share theirs. Where
+it is more than what is left, the pixel is taken for a bound, as a clipped one is: it counts where there is no other,
+and what rests on such pixels alone is not measured.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...brdf.material import ObjectMaterial
+from ...brdf.model import Microfacets
+from ...kinds import Code
+from ...light.emitters import bright_triangles
+from ...light.field import LightField
+from ...light.lobes import GRID, reflected_light
+from ...lit_diffuse.accumulate import accumulate
+from ...scene.lit_diffuse import LitDiffuse
+from ...scene.model import Camera, Frame, Pixels
+from ...scene.visibility import SATURATED
+from .params import REMOVAL, RemovalParams
+
+NO_OBJECT: Code[int] = -1
+
+
+@dataclass(frozen=True)
+class Removed:
+    """What the frames show of L_d without its specular part.
+
+    Attributes
+    ----------
+    specular : (n, 3) float32
+        Part of L_d that is not diffuse; 0 where nothing was asked for.
+    hidden : (n,) bool
+        In every view the specular part is more than what is left.
+    """
+
+    specular: np.ndarray
+    hidden: np.ndarray
+
+
+class SpecularPart:
+    """The specular part of whole pictures.
+
+    Parameters
+    ----------
+    field : LightField
+    materials : sequence of ObjectMaterial
+        Those whose lobes are predicted.
+    rays : int
+        Of each observation in the fit.
+    """
+
+    def __init__(
+        self,
+        field: LightField,
+        materials: Sequence[ObjectMaterial],
+        rays: int,
+        seed: int = 0,
+        params: RemovalParams = REMOVAL,
+    ):
+        self._field, self._bright, self._params, self._seed = field, bright_triangles(field), params, seed
+        self._rays = max(rays // params.fewer, params.least)
+        self._lobes: dict[int, tuple[float, float, Microfacets]] = {}
+        for m in materials:
+            if m.alpha is None or m.f0 is None or m.model.microfacets is None:
+                raise ValueError(f"{m.name} has no lobe")
+            lobe = max(float(m.alpha), float(GRID[0])), float(np.mean(m.f0)), m.model.microfacets
+            self._lobes[m.object_id] = lobe
+
+    def __call__(self, camera: Camera, seed: int) -> np.ndarray:
+        """I_nd as a camera sees it, (height, width, 3) float32; 0 where there is no lobe."""
+        field = self._field
+        directions, led = camera.rays(camera.pixel_centres())
+        origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
+        hits = field.scene.intersect(origins, directions)
+        element = np.where(led, field.elements(hits), -1)
+        shown = np.where(element >= 0, field.atlas.object_id[element], NO_OBJECT)
+        part = np.zeros((len(element), 3), np.float32)
+        for object_id in self._lobes.keys() & set(np.unique(shown).tolist()):
+            # Each object has rays of its own, so that its part is the same whichever others are asked for.
+            (alpha, f0, microfacets), at = self._lobes[object_id], np.flatnonzero(shown == object_id)
+            light = reflected_light(
+                field, self._bright, element[at], -directions[at], rays=self._rays, grid=np.array([alpha], np.float32),
+                proposals=(alpha,), microfacets=microfacets, threads=1, seed=self._seed + seed + object_id,
+            )  # fmt: skip
+            part[at] = f0 * light.A[:, 0] + light.B[:, 0]
+        shape = camera.height, camera.width
+        return self._shared(part.reshape(*shape, 3), shown.reshape(shape))
+
+    def _shared(self, part: np.ndarray, owner: np.ndarray) -> np.ndarray:
+        """The mean of pixels nearby that show the same object."""
+        height, width = owner.shape
+        total, weights = part.copy(), np.ones(owner.shape, np.float32)
+        reach = range(-self._params.reach, self._params.reach + 1)
+        for down in reach:
+            for right in reach:
+                if not (down or right):
+                    continue
+                weight = np.float32(np.exp(-(down**2 + right**2) / (2 * self._params.width**2)))
+                rows, columns = (slice(max(-by, 0), n - max(by, 0)) for by, n in ((down, height), (right, width)))
+                others = (slice(max(by, 0), n - max(-by, 0)) for by, n in ((down, height), (right, width)))
+                own, other = (rows, columns), tuple(others)
+                alike = weight * (owner[own] == owner[other])
+                total[own] += alike[..., None] * part[other]
+                weights[own] += alike
+        return total / weights[..., None]
+
+
+def without_specular(
+    part: SpecularPart,
+    field: LightField,
+    lit: LitDiffuse,
+    own: np.ndarray,
+    frames: Sequence[Frame],
+    read: Callable[[Frame], Pixels],
+    params: RemovalParams = REMOVAL,
+    **how: Any,
+) -> Removed:
+    """Take the specular part out of every frame, and the median of what is left.
+
+    Parameters
+    ----------
+    part : SpecularPart
+    lit : LitDiffuse
+        With the specular part.
+    own : (n,) bool
+        Elements of glossy objects.
+    frames : sequence of Frame
+        In the poses that `lit` was accumulated with.
+    read : callable
+        Gives a frame's pixels.
+    **how
+        As `accumulate` takes it: median, seed, threads, folder, progress.
+
+    Raises
+    ------
+    BadInputError
+        From `read`.
+    InterruptedRun
+        From a progress.
+    """
+
+    def rest(frame: Frame) -> Pixels:
+        pixels = read(frame)
+        specular = part(frame.camera, zlib.crc32(frame.name.encode()) & 0xFFFFFF)
+        left = pixels.radiance - specular
+        hidden = specular.sum(-1) > params.most * left.sum(-1)
+        return replace(pixels, radiance=left, saturated=pixels.saturated | hidden)
+
+    found = accumulate(field.mesh, field.atlas, field.scene, frames, rest, only=own, **how)
+    told = own & lit.seen & found.seen
+    radiance = np.nan_to_num(lit.radiance)
+    specular = np.where(told[:, None], radiance - np.maximum(np.nan_to_num(found.radiance), 0), 0).astype(np.float32)
+    return Removed(specular, told & (found.tier == SATURATED))

@@ -1,0 +1,94 @@
+"""Specular removal: a painted floor that mirrors a lamp, its lobe summed up by brute force, against the paint."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon.core.brdf.dielectric import DIELECTRIC
+from addon.core.brdf.material import ObjectMaterial
+from addon.core.errors import InterruptedRun
+from addon.core.passes.specular_removal.removal import SpecularPart, without_specular
+from addon.core.progress import Progress
+from tests.core.glossy_box import Box
+from tests.core.lit_diffuse.test_accumulate import frames_of, run
+from tests.core.rooms import look_at, pixels_of
+
+ALPHA, F0, FLOOR = 0.1, 0.04, 0
+EYES = [(0.5 + 0.02 * i, 1.4 + 0.03 * (i % 3), 1.5 + 0.02 * (i % 4)) for i in range(7)]
+"""Close together: most of them see the lamp mirrored at the same place."""
+
+
+def paint(where: np.ndarray) -> np.ndarray:
+    """L_d of the floor, (m, 3): boards of two reddish colours."""
+    level = np.where((where[:, 1] % 0.5) < 0.25, 0.4, 0.7)
+    return level[:, None] * np.array([1.0, 0.6, 0.3])
+
+
+class Floor:
+    """A box whose floor has a lobe, and the pictures that frames take of it."""
+
+    def __init__(self, glow: float):
+        self.box = Box(glow=np.full(3, glow))
+        self.cameras = [look_at(eye, (1.6, 1.4, 0), 28, 21, 70) for eye in EYES]
+        self.pictures = [pixels_of(self.picture(camera)) for camera in self.cameras]
+        self.lit = run(self.box.room, self.cameras, self.pictures)
+        self.own = self.box.room.atlas.object_id == FLOOR
+        self.truth = paint(self.box.room.atlas.position)
+
+    def picture(self, camera) -> np.ndarray:
+        directions = camera.directions(camera.pixel_centres())
+        origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
+        hits = self.box.room.scene.intersect(origins, directions)
+        element = self.box.field.elements(hits)
+        seen = self.box.arriving(origins.astype(float), directions.astype(float))
+        floor = np.flatnonzero(self.box.room.atlas.object_id[element] == FLOOR)
+        where = origins[floor] + hits.distance[floor, None] * directions[floor]
+        A, B = self.box.lobe(element[floor], -directions[floor], ALPHA, 12)
+        seen[floor] = paint(where) + F0 * A + B
+        return seen.reshape(camera.height, camera.width, 3)
+
+    def removed(self, f0: float = F0, **how):
+        material = ObjectMaterial(FLOOR, "floor", DIELECTRIC, alpha=ALPHA, f0=f0)
+        part = SpecularPart(self.box.field, [material], rays=256)
+        read = lambda frame: self.pictures[int(frame.name)]  # noqa: E731
+        frames = frames_of(self.cameras)
+        return without_specular(part, self.box.field, self.lit, self.own, frames, read, threads=2, **how)
+
+
+@pytest.fixture(scope="module")
+def floor():
+    return Floor(60.0)
+
+
+def test_a_lamps_mirror_image_leaves_the_floor(floor):
+    found = floor.removed()
+    bright = floor.own & (floor.lit.count >= 4) & (floor.lit.radiance[:, 2] > 1.5 * floor.truth[:, 2])
+    assert bright.sum() > 10
+    left = floor.lit.radiance - found.specular
+    before = np.abs(floor.lit.radiance - floor.truth)[bright].mean()
+    assert np.abs(left - floor.truth)[bright].mean() < 0.3 * before
+    hue = left[bright] / left[bright].sum(1, keepdims=True)
+    assert np.allclose(np.median(hue, 0), [1 / 1.9, 0.6 / 1.9, 0.3 / 1.9], atol=0.03)
+    assert not found.specular[~floor.own].any() and not found.hidden[~floor.own].any()
+
+
+@pytest.mark.slow
+def test_what_every_view_hides_is_marked():
+    """A lamp so bright that its mirror image is many times the paint: an error of a tenth is more than that."""
+    floor = Floor(3000.0)
+    found = floor.removed(1.1 * F0)
+    drowned = floor.own & (floor.lit.count >= 4) & (floor.lit.radiance[:, 0] > 12 * floor.truth[:, 0])
+    clear = floor.own & (floor.lit.count >= 4) & (floor.lit.radiance[:, 0] < 1.3 * floor.truth[:, 0])
+    assert drowned.sum() > 5 and clear.sum() > 5
+    assert found.hidden[drowned].mean() > 0.9 and found.hidden[clear].mean() < 0.1
+
+
+def test_no_channel_is_driven_below_black(floor):
+    found = floor.removed(3 * F0)
+    assert (floor.lit.radiance - found.specular)[floor.own & floor.lit.seen].min() >= 0
+
+
+def test_it_can_be_stopped(floor):
+    with pytest.raises(InterruptedRun):
+        floor.removed(progress=Progress(should_stop=lambda: True))
