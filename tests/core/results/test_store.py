@@ -7,7 +7,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,6 @@ import pytest
 from addon.core.errors import BadInputError, StorageError
 from addon.core.io.exr import read_exr
 from addon.core.json_values import key
-from addon.core.results import store as module
 from addon.core.results.store import Store
 from addon.core.settings import PAPER, Settings
 
@@ -230,11 +228,3 @@ def test_a_disk_without_locks(tmp_path, monkeypatch):
 
     monkeypatch.setattr(fcntl, "flock", no_locks)
     Store(tmp_path).close()
-
-
-def test_large_stages_are_written_and_read_quickly(store):
-    started = time.process_time()
-    store.save("a", "k", {"x": np.zeros((20_000_000,), np.float32)})
-    assert store.load("a", "k")["x"].nbytes == 80_000_000
-    assert time.process_time() - started < 5
-    assert module.META not in store.load("a", "k")

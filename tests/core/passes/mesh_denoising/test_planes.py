@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from addon.core.passes.mesh_denoising import denoise, planes
-from addon.core.passes.mesh_denoising.planes import Sheet, neighbours_of, sheet_of, sheets_of
+from addon.core.passes.mesh_denoising import denoise
+from addon.core.passes.mesh_denoising.planes import neighbours_of, sheet_of, sheets_of
 from addon.core.scene.model import Mesh
 from addon.core.scene.weld import welded
 from tests.core.passes.mesh_denoising.test_denoise import NOISE, cube, noisy, rms, sheet, smoothed, sphere, tilted, tube
@@ -115,23 +113,6 @@ def test_front_and_back_of_a_plate_as_thin_as_the_noise_stay_two(seed):
     assert np.mean(measured[0] > middle) < 0.95
     now, before = (tilted(mesh, true)[front | back] for mesh in (found, by_angles_alone(off)))
     assert np.quantile(now, 0.95) < 0.5 < np.quantile(before, 0.95)
-
-
-def test_a_point_of_front_and_back_goes_to_one_of_them(monkeypatch):
-    """Half-way between would be on neither; where sheets cross, it goes to their line."""
-    points = np.array([[0, 0, 0.002], [0, 1, 0.002], [1, 0, 0], [1, 0, 0.005]])
-    faces = np.array([[0, 1, 2], [0, 1, 3]])
-
-    def placed(second: np.ndarray) -> np.ndarray:
-        first = Sheet(np.zeros(3), np.eye(3)[::-1], np.zeros(6), np.array([0]))
-        other = Sheet(np.array([0, 0, 0.005]), second, np.zeros(6), np.array([1]))
-        grower = SimpleNamespace(area=np.array([0.5, 0.4]))
-        monkeypatch.setattr(planes, "sheets_of", lambda *_: ([first, other], grower))
-        return planes.onto_sheets(points, points, faces, NOISE)
-
-    assert placed(-np.eye(3)[::-1])[:, 2] == pytest.approx([0, 0, 0, 0.005], abs=1e-5)
-    across = placed(np.array([[0.6, 0, 0.8], [0, 1, 0], [0.8, 0, -0.6]]))
-    assert across[:2] == pytest.approx(np.array([[0.004 / 0.6, 0, 0], [0.004 / 0.6, 1, 0]]), abs=2e-5)
 
 
 def test_small_triangles_do_not_lead_around_an_edge():
