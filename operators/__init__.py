@@ -120,7 +120,7 @@ def unregister():
     from ..addon.bridge.job import job
     from . import keymaps, manual, menus, translations
     from .recover import findings
-    from .relight import light_pictures
+    from .relight import lights
     from .results import told
 
     bpy.utils.unregister_manual_map(manual.manual_map)
@@ -129,8 +129,9 @@ def unregister():
     translations.unregister()
     for known, ours in handlers():
         known.remove(ours)
-    for one in (corrections, findings, told, light_pictures, job):
+    for one in (corrections, findings, told, job):
         one.forget()
+    lights.forget_pictures()
     job.end_all()
     del bpy.types.Scene.scan_relight_row
     for owner, name, _ in pointers():

@@ -10,6 +10,7 @@ import bpy
 from ..addon.bridge.results import home
 from ..addon.core.kinds import Shown
 from . import keymaps
+from .base.job_operator import areas
 
 PACKAGE = home.PACKAGE
 
@@ -133,8 +134,6 @@ def _add_up(folder: Path) -> None:
 def _show_size() -> float | None:
     if _size["thread"] is not None and _size["thread"].is_alive():
         return 0.2
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "PREFERENCES":
-                area.tag_redraw()
+    for area in areas(bpy.context, "PREFERENCES"):
+        area.tag_redraw()
     return None

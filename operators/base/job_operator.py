@@ -39,15 +39,18 @@ def progress_text(job: jobs.Job) -> str:
     return text if left is None else f"{text}, {told(f'{duration(left)} left')}"
 
 
+def areas(context, kind: str) -> list[bpy.types.Area]:
+    """The areas of a kind in all windows."""
+    return [one for window in context.window_manager.windows for one in window.screen.areas if one.type == kind]
+
+
 def redraw(context) -> None:
     """Have the sidebars of all 3D views and the status bars drawn again, and nothing else."""
     bpy.msgbus.publish_rna(key=(bpy.types.Window, "view_layer"))  # what status bars listen to
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                for region in area.regions:
-                    if region.type == "UI":
-                        region.tag_redraw()
+    for area in areas(context, "VIEW_3D"):
+        for region in area.regions:
+            if region.type == "UI":
+                region.tag_redraw()
 
 
 def over_3d_view(context, event) -> bool:

@@ -9,6 +9,7 @@ import bpy
 from ...addon.bridge.relight import estimate, exposure
 from ...addon.core.errors import ScanRelightError
 from ...addon.core.kinds import Shown
+from ..base.job_operator import areas
 from .base import RelightOperator
 
 _REST: Shown[float] = 0.2
@@ -77,8 +78,6 @@ def _look() -> float | None:
     except (ReferenceError, KeyError, ScanRelightError):  # the room went meanwhile; the next drawing asks anew
         pass
     _looked["run"] = None
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+    for area in areas(bpy.context, "VIEW_3D"):
+        area.tag_redraw()
     return None

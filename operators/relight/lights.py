@@ -1,6 +1,9 @@
 """`bpy.ops.scan_relight.*` for the light: switch and restore lamps, add lights, another picture around the room."""
 
 # No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import atexit
+from pathlib import Path
+
 import bpy
 
 from ...addon.bridge.light import lamps, outside
@@ -10,8 +13,43 @@ from ..base import poll
 from ..results.select import make_active
 from .base import RelightOperator
 from .exposure import follow
-from .light_pictures import PRESETS
 from .props import AIM, KELVIN, UNIT
+
+PRESETS = (
+    ("WINDOW", "Window", "A window's soft, cool light from the side"),
+    ("SOFTBOX", "Softbox", "A studio light beside the camera"),
+    ("SPOT", "Spot", "A spot from above, a little on the camera's side"),
+    ("SUN", "Evening Sun", "A low, warm sun: through an opening of the scan, else as a window would let it in"),
+)
+FOLDER = Path(__file__).resolve().parents[1] / "thumbnails"
+_pictures = None
+
+
+def picture(name: str) -> int:
+    """Blender's number of a preset's picture; 0, for none, where it has no window to show one in."""
+    global _pictures
+    if bpy.app.background:
+        return 0
+    if _pictures is None:
+        from bpy.utils import previews
+
+        _pictures = previews.new()
+        atexit.register(forget_pictures)
+    path = FOLDER / f"{name.lower()}.png"
+    if name not in _pictures:
+        _pictures.load(name, str(path), "IMAGE")
+    return _pictures[name].icon_id
+
+
+def forget_pictures() -> None:
+    """Let go of the pictures."""
+    global _pictures
+    if _pictures is not None:
+        from bpy.utils import previews
+
+        previews.remove(_pictures)
+        _pictures = None
+        atexit.unregister(forget_pictures)
 
 
 class SCAN_RELIGHT_OT_switch_lamps(RelightOperator, bpy.types.Operator):

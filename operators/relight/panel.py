@@ -11,9 +11,9 @@ from ...addon.bridge.relight import exposure, lights, match_frame
 from ...addon.core.kinds import Shown
 from ...addon.core.naming import in_order
 from ..base.panel import NamedRows, SidebarPanel, places
-from . import light_pictures
 from .base import has_room
 from .exposure import look_soon
+from .lights import PRESETS, picture
 
 NAME: Shown[float] = 0.6
 """Share of a row of the lamps that their names have."""
@@ -149,9 +149,9 @@ class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):
         layout.prop(studio, field)
         layout.prop(studio, "kelvin")
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
-        for name, text, _ in light_pictures.PRESETS:
+        for name, text, _ in PRESETS:
             cell = grid.column(align=True)
-            cell.template_icon(icon_value=light_pictures.picture(name), scale=4.0)
+            cell.template_icon(icon_value=picture(name), scale=4.0)
             button = cell.operator("scan_relight.add_light", text=text, icon=ICONS[name])
             button.preset, button.aim, button.strength = name, studio.aim, getattr(studio, field)
             button.unit, button.kelvin = studio.unit, studio.kelvin

@@ -9,7 +9,7 @@ from ...addon.bridge.results import find, home
 from ...addon.core.errors import ScanRelightError
 from .. import preferences
 from ..base import poll
-from ..base.at_once import AtOnce
+from ..base.at_once import AtOnce, NothingDone
 from . import told
 
 
@@ -56,32 +56,31 @@ class SCAN_RELIGHT_OT_clear_cache(AtOnce, bpy.types.Operator):
 
 @poll.needs(lambda context: home.earlier_results(), "No result lies in the extension's own folder.")
 @poll.no_run
-class SCAN_RELIGHT_OT_move_results(bpy.types.Operator):
+class SCAN_RELIGHT_OT_move_results(AtOnce, bpy.types.Operator):
     """Move the results of earlier versions out of the extension's own folder into the results folder, so that removing
     the extension can't delete them; this file's images are pointed there"""
 
     bl_idname = "scan_relight.move_results"
     bl_label = "Move Out"
-    bl_options = {"REGISTER", "UNDO"}
 
-    def execute(self, context):
+    def work(self, context):
         """Move each; one that can't be moved stays whole where it is, and is told."""
-        moved = 0
-        for folder in home.earlier_results():
+        there, problems = home.earlier_results(), []
+        for folder in there:
             try:
                 find.move(folder, preferences.results_folder())
-                moved += 1
             except ScanRelightError as error:
-                self.report({"WARNING"}, str(error))
+                problems.append(str(error))
         preferences.forget_size()
+        moved = len(there) - len(problems)
         if not moved:
-            return {"CANCELLED"}
+            raise NothingDone(" ".join(problems))
         self.report(
             {"INFO"},
             f"{moved} result{'s' * (moved != 1)} moved into '{preferences.results_folder()}'; save "
             "this file to keep its images there.",
         )
-        return {"FINISHED"}
+        return problems
 
 
 def _page(context) -> Path | None:
