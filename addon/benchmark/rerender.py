@@ -11,12 +11,12 @@ import numpy as np
 from ..core.kinds import Workload
 from ..core.light.emitters import bright_triangles
 from ..core.light.lobes import GRID, reflected_light
+from ..core.photo import MIDDLE_GREY
 from ..core.pipeline.recover import Recovery
 
 PIXELS: Workload[int] = 1500
 """Of each view."""
 RAYS: Workload[int] = 64
-GREY: Workload[float] = 0.18
 
 
 def rerender_psnr(recovery: Recovery, seen: list[dict], seed: int = 0) -> float:
@@ -33,7 +33,7 @@ def rerender_psnr(recovery: Recovery, seen: list[dict], seed: int = 0) -> float:
         chosen = rng.choice(usable, min(PIXELS, len(usable)), replace=False)
         element.append(one["element"][0][chosen])
         direction.append(one["directions"][chosen])
-        true.append(one["image"][chosen] / max(float(np.median(one["image"][usable].mean(1))), 1e-12) * GREY)
+        true.append(one["image"][chosen] / max(float(np.median(one["image"][usable].mean(1))), 1e-12) * MIDDLE_GREY)
         view.append(np.full(len(chosen), number))
     element, direction, true, view = (np.concatenate(x) for x in (element, direction, true, view))
     shown = _shown(recovery, materials, element, np.asarray(direction, np.float32), seed)
@@ -41,7 +41,7 @@ def rerender_psnr(recovery: Recovery, seen: list[dict], seed: int = 0) -> float:
     for number, one in enumerate(seen):
         own = view == number
         usable = one["inside"] & ~np.isin(one["id"], left_out) & np.isfinite(one["image"]).all(1)
-        level = GREY / max(float(np.median(one["image"][usable].mean(1))), 1e-12)
+        level = MIDDLE_GREY / max(float(np.median(one["image"][usable].mean(1))), 1e-12)
         error = _display(shown[own] * level) - _display(true[own])
         result.append(-10 * np.log10(max(float(np.mean(error**2)), 1e-12)))
     return float(np.mean(result))

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from .kinds import Unit
+
+MIDDLE_GREY: Unit[float] = 0.18
+"""What a grey card reflects, and what an exposure puts a picture's median at."""
+
 
 def encoded(linear: np.ndarray) -> np.ndarray:
     """Linear Rec.709 in 0...1 as sRGB bytes."""

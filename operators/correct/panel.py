@@ -6,13 +6,11 @@ import bpy
 
 from ...addon.bridge.corrections import corrections, unseen
 from ...addon.core.brdf.registry import named, shown
-from ...addon.core.kinds import Unit
+from ...addon.core.photo import MIDDLE_GREY
 from ..base.job_operator import active, bar
 from ..base.panel import SidebarPanel
 from .base import chosen
 from .props import STATEMENTS
-
-GREY_CARD: Unit[float] = 0.18
 
 
 def the_object(context) -> bpy.types.Object | None:
@@ -121,7 +119,9 @@ class SCAN_RELIGHT_PT_correct_scale(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("scan_relight.this_is_white", text="This Object").albedo = choices.albedo
         row.operator("scan_relight.pick_white", text="Spot", icon="EYEDROPPER").albedo = choices.albedo
-        layout.operator("scan_relight.pick_white", text="Grey Card (0.18)", icon="EYEDROPPER").albedo = (GREY_CARD,) * 3
+        layout.operator("scan_relight.pick_white", text="Grey Card (0.18)", icon="EYEDROPPER").albedo = (
+            MIDDLE_GREY,
+        ) * 3
         known = corrections.white_of(thing) if thing is not None else None
         if known is not None:
             row = layout.row(align=True)

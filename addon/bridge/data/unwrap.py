@@ -12,12 +12,10 @@ import bpy
 import numpy as np
 
 from ...core.scene.model import Mesh
+from ...core.scene.params import SURFACE
 from ...core.scene.uv_islands import areas, connected, corner_ids, cut_sparse
 from ...core.scene.uv_overlap import layers, overlapping_pairs
 from .arrays import layer_of, make_mesh, set_layer
-
-OVERLAP_TEXELS = 0.02
-"""Triangles may penetrate each other by this much; far less than what moves a texel's centre, more than rounding."""
 
 _PROJECTION_ANGLE = 1.15
 _LAYER = "ScanRelight"
@@ -65,7 +63,7 @@ def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0, polygons: P
     Returns
     -------
     uv : (t, 3, 2) float32
-        In [0, 1]. No two triangles penetrate each other by more than `OVERLAP_TEXELS`. Triangles that repeat a
+        In [0, 1]. No two triangles penetrate each other by more than `SURFACE.overlap_texels`. Triangles that repeat a
         vertex lie in the lower left corner, without area.
     """
     if not len(mesh.triangles):
@@ -103,7 +101,7 @@ def _unwrapped(vertices, triangles, object_id, size, margin_texels, polygons):
         uv = _projected(vertices.astype(np.float32), polygons.vertex, polygons.start[:-1])[polygons.corner]
     ids = corner_ids(corners, uv)
     island = connected(ids)
-    pairs = overlapping_pairs(uv, OVERLAP_TEXELS / size, island)
+    pairs = overlapping_pairs(uv, SURFACE.overlap_texels / size, island)
     face, height = np.arange(len(uv)), _height(vertices[triangles], island)
     if polygons is not None:
         face = _faces(polygons.face, pairs)

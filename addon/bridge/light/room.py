@@ -10,6 +10,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.errors import BadInputError
+from ...core.photo import MIDDLE_GREY
 from ..data.images import image_array
 from ..data.materials import opacity
 from ..marks import OBJECT_ID
@@ -17,7 +18,7 @@ from .kelvin import LUMINANCE
 
 ROOM_LIGHT = "scan_relight_room_light"
 """Custom property of the scene: median irradiance of the scanned room, in the frames' unit."""
-_ALBEDO, _GREY = 0.4, 0.18
+_ALBEDO = 0.4
 VIEW, CURSOR, OBJECT = "VIEW", "CURSOR", "OBJECT"
 
 
@@ -133,7 +134,7 @@ def room_light(scene: bpy.types.Scene) -> float:
     kept = scene.get(ROOM_LIGHT)
     if kept:
         return float(kept)
-    found = _median_shading() or math.pi * _GREY / 2**scene.view_settings.exposure / _ALBEDO
+    found = _median_shading() or math.pi * MIDDLE_GREY / 2**scene.view_settings.exposure / _ALBEDO
     scene[ROOM_LIGHT] = found
     return found
 

@@ -10,6 +10,7 @@ import math
 import bpy
 
 from ...core.errors import BadInputError
+from ...core.photo import MIDDLE_GREY
 from ..scene.settings import EXPOSURE
 from . import estimate
 from .pictures import small_median
@@ -18,7 +19,7 @@ CAPTURED = "scan_relight_captured_exposure"
 """Custom property of a scene: its exposure before ours, in stops."""
 ASKED = "scan_relight_asked_exposure"
 """Custom property of a scene: the exposure that its light asked for when it was last measured, in stops."""
-_GREY, _MOST = 0.18, 32.0
+_MOST = 32.0
 
 
 def measure(scene: bpy.types.Scene) -> float:
@@ -31,7 +32,7 @@ def measure(scene: bpy.types.Scene) -> float:
     median = small_median(scene)
     if not median > 0:
         raise BadInputError("No light reaches what the camera looks at; switch a lamp on or add a light.")
-    asked = min(max(math.log2(_GREY / median), -_MOST), _MOST)
+    asked = min(max(math.log2(MIDDLE_GREY / median), -_MOST), _MOST)
     scene[ASKED] = asked
     return asked
 

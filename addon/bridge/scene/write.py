@@ -16,6 +16,7 @@ import bpy
 import numpy as np
 
 from ...core.brdf.material import ObjectMaterial, undescribed
+from ...core.photo import MIDDLE_GREY
 from ...core.results.room_file import run_of
 from ...core.scene.model import Capture
 from ..data.added import Made
@@ -38,7 +39,6 @@ BASE_COLOR, ALBEDO, SHADING, ENVIRONMENT = "base_color.exr", "albedo.exr", "shad
 _WRITING = ".scene-being-written.blend"
 SCENE_FILES = "scene.blend", _WRITING
 """A result's own file of its room; what it is called while it is written."""
-_GREY = 0.18
 
 
 @dataclass
@@ -275,4 +275,4 @@ def _prepare(scene, median_radiance):
     scene.cycles.sample_clamp_indirect = 0.0
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.glossy_bounces = 12, 8, 8
     if median_radiance > 0 and math.isfinite(median_radiance):
-        scene.view_settings.exposure = min(max(math.log2(_GREY / median_radiance), -32.0), 32.0)
+        scene.view_settings.exposure = min(max(math.log2(MIDDLE_GREY / median_radiance), -32.0), 32.0)

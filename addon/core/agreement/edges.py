@@ -10,6 +10,7 @@ from scipy.ndimage import maximum_filter
 
 from ..scene.model import Camera, Mesh
 from ..scene.rays import RayScene
+from ..significance import LEVELS
 from .params import AGREEMENT
 from .views import SmallView
 
@@ -67,6 +68,6 @@ def edge_score(views: Sequence[SmallView], seen: Sequence[Shown]) -> float:
         at.append(rank[one.edge & known])
         off.append(rank[~one.edge & known])
     a, b = np.concatenate(at or [np.zeros(0)]), np.sort(np.concatenate(off or [np.zeros(0)]))
-    if len(a) < AGREEMENT.least_edges or len(b) < AGREEMENT.least_edges:
+    if len(a) < LEVELS.many or len(b) < LEVELS.many:
         return float("nan")
     return float(np.searchsorted(b, a).mean() / len(b))

@@ -191,7 +191,7 @@ def _search(scene: _Scene) -> Fit | None:
     for scale in (1.0, *_likely(scene)):
         every = max(1, len(scene.views) // AGREEMENT.coarse)
         found = [scene.colour(replace(one, scale=scale), every) for one in alternatives()]
-        found = sorted((fit for fit in found if fit.quality > 0), key=lambda fit: -fit.quality)[: AGREEMENT.finalists]
+        found = sorted((fit for fit in found if fit.quality > 0), key=lambda fit: -fit.quality)[: AGREEMENT.coarse]
         for fit in (scene.whole(scene.colour(fit.convention)) for fit in found):
             if best is None or fit.quality > best.quality + AGREEMENT.tie * np.sign(
                 fit.convention.parts - best.convention.parts

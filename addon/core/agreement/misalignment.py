@@ -22,7 +22,7 @@ def predicted(index: int, views: Sequence[SmallView], cameras: Sequence[Camera],
     at = np.flatnonzero((own.triangle >= 0).ravel())
     points = camera.centre + own.distance.ravel()[at, None].astype(np.float64) * directions[at]
     way = [np.linalg.norm(eye.centre - camera.centre) for eye in cameras]
-    nearest = [j for j in np.argsort(way, kind="stable") if j != index][: MISALIGNMENT.others]
+    nearest = [j for j in np.argsort(way, kind="stable") if j != index][: AGREEMENT.coarse]
     said = np.full((len(nearest), len(at)), np.nan, np.float32)
     for row, j in enumerate(nearest):
         inside, pixels = sees(cameras[j], points, scene, margin=1)

@@ -19,8 +19,6 @@ class AgreementParams:
         Share of rays that meet the mesh, below which nothing can be said for a convention.
     coarse : int
         Views that all candidates are tried on: pairs of views grow with the square of their number.
-    finalists : int
-        Candidates of which all views and the edges are looked at.
     plausible : float
         A scale is tried if it spreads the cameras over a third of the mesh, within this factor.
     tie : float
@@ -35,21 +33,16 @@ class AgreementParams:
         About so many pixels across are enough to tell a wrong convention, and cheap.
     grid : int
         Rays along an edge of each view.
-    least_pairs : int
-        Fewer pairs of observations say nothing.
     jump : float
         Relative step in distance that counts as an edge.
     bend : float
         Cosine between two neighbouring pixels' normals below which there is an edge.
-    least_edges : int
-        Pixels on edges; with fewer edges say nothing.
     """
 
     agree: float = 0.755
     better: float = 0.08
     least_hit: float = 0.05
     coarse: int = 6
-    finalists: int = 6
     plausible: float = 5.0
     tie: float = 0.01
     upright: float = 0.7
@@ -57,10 +50,8 @@ class AgreementParams:
     count: int = 16
     width: int = 160
     grid: int = 20
-    least_pairs: int = 200
     jump: float = 0.05
     bend: float = 0.85
-    least_edges: int = 50
 
 
 AGREEMENT = AgreementParams()
@@ -72,8 +63,6 @@ class MisalignmentParams:
 
     Attributes
     ----------
-    others : int
-        Views whose median is taken as what a spot looks like.
     rounds : int
         Of Gauss and Newton's method.
     largest : float
@@ -84,7 +73,6 @@ class MisalignmentParams:
         Residuals beyond so many times their median, or this if that is more, count as highlights or occlusion.
     """
 
-    others: int = 6
     rounds: int = 12
     largest: float = 4.0
     least_texture: float = 1e-3

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..scene.model import Camera
 from ..scene.rays import RayScene
+from ..significance import LEVELS
 from .params import AGREEMENT
 from .views import SmallView, sees
 
@@ -66,7 +67,7 @@ def consistency(views: Sequence[SmallView], cameras: Sequence[Camera], scene: Ra
                 near.append(np.abs(own[inside] - theirs).mean(1))
                 far.append(np.abs(own[inside] - theirs[rng.permutation(len(inside))]).mean(1))
     pairs = sum(map(len, near))
-    if pairs < AGREEMENT.least_pairs:
+    if pairs < LEVELS.many:
         return Consistency(float("nan"), hits / max(rays, 1), pairs)
     a, b = np.concatenate(near), np.concatenate(far)
     return Consistency(float((a < b).mean() + (a == b).mean() / 2), hits / max(rays, 1), pairs)

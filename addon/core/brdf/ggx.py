@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..kinds import Unit
 from ..paper.brdf import G1, D, F, G, f_nd
 
 __all__ = ["GGX", "D", "F", "G", "G1", "f_nd", "lobes", "sample_visible_normal", "visible_normal_density"]
 
 
-LEAST = 1e-4
+LEAST: Unit[float] = 1e-4
 """Cosine below which a direction runs along the surface."""
 
 

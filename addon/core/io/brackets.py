@@ -15,9 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..kinds import Unit
 from ..scene.model import Frame
 
-SAME_POSE = 1e-6
+SAME_POSE: Unit[float] = 1e-6
 """Metres, and entries of a rotation, within which two poses are one."""
 DIFFERENT = 1.05
 """Ratio of two exposures from which on frames of one pose are brackets."""

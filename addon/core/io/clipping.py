@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..scene.model import Frame
+from .brackets import DIFFERENT
 from .exr import HALF_MAX
 
 LOOK = 32
@@ -29,8 +30,6 @@ STEEP = 4.0
 """The pile is this many times what lies in the ten times wider band below it; a smooth tail has a tenth."""
 PARTLY = 4
 """Pixels with other channels at the level than the rest of the pile, of different values, that tell it from a lamp."""
-DIFFERENT = 1.1
-"""Ratio of two exposures from which on a pile at one stored value in both can't be a lamp."""
 
 
 class _Pile(NamedTuple):

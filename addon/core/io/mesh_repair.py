@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import BadInputError
-from ..kinds import Limit
+from ..kinds import Limit, Unit
 from .layout import RawMesh
 
 MAX_COORDINATE: Limit[float] = 1e6
 """Metres; beyond, single precision (rays, atlas) can't hold a room."""
-THIN = 1e-12
+THIN: Unit[float] = 1e-12
 """A triangle whose height is below this share of its longest edge has no area."""
 USUAL_EXTENT = (0.1, 1000.0)
 """Metres; a room outside of this was likely exported in another unit."""

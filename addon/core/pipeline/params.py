@@ -45,8 +45,6 @@ class PartsParams:
         Finer by less than this is not worth another look at the frames.
     most_texels : int
         Of all parts together: one and a half times an atlas of 4096. Memory, a few gigabytes for this, ends there.
-    pixel_step : int
-        Every so many pixels in x and y tell how fine an object was seen.
     half : float
         Of what lies around a spot on the room's atlas, this share has to be measured for detail to be told there.
     looked : float
@@ -56,7 +54,6 @@ class PartsParams:
     finest: float = 4.0
     worth: float = 1.2
     most_texels: int = 25_000_000
-    pixel_step: int = 8
     half: float = 0.5
     looked: float = 0.3
 

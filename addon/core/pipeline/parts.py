@@ -25,7 +25,7 @@ from ..scene.elements import ElementLookup, make_atlas
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Camera, Mesh
 from ..scene.pages import OBJECT, Pages, lay_out
-from ..scene.params import VISIBILITY
+from ..scene.params import SIDES, VISIBILITY
 from ..scene.surface import Surface
 from ..scene.visibility import CLEAN
 from ..significance import LEVELS
@@ -89,8 +89,8 @@ def footprints(surface: Surface, cameras: list[Camera]) -> dict[int, float]:
     found: dict[int, list[np.ndarray]] = {}
     for camera in cameras:
         y, x = np.mgrid[
-            PARTS.pixel_step // 2 : camera.height : PARTS.pixel_step,
-            PARTS.pixel_step // 2 : camera.width : PARTS.pixel_step,
+            SIDES.pixel_step // 2 : camera.height : SIDES.pixel_step,
+            SIDES.pixel_step // 2 : camera.width : SIDES.pixel_step,
         ]
         pixels = np.stack([x.ravel() + 0.5, y.ravel() + 0.5], -1)
         directions, led = camera.rays(pixels)

@@ -11,7 +11,7 @@ from ..light.field import LightField
 from ..light.over_surface import RayCounts, irradiance
 from ..light.params import GATHER
 from ..passes.albedo.albedo import fill, quotient
-from ..passes.albedo.params import ALBEDO
+from ..passes.albedo.params import MAX_ALBEDO
 from ..passes.unseen_light.params import SHADES
 from ..passes.unseen_light.shades import strongly_lit
 from ..scene.lit_diffuse import LitDiffuse
@@ -79,7 +79,7 @@ def with_unseen_surfaces(
             rho, valid = quotient(lit_diffuse.radiance[own], E[own])
             seen = lit_diffuse.seen[own]
             known = valid & seen
-            paint = np.clip(np.median(rho[known], 0), 0, ALBEDO.max_albedo) if known.any() else guess[own]
+            paint = np.clip(np.median(rho[known], 0), 0, MAX_ALBEDO) if known.any() else guess[own]
             radiance[own] = np.where(seen[:, None], radiance[own], paint * E[own] / np.float32(np.pi))
         field = field.with_light(radiance)
     return field, E, escaped

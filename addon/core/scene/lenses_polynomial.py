@@ -19,12 +19,13 @@ STEEPEST = math.tan(math.radians(89.99))
 """Tangent of the widest angle that a perspective lens is followed to."""
 ROOT: Unit[float] = 1e-12
 """A denominator up to this counts as 0: where it only touches 0, rounding hides on which side of the root it is."""
-ENTRIES = 2049
+ENTRIES: Block[int] = 2049
 """Of the table from which the search for a radius starts."""
 AZIMUTHS = 64
 RIM = 0.999
 """Share of the radius that was found by samples in `AZIMUTHS` directions, for what lies between them."""
-STEPS, STEPS_2D = 60, 20
+STEPS: Block[int] = 60
+STEPS_2D: Block[int] = 20
 CLOSE: Unit[float] = 1e-13
 """A search ends when it is this near its target, relative to 1 plus the radius."""
 BLOCK: Block[int] = 1 << 16

@@ -66,7 +66,7 @@ def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequenc
     sign = np.where(votes != 0, np.sign(votes), np.where(by_object[mesh.object_id] < 0, -1.0, 1.0))
     together = np.concatenate(footprints) if footprints else np.zeros(0, np.float32)
     footprint = float(np.percentile(together, 25)) if len(together) else 0.0
-    both = sides.min(0) >= np.maximum(SIDES.least_votes_share * sides.sum(0), SIDES.least_rays)
+    both = sides.min(0) >= np.maximum(SIDES.least_share * sides.sum(0), SIDES.least_rays)
     if sides[0].any() and sides[1].any():
         sheets, turned = two_sided(mesh, sides)
         both = worth_it(mesh, both | sheets)

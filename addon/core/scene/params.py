@@ -59,10 +59,6 @@ class SidesParams:
     ----------
     least_share, least_rays : float, int
         A sheet is given two sides if this share of the rays that met it, and so many, met the side that is seen less.
-    less_share, more_rays : float, int
-        Or this share, where they are so many: a floor lamp's shade had 17 of 590, and threw its inner side's light at
-        the wall behind it. Bent tubes have 4 to 10 of some hundred at their ends, and second sides would halve what
-        shows them.
     least_of_object, least_of_room : float
         Sheets that are less of their object's surface, and of the room's, are left as they are: single leaves of a
         plant, whose two sides are alike, only cost elements, and views that its other elements would be judged by.
@@ -72,22 +68,17 @@ class SidesParams:
         A triangle's corners go along the sheet's normals where these agree with its own at least by this cosine.
     pixel_step : int
         Every fourth pixel in x and y votes.
-    least_votes_share : float, int
-        A triangle is seen from both sides if this share of its votes, and so many, are for the other one.
     max_rays : int
         Rays over all frames; of larger captures every second, third ... pixel votes.
     """
 
     least_share: float = 0.05
     least_rays: int = 4
-    less_share: float = 0.025
-    more_rays: int = 12
     least_of_object: float = 0.1
     least_of_room: float = 0.01
     gap: float = 4e-5
     upright: float = 0.3
     pixel_step: int = 4
-    least_votes_share: float = 0.1
     max_rays: int = 20_000_000
 
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError
-from ..kinds import Limit
+from ..kinds import Limit, Unit
 
-TOLERANCE = 1e-3
+TOLERANCE: Unit[float] = 1e-3
 """How far R^T R may be from the identity; less is rounding, and is taken out."""
 MAX_DISTANCE: Limit[float] = 1e6
 """Metres from the origin from which on single precision can't hold a room."""

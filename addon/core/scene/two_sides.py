@@ -71,7 +71,6 @@ def two_sided(mesh: Mesh, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     one_surface[sheet[up == down]] = False  # such as Moebius' strip
     less, rays_on = np.minimum(front, back), front + back
     seen = less >= np.maximum(SIDES.least_share * rays_on, SIDES.least_rays)
-    seen |= less >= np.maximum(SIDES.less_share * rays_on, SIDES.more_rays)
     both = (seen & bordered & one_surface)[sheet]
     return both, np.where(front >= back, 1, -1)[sheet] * ways.astype(np.float32)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..kinds import Block
 
-_LEVELS = 12
+_LEVELS: Block[int] = 12
 _CANDIDATES_AT_ONCE: Block[int] = 1_500_000
 
 

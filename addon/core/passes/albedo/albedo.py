@@ -13,7 +13,7 @@ from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Instance
 from .neighbourhood import relative_error, shrink
-from .params import ALBEDO
+from .params import ALBEDO, MAX_ALBEDO
 
 MEASURED: Code[int] = 2
 FILLED: Code[int] = 1
@@ -71,7 +71,7 @@ def without_emitters(atlas: Atlas, told: np.ndarray, emitters: set[int]) -> np.n
 
 def above_one(rho: np.ndarray, reflecting: np.ndarray) -> float:
     """Share of the `reflecting` elements, (n,) bool, whose quotient is above 1: an alarm that light is missing."""
-    return float((rho[reflecting].max(1) > ALBEDO.max_albedo).mean()) if reflecting.any() else 0.0
+    return float((rho[reflecting].max(1) > MAX_ALBEDO).mean()) if reflecting.any() else 0.0
 
 
 def albedo_of(
@@ -126,7 +126,7 @@ def fill(
     """
     if error is not None:
         valid = valid & np.isfinite(error)
-    result = np.clip(np.nan_to_num(rho), 0, ALBEDO.max_albedo)
+    result = np.clip(np.nan_to_num(rho), 0, MAX_ALBEDO)
     origin = np.where(valid, MEASURED, FILLED).astype(np.int8)
     reflecting = without_emitters(atlas, valid, emitters)
     everywhere = np.median(result[reflecting], 0) if reflecting.any() else np.full(3, 0.5, np.float32)
@@ -142,7 +142,7 @@ def fill(
         if not valid[own].any():
             bare.append((object_id, own))
             continue
-        result[own], left[own] = shrink(atlas, own, result[own], error[own], most=ALBEDO.max_albedo, without=without)
+        result[own], left[own] = shrink(atlas, own, result[own], error[own], most=MAX_ALBEDO, without=without)
         by_class.setdefault(class_of.get(object_id, ""), []).append(np.median(result[own][valid[own]], 0))
     known = [middle for alike in by_class.values() for middle in alike]
     for object_id, own in bare:
@@ -150,7 +150,7 @@ def fill(
         result[own] = np.median(alike, 0) if alike else everywhere
         origin[own] = NONE
         left[own] = _spread(alike if alike and len(alike) > 2 else known)
-    return Albedo(np.clip(result, 0, ALBEDO.max_albedo).astype(np.float32), origin, left)
+    return Albedo(np.clip(result, 0, MAX_ALBEDO).astype(np.float32), origin, left)
 
 
 def _parts(atlas: Atlas, valid: np.ndarray) -> np.ndarray:

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ...kinds import Unit
+
+MAX_ALBEDO: Unit[float] = 1.0
+"""What reflects more than it gets emits light."""
+
 
 @dataclass(frozen=True)
 class PriorParams:
@@ -80,14 +85,11 @@ class AlbedoParams:
     ----------
     floor : float
         Below this share of the room's median irradiance a quotient says nothing.
-    max_albedo : float
-        What reflects more than it gets emits light.
     unknown, least_spread : float
         Relative error of an albedo that was taken from other objects: where there are too few to tell, and at least.
     """
 
     floor: float = 1e-3
-    max_albedo: float = 1.0
     unknown: float = 0.7
     least_spread: float = 0.3
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...significance import LEVELS
-from .params import CRACKS, PLANES
+from .params import PLANES
 
 
 def border_edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -60,9 +60,9 @@ def _beside(
     length = np.linalg.norm(along, axis=1)
     arm = points[opposite] - start
     over = np.linalg.norm(np.cross(along, arm), axis=1) / np.maximum(length, 1e-30)
-    able = np.flatnonzero((length > PLANES.high * noise) & (over > CRACKS.high * noise))
+    able = np.flatnonzero((length > PLANES.high * noise) & (over > PLANES.high * noise))
     border = np.unique(edges)
-    border_able = border[height[border] > CRACKS.high * noise]
+    border_able = border[height[border] > PLANES.high * noise]
     none = np.zeros(0, int), np.zeros(0, int), np.zeros(0)
     if not len(able) or not len(border_able):
         return none

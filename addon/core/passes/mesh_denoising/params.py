@@ -154,14 +154,7 @@ class CracksParams:
 
     Attributes
     ----------
-    high : float
-        Times the noise: shorter edges, and triangles lower than this on either side of a crack, are left alone. They
-        are strips of mouldings, whose two borders lie as close together and whose triangles would be turned. Of the
-        points taken in three perturbed living rooms (83, 55 and 57) .61, .78 and .86 truly lie on the edge; without
-        HIGH .1 of 640 to 930.
     """
-
-    high: float = 6.0
 
 
 CRACKS = CracksParams()

@@ -25,8 +25,6 @@ class PoseParams:
         Pixels, standard deviation, that gradients are taken over.
     border : int
         Pixels along the picture's edges that don't count.
-    least_pixels : int
-        With fewer a frame is left where it is.
     least_gradient : float
         Of log radiance over a pixel; less tells of no shift.
     floor : float
@@ -55,7 +53,6 @@ class PoseParams:
     samples: int = 2
     blur: float = 1.0
     border: int = 3
-    least_pixels: int = 200
     least_gradient: float = 0.01
     floor: float = 0.1
     rounds: int = 2

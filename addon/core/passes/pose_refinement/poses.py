@@ -173,11 +173,11 @@ def step_of(camera: Camera, pixels: Pixels, texture: Texture) -> Step | None:
     count = min(POSES.pixels, steep.size - 1)
     least = max(float(np.partition(steep.ravel(), -count)[-count]), POSES.least_gradient)
     y, x = np.nonzero(steep >= least)
-    if len(x) < POSES.least_pixels:
+    if len(x) < LEVELS.many:
         return None
     radiance, distance, known = texture.shown(camera, x, y)
     x, y = x[known], y[known]
-    if len(x) < POSES.least_pixels:
+    if len(x) < LEVELS.many:
         return None
     residual = picture[y, x] - np.log(np.maximum(radiance[known], 0) + floor).mean(-1)
     directions = camera.directions(np.stack([x + 0.5, y + 0.5], -1)).astype(np.float64)

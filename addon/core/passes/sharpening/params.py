@@ -11,8 +11,6 @@ class SharpeningParams:
 
     Attributes
     ----------
-    middle, corner : float
-        Weights of a pixel's middle and corners: together they give what is quadratic over the pixel its true mean.
     detail : float
         Share of its radiance by which an element must differ from the mean of the texels around it: where L_d is even,
         there is nothing to make sharper.
@@ -20,8 +18,6 @@ class SharpeningParams:
         Times that L_d may become brighter or darker.
     """
 
-    middle: float = 2 / 3
-    corner: float = 1 / 12
     detail: float = 0.02
     most: float = 2.0
 

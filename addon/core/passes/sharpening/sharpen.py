@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import uniform_filter
 
+from ...kinds import Unit
 from ...lit_diffuse.accumulate import accumulate
 from ...scene.atlas import Atlas
 from ...scene.elements import ElementLookup
@@ -27,6 +28,10 @@ from ...scene.surface import Surface
 from ...scene.visibility import CLEAN
 from ...significance import LEVELS
 from .params import SHARPENING
+
+MIDDLE: Unit[float] = 2 / 3
+CORNER: Unit[float] = 1 / 12
+"""Weights of a pixel's middle and corners: together they give what is quadratic over the pixel its true mean."""
 
 
 def sharpened(
@@ -110,4 +115,4 @@ def _shown(camera: Camera, surface: Surface, lookup: Callable, lit: LitDiffuse) 
     corner = np.full((height + 1, width + 1, 3), np.nan, np.float32)
     corner[wanted] = traced(np.argwhere(wanted)[:, ::-1].astype(float))
     around = corner[1:, 1:] + corner[1:, :-1] + corner[:-1, 1:] + corner[:-1, :-1]
-    return np.float32(SHARPENING.middle) * middle + np.float32(SHARPENING.corner) * around
+    return np.float32(MIDDLE) * middle + np.float32(CORNER) * around

@@ -26,7 +26,7 @@ def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice
     For things that are small and thin: `problem` may hold elements of a single view. They are taken to be of one
     colour; where they are not, texture widens all spreads and the choice stays.
     """
-    if looks.other < LOOKS.metal_spread or looks.ratio > LOOKS.ratio or looks.sigmas < LOOKS.likely_sigmas:
+    if looks.other < LOOKS.metal_spread or looks.ratio > LOOKS.ratio or looks.sigmas < LEVELS.likely:
         return choice
     f0 = metal_f0(problem, looks.phi)
     if f0.min() <= MOST_F0:  # no metal is that dark in any channel, gold has .3 in blue; reddish wood had .06
@@ -44,7 +44,7 @@ def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice
 def coated_by_looks(choice: Choice, looks: Coated) -> Choice:
     """A Lambertian object's choice, DIELECTRIC where one colour under a coat explains all of its surface far better."""
     least, most = LOOKS.coated_spread
-    if looks.matt < least or looks.coated > most or looks.ratio > LOOKS.ratio or looks.sigmas < LOOKS.coated_sigmas:
+    if looks.matt < least or looks.coated > most or looks.ratio > LOOKS.ratio or looks.sigmas < LEVELS.sigmas:
         return choice
     fit = _fit(looks.phi, np.full(3, USUAL_F0), looks.coated, looks.matt)
     note = (

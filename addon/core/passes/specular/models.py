@@ -140,7 +140,7 @@ def choose_model(problem: Problem) -> Choice:
     with_lobe, without = held_out(fit, DIELECTRIC)
     scores = {LAMBERTIAN.name: 1.0, DIELECTRIC.name: float(with_lobe.sum() / max(without.sum(), 1e-30))}
     gain, sigmas = _gain(with_lobe, without)
-    large = gain > LEVELS.gain and dense.there.shape[1] >= CHOICE.large_elements
+    large = gain > LEVELS.gain and dense.there.shape[1] >= LEVELS.enough
     sure = (
         gain > CHOICE.min_gain and sigmas > (LEVELS.likely if large else LEVELS.sigmas) and fit.phi <= FIT.broadest_phi
     )
@@ -152,9 +152,8 @@ def choose_model(problem: Problem) -> Choice:
         scores[METAL.name] = float(with_metal.sum() / max(matt.sum(), 1e-30))
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
         (less, by), (more, surely) = _gain(with_metal, matt), _gain(with_metal, with_lobe)
-        most = CHOICE.bare_at_most if min(less, more) > CHOICE.much else CHOICE.bare
         alone = _bare_metal(problem, dense, metal.phi, metal, scale)[1].sum()
-        if min(less, more) > CHOICE.min_gain and alone <= most * matt.sum():
+        if min(less, more) > CHOICE.min_gain and alone <= CHOICE.bare * matt.sum():
             if by > LEVELS.sigmas and surely > LEVELS.likely:
                 other = dielectric if sure and surely < LEVELS.sigmas else None
                 return Choice(METAL, metal, less, by, scores=scores, dielectric=other)

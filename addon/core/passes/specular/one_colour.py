@@ -21,7 +21,7 @@ from ...fit.lobe_fit import robust_scale
 from ...fit.problem import Problem
 from ...luminance import LUMINANCE
 from ...significance import LEVELS
-from .params import FIT, LOOKS
+from .params import FIT
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def _told(problem: Problem, irradiance: np.ndarray) -> tuple[np.ndarray, np.ndar
     """Which observations tell something, (m,) bool, and their radiance, E (k, 3) and element (k,); None if too few."""
     bright, E = problem.radiance @ LUMINANCE, irradiance[problem.element]
     usable = (bright > 1e-3 * np.median(bright)) & (E @ LUMINANCE > 0)
-    if usable.sum() < LOOKS.least_observations:
+    if usable.sum() < LEVELS.enough:
         return None
     return usable, problem.radiance[usable], E[usable], problem.element[usable]
 

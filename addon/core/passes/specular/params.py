@@ -63,26 +63,15 @@ class ChoiceParams:
         what each element's own mean does (errors of the light field and of the mesh): metals in the living room had 0.1
         to 1.4, dielectrics and diffuse things whose lobe looked like a metal's 2.4 to 60, there and in four small
         rooms.
-    bare_at_most, much : float
-        The same where a metal takes away more than this share of what a diffuse surface costs, and of what a dielectric
-        does: thin legs of steel, 32 elements in 5 views, had 2.4.
     min_gain : float
         A lobe must lower the cost on elements that its fit has not seen by this share, and by this many standard errors
         (`LEVELS.sigmas`). A metal must also beat a dielectric over a diffuse part, by `LEVELS.likely`: that alone it
         does not stand or fall with, as it has to do without a diffuse part besides. Below three others of its class
         decide: of 31 true metals in nine rooms two had less, a black keyboard 1.9 or 2.1.
-    large_elements : float, int
-        A lobe that takes so much off need only be likely (`LEVELS.likely`): few elements show a small highlight, but
-        what they show nothing else explains (a bathroom's tiles, 38,000 pixels: gain .16, 2.2; of what is truly diffuse
-        in the living room and its perturbed scan nothing gains a tenth with less than 3). Not of a handful of elements
-        (a cord, a pixel wide at most), whose standard error is no better known than that.
     """
 
     bare: float = 2.0
-    bare_at_most: float = 3.0
-    much: float = 0.2
     min_gain: float = 0.02
-    large_elements: int = 50
 
 
 CHOICE = ChoiceParams()
@@ -100,28 +89,17 @@ class LooksParams:
         0.2 to 1.1 (the half of them below 0.8), everything else 0.92 and more, but for what `metal_spread` leaves out
         and a pane of glass (0.58); reddish wood in a perturbed scan had 0.78 and an F0 that no metal has
         (`metal_by_looks`).
-    likely_sigmas : float
-        With so many it is metal if others of its class are.
     metal_spread : float
         What follows diffuse light as closely as this says nothing against it: errors of E and A are of that size.
-    coated_sigmas : float
-        An object is coated by this many standard errors. Of what was called Lambertian in six rooms and two perturbed
-        scans, fourteen coated things had less (black tubes 0.42, a hand rail 0.74, soap 0.75, a plant pot 0.89); what
-        is truly diffuse had 0.94 and more, but for what `coated_spread` says.
     coated_spread : tuple[float, float]
         What follows diffuse light as closely as the first says nothing against it (a bath mat: 0.04); what does not
         follow coated light to the second is not explained (a cord as thick as a pixel: 0.65 diffuse, 0.40 coated; of a
         table 0.35).
-    least_observations : int
-        With fewer nothing is said.
     """
 
     ratio: float = 0.9
-    likely_sigmas: float = 1.5
     metal_spread: float = 0.15
-    coated_sigmas: float = 4.0
     coated_spread: tuple[float, float] = (0.1, 0.37)
-    least_observations: int = 40
 
 
 LOOKS = LooksParams()

@@ -20,15 +20,8 @@ class UnseenParams:
         it does among `samples`. Lamps over the truth in perturbed living rooms, two seeds each: 0.99 +- 0.06 with 4,000
         elements (seven scans), 1.01 +- 0.035 with 16,000 (six), 1.07 +- 0.02 where large objects count for more
         (three).
-    most_tilted : float
-        Radians (8 degrees, as cells that count as flat). The living room perturbed, four seeds: its clipped lamp of
-        26.2 comes out at 26.4 +- 0.8, and at 25.7 +- 1.2 with all elements of such cells.
-    enough : int
-        Elements on flat spots from which on the others are left out.
     lamp_gain : float
         A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share.
-    least_sky : float
-        Part of the received light below which a part of the sky can't be solved for; its neighbours' radiance stays.
     sweeps : int
         Times that all parts of the sky are solved for in turn.
     darker : float
@@ -38,20 +31,14 @@ class UnseenParams:
         1.1).
     brightest : float
         The same for a part of the sky that is clipped.
-    least_open : float
-        Share of the received directions that must lead outside for such a sky to be looked for.
     """
 
     samples: int = 4000
     clipped: int = 4
-    most_tilted: float = 0.14
-    enough: int = 200
     lamp_gain: float = 0.03
-    least_sky: float = 0.01
     sweeps: int = 2
     darker: float = 1.25
     brightest: float = 30.0
-    least_open: float = 0.02
 
 
 UNSEEN = UnseenParams()

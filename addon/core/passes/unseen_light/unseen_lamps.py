@@ -6,7 +6,7 @@ import numpy as np
 
 from ...light.lamps import Lamp, twin
 from ...light.light_fit import Sample
-from ...light.params import LIGHT_FIT
+from ...light.params import LIGHT_FIT, SKY
 from ...luminance import LUMINANCE
 from .params import UNSEEN
 from .refine_light import Sky, all_light
@@ -81,7 +81,7 @@ def solve_sky(sample: Sample, lamps, thrown, sky: Sky, base) -> None:
     """Radiance of the sky's unknown parts, channel by channel, one after another."""
     for i, G in enumerate(sky.thrown):
         others = all_light(base, lamps, thrown, sky, without=i)
-        if (G[:, None] * sky.guess[i]).mean() < UNSEEN.least_sky * others.mean():
+        if (G[:, None] * sky.guess[i]).mean() < SKY.least_share * others.mean():
             continue
         found = [sample.best(sample.radiance[:, c], others[:, c], G) for c in range(3)]
         solved = [one[0] for one in found if one is not None]

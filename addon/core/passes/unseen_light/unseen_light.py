@@ -120,7 +120,7 @@ def find_light(
     """
     flat = on_flat(field.atlas)
     if tilted is not None:
-        flat &= tilted < UNSEEN.most_tilted
+        flat &= tilted < np.arccos(LIGHT_FIT.flat)
     clipped = any(i in (colours or {}) for i in unseen_objects)
     usable = steady(field, good, flat) | barely_seen(field, good)
     # What a mirror shows is no albedo.
@@ -154,7 +154,7 @@ def find_light(
     filled = received + sum(G[:, None] * s for G, s in zip(thrown_sky, guess, strict=True))
     seen = find_seen(atlas.object_id[element], field.radiance[element], filled)
     lit = ~np.isin(atlas.object_id[element], [lamp.object_id for lamp in seen])
-    if (lit & flat[element]).sum() >= UNSEEN.enough:
+    if (lit & flat[element]).sum() >= LEVELS.many:
         lit &= flat[element]
     if lit.sum() < LEVELS.enough:
         return Light(tuple(seen), environment, found, element, filled)

@@ -9,6 +9,7 @@ from ...light.few_elements import evened, irradiance_at
 from ...light.field import LightField
 from ...light.lamps import find_seen
 from ...light.light_fit import Sample
+from ...light.params import SKY
 from ...luminance import LUMINANCE
 from ...significance import LEVELS
 from .params import UNSEEN
@@ -21,7 +22,7 @@ def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[L
     everywhere = Environment.only(np.ones((1, 2), np.float32))
     dark = field.with_sun(None).with_light(np.zeros_like(field.radiance), everywhere)
     thrown = irradiance_at(dark, element, seed)[:, 0]
-    if thrown.mean() < UNSEEN.least_open * np.pi:
+    if thrown.mean() < SKY.least_share * np.pi:
         return field, ()
     received = irradiance_at(field.with_light(evened(field)), element, seed)
     object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
