@@ -21,7 +21,7 @@ import numpy as np
 from ..core.errors import BadInputError
 from ..core.io.read import read_capture
 from ..core.memory import peak_memory
-from ..core.passes.registry import PASSES, STAGE_OF, check
+from ..core.passes.registry import PASSES, check, stage_of
 from ..core.pipeline.recover import Recovery
 from ..core.progress import Progress
 from ..core.results.store import Store
@@ -174,7 +174,7 @@ class Bench:
         other = self._folder.with_name(f"{self._folder.name}-without")
         shutil.rmtree(other, ignore_errors=True)
         try:
-            return self._run(name, other, STAGE_OF[name])
+            return self._run(name, other, stage_of(name))
         finally:
             shutil.rmtree(other, ignore_errors=True)
 

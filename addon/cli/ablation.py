@@ -53,11 +53,11 @@ def add_ablation(commands, epilog: str) -> argparse.ArgumentParser:
 
 def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`benchmark ablation ROOM ... --out DIR`, or with `--list` or `--table FILE`."""
-    from ..core.passes.registry import PASSES
+    from ..core.passes.registry import passes
 
     if arguments.list:
-        width = max(len(one.name) for one in PASSES)
-        for one in PASSES:
+        width = max(len(one.name) for one in passes())
+        for one in passes():
             print(f"{one.name:{width}}  {one.stage:11}  {one.does}", file=stream)
         return EXIT_OK
     if arguments.out is None:

@@ -13,6 +13,7 @@ from functools import cache
 from importlib.metadata import entry_points
 
 from ..errors import BadInputError
+from ..origin import of_point, of_thing
 from .dielectric import DIELECTRIC
 from .emitter import EMITTER
 from .lambertian import LAMBERTIAN
@@ -22,6 +23,9 @@ from .transparent import TRANSPARENT
 
 GROUP = "scan_relight.brdfs"
 _models: dict[str, Brdf] = {one.name: one for one in (LAMBERTIAN, DIELECTRIC, METAL, EMITTER, TRANSPARENT)}
+
+
+_packages: dict[str, str] = {}
 
 
 def register(model: Brdf) -> Brdf:
@@ -44,6 +48,11 @@ def find(name: str | None) -> Brdf | None:
     return _models.get(name) if name is not None else None
 
 
+def origin(model: Brdf) -> str:
+    """The package that a model comes from, and its version; "" for the program's own."""
+    return _packages.get(model.name) or " ".join(filter(None, map(of_thing, (model, model.microfacets))))
+
+
 def shown(name: str | None) -> Brdf:
     """The model of a name as interfaces show it: `LAMBERTIAN` where its package is not there."""
     return find(name) or LAMBERTIAN
@@ -63,6 +72,6 @@ def _installed() -> None:
     """Register, once, what installed packages bring; one that is broken is left out with a warning."""
     for entry in entry_points(group=GROUP):
         try:
-            register(entry.load())
+            _packages[register(entry.load()).name] = of_point(entry)
         except Exception as error:  # whatever another package does wrong
             warnings.warn(f"The reflectance model '{entry.name}' can't be loaded ({error!r}); mend it.", stacklevel=2)

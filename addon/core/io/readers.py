@@ -7,6 +7,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
 from ..errors import BadInputError
+from ..origin import of_point, of_thing
 from . import colmap, fipt, nerfstudio, replica, scannetpp, traj
 from .layout import Layout, Reader, Reading
 
@@ -48,6 +49,13 @@ def readers() -> tuple[Reader, ...]:
 @functools.cache
 def _of_packages() -> tuple[Reader, ...]:
     return tuple(_loaded(point) for point in entry_points(group=GROUP))
+
+
+def origin(name: str) -> str:
+    """The package that the reader of a format comes from, and its version; "" for the program's own."""
+    if name in _registered:
+        return of_thing(_registered[name].read)
+    return next((of_point(point) for point in entry_points(group=GROUP) if point.name == name), "")
 
 
 def _loaded(point: EntryPoint) -> Reader:

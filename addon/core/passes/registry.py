@@ -1,15 +1,29 @@
 """The passes that correct the published method, by name: what each does, and the first stage that it changes.
 
-Any of them can be left out (`Settings.without`); what each gains: docs/ablation.md.
+Any of them can be left out (`Settings.without`); what each gains: docs/ablation.md. Those of other packages follow the
+stage's own. They are made known by `register`, or found by their entry points:
+
+    [project.entry-points."scan_relight.passes"]
+    grey-floor = "my_package.grey_floor:PASS"
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+import warnings
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.metadata import entry_points
+from typing import Any, TypeVar
 
-from ..errors import BadInputError
+from ..errors import BadInputError, ScanRelightError
+from ..origin import of_point, of_thing
 from ..stages import RUN_STAGES
+
+GROUP = "scan_relight.passes"
+OPEN_STAGES = ("lit_diffuse", "shading", "specular")
+"""Stages that a pass of another package can follow. The surface is stored as what it differs by from the capture's."""
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -23,11 +37,18 @@ class Pass:
         One sentence.
     stage : str
         The first stage whose result it changes, of `stages.RUN_STAGES`.
+    run : callable(value, before) -> value, optional
+        Of another package's: the stage's value to a new one of the same type, once the stage's own passes are through.
+        `before` has the values of the stages before it, by name. The program's own are called where they belong.
+    origin : str
+        Of another package's: its name and version.
     """
 
     name: str
     does: str
     stage: str
+    run: Callable[[Any, Mapping[str, Any]], Any] | None = None
+    origin: str = ""
 
 
 def _of(stage: str, **does: str) -> tuple[Pass, ...]:
@@ -97,17 +118,86 @@ PASSES = (
     ),
 )  # fmt: skip
 """All of them in the order of the stages."""
-STAGE_OF = {one.name: one.stage for one in PASSES}
+_own = {one.name: one for one in PASSES}
+_others: dict[str, Pass] = {}
+
+
+def register(one: Pass) -> Pass:
+    """Have a pass of another package called at the end of its stage, after those that were registered before.
+
+    Raises
+    ------
+    BadInputError
+        There is a pass of that name already, or it has no stage or function that it could have.
+    """
+    if one.name in _own or _others.get(one.name, one) is not one:
+        raise BadInputError(f"There is a pass '{one.name}' already; give the new one another name.")
+    if one.stage not in OPEN_STAGES or one.run is None:
+        raise BadInputError(f"The pass '{one.name}' needs a function, and one of the stages {', '.join(OPEN_STAGES)}.")
+    _others[one.name] = one
+    return one
+
+
+def passes() -> tuple[Pass, ...]:
+    """All of them, the program's own first."""
+    _installed()
+    return (*PASSES, *_others.values())
+
+
+def stage_of(name: str) -> str:
+    """The first stage that a pass changes. Raises `KeyError` where there is no such pass."""
+    return _own[name].stage if name in _own else {one.name: one.stage for one in passes()}[name]
 
 
 def check(without: Collection[str]) -> None:
     """Raise `BadInputError` for a name that is no pass's."""
+    known = [one.name for one in passes()]
     for name in without:
-        if name not in STAGE_OF:
-            raise BadInputError(f"There is no pass '{name}' to leave out; choose among {', '.join(STAGE_OF)}.")
+        if name not in known:
+            raise BadInputError(f"There is no pass '{name}' to leave out; choose among {', '.join(known)}.")
 
 
 def left_out_of(stage: str, without: Collection[str]) -> tuple[str, ...]:
-    """Those passes left out that change `stage` first: a part of its key."""
+    """Those of the program's own passes left out that change `stage` first: a part of its key."""
     assert stage in RUN_STAGES
-    return tuple(name for name in sorted(without) if STAGE_OF[name] == stage)
+    return tuple(name for name in sorted(without) if name in _own and _own[name].stage == stage)
+
+
+def following(stage: str, without: Collection[str]) -> tuple[Pass, ...]:
+    """Other packages' passes that follow a stage, in the order in which they are called."""
+    return tuple(one for one in passes()[len(PASSES) :] if one.stage == stage and one.name not in without)
+
+
+def followed(stage: str, value: T, before: Mapping[str, Any], without: Collection[str]) -> T:
+    """A stage's value after other packages' passes.
+
+    Raises
+    ------
+    ScanRelightError
+        One of them failed, or gave something else.
+    """
+    for one in following(stage, without):
+        assert one.run is not None
+        told = f"The pass '{one.name}' of '{one.origin or of_thing(one.run)}'"
+        try:
+            found = one.run(value, before)
+        except ScanRelightError:
+            raise
+        except Exception as error:  # whatever another package does wrong
+            raise ScanRelightError(f"{told} failed ({error!r}); mend it, or leave it out.") from error
+        if type(found) is not type(value):
+            raise ScanRelightError(
+                f"{told} gave a {type(found).__name__}, no {type(value).__name__}; mend it, or leave it out."
+            )
+        value = found
+    return value
+
+
+@cache
+def _installed() -> None:
+    """Register, once, what installed packages bring; one that is broken is left out with a warning."""
+    for entry in sorted(entry_points(group=GROUP), key=lambda one: one.name):
+        try:
+            register(replace(entry.load(), origin=of_point(entry)))
+        except Exception as error:  # whatever another package does wrong
+            warnings.warn(f"The pass '{entry.name}' can't be loaded ({error!r}); mend it.", stacklevel=2)

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..origin import of_thing
 from ..passes.albedo.albedo import MEASURED, above_one, quotient, without_emitters
+from ..passes.registry import following
 from ..scene.elements import triangle_geometry
 from ..scene.visibility import SATURATED
 from .corrected import Corrected
@@ -19,6 +21,11 @@ def make_report(run: Corrected) -> dict[str, Any]:
         "capture": run.capture.root.name,
         "settings": dataclasses.asdict(run.settings),
         "stages": run.log,
+        "passes_of_packages": [
+            {"name": one.name, "stage": one.stage, "package": one.origin or of_thing(one.run)}
+            for stage in run.done
+            for one in following(stage, run.settings.without)
+        ],
         "warnings": list(run.capture.warnings) + run.read.bad,
     }
     figures: dict[str, Any] = {"frames": len(run.capture.frames), "triangles": len(run.capture.mesh.triangles)}

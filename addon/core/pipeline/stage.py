@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ..json_values import key
-from ..passes.registry import STAGE_OF, left_out_of
+from ..origin import of_thing
+from ..passes.registry import following, left_out_of, stage_of
 from ..settings import Settings
 from .source import digest
 
@@ -41,7 +42,7 @@ class Stage:
     def settings(self, asked: Settings) -> Settings:
         """Settings as the stage sees them: what it does not declare has its default, so that no result rests on it."""
         heeded = {name: getattr(asked, name) for name in self.heeds}
-        without = tuple(name for name in asked.without if STAGE_OF[name] in self.after)
+        without = tuple(name for name in asked.without if stage_of(name) in self.after)
         return Settings(**heeded, without=without, threads=asked.threads)
 
     def key(self, asked: Settings, before: dict[str, str], *more: Any) -> str:
@@ -57,4 +58,6 @@ class Stage:
         """
         heeded = {name: getattr(asked, name) for name in self.heeds}
         taken = [before[one.name] for one in self.takes]
+        others = tuple((one.name, one.origin or of_thing(one.run)) for one in following(self.name, asked.without))
+        more += (others,) if others else ()
         return key(self.name, digest(self.source), taken, heeded, left_out_of(self.name, asked.without), *more)

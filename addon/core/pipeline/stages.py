@@ -10,6 +10,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from ..brdf.registry import origin as brdf_origin
+from ..errors import MissingStageError
+from ..io import readers
 from ..io.fingerprint import fingerprint
 from ..json_values import key
 from ..light.environment import Environment
@@ -18,7 +21,7 @@ from ..light.mirrors import in_their_planes
 from ..light.shading import Shading
 from ..memory import peak_memory
 from ..passes.pose_refinement.poses import Poses
-from ..passes.registry import check, left_out_of
+from ..passes.registry import check, followed, left_out_of
 from ..progress import Progress
 from ..results.overrides import NONE as NO_OVERRIDES
 from ..results.overrides import Overrides
@@ -28,6 +31,7 @@ from ..scene.model import Capture, Frame, Mesh
 from ..scene.samples import Samples
 from ..scene.surface import Surface
 from ..scene.two_sides import laid_apart
+from ..scene.unwrap import Unwrap
 from ..settings import ROOM, Settings
 from ..stages import WRITE
 from . import frames, shading, specular, surface
@@ -57,8 +61,9 @@ class Stages:
     store : Store
     settings : Settings
     progress : Progress
-    unwrap : callable(Mesh, int) -> (t, 3, 2) float32
-        Lays the mesh out in an atlas of so many texels; Blender's, in the extension.
+    unwrap : callable(Mesh, int) -> (t, 3, 2) float32, optional
+        Lays the mesh out in an atlas of so many texels; Blender's, in the extension. None: only what is stored is
+        looked at.
     overrides : Overrides
         What the artist gives.
 
@@ -78,7 +83,7 @@ class Stages:
         store: Store,
         settings: Settings,
         progress: Progress,
-        unwrap: Callable[[Mesh, int], np.ndarray],
+        unwrap: Unwrap | None,
         overrides: Overrides = NO_OVERRIDES,
     ):
         check(settings.without)
@@ -104,12 +109,23 @@ class Stages:
         """What they are under other overrides."""
         keys: dict[str, str] = {}
         for stage in STAGES:
-            given = overrides.lobes_key() if stage is specular.STAGE else ()
+            given: tuple[Any, ...] = ()
+            if stage is specular.STAGE:
+                brdfs = {one.brdf for one in overrides.lobes().values() if one.brdf is not None}
+                given = (*overrides.lobes_key(), *sorted(filter(None, map(brdf_origin, brdfs))))
             keys[stage.name] = stage.key(self.settings, keys, *given) if stage.takes else self._first_key(stage)
         return keys
 
     def _first_key(self, stage: Stage) -> str:
-        return stage.key(self.settings, {}, fingerprint(self.capture))
+        others = tuple(filter(None, (readers.origin(self.capture.format), self._laid_out_by)))
+        return stage.key(self.settings, {}, fingerprint(self.capture), *others)
+
+    @cached_property
+    def _laid_out_by(self) -> str:
+        """What lays out the atlas; where that is not told, as what is stored is only looked at: what did."""
+        if self._unwrap is not None:
+            return surface.laid_out_by(self._unwrap)
+        return str(self.store.stored_meta(surface.STAGE.name).get("unwrap", ""))
 
     @property
     def run_key(self) -> str:
@@ -138,6 +154,7 @@ class Stages:
             value = from_store(stored, self.store.load_meta(name, self.keys[name]) or {})
         else:
             value = compute(stage.settings(self.settings))
+            value = followed(name, value, self.done, self.settings.without)
             self.store.save(name, self.keys[name], *to_store(value))
         self.log[name] = {"seconds": round(time.monotonic() - started, 2), "stored": stored is not None}
         self.log[name]["peak_memory_bytes"] = peak_memory()
@@ -150,10 +167,15 @@ class Stages:
         capture = self._near
         return self._stage(
             surface.STAGE,
-            lambda settings: surface.make_surface(capture, self._unwrap, settings),
-            lambda found: surface.to_store(found, capture.mesh),
+            lambda settings: surface.make_surface(capture, self._needed_unwrap(), settings),
+            lambda found: surface.to_store(found, capture.mesh, self._laid_out_by),
             lambda arrays, meta: surface.from_store(arrays, meta, capture.mesh),
         )
+
+    def _needed_unwrap(self) -> Unwrap:
+        if self._unwrap is None:
+            raise MissingStageError("The stage 'surface' is not stored for this capture and these settings; run it.")
+        return self._unwrap
 
     def room_mesh(self) -> Mesh:
         """The mesh that the stages worked on, where the capture has it: normals face the frames, noise is out of it.

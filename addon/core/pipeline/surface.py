@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
 from dataclasses import replace
+from functools import partial
+from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..lit_diffuse.from_texture import face_edge
+from ..origin import OWN, of_thing
 from ..passes.mesh_denoising.denoise import without_noise
 from ..scene.model import Capture, Mesh
 from ..scene.recentre import near_origin
 from ..scene.surface import Surface, build_surface, from_uv
 from ..scene.two_sides import with_backs
+from ..scene.unwrap import Unwrap, by_xatlas
 from ..settings import Settings
+from .source import CORE, digest
 from .stage import Stage
 
 STAGE = Stage("surface", Path(__file__), (), ("texel_size", "detail", "atlas_size", "denoise_mesh"))
@@ -28,7 +34,20 @@ def taken_in(capture: Capture) -> Capture:
     return near_origin(capture)
 
 
-def make_surface(capture: Capture, unwrap: Callable[[Mesh, int], np.ndarray], settings: Settings) -> Surface:
+def laid_out_by(unwrap: Unwrap) -> str:
+    """What lays the atlas out, in which version: its name, its source if it is the program's own, else its package."""
+    while isinstance(unwrap, partial):
+        unwrap = unwrap.func
+    module = sys.modules[unwrap.__module__]
+    name = f"{module.__name__.removeprefix(OWN)}.{getattr(unwrap, '__qualname__', type(unwrap).__qualname__)}"
+    of = of_thing(unwrap)
+    if not of and module.__file__ is not None:
+        of = digest(Path(module.__file__), CORE.parent)[:16]
+    library = version("xatlas") if unwrap is by_xatlas and find_spec("xatlas") else ""
+    return " ".join(filter(None, (name, of, library)))
+
+
+def make_surface(capture: Capture, unwrap: Unwrap, settings: Settings) -> Surface:
     """Lay surface elements out over the mesh of a capture `taken_in`. Raises `BadInputError`: no camera looks at it."""
     noisy = settings.denoise_mesh and "mesh-denoising" not in settings.without
     mesh, noise = without_noise(capture.mesh, settings.without) if noisy else (capture.mesh, 0.0)
@@ -40,7 +59,7 @@ def make_surface(capture: Capture, unwrap: Callable[[Mesh, int], np.ndarray], se
     return replace(found, noise=noise)
 
 
-def to_store(found: Surface, captured: Mesh) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def to_store(found: Surface, captured: Mesh, laid_out: str = "") -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """What is stored of a surface: arrays, and what JSON holds. Of the captured mesh it holds what is different."""
     first = found.mesh.triangles[: len(captured.triangles)]
     sign = np.where((first == captured.triangles).all(1), 1, -1).astype(np.int8)
@@ -48,7 +67,7 @@ def to_store(found: Surface, captured: Mesh) -> tuple[dict[str, np.ndarray], dic
     if found.noise:
         arrays["vertices"] = found.mesh.vertices[: len(captured.vertices)]
     arrays |= {name: getattr(found.atlas, name) for name in ELEMENTS}
-    return arrays, {"size": found.atlas.size, "noise": found.noise}
+    return arrays, {"size": found.atlas.size, "noise": found.noise, "unwrap": laid_out}
 
 
 def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any], captured: Mesh) -> Surface:

@@ -127,6 +127,10 @@ class Store:
         meta = _read_meta(self._stage(name))
         return None if meta is None or meta.get("key") != key else meta.get("meta", {})
 
+    def stored_meta(self, name: str) -> dict[str, Any]:
+        """What the stage `name` was stored with as `meta`, under whatever key; empty where it is absent or damaged."""
+        return (_read_meta(self._stage(name)) or {}).get("meta") or {}
+
     def stored_key(self, name: str) -> str | None:
         """The key under which the stage `name` is stored; None where it is absent or damaged."""
         return (_read_meta(self._stage(name)) or {}).get("key")
