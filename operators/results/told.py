@@ -137,7 +137,7 @@ def facts(one: dict[str, Any]) -> list[tuple[str, str]]:
         found.append(("Roughness", _between(max(alpha, 0) ** 0.5, one.get("roughness_low"), one.get("roughness_high"))))
     value = specular(one)
     if value is not None:
-        found.append(("Specular F0", _between(value, one.get("specular_low"), one.get("specular_high"))))
+        found.append(("Specular F0", _between(value, one.get("f0_low"), one.get("f0_high"))))
     if brdf.gives_light and one.get("emission") is not None:
         found.append(("Radiance", ", ".join(f"{part:.3g}" for part in one["emission"])))
     albedo = _mean(evidence.get("albedo"))

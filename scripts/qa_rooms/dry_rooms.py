@@ -23,15 +23,15 @@ def bedroom(seed: int) -> FurnishedRoom:
     )
     x, y, z = r.size
     papered = r.matt_picture(stripes([r.tint((0.5, 0.42, 0.28)), r.tint((0.3, 0.36, 0.3))], 36))
-    plain = r.matt(0.55, 0.56, 0.5)
+    plain = r.diffuse(0.55, 0.56, 0.5)
     r.shell(
         r.gloss(0.4, (planks() * 0.5).astype(np.float32)),
-        r.matt(0.8, 0.79, 0.76),
+        r.diffuse(0.8, 0.79, 0.76),
         [plain, plain, papered, plain],
         {1: [(1.4, 2.9, 0.8, 2.1)]},
     )
     r.window_frame(r.gloss(0.45, (0.7, 0.7, 0.68)))
-    cloth = r.matt(0.35, 0.05, 0.1)
+    cloth = r.diffuse(0.35, 0.05, 0.1)
     r.add("curtain", [curtain((x - 0.07, 0.85, 0.05), (0, 0.4, 0), 2.3, (0.035, 0, 0), 4, 40)], cloth)
     r.add("curtain", [curtain((x - 0.07, 2.45, 0.05), (0, 0.4, 0), 2.3, (0.035, 0, 0), 4, 40)], cloth)
     r.add("rod", [tube([(x - 0.07, 0.6, 2.37), (x - 0.07, 3.1, 2.37)], 0.015)], r.metal(0.25, BRASS), smooth=True)
@@ -41,14 +41,14 @@ def bedroom(seed: int) -> FurnishedRoom:
         [box((1.2, 1.85, 0.08), (2.95, y - 0.08, 0.3)), box((1.15, y - 0.08, 0.05), (3.0, y - 0.02, 1.15))],
         dark,
     )
-    r.add("mattress", [cushion((2.075, 2.9, 0.4), (0.85, 1.0, 0.13), 10, 0.3)], r.matt(0.8, 0.79, 0.77), smooth=True)
+    r.add("mattress", [cushion((2.075, 2.9, 0.4), (0.85, 1.0, 0.13), 10, 0.3)], r.diffuse(0.8, 0.79, 0.77), smooth=True)
     blanket = stripes([(0.05, 0.12, 0.3), (0.55, 0.5, 0.4), (0.08, 0.2, 0.35)], 12)
     r.add("blanket", [cushion((2.075, 2.55, 0.44), (0.89, 0.68, 0.13), 10, 0.25)], r.matt_picture(blanket), smooth=True)
     for k in range(2):
         r.add(
             "pillow",
             [cushion((1.65 + 0.85 * k, 3.55, 0.6), (0.33, 0.2, 0.1), 10, 0.6)],
-            r.matt(0.75, 0.7, 0.55),
+            r.diffuse(0.75, 0.7, 0.55),
             smooth=True,
         )
         left = 0.55 + 2.6 * k
@@ -64,7 +64,7 @@ def bedroom(seed: int) -> FurnishedRoom:
         at = (left + 0.25, 3.75)
         stand = [(0.08, 0), (0.07, 0.02), (0.015, 0.04), (0.03, 0.14), (0.012, 0.2), (0.01, 0.3), (0.002, 0.3)]
         r.add("lamp stand", [turned((*at, 0.472), stand, 24)], r.metal(0.25, BRASS), smooth=True)
-        r.add("lamp shade", [cone((*at, 0.72), 0.17, 0.1, 0.24, 32)], r.matt(0.72, 0.62, 0.42))
+        r.add("lamp shade", [cone((*at, 0.72), 0.17, 0.1, 0.24, 32)], r.diffuse(0.72, 0.62, 0.42))
         r.add("bulb", [ball((*at, 0.82), 0.04, 5)], r.lamp(120, 84, 48))
     r.add("wardrobe", [box((0.01, 0.5, 0.06), (0.6, 2.4, 2.2))], r.gloss(0.3, wood((0.16, 0.075, 0.035), 3, seed + 1)))
     r.add("knob", [ball((0.63, a, 1.1), 0.02, 5) for a in (1.4, 1.5)], r.metal(0.2, BRASS), smooth=True)
@@ -112,7 +112,7 @@ def office(seed: int) -> FurnishedRoom:
     """Six fluorescent panels, black plastics, bent chrome chairs, four like desks, a glass partition."""
     r = FurnishedRoom("office", seed, (5.6, 4.2, 2.7), (0.9, 1.5, 4.6, 2.6), pitch=(-40, 20))
     x, y, z = r.size
-    wall_paint, accent = r.matt(0.7, 0.71, 0.7), r.matt(0.04, 0.2, 0.45)
+    wall_paint, accent = r.diffuse(0.7, 0.71, 0.7), r.diffuse(0.04, 0.2, 0.45)
     r.shell(
         r.matt_picture(clouds((0.1, 0.11, 0.13), (0.2, 0.2, 0.22), 60, seed)),
         r.matt_picture(tiles([(0.76, 0.76, 0.75)], (0.5, 0.5, 0.5), 9, 7, seed, 0.03)),
@@ -123,7 +123,7 @@ def office(seed: int) -> FurnishedRoom:
         r.add("light panel", [box((a, b, z - 0.03), (a + 0.3, b + 1.0, z - 0.005))], r.lamp(9.5, 10.5, 11))
         if k == 4:
             panel = r.things.pop()  # one tube is dead
-            r.add("light panel", [(panel.quads, panel.uv)], r.matt(0.7, 0.7, 0.7))
+            r.add("light panel", [(panel.quads, panel.uv)], r.diffuse(0.7, 0.7, 0.7))
     top = r.gloss(0.35, wood((0.55, 0.42, 0.27), 5, seed))
     black = r.gloss(0.3, (0.018, 0.018, 0.02))
     for k in range(4):
@@ -240,10 +240,10 @@ def hall(seed: int) -> FurnishedRoom:
         "hall", seed, (4.4, 5.0, 3.6), (0.7, 0.8, 2.6, 4.0), pitch=(-35, 8), sky=(4.2, 5.2, 6.8), ground=(1.0, 1.0, 0.7)
     )
     x, y, z = r.size
-    red, ochre = r.matt(0.62, 0.1, 0.06), r.matt(0.68, 0.45, 0.08)
+    red, ochre = r.diffuse(0.62, 0.1, 0.06), r.diffuse(0.68, 0.45, 0.08)
     r.shell(
         r.gloss(0.2, clouds((0.04, 0.04, 0.05), (0.2, 0.19, 0.18), 10, seed, sharp=3)),
-        r.matt(0.82, 0.8, 0.76),
+        r.diffuse(0.82, 0.8, 0.76),
         [red, ochre, red, ochre],
         {3: [(1.2, 3.8, 0.5, 2.9)]},
     )
@@ -291,7 +291,7 @@ def hall(seed: int) -> FurnishedRoom:
         )
     r.add("picture", [box((1.3, 0.002, 1.3), (2.5, 0.03, 2.2))], Finish(np.float32([0.03] * 3)), Finish(painting()))
     r.things[-1].slot[3] = 1
-    r.add("bench", [cushion((2.3, 4.6, 0.42), (0.6, 0.22, 0.06), 10, 0.3)], r.matt(0.06, 0.16, 0.12), smooth=True)
+    r.add("bench", [cushion((2.3, 4.6, 0.42), (0.6, 0.22, 0.06), 10, 0.3)], r.diffuse(0.06, 0.16, 0.12), smooth=True)
     r.add(
         "bench legs",
         [
@@ -323,5 +323,5 @@ def hall(seed: int) -> FurnishedRoom:
         r.gloss(0.1, (0.8, 0.8, 0.78)),
         smooth=True,
     )
-    r.add("cord", [tube([(1.8, 2.5, 3.1), (1.8, 2.5, z)], 0.006, 6)], r.matt(0.03, 0.03, 0.03))
+    r.add("cord", [tube([(1.8, 2.5, 3.1), (1.8, 2.5, z)], 0.006, 6)], r.diffuse(0.03, 0.03, 0.03))
     return r

@@ -65,7 +65,7 @@ class FurnishedRoom:
         """The colour a little changed by the seed."""
         return np.clip(np.asarray(colour) * self.rng.uniform(1 - spread, 1 + spread, 3), 0.005, 0.92)
 
-    def matt(self, *colour) -> Finish:
+    def diffuse(self, *colour) -> Finish:
         """Diffuse."""
         return Finish(np.float32(self.tint(colour)))
 

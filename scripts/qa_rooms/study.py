@@ -25,17 +25,17 @@ def study(seed: int) -> FurnishedRoom:
     )
     x, y, z = r.size
     paper = r.matt_picture(clouds(r.tint((0.28, 0.36, 0.3)), r.tint((0.55, 0.56, 0.42)), 22, seed, sharp=2))
-    plaster = r.matt(0.66, 0.62, 0.55)
+    plaster = r.diffuse(0.66, 0.62, 0.55)
     r.shell(
         r.gloss(0.25, np.float32(planks() * 0.8)),
-        r.matt(0.8, 0.8, 0.78),
+        r.diffuse(0.8, 0.8, 0.78),
         [paper, plaster, paper, plaster],
         {0: [(0.8, 1.8, 0.9, 2.2), (2.8, 3.8, 0.9, 2.2)]},
     )
     r.window_frame(r.gloss(0.3, (0.8, 0.8, 0.78)))
     for left in (1.0, 2.05, 3.0, 4.05):
         drape = curtain((left - 0.15, 0.07, 0.1), (0.3, 0, 0), 2.3, (0, 0.03, 0), 3, 36)
-        r.add("curtain", [drape], r.matt(0.12, 0.2, 0.35))
+        r.add("curtain", [drape], r.diffuse(0.12, 0.2, 0.35))
     _books(r, y)
     _piano(r, x)
     _desk(r, seed, y)
@@ -88,7 +88,7 @@ def _desk(r: FurnishedRoom, seed: int, y: float) -> None:
         top,
     )
     r.add("desk pad", [box((3.5, y - 0.85, 0.7605), (4.1, y - 0.45, 0.765))], r.gloss(0.5, (0.03, 0.09, 0.05)))
-    r.add("paper", [box((3.65, y - 0.75, 0.7655), (3.86, y - 0.5, 0.768))], r.matt(0.82, 0.82, 0.8))
+    r.add("paper", [box((3.65, y - 0.75, 0.7655), (3.86, y - 0.5, 0.768))], r.diffuse(0.82, 0.82, 0.8))
     arm = [(4.35, y - 0.3, 0.775), (4.35, y - 0.3, 1.1), (4.2, y - 0.45, 1.2)]
     foot = turned((4.35, y - 0.3, 0.7605), [(0.1, 0), (0.1, 0.012), (0.002, 0.015)], 24)
     r.add("desk lamp", [tube(arm, 0.012, 10), foot], r.metal(0.35, STEEL), smooth=True)
@@ -106,7 +106,7 @@ def _desk(r: FurnishedRoom, seed: int, y: float) -> None:
             cushion((3.8, y - 1.25, 0.46), (0.23, 0.22, 0.035), 8, 0.4),
             cushion((3.8, y - 1.47, 0.8), (0.22, 0.03, 0.24), 8, 0.4),
         ],
-        r.matt(0.4, 0.12, 0.05),
+        r.diffuse(0.4, 0.12, 0.05),
         smooth=True,
     )
     r.add("chair legs", legs(3.58, y - 1.46, 4.02, y - 1.04, 0.43, 0.035), r.gloss(0.35, (0.12, 0.06, 0.03)))
@@ -123,7 +123,7 @@ def _seats(r: FurnishedRoom) -> None:
     r.add("sofa", parts, leather, smooth=True)
     for k, colour in enumerate(((0.6, 0.45, 0.08), (0.65, 0.63, 0.58))):
         pad = cushion((0.4, 1.45 + 0.85 * k, 0.56), (0.1, 0.2, 0.18), 8, 0.6)
-        r.add("cushion", [pad], r.matt(*colour), smooth=True)
+        r.add("cushion", [pad], r.diffuse(*colour), smooth=True)
     rug = checker(r.tint((0.3, 0.06, 0.05)), r.tint((0.45, 0.36, 0.24)), 14)
     r.add("rug", [box((0.95, 1.0, 0.001), (2.6, 2.9, 0.012))], r.matt_picture(rug))
     stone = r.gloss(0.15, clouds((0.03, 0.03, 0.035), (0.22, 0.2, 0.18), 8, 3, sharp=2))
@@ -138,7 +138,7 @@ def _lamps(r: FurnishedRoom, z: float) -> None:
     """A floor lamp with a cloth shade, and two bulbs on cords."""
     pole = [(0.14, 0), (0.13, 0.02), (0.012, 0.03), (0.012, 1.42), (0.002, 1.42)]
     r.add("lamp stand", [turned((0.45, 3.35, 0.002), pole, 24)], r.metal(0.25, BRASS), smooth=True)
-    r.add("lamp shade", [cone((0.45, 3.35, 1.4), 0.2, 0.13, 0.26, 32)], r.matt(0.75, 0.66, 0.48))
+    r.add("lamp shade", [cone((0.45, 3.35, 1.4), 0.2, 0.13, 0.26, 32)], r.diffuse(0.75, 0.66, 0.48))
     r.add("bulb", [ball((0.45, 3.35, 1.53), 0.045, 5)], r.lamp(100, 72, 44))
     for a, b in ((1.6, 2.2), (3.4, 2.2)):
         r.add("bulb", [ball((a, b, 2.25), 0.055, 6)], r.lamp(70, 52, 34))
@@ -148,7 +148,7 @@ def _lamps(r: FurnishedRoom, z: float) -> None:
             r.metal(0.3, BRASS),
             smooth=True,
         )
-        r.add("cord", [tube([(a, b, 2.37), (a, b, z)], 0.006, 6)], r.matt(0.03, 0.03, 0.03))
+        r.add("cord", [tube([(a, b, 2.37), (a, b, z)], 0.006, 6)], r.diffuse(0.03, 0.03, 0.03))
 
 
 def _small_things(r: FurnishedRoom, x: float, y: float, seed: int) -> None:

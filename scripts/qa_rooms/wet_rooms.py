@@ -16,10 +16,10 @@ def kitchen(seed: int) -> FurnishedRoom:
         "kitchen", seed, (4.2, 3.6, 2.5), (1.0, 0.9, 3.2, 2.1), sky=(2.2, 2.8, 3.6), ground=(0.5, 0.45, 0.4)
     )
     x, y, z = r.size
-    plain = r.matt(0.72, 0.68, 0.58)
+    plain = r.diffuse(0.72, 0.68, 0.58)
     r.shell(
         r.gloss(0.35, checker((0.62, 0.58, 0.52), (0.06, 0.06, 0.07), 10)),
-        r.matt(0.82, 0.82, 0.8),
+        r.diffuse(0.82, 0.82, 0.8),
         [plain] * 4,
         {1: [(1.2, 2.3, 1.1, 2.0)]},
     )
@@ -98,7 +98,7 @@ def kitchen(seed: int) -> FurnishedRoom:
             r.metal(0.3, COPPER),
             smooth=True,
         )
-        r.add("cord", [tube([(at, 0.5, 1.82), (at, 0.5, z)], 0.005, 6)], r.matt(0.03, 0.03, 0.03))
+        r.add("cord", [tube([(at, 0.5, 1.82), (at, 0.5, z)], 0.005, 6)], r.diffuse(0.03, 0.03, 0.03))
         r.add("bulb", [ball((at, 0.5, 1.68), 0.045, 5)], r.lamp(150, 120, 82))
     bowl = [(0.03, 0), (0.09, 0.02), (0.15, 0.08), (0.145, 0.08), (0.085, 0.03), (0.002, 0.015)]
     r.add("bowl", [turned((2.55, 0.5, 0.902), bowl, 24)], r.gloss(0.15, (0.75, 0.75, 0.76)), smooth=True)
@@ -118,7 +118,9 @@ def kitchen(seed: int) -> FurnishedRoom:
         r.gloss(0.18, (0.03, 0.25, 0.22)),
         smooth=True,
     )
-    r.add("curtain", [curtain((x - 0.05, 0.75, 0.9), (0, 0.42, 0), 1.25, (0.03, 0, 0), 4, 32)], r.matt(0.6, 0.5, 0.12))
+    r.add(
+        "curtain", [curtain((x - 0.05, 0.75, 0.9), (0, 0.42, 0), 1.25, (0.03, 0, 0), 4, 32)], r.diffuse(0.6, 0.5, 0.12)
+    )
     r.add(
         "shelf",
         [box((0.005, 0.5, 1.4), (0.25, 1.8, 1.43)), box((0.005, 0.5, 1.8), (0.25, 1.8, 1.83))],
@@ -154,7 +156,7 @@ def bathroom(seed: int) -> FurnishedRoom:
     white = r.gloss(0.18, tiles([(0.78, 0.79, 0.78)], (0.42, 0.42, 0.4), 12, 10, seed, 0.04))
     r.shell(
         r.gloss(0.4, tiles([(0.1, 0.1, 0.11), (0.13, 0.13, 0.14)], (0.3, 0.29, 0.28), 8, 7, seed, 0.03)),
-        r.matt(0.84, 0.84, 0.83),
+        r.diffuse(0.84, 0.84, 0.83),
         [white] * 4,
     )
     border = tiles([(0.02, 0.16, 0.3), (0.05, 0.3, 0.4), (0.6, 0.6, 0.55)], (0.4, 0.4, 0.4), 40, 2, seed)
@@ -184,8 +186,8 @@ def bathroom(seed: int) -> FurnishedRoom:
         smooth=True,
     )
     r.add("towel rail", [tube([(0.06, 0.5, 1.15), (0.06, 1.3, 1.15)], 0.012)], r.metal(0.12, CHROME), smooth=True)
-    r.add("towel", [curtain((0.085, 0.58, 0.45), (0, 0.45, 0), 0.7, (0.012, 0, 0), 3, 24)], r.matt(0.62, 0.12, 0.04))
-    r.add("towel", [curtain((0.085, 1.06, 0.6), (0, 0.2, 0), 0.55, (0.01, 0, 0), 2, 16)], r.matt(0.62, 0.12, 0.04))
+    r.add("towel", [curtain((0.085, 0.58, 0.45), (0, 0.45, 0), 0.7, (0.012, 0, 0), 3, 24)], r.diffuse(0.62, 0.12, 0.04))
+    r.add("towel", [curtain((0.085, 1.06, 0.6), (0, 0.2, 0), 0.55, (0.01, 0, 0), 2, 16)], r.diffuse(0.62, 0.12, 0.04))
     seat = [(0.12, 0), (0.1, 0.15), (0.18, 0.36), (0.2, 0.42), (0.002, 0.43)]
     r.add(
         "toilet",
@@ -193,7 +195,7 @@ def bathroom(seed: int) -> FurnishedRoom:
         r.gloss(0.14, (0.82, 0.82, 0.8)),
         smooth=True,
     )
-    r.add("mat", [cushion((1.5, 1.35, 0.015), (0.4, 0.3, 0.012))], r.matt(0.2, 0.35, 0.3), smooth=True)
+    r.add("mat", [cushion((1.5, 1.35, 0.015), (0.4, 0.3, 0.012))], r.diffuse(0.2, 0.35, 0.3), smooth=True)
     r.add(
         "bin",
         [turned((1.25, 0.25, 0.002), [(0.12, 0), (0.13, 0.3), (0.12, 0.32), (0.002, 0.33)], 28)],

@@ -40,9 +40,9 @@ def test_the_truth_agrees_with_itself(office):
     objects = {o["id"]: o for o in json.loads((office / "truth" / "materials.json").read_text())}
     ids, albedo, colour = truth(office, "object_id")[..., 0], truth(office, "albedo"), truth(office, "diffuse_color")
     light, image = truth(office, "diffuse_light"), truth(office, "image")
-    matt = np.isin(ids, [i for i, o in objects.items() if o["bsdf"] == "diffuse" and not o["emission"]])
+    diffuse = np.isin(ids, [i for i, o in objects.items() if o["bsdf"] == "diffuse" and not o["emission"]])
     middle = ids[:, 1:-1, 1:-1]
-    inside = matt[:, 1:-1, 1:-1] & (middle == ids[:, 1:-1, :-2]) & (middle == ids[:, :-2, 1:-1])
+    inside = diffuse[:, 1:-1, 1:-1] & (middle == ids[:, 1:-1, :-2]) & (middle == ids[:, :-2, 1:-1])
     inside &= (middle == ids[:, 1:-1, 2:]) & (middle == ids[:, 2:, 1:-1])
     assert inside.sum() > 300
     pictures = {"albedo": albedo, "colour": colour, "light": light, "image": image}

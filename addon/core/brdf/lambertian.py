@@ -31,7 +31,7 @@ class Lambertian(Brdf):
 
 LAMBERTIAN = Lambertian(
     name="lambertian",
-    label="Matt",
+    label="Diffuse",
     text="Reflects the same to all sides, as chalk and plain wall paint",
     colour=(150, 150, 150),
     icon="SHADING_SOLID",

@@ -50,7 +50,7 @@ class ObjectMaterial:
         Pixels that the fit used.
     roughness_low, roughness_high : float or None
         90 % interval of Blender's roughness, sqrt(alpha); 0 and 1 where it is not identifiable. None for emitters.
-    specular_low, specular_high : float or None
+    f0_low, f0_high : float or None
         The same of F0, of a metal in the mean; all that a dielectric can have where it is not identifiable.
     scores : dict of str to float
         Cost on observations that the fit has not seen, relative to the Lambertian's, of each model that was tried:
@@ -77,8 +77,8 @@ class ObjectMaterial:
     observations: int = 0
     roughness_low: float | None = None
     roughness_high: float | None = None
-    specular_low: float | None = None
-    specular_high: float | None = None
+    f0_low: float | None = None
+    f0_high: float | None = None
     scores: dict[str, float] = field(default_factory=dict)
     note: str = ""
     given: dict[str, Any] = field(default_factory=dict)
@@ -130,10 +130,14 @@ def undescribed(object_id: int, class_name: str) -> ObjectMaterial:
     return ObjectMaterial(object_id, class_name, LAMBERTIAN, note="no description")
 
 
+EARLIER = {"alpha": "phi", "f0": "psi", "f0_low": "specular_low", "f0_high": "specular_high"}
+"""What results of version 0.1 call them."""
+
+
 def renamed(told: dict[str, Any]) -> dict[str, Any]:
-    """An entry of materials.json by today's names: results of version 0.1 say `phi` for alpha, `psi` for one F0."""
-    today = {name: value for name, value in told.items() if name not in ("phi", "psi")}
-    for name, before in (("alpha", "phi"), ("f0", "psi")):
+    """An entry of materials.json by today's names."""
+    today = {name: value for name, value in told.items() if name not in EARLIER.values()}
+    for name, before in EARLIER.items():
         if told.get(before) is not None and today.get(name) is None:
             today[name] = told[before]
     return today

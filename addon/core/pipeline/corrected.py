@@ -237,7 +237,7 @@ def corrected(materials: tuple[ObjectMaterial, ...], overrides: Overrides, light
             m = replace(m, emission=rgb(np.asarray(m.emission) * light))
         if m.model.lobe_alone and given.base_color is not None and given.f0 is None:
             mean = float(np.mean(given.base_color))
-            m = replace(m, f0=m.model.as_f0(given.base_color), specular_low=mean, specular_high=mean)
+            m = replace(m, f0=m.model.as_f0(given.base_color), f0_low=mean, f0_high=mean)
         result.append(m)
     return result
 
@@ -248,7 +248,7 @@ def coated(materials: list[ObjectMaterial], albedo: Albedo, atlas: Atlas) -> lis
     Not on what was looked at and showed none, or is of a class that did, nor on what is too dark to reflect as much as
     the coat does. The roughness is the median of the dielectrics that were identified in the class, else in the room.
     """
-    matt = {m.class_name for m in materials if not m.model.has_lobe and m.model.has_albedo and m.scores}
+    diffuse = {m.class_name for m in materials if not m.model.has_lobe and m.model.has_albedo and m.scores}
     rough: dict[str, list[float]] = {}
     for m in materials:
         if m.model.layered and m.alpha is not None:
@@ -257,7 +257,7 @@ def coated(materials: list[ObjectMaterial], albedo: Albedo, atlas: Atlas) -> lis
     result = []
     for m in materials:
         plain = not m.model.has_lobe and m.model.has_albedo and not m.scores
-        if plain and m.class_name not in matt and m.given.keys() <= {"base_color"}:
+        if plain and m.class_name not in diffuse and m.given.keys() <= {"base_color"}:
             own = atlas.object_id == m.object_id
             roughness = float(np.median(rough.get(m.class_name) or everywhere or [SATIN]))
             if own.any() and np.median(albedo.rho[own], 0).min() > layer_reflectance(USUAL_F0, roughness**2):

@@ -147,8 +147,8 @@ NONE = Overrides()
 def merge(older: Overrides, newer: Overrides) -> Overrides:
     """Both together: key by key what is newer wins, and what it took back is gone.
 
-    A newly given `same_as` replaces an older description of the highlight, and the other way round; a matt surface or
-    a lamp has no older roughness or F0.
+    A newly given `same_as` replaces an older description of the highlight, and the other way round; a diffuse surface
+    or a lamp has no older roughness or F0.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def merge(older: Overrides, newer: Overrides) -> Overrides:
         if "model" in given:
             outdated += _has_no(given["model"])
         elif given.keys() & set(_has_no(objects.get(object_id, NOTHING).model)):
-            outdated += ("model",)  # a highlight is given now, so it is matt no longer
+            outdated += ("model",)  # a highlight is given now, so it is diffuse no longer
         was = replace(objects.get(object_id, NOTHING), **dict.fromkeys(outdated))
         objects[object_id] = replace(was, **{name: getattr(one, name) for name in given})
     white = newer.white or (None if ("white", "") in newer.back else older.white)

@@ -35,8 +35,8 @@ def things(scene, tmp_path):
 
 def test_recovered_materials_are_marked_and_others_are_not(things):
     assert assets.mark(things) == 2
-    matt, glossy, own = (thing.material_slots[0].material for thing in things)
-    assert own.asset_data is None and matt.asset_data is not None
+    diffuse, glossy, own = (thing.material_slots[0].material for thing in things)
+    assert own.asset_data is None and diffuse.asset_data is not None
     assert {tag.name for tag in glossy.asset_data.tags} == {"Scan Relight", "den", "specular"}
     assert "scan 'den'" in glossy.asset_data.description and glossy.asset_data.author
 

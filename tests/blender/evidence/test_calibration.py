@@ -51,7 +51,7 @@ def gloss_held(run: Recovery, gloss: dict[int, tuple[float, float]]) -> list[boo
     for m in run.materials():
         if m.object_id in gloss:
             roughness, f0 = gloss[m.object_id]
-            found += [m.roughness_low <= roughness <= m.roughness_high, m.specular_low <= f0 <= m.specular_high]
+            found += [m.roughness_low <= roughness <= m.roughness_high, m.f0_low <= f0 <= m.f0_high]
     return found
 
 

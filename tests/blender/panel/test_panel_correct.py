@@ -40,7 +40,7 @@ def test_each_model_has_its_values(room, panels, draw, number, rows):
     select(room[number])
     words = draw(panels[0]).words
     assert {"Model", "Roughness", "F0", "F0 Color", "Base Color"} & set(words) == rows
-    assert {"Metal", "Glossy", "Matt", "Lamp", "The Same As", "Refit"} <= set(words)
+    assert {"Metal", "Glossy", "Diffuse", "Lamp", "The Same As", "Refit"} <= set(words)
 
 
 def test_what_is_given_and_waits_is_told(room, panels, draw, ops):

@@ -74,10 +74,10 @@ OLD = {
 def test_results_of_version_0_1_open(tmp_path):
     write_room(tmp_path, a_capture())
     (tmp_path / "materials.json").write_text(json.dumps(OLD))
-    glossy, metal, matt = read_room(tmp_path).materials
+    glossy, metal, diffuse = read_room(tmp_path).materials
     assert (glossy.model, glossy.alpha, glossy.f0) == (DIELECTRIC, 0.25, 0.05)
     assert (metal.model, metal.alpha, metal.f0) == (METAL, 0.04, (0.9, 0.8, 0.7))
-    assert (matt.model, matt.alpha, matt.f0) == (LAMBERTIAN, None, None)
+    assert (diffuse.model, diffuse.alpha, diffuse.f0) == (LAMBERTIAN, None, None)
 
 
 def test_a_model_that_is_not_there_is_told(tmp_path):

@@ -21,7 +21,7 @@ from .params import LOOKS
 
 
 def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice:
-    """An object's choice, METAL where one metal explains all of its surface and neither matt nor dielectric does.
+    """An object's choice, METAL where one metal explains all of its surface and neither diffuse nor dielectric does.
 
     For things that are small and thin: `problem` may hold elements of a single view. They are taken to be of one
     colour; where they are not, texture widens all spreads and the choice stays.
@@ -31,7 +31,7 @@ def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice
     f0 = metal_f0(problem, looks.phi)
     if f0.min() <= MOST_F0:  # no metal is that dark in any channel, gold has .3 in blue; reddish wood had .06
         return choice
-    fit = _fit(looks.phi, f0, looks.metal, looks.matt)
+    fit = _fit(looks.phi, f0, looks.metal, looks.diffuse)
     if looks.sigmas < LEVELS.sigmas:
         return replace(choice, metal=choice.metal or fit)
     note = (
@@ -44,17 +44,17 @@ def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice
 def coated_by_looks(choice: Choice, looks: Coated) -> Choice:
     """A Lambertian object's choice, DIELECTRIC where one colour under a coat explains all of its surface far better."""
     least, most = LOOKS.coated_spread
-    if looks.matt < least or looks.coated > most or looks.ratio > LOOKS.ratio or looks.sigmas < LEVELS.sigmas:
+    if looks.diffuse < least or looks.coated > most or looks.ratio > LOOKS.ratio or looks.sigmas < LEVELS.sigmas:
         return choice
-    fit = _fit(looks.phi, np.full(3, USUAL_F0), looks.coated, looks.matt)
+    fit = _fit(looks.phi, np.full(3, USUAL_F0), looks.coated, looks.diffuse)
     note = (
-        f"Its radiance spreads by {looks.coated:.2f} about that of one colour under a coat, by {looks.matt:.2f} about "
-        "a matt one's."
+        f"Its radiance spreads by {looks.coated:.2f} about that of one colour under a coat, by {looks.diffuse:.2f} "
+        "about a diffuse one's."
     )
     return replace(choice, model=DIELECTRIC, fit=fit, gain=1 - looks.ratio, sigmas=looks.sigmas, note=note, looks=looks)
 
 
-def _fit(phi: float, psi: np.ndarray, spread: float, matt: float) -> LobeFit:
+def _fit(phi: float, psi: np.ndarray, spread: float, diffuse: float) -> LobeFit:
     """The lobe as a fit; its residuals are median sizes, as `LobeFit` has them."""
-    residual, without = spread / 1.4826, matt / 1.4826
+    residual, without = spread / 1.4826, diffuse / 1.4826
     return LobeFit(phi, psi, 0.0, 0.0, residual**2, without**2, residual, without)

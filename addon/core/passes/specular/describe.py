@@ -58,8 +58,8 @@ def described(
         residual_lambertian=None if fit is None else fit.residual_lambertian,
         roughness_low=sure.roughness[0],
         roughness_high=sure.roughness[1],
-        specular_low=sure.specular[0],
-        specular_high=sure.specular[1],
+        f0_low=sure.specular[0],
+        f0_high=sure.specular[1],
         scores=choice.scores,
         note=choice.note,
     )
@@ -77,7 +77,7 @@ def as_given(found: ObjectMaterial, given: Given, choice: Choice, fitted_interva
     """The description of an object of which something was given; the interval is of what was fitted."""
     note = given_note(given)
     if not choice.model.has_lobe:  # that there is no highlight is known, and what it would be like does not apply
-        return replace(found, roughness_low=None, roughness_high=None, specular_low=0.0, specular_high=0.0, note=note)
+        return replace(found, roughness_low=None, roughness_high=None, f0_low=0.0, f0_high=0.0, note=note)
     sure = given_interval(given, choice, fitted_interval)
     f0 = choice.model.as_f0(choice.lobe.psi if given.f0 is None else given.f0)
     fitted = choice.lobe.residual > 0
@@ -85,5 +85,5 @@ def as_given(found: ObjectMaterial, given: Given, choice: Choice, fitted_interva
         found, f0=f0, note=note, residual=found.residual if fitted else None,
         residual_lambertian=found.residual_lambertian if fitted else None,
         roughness_low=sure.roughness[0], roughness_high=sure.roughness[1],
-        specular_low=sure.specular[0], specular_high=sure.specular[1],
+        f0_low=sure.specular[0], f0_high=sure.specular[1],
     )  # fmt: skip

@@ -123,7 +123,7 @@ def given_note(given: Given) -> str:
 def same_material(other: ObjectMaterial, own: ObjectMaterial) -> ObjectMaterial:
     """An object's description with model and highlight of another one."""
     taken = ("model", "alpha", "f0", "emission", "transmission", "surfaces", "roughness_low", "roughness_high",
-             "specular_low", "specular_high")  # fmt: skip
+             "f0_low", "f0_high")  # fmt: skip
     note = f"Given by the user: the same as object {other.object_id}."
     return replace(own, **{name: getattr(other, name) for name in taken}, note=note)
 

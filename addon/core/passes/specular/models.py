@@ -148,12 +148,12 @@ def choose_model(problem: Problem) -> Choice:
     dielectric = replace(fit, psi=np.minimum(fit.psi, MOST_F0))
     metal, likely = fit_lobe(dense, constraints=METAL.constraints), None
     if _metallic(metal):
-        with_metal, matt = held_out(metal, METAL)
-        scores[METAL.name] = float(with_metal.sum() / max(matt.sum(), 1e-30))
+        with_metal, diffuse = held_out(metal, METAL)
+        scores[METAL.name] = float(with_metal.sum() / max(diffuse.sum(), 1e-30))
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.
-        (less, by), (more, surely) = _gain(with_metal, matt), _gain(with_metal, with_lobe)
+        (less, by), (more, surely) = _gain(with_metal, diffuse), _gain(with_metal, with_lobe)
         alone = _bare_metal(problem, dense, metal.phi, metal, scale)[1].sum()
-        if min(less, more) > CHOICE.min_gain and alone <= CHOICE.bare * matt.sum():
+        if min(less, more) > CHOICE.min_gain and alone <= CHOICE.bare * diffuse.sum():
             if by > LEVELS.sigmas and surely > LEVELS.likely:
                 other = dielectric if sure and surely < LEVELS.sigmas else None
                 return Choice(METAL, metal, less, by, scores=scores, dielectric=other)
@@ -225,7 +225,8 @@ def _together(members: dict[int, Choice]) -> dict[int, Choice]:
     """The members of a class that each gain by a lobe, as specular, if they are sure enough of it together.
 
     None of them is by itself; all that have any evidence count, also those that speak against a lobe. One that gains by
-    what is no dielectric's lobe (matt curtains did by phi .87 and 1, at 3.5 and 6.5 standard errors) speaks for none.
+    what is no dielectric's lobe (diffuse curtains did by phi .87 and 1, at 3.5 and 6.5 standard errors) speaks for
+    none.
     """
     judged = {i: choice for i, choice in members.items() if choice.fit is not None}
     counted = [c.sigmas if _dielectric(c.lobe) else min(c.sigmas, 0) for c in judged.values()]

@@ -1,13 +1,13 @@
-"""Whether an object looks like a metal or coated all over: matt, dielectric and metal compared, each of one colour.
+"""Whether an object looks like a metal or coated all over: diffuse, dielectric and metal compared, each of one colour.
 
 `models` asks what changes with the view while each element has a colour of its own. Thin and small things (taps, legs,
 rings) leave it little: few views of few elements, on a mesh coarser than what they mirror. But a metal shows the room,
-and everything matt the light that arrives: over a whole object of one colour the radiance follows one or the other.
+and everything diffuse the light that arrives: over a whole object of one colour the radiance follows one or the other.
 What is compared is the robust spread of log(I / prediction) over all observations; a factor common to all is free, so
 none of the three has to know its colour. Texture widens all three spreads alike, and so speaks for none.
 
-A coat of no colour of its own over a saturated one shows in the dark channels, too: matt and dielectric are compared by
-channel (`compare_coat`).
+A coat of no colour of its own over a saturated one shows in the dark channels, too: diffuse and dielectric are compared
+by channel (`compare_coat`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class OneColour:
 
     Attributes
     ----------
-    matt, dielectric, metal : float
+    diffuse, dielectric, metal : float
         Robust standard deviation of log(I / prediction).
     phi : float
         Width of the metal's lobe.
@@ -38,7 +38,7 @@ class OneColour:
         By how many standard errors over the elements the metal explains more than the better of the others.
     """
 
-    matt: float
+    diffuse: float
     dielectric: float
     metal: float
     phi: float
@@ -47,7 +47,7 @@ class OneColour:
     @property
     def other(self) -> float:
         """Spread of the better one of the others."""
-        return min(self.matt, self.dielectric)
+        return min(self.diffuse, self.dielectric)
 
     @property
     def ratio(self) -> float:
@@ -57,11 +57,11 @@ class OneColour:
 
 @dataclass(frozen=True)
 class Coated:
-    """How well one colour explains an object's frames in all channels, matt and under a dielectric's coat.
+    """How well one colour explains an object's frames in all channels, diffuse and under a dielectric's coat.
 
     Attributes
     ----------
-    matt, coated : float
+    diffuse, coated : float
         Robust standard deviation of log(I / prediction) over observations and channels.
     phi : float
         Width of the coat's lobe.
@@ -69,15 +69,15 @@ class Coated:
         By how many standard errors over the elements the coat explains more.
     """
 
-    matt: float
+    diffuse: float
     coated: float
     phi: float
     sigmas: float
 
     @property
     def ratio(self) -> float:
-        """The coated spread over the matt one; below 1 speaks for a coat."""
-        return self.coated / self.matt
+        """The coated spread over the diffuse one; below 1 speaks for a coat."""
+        return self.coated / self.diffuse
 
 
 def compare(problem: Problem, irradiance: np.ndarray) -> OneColour | None:
@@ -101,19 +101,23 @@ def compare(problem: Problem, irradiance: np.ndarray) -> OneColour | None:
         rest = log_I - np.log(np.maximum(predicted, 1e-3 * np.median(predicted) + 1e-12))
         return rest - np.median(rest)
 
-    matt = residual(E @ LUMINANCE)
+    diffuse = residual(E @ LUMINANCE)
     coats = (_one_colour(seen, E, _coat(problem, at)[usable]) for at in widths)
     dielectric = min((residual(predicted @ LUMINANCE) for predicted in coats), key=spread)
     metals = [residual(light.A[usable, at] @ LUMINANCE) for at in widths]
     best = int(np.argmin([spread(rest) for rest in metals]))
-    other, metal = min(matt, dielectric, key=spread), metals[best]
+    other, metal = min(diffuse, dielectric, key=spread), metals[best]
     return OneColour(
-        spread(matt), spread(dielectric), spread(metal), float(light.grid[widths[best]]), _sigmas(metal, other, element)
+        spread(diffuse),
+        spread(dielectric),
+        spread(metal),
+        float(light.grid[widths[best]]),
+        _sigmas(metal, other, element),
     )
 
 
 def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
-    """Compare matt and coated on an object's observations, by channel; None where there are too few.
+    """Compare diffuse and coated on an object's observations, by channel; None where there are too few.
 
     Parameters
     ----------
@@ -133,11 +137,14 @@ def compare_coat(problem: Problem, irradiance: np.ndarray) -> Coated | None:
         rest = np.log(np.maximum(seen, least) / np.maximum(predicted, least))
         return rest - np.median(rest.mean(1))
 
-    matt = residual(_one_colour(seen, E, np.zeros(1, np.float32)))
+    diffuse = residual(_one_colour(seen, E, np.zeros(1, np.float32)))
     coats = [residual(_one_colour(seen, E, _coat(problem, at)[usable])) for at in widths]
     best = int(np.argmin([spread(rest) for rest in coats]))
     return Coated(
-        spread(matt), spread(coats[best]), float(problem.light.grid[widths[best]]), _sigmas(coats[best], matt, element)
+        spread(diffuse),
+        spread(coats[best]),
+        float(problem.light.grid[widths[best]]),
+        _sigmas(coats[best], diffuse, element),
     )
 
 

@@ -34,7 +34,7 @@ def fit_targets(
     seed: int,
     progress: Progress | None = None,
 ) -> dict[int, ObjectMaterial]:
-    """A lobe for each object, from its target frame; matt where no frame can be one."""
+    """A lobe for each object, from its target frame; diffuse where no frame can be one."""
 
     def look(instance: Instance) -> ObjectMaterial:
         index = usable(samples, field.atlas.object_id, instance.object_id)

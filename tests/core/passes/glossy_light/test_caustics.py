@@ -112,8 +112,8 @@ def test_what_a_bright_metal_was_taken_to_send_is_not_reflected(dark):
 
 def test_nothing_glossy_or_nothing_bright(dark):
     n = len(dark.room.atlas)
-    matt = Gloss(np.zeros(n, np.float32), np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32))
-    assert not caustics(dark.field, dark.bright, matt).any()
+    diffuse = Gloss(np.zeros(n, np.float32), np.zeros((n, 3), np.float32), np.zeros((n, 3), np.float32))
+    assert not caustics(dark.field, dark.bright, diffuse).any()
     even = dark.field.with_light(np.ones((n, 3), np.float32))
     assert not caustics(even, bright_triangles(even), on_the_floor(dark, 0.1)).any()
 

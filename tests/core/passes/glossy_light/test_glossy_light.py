@@ -26,7 +26,7 @@ def box():
 
 
 def polished(model: str = DIELECTRIC, psi: float = PSI) -> tuple[ObjectMaterial, ...]:
-    """The floor is all but a mirror, the rest is matt."""
+    """The floor is all but a mirror, the rest is diffuse."""
     return (ObjectMaterial(0, "floor", model, alpha=0.01, f0=model.as_f0(psi)),)
 
 

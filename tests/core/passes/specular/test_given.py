@@ -137,13 +137,13 @@ def test_descriptions_say_what_was_given(glossy):
     by_id = {m.object_id: m for m in found.materials}
     floor = by_id[FLOOR]
     assert floor.alpha == pytest.approx(0.09) and (floor.roughness_low, floor.roughness_high) == (0.3, 0.3)
-    assert floor.specular_low < floor.f0 < floor.specular_high
+    assert floor.f0_low < floor.f0 < floor.f0_high
     assert "given by the user" in floor.note.lower() and floor.observations == 600
     assert by_id[1].model == METAL and by_id[1].observations == 0 and min(by_id[1].f0) > 0.3  # nothing seen: plausible
     assert by_id[2].model == EMITTER and np.all(np.array(by_id[2].emission) > 0)
     assert np.all(np.array(by_id[2].emission) < glossy.box.walls[2])  # what it reflects is not its own
     assert "light" in by_id[2].note
-    assert by_id[3].model == LAMBERTIAN and by_id[3].roughness_high is None and by_id[3].specular_high == 0
+    assert by_id[3].model == LAMBERTIAN and by_id[3].roughness_high is None and by_id[3].f0_high == 0
     for i in (4, 5):  # along the chain
         assert (by_id[i].model, by_id[i].alpha, by_id[i].f0) == (DIELECTRIC, floor.alpha, floor.f0)
         assert by_id[i].object_id == i and by_id[i].roughness_high == floor.roughness_high
@@ -152,7 +152,7 @@ def test_descriptions_say_what_was_given(glossy):
 
 def test_all_of_it_given_has_no_interval(glossy):
     floor = glossy.all({FLOOR: Given("specular", 0.3, 0.05)}).materials[FLOOR]
-    assert (floor.f0, floor.specular_low, floor.specular_high) == (0.05, 0.05, 0.05)
+    assert (floor.f0, floor.f0_low, floor.f0_high) == (0.05, 0.05, 0.05)
     assert (floor.roughness_low, floor.roughness_high) == (0.3, 0.3)
 
 

@@ -21,7 +21,7 @@ COPPER = np.array([0.9, 0.6, 0.3])
 
 @pytest.fixture(scope="module")
 def seen():
-    """Problems of four floors in the same box: as good as matt, glossy, metal, and glossy but hardly seen."""
+    """Problems of four floors in the same box: as good as diffuse, glossy, metal, and glossy but hardly seen."""
     box = Box()
     element, direction, _ = box.views(60, 10)
     few = element == element[0]
@@ -29,7 +29,7 @@ def seen():
         few |= element == one
     glossy = box.problem(element, direction, 0.11, 0.08, paint(element))
     return {
-        "matt": box.problem(element, direction, None, 0, paint(element)),
+        "diffuse": box.problem(element, direction, None, 0, paint(element)),
         "glossy": glossy,
         "metal": box.problem(element, direction, 0.11, COPPER, np.zeros((len(element), 3))),
         "few": glossy.part(few),
@@ -39,12 +39,12 @@ def seen():
 def test_each_gets_the_simplest_model(seen):
     chosen = {name: choose_model(problem) for name, problem in seen.items()}
     models = {name: choice.model for name, choice in chosen.items()}
-    assert models == {"matt": LAMBERTIAN, "glossy": DIELECTRIC, "metal": METAL, "few": LAMBERTIAN}
-    assert chosen["few"].fit is None and chosen["few"].note and chosen["matt"].note
+    assert models == {"diffuse": LAMBERTIAN, "glossy": DIELECTRIC, "metal": METAL, "few": LAMBERTIAN}
+    assert chosen["few"].fit is None and chosen["few"].note and chosen["diffuse"].note
     assert not chosen["glossy"].note and not chosen["metal"].note
     assert steps(chosen["glossy"].fit.phi, 0.11) <= 1 and chosen["glossy"].fit.psi[0] == pytest.approx(0.08, rel=0.15)
     assert chosen["glossy"].gain > 0.02 and chosen["glossy"].sigmas > 3
-    assert chosen["matt"].gain < 0.02
+    assert chosen["diffuse"].gain < 0.02
 
 
 def test_a_metals_colour(seen):
@@ -73,13 +73,13 @@ def test_a_metal_under_light_that_is_off(seen):
 def test_the_others_of_its_class_are_metal(seen):
     """One that is not sure of being metal takes their roughness unless its frames are sure of another; one whose frames
     say otherwise stays."""
-    sure, matt = choose_model(seen["metal"]), choose_model(seen["matt"])
+    sure, diffuse = choose_model(seen["metal"]), choose_model(seen["diffuse"])
     own = replace(sure.fit, phi=0.2)
     likely = Choice(LAMBERTIAN, sure.fit, 0.1, 2.5, "Not sure.", metal=own)
     classes = dict.fromkeys(range(4), "steel")
-    result = adopt_from_class({0: sure, 1: likely, 2: matt}, {2: seen["matt"]}, classes)
+    result = adopt_from_class({0: sure, 1: likely, 2: diffuse}, {2: seen["diffuse"]}, classes)
     assert result[1].model == METAL and result[1].fit.phi == sure.fit.phi and "class" in result[1].note
-    assert result[2] is matt
+    assert result[2] is diffuse
     # Frames of a metal of phi .11: those of a class that is broader (by the better judged 3) do not fit.
     broad = replace(sure, fit=replace(sure.fit, phi=0.5), sigmas=2 * sure.sigmas)
     likely = replace(likely, metal=sure.fit)
@@ -103,7 +103,7 @@ def test_the_others_of_its_class_are_no_metal(seen):
 
 def test_a_metal_hardly_better_than_a_dielectric_says_so(seen, monkeypatch):
     assert choose_model(seen["metal"]).dielectric is None
-    # Of the dielectric over matt, the metal over matt, the metal over the dielectric: share and standard errors.
+    # Of the dielectric over diffuse, the metal over diffuse, the metal over the dielectric: share and standard errors.
     gains = iter([(0.5, 10.0), (0.5, 10.0), (0.1, 2.5)])
     monkeypatch.setattr(models, "_gain", lambda with_lobe, without: next(gains))
     choice = choose_model(seen["metal"])
@@ -115,9 +115,9 @@ def test_the_class_helps_out(seen):
     sure = choose_model(seen["glossy"])
     weak = Choice(METAL, fit_lobe(seen["metal"], constraints=METAL.constraints), 0.1, sure.sigmas / 2)
     nothing = Choice(LAMBERTIAN, None, note="too few")
-    matt = choose_model(seen["matt"])
-    choices = {0: sure, 1: nothing, 2: nothing, 3: matt, 4: nothing, 5: weak}
-    problems = {0: seen["glossy"], 1: seen["few"], 3: seen["matt"], 5: seen["metal"]}
+    diffuse = choose_model(seen["diffuse"])
+    choices = {0: sure, 1: nothing, 2: nothing, 3: diffuse, 4: nothing, 5: weak}
+    problems = {0: seen["glossy"], 1: seen["few"], 3: seen["diffuse"], 5: seen["metal"]}
     classes = dict.fromkeys([0, 1, 2, 3, 5], "floor") | {4: "wall"}
     result = adopt_from_class(choices, problems, classes)
     for i, own in ((0, sure), (5, weak)):  # what is sure of itself stays
@@ -125,20 +125,20 @@ def test_the_class_helps_out(seen):
     for taker in (1, 2):
         assert result[taker].model == DIELECTRIC and result[taker].fit.phi == sure.fit.phi
         assert "object 0" in result[taker].note and result[taker].sigmas == 0
-    assert result[3] is matt and result[4] is nothing
+    assert result[3] is diffuse and result[4] is nothing
     assert choices[1] is nothing  # what was handed in is left alone
 
 
 def test_how_another_darkens_says_nothing_against_its_lobe(seen, monkeypatch):
     """How the diffuse part darkens towards grazing views is an object's own matter, with a lobe as without one."""
-    sure, matt = choose_model(seen["glossy"]), choose_model(seen["matt"])
+    sure, diffuse = choose_model(seen["glossy"]), choose_model(seen["diffuse"])
     asked = []
     monkeypatch.setattr(models, "gain_of", lambda fit, problem: asked.append(fit) or (0.0, 0.0))
-    own = replace(matt, fit=replace(matt.fit, kappa=0.6))
+    own = replace(diffuse, fit=replace(diffuse.fit, kappa=0.6))
     source = replace(sure, fit=replace(sure.fit, kappa=0.3))
-    result = adopt_from_class({0: source, 1: own}, {1: seen["matt"]}, {0: "floor", 1: "floor"})
+    result = adopt_from_class({0: source, 1: own}, {1: seen["diffuse"]}, {0: "floor", 1: "floor"})
     assert [fit.kappa for fit in asked] == [0.6] and asked[0].phi == sure.fit.phi
-    assert asked[0].kappa_lambertian == matt.fit.kappa_lambertian
+    assert asked[0].kappa_lambertian == diffuse.fit.kappa_lambertian
     assert result[1].model == DIELECTRIC
 
 
@@ -162,7 +162,7 @@ def test_a_class_may_be_sure_together(seen, sigmas, model):
 
 
 def test_what_is_no_lobe_makes_no_class_sure(seen):
-    """Matt curtains gained by phi .87 and 1, surely; the one that gains by a lobe is not sure of it."""
+    """Diffuse curtains gained by phi .87 and 1, surely; the one that gains by a lobe is not sure of it."""
     fit = choose_model(seen["glossy"]).fit
     broad = replace(fit, phi=0.9)
     choices = {i: Choice(LAMBERTIAN, broad, 0.03, s, "Not sure.") for i, s in enumerate((3.5, 6.5))}

@@ -1,4 +1,4 @@
-"""Matt, dielectric or metal, each of one colour: told apart with a single view of each element."""
+"""Diffuse, dielectric or metal, each of one colour: told apart with a single view of each element."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_a_metal(floor, irradiance):
 @pytest.mark.parametrize(
     ("phi", "psi", "rho"),
     [(None, 0, 0.5), (0.06, 0.04, 0.5), (0.11, 0.04, 0.1), (0.06, 0.05, 0.01), (0.11, 0.05, 0.0)],
-    ids=["matt", "coated", "dark and coated", "black and coated", "nothing but a coat"],
+    ids=["diffuse", "coated", "dark and coated", "black and coated", "nothing but a coat"],
 )
 def test_what_is_no_metal(floor, irradiance, phi, psi, rho):
     """Least clear is black gloss: it shows the room as a metal does; a dielectric explains it as well."""
@@ -77,7 +77,7 @@ def test_what_follows_matt_light_stays_matt(floor, irradiance):
     """A spread that errors of E explain says nothing, however much smaller the metal's is."""
     problem = floor(0.11, COPPER, 0.0)
     looks = compare(problem, irradiance)
-    flat = replace(looks, matt=0.12, dielectric=0.12, metal=0.03)
+    flat = replace(looks, diffuse=0.12, dielectric=0.12, metal=0.03)
     assert metal_by_looks(UNSURE, flat, problem) is UNSURE
 
 
@@ -136,7 +136,7 @@ def test_nothing_matt_is_coated(floor, irradiance):
 def test_what_a_coat_does_not_explain_either(floor, irradiance):
     """A cord as thick as a pixel shows its background: coated it is off by less, but by far too much."""
     looks = compare_coat(floor(0.11, 0.04, LEAF), irradiance)
-    assert coated_by_looks(UNSURE, replace(looks, matt=0.65, coated=0.4)) is UNSURE
+    assert coated_by_looks(UNSURE, replace(looks, diffuse=0.65, coated=0.4)) is UNSURE
 
 
 def test_a_coat_by_looks_gives_way_to_one_by_views(floor, irradiance):
