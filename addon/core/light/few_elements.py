@@ -88,7 +88,7 @@ def from_sun(field: LightField, element: np.ndarray) -> np.ndarray:
     return sunlight(field.scene, field.sun, atlas.position[element], atlas.normal[element], atlas.texel_edge)[:, :3]
 
 
-def thrown_by_object(field: LightField, element: np.ndarray, object_id: int, seed: int) -> np.ndarray:
+def contribution_of_object(field: LightField, element: np.ndarray, object_id: int, seed: int) -> np.ndarray:
     """E from one object at radiance 1 and nothing else, (m,) float64."""
     alone = np.repeat((field.atlas.object_id == object_id)[:, None], 3, 1).astype(np.float32)
     lit = field.with_sun(None).with_light(alone, Environment.dark(), [object_id])

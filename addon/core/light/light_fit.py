@@ -120,17 +120,19 @@ class Sample:
         off = [np.minimum(np.abs(log_albedo - by.medians(log_albedo)), cap) for by in self._groupings]
         return float(np.average(np.mean(off, 0), weights=self._weight))
 
-    def best(self, sent: np.ndarray, received: np.ndarray, thrown: np.ndarray) -> tuple[float, float, float] | None:
+    def best(
+        self, sent: np.ndarray, received: np.ndarray, contribution: np.ndarray
+    ) -> tuple[float, float, float] | None:
         """The radiance s that explains best what is `sent`, with the spread before and after; None if unbounded."""
-        if not (thrown > 0).any():
+        if not (contribution > 0).any():
             return None
         sent = np.log(np.maximum(sent, 1e-9))
 
         def cost(log_s: float) -> float:
-            return self.spread(sent - np.log(received + np.exp(log_s) * thrown + 1e-12))
+            return self.spread(sent - np.log(received + np.exp(log_s) * contribution + 1e-12))
 
         # The scale to search around: where the trial light gives as much as all known light together.
-        grid = np.log(max(received.mean(), 1e-9) / thrown.mean()) + np.linspace(-5, 4, 37)
+        grid = np.log(max(received.mean(), 1e-9) / contribution.mean()) + np.linspace(-5, 4, 37)
         costs = [cost(x) for x in grid]
         at = int(np.argmin(costs))
         if at == len(grid) - 1:
@@ -142,7 +144,7 @@ class Sample:
         self,
         sent: np.ndarray,
         received: np.ndarray,
-        thrown: np.ndarray,
+        contribution: np.ndarray,
         start: np.ndarray,
         least: np.ndarray,
         most: np.ndarray,
@@ -153,7 +155,7 @@ class Sample:
         ----------
         sent, received : (m,) float64
             L_d, and E from all light but these.
-        thrown : (m, k) float64
+        contribution : (m, k) float64
         start, least, most : (k,) float
         """
         sent = np.log(np.maximum(sent, 1e-9))
@@ -161,7 +163,7 @@ class Sample:
         bounds = np.log(np.stack([np.minimum(least, most), most], 1))
 
         def cost(x: np.ndarray) -> float:
-            return self.spread(sent - np.log(received + thrown @ np.exp(x) + 1e-12), self.cap)
+            return self.spread(sent - np.log(received + contribution @ np.exp(x) + 1e-12), self.cap)
 
         how = {"xtol": 5e-3, "ftol": 1e-6, "maxiter": 10}
         return np.exp(minimize(cost, np.clip(np.log(start), *bounds.T), method="Powell", bounds=bounds, options=how).x)

@@ -82,7 +82,7 @@ def shadow(
 
     Returns
     -------
-    thrown : (n,) float32
+    contribution : (n,) float32
         E at an irradiance of 1: the visible share times the cosine.
     unsure : (n,) float32
         Its standard error at a shadow's edge.
@@ -109,9 +109,9 @@ def sunlight(
     scene: RayScene, sun: Sun, position: np.ndarray, normal: np.ndarray, edge: float, seed: int = 0
 ) -> np.ndarray:
     """The sun's part of E in three channels, and the luminance of its error, (n, 4) float32; see `shadow`."""
-    thrown, unsure = shadow(scene, sun, position, normal, edge, seed)
+    contribution, unsure = shadow(scene, sun, position, normal, edge, seed)
     light = np.float32(sun.irradiance)
-    return np.concatenate([thrown[:, None] * light, (unsure * light.mean())[:, None]], 1).astype(np.float32)
+    return np.concatenate([contribution[:, None] * light, (unsure * light.mean())[:, None]], 1).astype(np.float32)
 
 
 def _directions(height: int) -> tuple[np.ndarray, np.ndarray]:

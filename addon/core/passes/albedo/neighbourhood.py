@@ -2,7 +2,7 @@
 
 Where the well-measured elements of an object agree among each other, a badly measured one between them (at a depth
 edge, seen once) is drawn towards them; where they differ, as in a texture, it is left as it is. Empirical Bayes on
-log albedo, with the spread of the neighbours as the prior's width; a second colour among them: `minority`.
+log albedo, with the spread of the neighbours as the prior's width; a second colour among them: `second_colour`.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.visibility import CLEAN, SATURATED
 from ...significance import LEVELS
-from .minority import Surroundings, drawn_to_minority
 from .params import ALBEDO, PRIOR, PriorParams
+from .second_colour import Neighbourhood, shrunk_to_second_colour
 
 BLOCK: Block[int] = 1 << 11
 
@@ -66,7 +66,7 @@ def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray, params
     return few[object_id]
 
 
-def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, params: PriorParams) -> Surroundings:
+def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, params: PriorParams) -> Neighbourhood:
     """The nearest references of m places."""
     # At most an eighth of the object: a small object's ends are not each other's surroundings.
     k = min(params.neighbours, max(len(references) // 8, 3), len(references))
@@ -82,7 +82,7 @@ def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, p
         width[part] = 1.4826 * _quantile(off, 0.5)
 
     for_blocks(gather, len(position), BLOCK, 0)
-    return Surroundings(middle, np.maximum(width, np.float32(0.02)), near)
+    return Neighbourhood(middle, np.maximum(width, np.float32(0.02)), near)
 
 
 def _quantile(ordered: np.ndarray, share: float) -> np.ndarray:
@@ -94,7 +94,7 @@ def _quantile(ordered: np.ndarray, share: float) -> np.ndarray:
 
 def _prior(
     position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, without: Collection[str], params: PriorParams
-) -> Surroundings:
+) -> Neighbourhood:
     """As `_around`, from as far around each place as it stays the same.
 
     `references` are in random order: half of them reach twice as far (in area) with as many neighbours.
@@ -186,6 +186,6 @@ def shrink(
     result = trust * log_rho + (1 - trust) * middle
     if not {"second-colour", "albedo-prior"} & set(without):
         near = around, index[measured], reference, reference_error
-        result[measured] = drawn_to_minority(result[measured], rho[measured], error[measured, 0], *near, most)
+        result[measured] = shrunk_to_second_colour(result[measured], rho[measured], error[measured, 0], *near, most)
     shrunk[todo] = np.exp(result)
     return shrunk, left

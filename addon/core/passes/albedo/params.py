@@ -53,7 +53,7 @@ class PriorParams:
 
 @dataclass(frozen=True)
 class SecondColourParams:
-    """Of `minority` (`second-colour` in the ablation).
+    """Of `second_colour` (`second-colour` in the ablation).
 
     Attributes
     ----------

@@ -179,13 +179,13 @@ def find_sun(
             return edges.explained(way, now.strength, now.radius)
 
         found = _searched(cost, found, steps)
-        thrown = spots.thrown(found.direction, found.radius)
-        strength = spots.strength(thrown)
+        contribution = spots.contribution(found.direction, found.radius)
+        strength = spots.strength(contribution)
         found = min((edges.explained(found.direction, strength, r) for r in RADII), key=lambda one: one.cost)
-    thrown = spots.thrown(found.direction, found.radius)
-    after = spots.spread(thrown, found.strength)
-    short = spots.over() & (thrown > SUN.lit)
-    left = short & spots.over(thrown, found.strength)
+    contribution = spots.contribution(found.direction, found.radius)
+    after = spots.spread(contribution, found.strength)
+    short = spots.over() & (contribution > SUN.lit)
+    left = short & spots.over(contribution, found.strength)
     if (
         found.cost > (1 - LEVELS.gain) * edges.differ()
         or after > (1 - LEVELS.gain) * before
@@ -197,9 +197,9 @@ def find_sun(
 
 def _coloured(spots: Spots, direction: np.ndarray, radius: float, before: float, after: float) -> Sun:
     """The sun with what each channel says of its irradiance, held near the luminance's."""
-    thrown = spots.thrown(direction, radius)
-    luminance = spots.strength(thrown)
-    channels = np.array([spots.strength(thrown, np.eye(3)[c]) for c in range(3)])
+    contribution = spots.contribution(direction, radius)
+    luminance = spots.strength(contribution)
+    channels = np.array([spots.strength(contribution, np.eye(3)[c]) for c in range(3)])
     channels = np.clip(channels, luminance / SUN.colour, luminance * SUN.colour)
     light = (channels * (luminance / float(channels @ LUMINANCE))).astype(np.float32)
     sun = Sun(np.asarray(direction, np.float32), light, radius)

@@ -66,22 +66,24 @@ class Spots:
     def __len__(self) -> int:
         return len(self.position)
 
-    def log_albedo(self, thrown: np.ndarray | float = 0.0, strength: float = 0.0, weights=LUMINANCE) -> np.ndarray:
+    def log_albedo(
+        self, contribution: np.ndarray | float = 0.0, strength: float = 0.0, weights=LUMINANCE
+    ) -> np.ndarray:
         """Of the channel that `weights` make, with a sun, (m,)."""
         sent = np.pi * (self.sample.radiance @ weights)
-        received = self.sample.received @ weights + strength * thrown
+        received = self.sample.received @ weights + strength * contribution
         return np.log(np.maximum(sent, 1e-12)) - np.log(np.maximum(received, 1e-12))
 
-    def over(self, thrown: np.ndarray | float = 0.0, strength: float = 0.0) -> np.ndarray:
+    def over(self, contribution: np.ndarray | float = 0.0, strength: float = 0.0) -> np.ndarray:
         """Elements short of light, (m,) bool."""
-        return self.log_albedo(thrown, strength) > np.log(SUN.over)
+        return self.log_albedo(contribution, strength) > np.log(SUN.over)
 
     def stands_out(self) -> np.ndarray:
         """Those, and what is much brighter than the rest of its object, (m,) bool."""
         value = self.log_albedo()
         return self.over() | (value - self.medians(value, np.ones(len(self), bool)) > SUN.stands_out)
 
-    def thrown(self, direction: np.ndarray, radius: float = 0.0) -> np.ndarray:
+    def contribution(self, direction: np.ndarray, radius: float = 0.0) -> np.ndarray:
         """E at an irradiance of 1, (m,) float32; without a radius that of a point in the sky."""
         if radius:
             return shadow(self.scene, Sun(direction, np.ones(3), radius), self.position, self.normal, self.edge, 0)[0]
@@ -97,24 +99,24 @@ class Spots:
         found[count > 0] = values[order[(start + count // 2)[count > 0]]]
         return found[group]
 
-    def strength(self, thrown: np.ndarray, weights=LUMINANCE) -> float:
+    def strength(self, contribution: np.ndarray, weights=LUMINANCE) -> float:
         """Irradiance that makes what is lit as bright as it is, if its albedo is that of its object's shaded rest."""
-        lit = thrown > SUN.lit
-        rho = np.exp(self.medians(self.log_albedo(weights=weights), thrown <= 0))
+        lit = contribution > SUN.lit
+        rho = np.exp(self.medians(self.log_albedo(weights=weights), contribution <= 0))
         use = lit & np.isfinite(rho)
         if use.sum() < 3:
             return 0.0
         sent, received = np.pi * (self.sample.radiance @ weights), self.sample.received @ weights
-        return max(float(np.median((sent[use] / rho[use] - received[use]) / thrown[use])), 0.0)
+        return max(float(np.median((sent[use] / rho[use] - received[use]) / contribution[use])), 0.0)
 
-    def spread(self, thrown: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
-        return self.sample.spread(self.log_albedo(thrown, strength), LIGHT_FIT.coarse)
+    def spread(self, contribution: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
+        return self.sample.spread(self.log_albedo(contribution, strength), LIGHT_FIT.coarse)
 
     def explained(self, direction: np.ndarray) -> Guess:
         """The direction with its strength and the spread that it leaves."""
-        thrown = self.thrown(direction)
-        strength = self.strength(thrown)
-        return Guess(direction, self.spread(thrown, strength), strength)
+        contribution = self.contribution(direction)
+        strength = self.strength(contribution)
+        return Guess(direction, self.spread(contribution, strength), strength)
 
 
 class Edges:
@@ -127,10 +129,10 @@ class Edges:
         self.a, k = np.nonzero(np.isfinite(far[:, 1:]))
         self.b = other[:, 1:][self.a, k]
 
-    def differ(self, thrown: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
+    def differ(self, contribution: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
         """Mean difference of log albedo between neighbours, each held at `COARSE`."""
-        value = self.spots.log_albedo(thrown, strength)
+        value = self.spots.log_albedo(contribution, strength)
         return float(np.minimum(np.abs(value[self.a] - value[self.b]), LIGHT_FIT.coarse).mean()) if len(self.a) else 0.0
 
     def explained(self, direction: np.ndarray, strength: float, radius: float) -> Guess:
-        return Guess(direction, self.differ(self.spots.thrown(direction, radius), strength), strength, radius)
+        return Guess(direction, self.differ(self.spots.contribution(direction, radius), strength), strength, radius)

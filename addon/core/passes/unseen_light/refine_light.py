@@ -20,7 +20,7 @@ class Sky:
 
     Attributes
     ----------
-    thrown : list of (m,) float64
+    contribution : list of (m,) float64
         E from each part at radiance 1.
     guess : list of (3,) float64
         Radiance of the seen neighbours; of a clipped part the lower bound.
@@ -33,7 +33,7 @@ class Sky:
         Parts of which the radiance was solved for.
     """
 
-    thrown: list[np.ndarray]
+    contribution: list[np.ndarray]
     guess: list[np.ndarray]
     clipped: bool
     told: list[bool] = field(default_factory=list)
@@ -45,7 +45,7 @@ class Sky:
         self.told = self.told or [False] * len(self.guess)
 
     def _is_clipped(self, i: int) -> bool:
-        return self.clipped and i == len(self.thrown) - 1
+        return self.clipped and i == len(self.contribution) - 1
 
     def bounds(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest radiance that is believed, (3,) each."""
@@ -73,13 +73,13 @@ class Sky:
 
 
 def all_light(
-    base: np.ndarray, lamps: list[Lamp], thrown: dict[int, np.ndarray], sky: Sky, without: int = -1
+    base: np.ndarray, lamps: list[Lamp], contribution: dict[int, np.ndarray], sky: Sky, without: int = -1
 ) -> np.ndarray:
     """E from everything, (m, 3): `base`, the lamps, and the sky but for one part."""
     total = base.copy()
     for lamp in lamps:
-        total += thrown[lamp.object_id][:, None] * lamp.radiance
-    for i, (G, s) in enumerate(zip(sky.thrown, sky.radiance, strict=True)):
+        total += contribution[lamp.object_id][:, None] * lamp.radiance
+    for i, (G, s) in enumerate(zip(sky.contribution, sky.radiance, strict=True)):
         if i != without:
             total += G[:, None] * s
     return total
@@ -101,7 +101,7 @@ def shared_by_class(
 def refined(
     sample: Sample,
     lamps: list[Lamp],
-    thrown: dict[int, np.ndarray],
+    contribution: dict[int, np.ndarray],
     least: dict[int, float],
     instances: tuple[Instance, ...],
     seen: list[Lamp],
@@ -128,14 +128,14 @@ def refined(
     if not free and not parts:
         return lamps
     others = Sky(
-        [G for i, G in enumerate(sky.thrown) if i not in parts],
+        [G for i, G in enumerate(sky.contribution) if i not in parts],
         [r for i, r in enumerate(sky.radiance) if i not in parts],
         False,
     )
 
-    def thrown_by() -> np.ndarray:
+    def contributions_of() -> np.ndarray:
         """E that each of `free` and `parts` throws at radiance 1, (m, k)."""
-        return np.stack([*(thrown[lamp.object_id] for lamp in free), *(sky.thrown[i] for i in parts)], 1)
+        return np.stack([*(contribution[lamp.object_id] for lamp in free), *(sky.contribution[i] for i in parts)], 1)
 
     def solve(weights: np.ndarray, start: np.ndarray, bright: np.ndarray | None = None) -> np.ndarray:
         """Radiances of `free` and `parts` in the channel that `weights` ((3,)) makes.
@@ -148,10 +148,10 @@ def refined(
             low[k] = least[lamp.object_id] * float(start[k] / max(float(lamp.radiance @ LUMINANCE), 1e-12))
         for k, i in enumerate(parts, len(free)):
             low[k], high[k] = (bound @ weights for bound in sky.bounds(i))
-        sent, others_light = sample.radiance @ weights, all_light(base, fixed, thrown, others)
+        sent, others_light = sample.radiance @ weights, all_light(base, fixed, contribution, others)
         if bright is not None:
             sent = sent * bright / np.maximum(sample.radiance @ LUMINANCE, 1e-12)
-        return sample.refine(sent, others_light @ weights, thrown_by(), start, low, high)
+        return sample.refine(sent, others_light @ weights, contributions_of(), start, low, high)
 
     def now() -> np.ndarray:
         return np.maximum([*(lamp.radiance for lamp in free), *(sky.radiance[i] for i in parts)], 1e-9)
@@ -168,7 +168,11 @@ def refined(
         free = [lamp for lamp in free if lamp.object_id not in twins]
         luminance = solve(LUMINANCE, now() @ LUMINANCE) if free or parts else luminance[:0]
     colour = now() * (luminance / (now() @ LUMINANCE))[:, None]
-    bright = all_light(base, fixed, thrown, others) @ LUMINANCE + thrown_by() @ luminance if len(colour) else None
+    bright = (
+        all_light(base, fixed, contribution, others) @ LUMINANCE + contributions_of() @ luminance
+        if len(colour)
+        else None
+    )
     told = np.array([lamp.object_id in colours for lamp in free] + [False] * len(parts), bool)
     fixed += [replace(lamp, radiance=colour[k].astype(np.float32)) for k, lamp in enumerate(free) if told[k]]
     free = [lamp for lamp in free if lamp.object_id not in colours]

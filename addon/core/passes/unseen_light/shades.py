@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from ...brdf.emitter import LAMP_ALBEDO
 from ...light.environment import Environment
-from ...light.few_elements import irradiance_at, thrown_by_object
+from ...light.few_elements import contribution_of_object, irradiance_at
 from ...light.field import LightField
 from ...light.lamps import Lamp
 from ...luminance import LUMINANCE
@@ -50,7 +50,7 @@ def by_way_of_shade(
     places = rng.choice(near, min(SHADES.places, len(near)), replace=False)
     closest = cKDTree(atlas.place(places)).query(atlas.place(near), workers=-1)[1]
     rho = np.clip([albedo.get(int(i), LAMP_ALBEDO) for i in atlas.object_id[near]], SHADES.darkest, SHADES.lightest)
-    from_lamp = thrown_by_object(field, places, lamp.object_id, seed)
+    from_lamp = contribution_of_object(field, places, lamp.object_id, seed)
     bright = float(lamp.radiance @ LUMINANCE)
     enough = SHADES.strongly * (even[near] @ LUMINANCE) / max(bright, 1e-12)
     sent, unlit = rho * from_lamp[closest] / np.pi, field.with_sun(None)

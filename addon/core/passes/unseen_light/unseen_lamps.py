@@ -12,14 +12,14 @@ from .params import UNSEEN
 from .refine_light import Sky, all_light
 
 
-def solve_lamps(sample: Sample, thrown, least, instances, seen, sky: Sky, base, colours) -> list[Lamp]:
+def solve_lamps(sample: Sample, contribution, least, instances, seen, sky: Sky, base, colours) -> list[Lamp]:
     """Unseen lamps, the one that explains most first; none once the gain falls below `lamp_gain`."""
     class_of = {i.object_id: i.class_name for i in instances}
     sent = sample.radiance @ LUMINANCE
     lamps: list[Lamp] = []
-    left = dict(thrown)
+    left = dict(contribution)
     while left:
-        received = all_light(base, lamps, thrown, sky) @ LUMINANCE
+        received = all_light(base, lamps, contribution, sky) @ LUMINANCE
         best = {i: sample.best(sent, received, G) for i, G in left.items()}
         found = {
             i: f for i, f in best.items() if f is not None and f[2] < (1 - UNSEEN.lamp_gain) * f[1] and f[0] > least[i]
@@ -28,7 +28,7 @@ def solve_lamps(sample: Sample, thrown, least, instances, seen, sky: Sky, base, 
             break
         object_id = min(found, key=lambda i: found[i][2])
         by_channel = [
-            sample.best(sample.radiance[:, c], all_light(base, lamps, thrown, sky)[:, c], left[object_id])
+            sample.best(sample.radiance[:, c], all_light(base, lamps, contribution, sky)[:, c], left[object_id])
             for c in range(3)
         ]
         known = colours.get(object_id)
@@ -38,17 +38,17 @@ def solve_lamps(sample: Sample, thrown, least, instances, seen, sky: Sky, base, 
     return lamps
 
 
-def needed(sample: Sample, lamps: list[Lamp], thrown, sky: Sky, base, colours) -> tuple[list[Lamp], Sky]:
+def needed(sample: Sample, lamps: list[Lamp], contribution, sky: Sky, base, colours) -> tuple[list[Lamp], Sky]:
     """The lamps and sky found; lamps that nobody saw shine only where the sky alone, which is there, explains less."""
     shining = [lamp for lamp in lamps if lamp.object_id in colours]
-    if not sky.thrown or len(shining) == len(lamps):
+    if not sky.contribution or len(shining) == len(lamps):
         return lamps, sky
-    alone = Sky(sky.thrown, sky.guess, sky.clipped, sky.told)
+    alone = Sky(sky.contribution, sky.guess, sky.clipped, sky.told)
     for _ in range(UNSEEN.sweeps):
-        solve_sky(sample, shining, thrown, alone, base)
+        solve_sky(sample, shining, contribution, alone, base)
     sent = np.log(np.maximum(sample.radiance @ LUMINANCE, 1e-9))
     with_lamps, without = (
-        sample.spread(sent - np.log(all_light(base, some, thrown, above) @ LUMINANCE + 1e-12))
+        sample.spread(sent - np.log(all_light(base, some, contribution, above) @ LUMINANCE + 1e-12))
         for some, above in ((lamps, sky), (shining, alone))
     )
     return (lamps, sky) if with_lamps < (1 - UNSEEN.lamp_gain) * without else (shining, alone)
@@ -77,10 +77,10 @@ def _coloured(object_id, s, before, after, class_of, seen, received, by_channel,
     return Lamp(int(object_id), radiance, False, spread=spread)
 
 
-def solve_sky(sample: Sample, lamps, thrown, sky: Sky, base) -> None:
+def solve_sky(sample: Sample, lamps, contribution, sky: Sky, base) -> None:
     """Radiance of the sky's unknown parts, channel by channel, one after another."""
-    for i, G in enumerate(sky.thrown):
-        others = all_light(base, lamps, thrown, sky, without=i)
+    for i, G in enumerate(sky.contribution):
+        others = all_light(base, lamps, contribution, sky, without=i)
         if (G[:, None] * sky.guess[i]).mean() < SKY.least_share * others.mean():
             continue
         found = [sample.best(sample.radiance[:, c], others[:, c], G) for c in range(3)]

@@ -15,13 +15,13 @@ import numpy as np
 from ...light.environment import Environment
 from ...light.few_elements import (
     barely_seen,
+    contribution_of_object,
     evened,
     from_sun,
     irradiance_at,
     most_reflected,
     pick,
     steady,
-    thrown_by_object,
 )
 from ...light.field import LightField
 from ...light.lamps import Lamp, find_seen
@@ -37,7 +37,7 @@ from .whole_sky import with_whole_sky
 
 
 @dataclass(frozen=True)
-class Thrown:
+class Contributions:
     """E at the sample, without any sun, as it took its rays to find: what a second solution needs no rays for.
 
     Attributes
@@ -76,7 +76,7 @@ class Light:
         Those that it was solved at.
     received : (m, 3) float64
         E there by all of this light.
-    thrown : Thrown, optional
+    contribution : Contributions, optional
     """
 
     lamps: tuple[Lamp, ...]
@@ -84,7 +84,7 @@ class Light:
     notes: tuple[str, ...]
     element: np.ndarray
     received: np.ndarray
-    thrown: Thrown | None = None
+    contribution: Contributions | None = None
 
 
 def find_light(
@@ -128,7 +128,7 @@ def find_light(
     element = pick(field, usable, seed, UNSEEN.clipped * UNSEEN.samples if clipped else UNSEEN.samples)
     if not len(element):
         return Light((), field.environment, (), element, np.zeros((0, 3)))
-    old = before.thrown if before is not None and field.environment.seen else None
+    old = before.contribution if before is not None and field.environment.seen else None
     field, found = (field, ()) if "whole-sky" in without else with_whole_sky(field, element, seed)
     environment, atlas = field.environment, field.atlas
     solve_zones = environment.seen and "unseen-sky" not in without
@@ -140,7 +140,7 @@ def find_light(
         known = known.with_zone(zone, np.zeros(3, np.float32))
     dark, even, unlit = np.zeros_like(field.radiance), evened(field), field.with_sun(None)
     received = old.received if old else irradiance_at(unlit.with_light(even, known), element, seed)
-    thrown_sky = (
+    sky_contributions = (
         old.sky
         if old
         else [
@@ -151,7 +151,7 @@ def find_light(
     if field.sun is not None:
         received = received + from_sun(field, element)
     guess = [environment.zone_mean(zone).astype(np.float64) for zone in zones]
-    filled = received + sum(G[:, None] * s for G, s in zip(thrown_sky, guess, strict=True))
+    filled = received + sum(G[:, None] * s for G, s in zip(sky_contributions, guess, strict=True))
     seen = find_seen(atlas.object_id[element], field.radiance[element], filled)
     lit = ~np.isin(atlas.object_id[element], [lamp.object_id for lamp in seen])
     if (lit & flat[element]).sum() >= LEVELS.many:
@@ -164,35 +164,35 @@ def find_light(
     sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit], most)
     earlier = old if old is not None and np.array_equal(old.element, sample.element) else None
     if earlier is not None:
-        thrown, least = earlier.lamps, earlier.least
+        contribution, least = earlier.lamps, earlier.least
     else:
-        thrown = {i: thrown_by_object(field, sample.element, i, seed) for i in unseen_objects}
+        contribution = {i: contribution_of_object(field, sample.element, i, seed) for i in unseen_objects}
         # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
         lit_room = field.with_light(even, environment)
         least = {i: most_reflected(lit_room, i, seed) for i in unseen_objects}
 
     clipped_sky = bool(zones) and bool(environment.clipped.any())
-    sky = Sky([G[lit] for G in thrown_sky], guess, clipped_sky, [zone.told for zone in zones])
+    sky = Sky([G[lit] for G in sky_contributions], guess, clipped_sky, [zone.told for zone in zones])
     colours = shared_by_class(colours or {}, unseen_objects, instances)
 
-    def solve(thrown: dict[int, np.ndarray], sky: Sky) -> tuple[list[Lamp], Sky, np.ndarray]:
+    def solve(contribution: dict[int, np.ndarray], sky: Sky) -> tuple[list[Lamp], Sky, np.ndarray]:
         """Lamps, the sky (changed in place, too) and log(L_d / E), (k, 3)."""
         for _ in range(UNSEEN.sweeps if zones else 1):
-            lamps = solve_lamps(sample, thrown, least, instances, seen, sky, received[lit], colours)
-            solve_sky(sample, lamps, thrown, sky, received[lit])
-        lamps, sky = needed(sample, lamps, thrown, sky, received[lit], colours)
-        E = all_light(received[lit], lamps, thrown, sky)
+            lamps = solve_lamps(sample, contribution, least, instances, seen, sky, received[lit], colours)
+            solve_sky(sample, lamps, contribution, sky, received[lit])
+        lamps, sky = needed(sample, lamps, contribution, sky, received[lit], colours)
+        E = all_light(received[lit], lamps, contribution, sky)
         return lamps, sky, np.log(np.maximum(sent, 1e-9) / np.maximum(E, 1e-12))
 
-    lamps, sky, log_albedo = solve(thrown, sky)
+    lamps, sky, log_albedo = solve(contribution, sky)
     if lamps and earlier is None and "shades" not in without:
-        thrown |= _by_shades(field, lamps, even, sample, log_albedo, thrown, seed)
-        lamps, sky, log_albedo = solve(thrown, sky)
+        contribution |= _by_shades(field, lamps, even, sample, log_albedo, contribution, seed)
+        lamps, sky, log_albedo = solve(contribution, sky)
     class_of = {i.object_id: i.class_name for i in instances}
     kind = kinds_of(sample.object_id, log_albedo, class_of)
     sample = replace(sample, kind=kind, cap=LIGHT_FIT.clipped_cap if clipped else LIGHT_FIT.cap)
     if "joint-light" not in without:
-        lamps = refined(sample, lamps, thrown, least, instances, seen, sky, received[lit], colours)
+        lamps = refined(sample, lamps, contribution, least, instances, seen, sky, received[lit], colours)
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))
     # With all light known, what looked like a lamp for want of it does so no more.
@@ -200,7 +200,7 @@ def find_light(
         field.with_light(lit_by(field, lamps), environment, [lamp.object_id for lamp in lamps]), element, seed
     )
     sure = find_seen(atlas.object_id[element], field.radiance[element], everything)
-    kept = Thrown(sunless, thrown_sky, sample.element, thrown, least)
+    kept = Contributions(sunless, sky_contributions, sample.element, contribution, least)
     return Light(tuple(sure) + tuple(lamps), environment, found + tuple(sky.notes()), element, everything, kept)
 
 

@@ -21,8 +21,8 @@ def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[L
         return field, ()
     everywhere = Environment.only(np.ones((1, 2), np.float32))
     dark = field.with_sun(None).with_light(np.zeros_like(field.radiance), everywhere)
-    thrown = irradiance_at(dark, element, seed)[:, 0]
-    if thrown.mean() < SKY.least_share * np.pi:
+    contribution = irradiance_at(dark, element, seed)[:, 0]
+    if contribution.mean() < SKY.least_share * np.pi:
         return field, ()
     received = irradiance_at(field.with_light(evened(field)), element, seed)
     object_id, sent = field.atlas.object_id[element], field.radiance[element].astype(np.float64)
@@ -30,23 +30,25 @@ def with_whole_sky(field: LightField, element: np.ndarray, seed: int) -> tuple[L
     found = None
     for _ in range(UNSEEN.sweeps):
         sample = Sample(element[left], object_id[left], sent[left], received[left])
-        found = sample.best(sent[left] @ LUMINANCE, received[left] @ LUMINANCE, thrown[left])
+        found = sample.best(sent[left] @ LUMINANCE, received[left] @ LUMINANCE, contribution[left])
         if found is None or found[2] > (1 - LEVELS.gain) * found[1]:
             return field, ()
         # Lamps show themselves once the rest is lit; their albedo says nothing of the sky.
-        lamps = find_seen(object_id, sent, received + found[0] * thrown[:, None])
+        lamps = find_seen(object_id, sent, received + found[0] * contribution[:, None])
         left = ~np.isin(object_id, [lamp.object_id for lamp in lamps])
         if left.sum() < LEVELS.enough:
             return field, ()
     assert found is not None  # there was a sweep
     radiance = np.full(3, found[0])
     at = np.searchsorted(element, sample.element)
-    by_channel = [sample.best(sample.radiance[:, c], sample.received[:, c], thrown[at]) for c in range(3)]
+    by_channel = [sample.best(sample.radiance[:, c], sample.received[:, c], contribution[at]) for c in range(3)]
     solved = [one[0] for one in by_channel if one is not None]
     if len(solved) == 3:
         radiance = np.array(solved)
     # No object reflects more than it gets.
-    least = (np.pi * sample.radiance - sample.received) / np.maximum(thrown[at], 1e-3 * thrown.mean())[:, None]
+    least = (np.pi * sample.radiance - sample.received) / np.maximum(contribution[at], 1e-3 * contribution.mean())[
+        :, None
+    ]
     for one in np.unique(sample.object_id):
         radiance = np.maximum(radiance, np.median(least[object_id[left] == one], 0))
     note = (

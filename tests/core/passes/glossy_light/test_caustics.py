@@ -71,8 +71,8 @@ def test_what_a_bright_metal_was_taken_to_send_goes(dark):
     found = caustics(dark.field, dark.bright, lobes)[:, :3]
     lamp = [quad for quad in dark.room.quads if quad.object_id == 6]
     at = np.flatnonzero(atlas.object_id < 6)[::20]
-    thrown = polygon_irradiance(atlas.position[at].astype(float), atlas.normal[at].astype(float), lamp)
-    truth = thrown.sum(1)[:, None] * dark.glow
+    contribution = polygon_irradiance(atlas.position[at].astype(float), atlas.normal[at].astype(float), lamp)
+    truth = contribution.sum(1)[:, None] * dark.glow
     assert found[at].mean(0) == pytest.approx(-truth.mean(0), rel=0.03)
     assert np.corrcoef(found[at].mean(1), truth.mean(1))[0, 1] < -0.98
 
@@ -91,9 +91,9 @@ def test_two_mirrors_in_a_corner(dark):
     ]
     middle = ((atlas.position > 0.2) & (atlas.position < np.array(SIZE) - 0.2))[:, 1:].all(1)  # cells end at edges
     at = np.flatnonzero((atlas.object_id == 3) & middle)
-    thrown = polygon_irradiance(atlas.position[at].astype(float), atlas.normal[at].astype(float), images)
-    assert thrown[:, 2].mean() > 0.2 * thrown.sum(1).mean()
-    truth = thrown.sum(1)[:, None] * dark.glow
+    contribution = polygon_irradiance(atlas.position[at].astype(float), atlas.normal[at].astype(float), images)
+    assert contribution[:, 2].mean() > 0.2 * contribution.sum(1).mean()
+    truth = contribution.sum(1)[:, None] * dark.glow
     assert found[at, :3].mean(0) == pytest.approx(truth.mean(0), rel=0.02)
     off, noise = (found[at, :3] - truth).std(), np.sqrt(np.square(found[at, 3:]).mean())
     assert off < 1.2 * noise

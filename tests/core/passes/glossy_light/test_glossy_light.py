@@ -76,8 +76,8 @@ def test_what_the_median_held_is_taken_off(box):
     held, _ = found(box, polished(), 0.3)
     floor = [q for q in box.room.quads if q.object_id == 0]
     atlas = box.room.atlas
-    thrown = polygon_irradiance(atlas.position[element].astype(float), atlas.normal[element].astype(float), floor)
-    assert (bare - held).mean() == pytest.approx(0.3 * thrown.sum(1).mean(), rel=0.04)
+    contribution = polygon_irradiance(atlas.position[element].astype(float), atlas.normal[element].astype(float), floor)
+    assert (bare - held).mean() == pytest.approx(0.3 * contribution.sum(1).mean(), rel=0.04)
 
 
 def test_a_metal_sends_nothing_but_its_lobe(box):

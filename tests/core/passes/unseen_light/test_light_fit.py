@@ -25,11 +25,11 @@ def sample(noise: float = 0.1, seed: int = 0):
     m = 1500
     object_id = rng.integers(0, 3, m)
     base = rng.uniform(0.2, 1, (m, 1)) * np.array([1, 0.9, 0.8])
-    thrown = rng.exponential(0.05, m), rng.exponential(0.5, m)
-    E = base + thrown[0][:, None] * TRUE[0] + thrown[1][:, None] * TRUE[1]
+    contribution = rng.exponential(0.05, m), rng.exponential(0.5, m)
+    E = base + contribution[0][:, None] * TRUE[0] + contribution[1][:, None] * TRUE[1]
     albedo = np.array([0.2, 0.5, 0.8])[object_id] * np.exp(rng.normal(0, noise, m))
     albedo[rng.random(m) < 0.1] *= 3
-    return Sample(np.arange(m), object_id, albedo[:, None] * E / np.pi, base), base, thrown
+    return Sample(np.arange(m), object_id, albedo[:, None] * E / np.pi, base), base, contribution
 
 
 @pytest.mark.parametrize("bound", [False, True])
@@ -119,10 +119,10 @@ def test_objects_of_a_kind_tell_of_the_lamp_that_lights_one_of_them():
     """Each has the same light all over, so neither tells by itself."""
     rng = np.random.default_rng(1)
     ids, m = np.repeat([0, 1], 200), 400
-    thrown = np.where(ids == 0, 1e-6, 0.1)
+    contribution = np.where(ids == 0, 1e-6, 0.1)
     received = np.ones(m)
-    sent = 0.5 / np.pi * (received + 20 * thrown) * np.exp(rng.normal(0, 0.1, m))
-    how = sent, received, thrown[:, None], np.array([14.0]), np.array([0.1]), np.array([1e3])
+    sent = 0.5 / np.pi * (received + 20 * contribution) * np.exp(rng.normal(0, 0.1, m))
+    how = sent, received, contribution[:, None], np.array([14.0]), np.array([0.1]), np.array([1e3])
     alone = Sample(np.arange(m), ids, sent[:, None].repeat(3, 1), received[:, None].repeat(3, 1))
     together = replace(alone, kind=np.zeros(m, int))
     assert together.refine(*how)[0] == pytest.approx(20, rel=0.05)

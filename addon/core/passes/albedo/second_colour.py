@@ -20,7 +20,7 @@ from .params import SECOND_COLOUR, SecondColourParams
 BLOCK: Block[int] = 1 << 11
 
 
-class Surroundings(NamedTuple):
+class Neighbourhood(NamedTuple):
     """What is around m places: log albedo's median (m, 3) and width (m,), and the neighbours themselves, (m, k) int."""
 
     middle: np.ndarray
@@ -28,11 +28,11 @@ class Surroundings(NamedTuple):
     near: np.ndarray
 
 
-def drawn_to_minority(
+def shrunk_to_second_colour(
     shrunk: np.ndarray,
     rho: np.ndarray,
     error: np.ndarray,
-    around: Surroundings,
+    around: Neighbourhood,
     cell: np.ndarray,
     reference: np.ndarray,
     reference_error: np.ndarray,
@@ -52,7 +52,7 @@ def drawn_to_minority(
         As measured; above 0.
     error : (m,)
         Its relative standard error.
-    around : Surroundings
+    around : Neighbourhood
         Of cells; neighbours are rows of `reference`.
     cell : (m,) int
         Each element's cell.
