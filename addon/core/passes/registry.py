@@ -109,8 +109,8 @@ PASSES = (
     ),
     *_of(
         "write",
-        albedo_prior="Draws uncertain albedo towards its neighbourhood's.",
-        second_colour="Draws it to a second colour of the neighbourhood where that is likelier.",
+        albedo_prior="Shrinks uncertain albedo towards its neighbourhood's.",
+        second_colour="Shrinks it to a second colour of the neighbourhood where that is likelier.",
         wide_prior="Widens the neighbourhood for as long as it stays alike.",
         object_spread="Takes the spread of single observations from others of the object.",
         compensation="Raises Base Color for the light that the Principled coat keeps from the diffuse part.",

@@ -1,7 +1,7 @@
 """A few objects of a finished result fitted again, with all else held: seconds instead of a run.
 
 What it needs lies in the result folder: the stages, the room and the images. The capture may be gone. Held are the
-light, the other objects and what glossy things throw on their surroundings; a whole run of the specular stage brings
+light, the other objects and what glossy things reflect onto the room; a whole run of the specular stage brings
 that up to date.
 """
 

@@ -50,7 +50,7 @@ class Specular:
     specular : (n, 3) float32
         Part of each element's L_d that is specular, or came through it from behind.
     excess : (n, 3) float32
-        What is to be added to E, as glossy things throw more on each element than their L_d says.
+        What is to be added to E, as glossy things reflect more onto each element than their L_d says.
     hidden : (n,) bool
         In every view the specular part is more than what is left: L_d tells of no albedo.
     """
@@ -137,7 +137,7 @@ def fit_specular(
     pictures : Pictures, optional
         What lobes are taken out of; without, they stay in L_d.
     refine : int
-        0 leaves L_d as the median gave it; 1 takes the lobes out of it; 2 also corrects E for what they really throw.
+        0 leaves L_d as the median gave it; 1 takes the lobes out of it; 2 also corrects E for what they really reflect.
     noise : float
         What was taken out of the mesh, in metres.
     given : dict of int to Given

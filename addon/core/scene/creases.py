@@ -1,4 +1,4 @@
-"""Near a crease an element's irradiance is in doubt: texel, pixels and facets mix the light of both sides."""
+"""Near a crease an element's irradiance is uncertain: texel, pixels and facets mix the light of both sides."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""What an object's albedo is like around a place: the prior that stands in for, or steadies, a poor measurement.
+"""What an object's albedo is like around a place: the prior that a poor measurement is shrunk towards.
 
 Where the well-measured elements of an object agree among each other, a badly measured one between them (at a depth
-edge, seen once) is drawn towards them; where they differ, as in a texture, it is left as it is. Empirical Bayes on
+edge, seen once) is shrunk towards them; where they differ, as in a texture, it is left as it is. Empirical Bayes on
 log albedo, with the spread of the neighbours as the prior's width; a second colour among them: `second_colour`.
 """
 
@@ -68,7 +68,7 @@ def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray, params
 
 def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, params: PriorParams) -> Neighbourhood:
     """The nearest references of m places."""
-    # At most an eighth of the object: a small object's ends are not each other's surroundings.
+    # At most an eighth of the object: a small object's ends are not each other's neighbourhood.
     k = min(params.neighbours, max(len(references) // 8, 3), len(references))
     near = cKDTree(references).query(position, k=k, workers=-1)[1].reshape(len(position), k)
     middle = np.empty((len(position), 3), np.float32)
@@ -124,7 +124,7 @@ def shrink(
     without: Collection[str] = (),
     params: PriorParams = PRIOR,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Albedo of one object's elements, each drawn towards its neighbourhood as far as it is in doubt.
+    """Albedo of one object's elements, each shrunk towards its neighbourhood as far as it is uncertain.
 
     Parameters
     ----------

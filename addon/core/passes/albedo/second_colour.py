@@ -1,8 +1,8 @@
 """A second colour around a place: the joints between tiles, stripes on a ground, letters on a page.
 
-A median and a width say nothing of a colour that covers a tenth of the surroundings: what bears it is drawn towards the
-others as far as it is in doubt. Where more neighbours lie far from the median than noise explains, each of those is a
-value that an element may have too. The prior is then a mixture of the surroundings' normal distribution and of narrow
+A median and a width say nothing of a colour that covers a tenth of the neighbourhood: what bears it is shrunk towards the
+others as far as it is uncertain. Where more neighbours lie far from the median than noise explains, each of those is a
+value that an element may have too. The prior is then a mixture of the neighbourhood's normal distribution and of narrow
 ones at these neighbours (an empirical prior, Robbins 1956); the albedo is its mean once the element is measured.
 """
 
@@ -39,7 +39,7 @@ def shrunk_to_second_colour(
     most: float,
     params: SecondColourParams = SECOND_COLOUR,
 ) -> np.ndarray:
-    """Log albedo of measured elements, drawn to the other colours around them as far as those are likelier.
+    """Log albedo of measured elements, shrunk to the other colours around them as far as those are likelier.
 
     Measured with it (score by `scripts/qa_rooms`, dB): bathrooms +.36 and +.45, a hall +.36, other rooms +.0 to +.05,
     the living room -.10.
@@ -47,7 +47,7 @@ def shrunk_to_second_colour(
     Parameters
     ----------
     shrunk : (m, 3)
-        Log albedo, drawn to the middle of its surroundings.
+        Log albedo, shrunk to the middle of its neighbourhood.
     rho : (m, 3)
         As measured; above 0.
     error : (m,)

@@ -1,1 +1,1 @@
-"""What glossy things throw on the room beyond what their L_d says."""
+"""What glossy things reflect onto the room beyond what their L_d says."""

@@ -1,4 +1,4 @@
-"""What glossy things really throw on their surroundings, beyond what the median over the frames says of them.
+"""What glossy things really reflect onto the room, beyond what the median over the frames says of them.
 
 The light field takes a surface to send its L_d into all directions. A highlight is not in that median: a floor under a
 lamp sends it towards the ceiling, and no camera stood there; a metal sends the lamp, and its median shows a wall. Once
