@@ -88,7 +88,7 @@ class Corrected(Stages):
 
     @cached_property
     def albedo(self) -> Albedo:
-        """The final albedo: of L_d less its specular part, under all that glossy things reflect, and as it was given."""
+        """The final albedo: of L_d less its specular part, under all that glossy things reflect, and as given."""
         return self.albedo_of_all_but(self.emitters)
 
     def albedo_of_all_but(self, without: set[int]) -> Albedo:

@@ -1,9 +1,9 @@
 """A second colour around a place: the joints between tiles, stripes on a ground, letters on a page.
 
-A median and a width say nothing of a colour that covers a tenth of the neighbourhood: what bears it is shrunk towards the
-others as far as it is uncertain. Where more neighbours lie far from the median than noise explains, each of those is a
-value that an element may have too. The prior is then a mixture of the neighbourhood's normal distribution and of narrow
-ones at these neighbours (an empirical prior, Robbins 1956); the albedo is its mean once the element is measured.
+A median and a width say nothing of a colour that covers a tenth of the neighbourhood: what bears it is shrunk towards
+the others as far as it is uncertain. Where more neighbours lie far from the median than noise explains, each of those
+is a value that an element may have too. The prior is then a mixture of the neighbourhood's normal distribution and of
+narrow ones at these neighbours (an empirical prior, Robbins 1956); the albedo is its mean once the element is measured.
 """
 
 from __future__ import annotations
