@@ -58,7 +58,10 @@ class SidesParams:
     Attributes
     ----------
     least_share, least_rays : float, int
-        A sheet is given two sides if this share of the rays that met it, and so many, met the side that is seen less.
+        A sheet is given two sides if this share of the rays that met it, and so many, met the side that is seen less;
+        or half that share, if they are `LEVELS.few` at least: a floor lamp's shade had 17 of 590, and its inner side's
+        light was reflected onto the wall behind it. Bent tubes have 4 to 10 of some hundred at their ends, and second
+        sides would halve what shows them. So is a triangle that pixels vote for either side of.
     least_of_object, least_of_room : float
         Sheets that are less of their object's surface, and of the room's, are left as they are: single leaves of a
         plant, whose two sides are alike, only cost elements, and views that its other elements would be judged by.

@@ -14,6 +14,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
+from ..significance import LEVELS
 from .elements import triangle_geometry
 from .model import Mesh
 from .params import SIDES
@@ -71,6 +72,7 @@ def two_sided(mesh: Mesh, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     one_surface[sheet[up == down]] = False  # such as Moebius' strip
     less, rays_on = np.minimum(front, back), front + back
     seen = less >= np.maximum(SIDES.least_share * rays_on, SIDES.least_rays)
+    seen |= less >= np.maximum(SIDES.least_share / 2 * rays_on, LEVELS.few)
     both = (seen & bordered & one_surface)[sheet]
     return both, np.where(front >= back, 1, -1)[sheet] * ways.astype(np.float32)
 
