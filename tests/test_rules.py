@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import sys
 import tomllib
 from pathlib import Path
 
@@ -231,3 +232,19 @@ def test_every_pass_is_described():
 
     told = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
     assert not [one.name for one in PASSES if f"`{one.name}`" not in told]
+
+
+def test_the_methods_numbers_are_fields_of_params():
+    """No number that was chosen by results stands by itself in a module of the method, or has no word on it."""
+    sys.path.insert(0, str(ROOT / "scripts"))
+    from count_constants import constants
+
+    method = ("agreement", "evidence", "fit", "light", "lit_diffuse", "passes", "pipeline")
+    for path in sorted(one for folder in method for one in (ROOT / "addon" / "core" / folder).rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        assert not [name for name, kind in constants(tree) if not kind], path
+        for one in tree.body:
+            if isinstance(one, ast.ClassDef) and one.name.endswith("Params"):
+                fields = {ast.unparse(field.target) for field in one.body if isinstance(field, ast.AnnAssign)}
+                told = re.findall(r"^ {4}(\w[\w, ]*) : ", ast.get_docstring(one, clean=False) or "", re.MULTILINE)
+                assert fields == {name for names in told for name in names.split(", ")}, f"{path}: {one.name}"

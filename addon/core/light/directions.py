@@ -6,6 +6,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ..scene.tangent_frame import tangent_frame
+from .params import GATHER
 
 
 def sobol(count: int, seed: int, axes: int = 2) -> np.ndarray:
@@ -26,7 +27,7 @@ def cosine_hemisphere(square: np.ndarray) -> np.ndarray:
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], -1).astype(np.float32)
 
 
-PATTERNS = 64
+PATTERNS = GATHER.patterns
 
 
 def cosine_patterns(rays: int, seed: int) -> np.ndarray:

@@ -11,6 +11,8 @@ class GatherParams:
 
     Attributes
     ----------
+    patterns : int
+        Sets of directions that elements take turns with: neighbours' noise then differs.
     finest_share : float
         Least distance of two gathering points, and edge of the texel blocks, as a share of the room; a texel where that
         is larger. Finer texels then cost look-ups, and rays only where the lamps' light changes; coarse ones are not
@@ -54,6 +56,7 @@ class GatherParams:
         Times the finest spacing of gathering points.
     """
 
+    patterns: int = 64
     finest_share: float = 0.005
     smooth: float = 0.05
     allowed: float = 0.2

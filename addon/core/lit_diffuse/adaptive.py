@@ -9,13 +9,11 @@ import numpy as np
 from ..paper.p_square import Summary
 from .batched import Batched
 from .exact import Exact
-
-EXACT_BYTES = 224
-"""Bytes an element that observations may take on disk, in the mean: 14 observations. `Batched` takes 244 in memory."""
+from .params import MEDIANS
 
 
 class Adaptive:
-    """`Exact` for as long as `EXACT_BYTES` allow, then `Batched`, which is told all that was seen until then.
+    """`Exact` for as long as `exact_bytes` allow, then `Batched`, which is told all that was seen until then.
 
     Sorting once at the end costs less than renewing knots again and again, and has no error; but its disk grows with
     the video. Short videos, and kinds of observations that are rare, never need more.
@@ -29,7 +27,7 @@ class Adaptive:
     def __init__(self, count: int, folder: Path | str | None = None, threads: int = 0):
         self._count, self._threads = count, threads
         self.now: Exact | Batched = Exact(count, folder, threads)
-        self._left = EXACT_BYTES // Exact.RECORD.itemsize * count
+        self._left = MEDIANS.exact_bytes // Exact.RECORD.itemsize * count
 
     def add(self, element: np.ndarray, values: np.ndarray) -> None:
         if isinstance(self.now, Exact):

@@ -20,9 +20,10 @@ import numpy as np
 from ..kinds import Block, Code
 from ..paper.p_square import QUARTILES, Summary
 from ..parallel import blocks, ordered_map
+from .params import MEDIANS
 from .sorting import sort_planes
 
-SLOTS, KNOTS = 20, 12
+SLOTS, KNOTS = MEDIANS.slots, MEDIANS.knots
 BATCH = SLOTS - KNOTS
 SLOT_BITS: Code[int] = 5
 AT_ONCE: Block[int] = 1 << 14

@@ -67,7 +67,10 @@ class ChoiceParams:
         A lobe must lower the cost on elements that its fit has not seen by this share, and by this many standard errors
         (`LEVELS.sigmas`). A metal must also beat a dielectric over a diffuse part, by `LEVELS.likely`: that alone it
         does not stand or fall with, as it has to do without a diffuse part besides. Below three others of its class
-        decide: of 31 true metals in nine rooms two had less, a black keyboard 1.9 or 2.1.
+        decide: of 31 true metals in nine rooms two had less, a black keyboard 1.9 or 2.1. What takes `LEVELS.gain` off
+        need only be likely: few elements show a small highlight, but what they show nothing else explains (a bathroom's
+        tiles: gain .16 at 2.2 standard errors; nothing truly diffuse gained a tenth with less than 3). Not of a handful
+        of elements, whose standard error is no better known than that.
     """
 
     bare: float = 2.0
@@ -85,10 +88,12 @@ class LooksParams:
     ----------
     ratio : float
         An object of one colour is metal, or coated, if that leaves less than this share of the spread that diffuse and
-        dielectric leave, by this many standard errors. Of 166 objects in the living room and five others, metals had
-        0.2 to 1.1 (the half of them below 0.8), everything else 0.92 and more, but for what `metal_spread` leaves out
-        and a pane of glass (0.58); reddish wood in a perturbed scan had 0.78 and an F0 that no metal has
-        (`metal_by_looks`).
+        dielectric leave, by `LEVELS.sigmas`; by `LEVELS.likely` if others of its class are metal. Of 166 objects in the
+        living room and five others, metals had 0.2 to 1.1 (the half of them below 0.8), everything else 0.92 and more,
+        but for what `metal_spread` leaves out and a pane of glass (0.58); reddish wood in a perturbed scan had 0.78 and
+        an F0 that no metal has (`metal_by_looks`). Of what was called Lambertian in six rooms and two perturbed scans,
+        fourteen coated things had less (black tubes 0.42, a hand rail 0.74, soap 0.75, a plant pot 0.89); what is truly
+        diffuse had 0.94 and more, but for what `coated_spread` says.
     metal_spread : float
         What follows diffuse light as closely as this says nothing against it: errors of E and A are of that size.
     coated_spread : tuple[float, float]
