@@ -52,7 +52,7 @@ def pinholes(disk, tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", LENSES)
+@pytest.mark.parametrize("name", ["brown", "fisheye of 220 degrees", "cropped prism fisheye", "panorama"])
 def test_albedo_is_that_of_pinholes(name, disk, pinholes, tmp_path, few_samples):
     frames = []
     for i, camera in enumerate(cameras(name)):
