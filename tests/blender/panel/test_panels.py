@@ -214,6 +214,15 @@ def test_run_hands_over_what_was_chosen(choices, module, monkeypatch, tmp_path):
     assert asked[-1][1] == str(tmp_path / "mine")
 
 
+def test_choices_of_older_files_are_what_they_were(choices):
+    """A choice that has gone is the default; the others have not moved up."""
+    settings = choices.settings
+    own = settings.bl_system_properties_get(do_create=True) if bpy.app.version >= (5, 0) else settings
+    for number, name in ((1, "adaptive"), (2, "exact"), (3, "p2"), (4, "mean")):
+        own["median"] = number
+        assert settings.value().median == name
+
+
 def test_run_tells_what_goes_wrong_once(choices, tmp_path):
     choices.capture_folder, choices.result_folder = str(tmp_path / "nowhere"), str(tmp_path / "result")
     with pytest.raises(RuntimeError, match="nowhere' does not exist") as told:
