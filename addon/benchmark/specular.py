@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core.brdf import ggx as brdf
+from ..core.brdf.fresnel import rise
 from ..core.fit.problem import Problem
 from ..core.kinds import Workload
 from ..core.light.directions import shifted, sobol
@@ -277,7 +278,7 @@ class Scene:
             origin = self.field.scene.off_surface(position[part], np.repeat(up, len(wo), 0))
             L = np.zeros((*good.shape, 3), np.float32)
             L[good] = self.field.along(np.repeat(origin, rays, 0)[good.ravel()], w[good].astype(np.float32))[0]
-            s = (1 - np.clip(cosine, 0, 1)) ** 5
+            s = rise(np.clip(cosine, 0, 1))
             if uniform:
                 f = brdf.lobes(n_w, n_wo, 1 - h[..., 2] ** 2, grid) * (n_w * np.float32(2 * np.pi / rays))[:, None]
             else:  # f cos / density; the density is D (n.h) / (4 w.h)
