@@ -7,9 +7,9 @@ A constant whose annotation names a kind of `addon/core/kinds.py` (a format's co
 a block's size, what is shown, a benchmark's workload) is counted apart: by kind, below. A tuple of numbers that is
 bound to several names counts once for each.
 
-`in code` counts the numbers that stand in functions as they are, but for whole numbers up to 4 and their halves,
-and what is told with `# fmt` or a formula: exponents, a unit's powers of ten below 1e-5 (which keep a quotient from
-dividing by 0). Most are a formula's; they are counted so that no constant gains by moving there.
+`in code` counts the numbers that stand in functions, but for 0 to 4 in halves and what is no more than 1e-5 (which
+keeps a quotient from dividing by 0). Most are a formula's, a format's or a layout's, and some are chosen: the count
+shows whether constants move there.
 """
 
 from __future__ import annotations

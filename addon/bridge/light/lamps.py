@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...core.brdf.emitter import LAMP_ALBEDO as UNLIT_GREY
 from ...core.errors import BadInputError
 from ...core.kinds import Limit
 from ...core.naming import in_order, numbered
@@ -18,8 +19,6 @@ _STRENGTH, _COLOUR, _BASE = (f"scan_relight_recovered_{name}" for name in ("stre
 _OFF, _FACTOR = "scan_relight_lamp_off", "scan_relight_lamp_factor"
 
 MAX_FACTOR: Limit[float] = 1000.0
-UNLIT_GREY = 0.5
-"""Albedo of a lamp that is off. What its shade reflects can't be told from what it emits, so this is a guess."""
 _DARK = ("window", "screen", "monitor", "tv", "television", "display", "laptop")
 """Classes that are nearly black when off: what is behind them is unlit."""
 

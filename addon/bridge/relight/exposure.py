@@ -10,6 +10,7 @@ import math
 import bpy
 
 from ...core.errors import BadInputError
+from ...core.kinds import Limit
 from ...core.photo import MIDDLE_GREY
 from ..scene.settings import EXPOSURE
 from . import estimate
@@ -19,7 +20,7 @@ CAPTURED = "scan_relight_captured_exposure"
 """Custom property of a scene: its exposure before ours, in stops."""
 ASKED = "scan_relight_asked_exposure"
 """Custom property of a scene: the exposure that its light asked for when it was last measured, in stops."""
-_MOST = 32.0
+_MOST: Limit[float] = 32.0
 
 
 def measure(scene: bpy.types.Scene) -> float:

@@ -47,15 +47,12 @@ class PartsParams:
         Of all parts together: one and a half times an atlas of 4096. Memory, a few gigabytes for this, ends there.
     half : float
         Of what lies around a spot on the room's atlas, this share has to be measured for detail to be told there.
-    looked : float
-        Share of the writing that the look at the frames takes.
     """
 
     finest: float = 4.0
     worth: float = 1.2
     most_texels: int = 25_000_000
     half: float = 0.5
-    looked: float = 0.3
 
 
 PARTS = PartsParams()

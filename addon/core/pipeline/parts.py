@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..json_values import key
+from ..kinds import Shown
 from ..parallel import ordered_map
 from ..passes.albedo.albedo import MEASURED
 from ..passes.sharpening.params import SHARPENING
@@ -32,6 +33,9 @@ from ..significance import LEVELS
 from .corrected import Corrected
 from .frames import lit_diffuse
 from .params import PARTS
+
+LOOKED: Shown[float] = 0.3
+"""Share of the writing, as progress tells it, that the look at the frames takes."""
 
 STAGE = "detail"
 FOLDER = "objects"
@@ -180,7 +184,7 @@ def _looked(run: Corrected, part: Mesh, atlas: Atlas, chosen: np.ndarray) -> Lit
         element[there] = find(own[there], u[there], v[there])
         return element
 
-    rounds = Rounds(run.progress, 0, PARTS.looked)
+    rounds = Rounds(run.progress, 0, LOOKED)
     how = {"median": s.median, "seed": s.seed, "threads": s.threads, "folder": run.store.folder, "progress": rounds}
     finer = replace(surface, atlas=atlas)
     found = lit_diffuse(finer, run.frames, run.read, s, run.store.folder, rounds)

@@ -14,8 +14,7 @@ from ..evidence.page import make_page
 from ..parallel import ordered_map
 from ..settings import ROOM
 from .corrected import Corrected
-from .params import PARTS
-from .parts import Parting, Parts, look_closer, remove_parts, write_parts
+from .parts import LOOKED, Parting, Parts, look_closer, remove_parts, write_parts
 from .report import make_report
 from .stages import code
 
@@ -66,7 +65,7 @@ class Recovery(Corrected):
         def write(name: str) -> None:
             self.store.write_exr(f"{name}.exr", atlas.image(images[name])[::-1])
 
-        begun = PARTS.looked if self._parting else 0.0
+        begun = LOOKED if self._parting else 0.0
         for done, _ in enumerate(ordered_map(write, images, self.settings.threads)):
             self.progress.update(begun + (0.5 - begun) * done / len(images))
         if wanted is None or "environment" in wanted:

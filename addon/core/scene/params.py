@@ -16,15 +16,12 @@ class VisibilityParams:
     depth_tolerance : float
         A neighbouring pixel whose hit lies further than this share of the distance off the pixel's own plane lies
         beyond a depth edge.
-    edge_margin : float
-        Pixels around the frame's border that are not looked up: half of each lies beyond the outermost centres.
     enough : int
         Clean observations from which on an element does without those at edges.
     """
 
     min_cosine: float = 0.2
     depth_tolerance: float = 0.02
-    edge_margin: float = 0.5
     enough: int = 3
 
 

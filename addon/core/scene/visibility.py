@@ -7,12 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinds import Code, Limit
+from ..kinds import Code, Limit, Unit
 from .atlas import Atlas
 from .model import Camera, Mesh, Pixels
 from .params import VISIBILITY
 from .pixel_rays import pixel_rays
 from .rays import RayScene
+
+EDGE_MARGIN: Unit[float] = 0.5
+"""Pixels around the frame's border that are not looked up: half of each lies beyond the outermost centres."""
 
 CLEAN: Code[int] = 0
 EDGE: Code[int] = 1
@@ -196,7 +199,7 @@ def observe(
     np.subtract(atlas.position.take(index, 0).T, centre[:, None], out=away)
     x, y, inside = _projected(camera, away)
     for position, extent in ((x, camera.width), (y, camera.height)):
-        inside &= (position >= VISIBILITY.edge_margin) & (position < extent - VISIBILITY.edge_margin)
+        inside &= (position >= EDGE_MARGIN) & (position < extent - EDGE_MARGIN)
     at = np.flatnonzero(inside)
     x, y = x.take(at), y.take(at)
     pixel = y.astype(np.int32) * camera.width + x.astype(np.int32)

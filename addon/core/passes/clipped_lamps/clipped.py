@@ -7,7 +7,7 @@ lamp that no frame looked at is (`unseen_light`); where that fails, the bound is
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,22 +16,7 @@ from ...luminance import LUMINANCE
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.visibility import SATURATED
-
-
-@dataclass(frozen=True)
-class ClippedParams:
-    """Of what counts as clipped (`clipped-lamps` in the ablation).
-
-    Attributes
-    ----------
-    mostly : float
-        Share of an object's seen area from which on it counts as clipped.
-    """
-
-    mostly: float = 0.5
-
-
-CLIPPED = ClippedParams()
+from .fringes import FringeParams
 
 
 def clipped_objects(lit: LitDiffuse, atlas: Atlas) -> dict[int, float]:
@@ -40,7 +25,7 @@ def clipped_objects(lit: LitDiffuse, atlas: Atlas) -> dict[int, float]:
     for object_id in np.unique(atlas.object_id[lit.tier == SATURATED]):
         own = lit.seen & (atlas.object_id == object_id)
         clipped = own & (lit.tier == SATURATED)
-        if atlas.area[clipped].sum() > CLIPPED.mostly * atlas.area[own].sum():
+        if atlas.area[clipped].sum() > FringeParams.least_share * atlas.area[own].sum():
             bounds[int(object_id)] = float(np.median(lit.radiance[clipped] @ LUMINANCE))
     return bounds
 

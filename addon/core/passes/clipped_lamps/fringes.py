@@ -30,7 +30,7 @@ class FringeParams:
     least_pixels : int
         Smaller clipped spots may be glints.
     least_share : float
-        Of a clipped spot that must show one object.
+        Of a clipped spot that must show one object; of an object's seen area that makes it a clipped one.
     enough : int
         Fringe pixels from which on their median is a colour.
     near, far : int

@@ -6,10 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...kinds import Unit
 from ...light.field import LightField
 from ...scene.samples import Samples
 from ...significance import LEVELS
 from .params import MIRRORS
+
+DARK: Unit[float] = 1e-5
+"""What nobody saw is dark in the field so far: 0, but for rounding."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,7 @@ class Views:
         """Which observations ((k,) int) a mirror that faces `normals` shows something known in, and what ((k, 3))."""
         along = 2 * np.einsum("ij,ij->i", self.direction, np.broadcast_to(normals, self.direction.shape))[:, None]
         shown = self.field.along(self.origin, (along * normals - self.direction).astype(np.float32))[0]
-        known = np.flatnonzero(shown.mean(1) > MIRRORS.dark)
+        known = np.flatnonzero(shown.mean(1) > DARK)
         return None if len(known) < LEVELS.many else (known, shown[known])
 
     def off(self, normal: np.ndarray) -> float:
@@ -61,7 +65,7 @@ class Views:
         if found is None:
             return np.inf
         known, shown = found
-        ratio = np.log(np.maximum(self.radiance[known].mean(1), MIRRORS.dark)) - np.log(shown.mean(1))
+        ratio = np.log(np.maximum(self.radiance[known].mean(1), DARK)) - np.log(shown.mean(1))
         return float(np.minimum(np.abs(ratio - np.median(ratio)), MIRRORS.most_off).mean())
 
     def compare(self, normals: np.ndarray) -> tuple[float, float, float, np.ndarray]:
@@ -80,12 +84,12 @@ class Views:
             return np.inf, 0.0, 0.0, np.zeros(3)
         known, shown = found
         seen = self.radiance[known]
-        a, b = (np.log(np.maximum(x.mean(1), MIRRORS.dark)) for x in (seen, shown))
+        a, b = (np.log(np.maximum(x.mean(1), DARK)) for x in (seen, shown))
         _, group, count = np.unique(self.element[known], return_inverse=True, return_counts=True)
         own_a, own_b = (x - (np.bincount(group, x) / count)[group] for x in (a, b))
         together = float(np.mean(own_a * own_b) / max(own_a.std() * own_b.std(), 1e-12))
         off = float(np.median(np.abs(a - b - np.median(a - b))))
-        return off, float(np.median(np.abs(own_a))), together, np.median(seen / np.maximum(shown, MIRRORS.dark), 0)
+        return off, float(np.median(np.abs(own_a))), together, np.median(seen / np.maximum(shown, DARK), 0)
 
 
 def sides_of(normal: np.ndarray) -> np.ndarray:

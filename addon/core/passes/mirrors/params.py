@@ -27,8 +27,6 @@ class MirrorsParams:
     tilt, tilts, fitted : float, int
         Radians by which the plane is turned first to fit what is mirrored, how often, and observations for it: a scan's
         planes are off.
-    dark : float
-        What nobody saw is dark in the field so far.
     most_off : float
         Most that one observation counts for, in log radiance: beside an edge a ray of a slightly other way meets
         something else altogether.
@@ -43,7 +41,6 @@ class MirrorsParams:
     tilt: float = 0.01
     tilts: int = 40
     fitted: int = 6000
-    dark: float = 1e-5
     most_off: float = 0.5
 
 
