@@ -15,7 +15,7 @@ FORMAT_ITEMS = [
     *((name, name, f"Known by {wants}") for name, wants in FORMATS.items()),
 ]
 CURVES = (
-    (FOUND, "Not Given", "Pictures of 8 and 16 bits are refused, as their curve is unknown"),
+    (FOUND, "Calibrated", "Response and exposures are estimated from what several pictures show"),
     ("srgb", "sRGB", "The curve of screens and of most pictures of 8 bits"),
     ("linear", "Linear", "Stored numbers are proportional to light"),
 )

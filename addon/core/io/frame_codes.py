@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..errors import BadInputError
-from ..scene.model import Frame
+from ..scene.model import AUTO, Frame
 from .pictures import picture_bits, unstated
 from .transfer import check_transfer, clip_level
 
 
 def with_curves(frames: Sequence[Frame], transfer: str) -> tuple[list[Frame], list[str], list[str]]:
-    """Give frames of codes the curve `transfer` ('' where nobody told) and the value at which codes end.
+    """Give frames of codes the curve `transfer` and the value at which codes end.
+
+    Where nobody told a curve (''), it is `AUTO` if all frames are codes; codes among floats are told as problems.
 
     Returns
     -------
@@ -23,22 +25,18 @@ def with_curves(frames: Sequence[Frame], transfer: str) -> tuple[list[Frame], li
     Raises
     ------
     BadInputError
-        There is no such curve, or all frames have codes and none was told.
+        There is no such curve.
     """
     check_transfer(transfer)
     found: list[Frame] = []
     problems = []
-    coded = 0
-    for frame in frames:
-        try:
-            bits = [picture_bits(shot.path) for shot in frame.shots]
-        except BadInputError:
-            found.append(frame)
-            continue
+    depths = [_bits(frame) for frame in frames]
+    coded = sum(any(bits) for bits in depths)
+    transfer = transfer or (AUTO if coded == sum(map(bool, depths)) else "")
+    for frame, bits in zip(frames, depths):
         if not any(bits):
             found.append(frame)
             continue
-        coded += 1
         if not transfer:
             problems.append(unstated(frame.path))
             continue
@@ -47,12 +45,24 @@ def with_curves(frames: Sequence[Frame], transfer: str) -> tuple[list[Frame], li
             replace(shot, saturation=min(shot.saturation, limit)) for shot, limit in zip(frame.brackets, limits[1:])
         )
         found.append(replace(frame, transfer=transfer, saturation=min(frame.saturation, limits[0]), brackets=shots))
-    if coded and coded == len(frames) and not transfer:
-        raise BadInputError(problems[0])
     notes = []
-    if coded and transfer:
+    if coded and transfer == AUTO:
+        notes.append(
+            f"{coded} of {len(frames)} frames are pictures of 8 or 16 bits whose curve nobody told: response, exposure,"
+            " white balance and vignetting are estimated from places that several frames show, and the contrast is"
+            " taken to be sRGB's. Give --transfer if the curve is known."
+        )
+    elif coded and transfer:
         notes.append(
             f"{coded} of {len(frames)} frames are pictures of 8 or 16 bits, decoded by the curve '{transfer}';"
             " where a camera or a program applied another (tone mapping), the light comes out wrong."
         )
     return found, problems, notes
+
+
+def _bits(frame: Frame) -> list[int]:
+    """Bits of a channel in each of a frame's pictures, 0 of floats; none where one can't be read, told later."""
+    try:
+        return [picture_bits(shot.path) for shot in frame.shots]
+    except BadInputError:
+        return []

@@ -110,8 +110,8 @@ def read_picture(path: Path, transfer: str = "") -> Picture:
 def unstated(path: Path | str) -> str:
     """The sentence on a picture of codes whose curve nobody told."""
     return (
-        f"Picture '{path}' holds 8 or 16-bit codes, and tone-mapped frames give wrong light; give EXR or HDR "
-        "frames, or the codes' curve with --transfer (srgb, linear, or a gamma such as 2.2)."
+        f"Picture '{path}' holds 8 or 16-bit codes among frames of floats; make all frames alike, or give the codes' "
+        "curve with --transfer (auto, srgb, linear, or a gamma such as 2.2)."
     )
 
 

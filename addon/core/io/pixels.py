@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..errors import BadInputError
-from ..scene.model import Frame, Pixels, Shot
+from ..scene.model import AUTO, Camera, Frame, Pixels, Shot
 from ..scene.pixel_rays import pixel_rays
+from ..scene.radiometry import srgb_to_linear
 from .brackets import Exposed, merge
 from .exr import HALF_MAX
 from .pictures import read_mask, read_picture
+from .transfer import LINEAR
 
 NOISE = 1e-4
 """Negative values down to this come from filtering and count as 0."""
@@ -41,15 +45,21 @@ def read_pixels(frame: Frame) -> Pixels:
     else:
         rgb, valid, saturated, *_ = _exposed(frame, frame.shots[0], seen)
         with np.errstate(over="ignore", invalid="ignore"):
-            radiance = rgb / np.float32(frame.exposure)
+            radiance = rgb / np.float32(frame.exposure if frame.radiometry is None else 1)
     valid &= np.isfinite(radiance).all(-1)
     radiance[~valid] = 0
     return Pixels(radiance.astype(np.float32, copy=False), valid, saturated)
 
 
+def as_codes(frame: Frame) -> Frame:
+    """A frame with the curve `AUTO` whose codes, 0...1, `read_pixels` gives as they are."""
+    return replace(frame, transfer=LINEAR, exposure=1.0, radiometry=None)
+
+
 def _exposed(frame: Frame, shot: Shot, seen: np.ndarray) -> Exposed:
     """One exposure of `frame`; `seen` ((h, w) bool) is False where no exposure says anything."""
-    rgb, alpha = read_picture(shot.path, frame.transfer)
+    auto = frame.transfer == AUTO
+    rgb, alpha = read_picture(shot.path, LINEAR if auto else frame.transfer)
     if rgb.shape[:2] != seen.shape:
         raise BadInputError(f"Frame '{frame.name}': '{shot.path}' changed its size during the run; start again.")
     # A half float overflows to inf: the pixel was bright, but it gives no value at all, not even a bound. Writers that
@@ -58,4 +68,15 @@ def _exposed(frame: Frame, shot: Shot, seen: np.ndarray) -> Exposed:
     if alpha is not None and (alpha > 0).any():  # some writers leave all of alpha at 0 and mean nothing by it
         seen = seen & (alpha >= OPAQUE)
     usable = seen & (np.isfinite(rgb) & (rgb >= -NOISE)).all(-1)
-    return Exposed(np.maximum(rgb, 0), usable, clipped & seen, shot.exposure, shot.saturation)
+    saturation = shot.saturation
+    if auto and frame.radiometry is not None:
+        rgb = frame.radiometry.radiance(rgb, _r2(frame.camera))
+    elif auto:
+        rgb, saturation = srgb_to_linear(rgb).astype(np.float32), float(srgb_to_linear(np.array(saturation)))
+    return Exposed(np.maximum(rgb, 0), usable, clipped & seen, shot.exposure, saturation)
+
+
+def _r2(camera: Camera) -> np.ndarray:
+    """Squared distance of each pixel from the principal point over focal length, (h, w) float64."""
+    x, y = np.arange(camera.width) + 0.5 - camera.cx, np.arange(camera.height) + 0.5 - camera.cy
+    return np.square(x / camera.fx) + np.square(y / camera.fy)[:, None]

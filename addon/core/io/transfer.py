@@ -13,6 +13,8 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..kinds import Limit
+from ..scene.model import AUTO
+from ..scene.radiometry import srgb_to_linear
 
 SRGB, LINEAR = "srgb", "linear"
 GAMMAS: Limit[tuple[float, float]] = (0.1, 10.0)
@@ -23,8 +25,8 @@ were shifted into 16 end there."""
 
 
 def check_transfer(text: str) -> None:
-    """Raise `BadInputError` unless `text` is '' or names a curve."""
-    if text:
+    """Raise `BadInputError` unless `text` is '', 'auto' or names a curve."""
+    if text not in ("", AUTO):
         _gamma(text)
 
 
@@ -34,7 +36,7 @@ def to_linear(values: np.ndarray, transfer: str) -> np.ndarray:
     if transfer == LINEAR:
         return values
     if transfer == SRGB:
-        return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+        return srgb_to_linear(values)
     return values ** _gamma(transfer)
 
 
@@ -44,7 +46,9 @@ def decode(codes: np.ndarray, transfer: str) -> np.ndarray:
 
 
 def clip_level(bits: int, transfer: str) -> float:
-    """The linear value from which on a picture of `bits` a channel counts as clipped."""
+    """The linear value from which on a picture of `bits` a channel counts as clipped; of `AUTO`, the code."""
+    if transfer == AUTO:
+        return TOP[bits]
     return float(to_linear(np.array(TOP[bits]), transfer))
 
 
@@ -61,5 +65,5 @@ def _gamma(text: str) -> float:
     except ValueError:
         gamma = 0.0
     if not GAMMAS[0] <= gamma <= GAMMAS[1]:
-        raise BadInputError(f"There is no curve '{text}' of pictures; give srgb, linear, or a gamma such as 2.2.")
+        raise BadInputError(f"There is no curve '{text}' of pictures; give auto, srgb, linear, or a gamma such as 2.2.")
     return gamma

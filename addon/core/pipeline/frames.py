@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
-from ..io.pixels import read_pixels
+from ..io.pixels import as_codes, read_pixels
 from ..io.read import MAX_BAD_SHARE
 from ..light.environment import Environment, EnvironmentAccumulator
 from ..light.field import LightField
@@ -20,6 +20,7 @@ from ..lit_diffuse.accumulate import accumulate
 from ..lit_diffuse.from_texture import lit_from_tiles
 from ..passes.clipped_lamps.fringes import FringeCollector, Fringes
 from ..passes.pose_refinement.poses import Poses, Texture, refine_poses
+from ..passes.radiometric_calibration.calibrate import Calibration, calibrate
 from ..passes.sharpening.sharpen import sharpened
 from ..progress import Progress, Rounds
 from ..scene.lit_diffuse import LitDiffuse
@@ -50,6 +51,8 @@ class Observed:
         Colours along the edges of what was clipped.
     poses : Poses
         Where the frames were found to be.
+    calibration : Calibration
+        What the codes of frames mean whose curve nobody told.
     """
 
     lit_diffuse: LitDiffuse
@@ -57,6 +60,11 @@ class Observed:
     samples: Samples
     fringes: Fringes
     poses: Poses
+    calibration: Calibration
+
+    def of(self, frames: Sequence[Frame]) -> tuple[Frame, ...]:
+        """The capture's frames where they were found to be, calibrated."""
+        return self.calibration.of(self.poses.of(frames))
 
     def arrays(self) -> dict[str, np.ndarray]:
         """What is stored of it."""
@@ -66,7 +74,7 @@ class Observed:
     @staticmethod
     def from_arrays(arrays: dict[str, np.ndarray]) -> Observed:
         """The inverse of `arrays`."""
-        kinds = (LitDiffuse, Environment, Samples, Fringes, Poses)
+        kinds = (LitDiffuse, Environment, Samples, Fringes, Poses, Calibration)
         return Observed(*(
             kind(**{one.name: arrays[f"{part.name}.{one.name}"] for one in fields(kind)})
             for part, kind in zip(fields(Observed), kinds, strict=True)
@@ -123,7 +131,7 @@ def observe(
         return all_passes(surface, capture.frames, read, settings, folder, progress)
     mesh = replace(capture.mesh, vertices=surface.mesh.vertices)
     lit = lit_from_tiles(mesh, surface.atlas, progress)
-    return Observed(lit, Environment.dark(), Samples.none(), Fringes.none(), Poses.as_read(()))
+    return Observed(lit, Environment.dark(), Samples.none(), Fringes.none(), Poses.as_read(()), Calibration.none(0))
 
 
 def lit_diffuse(
@@ -185,7 +193,7 @@ def one_pass(
         raise BadInputError(
             "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; check the frames."
         )
-    return Observed(lit, sky.result(), kept.result(), fringes.result(), poses)
+    return Observed(lit, sky.result(), kept.result(), fringes.result(), poses, Calibration.none(len(frames)))
 
 
 def all_passes(
@@ -198,6 +206,14 @@ def all_passes(
 ) -> Observed:
     """What `one_pass` finds with the poses as read, or put right. Parameters and errors are its."""
     rounds = Rounds(progress, 0, 1)
+    calibration = Calibration.none(len(frames))
+    if "radiometric-calibration" not in settings.without and any(frame.uncalibrated for frame in frames):
+        calibration = calibrate(
+            surface.mesh, surface.scene, frames, lambda frame: read(as_codes(frame)), threads=settings.threads,
+            seed=settings.seed, progress=rounds,
+        )  # fmt: skip
+        frames = calibration.of(frames)
+        rounds.next()
     found = one_pass(surface, frames, Poses.as_read(frames), read, settings, folder, rounds)
     if settings.refine_poses and "pose-refinement" not in settings.without:
         lit = found.lit_diffuse
@@ -215,4 +231,4 @@ def all_passes(
             threads=settings.threads, folder=folder, progress=rounds,
         )  # fmt: skip
         found = replace(found, lit_diffuse=lit)
-    return found
+    return replace(found, calibration=calibration)

@@ -86,6 +86,14 @@ def _report_lit(run: Corrected, figures: dict[str, Any], warnings: list[str]) ->
         warnings.append(f"{count} frames have no valid pixel (the first: {first}); all are NaN, inf or masked.")
     if not lit.radiance[lit.seen].any():
         warnings.append("Every frame is black; nothing can be said of any albedo.")
+    found = run.observed().calibration
+    if found.calibrated.any():
+        exposure = np.log2(found.gain[found.calibrated].mean(1))
+        figures |= {
+            "calibrated_frames": int(found.calibrated.sum()),
+            "exposure_range_stops": float(np.ptp(exposure)),
+            "calibration_spread": float(found.spread),
+        }
     poses = run.poses()
     if np.isfinite(poses.shift):
         figures |= {"pose_shift_pixels": float(poses.shift), "poses_refined": int(poses.moved.sum())}

@@ -98,7 +98,7 @@ class Stages:
     @property
     def frames(self) -> tuple[Frame, ...]:
         """The capture's, in the coordinates that the stages work in, where they were found to be."""
-        return self.poses().of(self._near.frames)
+        return self.observed().of(self._near.frames)
 
     @cached_property
     def keys(self) -> dict[str, str]:

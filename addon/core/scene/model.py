@@ -13,6 +13,10 @@ import numpy as np
 
 from ..naming import object_name
 from .lens import Lens
+from .radiometry import Radiometry
+
+AUTO = "auto"
+"""The curve of codes that nobody told: calibrated from what frames show together, sRGB's until then."""
 
 
 @dataclass(frozen=True)
@@ -152,11 +156,14 @@ class Frame:
     saturation : float
         Pixel value (before division by `exposure`) from which on the sensor clips; inf where unknown.
     transfer : str
-        Curve of the stored numbers, as `pictures.read_picture` takes it; '' for linear floats.
+        Curve of the stored numbers, as `pictures.read_picture` takes it; '' for linear floats; `AUTO` for codes whose
+        curve nobody told: `saturation` is one of a code then, in 0...1.
     brackets : tuple of Shot
         Further exposures of the same pose, to be merged with the first.
     id_path : Path or None
         Picture that holds each pixel's object.
+    radiometry : Radiometry or None
+        What calibration found of codes with the curve `AUTO`, in place of `exposure`.
     """
 
     name: str
@@ -168,6 +175,12 @@ class Frame:
     transfer: str = ""
     brackets: tuple[Shot, ...] = ()
     id_path: Path | None = None
+    radiometry: Radiometry | None = None
+
+    @property
+    def uncalibrated(self) -> bool:
+        """Whether its codes are still to be calibrated; brackets, whose exposures are known, have sRGB's curve."""
+        return self.transfer == AUTO and self.radiometry is None and not self.brackets
 
     @property
     def shots(self) -> tuple[Shot, ...]:

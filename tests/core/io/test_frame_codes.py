@@ -10,10 +10,11 @@ import pytest
 from addon.core.errors import BadInputError
 from addon.core.io.layout import Reading
 from addon.core.io.pictures import picture_bits, read_picture
-from addon.core.io.pixels import read_pixels
+from addon.core.io.pixels import as_codes, read_pixels
 from addon.core.io.png import write_png
 from addon.core.io.read import describe, read_capture
 from addon.core.io.transfer import decode, to_linear
+from addon.core.scene.radiometry import Radiometry
 from tests.core.io.conftest import HEIGHT, WIDTH
 
 CODES = (np.arange(HEIGHT * WIDTH * 3) % 256).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)
@@ -49,14 +50,33 @@ def test_frames_of_codes(capture, transfer):
     assert pixels.valid.all()
 
 
-def test_codes_without_a_curve_are_refused_with_what_to_do(capture):
+def test_codes_among_floats_are_left_out_with_what_to_do(capture):
     as_png(capture, 4)
     result = read_capture(capture.root)
     assert len(result.frames) == 9 and any("--transfer" in warning for warning in result.warnings)
-    as_png(capture, *(i for i in range(10) if i != 4))
-    with pytest.raises(BadInputError, match="tone-mapped frames give wrong light.*--transfer") as caught:
-        read_capture(capture.root)
-    assert str(caught.value).count("--transfer") == 1  # one sentence, not one a frame
+
+
+@pytest.mark.parametrize("told", ["", "auto"])
+def test_a_curve_that_nobody_told_is_srgbs_until_it_is_calibrated(capture, told):
+    as_png(capture, *range(10))
+    result = read_capture(capture.root, Reading(transfer=told))
+    assert len(result.frames) == 10 and all(frame.uncalibrated for frame in result.frames)
+    assert [warning.count("--transfer") for warning in result.warnings if "10 of 10" in warning] == [1]
+    frame = replace(result.frames[0], exposure=2.0)
+    pixels = read_pixels(frame)
+    np.testing.assert_allclose(pixels.radiance, to_linear(CODES / 255, "srgb") / 2, atol=1e-6)
+    np.testing.assert_array_equal(pixels.saturated, (CODES >= 254).any(-1))
+    # Calibrated: a linear response, an exposure of each channel that stands for the frame's own, and vignetting.
+    camera = frame.camera
+    linear = np.tile(np.linspace(0, 1, 256), (3, 1))
+    known = replace(frame, radiometry=Radiometry(linear, np.array([1.0, 2.0, 4.0]), np.array([-0.5, 0.0])))
+    assert not known.uncalibrated
+    column, row = np.arange(WIDTH) + 0.5 - camera.cx, np.arange(HEIGHT)[:, None] + 0.5 - camera.cy
+    dark = np.exp(-0.5 * ((column / camera.fx) ** 2 + (row / camera.fy) ** 2))
+    expected = CODES / 255 / dark[..., None] / (1, 2, 4)
+    np.testing.assert_allclose(read_pixels(known).radiance, expected, rtol=1e-4, atol=1e-6)
+    np.testing.assert_array_equal(read_pixels(known).saturated, (CODES >= 254).any(-1))
+    np.testing.assert_allclose(read_pixels(as_codes(known)).radiance, CODES / 255, atol=1e-6)
 
 
 @pytest.mark.parametrize("transfer", ["sRGB!", "0", "-1", "nan", "inf", "1e9"])

@@ -1,0 +1,197 @@
+"""Radiometric calibration from the capture itself: inverse response, exposure, white balance and vignetting.
+
+Frames that show the same place differ by what the camera did. With z the code, E_p the place's radiance, g the log of
+the inverse response, a frame's log gain e and log vignetting v, in each channel (Debevec and Malik 1997, equation 2;
+with vignetting Goldman and Chen 2005; Engel et al. 2016):
+
+    g(z) - e - v(r) = log E_p
+
+solved by reweighted least squares over places that several frames show, the E_p eliminated. g is the prior's curve,
+sRGB's, and a smooth difference. Multiplying g, e and v by one number scales all residuals (the exponential ambiguity of
+Goldman and Chen): that number, the contrast, comes from stated exposures where they differ, else from the prior.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+from scipy.interpolate import BSpline
+
+from ...progress import Progress, Rounds
+from ...scene.model import Frame, Mesh, Pixels
+from ...scene.radiometry import CODES, Radiometry, srgb_to_linear
+from ...scene.rays import RayScene
+from .observations import CodeObservations, observe_codes
+from .params import CALIBRATION, CalibrationParams
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What the frames' codes mean.
+
+    Attributes
+    ----------
+    response : (3, 256) float64
+        Inverse camera response, as in `Radiometry`.
+    gain : (f, 3) float64
+        Of each frame; the geometric mean over the calibrated ones is 1 in each channel, as no frame tells the unit.
+    falloff : (2,) float64
+        Vignetting, as in `Radiometry`.
+    calibrated : (f,) bool
+        Frames that it holds for.
+    spread : () float64
+        Standard deviation of the log residuals, robustly; NaN where nothing was calibrated.
+    """
+
+    response: np.ndarray
+    gain: np.ndarray
+    falloff: np.ndarray
+    calibrated: np.ndarray
+    spread: np.ndarray
+
+    @classmethod
+    def none(cls, frames: int) -> Calibration:
+        """Codes, if there are any, have sRGB's curve."""
+        response = np.tile(srgb_to_linear(CODES), (3, 1))
+        return cls(response, np.ones((frames, 3)), np.zeros(2), np.zeros(frames, bool), np.array(np.nan))
+
+    def of(self, frames: Sequence[Frame]) -> tuple[Frame, ...]:
+        """The frames with what was found of them."""
+        return tuple(
+            replace(frame, radiometry=Radiometry(self.response, gain, self.falloff)) if known else frame
+            for frame, gain, known in zip(frames, self.gain, self.calibrated, strict=True)
+        )
+
+
+def calibrate(
+    mesh: Mesh,
+    scene: RayScene,
+    frames: Sequence[Frame],
+    read: Callable[[Frame], Pixels],
+    *,
+    params: CalibrationParams = CALIBRATION,
+    threads: int = 0,
+    seed: int = 0,
+    progress: Progress | Rounds | None = None,
+) -> Calibration:
+    """Calibrate frames whose curve nobody told (`Frame.uncalibrated`); the others are left alone.
+
+    Parameters
+    ----------
+    read : callable
+        A frame's codes as "radiance", 0...1.
+
+    Raises
+    ------
+    InterruptedRun
+        From `progress`.
+    """
+    asked = np.array([frame.uncalibrated for frame in frames], bool)
+    nothing = Calibration.none(len(frames))
+    if asked.sum() < params.least_views:
+        return nothing
+    own = [frame for frame, wanted in zip(frames, asked) if wanted]
+    found = observe_codes(mesh, scene, own, read, params, threads=threads, seed=seed, progress=progress)
+    found = found.part(np.bincount(found.point, minlength=1)[found.point] >= params.least_views)
+    stated = np.log([frame.exposure for frame in own])
+    if len(found.point) < params.points:
+        return nothing
+    response, gain, falloff, spread = solve(found, len(own), stated, params)
+    gains = nothing.gain.copy()
+    gains[asked] = gain
+    return Calibration(response, gains, falloff, asked, np.array(spread))
+
+
+def solve(
+    seen: CodeObservations, frames: int, stated: np.ndarray, params: CalibrationParams = CALIBRATION
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Response, gains, falloff and the residuals' spread, as in `Calibration`, of observations of some frames.
+
+    Parameters
+    ----------
+    stated : (f,) float
+        Logarithm of the exposures that somebody stated; the same where nobody did.
+    """
+    point = np.unique(seen.point, return_inverse=True)[1]
+    rows, places, k = len(point), int(point.max()) + 1, params.splines
+    prior = _log_srgb(seen.code)
+    member = sparse.csr_matrix((np.ones(rows), (point, np.arange(rows))), shape=(places, rows))
+    of_frame = sparse.csr_matrix((np.ones(rows), (np.arange(rows), seen.frame)), shape=(rows, frames))
+    falloff = sparse.csr_matrix(np.stack([seen.r2, seen.r2**2], 1))
+    # Unknowns: for each channel the splines and the gains, then the falloff for all.
+    designs = [sparse.hstack([-_splines(seen.code[:, c], k), of_frame, falloff]).tocsr() for c in range(3)]
+    own = k + frames
+    index = [np.r_[c * own : (c + 1) * own, 3 * own, 3 * own + 1] for c in range(3)]
+    penalties = [_penalty(seen.code[:, c], frames, params) for c in range(3)]
+    # A code's noise counts by the slope of the logarithm.
+    slope = np.gradient(_log_srgb(CODES), CODES)
+    deviation = np.hypot(params.texture, params.noise * np.interp(seen.code, CODES, slope))
+    weight = deviation**-2 * np.median(deviation) ** 2
+    x = np.zeros(3 * own + 2)
+    residual = np.zeros((rows, 3))
+    for _ in range(params.rounds):
+        normal, right = np.zeros((len(x), len(x))), np.zeros(len(x))
+        for c, (design, at) in enumerate(zip(designs, index)):
+            w = weight[:, c]
+            summed = np.maximum(np.bincount(point, w, places), 1e-12)
+            weighted = sparse.diags(w) @ design
+            means = member @ weighted
+            normal[np.ix_(at, at)] += (design.T @ weighted - means.T @ sparse.diags(1 / summed) @ means).toarray()
+            right[at] += weighted.T @ prior[:, c] - means.T @ ((member @ (w * prior[:, c])) / summed)
+        for at, penalty in zip(index, penalties):
+            normal[np.ix_(at[:own], at[:own])] += penalty
+        x = np.linalg.solve(normal + 1e-9 * np.trace(normal) / len(x) * np.eye(len(x)), right)
+        for c, (design, at) in enumerate(zip(designs, index)):
+            left = prior[:, c] - design @ x[at]
+            w = weight[:, c]
+            residual[:, c] = left - ((member @ (w * left)) / np.maximum(member @ w, 1e-12))[point]
+        spread = 1.4826 * float(np.median(np.abs(residual)))
+        # One weight for all channels: what is no diffuse surface is none in all of them.
+        sigma = np.maximum(deviation, spread)
+        off = np.square(residual / sigma).mean(1, keepdims=True)
+        weight = np.median(sigma) ** 2 / sigma**2 / (1 + off / params.tuning**2)
+    log_response = np.stack([_log_srgb(CODES) + _splines(CODES, k) @ x[at[:k]] for at in index])
+    gain = np.stack([x[at[k:own]] for at in index], 1)
+    contrast = _stated_contrast(gain.mean(1), stated, params)
+    log_gain = (gain - gain.mean(0)) / contrast
+    top = log_response[:, -1:]
+    response = np.exp((log_response - top) / contrast)
+    response[:, 0] = 0.0
+    # Light grows with its code, whatever noise said of codes that hardly occur.
+    response = np.maximum.accumulate(response, 1)
+    return response, np.exp(log_gain), x[-2:] / contrast, spread
+
+
+def _log_srgb(code: np.ndarray) -> np.ndarray:
+    return np.log(np.maximum(srgb_to_linear(code), srgb_to_linear(np.array(0.5 / 255))))
+
+
+def _splines(code: np.ndarray, count: int) -> sparse.csr_matrix:
+    """Cubic B-splines over 0...1, (n, count)."""
+    knots = np.r_[np.zeros(3), np.linspace(0, 1, count - 2), np.ones(3)]
+    return BSpline.design_matrix(np.clip(code, 0, 1), knots, 3)
+
+
+def _penalty(code: np.ndarray, frames: int, params: CalibrationParams) -> np.ndarray:
+    """Of one channel's splines and gains: smooth, of the prior's contrast, and tied to each other."""
+    k = params.splines
+    result = np.zeros((k + frames, k + frames))
+    second = np.diff(np.eye(k), 2, axis=0)
+    result[:k, :k] = params.roughness * second.T @ second + 1e-3 * np.eye(k)
+    # Contrast is what the difference has in common with the prior's own curve over the codes that occur: none.
+    code = np.quantile(code, CODES)
+    curve = _log_srgb(code)
+    common = _splines(code, k).T @ (curve - curve.mean()) / np.square(curve - curve.mean()).sum()
+    result[:k, :k] += 1e9 * np.outer(common, common)
+    result[k:, k:] = params.loose / frames * np.eye(frames)
+    return result
+
+
+def _stated_contrast(log_gain: np.ndarray, stated: np.ndarray, params: CalibrationParams) -> float:
+    """What the logarithms are too large by, from stated exposures (total least squares); 1 where they don't differ."""
+    if stated.std() < params.least_range or log_gain.std() == 0:
+        return 1.0
+    return float(np.clip(log_gain.std() / stated.std(), 1 / params.widest, params.widest))

@@ -1,0 +1,134 @@
+"""Codes of the same places of the surface in all frames that show them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, maximum_filter, minimum_filter
+
+from ...parallel import ordered_map
+from ...progress import Progress, Rounds
+from ...scene.model import Frame, Mesh, Pixels
+from ...scene.rays import RayScene
+from .params import CalibrationParams
+
+
+@dataclass(frozen=True)
+class CodeObservations:
+    """m observations of some places.
+
+    Attributes
+    ----------
+    point : (m,) int
+    frame : (m,) int
+    r2 : (m,) float
+        Squared distance from the principal point over focal length.
+    code : (m, 3) float
+        0...1.
+    """
+
+    point: np.ndarray
+    frame: np.ndarray
+    r2: np.ndarray
+    code: np.ndarray
+
+    def part(self, index: np.ndarray) -> CodeObservations:
+        """Some of them."""
+        return CodeObservations(self.point[index], self.frame[index], self.r2[index], self.code[index])
+
+
+def observe_codes(
+    mesh: Mesh,
+    scene: RayScene,
+    frames: Sequence[Frame],
+    read: Callable[[Frame], Pixels],
+    params: CalibrationParams,
+    *,
+    threads: int = 0,
+    seed: int = 0,
+    progress: Progress | Rounds | None = None,
+) -> CodeObservations:
+    """What the frames' codes are at places spread over what they see, where codes are flat and not clipped.
+
+    Parameters
+    ----------
+    read : callable
+        A frame's codes as "radiance", 0...1.
+
+    Raises
+    ------
+    InterruptedRun
+        From `progress`.
+    """
+    places, normals = _places(mesh, scene, frames, params, seed)
+    found = []
+
+    def of(index: int) -> CodeObservations:
+        return _in_frame(index, frames[index], read(frames[index]), scene, places, normals, params)
+
+    for index, observed in enumerate(ordered_map(of, range(len(frames)), threads)):
+        found.append(observed)
+        if progress is not None:
+            progress.update((index + 1) / len(frames))
+    return CodeObservations(*(np.concatenate([getattr(one, name) for one in found])
+                              for name in ("point", "frame", "r2", "code")))  # fmt: skip
+
+
+def _places(
+    mesh: Mesh, scene: RayScene, frames: Sequence[Frame], params: CalibrationParams, seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """World positions and unit normals, (n, 3) each, of first hits through random pixels."""
+    rng = np.random.default_rng(seed)
+    each = max(params.points // len(frames), params.least_points)
+    corner = mesh.vertices[mesh.triangles]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    places, normals = [], []
+    for frame in frames:
+        camera = frame.camera
+        directions, led = camera.rays(rng.uniform((0, 0), (camera.width, camera.height), (each, 2)))
+        hits = scene.intersect(np.broadcast_to(np.float32(camera.centre), directions.shape), directions)
+        ok = led & (hits.triangle >= 0)
+        facing = normal[hits.triangle[ok]]
+        facing = facing * -np.sign(np.einsum("ij,ij->i", facing, directions[ok]))[:, None]
+        places.append(camera.centre + hits.distance[ok, None].astype(np.float64) * directions[ok])
+        normals.append(facing)
+    return np.concatenate(places), np.concatenate(normals)
+
+
+def _in_frame(
+    index: int,
+    frame: Frame,
+    pixels: Pixels,
+    scene: RayScene,
+    places: np.ndarray,
+    normals: np.ndarray,
+    params: CalibrationParams,
+) -> CodeObservations:
+    step = max(round(max(frame.camera.width, frame.camera.height) / params.width), 1)
+    camera = frame.camera.coarser(step)
+    small = pixels.coarser(step)
+    code = gaussian_filter(small.radiance, (params.blur, params.blur, 0))
+    window = (params.around, params.around)
+    spread = maximum_filter(code, (*window, 1)) - minimum_filter(code, (*window, 1))
+    flat = (spread <= params.flat * code).all(-1) & ~maximum_filter(~small.valid | small.saturated, window)
+    flat &= code.min(-1) >= params.darkest
+
+    towards = camera.centre - places
+    distance = np.linalg.norm(towards, axis=1)
+    towards /= np.maximum(distance, 1e-30)[:, None]
+    at, depth = camera.project(places)
+    edge = params.around // 2
+    inside = (depth > 0) & (at >= edge).all(1) & (at < (camera.width - edge, camera.height - edge)).all(1)
+    own = np.flatnonzero(inside & (np.einsum("ij,ij->i", towards, normals) > params.grazing))
+    column, row = at[own].astype(int).T
+    own, column, row = (one[flat[row, column]] for one in (own, column, row))
+    origin = np.broadcast_to(np.float32(camera.centre), (len(own), 3))
+    reach = ((1 - params.behind) * distance[own] - scene.offset).astype(np.float32)
+    clear = ~scene.occluded(origin, (-towards[own]).astype(np.float32), reach)
+    own, column, row = own[clear], column[clear], row[clear]
+    offset = (at[own] - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
+    r2 = np.square(offset).sum(1)
+    return CodeObservations(own, np.full(len(own), index), r2, code[row, column].astype(np.float64))

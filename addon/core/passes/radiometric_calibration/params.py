@@ -1,0 +1,75 @@
+"""What radiometric calibration looks at, and what it takes for granted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class CalibrationParams:
+    """Of `calibrate`.
+
+    Attributes
+    ----------
+    points : int
+        Of the surface, that are looked for in all frames; gains of 96 frames have a standard error of .01 stops then.
+    least_points : int
+        For each frame, where there are many.
+    width : int
+        Pixels; larger pictures are averaged down to about that, as the poses are no better.
+    blur : float
+        Pixels, standard deviation: poses that are off by a pixel or two compare the same surface.
+    flat : float
+        A place counts where codes around it, as far as poses may be off, differ by less than this share.
+    around : int
+        Pixels, edge of what is looked at around it.
+    darkest : float
+        Codes below this share of the greatest are mostly read noise and quantisation.
+    grazing : float
+        Cosine below which a surface is seen too flatly.
+    behind : float
+        Share of the distance by which a fused mesh may lie in front of a point.
+    least_views : int
+        Frames that must show a point for it to tell anything.
+    splines : int
+        Of a cubic B-spline that the logarithm of the response may differ by from the prior's.
+    roughness : float
+        Weight of its squared second differences, in observations: what the codes do not cover follows the prior.
+    noise : float
+        Of a code, standard deviation as share of the greatest: two codes of 8 bits.
+    texture : float
+        Relative standard deviation that radiance differs by between views of one place beside it.
+    tuning : float
+        Standard deviations beyond which an observation counts less (Cauchy): highlights, other surfaces.
+    rounds : int
+        Of reweighting.
+    loose : float
+        Weight in observations that holds each gain to the others': frames that share nothing with them stay at 1.
+    least_range : float
+        Standard deviation of the logarithm of stated exposures from which on they tell the curve's contrast.
+    widest : float
+        Contrast that stated exposures may give the curve, over the prior's.
+    """
+
+    points: int = 8192
+    least_points: int = 16
+    width: int = 480
+    blur: float = 1.0
+    flat: float = 0.25
+    around: int = 7
+    darkest: float = 0.03
+    grazing: float = 0.3
+    behind: float = 0.02
+    least_views: int = 3
+    splines: int = 10
+    roughness: float = 100.0
+    noise: float = 2 / 255
+    texture: float = 0.03
+    tuning: float = 2.0
+    rounds: int = 10
+    loose: float = 1.0
+    least_range: float = 0.1
+    widest: float = 2.0
+
+
+CALIBRATION = CalibrationParams()

@@ -1,0 +1,46 @@
+"""How the codes that a camera stored tell radiance: its response, a frame's exposure and white balance, vignetting."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+CODES = np.arange(256) / 255
+"""The codes of 8 bits."""
+
+
+def srgb_to_linear(codes: np.ndarray) -> np.ndarray:
+    """Linear light, float64, of codes in 0...1 of any shape (IEC 61966-2-1)."""
+    codes = np.asarray(codes, np.float64)
+    return np.where(codes <= 0.04045, codes / 12.92, ((codes + 0.055) / 1.055) ** 2.4)
+
+
+@dataclass(frozen=True)
+class Radiometry:
+    """Of one frame: code = response^-1(radiance * gain * vignetting), channel by channel.
+
+    Attributes
+    ----------
+    response : (3, m) float
+        Inverse camera response: linear light at m codes, evenly from 0 to the greatest, Rec.709 red, green, blue.
+    gain : (3,) float
+        Exposure times white balance.
+    falloff : (2,) float
+        log vignetting = falloff[0] r^2 + falloff[1] r^4, r the distance from the principal point over focal length.
+    """
+
+    response: np.ndarray
+    gain: np.ndarray
+    falloff: np.ndarray
+
+    def radiance(self, codes: np.ndarray, r2: np.ndarray) -> np.ndarray:
+        """Linear radiance ((..., 3) float32) of codes in 0...1 ((..., 3)) at squared distances `r2` ((...))."""
+        at = np.linspace(0, 1, self.response.shape[1])
+        linear = np.stack([np.interp(codes[..., c], at, self.response[c]) for c in range(3)], -1)
+        return (linear / (vignetting(r2, self.falloff)[..., None] * self.gain)).astype(np.float32)
+
+
+def vignetting(r2: np.ndarray, falloff: np.ndarray) -> np.ndarray:
+    """Share of the light that reaches the sensor at squared distances `r2`, 1 at the principal point."""
+    return np.exp(falloff[0] * r2 + falloff[1] * np.square(r2))
