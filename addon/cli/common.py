@@ -33,7 +33,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         "--transfer",
         metavar="CURVE",
         default="",
-        help="curve of 8 and 16-bit pictures: srgb, linear, a gamma such as 2.2, or auto, which calibrates them (default)",
+        help="curve of 8 and 16-bit pictures: srgb, linear, a gamma such as 2.2; auto calibrates them (default)",
     )
     group.add_argument("--exposures", metavar="CSV", type=Path, help="exposure of each frame: lines of name, exposure")
     group.add_argument(
