@@ -1,7 +1,7 @@
 """Furnished rooms with truth, rendered by Cycles as captures, for finding out where the recovery fails.
 
     python -m scripts.qa_rooms make KIND OUT [--seed 1] [--frames 48] [--size 240x180] [--samples 64] [--views 6]
-        [--denoise]
+        [--denoise] [--ground 100]
     python -m scripts.qa_rooms score CAPTURE RESULT
 
 KIND is kitchen, bathroom, bedroom, office, hall or study. `score` needs no rendering; it reads what
@@ -27,6 +27,7 @@ def main(argv: list[str] | None = None) -> int:
     make.add_argument("--samples", type=int, default=64)
     make.add_argument("--views", type=int, default=6)
     make.add_argument("--denoise", action="store_true")
+    make.add_argument("--ground", type=float, default=0, help="edge of a ground around the room, in rooms; 0: none")
     score = commands.add_parser("score", help="compare a result with the truth")
     score.add_argument("capture", type=Path)
     score.add_argument("result", type=Path)
@@ -37,6 +38,8 @@ def main(argv: list[str] | None = None) -> int:
 
         width, height = map(int, given.size.split("x"))
         room = ROOMS[given.kind](given.seed)
+        if given.ground:
+            room.surround(given.ground)
         render(room, given.out, given.frames, (width, height), given.samples, given.views, given.denoise)
     else:
         from .score import table

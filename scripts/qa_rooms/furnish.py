@@ -107,6 +107,13 @@ class FurnishedRoom:
         for finish, shapes in parts.values():
             self.add("wall", shapes, finish)
 
+    def surround(self, times: float) -> None:
+        """A ground below the floor that goes on around the room, `times` its longer side wide."""
+        x, y, _ = self.size
+        edge = times * max(x, y)
+        corner = (x / 2 - edge / 2, y / 2 - edge / 2, -0.3)
+        self.add("ground", [grid(corner, (edge, 0, 0), (0, edge, 0), 40, 40)], self.matt(0.25, 0.24, 0.18))
+
     def window_frame(self, finish: Finish) -> None:
         """A frame of bars around and across each window."""
         for origin, across, up in self.windows:

@@ -64,3 +64,12 @@ def test_every_kind_has_metals_gloss_and_light():
 def test_seeds_change_a_room():
     one, other = ROOMS["kitchen"](1), ROOMS["kitchen"](2)
     assert not np.allclose(one.things[2].paints[0].albedo, other.things[2].paints[0].albedo)
+
+
+def test_a_ground_goes_on_around_the_room():
+    room, plain = ROOMS["office"](1), ROOMS["office"](1)
+    room.surround(100)
+    assert [thing.class_name for thing in room.things] == [*(thing.class_name for thing in plain.things), "ground"]
+    corners = room.things[-1].quads.reshape(-1, 3)
+    assert np.ptp(corners, axis=0)[:2] == pytest.approx([100 * max(room.size[:2])] * 2)
+    assert corners[:, 2].max() < min(thing.quads[..., 2].min() for thing in plain.things)

@@ -103,10 +103,14 @@ class Room:
 DARK = Environment(np.zeros((1, 2, 3), np.float32), np.zeros((1, 2), np.int32))
 
 
-def make_room(quads: list[Quad], texel: float = 0.1, flip: np.ndarray | None = None) -> Room:
-    """Parameters: edge of a texel in metres; `flip`: (2 * quads,) bool, triangles whose winding is turned."""
-    wide = [max(round(float(np.linalg.norm(q.edge_u)) / texel), 1) for q in quads]
-    high = [max(round(float(np.linalg.norm(q.edge_v)) / texel), 1) for q in quads]
+def make_room(
+    quads: list[Quad], texel: float = 0.1, flip: np.ndarray | None = None, most: dict[int, int] | None = None
+) -> Room:
+    """Parameters: edge of a texel in metres; `flip`: (2 * quads,) bool, triangles whose winding is turned; `most`: of
+    some objects' quads, texels along an edge at most."""
+    least = [(most or {}).get(q.object_id, 1 << 20) for q in quads]
+    wide = [min(max(round(float(np.linalg.norm(q.edge_u)) / texel), 1), n) for q, n in zip(quads, least)]
+    high = [min(max(round(float(np.linalg.norm(q.edge_v)) / texel), 1), n) for q, n in zip(quads, least)]
     row = max(max(wide) + 2 * GAP, int(np.sqrt(sum((w + GAP) * (h + GAP) for w, h in zip(wide, high)))) + 2 * GAP)
     x = y = GAP
     tallest, places = 0, []

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...core.scene.model import Mesh
 from ...core.scene.params import SURFACE
+from ...core.scene.unwrap import of_parts
 from ...core.scene.uv_islands import areas, connected, corner_ids, cut_sparse
 from ...core.scene.uv_overlap import layers, overlapping_pairs
 from .arrays import layer_of, make_mesh, set_layer
@@ -45,6 +46,7 @@ class Polygons(NamedTuple):
         return np.searchsorted(self.start, self.corner[:, 0], "right") - 1
 
 
+@of_parts
 def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0, polygons: Polygons | None = None) -> np.ndarray:
     """Lay the room out flat without overlap, all surfaces at nearly one scale.
 

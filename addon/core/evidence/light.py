@@ -68,7 +68,7 @@ def spots(atlas: Atlas, seen: np.ndarray, count: int, seed: int = 0) -> tuple[np
         For each element, the index into `chosen` of the one that stands for it: of its object, in its cell, and on the
         same side of it.
     """
-    edge = float(np.sqrt(atlas.area.sum(dtype=np.float64) / count))
+    edge = float(np.sqrt(atlas.weight.sum(dtype=np.float64) / count))
     # Small things and edges occupy more cells than their area says.
     cell = np.floor(atlas.position / (1.3 * max(edge, 1e-9))).astype(np.int64)
     cell -= cell.min(0)

@@ -58,7 +58,8 @@ def bright_triangles(field: LightField) -> BrightTriangles:
     """The triangles that give most of the light for their size."""
     normal, area = triangle_geometry(field.mesh)
     luminance = triangle_luminance(field)
-    mean = (luminance * area).sum() / max(area.sum(), 1e-30)
+    weight = field.atlas.weight
+    mean = (field.radiance @ LUMINANCE * weight).sum() / max(weight.sum(), 1e-30)
     power = np.where(luminance > GATHER.bright * mean, luminance * area, 0)
     bright = np.argsort(-power)[: GATHER.max_triangles]
     bright = np.sort(bright[power[bright] > 0])

@@ -46,7 +46,7 @@ def barely_seen(field: LightField, good: np.ndarray) -> np.ndarray:
     """
     luminance, atlas = field.radiance @ LUMINANCE, field.atlas
     seen = (luminance > 0) & ~np.isin(atlas.object_id, atlas.object_id[good])
-    level = GATHER.bright * float((luminance * atlas.area).sum() / max(atlas.area.sum(), 1e-30))
+    level = GATHER.bright * float((luminance * atlas.weight).sum() / max(atlas.weight.sum(), 1e-30))
     objects = np.unique(atlas.object_id[seen])
     bright = [i for i in objects if np.median(luminance[seen & (atlas.object_id == i)]) > level]
     return seen & np.isin(atlas.object_id, bright)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 
 import numpy as np
 
@@ -48,6 +49,14 @@ class LightField:
         self.sun: Sun | None = None
         self.mirror_of = np.full(len(mesh.triangles), -1, np.int8)
         self.lookup = ElementLookup(mesh, atlas)
+
+    @cached_property
+    def room_box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner ((3,) each) of the mesh, or of its part that is the room (`Atlas.box`)."""
+        low, high = self.mesh.vertices.min(0), self.mesh.vertices.max(0)
+        first, last = self.atlas.box
+        reach = np.maximum(last - first, 0.01 * float(np.max(last - first)))
+        return np.maximum(low, first - 0.02 * reach), np.minimum(high, last + 0.02 * reach)
 
     def with_light(
         self, radiance: np.ndarray, environment: Environment | None = None, lamps: Iterable[int] | None = None

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from ..kinds import Block
 from ..parallel import for_blocks
+from ..scene.atlas import room_box
 from .params import GATHER
 
 REACH = 2 * GATHER.allowed
@@ -82,7 +83,8 @@ def interpolated(
     contrast : (n,) float32
         Mean relative deviation between the points around each element: how far its value may be off.
     """
-    extent = np.sort(np.ptp(position, axis=0))
+    low, high = room_box(position)
+    extent = np.sort(high - low)
     spacing = max(GATHER.coarsest * float(np.sqrt(extent[1] * extent[2])), finest)
     todo = np.arange(len(position))
     chosen = np.zeros(0, np.int64)

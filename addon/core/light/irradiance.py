@@ -124,6 +124,7 @@ def from_outside(
         light = np.zeros((len(directions), 3), np.float32)
         light[useful] = field.environment(directions[useful]) * weight[:, None]
         total[part] = light.reshape(len(p), portal_rays, 3).sum(1)
+        total[part][~portals.around(origins)] = 0
     return total
 
 

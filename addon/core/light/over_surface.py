@@ -26,7 +26,8 @@ ELEMENTS_AT_ONCE: Block[int] = 1 << 13
 
 def finest_spacing(atlas: Atlas, share: float = GATHER.finest_share) -> float:
     """Least distance of two gathering points, metres."""
-    extent = np.sort(np.ptp(atlas.position, axis=0))
+    low, high = atlas.box
+    extent = np.sort(high - low)
     return max(atlas.texel_edge, share * float(np.sqrt(extent[1] * extent[2])))
 
 

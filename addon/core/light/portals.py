@@ -45,7 +45,12 @@ class Portals:
     def aimed_density(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """Solid-angle density with which aimed rays take directions that leave the room, (n,) float32."""
         cell, distance, cosine = _exits(self.low, self.size, origins, directions)
-        return self.density[cell] * distance**2 / np.maximum(cosine, 1e-6)
+        density = self.density[cell] * distance**2 / np.maximum(cosine, 1e-6)
+        return np.where(self.around(origins), density, 0)
+
+    def around(self, origins: np.ndarray) -> np.ndarray:
+        """Points ((n, 3) float32) inside of the box, (n,) bool: from others nothing is aimed at the portals."""
+        return within(self.low, self.size, origins)
 
     def sample(
         self, origins: np.ndarray, square: np.ndarray, rng: np.random.Generator
@@ -85,6 +90,11 @@ class Portals:
         return directions, self.density[pick] * distance**2 / np.maximum(cosine, 1e-6)
 
 
+def within(low: np.ndarray, size: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Points ((n, 3)) inside of a box, (n,) bool."""
+    return ((points >= low) & (points <= low + size)).all(1)
+
+
 def _exits(
     low: np.ndarray, size: np.ndarray, origins: np.ndarray, directions: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -113,7 +123,7 @@ def find_portals(field: LightField, seed: int = 0) -> Portals | None:
         return None
     atlas = field.atlas
     rng = np.random.default_rng(seed)
-    weight = np.cumsum(atlas.area.astype(np.float64))
+    weight = np.cumsum(atlas.weight.astype(np.float64))
     start = np.searchsorted(
         weight, (np.arange(GATHER.pilot_points) + rng.random(GATHER.pilot_points)) / GATHER.pilot_points * weight[-1]
     )
@@ -128,9 +138,10 @@ def find_portals(field: LightField, seed: int = 0) -> Portals | None:
     if len(out) < GATHER.least_escaped:
         return None
     margin = np.float32(2 * field.scene.offset)
-    corners = field.mesh.vertices
-    low = corners.min(0).astype(np.float32) - margin
-    size = corners.max(0).astype(np.float32) + margin - low
+    low, high = (corner.astype(np.float32) for corner in field.room_box)
+    low, size = low - margin, high - low + 2 * margin
+    inside = within(low, size, origins[out])
+    out, light = out[inside], light[inside]
     cell, _, _ = _exits(low, size, origins[out], directions[out])
     chance = np.bincount(cell, light.astype(np.float64), 6 * GATHER.cells**2)
     side = np.repeat(np.arange(3), 2 * GATHER.cells**2)

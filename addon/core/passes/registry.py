@@ -63,6 +63,7 @@ PASSES = (
         angle_variance="Weights dihedral angles by their variance, from draws of the posterior.",
         sheets="Puts what lies in flat parts into their planes.",
         cracks="Closes cracks that the noise opened between parts that only touch.",
+        coarse_unseen="Lets one element stand for many texels where no frame looks.",
         two_sides="Gives triangles that frames see from both sides a second side of its own.",
     ),
     *_of(

@@ -26,7 +26,8 @@ from ..scene.elements import ElementLookup, make_atlas
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Camera, Mesh
 from ..scene.pages import OBJECT, Pages, lay_out
-from ..scene.params import SIDES, VISIBILITY
+from ..scene.params import VISIBILITY
+from ..scene.sparse_hits import pixel_edges, sparse_hits
 from ..scene.surface import Surface
 from ..scene.visibility import CLEAN
 from ..significance import LEVELS
@@ -92,19 +93,8 @@ def footprints(surface: Surface, cameras: list[Camera]) -> dict[int, float]:
     """Edge in metres of the surface that a pixel covers, by object: the lower quartile over all views of it."""
     found: dict[int, list[np.ndarray]] = {}
     for camera in cameras:
-        y, x = np.mgrid[
-            SIDES.pixel_step // 2 : camera.height : SIDES.pixel_step,
-            SIDES.pixel_step // 2 : camera.width : SIDES.pixel_step,
-        ]
-        pixels = np.stack([x.ravel() + 0.5, y.ravel() + 0.5], -1)
-        directions, led = camera.rays(pixels)
-        pixels, directions = pixels[led], directions[led]
-        hits = surface.scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
-        met = np.flatnonzero(hits.triangle >= 0)
-        edge = hits.distance[met] * (
-            camera.pixel_angles(pixels[met]) if camera.lens is not None else 1 / np.sqrt(camera.fx * camera.fy)
-        )
-        owner = surface.mesh.object_id[hits.triangle[met]]
+        pixels, _, hits = sparse_hits(surface.scene, camera)
+        edge, owner = pixel_edges(camera, pixels, hits), surface.mesh.object_id[hits.triangle]
         for number in np.unique(owner):
             found.setdefault(int(number), []).append(edge[(owner == number) & (edge > 0)])
     return {

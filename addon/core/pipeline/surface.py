@@ -15,6 +15,7 @@ import numpy as np
 from ..lit_diffuse.from_texture import face_edge
 from ..origin import OWN, of_thing
 from ..passes.mesh_denoising.denoise import without_noise
+from ..scene.elements import Elements, uv_scale
 from ..scene.model import Capture, Mesh
 from ..scene.recentre import near_origin
 from ..scene.surface import Surface, build_surface, from_uv
@@ -25,8 +26,6 @@ from .source import CORE, digest
 from .stage import Stage
 
 STAGE = Stage("surface", Path(__file__), (), ("texel_size", "detail", "atlas_size", "denoise_mesh"))
-ELEMENTS = ("texel", "triangle", "position")
-"""What is stored of the elements, as finding it takes seconds; older stages lack it."""
 
 
 def taken_in(capture: Capture) -> Capture:
@@ -55,7 +54,10 @@ def make_surface(capture: Capture, unwrap: Unwrap, settings: Settings) -> Surfac
     if mesh.lit is not None:
         texel = texel or face_edge(mesh) / settings.detail
     cameras, two_sides = [frame.camera for frame in capture.frames], "two-sides" not in settings.without
-    found = build_surface(mesh, cameras, unwrap, texel, settings.detail, settings.atlas_size, two_sides)
+    found = build_surface(
+        mesh, cameras, unwrap, texel, settings.detail, settings.atlas_size, two_sides,
+        "coarse-unseen" not in settings.without, settings.threads,
+    )  # fmt: skip
     return replace(found, noise=noise)
 
 
@@ -66,16 +68,17 @@ def to_store(found: Surface, captured: Mesh, laid_out: str = "") -> tuple[dict[s
     arrays = {"uv": found.uv, "sign": sign, "backs": found.backs}
     if found.noise:
         arrays["vertices"] = found.mesh.vertices[: len(captured.vertices)]
-    arrays |= {name: getattr(found.atlas, name) for name in ELEMENTS}
-    return arrays, {"size": found.atlas.size, "noise": found.noise, "unwrap": laid_out}
+    arrays |= {name: getattr(found.atlas, name) for name in Elements._fields}
+    meta = {"size": found.atlas.size, "noise": found.noise, "texel_size": found.texel_size, "unwrap": laid_out}
+    return arrays, meta
 
 
 def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any], captured: Mesh) -> Surface:
     """The inverse of `to_store`."""
     mesh = replace(captured, vertices=arrays["vertices"]) if "vertices" in arrays else captured
     mesh = with_backs(mesh, arrays["backs"])
-    texel, triangle, position = (arrays.get(name) for name in ELEMENTS)
-    known = None
-    if texel is not None and triangle is not None and position is not None:
-        known = texel, triangle, position
-    return from_uv(mesh, arrays["sign"], arrays["uv"], int(meta["size"]), float(meta["noise"]), known)
+    # Stages of versions before this lack some of it: each texel had an element.
+    whole = all(name in arrays for name in Elements._fields)
+    known = Elements(**{name: arrays[name] for name in Elements._fields}) if whole else None
+    texel = float(meta.get("texel_size", 0)) or 1 / (uv_scale(mesh, arrays["uv"]) * int(meta["size"]))
+    return from_uv(mesh, arrays["sign"], arrays["uv"], int(meta["size"]), texel, float(meta["noise"]), known)

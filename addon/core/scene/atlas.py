@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .params import SURFACE
+from .params import SPARSE, SURFACE
 
 
 @dataclass(frozen=True)
@@ -58,9 +58,20 @@ class Atlas:
         return float(np.sqrt(np.median(self.area)))
 
     @property
+    def weight(self) -> np.ndarray:
+        """Surface that an element counts for in a mean over the room, (n,) float32: no more than a quarter of a cell
+        near the cameras, however large the ground that it stands for."""
+        return np.minimum(self.area, np.float32((SPARSE.cell / 2 * self.texel_edge) ** 2))
+
+    @property
     def side(self) -> np.ndarray:
         """Twice the object's number, plus 1 on the second side of a sheet, (n,) int64."""
         return 2 * self.object_id.astype(np.int64) + (0 if self.back is None else self.back)
+
+    @property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corner of the room, (3,) each: `room_box` of the elements."""
+        return room_box(self.position)
 
     def place(self, index: np.ndarray) -> np.ndarray:
         """Elements (m,) as points (m, 6) whose nearest neighbours lie close and face the same way."""
@@ -72,3 +83,16 @@ class Atlas:
         shown = self.padding >= 0
         flat[shown] = values[self.padding[shown]]
         return flat.reshape(self.size, self.size, *values.shape[1:])
+
+
+def room_box(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corner ((3,) each) of the box around points ((n, 3) float).
+
+    Where few lie far off all others it ends where all but a few do: more than half of what the middle ones span lies
+    between.
+    """
+    low, high = position.min(0), position.max(0)
+    outer, few = SPARSE.outer, SPARSE.few
+    start, first, last, end = np.percentile(position, (few, outer, 100 - outer, 100 - few), axis=0)
+    least, most = first - (last - first) / 2, last + (last - first) / 2
+    return np.where(low < least, np.maximum(start, least), low), np.where(high > most, np.minimum(end, most), high)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple, Protocol
+
 import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from ..kinds import Block
+from ..parallel import blocks
 from .atlas import Atlas
 from .model import Mesh
 from .rays import RayScene
@@ -77,29 +80,128 @@ def _cover(uv: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     return triangle, u, v
 
 
-def _padding(texel: np.ndarray, size: int) -> np.ndarray:
-    """The nearest element of every texel, (size * size,) int32."""
+def _padding(element: np.ndarray) -> np.ndarray:
+    """The nearest element of every texel, (size * size,) int32, of an image with -1 where there is none."""
+    nearest = ndimage.distance_transform_edt(element < 0, return_distances=False, return_indices=True)
+    return element[nearest[0], nearest[1]].ravel()
+
+
+class Elements(NamedTuple):
+    """What takes time to find of an atlas's elements: fields of `Atlas`."""
+
+    texel: np.ndarray
+    triangle: np.ndarray
+    position: np.ndarray
+    area: np.ndarray
+    padding: np.ndarray
+
+
+class Crumbs(NamedTuple):
+    """Small triangles of which those of one cell share an element.
+
+    Attributes
+    ----------
+    triangle : (k,) int
+    cell : (k,) int
+        From 0 on, each number in use.
+    corner : (m, 2) int
+        Column and row of the first of each cell's two by two texels.
+    """
+
+    triangle: np.ndarray
+    cell: np.ndarray
+    corner: np.ndarray
+
+
+class Coarse(Protocol):
+    """Where one element stands for many texels (`seen_cells.SeenCells`)."""
+
+    def seen(self, position: np.ndarray, triangle: np.ndarray) -> np.ndarray:
+        """Points ((n, 3) float, of triangles (n,) int) that have elements of their own, (n,) bool."""
+
+    def coarse(self, position: np.ndarray, triangle: np.ndarray) -> np.ndarray:
+        """A number for each of the others, (n,) uint64: those alike share an element."""
+
+
+def find_elements(
+    mesh: Mesh, uv: np.ndarray, size: int, coarse: Coarse | None = None, crumbs: Crumbs | None = None
+) -> Elements:
+    """The elements at the texels that `uv` covers.
+
+    Parameters
+    ----------
+    mesh, uv, size
+        See `make_atlas`.
+    coarse : Coarse, optional
+        Where one element stands for many texels; not given: each texel has its own.
+    crumbs : Crumbs, optional
+        Triangles that have elements together.
+    """
+    whole = np.ones(len(uv), bool)
+    if crumbs is not None:
+        whole[crumbs.triangle] = False
+    triangle, u, v = _cover(uv if whole.all() else uv[whole], size)
+    texel = np.flatnonzero(triangle >= 0)
+    triangle, u, v = np.flatnonzero(whole).astype(np.int32)[triangle[texel]], u[texel], v[texel]
+    position = np.empty((len(texel), 3), np.float32)
+    for part in blocks(len(texel), 1 << 18):
+        a, b, c = (mesh.vertices[mesh.triangles[triangle[part], i]].astype(np.float64) for i in range(3))
+        position[part] = a + u[part, None] * (b - a) + v[part, None] * (c - a)
+    # Each triangle's surface is shared out between its texels; what no texel covers is left out.
+    count = np.bincount(triangle, minlength=len(mesh.triangles))
+    area = triangle_geometry(mesh)[1]
+    shared = (area[triangle] / count[triangle]).astype(np.float32)
     element = np.full(size * size, -1, np.int32)
     element[texel] = np.arange(len(texel), dtype=np.int32)
-    nearest = ndimage.distance_transform_edt(
-        element.reshape(size, size) < 0, return_distances=False, return_indices=True
-    )
-    return element.reshape(size, size)[nearest[0], nearest[1]].ravel()
+    found = texel, triangle, position, shared
+    if crumbs is not None and len(crumbs.triangle):
+        more = _of_crumbs(mesh, size, area, crumbs)
+        at = more[0][:, None] + np.array([0, 1, size, size + 1])
+        element[at] = len(texel) + np.arange(len(at), dtype=np.int32)[:, None]
+        found = tuple(np.concatenate(both) for both in zip(found, more, strict=True))
+    return _merged(Elements(*found, _padding(element.reshape(size, size))), len(texel), coarse)
 
 
-Covered = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Texel, triangle and position of each element: what takes time to find."""
+def _of_crumbs(mesh, size, area, crumbs):
+    """Texel, triangle, position and area of the element of each cell."""
+    corner = mesh.vertices[mesh.triangles[crumbs.triangle]].mean(1, dtype=np.float64)
+    chosen = _nearest_to_middle(corner, crumbs.cell)
+    texel = crumbs.corner[:, 1].astype(np.int64) * size + crumbs.corner[:, 0]
+    total = np.bincount(crumbs.cell, area[crumbs.triangle]).astype(np.float32)
+    return texel, crumbs.triangle[chosen].astype(np.int32), corner[chosen].astype(np.float32), total
 
 
-def _covered(mesh: Mesh, uv: np.ndarray, size: int) -> Covered:
-    triangle, u, v = _cover(uv, size)
-    texel = np.flatnonzero(triangle >= 0)
-    triangle, u, v = triangle[texel], u[texel, None].astype(np.float64), v[texel, None].astype(np.float64)
-    a, b, c = (mesh.vertices[mesh.triangles[triangle, i]] for i in range(3))
-    return texel, triangle, (a + u * (b - a) + v * (c - a)).astype(np.float32)
+def _nearest_to_middle(position: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """Of each group ((n,) int, all in use) the point nearest to its middle, which may lie off the surface, (m,) int."""
+    off, count = np.zeros(len(position)), np.bincount(group)
+    for axis in range(3):
+        off += np.square(position[:, axis] - (np.bincount(group, position[:, axis]) / count)[group])
+    order = np.lexsort((off, group))
+    return order[np.cumsum(count) - count]
 
 
-def make_atlas(mesh: Mesh, uv: np.ndarray, size: int, known: Covered | None = None) -> Atlas:
+def _merged(found: Elements, count: int, coarse: Coarse | None) -> Elements:
+    """Elements, by rising texel, of which one stands for all of its coarse cell; the first `count` are asked."""
+    own = np.ones(len(found.texel), bool)
+    if coarse is not None:
+        own[:count] = coarse.seen(found.position[:count], found.triangle[:count])
+    other = np.flatnonzero(~own)
+    if not len(other) and count == len(own):
+        return found
+    assert coarse is not None
+    group = np.unique(coarse.coarse(found.position[other], found.triangle[other]), return_inverse=True)[1].ravel()
+    chosen = other[_nearest_to_middle(found.position[other], group)]
+    own[chosen] = True
+    kept = np.flatnonzero(own)
+    kept = kept[np.argsort(found.texel[kept], kind="stable")]
+    number = np.empty(len(own), np.int32)
+    number[kept] = np.arange(len(kept), dtype=np.int32)
+    number[other] = number[chosen][group]
+    parts = (found.texel[kept], found.triangle[kept], found.position[kept])
+    return Elements(*parts, np.bincount(number, found.area).astype(np.float32), number[found.padding])
+
+
+def make_atlas(mesh: Mesh, uv: np.ndarray, size: int, known: Elements | None = None) -> Atlas:
     """Surface elements at the texels that `uv` covers.
 
     Parameters
@@ -109,24 +211,18 @@ def make_atlas(mesh: Mesh, uv: np.ndarray, size: int, known: Covered | None = No
         Atlas coordinates in [0, 1], without overlap.
     size : int
         Edge of the atlas in texels.
-    known : Covered, optional
-        Of the same atlas, made before.
+    known : Elements, optional
+        Of the same atlas; not given: each texel has its own.
     """
-    texel, triangle, position = known or _covered(mesh, uv, size)
-    normal, area = triangle_geometry(mesh)
-    # Each triangle's surface is shared out between its elements; what no element covers is left out.
-    count = np.bincount(triangle, minlength=len(mesh.triangles))
+    found = known or find_elements(mesh, uv, size)
+    normal, _ = triangle_geometry(mesh)
     return Atlas(
         size=size,
         uv=uv,
-        texel=texel,
-        triangle=triangle,
-        position=position,
-        normal=normal[triangle],
-        object_id=mesh.object_id[triangle],
-        area=(area[triangle] / count[triangle]).astype(np.float32),
-        padding=_padding(texel, size),
-        back=None if mesh.backs is None else triangle >= len(mesh.triangles) - len(mesh.backs),
+        normal=normal[found.triangle],
+        object_id=mesh.object_id[found.triangle],
+        back=None if mesh.backs is None else found.triangle >= len(mesh.triangles) - len(mesh.backs),
+        **found._asdict(),
     )
 
 
@@ -134,6 +230,12 @@ def element_of_triangle(mesh: Mesh, atlas: Atlas) -> np.ndarray:
     """An element for each triangle, (t,) int32: its own, else the nearest one of the same object, else the nearest."""
     first = np.full(len(mesh.triangles), -1, np.int32)
     first[atlas.triangle[::-1]] = np.arange(len(atlas) - 1, -1, -1, dtype=np.int32)
+    # What lies under its middle in the atlas: beside its own texels, or the one element of many.
+    bare = np.flatnonzero(first < 0)
+    middle = atlas.uv[bare].mean(1, dtype=np.float64) * atlas.size
+    column, row = np.clip(middle.astype(np.int64), 0, atlas.size - 1).T
+    under = atlas.padding[row * atlas.size + column]
+    first[bare] = np.where(atlas.object_id[under] == mesh.object_id[bare], under, -1)
     centroid = mesh.vertices[mesh.triangles].mean(1)
     for object_id in np.unique(mesh.object_id[first < 0]):
         bare = np.flatnonzero((first < 0) & (mesh.object_id == object_id))

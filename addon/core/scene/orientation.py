@@ -10,6 +10,7 @@ import numpy as np
 from .model import Camera, Mesh
 from .params import SIDES
 from .rays import RayScene
+from .sparse_hits import pixel_edges, sparse_hits
 from .two_sides import two_sided, worth_it
 
 
@@ -43,25 +44,16 @@ def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequenc
     """
     votes = np.zeros(len(mesh.triangles))
     sides = np.zeros((2, len(votes)), np.int64)  # rays that met the front, and the back
-    footprints, step = [], SIDES.pixel_step
+    footprints = []
     for camera in cameras:
-        y, x = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
-        pixels = np.stack([x.ravel() + 0.5, y.ravel() + 0.5], -1)
-        directions, seen = camera.rays(pixels)
-        if not seen.all():
-            pixels, directions = pixels[seen], directions[seen]
-        hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
-        hit = hits.triangle >= 0
-        triangle = hits.triangle[hit]
-        cosine = -np.einsum("ij,ij->i", directions[hit], normal[triangle])
+        pixels, directions, hits = sparse_hits(scene, camera)
+        triangle = hits.triangle
+        cosine = -np.einsum("ij,ij->i", directions, normal[triangle])
         votes += np.bincount(triangle, weights=cosine, minlength=len(votes))
         for side, met in zip(sides, (cosine > 0, cosine < 0), strict=True):
             side += np.bincount(triangle[met], minlength=len(votes))
-        if camera.lens is None:
-            footprints.append(hits.distance[hit] / np.float32(np.sqrt(camera.fx * camera.fy)))
-        else:
-            edges = hits.distance[hit] * camera.pixel_angles(pixels[hit])
-            footprints.append(edges[edges > 0])
+        edges = pixel_edges(camera, pixels, hits)
+        footprints.append(edges[edges > 0])
     by_object = np.bincount(mesh.object_id, weights=np.sign(votes), minlength=int(mesh.object_id.max()) + 1)
     sign = np.where(votes != 0, np.sign(votes), np.where(by_object[mesh.object_id] < 0, -1.0, 1.0))
     together = np.concatenate(footprints) if footprints else np.zeros(0, np.float32)

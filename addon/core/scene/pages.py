@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from .params import SURFACE
+from .params import SPARSE, SURFACE
 from .uv_islands import boxes, connected, corner_ids
 
 OBJECT, UDIM = "object", "udim"
@@ -146,7 +146,7 @@ def lay_out(
     largest : int
         Upper bound of an image's edge in texels.
     """
-    island = connected(corner_ids(triangles, uv), object_id)
+    island = _by_block(connected(corner_ids(triangles, uv), object_id), uv * (size / SPARSE.block), object_id)
     first = np.unique(island, return_index=True)[1]
     owner = object_id[first].astype(np.int64)
     low, high = (edge.astype(np.float64) * size for edge in boxes(uv, island))
@@ -193,7 +193,17 @@ def lay_out(
     )
 
 
-def _shelves(box: np.ndarray, width: int) -> tuple[np.ndarray, int, int]:
+def _by_block(island: np.ndarray, at: np.ndarray, object_id: np.ndarray) -> np.ndarray:
+    """Islands ((t,) int) with those of an object in one block, an edge of which is 1 in `at` ((t, 3, 2)), made one."""
+    low, high = (np.floor(edge) for edge in boxes(at, island))
+    within = (low == high).all(1)
+    first = np.unique(island, return_index=True)[1]
+    place = np.concatenate([low, object_id[first, None]], 1)
+    place[~within] = np.stack([-1 - np.arange(len(first))] * 3, 1)[~within]
+    return np.unique(place, axis=0, return_inverse=True)[1].reshape(-1)[island]
+
+
+def shelves(box: np.ndarray, width: int) -> tuple[np.ndarray, int, int]:
     """Rectangles ((n, 2) width and height) in rows of at most `width`: lower left corners, and what they take."""
     place = np.zeros_like(box)
     x = y = height = widest = 0
@@ -214,14 +224,14 @@ def _block(box: np.ndarray, largest: int) -> tuple[np.ndarray, int, int]:
         int(np.clip(np.ceil(side * shape), box[:, 0].max(), max(largest, box[:, 0].max())))
         for shape in SURFACE.page_shapes
     }
-    found = [_shelves(box, width) for width in sorted(widths)]
+    found = [shelves(box, width) for width in sorted(widths)]
     return min(found, key=lambda one: (max(one[1:]) > largest, one[1] * one[2]))
 
 
 def _in_blocks(blocks, place):
     """A page for each object, side by side."""
     extents = np.array([(width, height) for _, width, height in blocks.values()], np.float64)
-    corner, _, _ = _shelves(extents, int(max(np.sqrt(extents.prod(1).sum()) * 1.1, extents[:, 0].max())))
+    corner, _, _ = shelves(extents, int(max(np.sqrt(extents.prod(1).sum()) * 1.1, extents[:, 0].max())))
     pages, tile = [], np.zeros(len(place), np.int64)
     for k, (number, (own, width, height)) in enumerate(blocks.items()):
         pages.append(Page(int(number), int(corner[k, 0]), int(corner[k, 1]), int(width), int(height)))

@@ -189,3 +189,45 @@ class SurfaceParams:
 
 
 SURFACE = SurfaceParams()
+
+
+@dataclass(frozen=True)
+class SparseParams:
+    """Where one element stands for many texels, and triangles take few (`seen_cells`, `sparse_layout`).
+
+    Attributes
+    ----------
+    cell : int
+        Edge of a cell in elements. In those that a ray met, and the ones beside them, lies 99.7 % of what a kitchen's
+        frames observed three times and more; together they hold 1.2 times the elements that were observed.
+    block : int
+        Edge in texels of what shows one element: between the centres of four texels a lookup stays within them.
+    angle : float
+        Radians: what no frame saw takes cells of this edge, seen from the cameras, where that is larger.
+    fine : float
+        Elements along its longest edge: smaller triangles that were seen have a cell as large as an element. In a
+        kitchen of a million triangles that is half of them, and 0.3 % of the surface; to unwrap them took 600 MiB.
+    large : int
+        Texels along the root of a triangle's area: one that no frame saw takes no more, however large it is, and only
+        larger ones are asked for the share of them that was seen.
+    seen_part : float
+        A large triangle takes at most so many times the texels of what was seen of it, to a factor of 4.
+    outer, few : float
+        Per cent of the elements at either end of an axis: between them is the room's middle, and where some lie far
+        off it, all that may be its own (`atlas.room_box`).
+    highest : float
+        Of the atlas's edge sparse triangles take at most this: else their texels grow.
+    """
+
+    cell: int = 8
+    block: int = 2
+    angle: float = 0.02
+    fine: float = 0.5
+    large: int = 64
+    seen_part: float = 16
+    outer: float = 15
+    few: float = 5
+    highest: float = 0.25
+
+
+SPARSE = SparseParams()

@@ -55,8 +55,8 @@ class RayScene:
         low, high = vertices.min(0), vertices.max(0)
         self.diagonal = float(np.linalg.norm(high - low))
         # Far from the origin float32 itself is coarser than that: 1 mm at 10 km.
-        coarse = float(np.spacing(np.float32(np.abs([low, high]).max())))
-        self.offset = max(RELATIVE_OFFSET * self.diagonal, 4 * coarse)
+        self._coarse = 4 * float(np.spacing(np.float32(np.abs([low, high]).max())))
+        self.offset = max(RELATIVE_OFFSET * self.diagonal, self._coarse)
         self.triangle_count = len(triangles)
         self._sides: tuple[np.ndarray, np.ndarray] | None = None  # of each triangle: its second side, and its normal
         if backs is not None and len(backs):
@@ -70,6 +70,10 @@ class RayScene:
             self._scene, np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(triangles, np.int32)
         )
         self._run(np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32))  # builds the tree now, in one thread
+
+    def fit(self, extent: float) -> None:
+        """Let origins lie as near to their surface as a room of so many metres needs it, where the mesh goes on."""
+        self.offset = max(RELATIVE_OFFSET * min(self.diagonal, 2 * extent), self._coarse)
 
     def _run(self, origins, directions, **options):
         return self._scene.run(

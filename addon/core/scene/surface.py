@@ -9,12 +9,15 @@ import numpy as np
 
 from ..errors import BadInputError
 from .atlas import Atlas
-from .elements import Covered, make_atlas, triangle_geometry, uv_scale
+from .elements import Crumbs, Elements, find_elements, make_atlas, triangle_geometry, uv_scale
 from .model import Camera, Mesh
 from .orientation import Sides, seen_sides
 from .params import SURFACE
 from .rays import RayScene
+from .seen_cells import SeenCells
+from .sparse_layout import Sparse, with_strip
 from .two_sides import with_backs
+from .unwrap import takes_parts
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,14 @@ def oriented(mesh: Mesh, cameras: Sequence[Camera]) -> Sides:
     return seen_sides(mesh, normal, RayScene(mesh.vertices, mesh.triangles), cameras)
 
 
+def without_triangles(mesh: Mesh, which: np.ndarray) -> Mesh:
+    """What an unwrap needs of a mesh's other triangles; second sides count as any."""
+    left = np.ones(len(mesh.triangles), bool)
+    left[which] = False
+    uv = None if mesh.uv is None else mesh.uv[left]
+    return Mesh(mesh.vertices, mesh.triangles[left], mesh.object_id[left], uv=uv)
+
+
 def _every(mesh: Mesh, sign: np.ndarray) -> np.ndarray:
     """The signs of a mesh's first sides, and the same for its second ones."""
     return sign if mesh.backs is None else np.concatenate([sign, sign[mesh.backs]])
@@ -99,6 +110,8 @@ def build_surface(
     detail: float = 1.0,
     largest: int = 4096,
     two_sides: bool = True,
+    coarse_unseen: bool = True,
+    threads: int = 0,
 ) -> Surface:
     """Lay out the surface elements.
 
@@ -116,6 +129,8 @@ def build_surface(
         Upper bound of the atlas's edge.
     two_sides : bool
         Give triangles that are seen from both sides a second side of its own.
+    coarse_unseen : bool
+        Let one element stand for many texels where no camera looks.
 
     Raises
     ------
@@ -128,24 +143,50 @@ def build_surface(
             "No camera of the capture looks at the mesh; check that transforms.json and mesh.ply share one frame."
         )
     mesh = with_backs(mesh, np.flatnonzero(sides.both & two_sides))
-    _, area = triangle_geometry(mesh)
+    towards = facing(mesh, sides.sign)
+    scene = RayScene(towards.vertices, towards.triangles, towards.backs)
     texel = texel_size or sides.footprint / detail
-    size = atlas_size(float(area.sum()), texel, largest)
-    uv = unwrap(mesh, size)
+    cells = SeenCells(towards, scene, cameras, texel, threads) if cameras and coarse_unseen else None
+    uv, size, edge, crumbs = _laid_out(mesh, unwrap, texel, largest, cells)
+    elements = find_elements(towards, turned(uv, _every(mesh, sides.sign)), size, cells, crumbs)
+    return from_uv(mesh, sides.sign, uv, size, edge, known=elements, scene=scene)
+
+
+def _laid_out(
+    mesh: Mesh, unwrap: Callable[[Mesh, int], np.ndarray], texel: float, largest: int, cells: SeenCells | None
+) -> tuple[np.ndarray, int, float, Crumbs | None]:
+    """Atlas coordinates, the atlas's edge in texels, edge of a texel in metres, and what shares texels."""
+    sparse = Sparse(mesh, cells, texel) if cells is not None and takes_parts(unwrap) else None
+    part = mesh if sparse is None or not len(sparse.triangle) else without_triangles(mesh, sparse.triangle)
+    _, area = triangle_geometry(part)
+    uv = unwrap(part, atlas_size(float(area.sum()), texel, largest))
     # The islands' true scale sets the size that makes a texel as large as wished.
-    scale = uv_scale(mesh, uv)
-    return from_uv(mesh, sides.sign, uv, _whole_steps(1 / max(texel * scale, 1e-12), largest))
+    scale = max(uv_scale(part, uv), 1e-12)
+    edge = 1 / max(texel * scale, 1e-12)
+    if sparse is not None and part is not mesh:
+        uv, size, square, crumbs = with_strip(mesh, sparse, uv, edge, _whole_steps(largest, largest))
+        return uv, size, 1 / (scale * square), crumbs
+    size = _whole_steps(edge, largest)
+    return uv, size, 1 / (scale * size), None
 
 
 def from_uv(
-    mesh: Mesh, sign: np.ndarray, uv: np.ndarray, size: int, noise: float = 0.0, known: Covered | None = None
+    mesh: Mesh,
+    sign: np.ndarray,
+    uv: np.ndarray,
+    size: int,
+    texel_size: float,
+    noise: float = 0.0,
+    known: Elements | None = None,
+    scene: RayScene | None = None,
 ) -> Surface:
     """The surface for a known layout of a mesh `with_backs`, and the sign of each of its first sides.
 
-    `known`, if given, is what was found of the elements before.
+    `known` and `scene`, if given, are what was found of the elements before, and the rays against it.
     """
     towards = facing(mesh, sign)
     atlas = make_atlas(towards, turned(uv, _every(mesh, sign)), size, known)
-    scale = uv_scale(mesh, uv)
-    scene = RayScene(towards.vertices, towards.triangles, towards.backs)
-    return Surface(towards, atlas, scene, uv, 1 / max(scale * size, 1e-12), noise)
+    scene = scene or RayScene(towards.vertices, towards.triangles, towards.backs)
+    low, high = atlas.box
+    scene.fit(float(np.linalg.norm(high - low)))
+    return Surface(towards, atlas, scene, uv, texel_size, noise)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,6 +14,19 @@ from .uv_overlap import overlapping_pairs
 
 Unwrap = Callable[[Mesh, int], np.ndarray]
 """Atlas coordinates, (t, 3, 2) float32 in [0, 1] without overlap, for a mesh and an atlas's edge in texels."""
+T = TypeVar("T", bound=Callable)
+
+
+def of_parts(unwrap: T) -> T:
+    """Marks an unwrap that may be asked for some of a mesh's triangles alone."""
+    vars(unwrap)["of_parts"] = True
+    return unwrap
+
+
+def takes_parts(unwrap: Unwrap) -> bool:
+    """Whether it is marked so; not where it is told by number which triangles are a face of the artist's mesh."""
+    told = getattr(unwrap, "keywords", {})
+    return getattr(getattr(unwrap, "func", unwrap), "of_parts", False) and told.get("polygons") is None
 
 
 def own_coordinates(mesh: Mesh, size: int) -> np.ndarray:
@@ -42,6 +56,7 @@ def own_coordinates(mesh: Mesh, size: int) -> np.ndarray:
     return apart
 
 
+@of_parts
 def by_xatlas(mesh: Mesh, size: int) -> np.ndarray:
     """Charts by the library xatlas, each of one object; packed into one square.
 

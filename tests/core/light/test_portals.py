@@ -78,3 +78,22 @@ def test_from_outside_alone_misses_what_the_heuristic_leaves_to_gather(room):
     field, position, normal, true = room
     part = from_outside(field, find_portals(field), position, normal, 64, 64, 0)[:, 0]
     assert 0.3 < part.sum() / true.sum() < 1
+
+
+def test_a_ground_around_the_room_moves_no_portal(room):
+    """Where the mesh goes on outside, rays are aimed from the room alone, at openings of its own box."""
+    _, position, normal, true = room
+    sides = box_sides()
+    wall = next(s for s in sides if s.corner[0] == 0 and s.edge_u[0] == 0 and s.edge_v[0] == 0)
+    ground = quad((-300, -300, -1), (600, 0, 0), (0, 600, 0), 9)
+    made = make_room([s for s in sides if s is not wall] + around(wall, *WINDOW), 0.2)
+    wide = make_room([*made.quads, ground], 0.2, most={9: 8})
+    field = wide.field(wide.by_object({}, default=(0, 0, 0)), room[0].environment)
+    portals = find_portals(field)
+    assert (portals.size < 12).all() and not portals.around(np.float32([[100, 0, 5]])).any()
+    up = normal[:, 2] > 0.5  # the others see the ground, which is dark
+    E, _, _ = gather(field, bright_triangles(field), position[up], normal[up], 64, 0, 3, portals, 64)
+    lit = true[up] > 0.02
+    assert np.abs(E[lit, 0] / true[up][lit] - 1).mean() < 0.1
+    out = np.float32([[50, 0, 5]]), np.float32([[0, 0, 1]])
+    assert gather(field, bright_triangles(field), *out, 64, 0, 3, portals, 64)[0] == pytest.approx(np.pi, rel=1e-3)

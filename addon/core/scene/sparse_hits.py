@@ -1,0 +1,43 @@
+"""What some of a frame's pixels meet: enough to tell which surface the frames look at, and how closely."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .model import Camera
+from .params import SIDES
+from .rays import Hits, RayScene
+
+
+def sparse_hits(scene: RayScene, camera: Camera, step: int = SIDES.pixel_step) -> tuple[np.ndarray, np.ndarray, Hits]:
+    """What every `step`-th pixel in x and y of a camera meets.
+
+    Returns
+    -------
+    pixels : (n, 2) float64
+        Those whose rays meet the mesh.
+    directions : (n, 3) float32
+    hits : Hits
+    """
+    y, x = np.mgrid[step // 2 : camera.height : step, step // 2 : camera.width : step]
+    pixels = np.stack([x.ravel() + 0.5, y.ravel() + 0.5], -1)
+    directions, led = camera.rays(pixels)
+    if not led.all():
+        pixels, directions = pixels[led], directions[led]
+    hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
+    met = np.flatnonzero(hits.triangle >= 0)
+    return pixels[met], directions[met], hits.part(met)
+
+
+def pixel_edges(camera: Camera, pixels: np.ndarray, hits: Hits) -> np.ndarray:
+    """Edge in metres of the surface that each pixel covers where it is met head-on, (n,) float32; NaN: unknown.
+
+    Parameters
+    ----------
+    pixels : (n, 2) float
+    hits : Hits
+        Of their rays.
+    """
+    if camera.lens is None:
+        return hits.distance / np.float32(np.sqrt(camera.fx * camera.fy))
+    return hits.distance * camera.pixel_angles(pixels)
