@@ -20,7 +20,7 @@ class Lambertian(Brdf):
             return albedo
         # The frames' albedo is all that it reflects, so what the coat does is no longer the diffuse part's.
         coat = float(layer_reflectance(of.coat["f0"], of.coat["roughness"] ** 2))
-        return np.maximum(albedo - coat, 0) / (1 - coat)
+        return np.clip((albedo - coat) / (1 - coat), 0, 1)  # 1 itself would come out as 1 + 1e-7
 
     def principled(self, of: Parameters) -> Principled:
         """No lobe, but for a coat."""

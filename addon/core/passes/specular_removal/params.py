@@ -17,6 +17,8 @@ class RemovalParams:
         Pixels whose rays are shared, and the standard deviation of their weights, in pixels.
     most : float
         Times what is left that the specular part may be.
+    dark : float
+        An object with more than this share of its elements under such specular parts is dark by itself.
     """
 
     fewer: int = 32
@@ -24,6 +26,7 @@ class RemovalParams:
     reach: int = 2
     width: float = 1.0
     most: float = 3.0
+    dark: float = 0.5
 
 
 REMOVAL = RemovalParams()

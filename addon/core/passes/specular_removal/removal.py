@@ -42,7 +42,7 @@ class Removed:
     specular : (n, 3) float32
         Part of L_d that is not diffuse; 0 where nothing was asked for.
     hidden : (n,) bool
-        In every view the specular part is more than what is left.
+        In every view the specular part is far more than what is left, and not on most of the object: that is dark.
     """
 
     specular: np.ndarray
@@ -162,4 +162,7 @@ def without_specular(
     told = own & lit.seen & found.seen
     radiance = np.nan_to_num(lit.radiance)
     specular = np.where(told[:, None], radiance - np.maximum(np.nan_to_num(found.radiance), 0), 0).astype(np.float32)
-    return Removed(specular, told & (found.tier == SATURATED))
+    hidden, object_id = told & (found.tier == SATURATED), field.atlas.object_id
+    objects = int(object_id.max()) + 1
+    share = np.bincount(object_id, hidden, objects) / np.maximum(np.bincount(object_id, told, objects), 1)
+    return Removed(specular, hidden & (share[object_id] <= params.dark))

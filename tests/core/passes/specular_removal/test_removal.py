@@ -28,13 +28,14 @@ def paint(where: np.ndarray) -> np.ndarray:
 class Floor:
     """A box whose floor has a lobe, and the pictures that frames take of it."""
 
-    def __init__(self, glow: float):
+    def __init__(self, glow: float, shade: float = 1.0):
+        self.shade = shade
         self.box = Box(glow=np.full(3, glow))
         self.cameras = [look_at(eye, (1.6, 1.4, 0), 28, 21, 70) for eye in EYES]
         self.pictures = [pixels_of(self.picture(camera)) for camera in self.cameras]
         self.lit = run(self.box.room, self.cameras, self.pictures)
         self.own = self.box.room.atlas.object_id == FLOOR
-        self.truth = paint(self.box.room.atlas.position)
+        self.truth = shade * paint(self.box.room.atlas.position)
 
     def picture(self, camera) -> np.ndarray:
         directions = camera.directions(camera.pixel_centres())
@@ -45,7 +46,7 @@ class Floor:
         floor = np.flatnonzero(self.box.room.atlas.object_id[element] == FLOOR)
         where = origins[floor] + hits.distance[floor, None] * directions[floor]
         A, B = self.box.lobe(element[floor], -directions[floor], ALPHA, 12)
-        seen[floor] = paint(where) + F0 * A + B
+        seen[floor] = self.shade * paint(where) + F0 * A + B
         return seen.reshape(camera.height, camera.width, 3)
 
     def removed(self, f0: float = F0, **how):
@@ -87,6 +88,17 @@ def test_what_every_view_hides_is_marked():
 def test_no_channel_is_driven_below_black(floor):
     found = floor.removed(3 * F0)
     assert (floor.lit.radiance - found.specular)[floor.own & floor.lit.seen].min() >= 0
+
+
+@pytest.mark.slow
+def test_a_black_floor_is_not_hidden():
+    """What reflects next to nothing of its own does so in every view, all over."""
+    floor = Floor(60.0, shade=0.01)
+    found = floor.removed()
+    own = floor.own & (floor.lit.count >= 4)
+    assert not found.hidden.any()
+    left = np.abs((floor.lit.radiance - found.specular - floor.truth)[own]).mean()
+    assert left < 0.5 * np.abs((floor.lit.radiance - floor.truth)[own]).mean()
 
 
 def test_it_can_be_stopped(floor):
