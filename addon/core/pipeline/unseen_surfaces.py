@@ -11,7 +11,7 @@ from ..light.field import LightField
 from ..light.over_surface import RayCounts, irradiance
 from ..light.params import GATHER
 from ..passes.albedo.albedo import fill, quotient
-from ..passes.albedo.params import MAX_ALBEDO
+from ..passes.albedo.params import MAX_ALBEDO, UNSEEN_PRIOR
 from ..passes.unseen_light.params import SHADES
 from ..passes.unseen_light.shades import strongly_lit
 from ..scene.lit_diffuse import LitDiffuse
@@ -64,7 +64,8 @@ def with_unseen_surfaces(
     E[lit] = rough(field, lit, finest=GATHER.unseen_coarser * finest)[0]
     E[dark], escaped[dark], _, _ = rough(field, dark, finest=GATHER.unseen_coarser * finest)
     rho, valid = quotient(lit_diffuse.radiance, E)
-    guess = fill(atlas, rho, valid, {i.object_id: i.class_name for i in instances}, emitters).rho
+    classes = {i.object_id: i.class_name for i in instances}
+    guess = fill(atlas, rho, valid, classes, emitters, params=UNSEEN_PRIOR).rho
     radiance = field.radiance.copy()
     radiance[dark] = guess[dark] * E[dark] / np.float32(np.pi)
     field = field.with_light(radiance)

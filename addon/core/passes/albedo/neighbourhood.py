@@ -12,6 +12,7 @@ from collections.abc import Collection
 import numpy as np
 from scipy import special
 from scipy.spatial import cKDTree
+from scipy.special import ndtri
 
 from ...groups import by_label
 from ...kinds import Block
@@ -74,12 +75,13 @@ def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, p
     middle = np.empty((len(position), 3), np.float32)
     width = np.empty(len(position), np.float32)
     channels = np.ascontiguousarray(log_rho.T)
+    normal = np.float32(ndtri((1 + params.width_quantile) / 2))  # that quantile of |deviation|, in standard deviations
 
     def gather(part: slice) -> None:
         around = channels[:, near[part]]
         middle[part] = _quantile(np.sort(around), 0.5).T
         off = np.sort(np.abs(around - middle[part].T[..., None]).mean(0))
-        width[part] = 1.4826 * _quantile(off, 0.5)
+        width[part] = _quantile(off, params.width_quantile) / normal
 
     for_blocks(gather, len(position), BLOCK, 0)
     return Neighbourhood(middle, np.maximum(width, np.float32(0.02)), near)
