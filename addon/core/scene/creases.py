@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from .atlas import Atlas
@@ -12,14 +14,30 @@ from .two_sides import fronts, other_way
 from .weld import welded
 
 
-def edge_angles(mesh: Mesh) -> np.ndarray:
+def edge_angles(mesh: Mesh, wanted: np.ndarray | None = None) -> np.ndarray:
     """Angle in radians, 0...pi/2, by which the surface bends at each triangle's edges, (t, 3); edge k lies opposite
     corner k. Windings don't matter. Where an edge has no other triangle, pi/2: what goes on there is not known. 0 at a
-    sliver's edges. A sheet's second side bends as its first one does."""
+    sliver's edges. A sheet's second side bends as its first one does. Of triangles that are not `wanted` ((t,) bool),
+    anything."""
     if mesh.backs is not None:
-        angle = edge_angles(fronts(mesh)[0])
+        single, sheet = fronts(mesh)
+        either = None if wanted is None else np.bincount(sheet, wanted, len(single.triangles)) > 0
+        angle = edge_angles(single, either)
         return np.concatenate([angle, other_way(angle[mesh.backs])])
     points, faces, _ = welded(mesh, CREASES.weld)
+    if wanted is not None:
+        # Who shares an edge has two of its points: the others tell nothing, and may be most of a million.
+        used = np.zeros(len(points), bool)
+        used[faces[wanted]] = True
+        kept = np.flatnonzero(used[faces].sum(1) >= 2)
+        result = np.zeros((len(faces), 3))
+        result[kept] = _angles(replace(mesh, triangles=mesh.triangles[kept]), points, faces[kept])
+        return result
+    return _angles(mesh, points, faces)
+
+
+def _angles(mesh: Mesh, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """`edge_angles` of a mesh whose triangles are `faces` of welded `points`."""
     normal, area = triangle_geometry(mesh)
     corners = mesh.vertices[mesh.triangles]
     longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
@@ -49,7 +67,7 @@ def crease_error(mesh: Mesh, atlas: Atlas, texel: float) -> np.ndarray:
     texel : float
         Edge of an element in metres.
     """
-    angles = edge_angles(mesh)
+    angles = edge_angles(mesh, np.bincount(atlas.triangle, minlength=len(mesh.triangles)) > 0)
     relative_error = np.zeros(len(atlas), np.float32)
     corners = mesh.vertices[mesh.triangles].astype(np.float32)
     bent = np.flatnonzero((angles[atlas.triangle] > 0.01 * CREASES.knee).any(1))

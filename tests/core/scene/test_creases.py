@@ -9,6 +9,7 @@ from addon.core.scene.atlas import Atlas
 from addon.core.scene.creases import crease_error, edge_angles
 from addon.core.scene.model import Mesh
 from addon.core.scene.params import CREASES
+from addon.core.scene.two_sides import with_backs
 
 TEXEL = 0.01
 
@@ -73,3 +74,16 @@ def test_slivers_tell_of_no_bend():
     with_sliver = Mesh(vertices, np.concatenate([mesh.triangles, [[0, len(vertices) - 1, 1]]]), np.zeros(5, np.int32))
     angles = edge_angles(with_sliver)
     assert angles[0, 2] == 0 and (angles[4] == 0).all() and angles[1, 0] == pytest.approx(np.pi / 2)
+
+
+def test_what_is_asked_for_is_the_same_as_of_the_whole():
+    rng = np.random.default_rng(0)
+    grid = np.arange(49).reshape(7, 7)
+    a, b, c, d = (part.ravel() for part in (grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]))
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]).astype(np.int32)
+    bumpy = Mesh(rng.random((49, 3)), triangles, np.zeros(72, np.int32))
+    whole = edge_angles(with_backs(bumpy, np.arange(0, 72, 5)))
+    for share in (0.05, 0.5):
+        wanted = rng.random(len(whole)) < share
+        some = edge_angles(with_backs(bumpy, np.arange(0, 72, 5)), wanted)
+        np.testing.assert_array_equal(some[wanted], whole[wanted])
