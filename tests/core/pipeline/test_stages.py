@@ -38,7 +38,7 @@ def capture(disk):
 
 
 def keys(capture, settings: Settings = DEFAULT, **given) -> dict[str, str]:
-    run = Stages(capture, None, settings, Progress(), None, **given)
+    run = Stages(capture, None, settings, Progress(), lambda mesh, size: None, **given)
     return run.keys | {"run": run.run_key}
 
 
