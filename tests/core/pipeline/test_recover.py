@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 from dataclasses import replace
+from functools import wraps
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,7 @@ def test_albedo_lamp_and_report(disk, finished):
 def test_a_second_run_computes_nothing(disk, finished):
     folder, first = finished
 
+    @wraps(disk.unwrap)  # by its name and place it is the same
     def no_unwrap(mesh, size):
         raise AssertionError("laid out again")
 
