@@ -73,8 +73,11 @@ class Pages:
             bottom, left = rows[0][0], columns[0][0]
             box = slice(bottom, rows[1][-1] + 1), slice(left, columns[1][-1] + 1)
             shown = room[box]
-            foreign = None if owner is None else owner[box] != number
-            if foreign is not None and foreign.any() and not foreign.all():
+            foreign = np.zeros(shown.shape[:2], bool) if owner is None else owner[box] != number
+            if owner is not None and foreign.all() and (owner == number).any():
+                # Too narrow for a texel of its own: what the object shows elsewhere.
+                shown = np.broadcast_to(room[owner == number].mean(0), shown.shape)
+            elif foreign.any() and not foreign.all():
                 shown = shown[tuple(distance_transform_edt(foreign, return_distances=False, return_indices=True))]
             rows, columns = (
                 (low - start, high - start, share) for (low, high, share), start in ((rows, bottom), (columns, left))
