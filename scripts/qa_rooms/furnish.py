@@ -112,7 +112,7 @@ class FurnishedRoom:
         x, y, _ = self.size
         edge = times * max(x, y)
         corner = (x / 2 - edge / 2, y / 2 - edge / 2, -0.3)
-        self.add("ground", [grid(corner, (edge, 0, 0), (0, edge, 0), 40, 40)], self.matt(0.25, 0.24, 0.18))
+        self.add("ground", [grid(corner, (edge, 0, 0), (0, edge, 0), 40, 40)], self.diffuse(0.25, 0.24, 0.18))
 
     def window_frame(self, finish: Finish) -> None:
         """A frame of bars around and across each window."""

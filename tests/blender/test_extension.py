@@ -114,7 +114,7 @@ def test_content(archive, root):
         names = content.namelist()
         manifest = tomllib.loads(content.read("blender_manifest.toml").decode())
     code = [name for name in names if not name.endswith(".whl")]
-    assert {"__init__.py", "LICENSE", "addon/cli/__init__.py", "operators/recover/recover.py"} <= set(code)
+    assert {"__init__.py", "LICENSE", "addon/cli/__init__.py", "operators/recover/stages.py"} <= set(code)
     assert {name.split("/")[0] for name in code} == {
         "__init__.py",
         "LICENSE",
