@@ -200,6 +200,9 @@ class SparseParams:
     cell : int
         Edge of a cell in elements. In those that a ray met, and the ones beside them, lies 99.7 % of what a kitchen's
         frames observed three times and more; together they hold 1.2 times the elements that were observed.
+    coarse : int
+        Edge in elements of the cells that stand for what no frame saw. With 8 the light beside a ceiling lamp that no
+        frame sees came out wrong, and the lamp at .68 of its radiance; with 2 at .93, without such cells at .90.
     block : int
         Edge in texels of what shows one element: between the centres of four texels a lookup stays within them.
     angle : float
@@ -220,6 +223,7 @@ class SparseParams:
     """
 
     cell: int = 8
+    coarse: int = 2
     block: int = 2
     angle: float = 0.02
     fine: float = 0.5

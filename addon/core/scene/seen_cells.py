@@ -100,9 +100,9 @@ class SeenCells:
     def coarse_edge(self, position: np.ndarray, coarser: np.ndarray | float = 1.0) -> np.ndarray:
         """Edge of the coarse cell around points ((n, 3) float), (n,) float64, metres."""
         away = np.maximum(np.maximum(self._low - position, position - self._high), 0)
-        far = SPARSE.angle * np.sqrt(np.einsum("ij,ij->i", away, away))
+        far = SPARSE.angle * np.sqrt(np.einsum("ij,ij->i", away, away)) / self._edge
         # Steps of two: cells of neighbouring places are mostly of one size.
-        return self._edge * np.exp2(np.ceil(np.log2(coarser * np.maximum(far / self._edge, 1)) - 1e-9))
+        return self._edge * np.exp2(np.ceil(np.log2(coarser * np.maximum(far, SPARSE.coarse / SPARSE.cell)) - 1e-9))
 
     def coarse(self, position: np.ndarray, triangle: np.ndarray, coarser: np.ndarray | float = 1.0) -> np.ndarray:
         """Number of the coarse cell of each point ((n, 3) float, of triangles (n,) int), (n,) uint64.

@@ -87,7 +87,7 @@ class Sparse:
         small = np.flatnonzero(self._small[chosen])
         middle = self._middle[chosen[small]]
         number = self._cells.coarse(
-            middle, chosen[small], np.where(self._seen[chosen[small]], 1 / SPARSE.cell, coarser)
+            middle, chosen[small], np.where(self._seen[chosen[small]], 1 / SPARSE.coarse, coarser)
         )
         names, first, cell = np.unique(number, return_index=True, return_inverse=True)
         cell = cell.ravel()

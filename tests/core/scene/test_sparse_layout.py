@@ -121,7 +121,7 @@ def test_what_frames_see_keeps_an_element_for_each_texel():
     seen = np.isin(every.atlas.texel, merged.atlas.texel)
     hidden = every.atlas.object_id >= 9
     assert seen[~hidden & (every.atlas.object_id != 1)].mean() > 0.8
-    assert (merged.atlas.object_id >= 9).sum() < hidden.sum() / 20
+    assert (merged.atlas.object_id >= 9).sum() < hidden.sum() / 5
     # Each texel shows an element of its object within its cell.
     shown = merged.atlas.padding[every.atlas.texel]
     np.testing.assert_array_equal(merged.atlas.object_id[shown], every.atlas.object_id)
