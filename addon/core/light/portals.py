@@ -135,13 +135,13 @@ def find_portals(field: LightField, seed: int = 0) -> Portals | None:
     out = np.flatnonzero(field.scene.intersect(origins, directions).triangle < 0)
     light = field.environment(directions[out]) @ LUMINANCE
     out, light = out[light > 0], light[light > 0]
-    if len(out) < GATHER.least_escaped:
-        return None
     margin = np.float32(2 * field.scene.offset)
     low, high = (corner.astype(np.float32) for corner in field.room_box)
     low, size = low - margin, high - low + 2 * margin
     inside = within(low, size, origins[out])
     out, light = out[inside], light[inside]
+    if len(out) < GATHER.least_escaped:
+        return None
     cell, _, _ = _exits(low, size, origins[out], directions[out])
     chance = np.bincount(cell, light.astype(np.float64), 6 * GATHER.cells**2)
     side = np.repeat(np.arange(3), 2 * GATHER.cells**2)
