@@ -51,7 +51,9 @@ def small_views(
     return views
 
 
-def sees(camera: Camera, points: np.ndarray, scene: RayScene, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+def sees(
+    camera: Camera, points: np.ndarray, scene: RayScene, margin: float = 0.0, slack: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     """Which points of the mesh a camera sees, none of its triangles before them, and at which pixels.
 
     Parameters
@@ -59,6 +61,8 @@ def sees(camera: Camera, points: np.ndarray, scene: RayScene, margin: float = 0.
     points : (n, 3) float64
     margin : float
         Pixels along the picture's edges that don't count.
+    slack : float
+        Share of the distance within which triangles before a point don't hide it: those of a noisy mesh.
 
     Returns
     -------
@@ -72,8 +76,9 @@ def sees(camera: Camera, points: np.ndarray, scene: RayScene, margin: float = 0.
     away = camera.centre - points[which]
     distance = np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-12)
     away /= distance
-    origins = points[which] + away * (4 * scene.offset)
-    free = ~scene.occluded(*(np.asarray(a, np.float32) for a in (origins, away, distance[:, 0] - 8 * scene.offset)))
+    origins = points[which] + away * (4 * scene.offset + slack * distance)
+    reach = (1 - slack) * distance[:, 0] - 8 * scene.offset
+    free = ~scene.occluded(*(np.asarray(a, np.float32) for a in (origins, away, reach)))
     return which[free], pixels[which[free]]
 
 

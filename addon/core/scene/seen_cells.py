@@ -42,7 +42,7 @@ class SeenCells:
 
     def __init__(self, mesh: Mesh, scene: RayScene, cameras: Sequence[Camera], texel: float, threads: int = 0):
         self._edge = SPARSE.cell * texel
-        normal, _ = triangle_geometry(mesh)
+        normal, area = triangle_geometry(mesh)
         side = 2 * np.abs(normal).argmax(1)
         side += np.take_along_axis(normal, (side // 2)[:, None], 1)[:, 0] > 0
         self._label = (mesh.object_id.astype(np.int64) * 6 + side) * 2
@@ -51,7 +51,6 @@ class SeenCells:
         centres = np.array([camera.centre for camera in cameras])
         self._low, self._high = centres.min(0), centres.max(0)
 
-        _, area = triangle_geometry(mesh)
         large = np.sqrt(area) > SPARSE.large * texel
 
         def look(camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter, maximum_filter, minimum_filter
 
+from ...agreement.views import sees
 from ...parallel import ordered_map
 from ...progress import Progress, Rounds
+from ...scene.elements import triangle_geometry
 from ...scene.model import Frame, Mesh, Pixels
 from ...scene.rays import RayScene
 from .params import CalibrationParams
@@ -82,9 +84,7 @@ def _places(
     """World positions and unit normals, (n, 3) each, of first hits through random pixels."""
     rng = np.random.default_rng(seed)
     each = max(params.points // len(frames), params.least_points)
-    corner = mesh.vertices[mesh.triangles]
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    normal, _ = triangle_geometry(mesh)
     places, normals = [], []
     for frame in frames:
         camera = frame.camera
@@ -117,18 +117,11 @@ def _in_frame(
     flat &= code.min(-1) >= params.darkest
 
     towards = camera.centre - places
-    distance = np.linalg.norm(towards, axis=1)
-    towards /= np.maximum(distance, 1e-30)[:, None]
-    at, depth = camera.project(places)
-    edge = params.around // 2
-    inside = (depth > 0) & (at >= edge).all(1) & (at < (camera.width - edge, camera.height - edge)).all(1)
-    own = np.flatnonzero(inside & (np.einsum("ij,ij->i", towards, normals) > params.grazing))
-    column, row = at[own].astype(int).T
-    own, column, row = (one[flat[row, column]] for one in (own, column, row))
-    origin = np.broadcast_to(np.float32(camera.centre), (len(own), 3))
-    reach = ((1 - params.behind) * distance[own] - scene.offset).astype(np.float32)
-    clear = ~scene.occluded(origin, (-towards[own]).astype(np.float32), reach)
-    own, column, row = own[clear], column[clear], row[clear]
-    offset = (at[own] - (camera.cx, camera.cy)) / (camera.fx, camera.fy)
-    r2 = np.square(offset).sum(1)
+    cosine = np.einsum("ij,ij->i", towards, normals) / np.maximum(np.linalg.norm(towards, axis=1), 1e-30)
+    own = np.flatnonzero(cosine > params.grazing)
+    which, at = sees(camera, places[own], scene, params.around // 2, params.behind)
+    column, row = at.astype(int).T
+    kept = flat[row, column]
+    own, at, column, row = own[which[kept]], at[kept], column[kept], row[kept]
+    r2 = np.square((at - (camera.cx, camera.cy)) / (camera.fx, camera.fy)).sum(1)
     return CodeObservations(own, np.full(len(own), index), r2, code[row, column].astype(np.float64))
