@@ -23,6 +23,7 @@ from ..core.io.read import read_capture
 from ..core.memory import peak_memory
 from ..core.passes.registry import PASSES, check, stage_of
 from ..core.pipeline.recover import Recovery
+from ..core.pipeline.stages import code
 from ..core.progress import Progress
 from ..core.results.store import Store
 from ..core.settings import PRESETS, Settings
@@ -138,7 +139,7 @@ def run_ablation(asked: Ablation, tell: Callable[[str], None] = lambda text: Non
             for name in todo:
                 if asked.over:
                     break
-                line = bench.run(name)
+                line = bench.run(name) | {"code": code()}
                 with open(path, "a", encoding="utf-8") as file:
                     file.write(json.dumps(line) + "\n")
                 tell(_told(line))

@@ -65,12 +65,25 @@ class Gain:
         Mean over the seeds.
     mean : float
     error : float or None
-        Standard error of the mean by the seeds alone; None where no room in which the pass acts has two seeds.
+        Standard error of the mean by the seeds alone; where no room in which the pass acts has two seeds, by the rooms,
+        whose deviation holds that of the seeds. None for one room and seed.
     """
 
     by_room: dict[str, float]
     mean: float
     error: float | None
+
+    @property
+    def leave_one_out(self) -> tuple[float, float] | None:
+        """Least and greatest mean over all rooms but one; None with a single room.
+
+        A verdict whose sign changes here was taken by one room.
+        """
+        count = len(self.by_room)
+        if count < 2:
+            return None
+        means = [(self.mean * count - gain) / (count - 1) for gain in self.by_room.values()]
+        return min(means), max(means)
 
 
 def gain_of(figure: Figure, name: str, runs: Mapping[tuple, Line]) -> Gain | None:
@@ -99,6 +112,8 @@ def gain_of(figure: Figure, name: str, runs: Mapping[tuple, Line]) -> Gain | Non
     if repeated:
         variance = float(np.mean([np.var(gains, ddof=1) for gains in repeated]))
         error = float(np.sqrt(variance * sum(1 / len(gains) for gains in acting))) / len(pairs)
+    elif len(by_room) > 1:
+        error = float(np.std(list(by_room.values()), ddof=1) / np.sqrt(len(by_room)))
     return Gain(by_room, float(np.mean(list(by_room.values()))), error)
 
 
@@ -141,6 +156,7 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None) -> str:
     known = {one.name for one in PASSES}
     gone = sorted({name for _, _, name in runs if name not in known and name != WHOLE})
     presets = sorted({preset for _, preset in rooms})
+    codes = sorted({str(line["code"]) for line in runs.values() if "code" in line})
     lines = [
         "# What each pass gains",
         "",
@@ -148,24 +164,27 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None) -> str:
         "benchmark ablation ROOM ... --out DIR`; this page is `scan-relight benchmark ablation --out DIR --table "
         "docs/ablation.md`.",
         "A gain is the whole method's figure less the figure without the pass, under the same seed: above 0 the pass "
-        "helps. After the sign ± is the standard error of the mean over the rooms by the seeds alone; rooms differ by "
-        "more, as worst and best room show. Albedo: PSNR of Base Color over held-out views. Re-render: PSNR of those "
-        "views in display values, predicted from albedo, irradiance and lobes without a renderer; the plain quotient "
-        "gives L_d back whatever E is, so what corrects the albedo alone can lower it. Roughness: mean "
-        "absolute error of the square root of alpha. Seconds: processor time of the stages that were done again. The "
-        "verdict names the figures in which the gain is more than twice its standard error, either way. Where one "
-        "object is taken for another kind of matter, all figures jump: gains of a single seed say little.",
+        "helps. After the sign ± is the standard error of the mean over the rooms by the seeds alone (by the rooms "
+        "where there is one seed); rooms differ by more, as worst and best room show. Albedo: PSNR of Base Color over "
+        "held-out views. Re-render: PSNR of those views in display values, predicted from albedo, irradiance and lobes "
+        "without a renderer; the plain quotient gives L_d back whatever E is, so what corrects the albedo alone can "
+        "lower it. Roughness: mean absolute error of the square root of alpha. Seconds: processor time of the stages "
+        "that were done again. The verdict names the figures in which the gain is more than twice its standard error, "
+        "either way, and its sign stays whichever room is left out. Where one object is taken for another kind of "
+        "matter, all figures jump: gains of a single seed say little.",
         "",
         "What parts of the mesh denoising gain on meshes with known noise: "
         "[benchmark/mesh_denoising.md](benchmark/mesh_denoising.md) (`scripts/measure_denoising.py`).",
         "",
         f"Rooms ({', '.join(presets)} preset): {', '.join(_room(one) for one in rooms)}. "
-        f"Seeds: {', '.join(str(seed) for seed in sorted({seed for _, seed, _ in runs}))}.",
+        f"Seeds: {', '.join(str(seed) for seed in sorted({seed for _, seed, _ in runs}))}. "
+        f"Source of the stages (`code` in report.json): {', '.join(codes) or 'not recorded'}.",
         "",
     ]
     if image:
         lines += [f"![Gain of albedo against seconds]({image})", ""]
-    columns = ["pass", "rooms", *(f.column for f in FIGURES), "worst room, dB", "best room, dB", "seconds", "verdict"]
+    columns = ["pass", "rooms", *(f.column for f in FIGURES), "worst room, dB", "best room, dB"]
+    columns += ["leave one room out, dB", "seconds", "verdict"]
     lines += ["## All rooms together", "", *_table(columns, [_summary(one.name, runs) for one in acting]), ""]
     head = ["pass", *(_room(room) for room in rooms)]
     lines += ["## Albedo by room, dB", "", *_table(head, [_by_room(one, rooms, runs) for one in acting]), ""]
@@ -214,7 +233,9 @@ def _summary(name: str, runs: Mapping[tuple, Line]) -> list[str]:
         cells.append("" if gain is None else _signed(gain.mean, figure.digits, gain.error))
     of = {room for room, _, left_out in runs if left_out == name}
     acts = {room for (room, _, left_out), line in runs.items() if left_out == name and not line["same"]}
-    by_room = getattr(gain_of(ALBEDO, name, runs), "by_room", None) or {}
+    albedo = gain_of(ALBEDO, name, runs)
+    by_room = albedo.by_room if albedo is not None else {}
+    left_out = albedo.leave_one_out if albedo is not None else None
     ends: list[Callable] = [min, max]
     extremes = [f"{_signed(end(by_room.values()))} {_room(end(by_room, key=by_room.get))}" for end in ends if by_room]
     return [
@@ -222,25 +243,30 @@ def _summary(name: str, runs: Mapping[tuple, Line]) -> list[str]:
         f"{len(acts)} of {len(of)}",
         *cells,
         *(extremes or ["", ""]),
+        "" if left_out is None else " to ".join(_signed(end) for end in left_out),
         _seconds(name, runs),
         _verdict(name, runs),
     ]
 
 
 def _verdict(name: str, runs: Mapping[tuple, Line]) -> str:
-    """The figures in which a pass gains or costs more than twice the standard error."""
+    """The figures in which a pass gains or costs more than twice the standard error, whichever room is left out."""
     gains = {figure.name: gain_of(figure, name, runs) for figure in FIGURES}
     known = {key: gain for key, gain in gains.items() if gain is not None and gain.error is not None}
     if not known:
-        return "one seed: open"
-    better = [key for key, gain in known.items() if gain.mean > 2 * gain.error + 1e-9]
-    worse = [key for key, gain in known.items() if gain.mean < -2 * gain.error - 1e-9]
+        return "one run: open"
+    better = [key for key, gain in known.items() if min(_ends(gain)) >= 0 and gain.mean > 2 * gain.error + 1e-9]
+    worse = [key for key, gain in known.items() if max(_ends(gain)) <= 0 and gain.mean < -2 * gain.error - 1e-9]
     words = [
         f"{verb} {', '.join(SHORT[key] for key in some)}"
         for verb, some in (("gains", better), ("costs", worse))
         if some
     ]
     return "; ".join(words) or "open"
+
+
+def _ends(gain: Gain) -> tuple[float, float]:
+    return gain.leave_one_out or (gain.mean, gain.mean)
 
 
 def _by_room(one: Pass, rooms: Sequence[tuple[str, str]], runs: Mapping[tuple, Line]) -> list[str]:

@@ -124,10 +124,21 @@ def test_gains_and_their_error(tmp_path):
     text = (tmp_path / "table.md").read_text()
     row = next(one for one in text.splitlines() if one.startswith("| sun | 2 of 2"))
     assert row.endswith("| open |") and "+1.00 ± 0.87" in row and "-1.00 b" in row and "+3.00 a" in row
+    assert "| -1.00 to +3.00 |" in row  # over b alone, over a alone
     assert "Taken out" not in text
     (tmp_path / "ablation-three.jsonl").write_text(json.dumps(line("a", 0, "moonlight", 29.5, 0.1, {})))
     write_report(tmp_path, tmp_path / "table.md")
     _, _, gone = (tmp_path / "table.md").read_text().partition("## Taken out of the method since")
     assert "| moonlight | 1 of 1 | +0.50 |" in gone
+    # With one seed the rooms' deviation counts: gains of 2 and -1.
+    first = {key: one for key, one in runs.items() if key[1] == 0}
+    assert np.isclose(gain_of(FIGURES[0], "sun", first).error, np.std([2, -1], ddof=1) / np.sqrt(2))
+    # A gain that one room makes is no verdict, however small its error.
+    steady = [line(room, seed, name, 30 - (name == "sun") * gain, 0.1, {}) for room, gain in (("a", 9), ("b", -1))
+              for seed in (0, 1) for name in ("", "sun")]  # fmt: skip
+    (tmp_path / "steady").mkdir()
+    (tmp_path / "steady" / "ablation.jsonl").write_text("\n".join(json.dumps(one) for one in steady))
+    write_report(tmp_path / "steady", tmp_path / "table.md")
+    assert "| +4.00 ± 0.00 |" in (text := (tmp_path / "table.md").read_text()) and "gains albedo" not in text
     with pytest.raises(BadInputError, match="no runs"):
         write_report(tmp_path / "empty", tmp_path / "other.md")
