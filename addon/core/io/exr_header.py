@@ -25,6 +25,8 @@ MAX_RATIO: Limit[int] = 5000
 """No compression of OpenEXR makes a picture smaller than this; more claims a size that the file can't hold."""
 FREE_BYTES: Limit[int] = 1 << 26
 """Below this many bytes of pixels the ratio is not looked at."""
+MAX_BYTES: Limit[int] = 1 << 31
+"""Of the pixels of all channels and parts: the library decodes every one of them, whichever is asked for."""
 HEADER_BYTES: Limit[tuple[int, int]] = (1 << 18, 1 << 24)
 """How much is read in search of the header's end, and how much where the first did not hold it."""
 LINES_PER_CHUNK = {0: 1, 1: 1, 2: 1, 3: 16, 4: 32, 5: 16, 6: 32, 7: 32, 8: 32, 9: 256, 10: 256, 11: 32, 12: 256, 13: 1}
@@ -154,6 +156,8 @@ def _parse(head: bytes, size: int) -> tuple[tuple[ExrHeader, ...], int, list[_Ch
         bytes_in_all += width * height * pixel_bytes
         if bytes_in_all > max(FREE_BYTES, MAX_RATIO * size):
             raise _Damaged(f"claims {width} x {height} pixels, more than its {size} bytes can hold")
+        if bytes_in_all > MAX_BYTES:
+            raise _Damaged(f"holds over {MAX_BYTES >> 30} GiB of pixels in all its channels, more than is read")
         headers.append(header)
         tiled = flags & TILED if not flags & MULTIPART else part.get("type", b"").startswith(b"tiled")
         largest, count = _tile_count(part, width, height, pixel_bytes) if tiled else _strip_count(part, height)

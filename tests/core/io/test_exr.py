@@ -41,6 +41,16 @@ def test_what_is_written_is_read(tmp_path, shape, half):
     assert read_header(tmp_path / "a.exr") == (70, 40)
 
 
+def test_a_file_of_more_channels_than_memory_should_hold_is_refused_by_its_header(tmp_path):
+    path = tmp_path / "a.exr"
+    write_with_library(path, {f"layer{i}.{c}": np.zeros((16, 16), np.float32) for i in range(12) for c in "RGB"})
+    small, large = (struct.pack("<4i", 0, 0, size - 1, size - 1) for size in (16, 8192))
+    # As long as a well packed file of that size could be.
+    path.write_bytes(path.read_bytes().replace(small, large) + bytes(1 << 22))
+    with pytest.raises(BadInputError, match="over 2 GiB of pixels in all its channels"):
+        read_header(path)
+
+
 def test_half_holds_large_values_and_keeps_inf_and_nan(tmp_path):
     write_exr(tmp_path / "a.exr", np.array([[1e9, np.inf, np.nan, -1e9]]), half=True)
     np.testing.assert_array_equal(read_exr(tmp_path / "a.exr").rgb[0, :, 0], [HALF_MAX, np.inf, np.nan, -HALF_MAX])
