@@ -17,8 +17,9 @@ class SunParams:
     ----------
     reached : float
         Least share of what stands out that a direction must reach.
-    kept, tried : int
-        Directions of the grid of which the whole sample is asked, and that are then refined.
+    kept, refined, tried : int
+        Directions of the grid of which the whole sample is asked; of these, those that are refined on it; and then on
+        the elements around what stands out.
     pool : int
         Elements, at most, that these are drawn from.
     near, dense : float, int
@@ -37,6 +38,7 @@ class SunParams:
 
     reached: float = 0.05
     kept: int = 160
+    refined: int = 24
     tried: int = 4
     pool: int = 60_000
     near: float = 0.3

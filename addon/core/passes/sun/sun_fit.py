@@ -59,11 +59,18 @@ def _on_grid(even: Spots, environment: Environment) -> list[Guess]:
     reached = np.bincount(ray[~hidden], weight[spot[~hidden]], len(way)) / max(weight.sum(), 1e-9)
     best = np.argsort(-reached, kind="stable")[: SUN.kept]
     guesses = [even.explained(way[k]) for k in best if reached[k] > SUN.reached]
+    # A patch may be narrower than the grid is wide, and the guess beside the sun then no better than any other.
+    refined = [_searched(even.explained, one, SHARP[:2]) for one in _apart(guesses)[: SUN.refined]]
+    return _apart(refined)[: SUN.tried]
+
+
+def _apart(guesses: list[Guess]) -> list[Guess]:
+    """The guesses that have none better within 1.5 `GRID`, the best first."""
     chosen: list[Guess] = []
     for guess in sorted(guesses, key=lambda one: one.cost):
         if all(guess.direction @ one.direction < np.cos(1.5 * GRID) for one in chosen):
             chosen.append(guess)
-    return chosen[: SUN.tried]
+    return chosen
 
 
 def _searched(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np.ndarray) -> Guess:
