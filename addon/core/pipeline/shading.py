@@ -147,8 +147,7 @@ def shade(
     told = lit_diffuse.seen | np.isin(atlas.object_id, list(emitters))
     E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
     if not told.all() and "unseen-surfaces" not in without:
-        follow_shades = "shades" not in without
-        field, E, escaped = with_unseen_surfaces(field, told, lit_diffuse, instances, emitters, follow_shades, **how)
+        field, E, escaped = with_unseen_surfaces(field, told, lit_diffuse, instances, emitters, **how)
     lit, unsure = np.flatnonzero(told), np.zeros(len(atlas), np.float32)
     E[lit], escaped[lit], points, unsure[lit] = irradiance(
         field, lit, rays=rays,

@@ -6,14 +6,11 @@ from functools import partial
 
 import numpy as np
 
-from ..light.few_elements import evened
 from ..light.field import LightField
 from ..light.over_surface import RayCounts, irradiance
 from ..light.params import GATHER
 from ..passes.albedo.albedo import fill, quotient
-from ..passes.albedo.params import MAX_ALBEDO, UNSEEN_PRIOR
-from ..passes.unseen_light.params import SHADES
-from ..passes.unseen_light.shades import strongly_lit
+from ..passes.albedo.params import UNSEEN_PRIOR
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance
 
@@ -26,7 +23,6 @@ def with_unseen_surfaces(
     lit_diffuse: LitDiffuse,
     instances: tuple[Instance, ...],
     emitters: set[int],
-    follow_shades: bool,
     *,
     finest: float,
     smooth: bool,
@@ -43,8 +39,6 @@ def with_unseen_surfaces(
         Elements whose radiance is known; some are not.
     emitters : set of int
         Objects that are lamps.
-    follow_shades : bool
-        Follow the light to and fro inside of what is lit strongly.
     finest, smooth, threads, seed
         Of `irradiance`.
 
@@ -68,19 +62,4 @@ def with_unseen_surfaces(
     guess = fill(atlas, rho, valid, classes, emitters, params=UNSEEN_PRIOR).rho
     radiance = field.radiance.copy()
     radiance[dark] = guess[dark] * E[dark] / np.float32(np.pi)
-    field = field.with_light(radiance)
-    seen_as = evened(field)[dark]
-    for _ in range(SHADES.bounces - 1 if follow_shades else 0):
-        shades = strongly_lit(atlas, dark, field.radiance[dark], seen_as)
-        if not shades:
-            break
-        radiance = field.radiance.copy()
-        for own in shades:
-            E[own] = rough(field, own, finest=finest)[0]
-            rho, valid = quotient(lit_diffuse.radiance[own], E[own])
-            seen = lit_diffuse.seen[own]
-            known = valid & seen
-            paint = np.clip(np.median(rho[known], 0), 0, MAX_ALBEDO) if known.any() else guess[own]
-            radiance[own] = np.where(seen[:, None], radiance[own], paint * E[own] / np.float32(np.pi))
-        field = field.with_light(radiance)
-    return field, E, escaped
+    return field.with_light(radiance), E, escaped

@@ -17,7 +17,6 @@ from ...light.few_elements import contribution_of_object, irradiance_at
 from ...light.field import LightField
 from ...light.lamps import Lamp
 from ...luminance import LUMINANCE
-from ...scene.atlas import Atlas
 from ...significance import LEVELS
 from .params import SHADES
 
@@ -68,21 +67,3 @@ def by_way_of_shade(
         sent = rho * (from_lamp + from_shade)[closest] / np.pi
     strong = sent > enough
     return irradiance_at(with_only(near[strong], sent[strong]), element, seed)[:, 0]
-
-
-def strongly_lit(atlas: Atlas, dark: np.ndarray, sent: np.ndarray, seen_as: np.ndarray) -> list[np.ndarray]:
-    """Elements, seen or not, of each object's side that light makes strong where nobody saw it.
-
-    Parameters
-    ----------
-    dark : (d,) int
-        Elements that nobody saw.
-    sent, seen_as : (d, 3) float32
-        Radiance that they are found to send, and what was seen of their object; 0: nothing was, the room stands in.
-    """
-    level = seen_as @ LUMINANCE
-    level = np.where(level > 0, level, np.median(level[level > 0]) if level.any() else np.inf)
-    side = atlas.side
-    strong = sent @ LUMINANCE > SHADES.strongly * level
-    of_all, of_strong = (np.bincount(side[dark], weight, side.max() + 1) for weight in (None, strong))
-    return [np.flatnonzero(side == one) for one in np.flatnonzero(of_strong > np.maximum(of_all / 2, LEVELS.enough))]

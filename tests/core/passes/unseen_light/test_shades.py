@@ -7,7 +7,7 @@ import pytest
 
 from addon.core.light.few_elements import contribution_of_object, evened
 from addon.core.light.lamps import Lamp
-from addon.core.passes.unseen_light.shades import by_way_of_shade, strongly_lit
+from addon.core.passes.unseen_light.shades import by_way_of_shade
 from tests.core.rooms import lit_box, make_room, radiosity
 
 FLOOR, LAMP, PAPER, DIM = 0, 6, 0.4, 1e-3
@@ -53,20 +53,3 @@ def test_a_dim_lamp_adds_nothing_to_what_is_taken_for_seen(shade, floor):
     half[(shade.atlas.position[:, 2] < 1.2) & (shade.atlas.object_id != FLOOR)] = 0
     assert not contribution(shade, floor, half, brightness=0.5).any()
     assert contribution(shade, floor, half, brightness=50.0).any()
-
-
-def test_sides_that_are_strongly_lit(shade):
-    dark = np.flatnonzero(shade.atlas.object_id != FLOOR)
-    sent = shade.by_object({1: 0.5, 2: 0.1})[dark]
-    seen_as = np.full_like(sent, 0.1)
-    (found,) = strongly_lit(shade.atlas, dark, sent, seen_as)
-    assert (shade.atlas.object_id[found] == 1).all()
-
-
-def test_what_nobody_saw_is_judged_by_the_room(shade):
-    """Another room, dark or not, is no shade; a lamp's globe that no frame sees is."""
-    dark = np.flatnonzero(shade.atlas.object_id != FLOOR)
-    seen_as = shade.by_object({i: 0.1 for i in range(2, 7)})[dark]  # of object 1 nothing was seen
-    assert not strongly_lit(shade.atlas, dark, shade.by_object({1: 0.2})[dark], seen_as)
-    assert len(strongly_lit(shade.atlas, dark, shade.by_object({1: 0.5})[dark], seen_as)) == 1
-    assert not strongly_lit(shade.atlas, dark, shade.by_object({1: 0.5})[dark], np.zeros_like(seen_as))
