@@ -62,6 +62,7 @@ def accumulate(
     folder: Path | None = None,
     edge_tier: bool = True,
     only: np.ndarray | None = None,
+    change: Callable[[Frame, FrameView, Pixels], Pixels] | None = None,
     also: Callable[[int, FrameView, Pixels, Observations], None] | None = None,
     progress: Progress | Rounds | None = None,
 ) -> LitDiffuse:
@@ -81,6 +82,8 @@ def accumulate(
         Observations at depth edges count only where there are too few others.
     only : (n,) bool, optional
         Elements to ask for; all where not given.
+    change : callable, optional
+        Makes a frame's pixels what is to be projected, once it is known what they show.
     also : callable, optional
         Called with each frame's index, view, pixels and observations, in this thread: others who want to see them.
 
@@ -100,6 +103,7 @@ def accumulate(
         frame = frames[index]
         pixels = read(frame)
         view = view_frame(frame.camera, mesh, scene, normal)
+        pixels = pixels if change is None else change(frame, view, pixels)
         asked = groups.candidates(view)
         asked = asked if only is None else asked[only[asked]]
         return int(index), view, pixels, observe(view, pixels, atlas, scene, asked)

@@ -36,8 +36,12 @@ class FrameView:
     Attributes
     ----------
     camera : Camera
+    rays : (3, height, width) float32
+        Unit directions through the pixels' centres, world; nonsense where no ray leads to the pixel.
     triangle : (height, width) int32
         First triangle along the pixel's ray; -1 where the ray leaves the mesh, or no ray leads to the pixel.
+    u, v : (height, width) float32
+        Where on it: barycentric coordinates of the second and third corner.
     distance : (height, width) float32
         Along the ray, metres.
     object_id : (height, width) int32
@@ -48,7 +52,10 @@ class FrameView:
     """
 
     camera: Camera
+    rays: np.ndarray
     triangle: np.ndarray
+    u: np.ndarray
+    v: np.ndarray
     distance: np.ndarray
     object_id: np.ndarray
     clean: np.ndarray
@@ -126,7 +133,8 @@ def view_frame(camera: Camera, mesh: Mesh, scene: RayScene, triangle_normal: np.
     if seen is not None:
         clean &= seen
         object_id[~seen] = -1
-    return FrameView(camera, triangle.reshape(height, width), distance, object_id, clean)
+    triangle, u, v = (part.reshape(height, width) for part in (triangle, hits.u, hits.v))
+    return FrameView(camera, rays, triangle, u, v, distance, object_id, clean)
 
 
 def _projected(camera: Camera, away: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -26,8 +26,9 @@ from ...light.field import LightField
 from ...light.lobes import GRID, reflected_light
 from ...lit_diffuse.accumulate import accumulate
 from ...scene.lit_diffuse import LitDiffuse
-from ...scene.model import Camera, Frame, Pixels
-from ...scene.visibility import SATURATED
+from ...scene.model import Frame, Pixels
+from ...scene.rays import Hits
+from ...scene.visibility import SATURATED, FrameView
 from .params import REMOVAL, RemovalParams
 
 NO_OBJECT: Code[int] = -1
@@ -78,24 +79,21 @@ class SpecularPart:
             lobe = max(float(m.alpha), float(GRID[0])), float(np.mean(m.f0)), m.model.microfacets
             self._lobes[m.object_id] = lobe
 
-    def __call__(self, camera: Camera, seed: int) -> np.ndarray:
-        """I_nd as a camera sees it, (height, width, 3) float32; 0 where there is no lobe."""
+    def __call__(self, view: FrameView, seed: int) -> np.ndarray:
+        """I_nd as a frame sees it, (height, width, 3) float32; 0 where there is no lobe."""
         field = self._field
-        directions, led = camera.rays(camera.pixel_centres())
-        origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
-        hits = field.scene.intersect(origins, directions)
-        element = np.where(led, field.elements(hits), -1)
+        element = field.elements(Hits(*(x.ravel() for x in (view.triangle, view.u, view.v, view.distance))))
         shown = np.where(element >= 0, field.atlas.object_id[element], NO_OBJECT)
-        part = np.zeros((len(element), 3), np.float32)
+        rays, part = view.rays.reshape(3, -1), np.zeros((len(element), 3), np.float32)
         for object_id in self._lobes.keys() & set(np.unique(shown).tolist()):
             # Each object has rays of its own, so that its part is the same whichever others are asked for.
             (alpha, f0, microfacets), at = self._lobes[object_id], np.flatnonzero(shown == object_id)
             light = reflected_light(
-                field, self._bright, element[at], -directions[at], rays=self._rays, grid=np.array([alpha], np.float32),
+                field, self._bright, element[at], -rays[:, at].T, rays=self._rays, grid=np.array([alpha], np.float32),
                 proposals=(alpha,), microfacets=microfacets, threads=1, seed=self._seed + seed + object_id,
             )  # fmt: skip
             part[at] = f0 * light.A[:, 0] + light.B[:, 0]
-        shape = camera.height, camera.width
+        shape = view.triangle.shape
         return self._shared(part.reshape(*shape, 3), shown.reshape(shape))
 
     def _shared(self, part: np.ndarray, owner: np.ndarray) -> np.ndarray:
@@ -151,14 +149,13 @@ def without_specular(
         From a progress.
     """
 
-    def rest(frame: Frame) -> Pixels:
-        pixels = read(frame)
-        specular = part(frame.camera, zlib.crc32(frame.name.encode()) & 0xFFFFFF)
+    def rest(frame: Frame, view: FrameView, pixels: Pixels) -> Pixels:
+        specular = part(view, zlib.crc32(frame.name.encode()) & 0xFFFFFF)
         left = pixels.radiance - specular
         hidden = specular.sum(-1) > params.most * left.sum(-1)
         return replace(pixels, radiance=left, saturated=pixels.saturated | hidden)
 
-    found = accumulate(field.mesh, field.atlas, field.scene, frames, rest, only=own, **how)
+    found = accumulate(field.mesh, field.atlas, field.scene, frames, read, only=own, change=rest, **how)
     told = own & lit.seen & found.seen
     radiance = np.nan_to_num(lit.radiance)
     specular = np.where(told[:, None], radiance - np.maximum(np.nan_to_num(found.radiance), 0), 0).astype(np.float32)
