@@ -88,10 +88,11 @@ def aimed_at(
     -------
     (m,) int, (m,) float32
     """
-    density = bright.density[hits.triangle]  # of an escaped ray that of the last triangle; taken out below
+    density = bright.density.take(hits.triangle)  # of an escaped ray that of the last triangle; taken out below
     on = np.flatnonzero((density > 0) & (hits.triangle >= 0))
-    cosine = np.abs(np.einsum("ij,ij->i", directions[on], triangle_normal[hits.triangle[on]]))
-    return on, density[on] * hits.distance[on] ** 2 / np.maximum(cosine, 1e-6)
+    normal = triangle_normal.take(hits.triangle.take(on), 0)
+    cosine = np.abs(np.einsum("ij,ij->i", directions.take(on, 0), normal))
+    return on, density.take(on) * hits.distance.take(on) ** 2 / np.maximum(cosine, 1e-6)
 
 
 def aimed_density(
@@ -142,6 +143,7 @@ def sample_bright(bright: BrightTriangles, cube: np.ndarray) -> BrightPoints:
     index = np.minimum(np.searchsorted(np.cumsum(bright.chance), flat[:, 0]), len(bright) - 1)
     root = np.sqrt(flat[:, 1])
     u, v = root * (1 - flat[:, 2]), root * flat[:, 2]  # uniform over the triangle
-    point = bright.corner[index] + u[:, None] * bright.edge_u[index] + v[:, None] * bright.edge_v[index]
-    triangle = np.flatnonzero(bright.density > 0).astype(np.int32)[index]
-    return BrightPoints(index, triangle, u, v, point, bright.density[triangle])
+    corner, edge_u, edge_v = (part.take(index, 0) for part in (bright.corner, bright.edge_u, bright.edge_v))
+    point = corner + u[:, None] * edge_u + v[:, None] * edge_v
+    triangle = np.flatnonzero(bright.density > 0).astype(np.int32).take(index)
+    return BrightPoints(index, triangle, u, v, point, bright.density.take(triangle))

@@ -134,7 +134,7 @@ class Environment:
 
     def __call__(self, directions: np.ndarray) -> np.ndarray:
         """Radiance from unit `directions` ((n, 3) float32, away from the room): (n, 3) float32."""
-        return self.radiance.reshape(-1, 3)[_bin(directions, self.radiance.shape[0])]
+        return self.radiance.reshape(-1, 3).take(_bin(directions, self.radiance.shape[0]), 0)
 
     def refilled(self, radiance: np.ndarray) -> Environment:
         """The map with another `radiance` where frames saw it; the rest is filled in from that."""

@@ -139,29 +139,30 @@ class LightField:
         """
         radiance = self._sent(hits, element, directions)
         if self.mirrors:
-            seen = np.flatnonzero((self.mirror_of[hits.triangle] >= 0) & (element >= 0))
+            seen = np.flatnonzero((self.mirror_of.take(hits.triangle) >= 0) & (element >= 0))
             if len(seen):
-                radiance[seen] = self._mirrored(hits.part(seen), directions[seen], dark_in_mirrors)
+                radiance[seen] = self._mirrored(hits.part(seen), directions.take(seen, 0), dark_in_mirrors)
         return radiance
 
     def _sent(self, hits: Hits, element: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """L_d at hits, the environment where rays escape; lamps are dark from behind."""
-        radiance = self.radiance[element]
+        radiance = self.radiance.take(element, 0)  # indexing by arrays takes several times as long
         escaped = np.flatnonzero(element < 0)
         if len(escaped):
-            radiance[escaped] = self.environment(directions[escaped])
-        lamp = np.flatnonzero(self.one_sided[hits.triangle] & (element >= 0)) if self._lamps else ()
+            radiance[escaped] = self.environment(directions.take(escaped, 0))
+        lamp = np.flatnonzero(self.one_sided.take(hits.triangle) & (element >= 0)) if self._lamps else ()
         if len(lamp):
-            behind = np.einsum("ij,ij->i", directions[lamp], self.normal[hits.triangle[lamp]]) > 0
+            normal = self.normal.take(hits.triangle.take(lamp), 0)
+            behind = np.einsum("ij,ij->i", directions.take(lamp, 0), normal) > 0
             radiance[lamp[behind]] = 0
         return radiance
 
     def _mirrored(self, hits: Hits, directions: np.ndarray, dark: np.ndarray | None) -> np.ndarray:
         """What a mirror that was hit shows; a second mirror shows its L_d."""
-        a, b, c = (self.mesh.vertices[self.mesh.triangles[hits.triangle, i]] for i in range(3))
+        a, b, c = (self.mesh.vertices.take(corner, 0) for corner in self.mesh.triangles.take(hits.triangle, 0).T)
         u, v = hits.u[:, None], hits.v[:, None]
         turn = ((1 - u - v) * a + u * b + v * c).astype(np.float32)
-        normal = self.normal[hits.triangle]
+        normal = self.normal.take(hits.triangle, 0)
         along = np.einsum("ij,ij->i", directions, normal)[:, None]
         onward = directions - 2 * along * normal
         origins = self.scene.off_surface(turn, -np.sign(along) * normal)
@@ -171,4 +172,4 @@ class LightField:
         if dark is not None:
             radiance[(dark[further.triangle] > 0) & (element >= 0)] = 0
         f0 = np.stack([mirror.f0 for mirror in self.mirrors]).astype(np.float32)
-        return radiance * f0[self.mirror_of[hits.triangle]]
+        return radiance * f0.take(self.mirror_of.take(hits.triangle), 0)

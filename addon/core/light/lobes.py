@@ -165,9 +165,10 @@ def _arriving(room, bright, origin, w, axes, aims) -> tuple[np.ndarray, np.ndarr
     world = np.einsum("amk,amj->mkj", w, axes).reshape(-1, 3)
     above = np.flatnonzero(w[2].ravel() > 1e-4)
     L, density = np.zeros((m * k, 3), np.float32), np.zeros(m * k, np.float32)
-    directions = world[above]
-    hits = room.scene.intersect(origin[above // k], directions)
-    met = (aims[above] == ANY) | (aims[above] == hits.triangle)
+    directions = world.take(above, 0)
+    hits = room.scene.intersect(origin.take(above // k, 0), directions)
+    aims = aims.take(above)
+    met = (aims == ANY) | (aims == hits.triangle)
     L[above] = room.arriving(hits, room.elements(hits), directions) * met[:, None]
     if len(bright):
         density[above] = aimed_density(bright, hits, directions, room.normal)

@@ -272,10 +272,10 @@ class ElementLookup:
     def _texel(self, triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         """The element whose texel the points fall in."""
         size = self._atlas.size
-        m = self._map[triangle]
-        column = (m[:, 0] + u * m[:, 2] + v * m[:, 3]).astype(np.int32)
-        row = (m[:, 1] + u * m[:, 4] + v * m[:, 5]).astype(np.int32)
-        return self._atlas.padding[np.minimum(row, size - 1) * size + np.minimum(column, size - 1)]
+        x, y, x_u, x_v, y_u, y_v = self._map.take(triangle, 0).T
+        column = (x + u * x_u + v * x_v).astype(np.int32)
+        row = (y + u * y_u + v * y_v).astype(np.int32)
+        return self._atlas.padding.take(np.minimum(row, size - 1) * size + np.minimum(column, size - 1))
 
     def __call__(self, triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         """The element at each point, (n,) int32.
@@ -288,7 +288,7 @@ class ElementLookup:
             Barycentric coordinates of the second and third corner.
         """
         element = self._texel(triangle, u, v)
-        close = np.flatnonzero(self._close[triangle])
+        close = np.flatnonzero(self._close.take(triangle))
         other = close[self._atlas.object_id[element[close]] != self._object_id[triangle[close]]]
         element[other] = self._of_triangle[triangle[other]]
         return element

@@ -36,7 +36,7 @@ class Hits:
 
     def part(self, index: np.ndarray) -> Hits:
         """The hits of some of the rays."""
-        return Hits(self.triangle[index], self.u[index], self.v[index], self.distance[index])
+        return Hits(self.triangle.take(index), self.u.take(index), self.v.take(index), self.distance.take(index))
 
 
 class RayScene:
