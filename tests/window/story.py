@@ -6,6 +6,7 @@ The tests play it on a small capture; `scripts/guide_pictures.py` plays it on a 
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from tests.window.driver import Window
@@ -133,8 +134,12 @@ for extra in bpy.context.window_manager.windows[1:]:
             self.window.turn_wheel(x, y, -2 - self._scrolled)  # to its top, where it ends
         self._scrolled = max(row - VISIBLE + 1, 0)
         self.window.turn_wheel(x, y, self._scrolled)
-        self.window.click_at(x, y + ROW * (row - self._scrolled))
-        return self.window.wait_for("getattr(bpy.context.view_layer.objects.active, 'name', '')")
+        active = "getattr(bpy.context.view_layer.objects.active, 'name', '')"
+        for _ in range(3):  # a loaded machine may not have drawn the rows yet
+            self.window.click_at(x, y + ROW * (row - self._scrolled))
+            with suppress(TimeoutError):
+                return self.window.wait_for(active, patience=10)
+        return self.window.wait_for(active)
 
     def choose_in_view(self, name: str) -> None:
         """Click on an object in the 3D view, where it is nearest to the middle of what is seen of it."""
