@@ -11,8 +11,8 @@ import numpy as np
 
 from ..errors import BadInputError, one_line
 from ..kinds import Shown
-from ..scene.connected_parts import connected_parts
 from ..scene.model import Capture, Frame, Mesh
+from ..scene.shape_parts import parts_of
 from ..scene.vote import vote
 from . import instances
 from .brackets import fold, group_brackets, unfold
@@ -92,24 +92,24 @@ def _chosen(frames: list[Frame]) -> list[str]:
 def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str]]:
     """The mesh repaired, with an instance for each of its triangles.
 
-    What tells the objects: the mesh's faces, objects or groups; else pictures of ids; else which parts hang together.
+    What tells the objects: the mesh's faces, objects or groups; else pictures of ids; else its shape.
     """
     raw, warnings = repair(layout.mesh)
     names = layout.names if layout.names is not None else raw.names
     found = raw.object_id
-    if found is None and any(frame.id_path is not None for frame in frames):
+    told = found is not None or any(frame.id_path is not None for frame in frames)
+    if found is None and told:
         found, notes = vote(raw.vertices, raw.triangles, frames, read_ids)
         warnings += notes
     elif found is None:
-        found = connected_parts(raw.vertices, raw.triangles)
-        count = int(found.max()) + 1
-        names = {i: f"part_{i}" for i in range(count)} if count > 1 else {0: "room"}
+        found, names = parts_of(raw.vertices, raw.triangles)
         warnings.append(
-            f"Nothing tells the mesh's objects; each of its {count} connected parts is taken as one."
-            if count > 1
-            else "The mesh has no object_id on its faces and hangs together; the whole room is taken as one object."
+            f"Nothing tells the mesh's objects; its shape says that it has {len(names)}. None of them is taken for "
+            "metal or glass unless you say so; give its faces an object_id if you know better."
         )
     ids, objects, more = instances.assign(found, names, layout.names_file or instances.FILE)
+    if not told:
+        objects = tuple(replace(one, guess=True) for one in objects)
     return Mesh(raw.vertices, raw.triangles, ids, raw.uv, None if frames else raw.lit), objects, warnings + more
 
 

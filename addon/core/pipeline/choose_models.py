@@ -86,10 +86,12 @@ def choose_models(
 ) -> Chosen:
     """Choose a model for each of the `wanted` objects; of those that are `given`, what is left to find."""
 
+    guesses = {one.object_id for one in room.instances if one.guess}
+
     def look(object_id: int) -> tuple[Choice, Problem | None, int]:
         if object_id in given:
             return *fit_given(given[object_id], maker, object_id, room.irradiance, rays), -1
-        return _look(room, maker, object_id, rays, without)
+        return _look(room, maker, object_id, rays, without, object_id in guesses)
 
     problems, choices, targets = {}, {}, {}
     for object_id, found in zip(wanted, ordered_map(look, wanted, threads, ahead=len(wanted)), strict=True):
@@ -107,43 +109,47 @@ def choose_models(
 
 
 def _look(
-    room: Room, maker: Problems, object_id: int, rays: int, without: Collection[str]
+    room: Room, maker: Problems, object_id: int, rays: int, without: Collection[str], guess: bool
 ) -> tuple[Choice, Problem | None, int]:
-    """What an object's own frames say: its model, the observations behind that, its target frame."""
+    """What an object's own frames say: its model, the observations behind that, its target frame.
+
+    A `guess` may hold several things: it is called neither metal nor transparent, as that would take the texture of
+    all of them, and it is not judged by one colour.
+    """
     field, samples = room.field, room.samples
-    choice, problem, index = _by_frames(maker, object_id, rays, "first-look" not in without)
+    choice, problem, index = _by_frames(maker, object_id, rays, "first-look" not in without, not guess)
     element, direction = samples.element[index], samples.direction[index]
     scores = frame_scores(
         field, field.atlas.position[element], field.atlas.normal[element], direction, samples.frame[index],
         len(room.frame_names),
     )  # fmt: skip
-    if problem is not None and choice.fit is not None and "see-through" not in without:
+    if problem is not None and choice.fit is not None and "see-through" not in without and not guess:
         behind = look_behind(field, room.lit_diffuse.seen, element, direction, object_id, room.noise)
         lobe = choice.fit if choice.model.has_lobe else None
         shown = judge(problem, behind, lobe, max(1.4826 * choice.fit.residual, 1e-4))
         if shown is not None:
             choice = set_apart(choice, shown, is_sure(shown))
-    if choice.model.has_albedo:
+    if choice.model.has_albedo and not guess:
         choice, problem = _by_looks(maker, object_id, choice, problem, room.irradiance, rays, without)
     return choice, problem, target_frame(scores)
 
 
 def _by_frames(
-    maker: Problems, object_id: int, rays: int, first_look: bool
+    maker: Problems, object_id: int, rays: int, first_look: bool, may_be_metal: bool
 ) -> tuple[Choice, Problem | None, np.ndarray]:
     """Choose a model; in two looks, as only some objects deserve the second. Last: which samples were looked at."""
     index = maker.pick(object_id, FIT.screen_elements, FIT.views)
     if not len(index):
         return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
     screen = maker.problem(index, max(rays // FIT.screen_rays, 16), rough=True)
-    first = choose_model(screen)
+    first = choose_model(screen, may_be_metal)
     fit = first.fit
     hopeless = fit is None or fit.cost > FIT.hopeless * fit.cost_lambertian
     if hopeless and not first.model.lobe_alone and first_look:
         return first, screen, index
     index = maker.pick(object_id, FIT.elements, FIT.views, seed=1)
     problem = maker.problem(index, rays)
-    return choose_model(problem), problem, index
+    return choose_model(problem, may_be_metal), problem, index
 
 
 def _by_looks(

@@ -80,7 +80,7 @@ def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = Non
     told = {
         "root": str(capture.root.absolute()),
         "format": capture.format,
-        "instances": [[one.object_id, one.class_name] for one in capture.instances],
+        "instances": [[one.object_id, one.class_name, one.guess] for one in capture.instances],
         "frames": [
             [
                 frame.name,
@@ -146,7 +146,7 @@ def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
         pictures = told.get("pictures") or [{}] * len(frames)
         frames = tuple(replace(frame, **_picture(one)) for frame, one in zip(frames, pictures, strict=True))
         mesh = Mesh(arrays["vertices"], arrays["triangles"], arrays["object_id"], arrays.get("uv"))
-        instances = tuple(Instance(int(number), name) for number, name in told["instances"])
+        instances = tuple(Instance(int(number), name, *guess) for number, name, *guess in told["instances"])
         return Capture(Path(told["root"]), mesh, instances, frames, format=told["format"]), arrays["atlas_uv"]
     except DAMAGE as error:
         raise _damaged(folder, error) from error

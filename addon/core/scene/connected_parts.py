@@ -42,10 +42,14 @@ def connected_parts(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     kept = order[: max(int((surface[order[: SURFACE.most_parts]] >= SURFACE.tiny * surface.sum()).sum()), 1)]
     number = np.full(len(surface), -1)
     number[kept] = np.arange(len(kept))
-    part = number[part]
+    return to_nearest(number[part], (a + b + c) / 3)
+
+
+def to_nearest(part: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Parts ((t,) int), each triangle that has none (-1) joined to that of the nearest `centre` ((t, 3))."""
     loose = np.flatnonzero(part < 0)
-    if len(loose):
-        known = np.flatnonzero(part >= 0)
-        centre = (a + b + c) / 3
-        part[loose] = part[known[cKDTree(centre[known]).query(centre[loose])[1]]]
-    return part
+    if not len(loose):
+        return part
+    known, result = np.flatnonzero(part >= 0), part.copy()
+    result[loose] = part[known[cKDTree(centre[known]).query(centre[loose])[1]]]
+    return result

@@ -227,10 +227,14 @@ class Pixels:
 
 @dataclass(frozen=True)
 class Instance:
-    """One object of the room; `object_id` is what the mesh's faces carry."""
+    """One object of the room; `object_id` is what the mesh's faces carry.
+
+    It is a `guess` where nobody told it and the mesh's shape alone did: it may hold things of several materials.
+    """
 
     object_id: int
     class_name: str
+    guess: bool = False
 
     @property
     def name(self) -> str:

@@ -122,7 +122,7 @@ def _of_class(own: LobeFit, of_class: LobeFit, model: Brdf, problem: Problem | N
     return own if gain > CHOICE.min_gain and sigmas > LEVELS.sigmas else shared
 
 
-def choose_model(problem: Problem) -> Choice:
+def choose_model(problem: Problem, may_be_metal: bool = True) -> Choice:
     """The simplest model that the observations support, by two-fold cross-validation over the elements."""
     if len(np.unique(problem.element)) < LEVELS.few:
         return Choice(LAMBERTIAN, None, note="Too few observations to look for a highlight.")
@@ -147,7 +147,7 @@ def choose_model(problem: Problem) -> Choice:
     # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
     dielectric = replace(fit, psi=np.minimum(fit.psi, MOST_F0))
     metal, likely = fit_lobe(dense, constraints=METAL.constraints), None
-    if _metallic(metal):
+    if may_be_metal and _metallic(metal):
         with_metal, diffuse = held_out(metal, METAL)
         scores[METAL.name] = float(with_metal.sum() / max(diffuse.sum(), 1e-30))
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.

@@ -18,6 +18,7 @@ from ...light.environment import Environment
 from ...light.field import LightField
 from ...light.sun import Sun, around
 from ...luminance import LUMINANCE
+from ...scene.sphere import fibonacci
 from ...significance import LEVELS
 from .params import SUN
 from .sun_spots import Edges, Guess, Spots, visible
@@ -31,15 +32,6 @@ RADII = np.radians([0.27, 0.5, 0.75, 1.0])
 """Discs that are tried: thin clouds, and pictures and meshes that are not sharp, soften the edges."""
 
 
-def _directions() -> np.ndarray:
-    """Unit directions about `GRID` apart, evenly over the sphere (Fibonacci's lattice), (n, 3) float32."""
-    count = int(4 * np.pi / GRID**2)
-    z = 1 - (2 * np.arange(count) + 1) / count
-    angle = np.arange(count) * np.pi * (3 - np.sqrt(5))
-    flat = np.sqrt(1 - z**2)
-    return np.stack([flat * np.cos(angle), flat * np.sin(angle), z], 1).astype(np.float32)
-
-
 def _ring(count: int) -> np.ndarray:
     angle = np.arange(count) * (2 * np.pi / count)
     return np.stack([np.cos(angle), np.sin(angle)], 1)
@@ -50,7 +42,7 @@ def _on_grid(even: Spots, environment: Environment) -> list[Guess]:
     value = even.log_albedo()
     excess = value - np.minimum(even.medians(value, np.ones(len(even), bool)), 0)
     out = np.flatnonzero(even.stands_out())
-    way = _directions()
+    way = fibonacci(int(4 * np.pi / GRID**2)).astype(np.float32)
     way = way[~environment.known(way)]
     spot, ray = np.nonzero(even.normal[out] @ way.T > 0)
     start = even.scene.off_surface(even.position[out], even.normal[out])
