@@ -104,8 +104,8 @@ def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str
     elif found is None:
         found, names = parts_of(raw.vertices, raw.triangles)
         warnings.append(
-            f"Nothing tells the mesh's objects; its shape says that it has {len(names)}. None of them is taken for "
-            "metal or glass unless you say so; give its faces an object_id if you know better."
+            "Nothing tells the mesh's objects: its faces have no object_id. By its shape it has "
+            f"{len(names)}; none of them is taken for metal or glass unless you say so."
         )
     ids, objects, more = instances.assign(found, names, layout.names_file or instances.FILE)
     if not told:

@@ -227,4 +227,5 @@ def parts_of(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, d
         point = np.empty((int(place.max()) + 1, 3))
         point[place] = vertices[triangles.ravel()]
         part, names = shape_parts(point, place.reshape(-1, 3))
-    return part, {i: f"part_{i}" for i in range(int(part.max()) + 1)} | names
+    count = int(part.max()) + 1
+    return part, {i: f"part_{i}" for i in range(count)} | names if count > 1 else {0: "room"}
