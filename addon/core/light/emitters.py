@@ -19,19 +19,25 @@ class BrightTriangles:
 
     Attributes
     ----------
+    triangle : (k,) int32
+        Which of the mesh's they are.
     corner, edge_u, edge_v : (k, 3) float32
     normal : (k, 3) float32
     chance : (k,) float64
         Of being aimed at; sums to 1. In proportion to area * luminance.
+    reached : (k,) float64
+        Sum of the chances up to each.
     density : (t,) float32
         Chance over area for every triangle of the mesh: density of aimed points per square metre; 0 if not bright.
     """
 
+    triangle: np.ndarray
     corner: np.ndarray
     edge_u: np.ndarray
     edge_v: np.ndarray
     normal: np.ndarray
     chance: np.ndarray
+    reached: np.ndarray
     density: np.ndarray
 
     def __len__(self) -> int:
@@ -67,8 +73,9 @@ def bright_triangles(field: LightField) -> BrightTriangles:
     density = np.zeros(len(area), np.float32)
     density[bright] = chance / area[bright]
     corners = field.mesh.vertices[field.mesh.triangles[bright]].astype(np.float32)
+    corner, edge_u, edge_v = corners[:, 0].copy(), corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     return BrightTriangles(
-        corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], normal[bright], chance, density
+        bright.astype(np.int32), corner, edge_u, edge_v, normal[bright], chance, np.cumsum(chance), density
     )
 
 
@@ -140,10 +147,10 @@ def sample_bright(bright: BrightTriangles, cube: np.ndarray) -> BrightPoints:
         In [0, 1): which triangle, and where on it. Well spread in all three together, they spread over each lamp too.
     """
     flat = cube.reshape(-1, 3)
-    index = np.minimum(np.searchsorted(np.cumsum(bright.chance), flat[:, 0]), len(bright) - 1)
+    index = np.minimum(np.searchsorted(bright.reached, flat[:, 0]), len(bright) - 1)
     root = np.sqrt(flat[:, 1])
     u, v = root * (1 - flat[:, 2]), root * flat[:, 2]  # uniform over the triangle
     corner, edge_u, edge_v = (part.take(index, 0) for part in (bright.corner, bright.edge_u, bright.edge_v))
     point = corner + u[:, None] * edge_u + v[:, None] * edge_v
-    triangle = np.flatnonzero(bright.density > 0).astype(np.int32).take(index)
+    triangle = bright.triangle.take(index)
     return BrightPoints(index, triangle, u, v, point, bright.density.take(triangle))

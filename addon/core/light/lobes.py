@@ -115,31 +115,31 @@ def reflected_light(
         rng = np.random.default_rng([seed, part.start])
         at = np.repeat(element[part], 2)
         n, wo = room.atlas.normal[at], np.repeat(direction[part], 2, 0)
-        axes = np.stack([*tangent_frame(n), n])  # (3 axes, m, 3): the frame in which the normal is +Z
-        local_wo = np.einsum("amj,mj->am", axes, wo)
+        axes = np.stack([*tangent_frame(n), n]).transpose(0, 2, 1)[..., None]  # (3 axes, 3, m, 1): +Z is the normal
+        local_wo = np.stack([_dot(axis, wo.T[..., None])[:, 0] for axis in axes])
         local_wo[2] = np.maximum(local_wo[2], 1e-4)
         origin = room.scene.off_surface(room.atlas.position[at], n)
         drawn, aims = [], []  # aims: the triangle that a ray must meet, or `ANY`
         for phi in proposals:
             h = ggx.sample_visible_normal(local_wo, _stratified(len(at), each, rng), phi)
-            drawn.append(2 * np.einsum("amk,am->mk", h, local_wo) * h - local_wo[..., None])
+            drawn.append(2 * _dot(h, local_wo[..., None]) * h - local_wo[..., None])
             aims.append(np.full((len(at), each), ANY, np.int32))
         if len(bright):
             cube = rng.random((len(at), each, 3), np.float32)
             cube[..., 0] = (np.arange(each, dtype=np.float32) + cube[..., 0]) / each
             pick = sample_bright(bright, cube)
-            way = pick.point.reshape(len(at), each, 3) - origin[:, None]
-            way /= np.maximum(np.sqrt(np.einsum("mkj,mkj->mk", way, way)), 1e-9)[..., None]
-            drawn.append(np.einsum("amj,mkj->amk", axes, way))
+            way = pick.point.T.reshape(3, len(at), each) - origin.T[..., None]
+            way /= np.maximum(np.sqrt(_dot(way, way)), 1e-9)
+            drawn.append(np.stack([_dot(axis, way) for axis in axes]))
             aims.append(pick.triangle.reshape(len(at), each))
         w = np.concatenate(drawn, 2).astype(np.float32)
         L, density = _arriving(room, bright, origin, w, axes, np.concatenate(aims, 1).ravel())
         density *= each
 
         n_w, n_wo = np.maximum(w[2], 1e-4), local_wo[2][:, None]
-        along = np.einsum("amk,am->mk", w, local_wo)  # w.wo, from which |w + wo|, w.h and n.h follow
-        h = w[:2] + local_wo[:2, :, None]
-        sin2_h = np.minimum(np.einsum("amk,amk->mk", h, h) / np.maximum(2 + 2 * along, 1e-9), 1)
+        along = _dot(w, local_wo[..., None])  # w.wo, from which |w + wo|, w.h and n.h follow
+        hx, hy = w[0] + local_wo[0][:, None], w[1] + local_wo[1][:, None]
+        sin2_h = np.minimum((hx * hx + hy * hy) / np.maximum(2 + 2 * along, 1e-9), 1)
         s = rise(np.sqrt(np.clip((1 + along) / 2, 0, 1)))
         # G1(n.wo) D / 2 is the density of `ggx.visible_normal_density`
         for phi in proposals:
@@ -162,10 +162,11 @@ def _arriving(room, bright, origin, w, axes, aims) -> tuple[np.ndarray, np.ndarr
     densities there do not count it.
     """
     _, m, k = w.shape
-    world = np.einsum("amk,amj->mkj", w, axes).reshape(-1, 3)
     above = np.flatnonzero(w[2].ravel() > 1e-4)
     L, density = np.zeros((m * k, 3), np.float32), np.zeros(m * k, np.float32)
-    directions = world.take(above, 0)
+    directions = np.empty((len(above), 3), np.float32)
+    for j in range(3):
+        directions[:, j] = _dot(w, axes[:, j]).ravel().take(above)
     hits = room.scene.intersect(origin.take(above // k, 0), directions)
     aims = aims.take(above)
     met = (aims == ANY) | (aims == hits.triangle)
@@ -173,6 +174,11 @@ def _arriving(room, bright, origin, w, axes, aims) -> tuple[np.ndarray, np.ndarr
     if len(bright):
         density[above] = aimed_density(bright, hits, directions, room.normal)
     return L.reshape(m, k, 3), density.reshape(m, k)
+
+
+def _dot(planes: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Sum of products over the first axis, of three planes each: many times as fast as einsum along short rows."""
+    return planes[0] * others[0] + planes[1] * others[1] + planes[2] * others[2]
 
 
 def _stratified(count: int, each: int, rng: np.random.Generator) -> np.ndarray:
