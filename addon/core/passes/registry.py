@@ -95,7 +95,6 @@ PASSES = (
     ),
     *_of(
         "specular",
-        first_look="Drops hopeless lobes after a cheap first fit.",
         more_rays="Traces more rays for observations whose reflected light is noisy.",
         grazing="Lets the diffuse part darken towards grazing views.",
         ray_noise="Takes the rays' noise out of the least squares for the lobe.",

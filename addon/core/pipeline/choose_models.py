@@ -117,7 +117,7 @@ def _look(
     all of them, and it is not judged by one colour.
     """
     field, samples = room.field, room.samples
-    choice, problem, index = _by_frames(maker, object_id, rays, "first-look" not in without, not guess)
+    choice, problem, index = _by_frames(maker, object_id, rays, not guess)
     element, direction = samples.element[index], samples.direction[index]
     scores = frame_scores(
         field, field.atlas.position[element], field.atlas.normal[element], direction, samples.frame[index],
@@ -135,19 +135,12 @@ def _look(
 
 
 def _by_frames(
-    maker: Problems, object_id: int, rays: int, first_look: bool, may_be_metal: bool
+    maker: Problems, object_id: int, rays: int, may_be_metal: bool
 ) -> tuple[Choice, Problem | None, np.ndarray]:
-    """Choose a model; in two looks, as only some objects deserve the second. Last: which samples were looked at."""
-    index = maker.pick(object_id, FIT.screen_elements, FIT.views)
+    """Choose a model by some of the object's samples, which come last."""
+    index = maker.pick(object_id, FIT.elements, FIT.views, seed=1)
     if not len(index):
         return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
-    screen = maker.problem(index, max(rays // FIT.screen_rays, 16), rough=True)
-    first = choose_model(screen, may_be_metal)
-    fit = first.fit
-    hopeless = fit is None or fit.cost > FIT.hopeless * fit.cost_lambertian
-    if hopeless and not first.model.lobe_alone and first_look:
-        return first, screen, index
-    index = maker.pick(object_id, FIT.elements, FIT.views, seed=1)
     problem = maker.problem(index, rays)
     return choose_model(problem, may_be_metal), problem, index
 

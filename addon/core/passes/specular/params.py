@@ -13,12 +13,8 @@ class FitParams:
     ----------
     elements, views : int
         Elements of an object that the fit looks at, and views of each.
-    screen_elements, screen_rays : int
-        The first look is at fewer elements and with so many times fewer rays; it drops what a lobe makes much worse.
-    hopeless : float
-        A lobe that raises the cost by this factor in the first look needs no second.
     looks_like_none : float
-        A metal whose spread is so many times the other's in the first look needs no second.
+        A metal whose spread is so many times the other's over the views that were fitted is not asked for over all.
     separate_elements, separate_views : int
         The same for what is behind glass.
     noisy, again, narrowest_phi : float, int, float
@@ -35,9 +31,6 @@ class FitParams:
 
     elements: int = 350
     views: int = 12
-    screen_elements: int = 200
-    screen_rays: int = 4
-    hopeless: float = 1.15
     looks_like_none: float = 1.5
     separate_elements: int = 2500
     separate_views: int = 9

@@ -71,20 +71,16 @@ class Problems:
 
     def pick(self, object_id: int, elements: int, views: int, least: int = LEVELS.views, seed: int = 0) -> np.ndarray:
         """Indices into the samples of some of an object's observations, sorted by element."""
-        first, last = np.searchsorted(self._owner, [object_id, object_id + 1])
+        wanted = np.array([object_id, object_id + 1], self._owner.dtype)  # else all owners would be converted
+        first, last = np.searchsorted(self._owner, wanted)
         return pick(self._samples, self._usable[first:last], elements, views, least, self._seed + seed)
 
     def light(
-        self,
-        index: np.ndarray,
-        rays: int,
-        phi: float | None = None,
-        rough: bool = False,
-        microfacets: Microfacets = GGX,
+        self, index: np.ndarray, rays: int, phi: float | None = None, microfacets: Microfacets = GGX
     ) -> LobeLight:
         """A and B of observations: for the whole grid, or for the one width `phi` with rays of that width.
 
-        Those that come out noisy are done again with more rays, unless it need only be `rough`.
+        Those that come out noisy are done again with more rays.
         """
         grid = GRID if phi is None else np.array([phi], np.float32)
         proposals: Sequence[float] = GATHER.proposals if phi is None else (phi,)
@@ -97,7 +93,7 @@ class Problems:
             )  # fmt: skip
 
         found = light(index, rays)
-        if rough or "more-rays" in self._without:
+        if "more-rays" in self._without:
             return found
         noisy = np.flatnonzero(_noise(found, self._samples.radiance[index]) > FIT.noisy)
         return found.replaced(noisy, light(index[noisy], FIT.again * rays)) if len(noisy) else found
@@ -107,18 +103,13 @@ class Problems:
         return self._samples.element[index]
 
     def problem(
-        self,
-        index: np.ndarray,
-        rays: int,
-        rough: bool = False,
-        phi: float | None = None,
-        microfacets: Microfacets = GGX,
+        self, index: np.ndarray, rays: int, phi: float | None = None, microfacets: Microfacets = GGX
     ) -> Problem:
         """The fit's problem over observations (see `light`)."""
         element = self._samples.element[index]
         cosine = np.einsum("ij,ij->i", self._field.atlas.normal[element], self._samples.direction[index])
         radiance = self._samples.radiance[index]
-        light = self.light(index, rays, phi, rough, microfacets)
+        light = self.light(index, rays, phi, microfacets)
         light = light.as_exact() if "ray-noise" in self._without else light
         return Problem(element, radiance, light, cosine, frozenset(self._without))
 

@@ -29,14 +29,14 @@ def speckled(room, even):
     return even * np.where(np.random.default_rng(0).random(len(even)) < 0.01, 300, 1).astype(np.float32)[:, None]
 
 
-def lights(room, radiance, *, rough=False, without=()) -> LobeLight:
+def lights(room, radiance, *, without=()) -> LobeLight:
     """Of observations of radiance 1, all straight from above."""
     n = len(room.atlas)
     one = np.ones((n, 3), np.float32)
     direction = room.atlas.normal.astype(np.float32)
     samples = Samples(np.arange(n, dtype=np.int32), np.zeros(n, np.int32), one, direction, np.zeros(n, bool))
     made = Problems(room.field(radiance), samples, without=without)
-    return made.light(np.arange(n), RAYS, rough=rough)
+    return made.light(np.arange(n), RAYS)
 
 
 def noise(light: LobeLight) -> float:
@@ -50,11 +50,6 @@ def test_noisy_ones_are_done_again(room, speckled):
     same = (found.A == plain.A).all((1, 2))
     assert 0 < same.sum() < len(same)
     assert noise(plain.part(same)) < 0.2 * noise(plain.part(~same))
-
-
-def test_a_first_look_may_be_rough(room, speckled):
-    rough, plain = lights(room, speckled, rough=True), lights(room, speckled, without=("more-rays",))
-    assert np.array_equal(rough.A, plain.A)
 
 
 def test_what_is_sure_is_done_once(room, even):
