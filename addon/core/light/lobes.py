@@ -64,14 +64,6 @@ class LobeLight:
         """The same, taken to have no noise."""
         return LobeLight(self.A, self.B, 0 * self.A_noise, 0 * self.B_noise, self.grid)
 
-    def replaced(self, at: np.ndarray, other: LobeLight) -> LobeLight:
-        """With another's values for the observations `at` ((k,) indices), in its order."""
-        values = {}
-        for name in ("A", "B", "A_noise", "B_noise"):
-            values[name] = getattr(self, name).copy()
-            values[name][at] = getattr(other, name)
-        return LobeLight(**values, grid=self.grid)
-
 
 def nearest(grid: np.ndarray, phi: float) -> int:
     """Index of the phi next to this one, in roughness."""

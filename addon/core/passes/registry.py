@@ -95,7 +95,6 @@ PASSES = (
     ),
     *_of(
         "specular",
-        more_rays="Traces more rays for observations whose reflected light is noisy.",
         grazing="Lets the diffuse part darken towards grazing views.",
         ray_noise="Takes the rays' noise out of the least squares for the lobe.",
         dielectric_prior="Gives the specular weight of dielectrics a prior.",

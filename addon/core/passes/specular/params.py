@@ -17,10 +17,6 @@ class FitParams:
         A metal whose spread is so many times the other's over the views that were fitted is not asked for over all.
     separate_elements, separate_views : int
         The same for what is behind glass.
-    noisy, again, narrowest_phi : float, int, float
-        Noise of a dielectric's lobe, as a share of the radiance, from which on an observation gets so many times more
-        rays. Highlights of a bulb half hidden in its shade had .4: a desk's psi came out at .11 with 256 rays each, at
-        .06 with 2048, where .04 is true. One observation in 70 of the living room, in 20 of a study with such lamps.
     broadest_phi : float
         A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface.
     neighbours : int
@@ -34,9 +30,6 @@ class FitParams:
     looks_like_none: float = 1.5
     separate_elements: int = 2500
     separate_views: int = 9
-    noisy: float = 0.2
-    again: int = 8
-    narrowest_phi: float = 0.02
     broadest_phi: float = 0.5
     neighbours: int = 16
     unresolved: float = 0.17

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 
 import numpy as np
 
-from ...brdf.dielectric import USUAL_F0
 from ...brdf.ggx import GGX
 from ...brdf.model import Microfacets
 from ...fit.problem import Problem
@@ -16,7 +15,6 @@ from ...light.lobes import GRID, LobeLight, reflected_light
 from ...light.params import GATHER
 from ...scene.samples import Samples
 from ...significance import LEVELS
-from .params import FIT
 
 
 def pick(samples: Samples, of_object: np.ndarray, elements: int, views: int, least: int, seed: int) -> np.ndarray:
@@ -71,32 +69,19 @@ class Problems:
 
     def pick(self, object_id: int, elements: int, views: int, least: int = LEVELS.views, seed: int = 0) -> np.ndarray:
         """Indices into the samples of some of an object's observations, sorted by element."""
-        wanted = np.array([object_id, object_id + 1], self._owner.dtype)  # else all owners would be converted
-        first, last = np.searchsorted(self._owner, wanted)
+        first, last = np.searchsorted(self._owner, [object_id, object_id + 1])
         return pick(self._samples, self._usable[first:last], elements, views, least, self._seed + seed)
 
     def light(
         self, index: np.ndarray, rays: int, phi: float | None = None, microfacets: Microfacets = GGX
     ) -> LobeLight:
-        """A and B of observations: for the whole grid, or for the one width `phi` with rays of that width.
-
-        Those that come out noisy are done again with more rays.
-        """
-        grid = GRID if phi is None else np.array([phi], np.float32)
-        proposals: Sequence[float] = GATHER.proposals if phi is None else (phi,)
-
-        def light(some: np.ndarray, count: int) -> LobeLight:
-            element, direction = self._samples.element[some], self._samples.direction[some]
-            return reflected_light(
-                self._field, self._bright, element, direction, rays=count, grid=grid, proposals=proposals,
-                threads=self._threads, seed=self._seed, microfacets=microfacets,
-            )  # fmt: skip
-
-        found = light(index, rays)
-        if "more-rays" in self._without:
-            return found
-        noisy = np.flatnonzero(_noise(found, self._samples.radiance[index]) > FIT.noisy)
-        return found.replaced(noisy, light(index[noisy], FIT.again * rays)) if len(noisy) else found
+        """A and B of observations: for the whole grid, or for the one width `phi` with rays of that width."""
+        return reflected_light(
+            self._field, self._bright, self._samples.element[index], self._samples.direction[index], rays=rays,
+            grid=GRID if phi is None else np.array([phi], np.float32),
+            proposals=GATHER.proposals if phi is None else (phi,),
+            threads=self._threads, seed=self._seed, microfacets=microfacets,
+        )  # fmt: skip
 
     def element(self, index: np.ndarray) -> np.ndarray:
         """The elements of observations."""
@@ -112,10 +97,3 @@ class Problems:
         light = self.light(index, rays, phi, microfacets)
         light = light.as_exact() if "ray-noise" in self._without else light
         return Problem(element, radiance, light, cosine, frozenset(self._without))
-
-
-def _noise(light: LobeLight, radiance: np.ndarray) -> np.ndarray:
-    """Noise of a dielectric's lobe as a share of the radiance, (m,), at the width that has most of it."""
-    widths = np.flatnonzero((light.grid >= FIT.narrowest_phi) & (light.grid <= FIT.broadest_phi))
-    noise = USUAL_F0 * light.A_noise[:, widths] + light.B_noise[:, widths]
-    return np.abs(noise).mean(2).max(1, initial=0) / np.maximum(radiance.mean(1), 1e-12)
