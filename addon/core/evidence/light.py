@@ -107,7 +107,12 @@ def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, relative_
         level = float(shading.sun.irradiance @ LUMINANCE)
         sun = replace(shading.sun, irradiance=np.array([level, 0, CALIBRATION.solved * level], np.float32))
     room = field.with_light(np.stack(kinds, 1), Environment(sky, shading.environment.observations))
-    return room.with_sun(sun)
+    openings = field.openings
+    if openings is not None:
+        shown = openings.radiance @ LUMINANCE
+        shown = np.stack([shown, np.zeros_like(shown), CALIBRATION.solved_sky * shown], -1).astype(np.float32)
+        openings = replace(openings, radiance=shown)
+    return room.with_sun(sun).with_openings(openings)
 
 
 def light_evidence(

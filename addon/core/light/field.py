@@ -13,6 +13,7 @@ from ..scene.model import Mesh
 from ..scene.rays import Hits, RayScene
 from .environment import Environment
 from .mirrors import Mirror
+from .openings import Openings
 from .sun import Sun
 
 FLAT = np.cos(np.radians(2.0))
@@ -47,6 +48,7 @@ class LightField:
         self._say_lamps(lamps)
         self.mirrors: tuple[Mirror, ...] = ()
         self.sun: Sun | None = None
+        self.openings: Openings | None = None
         self.mirror_of = np.full(len(mesh.triangles), -1, np.int8)
         self.lookup = ElementLookup(mesh, atlas)
 
@@ -57,6 +59,13 @@ class LightField:
         first, last = self.atlas.box
         reach = np.maximum(last - first, 0.01 * float(np.max(last - first)))
         return np.maximum(low, first - 0.02 * reach), np.minimum(high, last + 0.02 * reach)
+
+    @property
+    def outer_box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Low corner and size, (3,) float32 each, of `room_box` with what rays start off the surface by around it."""
+        margin = np.float32(2 * self.scene.offset)
+        low, high = (corner.astype(np.float32) for corner in self.room_box)
+        return low - margin, high - low + 2 * margin
 
     def with_light(
         self, radiance: np.ndarray, environment: Environment | None = None, lamps: Iterable[int] | None = None
@@ -93,6 +102,22 @@ class LightField:
         other.sun = sun
         return other
 
+    def with_openings(self, openings: Openings | None) -> LightField:
+        """The same room with light that comes in by its openings, in place of the environment's for rays from inside.
+
+        With dark openings instead of None, nothing comes in.
+        """
+        other = self.with_light(self.radiance)
+        other.openings = openings
+        return other
+
+    def outside(self, origins: np.ndarray | None, directions: np.ndarray) -> np.ndarray:
+        """Radiance that comes in along rays that leave the mesh, (n, 3) float32; `origins` as in `arriving`."""
+        if self.openings is None or origins is None:
+            return self.environment(directions)
+        radiance, inside = self.openings(origins, directions)
+        return np.where(inside[:, None], radiance, self.environment(directions))
+
     def elements(self, hits: Hits) -> np.ndarray:
         """The element at each hit, (n,) int32; -1 where the ray escaped."""
         missed = np.flatnonzero(hits.triangle < 0)
@@ -125,10 +150,15 @@ class LightField:
         """
         hits = self.scene.intersect(origins, directions)
         element = self.elements(hits)
-        return self.arriving(hits, element, directions), hits.distance, element
+        return self.arriving(hits, element, directions, origins=origins), hits.distance, element
 
     def arriving(
-        self, hits: Hits, element: np.ndarray, directions: np.ndarray, dark_in_mirrors: np.ndarray | None = None
+        self,
+        hits: Hits,
+        element: np.ndarray,
+        directions: np.ndarray,
+        dark_in_mirrors: np.ndarray | None = None,
+        origins: np.ndarray | None = None,
     ) -> np.ndarray:
         """Radiance that comes back along rays whose hits and `elements` are known, (n, 3) float32.
 
@@ -136,20 +166,25 @@ class LightField:
         ----------
         dark_in_mirrors : (t,) float32, optional
             Triangles with a value above 0 count as dark where they are seen in a mirror.
+        origins : (n, 3) float32, optional
+            Where the rays start; without, what comes in by openings is looked up in the environment.
         """
-        radiance = self._sent(hits, element, directions)
+        radiance = self._sent(hits, element, directions, origins)
         if self.mirrors:
             seen = np.flatnonzero((self.mirror_of.take(hits.triangle) >= 0) & (element >= 0))
             if len(seen):
                 radiance[seen] = self._mirrored(hits.part(seen), directions.take(seen, 0), dark_in_mirrors)
         return radiance
 
-    def _sent(self, hits: Hits, element: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    def _sent(
+        self, hits: Hits, element: np.ndarray, directions: np.ndarray, origins: np.ndarray | None = None
+    ) -> np.ndarray:
         """L_d at hits, the environment where rays escape; lamps are dark from behind."""
         radiance = self.radiance.take(element, 0)  # indexing by arrays takes several times as long
         escaped = np.flatnonzero(element < 0)
         if len(escaped):
-            radiance[escaped] = self.environment(directions.take(escaped, 0))
+            start = None if origins is None else origins.take(escaped, 0)
+            radiance[escaped] = self.outside(start, directions.take(escaped, 0))
         lamp = np.flatnonzero(self.one_sided.take(hits.triangle) & (element >= 0)) if self._lamps else ()
         if len(lamp):
             normal = self.normal.take(hits.triangle.take(lamp), 0)
@@ -168,7 +203,7 @@ class LightField:
         origins = self.scene.off_surface(turn, -np.sign(along) * normal)
         further = self.scene.intersect(origins, onward)
         element = self.elements(further)
-        radiance = self._sent(further, element, onward)
+        radiance = self._sent(further, element, onward, origins)
         if dark is not None:
             radiance[(dark[further.triangle] > 0) & (element >= 0)] = 0
         f0 = np.stack([mirror.f0 for mirror in self.mirrors]).astype(np.float32)

@@ -69,7 +69,9 @@ def gather(
         origins = np.repeat(field.scene.off_surface(p, n), rays, 0)
         hits = field.scene.intersect(origins, directions)
         # What a mirror shows of the bright triangles is aimed at below; here it would come as fireflies.
-        radiance = field.arriving(hits, field.elements(hits), directions, bright.density if emitter_rays else None)
+        radiance = field.arriving(
+            hits, field.elements(hits), directions, bright.density if emitter_rays else None, origins
+        )
         out = hits.triangle < 0
         if emitter_rays and len(bright):
             on, aimed = aimed_at(bright, hits, directions, field.normal)
@@ -122,7 +124,8 @@ def from_outside(
         useful = useful[~hidden]
         weight = cosine[useful] / (portal_rays * density[useful] + rays * cosine[useful] / np.float32(np.pi))
         light = np.zeros((len(directions), 3), np.float32)
-        light[useful] = field.environment(directions[useful]) * weight[:, None]
+        start_at = np.repeat(origins, portal_rays, 0)
+        light[useful] = field.outside(start_at[useful], directions[useful]) * weight[:, None]
         total[part] = light.reshape(len(p), portal_rays, 3).sum(1)
         total[part][~portals.around(origins)] = 0
     return total

@@ -159,10 +159,11 @@ def _arriving(room, bright, origin, w, axes, aims) -> tuple[np.ndarray, np.ndarr
     directions = np.empty((len(above), 3), np.float32)
     for j in range(3):
         directions[:, j] = _dot(w, axes[:, j]).ravel().take(above)
-    hits = room.scene.intersect(origin.take(above // k, 0), directions)
+    start = origin.take(above // k, 0)
+    hits = room.scene.intersect(start, directions)
     aims = aims.take(above)
     met = (aims == ANY) | (aims == hits.triangle)
-    L[above] = room.arriving(hits, room.elements(hits), directions) * met[:, None]
+    L[above] = room.arriving(hits, room.elements(hits), directions, origins=start) * met[:, None]
     if len(bright):
         density[above] = aimed_density(bright, hits, directions, room.normal)
     return L.reshape(m, k, 3), density.reshape(m, k)

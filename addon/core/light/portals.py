@@ -14,6 +14,7 @@ from ..luminance import LUMINANCE
 from ..scene.tangent_frame import to_world
 from .directions import cosine_hemisphere, shifted, sobol
 from .field import LightField
+from .openings import CELLS, exits, within
 from .params import GATHER
 
 
@@ -44,7 +45,7 @@ class Portals:
 
     def aimed_density(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """Solid-angle density with which aimed rays take directions that leave the room, (n,) float32."""
-        cell, distance, cosine = _exits(self.low, self.size, origins, directions)
+        cell, distance, cosine = exits(self.low, self.size, origins, directions)
         density = self.density[cell] * distance**2 / np.maximum(cosine, 1e-6)
         return np.where(self.around(origins), density, 0)
 
@@ -90,36 +91,13 @@ class Portals:
         return directions, self.density[pick] * distance**2 / np.maximum(cosine, 1e-6)
 
 
-def within(low: np.ndarray, size: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points ((n, 3)) inside of a box, (n,) bool."""
-    return ((points >= low) & (points <= low + size)).all(1)
-
-
-def _exits(
-    low: np.ndarray, size: np.ndarray, origins: np.ndarray, directions: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where rays from inside the box leave it: flat cell, distance and |cosine| to the side's normal."""
-    far = low + np.where(directions > 0, size, np.float32(0))
-    along = np.abs(directions)
-    way = np.where(along > 1e-9, np.abs(far - origins) / np.maximum(along, 1e-9), np.float32(np.inf))
-    axis = way.argmin(1)
-    at = np.arange(len(axis))
-    distance = way[at, axis]
-    point = (origins + distance[:, None] * directions - low) / size
-    first, second = (axis + 1) % 3, (axis + 2) % 3
-    row = np.clip((point[at, first] * GATHER.cells).astype(np.int64), 0, GATHER.cells - 1)
-    column = np.clip((point[at, second] * GATHER.cells).astype(np.int64), 0, GATHER.cells - 1)
-    side = 2 * axis + (directions[at, axis] > 0)
-    return (side * GATHER.cells + row) * GATHER.cells + column, distance, along[at, axis]
-
-
 def find_portals(field: LightField, seed: int = 0) -> Portals | None:
     """The openings that matter, from a few rays of points spread over the surface; None where there are none.
 
     Which cells are found changes the noise of what is computed with them, not its expectation: light through a cell
     that was missed is still gathered.
     """
-    if not field.environment.radiance.any():
+    if not field.environment.radiance.any() and field.openings is None:
         return None
     atlas = field.atlas
     rng = np.random.default_rng(seed)
@@ -133,17 +111,15 @@ def find_portals(field: LightField, seed: int = 0) -> Portals | None:
     directions = to_world(local, normal).reshape(-1, 3)
     origins = np.repeat(field.scene.off_surface(atlas.position[start], normal), GATHER.pilot_rays, 0)
     out = np.flatnonzero(field.scene.intersect(origins, directions).triangle < 0)
-    light = field.environment(directions[out]) @ LUMINANCE
+    light = field.outside(origins[out], directions[out]) @ LUMINANCE
     out, light = out[light > 0], light[light > 0]
-    margin = np.float32(2 * field.scene.offset)
-    low, high = (corner.astype(np.float32) for corner in field.room_box)
-    low, size = low - margin, high - low + 2 * margin
+    low, size = field.outer_box
     inside = within(low, size, origins[out])
     out, light = out[inside], light[inside]
     if len(out) < GATHER.least_escaped:
         return None
-    cell, _, _ = _exits(low, size, origins[out], directions[out])
-    chance = np.bincount(cell, light.astype(np.float64), 6 * GATHER.cells**2)
+    cell, _, _ = exits(low, size, origins[out], directions[out])
+    chance = np.bincount(cell, light.astype(np.float64), CELLS)
     side = np.repeat(np.arange(3), 2 * GATHER.cells**2)
     area = (size[(side + 1) % 3] * size[(side + 2) % 3] / GATHER.cells**2).astype(np.float32)
     found = np.flatnonzero(chance > 0)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..scene.patches import Patches
 from .environment import Environment
 from .lamps import Lamp
 from .mirrors import Mirror
+from .openings import Openings
 from .sun import Sun
 
 
@@ -37,6 +39,10 @@ class Shading:
         Places at which the hemisphere was gathered.
     sun : Sun or None
         Its part is in `irradiance`.
+    openings : Openings or None
+        What comes in by the mesh's openings, where that was solved for; else the environment does.
+    patches : Patches
+        Parts of the mesh that were found to be lamps by themselves.
     """
 
     irradiance: np.ndarray
@@ -49,6 +55,8 @@ class Shading:
     mirrors: tuple[Mirror, ...]
     points: int
     sun: Sun | None = None
+    openings: Openings | None = None
+    patches: Patches = field(default_factory=Patches.none)
 
     @property
     def emitters(self) -> set[int]:

@@ -107,7 +107,8 @@ class Corrected(Stages):
 
         The objects `without` get none; by default the lamps that were found.
         """
-        atlas, lit, shading = self.surface().atlas, self.lit_diffuse(), self.shading()
+        shading = self.shading()
+        atlas, lit = self.surface().atlas, self.lit_diffuse()
         without = shading.emitters if without is None else without
         if "shading" in self.settings.published:
             return published_light.albedo_of(atlas, lit, irradiance, self.capture.instances, without, specular)
@@ -131,6 +132,7 @@ class Corrected(Stages):
     @property
     def findings(self) -> Findings:
         """All that was found; asks for every stage."""
+        self.shading()
         return Findings(
             name=self.capture.root.name,
             instances=self.capture.instances,

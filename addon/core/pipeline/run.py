@@ -156,7 +156,7 @@ class Run:
             self._progress.update(0.7)
             # The scene gets the mesh whose normals face the frames: its lamps shine on that side. And the one that the
             # materials were measured on: their colours fit its normals.
-            posed = replace(self.capture, frames=recovery.room_poses().of(self.capture.frames))
+            posed = replace(recovery.capture, frames=recovery.room_poses().of(self.capture.frames))
             write_room(store.folder, posed, recovery.surface().first_uv)
             warnings = () if scene is None else scene(recovery, replace(posed, mesh=recovery.written_mesh()))
             self._progress.done()

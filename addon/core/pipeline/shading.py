@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import asdict
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..light.environment import Environment
+from ..light.few_elements import evened
 from ..light.field import LightField
 from ..light.lamps import Lamp
 from ..light.mirrors import Mirror, known_mirror
+from ..light.openings import Openings
 from ..light.over_surface import Gathering, finest_spacing, irradiance
 from ..light.shading import Shading
 from ..light.sun import Sun, taken_out
 from ..passes.clipped_lamps.clipped import shade_clipped
+from ..passes.clipped_lamps.patches import clipped_patches, is_coarse
 from ..passes.mirrors.flat_mirrors import find_mirrors
+from ..passes.missing_light.missing_light import find_missing_light, is_missing
 from ..passes.unseen_light.unseen_light import Light
 from ..progress import Progress
 from ..scene.atlas import Atlas
@@ -26,6 +30,7 @@ from ..scene.lit_diffuse import LitDiffuse
 from ..scene.mesh_noise import tilt
 from ..scene.model import Capture, Instance, Mesh
 from ..scene.params import VISIBILITY
+from ..scene.patches import Patches
 from ..scene.rays import RayScene
 from ..scene.surface import Surface
 from ..scene.two_sides import fronts
@@ -58,29 +63,45 @@ def find_shading(
         told = [known_mirror(mirror, field.mesh) for mirror in capture.mirrors]
         return (*found, *(one for one in told if one.object_id not in {mirror.object_id for mirror in found}))
 
-    def shaded(lit: LitDiffuse) -> Shading:
-        return shade(
-            surface.mesh, capture.instances, surface.atlas, surface.scene, lit, observed.environment,
-            rays=s.shading_rays, emitter_rays=s.emitter_rays, portal_rays=s.portal_rays,
-            interpolate=s.interpolate, threads=s.threads, seed=s.seed, progress=progress,
-            find_mirrors=mirrors if s.mirrors else None, noise=surface.noise,
-            colours=observed.fringes.colours(), without=s.without,
-        )  # fmt: skip
-
     lit = observed.lit_diffuse
     if "shading" in s.published:
         return published_light.shade(
             surface.mesh, surface.atlas, surface.scene, lit, observed.environment,
             rays=s.shading_rays, threads=s.threads, seed=s.seed, progress=progress,
         )  # fmt: skip
-    return shaded(lit) if "clipped-lamps" in s.without else shade_clipped(shaded, lit, surface.atlas)
+    patches = Patches.none()
+    if not {"clipped-patches", "missing-light"} & set(s.without):
+        patches = clipped_patches(surface.mesh, surface.atlas, lit)
+        surface, capture = patches.surface(surface), patches.capture(capture)
+
+    def shaded(lit: LitDiffuse) -> Shading:
+        return shade(
+            surface.mesh, capture.instances, surface.atlas, surface.scene, lit, observed.environment,
+            rays=s.shading_rays, emitter_rays=s.emitter_rays, portal_rays=s.portal_rays,
+            interpolate=s.interpolate, threads=s.threads, seed=s.seed, progress=progress,
+            find_mirrors=mirrors if s.mirrors else None, noise=surface.noise,
+            colours=observed.fringes.colours(), patches=patches.objects, without=s.without,
+        )  # fmt: skip
+
+    if "clipped-lamps" in s.without:
+        found = shaded(lit)
+    else:
+        found = shade_clipped(shaded, lit, surface.atlas, patches.objects)
+    return with_lamps_of(found, patches)
+
+
+def with_lamps_of(found: Shading, patches: Patches) -> Shading:
+    """Light that was found with `patches` set apart: those that are no lamps are parts of their objects again."""
+    lamps, number = patches.kept(set(patches.objects) & found.emitters)
+    told = [replace(one, object_id=number.get(one.object_id, one.object_id)) for one in found.lamps]
+    return replace(found, lamps=tuple(told), patches=lamps)
 
 
 def lit_room(surface: Surface, shading: Shading) -> LightField:
     """The room as a light source, with all that was found of its light."""
     lamps = [lamp.object_id for lamp in shading.lamps]
     room = LightField(surface.mesh, surface.atlas, surface.scene, shading.radiance, shading.environment, lamps)
-    return room.with_mirrors(shading.mirrors).with_sun(shading.sun)
+    return room.with_mirrors(shading.mirrors).with_sun(shading.sun).with_openings(shading.openings)
 
 
 def unseen_dark(lit_diffuse: LitDiffuse) -> np.ndarray:
@@ -106,6 +127,7 @@ def shade(
     find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None = None,
     noise: float = 0.0,
     colours: dict[int, np.ndarray] | None = None,
+    patches: list[int] | None = None,
     without: Collection[str] = (),
 ) -> Shading:
     """Lamps and irradiance by aimed rays, interpolated.
@@ -119,6 +141,8 @@ def shade(
         Metres, what was taken out of the mesh's vertices.
     colours : dict of (3,) float, optional
         Colour of light of objects that were clipped (`fringes`).
+    patches : list of int, optional
+        Objects that were set apart as they were clipped.
     without : collection of str
         Passes left out.
 
@@ -140,7 +164,10 @@ def shade(
     environment, sun = (environment, None) if "seen-sun" in without else taken_out(environment)
     # What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
     field = LightField(mesh, atlas, scene, unseen_dark(lit_diffuse), environment).with_sun(sun)
+    dark = field
     field, light = with_all_light(field, lit_diffuse, instances, find_mirrors, seed, tilted, colours, without)
+    if is_coarse(atlas) and "missing-light" not in without:
+        field, light = with_missing_light(dark, field, light, lit_diffuse, patches or [], seed)
 
     # Where there is no L_d to divide, the rough E does.
     emitters = {lamp.object_id for lamp in light.lamps}
@@ -162,8 +189,9 @@ def shade(
         unsure = np.hypot(unsure, crease_error(mesh, atlas, atlas.texel_edge))
     notes = light.notes if field.sun is None else (*light.notes, field.sun.note)
     return Shading(
-        E, escaped, unsure, field.radiance, light.lamps, field.environment, notes, field.mirrors, points, field.sun
-    )
+        E, escaped, unsure, field.radiance, light.lamps, field.environment, notes, field.mirrors, points, field.sun,
+        field.openings,
+    )  # fmt: skip
 
 
 def turned_by_noise(mesh: Mesh, atlas: Atlas, noise: float) -> np.ndarray:
@@ -210,10 +238,43 @@ def with_all_light(
     return field.with_mirrors(find_mirrors(field, light.lamps) if find_mirrors else ()), light
 
 
+def with_missing_light(
+    dark: LightField, field: LightField, light: Light, lit_diffuse: LitDiffuse, patches: list[int], seed: int
+) -> tuple[LightField, Light]:
+    """The room with the light of clipped patches and openings, if it lacks light; else as it is.
+
+    Parameters
+    ----------
+    dark : LightField
+        As the frames show it, without lamps, dark where no frame saw it.
+    field : LightField
+        With all `light` that was found otherwise.
+    """
+    good = (lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= VISIBILITY.enough)
+    if not is_missing(field, good, seed):
+        return field, light
+    found = find_missing_light(dark, good, patches, seed)
+    radiance = evened(dark)
+    for one, solved in found.radiance.items():
+        own = dark.atlas.object_id == one
+        radiance[own] = np.maximum(radiance[own], solved)
+    seen = tuple(lamp for lamp in light.lamps if lamp.seen and lamp.object_id not in patches)
+    for lamp in seen:
+        own = dark.atlas.object_id == lamp.object_id
+        radiance[own & (lit_diffuse.tier != CLEAN)] = lamp.radiance
+    lamps = (*seen, *found.lamps)
+    field = field.with_light(radiance, dark.environment, [lamp.object_id for lamp in lamps])
+    light = replace(light, lamps=lamps, environment=dark.environment, notes=found.notes)
+    return field.with_openings(found.openings).with_sun(dark.sun), light
+
+
 def to_store(found: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """What is stored of a `Shading`: arrays, and what JSON holds."""
     arrays = {name: getattr(found, name) for name in ("irradiance", "escaped", "relative_error", "radiance")}
     arrays |= {"sky": found.environment.radiance, "sky_seen": found.environment.observations}
+    if found.openings is not None:
+        arrays |= {f"openings_{one.name}": getattr(found.openings, one.name) for one in fields(Openings)}
+    arrays |= {f"patches_{one.name}": getattr(found.patches, one.name) for one in fields(Patches)}
     meta = {
         "sun": found.sun and {k: np.asarray(v).tolist() for k, v in asdict(found.sun).items()},
         "points": found.points,
@@ -235,6 +296,8 @@ def from_store(a: dict[str, np.ndarray], meta: dict[str, Any]) -> Shading:
         a["irradiance"], a["escaped"], a["relative_error"], a["radiance"], lamps,
         Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
         None if meta["sun"] is None else _sun(**meta["sun"]),
+        Openings(*(a[f"openings_{one.name}"] for one in fields(Openings))) if "openings_low" in a else None,
+        Patches(*(a[f"patches_{one.name}"] for one in fields(Patches))),
     )  # fmt: skip
 
 

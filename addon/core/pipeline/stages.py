@@ -69,6 +69,8 @@ class Stages:
 
     Attributes
     ----------
+    capture : Capture
+        As read; with the lamps set apart that were found in other objects, once `shading` was asked for.
     done : dict
         Values of the stages so far.
     log : dict
@@ -88,6 +90,7 @@ class Stages:
     ):
         check(settings.without)
         self.capture, self.store, self.settings, self.progress = capture, store, settings, progress
+        self._as_read = capture
         self.overrides = overrides
         self.read = FrameReader(len(capture.frames))
         self._near = surface.taken_in(capture)
@@ -117,8 +120,8 @@ class Stages:
         return keys
 
     def _first_key(self, stage: Stage) -> str:
-        others = tuple(filter(None, (readers.origin(self.capture.format), self._laid_out_by)))
-        return stage.key(self.settings, {}, fingerprint(self.capture), *others)
+        others = tuple(filter(None, (readers.origin(self._as_read.format), self._laid_out_by)))
+        return stage.key(self.settings, {}, fingerprint(self._as_read), *others)
 
     @cached_property
     def _laid_out_by(self) -> str:
@@ -163,7 +166,10 @@ class Stages:
         return value
 
     def surface(self) -> Surface:
-        """Surface elements over the room; around the origin where the room lies far from it."""
+        """Surface elements over the room; around the origin where the room lies far from it.
+
+        Once `shading` was asked for, this and the capture have the lamps set apart that it found in other objects.
+        """
         capture = self._near
         return self._stage(
             surface.STAGE,
@@ -233,18 +239,23 @@ class Stages:
 
     def shading(self) -> Shading:
         """Lamps and irradiance."""
-        room, observed = self.surface(), self.observed()
-        return self._stage(
+        room, observed, first = self.surface(), self.observed(), shading.STAGE.name not in self.done
+        found = self._stage(
             shading.STAGE,
             lambda settings: shading.find_shading(self._near, room, observed, settings, self.progress),
             shading.to_store,
             shading.from_store,
         )
+        if first and len(found.patches):
+            self.done[surface.STAGE.name] = found.patches.surface(room)
+            self.capture, self._near = found.patches.capture(self.capture), found.patches.capture(self._near)
+        return found
 
     @cached_property
     def field(self) -> LightField:
         """The room as a light source, with all that was found of its light."""
-        return shading.lit_room(self.surface(), self.shading())
+        found = self.shading()
+        return shading.lit_room(self.surface(), found)
 
     def specular(self) -> Specular:
         """phi, psi and the model of every object."""

@@ -6,7 +6,7 @@ lamp that no frame looked at is (`unseen_light`); where that fails, the bound is
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -19,10 +19,10 @@ from ...scene.visibility import SATURATED
 from .fringes import FringeParams
 
 
-def clipped_objects(lit: LitDiffuse, atlas: Atlas) -> dict[int, float]:
-    """Objects of which most of what was seen is clipped, with the luminance that they have at least."""
+def clipped_objects(lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()) -> dict[int, float]:
+    """Objects of which most of what was seen is clipped, with the luminance that they have at least; none of `but`."""
     bounds = {}
-    for object_id in np.unique(atlas.object_id[lit.tier == SATURATED]):
+    for object_id in np.setdiff1d(atlas.object_id[lit.tier == SATURATED], list(but)):
         own = lit.seen & (atlas.object_id == object_id)
         clipped = own & (lit.tier == SATURATED)
         if atlas.area[clipped].sum() > FringeParams.least_share * atlas.area[own].sum():
@@ -40,20 +40,24 @@ def unseen(lit: LitDiffuse, atlas: Atlas, objects: list[int]) -> LitDiffuse:
     )  # fmt: skip
 
 
-def shade_clipped(shade: Callable[[LitDiffuse], Shading], lit: LitDiffuse, atlas: Atlas) -> Shading:
+def shade_clipped(
+    shade: Callable[[LitDiffuse], Shading], lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()
+) -> Shading:
     """`shade(lit)`, with clipped lamps solved for.
 
     Parameters
     ----------
     shade : callable
         Gives a Shading for an L_d.
+    but : collection of int
+        Objects that are left to `shade`.
 
     Returns
     -------
     Shading
         Each lamp that was clipped says so.
     """
-    bounds = clipped_objects(lit, atlas)
+    bounds = clipped_objects(lit, atlas, but)
     if not bounds:
         return shade(lit)
     found = shade(unseen(lit, atlas, list(bounds)))
@@ -66,4 +70,6 @@ def shade_clipped(shade: Callable[[LitDiffuse], Shading], lit: LitDiffuse, atlas
         # others, and has to be there when these are solved for. Where all were solved, the first run stands.
         found = shade(unseen(lit, atlas, list(solved)) if solved else lit)
 
-    return replace(found, lamps=tuple(replace(lamp, clipped=lamp.object_id in bounds) for lamp in found.lamps))
+    return replace(
+        found, lamps=tuple(replace(lamp, clipped=lamp.clipped or lamp.object_id in bounds) for lamp in found.lamps)
+    )

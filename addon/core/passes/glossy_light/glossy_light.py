@@ -81,7 +81,12 @@ class Excess(LightField):
         return caustics(self._lit, self._sources, self._gloss, self._seed)
 
     def arriving(
-        self, hits: Hits, element: np.ndarray, directions: np.ndarray, dark_in_mirrors: np.ndarray | None = None
+        self,
+        hits: Hits,
+        element: np.ndarray,
+        directions: np.ndarray,
+        dark_in_mirrors: np.ndarray | None = None,
+        origins: np.ndarray | None = None,
     ) -> np.ndarray:
         """As `LightField.arriving`; what is behind a surface gets nothing from it."""
         result = np.zeros((len(element), 3), np.float32)

@@ -1,0 +1,59 @@
+"""Where rays leave the room: cells on its bounding box, and the light that is known to come in by each of them.
+
+A lamp that hangs in a hole of a scan, or a wall that was never scanned, is near: from different places it lies in
+different directions, so an environment map can't hold it. A cell of the box can.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .params import GATHER
+
+CELLS = 6 * GATHER.cells**2
+"""Of all six sides: side (2 * axis, + 1 for the high one), row, column."""
+
+
+def within(low: np.ndarray, size: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Points ((n, 3)) inside of a box, (n,) bool."""
+    return ((points >= low) & (points <= low + size)).all(1)
+
+
+def exits(
+    low: np.ndarray, size: np.ndarray, origins: np.ndarray, directions: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where rays from inside the box leave it: flat cell, distance and |cosine| to the side's normal."""
+    far = low + np.where(directions > 0, size, np.float32(0))
+    along = np.abs(directions)
+    way = np.where(along > 1e-9, np.abs(far - origins) / np.maximum(along, 1e-9), np.float32(np.inf))
+    axis = way.argmin(1)
+    at = np.arange(len(axis))
+    distance = way[at, axis]
+    point = (origins + distance[:, None] * directions - low) / size
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    row = np.clip((point[at, first] * GATHER.cells).astype(np.int64), 0, GATHER.cells - 1)
+    column = np.clip((point[at, second] * GATHER.cells).astype(np.int64), 0, GATHER.cells - 1)
+    side = 2 * axis + (directions[at, axis] > 0)
+    return (side * GATHER.cells + row) * GATHER.cells + column, distance, along[at, axis]
+
+
+@dataclass(frozen=True)
+class Openings:
+    """Light that comes in by the cells of a box.
+
+    Attributes
+    ----------
+    low, size : (3,) float32
+        The box, metres.
+    radiance : (CELLS, 3) float32
+    """
+
+    low: np.ndarray
+    size: np.ndarray
+    radiance: np.ndarray
+
+    def __call__(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Radiance along rays that leave the mesh ((n, 3) float32), and which of them start inside of the box."""
+        return self.radiance[exits(self.low, self.size, origins, directions)[0]], within(self.low, self.size, origins)

@@ -1,0 +1,80 @@
+"""Patches of a coarse mesh that the sensor clipped.
+
+A fused mesh has no objects: its ceiling lamps and windows are of one piece with floor and walls. What nearly all frames
+that see it show clipped may be such a lamp, and its radiance is solved for. A white wall that a few frames clip is none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...scene.atlas import Atlas
+from ...scene.connected_parts import weld
+from ...scene.lit_diffuse import LitDiffuse
+from ...scene.model import Mesh
+from ...scene.patches import Patches
+from ...scene.uv_islands import connected
+from ...significance import LEVELS
+
+
+@dataclass(frozen=True)
+class PatchParams:
+    """What is set apart.
+
+    Attributes
+    ----------
+    coarse : float
+        Share of the room's surface from which on one object tells that objects are no things here.
+    least_share : float
+        Of the observations of a triangle that must be clipped. At a patch's edge poses that are off mix in what lies
+        beside it: of a ceiling lamp's 0.27 square metres 0.285 have .3, 0.279 .5 and 0.261 .7, and none of the wall.
+    core : float
+        Of an element's, somewhere in a patch: what frames only clip at times has none.
+    most : int
+        Patches; the greatest are taken.
+    """
+
+    coarse: float = 0.5
+    least_share: float = 0.5
+    core: float = 0.9
+    most: int = 24
+
+
+PATCHES = PatchParams()
+
+
+def is_coarse(atlas: Atlas) -> bool:
+    """Whether one object holds so much of the room that objects say nothing of what it is made of."""
+    area = np.bincount(atlas.object_id, atlas.weight)
+    return bool(area.max() > PATCHES.coarse * area.sum())
+
+
+def clipped_patches(mesh: Mesh, atlas: Atlas, lit: LitDiffuse) -> Patches:
+    """Connected triangles of a coarse mesh that nearly all frames show clipped."""
+    if not is_coarse(atlas):
+        return Patches.none()
+    count = len(mesh.triangles)
+    told = np.where(lit.seen, atlas.area, 0)
+    share = np.bincount(atlas.triangle, told * lit.clipped, count) / np.maximum(
+        np.bincount(atlas.triangle, told, count), 1e-20
+    )
+    chosen = np.flatnonzero(share > PATCHES.least_share)
+    if not len(chosen):
+        return Patches.none()
+    label = np.full(count, -1)
+    label[chosen] = connected(weld(mesh.vertices)[mesh.triangles[chosen]])
+    of_element = label[atlas.triangle]
+    own = (of_element >= 0) & lit.seen
+    parts = int(label.max()) + 1
+    elements = np.bincount(of_element[own], minlength=parts)
+    core = np.bincount(of_element[own & (lit.clipped > PATCHES.core)], minlength=parts)
+    area = np.bincount(of_element[own], atlas.area[own], parts)
+    enough = np.flatnonzero((elements >= LEVELS.few) & (core > 0))
+    kept = enough[np.argsort(-area[enough], kind="stable")][: PATCHES.most]
+    first = int(mesh.object_id.max()) + 1
+    number = np.full(parts, -1)
+    number[kept] = first + np.arange(len(kept))
+    triangle = np.flatnonzero(np.where(label >= 0, number[label], -1) >= 0)
+    return Patches(triangle.astype(np.int32), number[label[triangle]].astype(np.int32))

@@ -1,0 +1,141 @@
+"""Light that a scan without objects lacks: patches that the sensor clipped, and what comes in by the mesh's holes.
+
+Most of a room's light may come from there. In a living room as a phone gives it, one ceiling lamp is clipped in every
+frame, the other hangs in a part of the ceiling that no frame saw: the light that was measured is a third of all.
+Nothing is done unless albedos above 1 tell that light is missing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...light.directions import cosine_patterns, turned
+from ...light.environment import Environment
+from ...light.few_elements import contribution_of_object, evened, irradiance_at
+from ...light.field import LightField
+from ...light.lamps import Lamp
+from ...light.openings import CELLS, Openings, exits
+from ...light.params import GATHER
+from ...luminance import LUMINANCE
+from ...parallel import for_blocks
+from ...significance import LEVELS
+from .params import MISSING
+from .solve import Unknown, in_one_plane, solve
+
+
+@dataclass(frozen=True)
+class MissingLight:
+    """What was solved for.
+
+    Attributes
+    ----------
+    lamps : tuple of Lamp
+        Patches of which the room's light asks for clearly more than was measured.
+    radiance : dict of (3,) float
+        Of every patch, by object.
+    openings : Openings
+    notes : tuple of str
+    """
+
+    lamps: tuple[Lamp, ...]
+    radiance: dict[int, np.ndarray]
+    openings: Openings
+    notes: tuple[str, ...]
+
+
+def is_missing(field: LightField, good: np.ndarray, seed: int) -> bool:
+    """Whether the light of a room, as it was found, is too little for what it reflects."""
+    element = _sample(field, good, seed)
+    if len(element) < LEVELS.many:
+        return False
+    rho = np.pi * field.radiance[element] / np.maximum(irradiance_at(field, element, seed), 1e-12)
+    return float((rho.max(1) > 1).mean()) > MISSING.alarm
+
+
+def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], seed: int) -> MissingLight:
+    """Solve for the light of clipped patches, and of all that is seen through the mesh's openings.
+
+    Parameters
+    ----------
+    field : LightField
+        With L_d, dark where no frame saw it, and no lamps.
+    good : (n,) bool
+        Elements whose L_d is to be believed.
+    patches : list of int
+        Objects that were set apart as the sensor clipped them.
+    """
+    atlas = field.atlas
+    radiance = evened(field)
+    own = {one: atlas.object_id == one for one in patches}
+    bound = {one: np.median(radiance[which], 0).astype(np.float64) for one, which in own.items()}
+    hidden = np.isin(atlas.object_id, patches)
+    element = _sample(field, good & ~hidden, seed)
+    radiance[hidden] = 0
+    received = irradiance_at(field.with_openings(None).with_light(radiance, Environment.dark()), element, seed)
+    cell, through = _through_cells(field, element, seed)
+    thrown = [contribution_of_object(field, element, one, seed) for one in patches]
+    usual = np.median(radiance[element], 0).astype(np.float64)
+    # What hardly any element sees says nothing, and lights nothing.
+    told = through.mean(0) >= MISSING.least_seen
+    received = received + through[:, ~told].sum(1)[:, None] * usual
+    unknown = Unknown(
+        np.concatenate([np.reshape(thrown, (-1, len(element))).T, through[:, told]], 1),
+        np.concatenate([np.reshape([bound[one] for one in patches], (-1, 3)), np.full((int(told.sum()), 3), 1e-6)]),
+        np.concatenate([np.reshape([bound[one] for one in patches], (-1, 3)), np.tile(usual, (int(told.sum()), 1))]),
+    )
+    sent = field.radiance[element].astype(np.float64)
+    pairs = in_one_plane(atlas.position[element], atlas.normal[element], seed)
+    found, spread = solve(sent, received, unknown, pairs)
+
+    solved = dict(zip(patches, found, strict=False))
+    E = received + unknown.contribution @ found
+    of_all = (unknown.contribution[:, : len(patches)] * (found[: len(patches)] @ LUMINANCE)) / (E @ LUMINANCE)[:, None]
+    strong = (of_all > LEVELS.gain).sum(0) >= LEVELS.many
+    lamps = tuple(
+        Lamp(one, solved[one].astype(np.float32), False, clipped=True, spread=spread)
+        for k, one in enumerate(patches)
+        if strong[k] and solved[one] @ LUMINANCE > MISSING.lamp * (bound[one] @ LUMINANCE)
+    )
+    by_opening = np.tile(usual, (len(through.T), 1))
+    by_opening[told] = found[len(patches) :]
+    low, size = field.outer_box
+    openings = Openings(low, size, by_opening[cell].astype(np.float32))
+    share = float((through[:, told] @ found[len(patches) :]).sum() / E.sum())
+    note = (
+        f"{share:.0%} of the light comes in by openings of the mesh, from where it was solved from what it throws: "
+        "what no frame saw there may be a lamp."
+    )
+    return MissingLight(lamps, solved, openings, (note,) if share >= LEVELS.gain else ())
+
+
+def _sample(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:
+    """Good elements, spread over the surface."""
+    element = np.flatnonzero(good)
+    if len(element) <= MISSING.samples:
+        return element
+    weight = field.atlas.weight[element].astype(np.float64)
+    rng = np.random.default_rng(seed)
+    return np.sort(rng.choice(element, MISSING.samples, replace=False, p=weight / weight.sum()))
+
+
+def _through_cells(field: LightField, element: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which unknown each cell of the box belongs to, (CELLS,) int; E from each at radiance 1, (m, u) float64."""
+    side, row, column = np.unravel_index(np.arange(CELLS), (6, GATHER.cells, GATHER.cells))
+    edge = -(-GATHER.cells // MISSING.merged)
+    unknown = (side * edge + row // MISSING.merged) * edge + column // MISSING.merged
+    low, size = field.outer_box
+    patterns = cosine_patterns(MISSING.rays, seed)
+    through = np.zeros((len(element), int(unknown.max()) + 1))
+
+    def run(part: slice) -> None:
+        normal = field.atlas.normal[element[part]]
+        directions = turned(patterns, normal, np.random.default_rng([seed, part.start]))[0].reshape(-1, 3)
+        origins = np.repeat(field.scene.off_surface(field.atlas.position[element[part]], normal), MISSING.rays, 0)
+        out = np.flatnonzero(field.scene.intersect(origins, directions).triangle < 0)
+        met = unknown[exits(low, size, origins[out], directions[out])[0]]
+        np.add.at(through[part], (out // MISSING.rays, met), np.pi / MISSING.rays)
+
+    for_blocks(run, len(element), 64, 0)
+    return unknown, through

@@ -1,0 +1,74 @@
+"""Triangles that were found to be objects of their own, though the capture has them as parts of others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .model import Capture, Instance, Mesh
+from .surface import Surface
+
+CLASS_NAME = "lamp"
+"""Of their instances."""
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Triangles that are set apart.
+
+    Attributes
+    ----------
+    triangle : (p,) int32
+    object_id : (p,) int32
+        The object that each is of now.
+    """
+
+    triangle: np.ndarray
+    object_id: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.triangle)
+
+    @staticmethod
+    def none() -> Patches:
+        """Where nothing is."""
+        return Patches(np.zeros(0, np.int32), np.zeros(0, np.int32))
+
+    @property
+    def objects(self) -> list[int]:
+        """The new objects."""
+        return [int(i) for i in np.unique(self.object_id)]
+
+    def kept(self, objects: Iterable[int]) -> tuple[Patches, dict[int, int]]:
+        """Those of some objects alone, numbered without gaps; and the new number of each."""
+        numbers = dict(zip(sorted(objects), self.objects, strict=False))
+        kept = np.isin(self.object_id, list(numbers))
+        new = np.array([numbers[int(i)] for i in self.object_id[kept]], np.int32)
+        return Patches(self.triangle[kept], new), numbers
+
+    def mesh(self, mesh: Mesh) -> Mesh:
+        """A mesh with them set apart; it may lack the second sides (`Mesh.backs`)."""
+        if not len(self):
+            return mesh
+        object_id, there = mesh.object_id.copy(), self.triangle < len(mesh.object_id)
+        object_id[self.triangle[there]] = self.object_id[there]
+        return replace(mesh, object_id=object_id)
+
+    def surface(self, surface: Surface) -> Surface:
+        """A surface with them set apart."""
+        if not len(self):
+            return surface
+        mesh = self.mesh(surface.mesh)
+        return replace(
+            surface, mesh=mesh, atlas=replace(surface.atlas, object_id=mesh.object_id[surface.atlas.triangle])
+        )
+
+    def capture(self, capture: Capture) -> Capture:
+        """A capture with them set apart; as it is where they are already."""
+        known = {one.object_id for one in capture.instances}
+        new = tuple(Instance(i, CLASS_NAME) for i in self.objects if i not in known)
+        if not new:
+            return capture
+        return replace(capture, mesh=self.mesh(capture.mesh), instances=(*capture.instances, *new))
