@@ -6,10 +6,11 @@ different directions, so an environment map can't hold it. A cell of the box can
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .environment import Environment
 from .params import GATHER
 
 CELLS = 6 * GATHER.cells**2
@@ -57,3 +58,19 @@ class Openings:
     def __call__(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Radiance along rays that leave the mesh ((n, 3) float32), and which of them start inside of the box."""
         return self.radiance[exits(self.low, self.size, origins, directions)[0]], within(self.low, self.size, origins)
+
+    def filled(self, sky: Environment, place: np.ndarray) -> Environment:
+        """A map with these where it has no value, as a `place` ((3,)) sees them: for what knows maps alone."""
+        height, width = sky.radiance.shape[:2]
+        row, column = np.mgrid[:height, :width] + 0.5
+        around, up = (0.5 - column / width) * 2 * np.pi, (row / height - 0.5) * np.pi
+        flat = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)], -1).reshape(-1, 3)
+        start = np.broadcast_to(np.asarray(place, np.float32), flat.shape)
+        shown = self(start, flat.astype(np.float32))[0].reshape(sky.radiance.shape)
+        unknown = (sky.observations == 0) | sky.clipped
+        return replace(
+            sky,
+            radiance=np.where(
+                unknown[..., None], np.maximum(shown, sky.radiance * sky.clipped[..., None]), sky.radiance
+            ),
+        )

@@ -258,13 +258,16 @@ def with_missing_light(
     for one, solved in found.radiance.items():
         own = dark.atlas.object_id == one
         radiance[own] = np.maximum(radiance[own], solved)
-    seen = tuple(lamp for lamp in light.lamps if lamp.seen and lamp.object_id not in patches)
+    # What looked like a lamp for want of light may do so no more.
+    seen = tuple(lamp for lamp in light.lamps if lamp.seen and lamp.object_id in found.brighter)
     for lamp in seen:
         own = dark.atlas.object_id == lamp.object_id
         radiance[own & (lit_diffuse.tier != CLEAN)] = lamp.radiance
     lamps = (*seen, *found.lamps)
-    field = field.with_light(radiance, dark.environment, [lamp.object_id for lamp in lamps])
-    light = replace(light, lamps=lamps, environment=dark.environment, notes=found.notes)
+    middle = np.median(dark.atlas.position, 0)
+    environment = found.openings.filled(dark.environment, middle)
+    field = field.with_light(radiance, environment, [lamp.object_id for lamp in lamps])
+    light = replace(light, lamps=lamps, environment=environment, notes=found.notes)
     return field.with_openings(found.openings).with_sun(dark.sun), light
 
 

@@ -1,7 +1,7 @@
 """Patches of a coarse mesh that the sensor clipped.
 
 A fused mesh has no objects: its ceiling lamps and windows are of one piece with floor and walls. What nearly all frames
-that see it show clipped may be such a lamp, and its radiance is solved for. A white wall that a few frames clip is none.
+that see it show clipped may be such a lamp, and its radiance is solved for. A white wall that few frames clip is none.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 
 from ...scene.atlas import Atlas
 from ...scene.connected_parts import weld
+from ...scene.elements import ElementLookup
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Mesh
 from ...scene.patches import Patches
@@ -57,9 +58,13 @@ def clipped_patches(mesh: Mesh, atlas: Atlas, lit: LitDiffuse) -> Patches:
         return Patches.none()
     count = len(mesh.triangles)
     told = np.where(lit.seen, atlas.area, 0)
-    share = np.bincount(atlas.triangle, told * lit.clipped, count) / np.maximum(
-        np.bincount(atlas.triangle, told, count), 1e-20
-    )
+    of_triangle = np.bincount(atlas.triangle, told, count)
+    share = np.bincount(atlas.triangle, told * lit.clipped, count) / np.maximum(of_triangle, 1e-20)
+    # A triangle too small for an element of its own shows one beside it.
+    bare = np.flatnonzero(np.bincount(atlas.triangle, minlength=count) == 0).astype(np.int32)
+    third = np.full(len(bare), 1 / 3, np.float32)
+    beside = ElementLookup(mesh, atlas)(bare, third, third)
+    share[bare] = np.where(lit.seen[beside], lit.clipped[beside], 0)
     chosen = np.flatnonzero(share > PATCHES.least_share)
     if not len(chosen):
         return Patches.none()

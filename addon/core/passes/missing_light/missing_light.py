@@ -15,7 +15,7 @@ from ...light.directions import cosine_patterns, turned
 from ...light.environment import Environment
 from ...light.few_elements import contribution_of_object, evened, irradiance_at
 from ...light.field import LightField
-from ...light.lamps import Lamp
+from ...light.lamps import Lamp, find_seen
 from ...light.openings import CELLS, Openings, exits
 from ...light.params import GATHER
 from ...luminance import LUMINANCE
@@ -35,12 +35,15 @@ class MissingLight:
         Patches of which the room's light asks for clearly more than was measured.
     radiance : dict of (3,) float
         Of every patch, by object.
+    brighter : frozenset of int
+        Other objects that give more than they could reflect of all this light.
     openings : Openings
     notes : tuple of str
     """
 
     lamps: tuple[Lamp, ...]
     radiance: dict[int, np.ndarray]
+    brighter: frozenset[int]
     openings: Openings
     notes: tuple[str, ...]
 
@@ -107,7 +110,8 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
         f"{share:.0%} of the light comes in by openings of the mesh, from where it was solved from what it throws: "
         "what no frame saw there may be a lamp."
     )
-    return MissingLight(lamps, solved, openings, (note,) if share >= LEVELS.gain else ())
+    brighter = frozenset(lamp.object_id for lamp in find_seen(atlas.object_id[element], sent, E))
+    return MissingLight(lamps, solved, brighter, openings, (note,) if share >= LEVELS.gain else ())
 
 
 def _sample(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:

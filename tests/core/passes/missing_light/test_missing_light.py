@@ -1,0 +1,133 @@
+"""A box of one object, as a fused mesh is: its lamp is clipped in every frame, or hangs in a hole of the mesh."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from addon.core.light.few_elements import irradiance_at
+from addon.core.passes.clipped_lamps.patches import clipped_patches
+from addon.core.passes.missing_light.missing_light import find_missing_light, is_missing
+from addon.core.scene.lit_diffuse import LitDiffuse
+from addon.core.scene.visibility import CLEAN
+from tests.core.rooms import DARK, Room, around, box_sides, cut, make_room, split
+
+LAMP = np.array([40.0, 36.0, 30.0], np.float32)
+CLIPPED = 1.0
+AT = (0.4, 0.6), (0.3, 0.5)
+
+
+@cache
+def box(hole: bool = False) -> Room:
+    """Object 0 throughout; the lamp's quads are the last, and absent with a `hole`."""
+    sides = [replace(one, object_id=0) for one in box_sides()]
+    ceiling = sides.pop(1)
+    quads = [cell for one in [*sides, *around(ceiling, *AT)] for cell in split(one, 6)]
+    return make_room(quads if hole else [*quads, *split(cut(ceiling, *AT), 4)], texel=0.2)
+
+
+def in_lamp(room: Room) -> np.ndarray:
+    """(n,) bool"""
+    return room.atlas.triangle >= len(room.mesh.triangles) - 32
+
+
+@cache
+def lit() -> tuple[np.ndarray, np.ndarray]:
+    """Albedo and radiance of the box, by bounces: floor of two paints, walls of a third."""
+    room = box()
+    rho = np.tile(np.float32([0.6, 0.55, 0.5]), (len(room.atlas), 1))
+    x, z = room.atlas.position[:, 0], room.atlas.position[:, 2]
+    rho[(z < 0.01) & (x < 1.5)] = 0.2, 0.25, 0.3
+    rho[(z < 0.01) & (x >= 1.5)] = 0.4, 0.2, 0.1
+    lamp = in_lamp(room)
+    radiance = np.where(lamp[:, None], LAMP, np.float32(0))
+    for bounce in range(6):
+        E = irradiance_at(room.field(radiance), np.arange(len(room.atlas)), bounce)
+        radiance = np.where(lamp[:, None], LAMP, rho * E / np.pi).astype(np.float32)
+    return rho, radiance
+
+
+def seen(radiance: np.ndarray, clipped: np.ndarray) -> LitDiffuse:
+    n = len(radiance)
+    return LitDiffuse(
+        radiance, radiance, radiance, np.full(n, 9, np.int32), np.full(n, CLEAN, np.int8), clipped.astype(np.float32)
+    )
+
+
+def off(found: np.ndarray, true: np.ndarray) -> float:
+    """Median relative error."""
+    return float(np.median(np.abs(found / true - 1)))
+
+
+def test_a_patch_is_what_nearly_all_frames_clip():
+    room = box()
+    window = (room.atlas.position[:, 0] < 0.01) & (room.atlas.position[:, 2] > 1)
+    share = np.where(in_lamp(room), 0.85, np.where(window, 0.3, 0.0))
+    share[np.flatnonzero(in_lamp(room))[::3]] = 1.0
+    found = clipped_patches(room.mesh, room.atlas, seen(lit()[1], share))
+    assert sorted(found.triangle) == list(range(len(room.mesh.triangles) - 32, len(room.mesh.triangles)))
+    assert found.objects == [1]
+
+
+def test_no_patch_is_taken_from_a_mesh_that_has_objects():
+    room = box()
+    mesh = replace(room.mesh, object_id=(np.arange(len(room.mesh.triangles)) // 40).astype(np.int32))
+    atlas = replace(room.atlas, object_id=mesh.object_id[room.atlas.triangle])
+    assert not len(clipped_patches(mesh, atlas, seen(lit()[1], in_lamp(room).astype(float))))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_clipped_lamp_of_the_same_object_gets_its_radiance(seed):
+    room, (rho, radiance) = box(), lit()
+    measured = np.where(in_lamp(room)[:, None], np.float32(CLIPPED), radiance)
+    patches = clipped_patches(room.mesh, room.atlas, seen(measured, in_lamp(room).astype(float)))
+    mesh = patches.mesh(room.mesh)
+    apart = replace(room, mesh=mesh)
+    field, good = apart.field(measured), np.ones(len(room.atlas), bool)
+    assert is_missing(field, good & ~in_lamp(room), seed)
+    found = find_missing_light(field, good, patches.objects, seed)
+    assert [lamp.object_id for lamp in found.lamps] == [1]
+    assert found.lamps[0].clipped and not found.lamps[0].seen
+    assert found.lamps[0].radiance == pytest.approx(LAMP, rel=0.3)
+    everything = np.where(in_lamp(room)[:, None], found.lamps[0].radiance, measured)
+    E = irradiance_at(apart.field(everything), np.flatnonzero(~in_lamp(room)), seed)
+    albedo = np.pi * measured[~in_lamp(room)] / E
+    assert off(albedo, rho[~in_lamp(room)]) < 0.2
+    assert (albedo > 1).mean() < 0.03
+
+
+def test_a_patch_that_is_as_bright_as_it_was_measured_is_no_lamp():
+    room, (_, radiance) = box(), lit()
+    floor = (room.atlas.position[:, 2] < 0.01) & (np.abs(room.atlas.position[:, 0] - 2) < 0.4)
+    patches = clipped_patches(room.mesh, room.atlas, seen(radiance, floor.astype(float)))
+    assert len(patches.objects) == 1
+    field = replace(room, mesh=patches.mesh(room.mesh)).field(radiance)
+    found = find_missing_light(field, np.ones(len(room.atlas), bool) & ~in_lamp(room), patches.objects, 0)
+    assert not found.lamps
+
+
+def test_nothing_is_missing_where_all_light_was_measured():
+    room, (_, radiance) = box(), lit()
+    assert not is_missing(room.field(radiance), ~in_lamp(room), 0)
+
+
+def test_light_through_a_hole_that_no_frame_saw_is_told_from_what_it_throws():
+    whole, (_, radiance) = box(), lit()
+    room = box(hole=True)
+    same = cKDTree(whole.atlas.place(np.arange(len(whole.atlas)))).query(room.atlas.place(np.arange(len(room.atlas))))[
+        1
+    ]
+    field, good = room.field(radiance[same]), np.ones(len(room.atlas), bool)
+    assert is_missing(field, good, 0)
+    found = find_missing_light(field, good, [], 0)
+    everything = np.arange(len(room.atlas))
+    E = irradiance_at(field.with_openings(found.openings), everything, 0)
+    true = irradiance_at(whole.field(radiance), same, 0)
+    assert off(E, true) < 0.25
+    assert off(irradiance_at(field, everything, 0), true) > 0.5
+    assert field.environment is DARK
+    assert "openings" in found.notes[0]
