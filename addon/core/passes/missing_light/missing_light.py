@@ -99,7 +99,7 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
     lamps = tuple(
         Lamp(one, solved[one].astype(np.float32), False, clipped=True, spread=spread)
         for k, one in enumerate(patches)
-        if strong[k] and solved[one] @ LUMINANCE > MISSING.lamp * (bound[one] @ LUMINANCE)
+        if strong[k] and (solved[one] > MISSING.lamp * bound[one]).all()
     )
     by_opening = np.tile(usual, (len(through.T), 1))
     by_opening[told] = found[len(patches) :]

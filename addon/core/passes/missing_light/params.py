@@ -50,7 +50,7 @@ class MissingLightParams:
     steps : int
         Of the minimisation.
     lamp : float
-        Times its clipped value that the room's light must ask for, of a patch that is called a lamp.
+        Times its clipped value, in each channel, that the room's light must ask for of a patch that is called a lamp.
     """
 
     alarm: float = 0.05
