@@ -19,7 +19,7 @@ from ..light.over_surface import Gathering, finest_spacing, irradiance
 from ..light.shading import Shading
 from ..light.sun import Sun, taken_out
 from ..passes.clipped_lamps.clipped import shade_clipped
-from ..passes.clipped_lamps.patches import clipped_patches, is_coarse
+from ..passes.clipped_lamps.patches import clipped_patches
 from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.missing_light.missing_light import find_missing_light, is_missing
 from ..passes.unseen_light.unseen_light import Light
@@ -69,8 +69,8 @@ def find_shading(
             surface.mesh, surface.atlas, surface.scene, lit, observed.environment,
             rays=s.shading_rays, threads=s.threads, seed=s.seed, progress=progress,
         )  # fmt: skip
-    patches = Patches.none()
-    if not {"clipped-patches", "missing-light"} & set(s.without):
+    patches, guessed = Patches.none(), all(one.guess for one in capture.instances)
+    if guessed and not {"clipped-patches", "missing-light"} & set(s.without):
         patches = clipped_patches(surface.mesh, surface.atlas, lit)
         surface, capture = patches.surface(surface), patches.capture(capture)
 
@@ -80,7 +80,7 @@ def find_shading(
             rays=s.shading_rays, emitter_rays=s.emitter_rays, portal_rays=s.portal_rays,
             interpolate=s.interpolate, threads=s.threads, seed=s.seed, progress=progress,
             find_mirrors=mirrors if s.mirrors else None, noise=surface.noise,
-            colours=observed.fringes.colours(), patches=patches.objects, without=s.without,
+            colours=observed.fringes.colours(), patches=patches.objects if guessed else None, without=s.without,
         )  # fmt: skip
 
     if "clipped-lamps" in s.without:
@@ -142,7 +142,7 @@ def shade(
     colours : dict of (3,) float, optional
         Colour of light of objects that were clipped (`fringes`).
     patches : list of int, optional
-        Objects that were set apart as they were clipped.
+        Objects that were set apart as they were clipped; None where the capture tells of its objects.
     without : collection of str
         Passes left out.
 
@@ -166,8 +166,8 @@ def shade(
     field = LightField(mesh, atlas, scene, unseen_dark(lit_diffuse), environment).with_sun(sun)
     dark = field
     field, light = with_all_light(field, lit_diffuse, instances, find_mirrors, seed, tilted, colours, without)
-    if is_coarse(atlas) and "missing-light" not in without:
-        field, light = with_missing_light(dark, field, light, lit_diffuse, patches or [], seed)
+    if patches is not None and "missing-light" not in without:
+        field, light = with_missing_light(dark, field, light, lit_diffuse, patches, seed)
 
     # Where there is no L_d to divide, the rough E does.
     emitters = {lamp.object_id for lamp in light.lamps}

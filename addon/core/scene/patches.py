@@ -68,7 +68,10 @@ class Patches:
     def capture(self, capture: Capture) -> Capture:
         """A capture with them set apart; as it is where they are already."""
         known = {one.object_id for one in capture.instances}
-        new = tuple(Instance(i, CLASS_NAME) for i in self.objects if i not in known)
+        new = tuple(Instance(i, CLASS_NAME, guess=True) for i in self.objects if i not in known)
         if not new:
             return capture
-        return replace(capture, mesh=self.mesh(capture.mesh), instances=(*capture.instances, *new))
+        mesh = self.mesh(capture.mesh)
+        left = set(np.unique(mesh.object_id).tolist())
+        instances = (*(one for one in capture.instances if one.object_id in left), *new)
+        return replace(capture, mesh=mesh, instances=instances)

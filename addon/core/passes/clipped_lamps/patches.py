@@ -1,6 +1,6 @@
-"""Patches of a coarse mesh that the sensor clipped.
+"""Patches that the sensor clipped, of a mesh that tells of no objects.
 
-A fused mesh has no objects: its ceiling lamps and windows are of one piece with floor and walls. What nearly all frames
+In a fused mesh ceiling lamps and windows are of one piece with the rest. What nearly all frames
 that see it show clipped may be such a lamp, and its radiance is solved for. A white wall that few frames clip is none.
 """
 
@@ -26,8 +26,6 @@ class PatchParams:
 
     Attributes
     ----------
-    coarse : float
-        Share of the room's surface from which on one object tells that objects are no things here.
     least_share : float
         Of the observations of a triangle that must be clipped. At a patch's edge poses that are off mix in what lies
         beside it: of a ceiling lamp's 0.27 square metres 0.285 have .3, 0.279 .5 and 0.261 .7, and none of the wall.
@@ -37,7 +35,6 @@ class PatchParams:
         Patches; the greatest are taken.
     """
 
-    coarse: float = 0.5
     least_share: float = 0.5
     core: float = 0.9
     most: int = 24
@@ -46,16 +43,8 @@ class PatchParams:
 PATCHES = PatchParams()
 
 
-def is_coarse(atlas: Atlas) -> bool:
-    """Whether one object holds so much of the room that objects say nothing of what it is made of."""
-    area = np.bincount(atlas.object_id, atlas.weight)
-    return bool(area.max() > PATCHES.coarse * area.sum())
-
-
 def clipped_patches(mesh: Mesh, atlas: Atlas, lit: LitDiffuse) -> Patches:
-    """Connected triangles of a coarse mesh that nearly all frames show clipped."""
-    if not is_coarse(atlas):
-        return Patches.none()
+    """Connected triangles that nearly all frames show clipped."""
     count = len(mesh.triangles)
     told = np.where(lit.seen, atlas.area, 0)
     of_triangle = np.bincount(atlas.triangle, told, count)

@@ -73,13 +73,6 @@ def test_a_patch_is_what_nearly_all_frames_clip():
     assert found.objects == [1]
 
 
-def test_no_patch_is_taken_from_a_mesh_that_has_objects():
-    room = box()
-    mesh = replace(room.mesh, object_id=(np.arange(len(room.mesh.triangles)) // 40).astype(np.int32))
-    atlas = replace(room.atlas, object_id=mesh.object_id[room.atlas.triangle])
-    assert not len(clipped_patches(mesh, atlas, seen(lit()[1], in_lamp(room).astype(float))))
-
-
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_clipped_lamp_of_the_same_object_gets_its_radiance(seed):
     room, (rho, radiance) = box(), lit()
