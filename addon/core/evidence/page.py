@@ -19,6 +19,7 @@ from .findings import Findings
 from .objects import ObjectEvidence
 from .pictures import Picture, pictures_of
 from .style import STYLE
+from .tier import TIERS
 from .views import choose_frames, view
 
 FRAMES: Shown[int] = 3
@@ -37,6 +38,7 @@ def make_page(found: Findings, evidence: Evidence, report: dict[str, Any]) -> st
     name = escape(found.name)
     parts = [
         f"<h1>{name} <small>recovered by Scan Relight</small></h1>",
+        f"<p><b>{escape(TIERS[report['tier']])}</b></p>",
         _facts(found, report),
         _warnings(report["warnings"]),
         _pictures(found, evidence),

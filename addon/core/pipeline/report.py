@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..evidence.tier import tier
 from ..origin import of_thing
 from ..passes.albedo.albedo import MEASURED, above_one, quotient, without_emitters
 from ..passes.registry import following
@@ -19,6 +20,7 @@ def make_report(run: Corrected) -> dict[str, Any]:
     """Stages, settings, figures and warnings of what has been computed so far."""
     result: dict[str, Any] = {
         "capture": run.capture.root.name,
+        "tier": tier(run.capture),
         "settings": dataclasses.asdict(run.settings),
         "stages": run.log,
         "passes_of_packages": [

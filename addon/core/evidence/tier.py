@@ -1,0 +1,34 @@
+"""What a capture's frames tell of radiance: the first thing to know of how far to trust a result."""
+
+from __future__ import annotations
+
+from ..scene.model import AUTO, Capture, Frame
+
+TIERS = {
+    "hdr": "HDR frames: their radiance is as it was recorded.",
+    "brackets": "Brackets of pictures with known exposures: their radiance is merged.",
+    "curve": "Pictures of 8 or 16 bits whose curve was told: what they clip is not known.",
+    "exposures": "Pictures of 8 or 16 bits with known exposures: the curve is estimated; what they clip is not known.",
+    "codes": "Pictures of 8 or 16 bits alone: exposures, white balance and curve are estimated, and brightness and "
+    "contrast of all albedo may be off.",
+    "texture": "No frames: the light is the one stored on the mesh, and nothing tells of highlights.",
+}
+"""From the best to the least; what report.json says, and the sentence."""
+
+
+def tier(capture: Capture) -> str:
+    """The name in `TIERS` of what most of a capture's frames are."""
+    if not capture.frames:
+        return "texture"
+
+    told = len({frame.exposure for frame in capture.frames}) > 1
+
+    def of(frame: Frame) -> str:
+        if frame.brackets:
+            return "brackets"
+        if frame.transfer != AUTO:
+            return "curve" if frame.transfer else "hdr"
+        return "exposures" if told else "codes"
+
+    found = [of(frame) for frame in capture.frames]
+    return max(TIERS, key=found.count)
