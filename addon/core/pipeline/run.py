@@ -20,7 +20,7 @@ from ..memory import peak_memory
 from ..progress import Progress, ProgressEvent
 from ..results.overrides import OVERRIDES, heeded
 from ..results.place import write_capture
-from ..results.room_file import ROOM, write_room
+from ..results.room_file import ROOM, objects_of, write_room
 from ..results.store import Store
 from ..scene.model import Capture
 from ..scene.unwrap import Unwrap
@@ -106,7 +106,8 @@ class Run:
         self.capture, self.folder = capture, out_folder
         self._settings, self._progress, self._versions = settings, progress, dict(versions or {})
         self._keep = override is not None and heed_kept
-        self._given = heeded(out_folder, (one.object_id for one in capture.instances), override, heed_kept)
+        known = {one.object_id for one in capture.instances} | objects_of(out_folder)
+        self._given = heeded(out_folder, known, override, heed_kept)
         self._told = _look(capture, reading) if capture.frames else []
         if not heed_kept and (out_folder / OVERRIDES).is_file():
             self._told = [LEFT_OUT, *self._told]

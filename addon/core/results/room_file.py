@@ -72,6 +72,15 @@ def _told(folder: Path | str, name: str) -> str:
     return key if isinstance(key, str) else ""
 
 
+def objects_of(folder: Path | str) -> set[int]:
+    """The objects of a folder's result, lamps that the run found by itself among them; none where there is none."""
+    try:
+        told = json.loads((Path(folder) / MATERIALS).read_text(encoding="utf-8"))["objects"]
+        return {int(one["object_id"]) for one in told}
+    except DAMAGE:
+        return set()
+
+
 def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = None) -> None:
     """Write `ROOM` into a folder; `atlas_uv` as in `Room`, all 0 where there is no atlas. Raises `StorageError`."""
     mesh = capture.mesh

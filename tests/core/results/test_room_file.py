@@ -13,7 +13,7 @@ from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.brdf.material import ObjectMaterial
 from addon.core.brdf.metal import METAL
 from addon.core.errors import BadInputError, MissingStageError
-from addon.core.results.room_file import read_capture_file, read_room, run_of, write_room
+from addon.core.results.room_file import objects_of, read_capture_file, read_room, run_of, write_room
 from addon.core.scene.lenses import Cropped
 from addon.core.scene.lenses_colmap import polynomial
 from addon.core.scene.model import Camera, Capture, Frame, Instance, Mesh
@@ -59,6 +59,14 @@ def test_materials_come_from_their_file(tmp_path):
     assert room.run == "" == run_of(tmp_path)  # of an older version
     (tmp_path / "materials.json").write_text(json.dumps({"run": "0123456789abcdef", "objects": [told]}))
     assert read_room(tmp_path).run == run_of(tmp_path) == "0123456789abcdef"
+
+
+def test_the_objects_of_a_result_are_those_that_its_materials_list(tmp_path):
+    assert objects_of(tmp_path) == set()
+    (tmp_path / "materials.json").write_text(json.dumps({"objects": [{"object_id": 4}, {"object_id": 62}]}))
+    assert objects_of(tmp_path) == {4, 62}  # 62 may be a lamp that the capture knows nothing of
+    (tmp_path / "materials.json").write_text("{")
+    assert objects_of(tmp_path) == set()
 
 
 OLD = {
