@@ -117,6 +117,7 @@ def compare(capture: Path, result: Path) -> dict:
             "scores": mine.scores, "note": mine.note,
         })  # fmt: skip
     lamps = {lamp.object_id: lamp for lamp in shading.lamps}
+    names = {one.object_id: one.name for one in recovery.capture.instances}
     lamp_rows = [
         {
             "id": i,
@@ -124,7 +125,7 @@ def compare(capture: Path, result: Path) -> dict:
             "true": truth[i]["emission"],
             "found": lamps[i].radiance.tolist() if i in lamps else None,
             "seen": lamps[i].seen if i in lamps else False,
-            "note": lamps[i].note if i in lamps else "",
+            "note": lamps[i].note(names) if i in lamps else "",
         }
         for i in truth
         if truth[i]["emission"] or i in lamps
