@@ -98,21 +98,27 @@ class SpecularPart:
 
     def _shared(self, part: np.ndarray, owner: np.ndarray) -> np.ndarray:
         """The mean of pixels nearby that show the same object."""
-        height, width = owner.shape
-        total, weights = part.copy(), np.ones(owner.shape, np.float32)
-        reach = range(-self._params.reach, self._params.reach + 1)
-        for down in reach:
-            for right in reach:
-                if not (down or right):
-                    continue
-                weight = np.float32(np.exp(-(down**2 + right**2) / (2 * self._params.width**2)))
-                rows, columns = (slice(max(-by, 0), n - max(by, 0)) for by, n in ((down, height), (right, width)))
-                others = (slice(max(by, 0), n - max(-by, 0)) for by, n in ((down, height), (right, width)))
-                own, other = (rows, columns), tuple(others)
-                alike = weight * (owner[own] == owner[other])
-                total[own] += alike[..., None] * part[other]
-                weights[own] += alike
-        return total / weights[..., None]
+        result = np.zeros_like(part)
+        for object_id in self._lobes.keys() & set(np.unique(owner).tolist()):
+            own = owner == object_id
+            rows, columns = (np.flatnonzero(own.any(axis)) for axis in (1, 0))
+            box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+            own = own[box]
+            planes = np.concatenate([part[box] * own[..., None], own[..., None]], -1).transpose(2, 0, 1)
+            total = self._spread(self._spread(planes, 1), 2)
+            result[box][own] = (total[:3, own] / total[3, own]).T
+        return result
+
+    def _spread(self, planes: np.ndarray, axis: int) -> np.ndarray:
+        """Sum of neighbours along one axis by the Gaussian's weights; nothing lies beyond the ends."""
+        total, size = planes.copy(), planes.shape[axis]
+        for step in range(1, min(self._params.reach, size - 1) + 1):
+            weight = np.float32(np.exp(-(step**2) / (2 * self._params.width**2)))
+            first, last = ([slice(None)] * planes.ndim for _ in range(2))
+            first[axis], last[axis] = slice(0, size - step), slice(step, size)
+            total[tuple(first)] += weight * planes[tuple(last)]
+            total[tuple(last)] += weight * planes[tuple(first)]
+        return total
 
 
 def without_specular(
