@@ -28,6 +28,7 @@ from ..data.world import set_world
 from ..marks import OWN_SCENE, mark
 from ..refused import refused
 from .as_made import stamp, stamp_tree
+from .openings import make_openings
 from .parts import CAMERAS, LAMPS, ROOM, hide_cameras, new_room, part_of, scene_name
 from .settings import EXPOSURE
 
@@ -126,6 +127,7 @@ def build_scene(
             room.objects.unlink(thing)
             lamps.objects.link(thing)
         stamp(thing, instance.name)
+    panels = make_openings(folder, lamps)
     cameras = make_cameras(capture.frames, eyes)
     track = make_track(cameras, eyes)
     if own:
@@ -141,7 +143,7 @@ def build_scene(
         scene.frame_start, scene.frame_end = 1, max(len(cameras), 1)
         scene.name, scene[OWN_SCENE] = scene_name(capture.root), True
         scene[EXPOSURE] = scene.view_settings.exposure
-    for thing in (*cameras, *filter(None, (track,))):
+    for thing in (*panels, *cameras, *filter(None, (track,))):
         mark(thing, folder, run, capture.root)
         stamp(thing)
     hide_cameras(scene, top)

@@ -9,7 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import ndimage
 
+from ..luminance import LUMINANCE
 from .environment import Environment
 from .params import GATHER
 
@@ -38,6 +40,25 @@ def exits(
     column = np.clip((point[at, second] * GATHER.cells).astype(np.int64), 0, GATHER.cells - 1)
     side = 2 * axis + (directions[at, axis] > 0)
     return (side * GATHER.cells + row) * GATHER.cells + column, distance, along[at, axis]
+
+
+PANELS = 4.0
+"""Times what openings show as a rule, from which luminance on what comes in by a cell is taken to be a lamp."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Bright cells that lie side by side: a lamp, or a window, that no frame saw.
+
+    Attributes
+    ----------
+    corners : (q, 4, 3) float32
+        Of its quads; they face the room.
+    radiance : (3,) float32
+    """
+
+    corners: np.ndarray
+    radiance: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -74,3 +95,38 @@ class Openings:
                 unknown[..., None], np.maximum(shown, sky.radiance * sky.clipped[..., None]), sky.radiance
             ),
         )
+
+    @property
+    def bright(self) -> np.ndarray:
+        """Cells that are far brighter than most, (CELLS,) bool."""
+        luminance = self.radiance @ LUMINANCE
+        return luminance > PANELS * np.median(luminance)
+
+    def without_bright(self) -> Openings:
+        """The same, the bright cells like most others."""
+        usual = np.median(self.radiance, 0)
+        return replace(self, radiance=np.where(self.bright[:, None], usual, self.radiance).astype(np.float32))
+
+    def panels(self) -> list[Panel]:
+        """The bright cells, those that hang together as one."""
+        found = []
+        bright = self.bright.reshape(6, GATHER.cells, GATHER.cells)
+        for side in range(6):
+            label, count = ndimage.label(bright[side])
+            for one in range(1, count + 1):
+                row, column = np.nonzero(label == one)
+                radiance = self.radiance[(side * GATHER.cells + row) * GATHER.cells + column].mean(0)
+                found.append(Panel(self._quads(side, row, column), radiance))
+        return found
+
+    def _quads(self, side: int, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+        """Corners of some cells of a side, (q, 4, 3) float32."""
+        axis = side // 2
+        around = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+        if side % 2:
+            around = around[::-1]
+        share = np.empty((len(row), 4, 3))
+        share[..., axis] = side % 2
+        share[..., (axis + 1) % 3] = (row[:, None] + around[:, 0]) / GATHER.cells
+        share[..., (axis + 2) % 3] = (column[:, None] + around[:, 1]) / GATHER.cells
+        return (self.low + share * self.size).astype(np.float32)

@@ -12,6 +12,7 @@ import numpy as np
 from ..atomic import write_bytes
 from ..evidence.page import make_page
 from ..parallel import ordered_map
+from ..results.room_file import OPENINGS
 from ..settings import ROOM
 from .corrected import Corrected
 from .parts import LOOKED, Parting, Parts, look_closer, remove_parts, write_parts
@@ -70,6 +71,7 @@ class Recovery(Corrected):
             self.progress.update(begun + (0.5 - begun) * done / len(images))
         if wanted is None or "environment" in wanted:
             self.store.write_exr("environment.exr", self.sky()[::-1])
+            self._write_openings()
         if self.settings.atlas == ROOM:
             remove_parts(self)
         elif "base_color" in images and self._parting is not None:
@@ -85,6 +87,20 @@ class Recovery(Corrected):
         self.store.write_json("materials.json", told)
         self.progress.update(0.6)
         write_bytes(self.store.path("report.html"), make_page(self.findings, self.evidence, self.report()).encode())
+
+    def _write_openings(self) -> None:
+        """What is bright behind the mesh's openings, as panels; no file where nothing is."""
+        openings = self.shading().openings
+        panels = openings.panels() if openings is not None else []
+        if not panels:
+            self.store.path(OPENINGS).unlink(missing_ok=True)
+            return
+        shift = self.capture.mesh.vertices[0] - self._near.mesh.vertices[0]
+        light = np.ones(3) if self.white is None else self.white.of_light
+        told = [
+            {"radiance": (one.radiance * light).tolist(), "corners": (one.corners + shift).tolist()} for one in panels
+        ]
+        self.store.write_json(OPENINGS, {"openings": told})
 
     def report(self) -> dict[str, Any]:
         """What report.json holds so far: stages, settings, figures and warnings."""

@@ -23,6 +23,8 @@ from ..scene.model import Camera, Capture, Frame, Instance, Mesh, Shot
 
 ROOM = "room.npz"
 MATERIALS = "materials.json"
+OPENINGS = "openings.json"
+"""Lamps and windows that no frame saw, where they hang in openings of the mesh; absent where none were found."""
 CAMERA = ("width", "height", "fx", "fy", "cx", "cy")
 DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, NotImplementedError)
 
@@ -79,6 +81,15 @@ def objects_of(folder: Path | str) -> set[int]:
         return {int(one["object_id"]) for one in told}
     except DAMAGE:
         return set()
+
+
+def openings_of(folder: Path | str) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Corners ((q, 4, 3)) and radiance ((3,)) of each panel in `OPENINGS`; none where the file is absent or damaged."""
+    try:
+        told = json.loads((Path(folder) / OPENINGS).read_text(encoding="utf-8"))["openings"]
+        return [(np.array(one["corners"], float).reshape(-1, 4, 3), np.array(one["radiance"], float)) for one in told]
+    except DAMAGE:
+        return []
 
 
 def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = None) -> None:
