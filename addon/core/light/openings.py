@@ -42,10 +42,6 @@ def exits(
     return (side * GATHER.cells + row) * GATHER.cells + column, distance, along[at, axis]
 
 
-PANELS = 4.0
-"""Times what openings show as a rule, from which luminance on what comes in by a cell is taken to be a lamp."""
-
-
 @dataclass(frozen=True)
 class Panel:
     """Bright cells that lie side by side: a lamp, or a window, that no frame saw.
@@ -100,7 +96,7 @@ class Openings:
     def bright(self) -> np.ndarray:
         """Cells that are far brighter than most, (CELLS,) bool."""
         luminance = self.radiance @ LUMINANCE
-        return luminance > PANELS * np.median(luminance)
+        return luminance > GATHER.lamp_in_opening * np.median(luminance)
 
     def without_bright(self) -> Openings:
         """The same, the bright cells like most others."""

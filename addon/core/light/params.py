@@ -54,6 +54,8 @@ class GatherParams:
         Widths (phi) of the lobes that rays are drawn from.
     unseen_coarser : int
         Times the finest spacing of gathering points.
+    lamp_in_opening : float
+        Times the luminance that cells of the box have as a rule, from which on what comes in by one is a lamp.
     """
 
     patterns: int = 64
@@ -76,6 +78,7 @@ class GatherParams:
     mirror_fewer: int = 4
     proposals: tuple[float, ...] = (0.015, 0.06, 0.2, 0.6)
     unseen_coarser: int = 8
+    lamp_in_opening: float = 4.0
 
 
 GATHER = GatherParams()
