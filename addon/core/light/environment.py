@@ -136,6 +136,17 @@ class Environment:
         """Radiance from unit `directions` ((n, 3) float32, away from the room): (n, 3) float32."""
         return self.radiance.reshape(-1, 3).take(_bin(directions, self.radiance.shape[0]), 0)
 
+    @property
+    def directions(self) -> np.ndarray:
+        """Unit directions through the middles of the map's cells, (height * width, 3) float32: `_bin`'s inverse."""
+        height, width = self.radiance.shape[:2]
+        row, column = np.mgrid[:height, :width] + 0.5
+        around, up = (0.5 - column / width) * 2 * np.pi, (row / height - 0.5) * np.pi
+        level = np.cos(up)
+        return (
+            np.stack([level * np.cos(around), level * np.sin(around), np.sin(up)], -1).reshape(-1, 3).astype(np.float32)
+        )
+
     def refilled(self, radiance: np.ndarray) -> Environment:
         """The map with another `radiance` where frames saw it; the rest is filled in from that."""
         return Environment(_filled(radiance, self.observations), self.observations, self.clipped)

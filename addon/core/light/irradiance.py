@@ -118,14 +118,12 @@ def from_outside(
         directions, density = portals.sample(origins, square, rng)
         cosine = np.einsum("nkj,nj->nk", directions.reshape(len(p), portal_rays, 3), n).ravel()
         useful = np.flatnonzero(cosine > 0)
-        hidden = field.scene.occluded(
-            np.repeat(origins, portal_rays, 0)[useful], directions[useful], np.full(len(useful), np.inf, np.float32)
-        )
+        starts = np.repeat(origins, portal_rays, 0)
+        hidden = field.scene.occluded(starts[useful], directions[useful], np.full(len(useful), np.inf, np.float32))
         useful = useful[~hidden]
         weight = cosine[useful] / (portal_rays * density[useful] + rays * cosine[useful] / np.float32(np.pi))
         light = np.zeros((len(directions), 3), np.float32)
-        start_at = np.repeat(origins, portal_rays, 0)
-        light[useful] = field.outside(start_at[useful], directions[useful]) * weight[:, None]
+        light[useful] = field.outside(starts[useful], directions[useful]) * weight[:, None]
         total[part] = light.reshape(len(p), portal_rays, 3).sum(1)
         total[part][~portals.around(origins)] = 0
     return total

@@ -78,12 +78,9 @@ class Openings:
 
     def filled(self, sky: Environment, place: np.ndarray) -> Environment:
         """A map with these where it has no value, as a `place` ((3,)) sees them: for what knows maps alone."""
-        height, width = sky.radiance.shape[:2]
-        row, column = np.mgrid[:height, :width] + 0.5
-        around, up = (0.5 - column / width) * 2 * np.pi, (row / height - 0.5) * np.pi
-        flat = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)], -1).reshape(-1, 3)
-        start = np.broadcast_to(np.asarray(place, np.float32), flat.shape)
-        shown = self(start, flat.astype(np.float32))[0].reshape(sky.radiance.shape)
+        directions = sky.directions
+        start = np.broadcast_to(np.asarray(place, np.float32), directions.shape)
+        shown = self(start, directions)[0].reshape(sky.radiance.shape)
         unknown = (sky.observations == 0) | sky.clipped
         return replace(
             sky,

@@ -10,6 +10,7 @@ import numpy as np
 from ..evidence.tier import tier
 from ..origin import of_thing
 from ..passes.albedo.albedo import MEASURED, above_one, quotient, without_emitters
+from ..passes.missing_light.params import MISSING
 from ..passes.registry import following
 from ..scene.elements import triangle_geometry
 from ..scene.visibility import SATURATED
@@ -143,7 +144,7 @@ def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]
     names = {one.object_id: one.name for one in run.capture.instances}
     warnings += [f"Lamp '{names[lamp.object_id]}': {note}" for lamp in shading.lamps if (note := lamp.note(names))]
     warnings += shading.notes
-    if above > 0.05:
+    if above > MISSING.alarm:
         warnings.append(
             f"{above:.0%} of the seen surface would need an albedo above 1: light is missing "
             "(an unseen lamp, a clipped one, or a hole that was no window)."

@@ -16,6 +16,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .connected_parts import connected_parts, to_nearest, weld
+from .elements import triangle_geometry
+from .model import Mesh
 from .params import PARTS
 from .sphere import fibonacci
 
@@ -74,6 +76,18 @@ class _Faces:
         graph = sparse.coo_matrix((np.ones(joined.sum(), bool), (self.a[joined], self.b[joined])), (self.count,) * 2)
         return connected_components(graph, directed=False)[1]
 
+    def largest(self, chosen: np.ndarray) -> np.ndarray:
+        """Those of some triangles ((k,) int) that hang together and have the most surface, (n,) int."""
+        if not len(chosen):
+            return chosen
+        number = np.full(self.count, -1)
+        number[chosen] = np.arange(len(chosen))
+        a, b = number[self.a], number[self.b]
+        both = (a >= 0) & (b >= 0)
+        graph = sparse.coo_matrix((np.ones(both.sum(), bool), (a[both], b[both])), (len(chosen),) * 2)
+        piece = connected_components(graph, directed=False)[1]
+        return chosen[piece == np.bincount(piece, self.area[chosen]).argmax()]
+
 
 def _planes(faces: _Faces, gap: float) -> list[Plane]:
     """Large planes, the best supported first: the densest cell of (direction, offset), then least squares."""
@@ -85,27 +99,32 @@ def _planes(faces: _Faces, gap: float) -> list[Plane]:
     free, found = np.ones(faces.count, bool), []
     support = np.bincount(cell, faces.area)
     while support.max() > PARTS.seed * least:
-        best = support.argmax()
-        seed = own = np.flatnonzero((cell == best) & free)
-        for _ in range(PARTS.fits):
-            weight = faces.area[own]
-            point = np.average(faces.centre[own], 0, weight)
-            arm = (faces.centre[own] - point) * np.sqrt(weight)[:, None]
-            normal = np.linalg.eigh(arm.T @ arm)[1][:, 0]
-            normal *= np.sign(normal @ (weight @ faces.normal[own])) or 1
-            near = np.abs((faces.centre - point) @ normal) < gap
-            on = free & near & (faces.normal @ normal > np.cos(PARTS.tilt))
-            piece = faces.pieces(on[faces.a] & on[faces.b])
-            own = np.flatnonzero(on & (piece == np.bincount(piece, faces.area * on).argmax()))
-            if not len(own):
-                break
-        if len(own) and faces.area[own].sum() >= least and not _is_curved(faces, own, normal):
-            found.append(Plane(normal, point, own))
-            free[own] = False
+        seed = np.flatnonzero((cell == support.argmax()) & free)
+        plane = _plane_at(faces, seed, np.flatnonzero(free), gap)
+        large = plane is not None and faces.area[plane.faces].sum() >= least
+        if plane is not None and large and not _is_curved(faces, plane.faces, plane.normal):
+            found.append(plane)
+            free[plane.faces] = False
         else:
             free[seed] = False  # no plane's seed any more, and none's triangles
         support = np.bincount(cell, faces.area * free, len(support))
     return found
+
+
+def _plane_at(faces: _Faces, seed: np.ndarray, free: np.ndarray, gap: float) -> Plane | None:
+    """The plane through some triangles, and which of the `free` ones ((k,) int) lie in it and hang together."""
+    own = seed
+    for _ in range(PARTS.fits):
+        weight = faces.area[own]
+        point = np.average(faces.centre[own], 0, weight)
+        arm = (faces.centre[own] - point) * np.sqrt(weight)[:, None]
+        normal = np.linalg.eigh(arm.T @ arm)[1][:, 0]
+        normal *= np.sign(normal @ (weight @ faces.normal[own])) or 1
+        near = free[np.abs((faces.centre[free] - point) @ normal) < gap]
+        own = faces.largest(near[faces.normal[near] @ normal > np.cos(PARTS.tilt)])
+        if not len(own):
+            return None
+    return Plane(normal, point, own)
 
 
 def _is_curved(faces: _Faces, own: np.ndarray, normal: np.ndarray) -> bool:
@@ -219,8 +238,7 @@ def parts_of(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, d
     """
     part = connected_parts(vertices, triangles)
     names: dict[int, str] = {}
-    corners = vertices[triangles]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = triangle_geometry(Mesh(vertices, triangles, part))[1]
     if area[part == 0].sum() > PARTS.hangs_together * area.sum():
         used, corner = np.unique(triangles.ravel(), return_inverse=True)
         place = weld(vertices[used])[corner.ravel()]

@@ -20,9 +20,8 @@ from .params import MISSING
 def in_one_plane(position: np.ndarray, normal: np.ndarray, seed: int) -> np.ndarray:
     """Pairs of m elements that lie in one plane, the nearest and some of all, (p, 2) int."""
     m = len(position)
-    near = cKDTree(np.concatenate([position, 3 * normal], 1)).query(
-        np.concatenate([position, 3 * normal], 1), min(MISSING.neighbours + 1, m)
-    )[1]
+    key = np.concatenate([position, 3 * normal], 1)
+    near = cKDTree(key).query(key, min(MISSING.neighbours + 1, m))[1]
     pairs = [np.stack([np.repeat(np.arange(m), near.shape[1] - 1), near[:, 1:].ravel()], 1)]
     rng = np.random.default_rng(seed)
     some = rng.integers(0, m, (8 * MISSING.far * m, 2))
@@ -62,7 +61,7 @@ class _Plausible:
         ends = np.stack([np.ones(p), -np.ones(p)], 1).ravel()
         self._differ = csr_matrix((ends, pairs.ravel(), 2 * np.arange(p + 1)), (p, m))
         self._back = self._differ.T.tocsr()
-        self._usual = np.log(np.maximum(unknown.usual, 1e-6))
+        self.usual = np.log(np.maximum(unknown.usual, 1e-6))
 
     def log_albedo(self, x: np.ndarray) -> np.ndarray:
         """(m, 3) at log radiances `x` ((k, 3))."""
@@ -89,7 +88,7 @@ class _Plausible:
         value += MISSING.above * 0.5 * float((above**2).mean())
         by_a += MISSING.above / (0.1 * channels * m) * above
         gradient = -(self._G.T @ (by_a / E)) * radiance
-        odd = (x - self._usual) / MISSING.unlike
+        odd = (x - self.usual) / MISSING.unlike
         value += MISSING.sources / k * float(np.log1p(odd**2).sum())
         gradient += MISSING.sources / k * 2 / MISSING.unlike * odd / (1 + odd**2)
         return value, gradient.ravel()
@@ -115,8 +114,7 @@ def solve(
     """
     cost = _Plausible(sent, received, unknown, pairs)
     low = np.log(np.maximum(unknown.least, 1e-6))
-    usual = np.log(np.maximum(unknown.usual, 1e-6))
-    start = usual + np.log(MISSING.start)
+    start = cost.usual + np.log(MISSING.start)
     found = minimize(
         cost, np.maximum(start, low).ravel(), jac=True, method="L-BFGS-B",
         bounds=[(one, 12.0) for one in low.ravel()], options={"maxiter": MISSING.steps},
@@ -126,4 +124,4 @@ def solve(
         a = cost.log_albedo(x).mean(1)
         return float(np.median(np.abs(a[pairs[:, 0]] - a[pairs[:, 1]])))
 
-    return np.exp(found), (spread(usual), spread(found))
+    return np.exp(found), (spread(cost.usual), spread(found))
