@@ -43,8 +43,14 @@ UV_MAP = "scan_relight_uv_map"
 def mark(owner, folder: Path | str, run: str, capture: Path | str | None = None) -> None:
     """Say on an object or a room's collection which run made it.
 
-    `folder`: the result folder. `run`: its run's key, as `room_file.run_of` reads it; '' for a result that is older
-    than such keys. `capture`: folder of the capture; for a collection.
+    Parameters
+    ----------
+    folder : Path or str
+        The result folder.
+    run : str
+        Its run's key, as `room_file.run_of` reads it; '' for a result that is older than such keys.
+    capture : Path or str, optional
+        Folder of the capture; for a collection.
     """
     owner[RESULT], owner[RUN] = str(Path(folder).absolute()), run
     if capture is not None:

@@ -27,9 +27,21 @@ def told_device(scene: bpy.types.Scene) -> str:
 def use_device(scene: bpy.types.Scene, told: str) -> str:
     """Have a scene rendered on a device, on the processor where it is not to be had.
 
-    `told`: 'CPU'; 'GPU', which is all graphics cards of the first kind of `TYPES` that there is; one of `TYPES`; or
-    what `told_device` gave. Whatever the case, but for ids. Returns: '' or a remark: why it is the processor. Raises
-    `BadInputError`: there is no such kind of device.
+    Parameters
+    ----------
+    told : str
+        'CPU'; 'GPU', which is all graphics cards of the first kind of `TYPES` that there is; one of `TYPES`; or what
+        `told_device` gave. Whatever the case, but for ids.
+
+    Returns
+    -------
+    str
+        '' or a remark: why it is the processor.
+
+    Raises
+    ------
+    BadInputError
+        There is no such kind of device.
     """
     kind, _, ids = told.partition("=")
     kind, wanted = kind.strip().upper(), {one for one in ids.split("|") if one}

@@ -48,7 +48,13 @@ def points(context) -> float:
 def lines(sentence: str, width: int, size: float) -> tuple[str, ...]:
     """`sentence` cut at spaces into lines of at most `width` pixels; a word that is longer is cut itself.
 
-    `width`: in pixels. `size`: of the letters, in points times the interface's scale.
+    Parameters
+    ----------
+    sentence : str
+    width : int
+        In pixels.
+    size : float
+        Of the letters, in points times the interface's scale.
     """
     found, line = [], ""
     for word in sentence.split():

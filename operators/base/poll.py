@@ -17,7 +17,12 @@ def check(operator, fine: bool, otherwise: str) -> bool:
 def needs(fine: Callable, otherwise: str | Callable[[], str]):
     """Class decorator: `poll` asks this of the context after all that it asks already.
 
-    `fine`: from the context to whether the operator can run. `otherwise`: what the tooltip says where it can't.
+    Parameters
+    ----------
+    fine : callable
+        From the context to whether the operator can run.
+    otherwise : str or callable
+        What the tooltip says where it can't.
     """
 
     def asking(cls):

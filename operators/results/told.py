@@ -54,8 +54,10 @@ def refused(things) -> list[tuple[str, Path | None]]:
 
     Those whose folder is gone are told by the panel's top (`find_result`).
 
-    Returns: list of (str, Path or None): a sentence, and the folder whose run has to be brought in; None where nobody
-    can tell.
+    Returns
+    -------
+    list of (str, Path or None)
+        A sentence, and the folder whose run has to be brought in; None where nobody can tell.
     """
     counts: dict[Path | None, int] = {}
     for state, result in standings(things).values():

@@ -75,9 +75,18 @@ def given(thing: bpy.types.Object) -> dict[str, Any]:
 def give(thing: bpy.types.Object, **values) -> None:
     """Say something of an object's material and show it.
 
-    `thing`: `correctable`. `**values`: as in an override: `model`, `roughness`, `f0`, `base_color`, `same_as`; None
-    takes one back. What contradicts them and was given before goes (`core.results.overrides.merge`). Raises
-    `BadInputError`: a value can't be, or objects would be the same as each other in a circle.
+    Parameters
+    ----------
+    thing : bpy.types.Object
+        `correctable`.
+    **values
+        As in an override: `model`, `roughness`, `f0`, `base_color`, `same_as`; None takes one back. What contradicts
+        them and was given before goes (`core.results.overrides.merge`).
+
+    Raises
+    ------
+    BadInputError
+        A value can't be, or objects would be the same as each other in a circle.
     """
     number = thing[OBJECT_ID]
     room = {one[OBJECT_ID]: one for one in room_of(thing)}
@@ -175,7 +184,10 @@ def reapply(thing: bpy.types.Object) -> list[str]:
 
     Its corrected values, its painted image, its smooth shading. For whoever updates a room, at the end of each object.
 
-    Returns: sentences on what no longer fits.
+    Returns
+    -------
+    list of str
+        Sentences on what no longer fits.
     """
     smoothing.reapply(thing)
     if not correctable(thing) or is_corrected(material.worn_material(thing)):
@@ -241,8 +253,17 @@ def keep(scene: bpy.types.Scene, folder: Path, things: Iterable[bpy.types.Object
     Entries of objects of which the scene says nothing are left alone, unless it was this session that wrote them: then
     the artist has taken them back by undo. `things` are the room's objects, by default those of that result.
 
-    Returns: objects whose entry is not what the result's materials were made with: a refit has to do them. Raises
-    `BadInputError`: the file is damaged; `StorageError`: it can't be written.
+    Returns
+    -------
+    set of int
+        Objects whose entry is not what the result's materials were made with: a refit has to do them.
+
+    Raises
+    ------
+    BadInputError
+        The file is damaged.
+    StorageError
+        It can't be written.
     """
     if things is None:
         things = [thing for thing in look.recovered(scene) if result_folder(thing) == folder]

@@ -23,9 +23,20 @@ def of_object(
 ) -> list[float]:
     """The mean albedo of an object one spot of which has a known one.
 
-    `thing`: `corrections.correctable`. `place`: the spot, on its surface; world, metres. `albedo`: (3,) tuple of float;
-    known, linear Rec.709. Raises `BadInputError`: the object has no texture, the result is gone, the spot is black or
-    was not measured, or the mean would have to be above 1.
+    Parameters
+    ----------
+    thing : bpy.types.Object
+        `corrections.correctable`.
+    place : Vector
+        The spot, on its surface; world, metres.
+    albedo : (3,) tuple of float
+        Known, linear Rec.709.
+
+    Raises
+    ------
+    BadInputError
+        The object has no texture, the result is gone, the spot is black or was not measured, or the mean would
+        have to be above 1.
     """
     mean = (corrections.entry(thing).get("evidence") or {}).get("albedo")
     if mean is None:

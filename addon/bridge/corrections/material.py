@@ -83,8 +83,12 @@ def renew(thing: bpy.types.Object, given: dict[str, Any]) -> None:
 def show(thing: bpy.types.Object, wanted: dict[str, Any], entry: dict[str, Any]) -> None:
     """Bring a material in line.
 
-    `wanted`: `model`, `roughness`, `f0`, `base_color` as they are to be; what the run made is brought back exactly.
-    `entry`: what materials.json says of the object.
+    Parameters
+    ----------
+    wanted : dict
+        `model`, `roughness`, `f0`, `base_color` as they are to be; what the run made is brought back exactly.
+    entry : dict
+        What materials.json says of the object.
     """
     material, made = worn_material(thing), worn(thing, entry)
     if WORN not in material:

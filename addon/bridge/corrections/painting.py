@@ -14,8 +14,19 @@ _GAMMA: Unit[float] = 1 / 2.4
 def begin(context: bpy.types.Context, thing: bpy.types.Object, where: str, masked: bool = True) -> None:
     """Canvas, stencil mask and colour for the active object, then Texture Paint.
 
-    `context`: `thing` is its active object. `where`: where the canvas goes, see `unseen.own_image`. `masked`: protect
-    what any frame saw. Raises `BadInputError`, `StorageError`: as of `unseen.own_image` and `unseen.unseen_mask`.
+    Parameters
+    ----------
+    context : bpy.types.Context
+        `thing` is its active object.
+    where : str
+        Where the canvas goes, see `unseen.own_image`.
+    masked : bool
+        Protect what any frame saw.
+
+    Raises
+    ------
+    BadInputError, StorageError
+        As of `unseen.own_image` and `unseen.unseen_mask`.
     """
     if masked:
         unseen.unseen_mask(thing)  # raises before anything is changed

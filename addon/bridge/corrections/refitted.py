@@ -30,9 +30,26 @@ _WORN = ("model", "alpha", "f0", "emission", "transmission", "surfaces", "coat",
 def words(scene: bpy.types.Scene, things: Iterable[bpy.types.Object]) -> tuple[Path, list[str], dict[int, dict]]:
     """What has to be run: writes down what is given and finds all that it bears on.
 
-    `things`: at least these are fitted again; they are of one room. Returns: `folder`: the result folder; `words`: of
-    the command line; `before`: the entries of materials.json as they are now. Raises `BadInputError`: the result is
-    gone, or they are of several; `StorageError`: its `overrides.json` can't be written.
+    Parameters
+    ----------
+    things : iterable of bpy.types.Object
+        At least these are fitted again; they are of one room.
+
+    Returns
+    -------
+    folder : Path
+        The result folder.
+    words : list of str
+        Of the command line.
+    before : dict of int to dict
+        The entries of materials.json as they are now.
+
+    Raises
+    ------
+    BadInputError
+        The result is gone, or they are of several.
+    StorageError
+        Its `overrides.json` can't be written.
     """
     things = list(things)
     folder = corrections.folder_for(things)
@@ -56,7 +73,12 @@ def bringing(
 
     Only materials that the refit changed are made anew, so that what an artist did to others by hand stays.
 
-    `folder`: the result folder. `after`: what `words` and `fitted` gave.
+    Parameters
+    ----------
+    folder : Path
+        The result folder.
+    after : result_file.Result
+        What `words` and `fitted` gave.
     """
     things = [
         thing

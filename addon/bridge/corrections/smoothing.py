@@ -15,7 +15,10 @@ def smooth(things: Iterable[bpy.types.Object], angle: float) -> int:
     The scan's geometric normals are what the light was divided by; smoothing changes how it is shown, not what was
     found.
 
-    Returns: how many meshes were changed.
+    Returns
+    -------
+    int
+        How many meshes were changed.
     """
     changed = set()
     for thing in things:

@@ -50,8 +50,17 @@ def painted(thing: bpy.types.Object) -> bpy.types.Image | None:
 def own_image(thing: bpy.types.Object, where: str = images.PACK) -> bpy.types.Image:
     """The artist's image of an object; made where there is none yet, and shown.
 
-    `where`: `results.images.FOLDER`: a file beside the saved .blend; else packed into it. Raises `BadInputError`: the
-    object has no texture, or one in tiles; `StorageError`: the file can't be written.
+    Parameters
+    ----------
+    where : str
+        `results.images.FOLDER`: a file beside the saved .blend; else packed into it.
+
+    Raises
+    ------
+    BadInputError
+        The object has no texture, or one in tiles.
+    StorageError
+        The file can't be written.
     """
     node = texture_node(thing)
     if node is None:
@@ -173,8 +182,17 @@ def fill(things: Iterable[bpy.types.Object], where: str = images.PACK) -> tuple[
     Each spot becomes the mean of the `NEIGHBOURS` measured ones of the same object that lie nearest and face alike;
     what was seen stays as it is.
 
-    Returns: `count`: texels that were filled; `remarks`: sentences on objects that were passed over. Raises
-    `BadInputError`, `StorageError`: as of `own_image` and `unseen_mask`; nothing is changed then.
+    Returns
+    -------
+    count : int
+        Texels that were filled.
+    remarks : list of str
+        Sentences on objects that were passed over.
+
+    Raises
+    ------
+    BadInputError, StorageError
+        As of `own_image` and `unseen_mask`; nothing is changed then.
     """
     from ..own_scene.capture import few
 

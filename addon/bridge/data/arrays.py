@@ -50,8 +50,13 @@ def set_layer(data: bpy.types.Mesh, name: str, values: np.ndarray) -> bpy.types.
 def make_mesh(name: str, vertices: np.ndarray, corners: np.ndarray, starts: np.ndarray | None = None) -> bpy.types.Mesh:
     """A mesh shaded flat.
 
-    `vertices`: (v, 3) float. `corners`: (c,) or (f, k) int; vertex of each corner; its loops have the same order.
-    `starts`: (f,) int; first corner of each face; not where all have k.
+    Parameters
+    ----------
+    vertices : (v, 3) float
+    corners : (c,) or (f, k) int
+        Vertex of each corner; its loops have the same order.
+    starts : (f,) int, optional
+        First corner of each face; not where all have k.
     """
     starts = np.arange(0, corners.size, corners.shape[1]) if starts is None else starts
     data = bpy.data.meshes.new(name)

@@ -37,10 +37,17 @@ _GRID = 33
 def make_cameras(frames: Iterable[Frame], collection: bpy.types.Collection, first: int = 0) -> list[bpy.types.Object]:
     """Make a camera object for each frame and link it to a collection.
 
-    `first`: place of the first of `frames` in the capture's order. They are named after the frames. Custom properties
-    ``width``, ``height`` (pixels) and ``pixel_aspect`` (fx / fy) tell the render size each one is exact for;
-    `use_camera` sets it. ``frame_path`` and ``frame_exposure`` tell the frame's picture and what its radiance was
-    multiplied by; `LENS` is the lens, where there is one.
+    Parameters
+    ----------
+    first : int
+        Place of the first of `frames` in the capture's order.
+
+    Returns
+    -------
+    list of bpy.types.Object
+        Named after the frames. Custom properties ``width``, ``height`` (pixels) and ``pixel_aspect`` (fx / fy) tell
+        the render size each one is exact for; `use_camera` sets it. ``frame_path`` and ``frame_exposure`` tell the
+        frame's picture and what its radiance was multiplied by; `LENS` is the lens, where there is one.
     """
     made = []
     for index, frame in enumerate(frames, first):

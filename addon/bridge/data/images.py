@@ -27,10 +27,28 @@ def load_image(
 ) -> bpy.types.Image:
     """Link an image file of a result folder; it is marked (`marks.IMAGE`) with where it came from.
 
-    `path`: one with ``<UDIM>`` in its name stands for all its tiles. `name`: name of the image in Blender; the file's
-    stem if left out. `colour_space`: `RADIANCE` or `DATA`. `packed`: store the file's bytes within the .blend. `keep`:
-    give it a fake user, so that it is saved although no material shows it. Returns: its path is absolute; `relative_to`
-    changes that. Raises `BadInputError`: the file is missing or is no image.
+    Parameters
+    ----------
+    path : Path or str
+        One with ``<UDIM>`` in its name stands for all its tiles.
+    name : str, optional
+        Name of the image in Blender; the file's stem if left out.
+    colour_space : str
+        `RADIANCE` or `DATA`.
+    packed : bool
+        Store the file's bytes within the .blend.
+    keep : bool
+        Give it a fake user, so that it is saved although no material shows it.
+
+    Returns
+    -------
+    bpy.types.Image
+        Its path is absolute; `relative_to` changes that.
+
+    Raises
+    ------
+    BadInputError
+        The file is missing or is no image.
     """
     path = Path(path).absolute()
     tiles = tiles_of(path)
@@ -92,8 +110,12 @@ def relative_to(image: bpy.types.Image, folder: Path | str) -> None:
 def array_image(name: str, pixels: np.ndarray, colour_space: str = RADIANCE) -> bpy.types.Image:
     """Make a float image from an array and pack it into the .blend.
 
-    `pixels`: (h, w), (h, w, 3) or (h, w, 4) float; row 0 at the bottom. Linear Rec.709 for `RADIANCE`. `colour_space`:
-    `RADIANCE` or `DATA`.
+    Parameters
+    ----------
+    pixels : (h, w), (h, w, 3) or (h, w, 4) float
+        Row 0 at the bottom. Linear Rec.709 for `RADIANCE`.
+    colour_space : str
+        `RADIANCE` or `DATA`.
     """
     height, width = pixels.shape[:2]
     image = bpy.data.images.new(name, width, height, float_buffer=True, is_data=colour_space == DATA)

@@ -49,10 +49,18 @@ def make_material(
 ) -> bpy.types.Material:
     """Make the material of one object.
 
-    `base_color`: of what has a diffuse part: Base Color over the atlas, linear Rec.709
-    (`core.brdf.material.base_colors`). Without it the colour is mid-grey. `one_sided`: emitter: shine on the side of
-    the normals only. Returns: its custom properties ``scan_relight_model``, ``_alpha``, ``_f0``, ``_transmission`` tell
-    what was fitted.
+    Parameters
+    ----------
+    base_color : bpy.types.Image, optional
+        Of what has a diffuse part: Base Color over the atlas, linear Rec.709 (`core.brdf.material.base_colors`).
+        Without it the colour is mid-grey.
+    one_sided : bool
+        Emitter: shine on the side of the normals only.
+
+    Returns
+    -------
+    bpy.types.Material
+        Its custom properties ``scan_relight_model``, ``_alpha``, ``_f0``, ``_transmission`` tell what was fitted.
     """
     return dress(bpy.data.materials.new(description.name), description, base_color, one_sided)
 

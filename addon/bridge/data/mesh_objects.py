@@ -28,10 +28,22 @@ def each_object(
 ) -> Iterator[tuple[int, bpy.types.Object]]:
     """Make one mesh object for each instance and link it to a collection, one by one: a window can be drawn in between.
 
-    `mesh`: world positions in metres. `instances`: one without triangles gets no object. `atlas_uv`: (t, 3, 2) float32;
-    atlas coordinates of each triangle's corners, in [0, 1]. `parts_uv`: (t, 3, 2) float32; see `PARTS_UV`; then these
-    are the active ones. Yields: `object_id` and the object. The origin lies in the middle of the object's box; shading
-    is flat, because the scan's geometric normals are what the light was divided by.
+    Parameters
+    ----------
+    mesh : Mesh
+        World positions in metres.
+    instances : iterable of Instance
+        One without triangles gets no object.
+    atlas_uv : (t, 3, 2) float32
+        Atlas coordinates of each triangle's corners, in [0, 1].
+    parts_uv : (t, 3, 2) float32, optional
+        See `PARTS_UV`; then these are the active ones.
+
+    Yields
+    ------
+    int, bpy.types.Object
+        `object_id` and the object. The origin lies in the middle of the object's box; shading is flat, because the
+        scan's geometric normals are what the light was divided by.
     """
     order = np.argsort(mesh.object_id, kind="stable")
     sorted_id = mesh.object_id[order]

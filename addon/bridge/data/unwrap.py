@@ -26,8 +26,14 @@ _EXPECTED_FILL = 0.6
 class Polygons(NamedTuple):
     """The faces that a mesh's triangles were cut from.
 
-    `start`: (p + 1,) int; first corner of each face, and the end. `vertex`: (c,) int; vertex of the mesh at each
-    corner. `corner`: (t, 3) int; the corners of each triangle, all of one face.
+    Attributes
+    ----------
+    start : (p + 1,) int
+        First corner of each face, and the end.
+    vertex : (c,) int
+        Vertex of the mesh at each corner.
+    corner : (t, 3) int
+        The corners of each triangle, all of one face.
     """
 
     start: np.ndarray
@@ -46,11 +52,21 @@ def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0, polygons: P
 
     Works on a temporary object in a temporary scene: the user's scene, selection and mode stay as they are.
 
-    `size`: edge of the atlas in texels; margin and tolerance count in these. `margin_texels`: empty texels between two
-    islands. `polygons`: keep the triangles of each face together, so that its corners have one coordinate each. A face
-    that folds onto itself is torn all the same. Further triangles of the mesh, the second sides of sheets, are faces
-    each. Returns: `uv`, (t, 3, 2) float32: in [0, 1]. No two triangles penetrate each other by more than
-    `SURFACE.overlap_texels`. Triangles that repeat a vertex lie in the lower left corner, without area.
+    Parameters
+    ----------
+    size : int
+        Edge of the atlas in texels; margin and tolerance count in these.
+    margin_texels : float
+        Empty texels between two islands.
+    polygons : Polygons, optional
+        Keep the triangles of each face together, so that its corners have one coordinate each. A face that folds onto
+        itself is torn all the same. Further triangles of the mesh, the second sides of sheets, are faces each.
+
+    Returns
+    -------
+    uv : (t, 3, 2) float32
+        In [0, 1]. No two triangles penetrate each other by more than `SURFACE.overlap_texels`. Triangles that repeat a
+        vertex lie in the lower left corner, without area.
     """
     if not len(mesh.triangles):
         return np.zeros((0, 3, 2), np.float32)

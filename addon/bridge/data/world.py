@@ -13,9 +13,18 @@ from .nodes import fresh_tree
 def set_world(scene: bpy.types.Scene, environment: Path | str | None, strength: float = 1.0) -> bpy.types.World:
     """Give a scene a world of its own.
 
-    `environment`: Equirectangular radiance, linear Rec.709, as docs/architecture.md states: u = 0.5 - atan2(y, x) / (2
-    pi), v = 0.5 + asin(z) / pi. None: black. `strength`: factor on the radiance. Raises `BadInputError`: the file is
-    missing or is no image.
+    Parameters
+    ----------
+    environment : Path, str or None
+        Equirectangular radiance, linear Rec.709, as docs/architecture.md states: u = 0.5 - atan2(y, x) / (2 pi),
+        v = 0.5 + asin(z) / pi. None: black.
+    strength : float
+        Factor on the radiance.
+
+    Raises
+    ------
+    BadInputError
+        The file is missing or is no image.
     """
     image = None if environment is None else load_image(environment, "Scan Relight environment", keep=False)
     scene.world = make_world("Scan Relight", image, strength)

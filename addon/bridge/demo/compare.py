@@ -40,7 +40,12 @@ def comparison(capture: Path, result: Path) -> str:
 
     Base colours are means over the surface that the frames see; what they don't see nobody can recover.
 
-    `capture`: the demo's, with its truth. `result`: the result folder whose scene is open.
+    Parameters
+    ----------
+    capture : Path
+        The demo's, with its truth.
+    result : Path
+        The result folder whose scene is open.
     """
     truth = json.loads((capture / "truth" / "materials.json").read_text())
     true_colours = seen_albedo(read_capture(capture))

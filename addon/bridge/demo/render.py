@@ -36,8 +36,18 @@ FORMAT: Workload[int] = (
 def render_capture(folder: Path, size: str = "small", progress: Progress | None = None) -> Path:
     """Render the demo's room into `folder`, unless it is there already.
 
-    `folder`: becomes a capture: transforms.json, mesh.ply, info_semantic.json, images/, and truth/materials.json, which
-    only the demo's comparison reads. `size`: one of `SIZES`. Returns: `folder`.
+    Parameters
+    ----------
+    folder : Path
+        Becomes a capture: transforms.json, mesh.ply, info_semantic.json, images/, and truth/materials.json, which
+        only the demo's comparison reads.
+    size : str
+        One of `SIZES`.
+
+    Returns
+    -------
+    Path
+        `folder`.
     """
     folder, progress = Path(folder), progress or Progress()
     if is_rendered(folder, size):

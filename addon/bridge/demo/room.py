@@ -23,9 +23,16 @@ SIZE: Workload[tuple[float, float, float]] = (4.4, 3.6, 2.6)
 class Paint:
     """A known material.
 
-    `albedo`: (3,) or (height, width, 3) float32; base colour, one or a picture whose row 0 is the bottom. `roughness`:
-    blender's, the square root of GGX alpha. `f0`: reflectance at normal incidence; 0 is purely diffuse. `emission`:
-    (3,) tuple of float or None; radiance of a lamp.
+    Attributes
+    ----------
+    albedo : (3,) or (height, width, 3) float32
+        Base colour, one or a picture whose row 0 is the bottom.
+    roughness : float
+        Blender's, the square root of GGX alpha.
+    f0 : float
+        Reflectance at normal incidence; 0 is purely diffuse.
+    emission : (3,) tuple of float or None
+        Radiance of a lamp.
     """
 
     albedo: np.ndarray
@@ -38,9 +45,17 @@ class Paint:
 class Thing:
     """One object of the room.
 
-    `quads`: (q, 4, 3) float64; corners, counter-clockwise from outside. `uv`: (q, 4, 2) float64. `slot`: (q,) int;
-    which of `paints` each quad wears. `paints`: all of the same gloss: one object, one roughness. `triangles`: split
-    every quad in two, in the scene and in the capture (quads that are not flat).
+    Attributes
+    ----------
+    quads : (q, 4, 3) float64
+        Corners, counter-clockwise from outside.
+    uv : (q, 4, 2) float64
+    slot : (q,) int
+        Which of `paints` each quad wears.
+    paints : tuple of Paint
+        All of the same gloss: one object, one roughness.
+    triangles : bool
+        Split every quad in two, in the scene and in the capture (quads that are not flat).
     """
 
     object_id: int
@@ -311,7 +326,12 @@ def frame_path(index: int) -> str:
 def write_all_but_frames(folder: Path, things: tuple[Thing, ...], poses: np.ndarray, size: tuple[int, int]) -> None:
     """Make `folder` a capture without its pictures.
 
-    `poses`: (n, 4, 4) float; camera to world. `size`: width and height of the frames.
+    Parameters
+    ----------
+    poses : (n, 4, 4) float
+        Camera to world.
+    size : tuple of int
+        Width and height of the frames.
     """
     (folder / "images").mkdir(parents=True)
     (folder / "truth").mkdir()

@@ -42,8 +42,17 @@ def run_demo(
 ) -> str:
     """Render the known room into OUT/capture, recover it into OUT, and compare.
 
-    `size`: one of `demo.render.SIZES`. `listener`, `should_stop`: see `Progress`. Returns: the table of recovered
-    against true values; OUT/comparison.txt holds it too.
+    Parameters
+    ----------
+    size : str
+        One of `demo.render.SIZES`.
+    listener, should_stop
+        See `Progress`.
+
+    Returns
+    -------
+    str
+        The table of recovered against true values; OUT/comparison.txt holds it too.
     """
     out = Path(out)
     Store(out).close()  # a folder that can't be written is told now, not after the rendering

@@ -28,7 +28,10 @@ def worn(things: Iterable[bpy.types.Object]) -> dict[bpy.types.Material, str]:
 def mark(things: Iterable[bpy.types.Object], previews: bool = False) -> int:
     """Mark what objects wear as assets; returns how many materials that are.
 
-    `previews`: have Blender render previews, beside the window; it renders none in the background.
+    Parameters
+    ----------
+    previews : bool
+        Have Blender render previews, beside the window; it renders none in the background.
     """
     found = worn(things)
     for material, capture in found.items():

@@ -50,10 +50,26 @@ def export(
 ) -> list[str]:
     """Write a scene's objects with plain materials.
 
-    `path`: the ending decides on the format, see `FORMATS`. `scope`: `ROOM`: what was scanned and what was set into it;
-    `SELECTED`: selected meshes; `ALL`: every visible mesh. `lights`, `cameras`: also Blender's lamps; also the scene's
-    camera. Returns: what the format can't hold, one sentence each. Raises `BadInputError`: nothing to export, an
-    unknown ending, or this Blender can't write the format; `StorageError`: the file can't be written.
+    Parameters
+    ----------
+    path : path
+        The ending decides on the format, see `FORMATS`.
+    scope : str
+        `ROOM`: what was scanned and what was set into it; `SELECTED`: selected meshes; `ALL`: every visible mesh.
+    lights, cameras : bool
+        Also Blender's lamps; also the scene's camera.
+
+    Returns
+    -------
+    list of str
+        What the format can't hold, one sentence each.
+
+    Raises
+    ------
+    BadInputError
+        Nothing to export, an unknown ending, or this Blender can't write the format.
+    StorageError
+        The file can't be written.
     """
     path = Path(path).absolute()
     ending = path.suffix.lower()

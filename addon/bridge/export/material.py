@@ -44,12 +44,24 @@ def plain_copy(
 ) -> bpy.types.Material:
     """A material that exporters understand.
 
-    `material`: what it shows is read off its Principled node; one without such a node becomes grey. `textures`: folder
-    for the 8-bit pictures. `pictures`: those that were made already, by the image they show (and its tile); filled
-    here. `level`: the format holds Specular IOR Level; else F0, which that level scales, goes into the index of
-    refraction. `tiles`: UDIM tiles that the material's object lies on. One becomes a picture that repeats; for an
-    object on several, the room's one image is taken. Returns: culled from behind where the original shines on one side
-    only: glTF then has it single-sided.
+    Parameters
+    ----------
+    material : bpy.types.Material
+        What it shows is read off its Principled node; one without such a node becomes grey.
+    textures : Path
+        Folder for the 8-bit pictures.
+    pictures : dict
+        Those that were made already, by the image they show (and its tile); filled here.
+    level : bool
+        The format holds Specular IOR Level; else F0, which that level scales, goes into the index of refraction.
+    tiles : frozenset of int
+        UDIM tiles that the material's object lies on. One becomes a picture that repeats; for an object on several, the
+        room's one image is taken.
+
+    Returns
+    -------
+    bpy.types.Material
+        Culled from behind where the original shines on one side only: glTF then has it single-sided.
     """
     shader = principled(material)
     if shader is None:

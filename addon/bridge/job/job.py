@@ -30,11 +30,28 @@ SPOKEN = "scan-relight: "
 class Job:
     """A command that runs beside Blender; it starts at once.
 
-    `command`: program and arguments; ends its work when its standard input ends. `**facts`: whatever the interface has
-    to remember of it; kept in `facts`. `state`: `RUNNING`, `STOPPED`, `DONE` or `FAILED`. `stage`: name of the stage
-    that is worked at; '' before the first. `share`, `overall`: of the stage and of the whole, 0...1. `sentence`: why it
-    ended without being done; '' else. `answer`: what the command said at its end. `text`: everything else that it wrote
-    to standard output.
+    Parameters
+    ----------
+    command : sequence of str
+        Program and arguments; ends its work when its standard input ends.
+    **facts
+        Whatever the interface has to remember of it; kept in `facts`.
+
+    Attributes
+    ----------
+    state : str
+        `RUNNING`, `STOPPED`, `DONE` or `FAILED`.
+    stage : str
+        Name of the stage that is worked at; '' before the first.
+    share, overall : float
+        Of the stage and of the whole, 0...1.
+    warnings : list of str
+    sentence : str
+        Why it ended without being done; '' else.
+    answer : dict
+        What the command said at its end.
+    text : str
+        Everything else that it wrote to standard output.
     """
 
     def __init__(self, command: Sequence[str], **facts: object):

@@ -32,9 +32,19 @@ def refit(
 ) -> dict:
     """Fit objects of a result again with all else held; `progress`, `override`, `heed_kept` and errors as in `run`.
 
-    `folder`: the result folder. `objects`: those to fit; those of which something new is given are fitted besides.
-    `scene`: also write scene.blend, from an empty file: what is open in this process is lost. Returns: what report.json
-    holds.
+    Parameters
+    ----------
+    folder : path
+        The result folder.
+    objects : collection of int
+        Those to fit; those of which something new is given are fitted besides.
+    scene : bool
+        Also write scene.blend, from an empty file: what is open in this process is lost.
+
+    Returns
+    -------
+    dict
+        What report.json holds.
     """
     started = time.monotonic()
     progress.stage(READ)

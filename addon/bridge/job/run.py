@@ -49,16 +49,40 @@ def run(
 ) -> dict:
     """Recover a capture up to a stage; stages that the result folder holds already are not done again.
 
-    `out_folder`: made where absent. `until`: one of `stages.RUN_STAGES`; `WRITE` for all of them, the images and
-    scene.blend. `scene`: with `WRITE`: also bring the room into the file that this scene is of, and leave all else that
-    is open as it is. Without one, scene.blend is made from an empty file. `import_first`: bring the room where it is
-    not there; False updates one that is. `reading`: how the capture is to be read. `from_stage`: do this stage and all
-    later ones anew, though the result folder holds them. `target`, `images`, `copies`: with `scene`: what the materials
-    go onto, see `own_scene.write_back.is_own`, and where their images go, see `results.images`. No room comes where
-    they go onto the artist's own objects. `override`: file of what the artist gives (`core.results.overrides`), merged
-    into what the result folder keeps. `heed_kept`: False leaves out, for this run, what the result folder keeps.
-    `into`: `OWN`: the room has a scene of its own; `SCENE`: it comes into `scene`. Returns: what report.json holds.
-    Raises `ScanRelightError`: one sentence for the user.
+    Parameters
+    ----------
+    out_folder : path
+        Made where absent.
+    until : str
+        One of `stages.RUN_STAGES`; `WRITE` for all of them, the images and scene.blend.
+    scene : bpy.types.Scene, optional
+        With `WRITE`: also bring the room into the file that this scene is of, and leave all else that is open as it
+        is. Without one, scene.blend is made from an empty file.
+    import_first : bool
+        Bring the room where it is not there; False updates one that is.
+    reading : Reading
+        How the capture is to be read.
+    from_stage : str, optional
+        Do this stage and all later ones anew, though the result folder holds them.
+    target, images, copies
+        With `scene`: what the materials go onto, see `own_scene.write_back.is_own`, and where their images go, see
+        `results.images`. No room comes where they go onto the artist's own objects.
+    override : Path, optional
+        File of what the artist gives (`core.results.overrides`), merged into what the result folder keeps.
+    heed_kept : bool
+        False leaves out, for this run, what the result folder keeps.
+    into : str
+        `OWN`: the room has a scene of its own; `SCENE`: it comes into `scene`.
+
+    Returns
+    -------
+    dict
+        What report.json holds.
+
+    Raises
+    ------
+    ScanRelightError
+        One sentence for the user.
     """
     capture_folder, out_folder = Path(capture_folder), Path(out_folder)
     check_run(capture_folder, out_folder, until, from_stage)

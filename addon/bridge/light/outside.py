@@ -93,8 +93,17 @@ def set_rotation(world: bpy.types.World, angle: float) -> None:
 def use_hdri(scene: bpy.types.Scene, path: Path | str, mean: float | None = None) -> bpy.types.World:
     """Put an equirectangular picture around the room; the recovered outside is kept for `restore`.
 
-    `path`: EXR, HDR or any picture that Blender reads. `mean`: mean radiance that the picture is scaled to; None leaves
-    it as it is. Raises `BadInputError`: the file is missing or no picture.
+    Parameters
+    ----------
+    path : path
+        EXR, HDR or any picture that Blender reads.
+    mean : float, optional
+        Mean radiance that the picture is scaled to; None leaves it as it is.
+
+    Raises
+    ------
+    BadInputError
+        The file is missing or no picture.
     """
     path = Path(path).absolute()
     if not path.is_file():
@@ -245,8 +254,12 @@ _maps: dict[tuple, np.ndarray] = {}
 def sky(world: bpy.types.World, direction: Vector, turn: float) -> float:
     """Luminance from a direction at strength 1, in the frames' unit; 0 where the world shows no picture or colour.
 
-    `direction`: unit, from the room outwards. `turn`: radians by which the picture is turned about +Z, anticlockwise
-    from above.
+    Parameters
+    ----------
+    direction : Vector
+        Unit, from the room outwards.
+    turn : float
+        Radians by which the picture is turned about +Z, anticlockwise from above.
     """
     node = find_node(world, "BACKGROUND")
     if node is None:

@@ -80,9 +80,16 @@ def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
 def target_of(scene: bpy.types.Scene, kind: str = VIEW, thing: bpy.types.Object | None = None) -> Vector:
     """What a light is aimed at.
 
-    `kind`: `VIEW`: the surface in the middle of the camera's picture, or the room's middle without a camera; `CURSOR`:
-    the 3D cursor; `OBJECT`: the middle of `thing`'s box. Raises `BadInputError`: `OBJECT` without an object, or no room
-    in the scene.
+    Parameters
+    ----------
+    kind : str
+        `VIEW`: the surface in the middle of the camera's picture, or the room's middle without a camera; `CURSOR`:
+        the 3D cursor; `OBJECT`: the middle of `thing`'s box.
+
+    Raises
+    ------
+    BadInputError
+        `OBJECT` without an object, or no room in the scene.
     """
     if kind == OBJECT:
         if thing is None:

@@ -28,8 +28,12 @@ AUTO, ANIMATION, OBJECTS = "AUTO", "ANIMATION", "OBJECTS"
 class View:
     """A camera at one moment, and the picture that it took.
 
-    `camera`: in the pixels of the picture; its pose in Blender's units. `exposure`, `saturation`: the camera's custom
-    properties of these names; see `core.scene.model.Frame`.
+    Attributes
+    ----------
+    camera : Camera
+        In the pixels of the picture; its pose in Blender's units.
+    exposure, saturation : float or None
+        The camera's custom properties of these names; see `core.scene.model.Frame`.
     """
 
     name: str
@@ -42,9 +46,19 @@ class View:
 def pixel_lens(data: bpy.types.Camera, width: float, height: float, aspect: float = 1.0) -> tuple[float, ...]:
     """Focal lengths and principal point (fx, fy, cx, cy) in pixels of a picture.
 
-    `data`: a perspective camera. `width`, `height`: of the picture, in pixels. `aspect`: height of a pixel over its
-    width. As `BKE_camera_params_compute_viewplane` in Blender's source: the sensor spans the longer side where its fit
-    is automatic, lengths count in widths of a pixel, and shifts in what the sensor spans.
+    Parameters
+    ----------
+    data : bpy.types.Camera
+        A perspective camera.
+    width, height : float
+        Of the picture, in pixels.
+    aspect : float
+        Height of a pixel over its width.
+
+    Notes
+    -----
+    As `BKE_camera_params_compute_viewplane` in Blender's source: the sensor spans the longer side where its fit is
+    automatic, lengths count in widths of a pixel, and shifts in what the sensor spans.
     """
     fit = data.sensor_fit
     if fit == "AUTO":
@@ -68,9 +82,21 @@ def camera_of(
 ) -> Camera:
     """What took a picture of `size` that a camera has as its background.
 
-    `thing`: a camera, evaluated where it is animated. `size`: width and height of the picture. `shown`: see
-    `frame_size`. `method`: how the background fills the camera's frame: 'STRETCH', 'FIT' or 'CROP'. Raises
-    `BadInputError`: the camera is neither a perspective one nor one of `make_cameras`, or has no rigid place.
+    Parameters
+    ----------
+    thing : bpy.types.Object
+        A camera, evaluated where it is animated.
+    size : tuple of int
+        Width and height of the picture.
+    shown : tuple of float
+        See `frame_size`.
+    method : str
+        How the background fills the camera's frame: 'STRETCH', 'FIT' or 'CROP'.
+
+    Raises
+    ------
+    BadInputError
+        The camera is neither a perspective one nor one of `make_cameras`, or has no rigid place.
     """
     data = thing.data
     kept = kept_lens(thing)
@@ -134,11 +160,19 @@ def views(
 ) -> Iterator[View]:
     """Every picture with the camera that took it.
 
-    `scene`: with `ANIMATION` its frame is changed; the caller sets it back. `things`: see `cameras_with_pictures`.
-    `how`: `OBJECTS`: one frame for each camera. `ANIMATION`: one for each frame of the scene's animation, through the
-    active camera, or the only one. `AUTO`: an animation where the one camera has a sequence or a clip behind it.
-    `first`, `last`, `step`: frames of the animation; the scene's where left out. `problems`: gets one sentence for each
-    picture that can't be used.
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        With `ANIMATION` its frame is changed; the caller sets it back.
+    things : list of bpy.types.Object
+        See `cameras_with_pictures`.
+    how : str
+        `OBJECTS`: one frame for each camera. `ANIMATION`: one for each frame of the scene's animation, through the
+        active camera, or the only one. `AUTO`: an animation where the one camera has a sequence or a clip behind it.
+    first, last, step : int, optional
+        Frames of the animation; the scene's where left out.
+    problems : list of str
+        Gets one sentence for each picture that can't be used.
     """
     problems = [] if problems is None else problems
     if how == AUTO:

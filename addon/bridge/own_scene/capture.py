@@ -42,8 +42,16 @@ MAX_TOLD: Shown[int] = 3
 class Source:
     """Which object of the scene an instance of the capture is.
 
-    `thing`: name of the object that shows it, when it was captured. `own`: its faces are those of the object's mesh.
-    `topology`: see `own_scene.mesh.Part.topology`. `corner_start`: first of its corners in `faces.npz`.
+    Attributes
+    ----------
+    thing : str
+        Name of the object that shows it, when it was captured.
+    own : bool
+        Its faces are those of the object's mesh.
+    topology : str
+        See `own_scene.mesh.Part.topology`.
+    corner_start : int
+        First of its corners in `faces.npz`.
     """
 
     object_id: int
@@ -65,10 +73,28 @@ def capture_scene(
 ) -> tuple[str, ...]:
     """Write objects and cameras of the open scene as a capture; the scene stays as it is.
 
-    `context`: its scene and view layer. `folder`: replaced as a whole where an earlier capture of a scene is there.
-    `things`: their surfaces become the mesh; cameras among them are the only ones that are taken. `how`, `first`,
-    `last`, `step`: see `own_scene.cameras.views`. Returns: warnings, one sentence each. Raises `BadInputError`: nothing
-    to take in, no usable picture, or `folder` holds something else; `StorageError`: the folder can't be written.
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Its scene and view layer.
+    folder : Path or str
+        Replaced as a whole where an earlier capture of a scene is there.
+    things : iterable of bpy.types.Object
+        Their surfaces become the mesh; cameras among them are the only ones that are taken.
+    how, first, last, step
+        See `own_scene.cameras.views`.
+
+    Returns
+    -------
+    tuple of str
+        Warnings, one sentence each.
+
+    Raises
+    ------
+    BadInputError
+        Nothing to take in, no usable picture, or `folder` holds something else.
+    StorageError
+        The folder can't be written.
     """
     folder, scene = Path(folder).absolute(), context.scene
     if folder.exists() and not (folder / OBJECTS).is_file() and any(folder.iterdir()):

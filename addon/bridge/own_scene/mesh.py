@@ -25,11 +25,19 @@ KINDS = ("MESH", "CURVE", "SURFACE", "FONT", "EMPTY")
 class Part:
     """One instance of the capture.
 
-    `name`: as the artist reads it. `class_name`: objects of one mesh share it, as they are of one kind. `thing`: the
-    artist's object that shows it. `own`: its faces are those of the object's mesh, one by one and in their order, so
-    that materials can be put there. `pieces`: list of (vertices, starts, corners, loops); world positions (v, 3)
-    float64; first corner of each face (f + 1,), vertex of each corner (c,) and the corners of each triangle (t, 3),
-    int32.
+    Attributes
+    ----------
+    name : str
+        As the artist reads it.
+    class_name : str
+        Objects of one mesh share it, as they are of one kind.
+    thing : bpy.types.Object
+        The artist's object that shows it.
+    own : bool
+        Its faces are those of the object's mesh, one by one and in their order, so that materials can be put there.
+    pieces : list of (vertices, starts, corners, loops)
+        World positions (v, 3) float64; first corner of each face (f + 1,), vertex of each corner (c,) and the corners
+        of each triangle (t, 3), int32.
     """
 
     object_id: int
@@ -54,9 +62,16 @@ class Part:
 class SceneMesh:
     """All parts as one.
 
-    `vertices`: (v, 3) float64; world, Blender's units. `triangles`: (t, 3) int32. `object_id`: (t,) int32. `polygons`:
-    the faces that the triangles were cut from, over the same vertices. `corner_start`: first corner in `polygons` of
-    each object; the next ones follow in the order of its mesh's loops.
+    Attributes
+    ----------
+    vertices : (v, 3) float64
+        World, Blender's units.
+    triangles : (t, 3) int32
+    object_id : (t,) int32
+    polygons : Polygons
+        The faces that the triangles were cut from, over the same vertices.
+    corner_start : dict of int to int
+        First corner in `polygons` of each object; the next ones follow in the order of its mesh's loops.
     """
 
     vertices: np.ndarray
@@ -69,9 +84,22 @@ class SceneMesh:
 def gather(depsgraph: bpy.types.Depsgraph, things: Iterable[bpy.types.Object]) -> list[Part]:
     """Read what the objects show.
 
-    `depsgraph`: brought up to date. `things`: the artist's; those without a surface are passed over. Returns: in the
-    order of `things`; one without faces is left out. Same scene, same numbers. Raises `BadInputError`: an object has
-    vertices that are not finite.
+    Parameters
+    ----------
+    depsgraph : bpy.types.Depsgraph
+        Brought up to date.
+    things : iterable of bpy.types.Object
+        The artist's; those without a surface are passed over.
+
+    Returns
+    -------
+    list of Part
+        In the order of `things`; one without faces is left out. Same scene, same numbers.
+
+    Raises
+    ------
+    BadInputError
+        An object has vertices that are not finite.
     """
     wanted = {thing: rank for rank, thing in enumerate(things) if thing.type in KINDS}
     found: dict[tuple, Part] = {}

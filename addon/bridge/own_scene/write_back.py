@@ -57,11 +57,28 @@ def writing_back(
 
     It yields the share done, so that a window can be drawn.
 
-    `capture`: made by `capture_scene`. `atlas_uv`: (t, 3, 2) float32. `where`: where the images go: see
-    `results.images`. `copies`: make a copy, with its faces fixed, of each object whose faces come from modifiers or
-    instances, and hide the object itself; without it such objects are left as they are. Returns: warnings, one sentence
-    each. Raises `MissingStageError`: the capture was not made of a scene; `BadInputError`: an image can't be read, or
-    the images' folder can't be told.
+    Parameters
+    ----------
+    capture : Capture
+        Made by `capture_scene`.
+    atlas_uv : (t, 3, 2) float32
+    where : str
+        Where the images go: see `results.images`.
+    copies : bool
+        Make a copy, with its faces fixed, of each object whose faces come from modifiers or instances, and hide the
+        object itself; without it such objects are left as they are.
+
+    Returns
+    -------
+    tuple of str
+        Warnings, one sentence each.
+
+    Raises
+    ------
+    MissingStageError
+        The capture was not made of a scene.
+    BadInputError
+        An image can't be read, or the images' folder can't be told.
     """
     known, polygons = sources(capture.root), polygons_of(capture.root, capture.mesh)
     check_own(capture.root)
@@ -198,8 +215,16 @@ class _Work:
 def restore(things: Iterable[bpy.types.Object]) -> tuple[int, tuple[str, ...]]:
     """Give objects back what they wore before the first `own_scene.write_back`.
 
-    `things`: those that nothing was put onto are passed over; a copy stands for the object that it was made of.
-    Returns: `count`: objects that were given back; `warnings`.
+    Parameters
+    ----------
+    things : iterable of bpy.types.Object
+        Those that nothing was put onto are passed over; a copy stands for the object that it was made of.
+
+    Returns
+    -------
+    count : int
+        Objects that were given back.
+    warnings : tuple of str
     """
     wanted = {(thing.get(COPY_OF) or thing): None for thing in things}
     count, edited, slots = 0, [], []

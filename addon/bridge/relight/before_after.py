@@ -64,7 +64,10 @@ def picture_folder(scene: bpy.types.Scene, chosen: str = "") -> tuple[Path, bool
     beside the file; a folder that is gone or can't be written to is passed over. Where none is left it is Blender's own
     for things of passing use.
 
-    Returns: (Path, bool): the folder; whether it stays when Blender ends.
+    Returns
+    -------
+    (Path, bool)
+        The folder; whether it stays when Blender ends.
     """
     beside_file = bpy.path.abspath("//") if bpy.data.filepath else ""
     places = [thing[RESULT] for thing in (*scene.collection.children_recursive, *scene.objects) if RESULT in thing]

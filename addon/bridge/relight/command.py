@@ -25,10 +25,19 @@ from .pictures import CYCLES, check_format, prepare, seconds_expected, settings_
 class Light:
     """What is to be changed about the light; None leaves it as the file has it.
 
-    `lamps`: 'on', 'off', or NAME=FACTOR and NAME=off, separated by commas; a name stands for one lamp or a class of
-    them. `world`: 'on', 'off', or degrees by which the outside is turned, anticlockwise from above. `hdri`: picture to
-    put around the room. `added`: dict of str to (float, str); strength of each new light and its unit
-    (`light.units.UNITS`), by `relight.lights.PRESETS`. `kelvin`: temperature of the new lights; None: what suits each.
+    Attributes
+    ----------
+    lamps : str or None
+        'on', 'off', or NAME=FACTOR and NAME=off, separated by commas; a name stands for one lamp or a class of them.
+    world : str or None
+        'on', 'off', or degrees by which the outside is turned, anticlockwise from above.
+    world_strength : float or None
+    hdri : Path or None
+        Picture to put around the room.
+    added : dict of str to (float, str)
+        Strength of each new light and its unit (`light.units.UNITS`), by `relight.lights.PRESETS`.
+    kelvin : float or None
+        Temperature of the new lights; None: what suits each.
     """
 
     lamps: str | None = None
@@ -54,13 +63,36 @@ def relight(
 ) -> list[str]:
     """Open a result's scene, change its light, render.
 
-    `result`: a result folder. `out`: ends in .png, .jpg or .exr. `camera`: number of a frame in the capture's order,
-    from 0, or its name; by default the scene's camera. `samples`: 0: as the scene says. `engine`: `pictures.CYCLES` or
-    `pictures.EEVEE`. `before_after`: two pictures beside each other: the captured light, the new one. `percentage`: of
-    the frame's size. `device`: see `render_device.use_device`; by default the file's, on which Cycles may have no say
-    without preferences. `of`: name of the scene, where the file holds several; by default the one that it was saved
-    with. Returns: remarks, one sentence each. Raises `BadInputError`, `StorageError`: one sentence for the user;
-    nothing is rendered if anything that was given is wrong.
+    Parameters
+    ----------
+    result : Path
+        A result folder.
+    out : Path
+        Ends in .png, .jpg or .exr.
+    camera : str, optional
+        Number of a frame in the capture's order, from 0, or its name; by default the scene's camera.
+    samples : int
+        0: as the scene says.
+    engine : str
+        `pictures.CYCLES` or `pictures.EEVEE`.
+    before_after : bool
+        Two pictures beside each other: the captured light, the new one.
+    percentage : int
+        Of the frame's size.
+    device : str, optional
+        See `render_device.use_device`; by default the file's, on which Cycles may have no say without preferences.
+    of : str, optional
+        Name of the scene, where the file holds several; by default the one that it was saved with.
+
+    Returns
+    -------
+    list of str
+        Remarks, one sentence each.
+
+    Raises
+    ------
+    BadInputError, StorageError
+        One sentence for the user; nothing is rendered if anything that was given is wrong.
     """
     progress = progress or Progress()
     check_format(out)

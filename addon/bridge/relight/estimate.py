@@ -58,7 +58,10 @@ _known: dict[str, Known] = {}
 def stops(scene: bpy.types.Scene) -> float | None:
     """How many stops the present light is brighter than the captured one, where the camera looks.
 
-    Returns: `NO_LIGHT` where all is dark; None as long as `looking` has not been run for this view and these lights.
+    Returns
+    -------
+    float or None
+        `NO_LIGHT` where all is dark; None as long as `looking` has not been run for this view and these lights.
     """
     known = _known.get(scene.name)
     if known is None or known.view != _view(scene):

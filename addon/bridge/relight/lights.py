@@ -55,10 +55,25 @@ def add_light(
 ) -> bpy.types.Object:
     """Add a light within the room, aimed at what is looked at.
 
-    `preset`: one of `PRESETS`. `strength`: in `unit`. `aim`: see `light.room.target_of`. `thing`: what `aim` = "OBJECT"
-    means. `kelvin`: temperature of its colour; by default the preset's in `KELVIN`. `unit`: of `light.units.UNITS`;
-    `ROOM`: a factor on the light that falls on the target, 1 keeps the exposure readable. Raises `BadInputError`: no
-    such preset or unit, no room in the scene, or no object to aim at.
+    Parameters
+    ----------
+    preset : str
+        One of `PRESETS`.
+    strength : float
+        In `unit`.
+    aim : str
+        See `light.room.target_of`.
+    thing : bpy.types.Object, optional
+        What `aim` = "OBJECT" means.
+    kelvin : float, optional
+        Temperature of its colour; by default the preset's in `KELVIN`.
+    unit : str
+        Of `light.units.UNITS`; `ROOM`: a factor on the light that falls on the target, 1 keeps the exposure readable.
+
+    Raises
+    ------
+    BadInputError
+        No such preset or unit, no room in the scene, or no object to aim at.
     """
     if preset not in PRESETS:
         raise BadInputError(f"There is no light '{preset}'; choose one of {', '.join(PRESETS)}.")

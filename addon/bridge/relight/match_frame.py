@@ -21,10 +21,25 @@ def match_frame(
 ) -> str:
     """Render and look through a frame's camera.
 
-    `index`: in the capture's order, clamped to what there is. `background`: lay the frame's picture behind the scene,
-    as bright as the scene's exposure shows it. `alpha`: opacity of the picture. `front`: lay it before the scene
-    instead. `capture_folder`: where to look for a picture that is no longer where it was. `size`: render at the frame's
-    size and with its shape of pixels, too. Returns: one sentence on what is not as it should be; '' if all is.
+    Parameters
+    ----------
+    index : int
+        In the capture's order, clamped to what there is.
+    background : bool
+        Lay the frame's picture behind the scene, as bright as the scene's exposure shows it.
+    alpha : float
+        Opacity of the picture.
+    front : bool
+        Lay it before the scene instead.
+    capture_folder : str
+        Where to look for a picture that is no longer where it was.
+    size : bool
+        Render at the frame's size and with its shape of pixels, too.
+
+    Returns
+    -------
+    str
+        One sentence on what is not as it should be; '' if all is.
     """
     cameras = frame_cameras(scene)
     if not cameras:

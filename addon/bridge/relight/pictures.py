@@ -95,8 +95,14 @@ def _render_slots():
 def prepare(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 0, percentage: int = 0) -> None:
     """Set a scene up for a picture; to be called within `settings_kept`.
 
-    `engine`: `CYCLES` or `EEVEE`. `samples`: for each pixel; 0: the scene's. `percentage`: of the scene's size; 0: the
-    scene's.
+    Parameters
+    ----------
+    engine : str
+        `CYCLES` or `EEVEE`.
+    samples : int
+        For each pixel; 0: the scene's.
+    percentage : int
+        Of the scene's size; 0: the scene's.
     """
     render = scene.render
     render.engine = engine_name(engine)

@@ -71,8 +71,15 @@ def add_volume(scene: bpy.types.Scene) -> bpy.types.Object:
 def bake(scene: bpy.types.Scene, wait: bool = True) -> bpy.types.Object:
     """Bake the room's light.
 
-    `wait`: return when it is done; else, in a window, Blender bakes on, with a bar in its status line, and ESC ends
-    that. Raises `BadInputError`: there is no room, or no graphics card to bake on; nothing is left behind then.
+    Parameters
+    ----------
+    wait : bool
+        Return when it is done; else, in a window, Blender bakes on, with a bar in its status line, and ESC ends that.
+
+    Raises
+    ------
+    BadInputError
+        There is no room, or no graphics card to bake on; nothing is left behind then.
     """
     if bpy.context.view_layer is None or bpy.context.scene != scene:
         raise BadInputError(f"Switch to scene '{scene.name}' first: what is baked is what the window shows.")
@@ -140,8 +147,16 @@ def fit(scene: bpy.types.Scene) -> float:
 def fitted_intensity(wanted: np.ndarray, once: np.ndarray, twice: np.ndarray) -> float:
     """The intensity whose luminances come nearest to those wanted, in the mean square of stops.
 
-    `wanted`, `once`, `twice`: (n,) float; median luminances by view: by Cycles, and by EEVEE at intensities of 1 and 2.
-    Views that are black by either engine tell nothing. Returns: 1 where no view tells anything.
+    Parameters
+    ----------
+    wanted, once, twice : (n,) float
+        Median luminances by view: by Cycles, and by EEVEE at intensities of 1 and 2. Views that are black by either
+        engine tell nothing.
+
+    Returns
+    -------
+    float
+        1 where no view tells anything.
     """
     tells = (wanted > 0) & (once > 0) & (twice > once)
     if not tells.any():

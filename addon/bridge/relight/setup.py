@@ -74,8 +74,15 @@ def setup_of(scene: bpy.types.Scene) -> str:
 def apply_setup(scene: bpy.types.Scene, text: str) -> list[str]:
     """Light a scene as `setup_of` told; its new lights are replaced, lamps of unknown classes are as captured.
 
-    Returns: one sentence where the picture around the room is gone: the recovered outside shines then. Raises
-    `BadInputError`: it is no set-up, or the scene holds no room; nothing is changed then.
+    Returns
+    -------
+    list of str
+        One sentence where the picture around the room is gone: the recovered outside shines then.
+
+    Raises
+    ------
+    BadInputError
+        It is no set-up, or the scene holds no room; nothing is changed then.
     """
     try:
         told = json.loads(text)

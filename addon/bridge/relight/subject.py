@@ -23,9 +23,18 @@ _STANDS_OUT = 0.3, 0.1
 class Subject:
     """What a light is for.
 
-    `target`: what it is aimed at, metres. `name`: of the thing; '' where it is the view as a whole. `points`,
-    `normals`: (n, 3) float64; what else the picture shows, metres. `weights`: (n,) float64; how much each counts; their
-    sum is 1. `radius`: metres around the target that belong to it.
+    Attributes
+    ----------
+    target : Vector
+        What it is aimed at, metres.
+    name : str
+        Of the thing; '' where it is the view as a whole.
+    points, normals : (n, 3) float64
+        What else the picture shows, metres.
+    weights : (n,) float64
+        How much each counts; their sum is 1.
+    radius : float
+        Metres around the target that belong to it.
     """
 
     target: Vector

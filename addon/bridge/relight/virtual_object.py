@@ -39,8 +39,21 @@ def add_virtual(
 ) -> bpy.types.Object:
     """Make a simple thing and stand it on a surface of the room.
 
-    `shape`: one of `SHAPES`. `size`: largest extent in metres. `look`: one of `LOOKS`. `at`: the surface; by default
-    what `place_in_view` finds. Raises `BadInputError`: no room, no surface to stand on, or no such shape.
+    Parameters
+    ----------
+    shape : str
+        One of `SHAPES`.
+    size : float
+        Largest extent in metres.
+    look : str
+        One of `LOOKS`.
+    at : Hit, optional
+        The surface; by default what `place_in_view` finds.
+
+    Raises
+    ------
+    BadInputError
+        No room, no surface to stand on, or no such shape.
     """
     if shape not in SHAPES:
         raise BadInputError(f"There is no shape '{shape}'; choose one of {', '.join(SHAPES)}.")
@@ -83,8 +96,17 @@ def set_look(thing: bpy.types.Object, look: str) -> None:
 def stand(scene: bpy.types.Scene, thing: bpy.types.Object, at: Hit | None = None) -> None:
     """Set an object onto a surface of the room: clear of the walls, let down until it touches.
 
-    `thing`: its rotation and scale stay. `at`: the surface; by default what `place_in_view` finds. An upright one means
-    the surface below, before it. Raises `BadInputError`: there is no surface below.
+    Parameters
+    ----------
+    thing : bpy.types.Object
+        Its rotation and scale stay.
+    at : Hit, optional
+        The surface; by default what `place_in_view` finds. An upright one means the surface below, before it.
+
+    Raises
+    ------
+    BadInputError
+        There is no surface below.
     """
     at = at or place_in_view(scene, thing)
     corners = _points(scene, thing)

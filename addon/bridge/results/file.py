@@ -27,8 +27,16 @@ told, as the object or the folder is older than runs' keys; or there is no resul
 class Result:
     """A result folder's content; empty where a file is absent or damaged.
 
-    `run`: key of the run; '' where it is older than such keys. `layout`: key of how its images are laid out; ''
-    likewise. `objects`: entries of materials.json by `object_id`. `stages`: of report.json.
+    Attributes
+    ----------
+    run : str
+        Key of the run; '' where it is older than such keys.
+    layout : str
+        Key of how its images are laid out; '' likewise.
+    objects : dict of int to dict
+        Entries of materials.json by `object_id`.
+    stages : dict of str to dict
+        Of report.json.
     """
 
     folder: Path

@@ -40,8 +40,16 @@ FRESH: Shown[float] = 2.0
 class Missing:
     """What a file misses of one result.
 
-    `folder`: where the result lay. `run`: the run's key; '' where nothing in the file tells it. `images`: names of the
-    image files that can't be shown. `gone`: the folder itself is not there, or holds no result any more.
+    Attributes
+    ----------
+    folder : Path
+        Where the result lay.
+    run : str
+        The run's key; '' where nothing in the file tells it.
+    images : tuple of str
+        Names of the image files that can't be shown.
+    gone : bool
+        The folder itself is not there, or holds no result any more.
     """
 
     folder: Path
@@ -204,7 +212,10 @@ def repoint(old: Path, new: Path) -> int:
 
     Images that can be shown from elsewhere (packed, or beside the file) stay as they are.
 
-    Returns: how many images are shown from `new`.
+    Returns
+    -------
+    int
+        How many images are shown from `new`.
     """
     count = 0
     for one in of_results():

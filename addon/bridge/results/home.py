@@ -31,8 +31,14 @@ def results_folder(preferred: str = "") -> Path:
 def result_folder(capture: Path, home: Path, scene: bpy.types.Scene | None = None) -> Path:
     """The result folder of a capture that none was chosen for; it is not made here.
 
-    `capture`: absolute. `home`: what `results_folder` gave. `scene`: where a room of this capture is in it, its result
-    goes on where it lies.
+    Parameters
+    ----------
+    capture : Path
+        Absolute.
+    home : Path
+        What `results_folder` gave.
+    scene : bpy.types.Scene, optional
+        Where a room of this capture is in it, its result goes on where it lies.
     """
     found = _of_room(scene, capture) if scene is not None else None
     return found or own_folder(beside() or home, capture)

@@ -39,8 +39,17 @@ BAKED = (BASE_COLOR, ALBEDO, SHADING)
 def bring(folder: Path | str, where: str = RESULT) -> bpy.types.Image | None:
     """Load the baked images (`BAKED`); what an earlier call loaded of this folder is taken again and renewed.
 
-    Returns: the one that Base Color shows. Raises `BadInputError`: an image is damaged, or `FOLDER` is wished for and
-    the file was never saved; `StorageError`: they can't be copied.
+    Returns
+    -------
+    bpy.types.Image or None
+        The one that Base Color shows.
+
+    Raises
+    ------
+    BadInputError
+        An image is damaged, or `FOLDER` is wished for and the file was never saved.
+    StorageError
+        They can't be copied.
     """
     folder = Path(folder).absolute()
     found = {name: image(folder, name, where) for name in BAKED if (folder / name).exists()}
@@ -87,11 +96,21 @@ def check(where: str) -> None:
 def settle(images: Iterable[bpy.types.Image], where: str = RESULT) -> None:
     """Images that are in the file already go where the artist wants them.
 
-    `images`: of result folders: those without a file of their own, and linked ones, are passed over. An earlier image
-    of the same file gives its place and its name to the new one, and goes. `where`: `RESULT`: refer to the result
-    folder, relative to the open file where it was saved; `FOLDER`: copy beside the open file; `PACK`: into it. Raises
-    `BadInputError`: `FOLDER` is wished for and the file was never saved, or an image's file is gone; `StorageError`:
-    they can't be copied.
+    Parameters
+    ----------
+    images : iterable of bpy.types.Image
+        Of result folders: those without a file of their own, and linked ones, are passed over. An earlier image of the
+        same file gives its place and its name to the new one, and goes.
+    where : str
+        `RESULT`: refer to the result folder, relative to the open file where it was saved; `FOLDER`: copy beside the
+        open file; `PACK`: into it.
+
+    Raises
+    ------
+    BadInputError
+        `FOLDER` is wished for and the file was never saved, or an image's file is gone.
+    StorageError
+        They can't be copied.
     """
     check(where)
     places = {}
@@ -137,8 +156,10 @@ def keep(saved: Path) -> None:
     They are further names (hard links) of the result's own files, so they take no space until a run writes those anew;
     copies where the disk knows no such links. What can't be kept stays referred to as it was.
 
-    `saved`: where the file will be. A result's own scene.blend is overwritten along with its images and refers to
-    those.
+    Parameters
+    ----------
+    saved : Path
+        Where the file will be. A result's own scene.blend is overwritten along with its images and refers to those.
     """
     for one in of_results():
         source = Path(one[IMAGE])

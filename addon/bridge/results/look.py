@@ -48,8 +48,14 @@ RAMP: Shown[tuple[tuple[float, float, float], ...]] = (
 class Look:
     """One entry of the choice.
 
-    `label`, `text`: as the artist reads it. `file`: image of the result folder; '' for the materials themselves.
-    `light`: radiance, which the scene's exposure applies to; else the exposure is taken out again.
+    Attributes
+    ----------
+    label, text : str
+        As the artist reads it.
+    file : str
+        Image of the result folder; '' for the materials themselves.
+    light : bool
+        Radiance, which the scene's exposure applies to; else the exposure is taken out again.
     """
 
     label: str
@@ -106,8 +112,21 @@ def set_look(scene: bpy.types.Scene, look: str) -> int:
 
     Objects of another run than lies in their folder now are left out: the images would not fit them.
 
-    `look`: one of `LOOKS`. Returns: how many objects show it. Raises `BadInputError`: nothing is recovered in the scene
-    whose run lies in its folder, or an image is missing or damaged; the look stays as it was.
+    Parameters
+    ----------
+    look : str
+        One of `LOOKS`.
+
+    Returns
+    -------
+    int
+        How many objects show it.
+
+    Raises
+    ------
+    BadInputError
+        Nothing is recovered in the scene whose run lies in its folder, or an image is missing or damaged; the look
+        stays as it was.
     """
     if look == MATERIAL:
         return clear(scene)

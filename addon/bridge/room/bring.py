@@ -32,9 +32,18 @@ __all__ = ["Brought", "bringing", "link_room", "rooms"]
 class Brought:
     """What came into the file.
 
-    `scene`: where the room is to be seen: the scene that was named, or the room's own. `collection`: the room's.
-    `updated`: it was in the file already. `warnings`: what was left as the artist has it, one sentence each. `changes`:
-    objects that were found to be notably different from last time: `object_id`, `name` and `text`, the sentence.
+    Attributes
+    ----------
+    scene : bpy.types.Scene
+        Where the room is to be seen: the scene that was named, or the room's own.
+    collection : bpy.types.Collection
+        The room's.
+    updated : bool
+        It was in the file already.
+    warnings : tuple of str
+        What was left as the artist has it, one sentence each.
+    changes : tuple of dict
+        Objects that were found to be notably different from last time: `object_id`, `name` and `text`, the sentence.
     """
 
     scene: bpy.types.Scene
@@ -52,12 +61,26 @@ def bringing(
     Nothing that was in the file changes before the last slice: a generator that fails, or is closed before, leaves all
     as it was.
 
-    `folder`: the result folder. `scene`: link the room into this scene and change nothing else of it. By default the
-    room has a scene of its own, "Scan Relight: <capture>", with its world, exposure, engine and camera; no other scene
-    is touched. `where`: where the images go: see `results.images`. `known`: only update a room that is there. Raises
-    `MissingStageError`: the folder holds no finished result; with `known`, the file holds no room of that capture;
-    `BadInputError`: scene.blend is damaged, or `where` is a folder beside a file that was never saved; `StorageError`:
-    images can't be copied.
+    Parameters
+    ----------
+    folder : Path or str
+        The result folder.
+    scene : bpy.types.Scene, optional
+        Link the room into this scene and change nothing else of it. By default the room has a scene of its own,
+        "Scan Relight: <capture>", with its world, exposure, engine and camera; no other scene is touched.
+    where : str
+        Where the images go: see `results.images`.
+    known : bool
+        Only update a room that is there.
+
+    Raises
+    ------
+    MissingStageError
+        The folder holds no finished result; with `known`, the file holds no room of that capture.
+    BadInputError
+        scene.blend is damaged, or `where` is a folder beside a file that was never saved.
+    StorageError
+        Images can't be copied.
     """
     folder = Path(folder).absolute()
     root = root_of(folder)
@@ -183,7 +206,12 @@ def _place(top, shell, scene, root: str, new: bool) -> tuple[bpy.types.Scene, li
 def link_room(top: bpy.types.Collection, scene: bpy.types.Scene, outside: bpy.types.Scene | None = None) -> None:
     """Show a room in another scene as well.
 
-    `top`: the room's. `outside`: give `scene` the world and the exposure of this one, too.
+    Parameters
+    ----------
+    top : bpy.types.Collection
+        The room's.
+    outside : bpy.types.Scene, optional
+        Give `scene` the world and the exposure of this one, too.
     """
     if top not in scene.collection.children_recursive:
         scene.collection.children.link(top)

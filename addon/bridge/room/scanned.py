@@ -24,8 +24,11 @@ def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generat
 
     A later run finds the room and updates it. Nothing that was in the file changes before the last slice.
 
-    `scene`: link it into this scene; by default it has one of its own. A room of the capture that the file has already
-    stays as it is, and only comes into the scene.
+    Parameters
+    ----------
+    scene : bpy.types.Scene, optional
+        Link it into this scene; by default it has one of its own. A room of the capture that the file has already
+        stays as it is, and only comes into the scene.
     """
     top = find_room(capture.root)
     if top is not None:

@@ -25,7 +25,10 @@ def dress(scene: bpy.types.Scene) -> None:
 def take_settings(scene: bpy.types.Scene, shell: bpy.types.Scene) -> list[str]:
     """Bring a room's own scene up to date with the scene of a new result; what the artist changed stays.
 
-    Returns: one sentence on each thing that stays hers.
+    Returns
+    -------
+    list of str
+        One sentence on each thing that stays hers.
     """
     kept = []
     if EXPOSURE not in scene:  # the capture was imported, no more

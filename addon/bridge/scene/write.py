@@ -46,8 +46,16 @@ SCENE_FILES = "scene.blend", _WRITING
 class BuiltScene:
     """What `build_scene` made.
 
-    `collection`: "Scan Relight", linked to the scene; within it "Room", "Lamps" and "Cameras". `objects`: by
-    `object_id`. `cameras`: in the capture's order. `images`: all that refer to files of the result folder.
+    Attributes
+    ----------
+    collection : bpy.types.Collection
+        "Scan Relight", linked to the scene; within it "Room", "Lamps" and "Cameras".
+    objects : dict of int to bpy.types.Object
+        By `object_id`.
+    cameras : list of bpy.types.Object
+        In the capture's order.
+    images : list of bpy.types.Image
+        All that refer to files of the result folder.
     """
 
     collection: bpy.types.Collection
@@ -70,12 +78,27 @@ def build_scene(
 ) -> BuiltScene:
     """Add the recovered room to a scene as a new collection; nothing that is there is changed.
 
-    `atlas_uv`: (t, 3, 2) float32; what `unwrap` gave. `materials`: an instance without one becomes lambertian.
-    `result_folder`: holds the images, see `BASE_COLOR` and its neighbours. `median_radiance`: of the frames; with `own`
-    it sets the exposure so that this becomes middle grey. 0: unknown. `own`: the scene is ours: also set its world,
-    active camera, render engine and exposure. `facing`: the mesh's normals face the frames: a lamp that is an open
-    sheet then shines on that side only, as it was seen. `parts`: images that the materials show instead of the room's
-    one; that is there all the same. Raises `BadInputError`: an image of the result folder can't be read.
+    Parameters
+    ----------
+    atlas_uv : (t, 3, 2) float32
+        What `unwrap` gave.
+    materials : iterable of ObjectMaterial
+        An instance without one becomes lambertian.
+    result_folder : Path or str
+        Holds the images, see `BASE_COLOR` and its neighbours.
+    median_radiance : float
+        Of the frames; with `own` it sets the exposure so that this becomes middle grey. 0: unknown.
+    own : bool
+        The scene is ours: also set its world, active camera, render engine and exposure.
+    facing : bool
+        The mesh's normals face the frames: a lamp that is an open sheet then shines on that side only, as it was seen.
+    parts : Parts, optional
+        Images that the materials show instead of the room's one; that is there all the same.
+
+    Raises
+    ------
+    BadInputError
+        An image of the result folder can't be read.
     """
     folder = Path(result_folder).absolute()
     images = {
@@ -151,11 +174,27 @@ def write_scene(
 
     The file appears whole or not at all, and refers to the images by paths relative to itself.
 
-    `path`: best within `result_folder`, so that both are moved together. `capture`, `atlas_uv`, `materials`,
-    `result_folder`, `median_radiance`, `facing`, `parts`: see `build_scene`. `fresh`: true: start from an empty file;
-    what is open in this process is lost. False: build next to what is open, save that part alone and take it away
-    again. By default fresh in background mode only. Returns: warnings, one sentence each. Raises `BadInputError`: an
-    image of the result folder can't be read; `StorageError`: the file can't be written.
+    Parameters
+    ----------
+    path : Path or str
+        Best within `result_folder`, so that both are moved together.
+    capture, atlas_uv, materials, result_folder, median_radiance, facing, parts
+        See `build_scene`.
+    fresh : bool, optional
+        True: start from an empty file; what is open in this process is lost. False: build next to what is open, save
+        that part alone and take it away again. By default fresh in background mode only.
+
+    Returns
+    -------
+    tuple of str
+        Warnings, one sentence each.
+
+    Raises
+    ------
+    BadInputError
+        An image of the result folder can't be read.
+    StorageError
+        The file can't be written.
     """
     path = Path(path).absolute()
     fresh = bpy.app.background if fresh is None else fresh
