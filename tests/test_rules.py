@@ -248,3 +248,12 @@ def test_the_methods_numbers_are_fields_of_params():
                 fields = {ast.unparse(field.target) for field in one.body if isinstance(field, ast.AnnAssign)}
                 told = re.findall(r"^ {4}(\w[\w, ]*) : ", ast.get_docstring(one, clean=False) or "", re.MULTILINE)
                 assert fields == {name for names in told for name in names.split(", ")}, f"{path}: {one.name}"
+
+
+def test_docstrings_have_numpys_sections():
+    """What a function takes and gives stands in sections of its own, not run in with the sentences."""
+    run_in = re.compile(r"\bReturns: |^\s*`\**\w+`: ", re.MULTILINE)
+    for path in CODE:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                assert not run_in.search(ast.get_docstring(node) or ""), f"{relative(path)}:{node.lineno}"
