@@ -252,7 +252,7 @@ def test_the_methods_numbers_are_fields_of_params():
 
 def test_docstrings_have_numpys_sections():
     """What a function takes and gives stands in sections of its own, not run in with the sentences."""
-    run_in = re.compile(r"\bReturns: |^\s*`\**\w+`: ", re.MULTILINE)
+    run_in = re.compile(r"\bReturns: |^\s*`\**[a-z_]+`: ", re.MULTILINE)
     for path in CODE:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
