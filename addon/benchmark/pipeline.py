@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import importlib.util
 import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,11 +19,10 @@ from ..core.results.store import Store
 from ..core.scene.model import Capture, Mesh
 from ..core.settings import PRESETS, Settings
 from ..core.stages import STAGES
-from .run import Options, SkippedStage
+from .run import Options, SkippedStage, room_and_scratch
 from .table import BASELINE, Curves, Table
 from .timing import once
 
-SCRATCH = "tmp-pipeline-"
 PAPER_RAYS: Workload[int] = 100
 """The smaller of the paper's two settings; its 10,000 rays at each texel would take hours."""
 DETAILS: Workload[tuple[float, float, float]] = (0.25, 0.5, 1.0)
@@ -71,13 +69,7 @@ def run(options: Options) -> Iterator[Table]:
     """Tables of presets, of texels and of triangles."""
     if importlib.util.find_spec("bpy") is None:
         raise SkippedStage("It unwraps and renders with Blender; run it where bpy can be imported.")
-    from ..bridge.demo.render import render_capture
-
-    with tempfile.TemporaryDirectory(dir=options.out, prefix=SCRATCH) as scratch:
-        scratch = Path(scratch)
-        folder = options.capture
-        if folder is None:
-            folder = render_capture(scratch / "capture", "large" if options.large else "small")
+    with room_and_scratch(options) as (folder, scratch):
         options.progress.update(0.2)
         yield _presets_table(folder, scratch, options)
         options.progress.update(0.6)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 import importlib.util
+import tempfile
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from ..core.atomic import write_bytes
@@ -15,8 +17,7 @@ from ..core.progress import Progress
 from .machine import describe_machine
 from .table import Table
 
-STAGES = ("medians", "accumulation", "shading", "specular", "pipeline")
-"""Each is the module of that name beside this one, with a function `run(options) -> iterable of Table`."""
+STAGES = ("lit_diffuse", "shading", "specular", "pipeline")
 NO_PLOTS = "Plots need matplotlib, which is not installed here; the tables are complete without it."
 
 
@@ -31,7 +32,7 @@ class Options:
     Attributes
     ----------
     capture : Path or None
-        A capture to measure on besides what the stage makes itself.
+        The capture to measure on; the demo's room where None.
     large : bool
         The real size, which may take hours; else what finishes in minutes.
     seed : int
@@ -39,7 +40,7 @@ class Options:
     threads : int
         0 takes all cores.
     out : Path
-        Where the files go. A stage may keep scratch files there, and takes them away again.
+        Where the files go.
     progress : Progress
         To be told the share of the stage that is done; raises `InterruptedRun` when the user wants to stop.
     """
@@ -51,10 +52,6 @@ class Options:
     out: Path = Path()
     progress: Progress = field(default_factory=Progress)
 
-    def part(self, start: float, end: float, weights: dict[str, float] | None = None) -> Progress:
-        """A `Progress` for code with stages of its own, which advances this stage from share `start` to `end`."""
-        return Progress(lambda event: self.progress.update(start + (end - start) * event.overall), weights=weights)
-
 
 def check_stages(stages: Sequence[str]) -> tuple[str, ...]:
     """The stages asked for in their order, all where none is named; raises `BadInputError` for an unknown one."""
@@ -65,8 +62,30 @@ def check_stages(stages: Sequence[str]) -> tuple[str, ...]:
 
 
 def load(stage: str) -> Callable[[Options], Iterable[Table]]:
-    """The function of a stage; imported when it is wanted, so that one stage does not need what another imports."""
-    return importlib.import_module(f".{stage}", __package__).run
+    """The function of a stage; imported when it is wanted: not all of them need what others import."""
+    if stage == "pipeline":
+        from .pipeline import run
+
+        return run
+    from . import stages
+
+    return partial(stages.run, stage)
+
+
+@contextmanager
+def room_and_scratch(options: Options) -> Iterator[tuple[Path, Path]]:
+    """The capture that is measured on, the demo's room where none is given; and a folder that goes at the end."""
+    with tempfile.TemporaryDirectory(dir=options.out, prefix="tmp-") as scratch:
+        folder = options.capture
+        if folder is None:
+            if importlib.util.find_spec("bpy") is None:
+                raise SkippedStage(
+                    "It renders a room with Blender; run it where bpy can be imported, or give --capture."
+                )
+            from ..bridge.demo.render import render_capture
+
+            folder = render_capture(Path(scratch) / "capture", "large" if options.large else "small")
+        yield folder, Path(scratch)
 
 
 def run_benchmark(stages: Sequence[str], options: Options) -> dict[str, list[Table] | str]:

@@ -19,11 +19,9 @@ def add_benchmark(commands, epilog: str) -> argparse.ArgumentParser:
         description="Run each stage over its alternatives, the paper's setting among them, and write a table (CSV and "
         "Markdown) and a plot for each. Errors are the same from run to run; seconds are the machine's.",
     )
-    stages = (
-        "medians, accumulation, shading, specular or pipeline (default all); or 'ablation ROOM ...', which has --help"
-    )
+    stages = "lit_diffuse, shading, specular or pipeline (default all); or 'ablation ROOM ...', which has --help"
     parser.add_argument("stages", metavar="STAGE", nargs="*", help=stages)
-    parser.add_argument("--capture", metavar="DIR", type=Path, help="also measure on this capture")
+    parser.add_argument("--capture", metavar="DIR", type=Path, help="measure on this capture (default the demo's room)")
     parser.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder to write, made if missing")
     parser.add_argument("--large", action="store_true", help="the real size; takes much longer")
     parser.add_argument("--seed", type=int, metavar="INT", default=0, help="of every random choice (default 0)")

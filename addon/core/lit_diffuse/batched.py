@@ -7,7 +7,7 @@ consecutive ranks around the median and ever wider apart towards the ends: in ra
 or two from batch to batch, and there the knots are observations, not interpolated. So it stays close to exact for
 thousands of observations (Munro and Paterson, Selection and sorting with limited storage, 1980, have the idea; the
 spacing is that of a merging digest, Dunning and Ertl 2019). In sorted order the median walks into the wide gaps; what
-is lost then the benchmark `medians` shows.
+is lost then docs/speed-against-error.md shows.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Running estimates of a typical value for each of n elements and three channels, by name.
 
 All share one interface (`estimator.Estimator`): `add(element, values)` with each element at most once a call, and
-`result()`. Measured against one another: `scan-relight benchmark medians`.
+`result()`. Measured against one another: `scan-relight benchmark lit_diffuse`.
 """
 
 from __future__ import annotations

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.benchmark.synthetic import synthetic_capture
 from addon.core.agreement.look import look
 from addon.core.agreement.overlay import LINE, overlay
 from addon.core.agreement.params import AGREEMENT
 from addon.core.errors import BadInputError
 from addon.core.io.conventions import Convention, matrix, parse
 from addon.core.scene.model import Capture, Instance, Pixels
+from tests.core.synthetic import synthetic_capture
 
 MENDS = ["opencv", "world-to-camera", "camera:+x-y-z,world:+x+z-y", "scale:100"]
 WIDTH, HEIGHT = 96, 72

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import csv
+import json
+import shutil
 import types
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from addon import cli
 from addon.benchmark import run as bench
+from addon.benchmark import stages
 from addon.benchmark.machine import describe_machine
+from addon.benchmark.pipeline import cut_in_four
 from addon.benchmark.run import Options, SkippedStage, run_benchmark
 from addon.benchmark.table import Curves, Table
-from addon.benchmark.timing import alternately
 from addon.core.errors import BadInputError, InterruptedRun
 from addon.core.progress import Progress
+from addon.core.scene.elements import triangle_geometry
+from tests.core.on_disk import CHEAP
+from tests.core.rooms import lit_box, make_room
 
+FEW_RAYS = {"specular_rays": 16}
 COLUMNS = ("room", "alternative", "baseline", "error", "seconds", "rays")
 
 
@@ -109,10 +117,10 @@ def test_a_stopped_run_keeps_what_is_finished(toy, tmp_path, monkeypatch):
 
 
 def test_unknown_stage_and_no_capture_folder(tmp_path):
-    with pytest.raises(BadInputError, match="no benchmark 'speed'.*medians, accumulation, shading"):
+    with pytest.raises(BadInputError, match="no benchmark 'speed'.*lit_diffuse, shading, specular"):
         run_benchmark(["speed"], Options(out=tmp_path))
     with pytest.raises(BadInputError, match="nowhere"):
-        run_benchmark(["medians"], Options(out=tmp_path, capture=tmp_path / "nowhere"))
+        run_benchmark(["shading"], Options(out=tmp_path, capture=tmp_path / "nowhere"))
 
 
 def test_command_line(toy, tmp_path, capsys):
@@ -126,17 +134,6 @@ def test_command_line(toy, tmp_path, capsys):
     assert cli.main(["benchmark", "toy"]) == 2
 
 
-def test_progress_of_a_part():
-    shares = []
-    outer = Progress(lambda event: shares.append(event.share))
-    inner = Options(progress=outer).part(0.5, 1.0, weights={"a": 1, "b": 3})
-    outer.stage("toy")
-    for name in ("a", "b"):
-        inner.stage(name)
-        inner.done()
-    assert shares == pytest.approx([0, 0.5, 0.625, 0.625, 1.0])
-
-
 def test_the_machine_is_described_without_its_name():
     import platform
 
@@ -145,7 +142,39 @@ def test_the_machine_is_described_without_its_name():
     assert not any(platform.node() and platform.node() in text for text in found.values())
 
 
-def test_alternatives_take_turns():
-    calls = []
-    times = alternately({"a": lambda: calls.append("a"), "b": lambda: calls.append("b") or 7}, repeats=2)
-    assert calls == ["a", "b", "a", "b"] and times["b"].value == 7 and times["a"].seconds >= 0
+@pytest.mark.slow
+@pytest.mark.parametrize(("stage", "exact"), [("lit_diffuse", "exact"), ("shading", None), ("specular", None)])
+def test_a_stage_is_measured_under_its_alternatives(stage, exact, disk, tmp_path, monkeypatch):
+    """On a capture with truth; the alternative that is the reference has no error, the paper's has one."""
+    capture = tmp_path / "capture"
+    shutil.copytree(disk.root, capture)
+    (capture / "truth").mkdir()
+    known = [{"id": i, "alpha": None if i else 0.09, "emission": None} for i in range(7)]
+    (capture / "truth" / "materials.json").write_text(json.dumps(known))
+    monkeypatch.setattr(stages, "unwrapper", lambda: disk.unwrap)
+    monkeypatch.setattr(stages, "Settings", lambda **given: replace(CHEAP, **given))
+    few = tuple({name: changes for name, changes in stages.ALTERNATIVES[stage] if name != "aimed rays"}.items())
+    monkeypatch.setitem(stages.ALTERNATIVES, stage, [(name, {**changes, **FEW_RAYS}) for name, changes in few])
+    monkeypatch.setitem(stages.FINEST, "shading", {"shading_rays": 256})
+    (table,) = stages.run(stage, Options(out=tmp_path, capture=capture, threads=2))
+    records = {record["alternative"]: record for record in table.records()}
+    assert records[stages.PAPERS]["baseline"] and not records["default"]["baseline"]
+    errors = {name: record[stages.ERRORS[stage]] for name, record in records.items()}
+    assert all(0 <= error < 1 for error in errors.values()), errors
+    assert exact is None or errors[exact] == 0 < errors[stages.PAPERS]
+    assert [path.name for path in tmp_path.iterdir()] == ["capture"]
+
+
+def test_without_truth_the_specular_stage_is_skipped(disk, tmp_path, monkeypatch):
+    monkeypatch.setattr(stages, "unwrapper", lambda: disk.unwrap)
+    with pytest.raises(SkippedStage, match="truth"):
+        list(stages.run("specular", Options(out=tmp_path, capture=disk.root)))
+
+
+def test_cutting_triangles_keeps_the_surface():
+    mesh = make_room(lit_box(), 0.5).mesh
+    cut = cut_in_four(mesh, 2)
+    assert len(cut.triangles) == 16 * len(mesh.triangles)
+    areas = [triangle_geometry(one)[1].sum() for one in (mesh, cut)]
+    assert areas[0] == pytest.approx(areas[1])
+    assert np.array_equal(np.bincount(cut.object_id), 16 * np.bincount(mesh.object_id))

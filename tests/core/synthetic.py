@@ -7,19 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.io.exr import write_exr
-from ..core.kinds import Workload
-from ..core.scene.atlas import Atlas
-from ..core.scene.elements import make_atlas
-from ..core.scene.model import Camera, Frame, Mesh, Pixels
-from ..core.scene.rays import RayScene
+from addon.core.scene.atlas import Atlas
+from addon.core.scene.elements import make_atlas
+from addon.core.scene.model import Camera, Frame, Mesh, Pixels
+from addon.core.scene.rays import RayScene
 
-ROOM: Workload[tuple[float, float, float]] = (6.0, 5.0, 2.8)
-BOXES: Workload[int] = 12
-TILES: Workload[int] = 16
+ROOM = (6.0, 5.0, 2.8)
+BOXES = 12
+TILES = 16
 """Squares along a side's edge: the tree of triangles is then as deep as a scan's."""
-NOISE: Workload[float] = 0.03
-GAP: Workload[int] = 2
+NOISE = 0.03
+GAP = 2
 """Texels between two islands."""
 
 
@@ -60,17 +58,13 @@ class SyntheticCapture:
         return Pixels(image, np.ones(shape, bool), np.zeros(shape, bool))
 
 
-def synthetic_capture(
-    count: int, size: tuple[int, int], elements: int, seed: int, folder: Path | None = None
-) -> SyntheticCapture:
+def synthetic_capture(count: int, size: tuple[int, int], elements: int, seed: int) -> SyntheticCapture:
     """A room with boxes seen by `count` frames of `size` (width, height) pixels on a closed way.
 
     Parameters
     ----------
     elements : int
         About so many surface elements.
-    folder : Path, optional
-        Write the frames there, half floats as cameras' tools do: reading them then costs what reading costs.
     """
     rng = np.random.default_rng(seed)
     quads, ids = [box(np.zeros(3), np.array(ROOM), inward=True)], [np.arange(6)]
@@ -79,12 +73,8 @@ def synthetic_capture(
         quads.append(box(low, low + rng.uniform(0.2, 0.9, 3), inward=False))
         ids.append(np.full(6, 6 + number))
     mesh, atlas = tiled(np.concatenate(quads), np.concatenate(ids), elements)
-    frames = tuple(Frame(str(i), (folder or Path()) / f"{i}.exr", _camera(i / count, size)) for i in range(count))
-    capture = SyntheticCapture(mesh, atlas, RayScene(mesh.vertices, mesh.triangles), frames, seed)
-    if folder is not None:
-        for frame in frames:
-            write_exr(frame.path, capture.make(frame).radiance, half=True)
-    return capture
+    frames = tuple(Frame(str(i), Path(f"{i}.exr"), _camera(i / count, size)) for i in range(count))
+    return SyntheticCapture(mesh, atlas, RayScene(mesh.vertices, mesh.triangles), frames, seed)
 
 
 def box(low: np.ndarray, high: np.ndarray, inward: bool) -> np.ndarray:
