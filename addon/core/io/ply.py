@@ -1,12 +1,12 @@
 """PLY meshes: text or binary, any order of properties, polygons split into triangles.
 
-A body is taken as one flat array: of bytes where binary, of numbers where text. So both kinds share one way of finding
-the records, and only `_Body.take` knows the difference. Nothing is allocated before the counts that the header claims
-were compared with the size of the file.
+A body is bytes: those of the file where it is binary, those of all its numbers as float64 where it is text. So both
+kinds are read alike. Nothing is allocated before the counts that the header claims were compared with the file's size.
 """
 
 from __future__ import annotations
 
+import struct
 import warnings
 from pathlib import Path
 from typing import NamedTuple
@@ -14,14 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import BadInputError
-from ..kinds import Block
 from .paths import absence
-from .ply_header import Element, parse_header
+from .ply_header import Element, Property, parse_header
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 INDEX_NAMES = ("vertex_indices", "vertex_index")
-WINDOW: Block[int] = 1 << 20
-"""Entries of the body that are looked at together; bounds the memory, as each takes some dozens of bytes."""
 
 
 class PlyMesh(NamedTuple):
@@ -46,23 +43,6 @@ class PlyMesh(NamedTuple):
     uv: np.ndarray | None
     face: np.ndarray
     corner: np.ndarray
-
-
-class _Body(NamedTuple):
-    """The flat array behind the header."""
-
-    data: np.ndarray  # uint8 where binary, float64 where text
-    order: str  # '<' or '>', '' where text
-
-    def size(self, kind: str) -> int:
-        """How many entries of `data` one value takes."""
-        return np.dtype(kind).itemsize if self.order else 1
-
-    def take(self, at: np.ndarray, kind: str, count: int = 1) -> np.ndarray:
-        """`count` values behind each position `at` ((n,) int), as (n, count)."""
-        size = self.size(kind) * count
-        raw = self.data[at[:, None] + np.arange(size)]
-        return raw.view(self.order + kind) if self.order else raw
 
 
 class _Damaged(Exception):
@@ -95,37 +75,36 @@ def read_ply(path: Path | str) -> PlyMesh:
 
 
 def _parse(content: bytes) -> PlyMesh:
-    order, elements, start = parse_header(content)
-    body = _Body(np.frombuffer(content, np.uint8, offset=start) if order else _numbers(content[start:]), order)
-    at = 0
-    found: dict[str, tuple[Element, np.ndarray, dict[str, np.ndarray]]] = {}
+    order, elements, at = parse_header(content)
+    if order:
+        data = np.frombuffer(content, np.uint8)
+    else:
+        data, at = _numbers(content[at:]).view(np.uint8), 0
+    found: dict[str, _Records] = {}
     for element in elements:
-        starts, lists, at = _records(body, element, at)
-        found[element.name] = element, starts, lists
+        found[element.name] = records = _Records(data, order, element, at)
+        at = records.end
         if {"vertex", "face"} <= found.keys():
             break
     if "vertex" not in found:
         raise _Damaged("holds no vertices")
-    element, starts, lists = found["vertex"]
-    place, *pairs = (_columns(body, element, starts, lists, names) for names in (("x", "y", "z"), *UV_NAMES))
+    place, *pairs = (found["vertex"].columns(names) for names in (("x", "y", "z"), *UV_NAMES))
     if place is None:
         raise _Damaged("has vertices without x, y and z")
     vertices = place.astype(np.float64)
     if "face" not in found:
-        return PlyMesh(
-            vertices, np.zeros((0, 3), np.int32), None, None, np.zeros(0, np.int64), np.zeros((0, 3), np.int32)
-        )
+        none = np.zeros((0, 3), np.int32)
+        return PlyMesh(vertices, none, None, None, np.zeros(0, np.int64), none)
 
-    element, starts, lists = found["face"]
-    name = next((n for n in INDEX_NAMES if n in lists), None)
+    faces = found["face"]
+    name = next((n for n in INDEX_NAMES if n in faces.counts), None)
     if name is None:
         raise _Damaged("has faces without vertex_indices")
-    kinds = {p.name: p for p in element.properties}
-    triangles, source, corner = _triangles(body, lists[name], kinds[name].count_kind, kinds[name].kind, vertices)
-    ids = _scalars(body, element, starts, lists, "object_id")
+    triangles, source, corner = _triangles(faces.counts[name], faces.entries(name), vertices)
+    ids = faces.columns(("object_id",))
     if ids is not None:
         whole = np.nan_to_num(ids, nan=-1.0, posinf=-1.0, neginf=-1.0) if ids.dtype.kind == "f" else ids
-        ids = whole.astype(np.int64)[source]
+        ids = whole[:, 0].astype(np.int64)[source]
     pair = next((pair for pair in pairs if pair is not None), None)
     uv = None if pair is None else pair.astype(np.float32)[triangles]
     return PlyMesh(vertices, triangles, ids, uv, source, corner)
@@ -142,130 +121,112 @@ def _numbers(text: bytes) -> np.ndarray:
             raise _Damaged("holds something that is no number") from error
 
 
-def _records(body: _Body, element: Element, at: int) -> tuple[np.ndarray, dict[str, np.ndarray], int]:
-    """Find the records of `element`, the first of which begins at `at`.
+class _Records:
+    """The records of an element that begin at `at`: how long their lists are, and where each of their values lies.
 
-    Returns
-    -------
-    starts : (n,) int64
-        Where each record begins.
-    lists : dict of str to (n,) int64
-        Where each list property's length stands.
+    Attributes
+    ----------
+    counts : dict of str to (n,) int64
+        Entries of each list property.
+    places : dict of str to (n,) int64
+        Where each property's value, or its first entry, begins.
     end : int
+        Where the records end.
     """
-    n, room = element.count, body.data.size - at
-    fixed = sum(body.size(p.count_kind or p.kind) for p in element.properties)
-    if n * max(fixed, 1) > room:
-        raise _Damaged(f"claims {n} of '{element.name}' but ends before them: it is cut off, or its header is wrong")
-    lists = [p for p in element.properties if p.count_kind]
-    if not n or not lists:
-        return at + fixed * np.arange(n), {p.name: np.zeros(0, np.int64) for p in lists}, at + fixed * n
 
-    # The fast path: all lists are as long as those of the first record, which holds for nearly every mesh.
-    where, length = _walk_one(body, element, at)
-    if n * length <= room:
-        starts = at + length * np.arange(n)
-        places = {p.name: starts + offset for p, (offset, _) in zip(lists, where)}
-        if all(np.all(body.take(places[p.name], p.count_kind)[:, 0] == count) for p, (_, count) in zip(lists, where)):
-            return starts, places, at + length * n
-    return _walk(body, element, at)
-
-
-def _walk_one(body: _Body, element: Element, at: int) -> tuple[list[tuple[int, int]], int]:
-    """Offset and length of each list of the record at `at`, and the record's size."""
-    where, begin = [], at
-    for p in element.properties:
-        if not p.count_kind:
-            at += body.size(p.kind)
-            continue
-        if at + body.size(p.count_kind) > body.data.size:
-            raise _Damaged(f"ends within its '{element.name}' records: it is cut off")
-        count = body.take(np.array([at]), p.count_kind)[0, 0]
-        if not 0 <= count <= body.data.size or count != int(count):
-            raise _Damaged(f"holds a list of {count} entries in '{element.name}'")
-        where.append((at - begin, int(count)))
-        at += body.size(p.count_kind) + int(count) * body.size(p.kind)
-    return where, at - begin
-
-
-def _walk(body: _Body, element: Element, at: int) -> tuple[np.ndarray, dict[str, np.ndarray], int]:
-    """As `_records`, for lists of different lengths: where a record begins is known only from the one before.
-
-    Within a window of the body, all possible records (one beginning at each entry) are sized at once; then the chain
-    of real ones is followed, doubling: who knows the first 2^k records and the jump over 2^k knows the first 2^(k+1).
-    """
-    found: list[np.ndarray] = []
-    places: dict[str, list[np.ndarray]] = {p.name: [] for p in element.properties if p.count_kind}
-    missing = element.count
-    while missing:
-        begin = np.arange(at, min(at + WINDOW, body.data.size))
-        end, where = _possible(body, element, begin)
-        outside = len(begin)
-        jump = np.append(np.minimum(end - at, outside), outside)
-        chain = np.zeros(1, np.int64)
-        while chain[-1] < outside and len(chain) < missing:
-            chain = np.concatenate([chain, jump[chain]])
-            jump = jump[jump]
-        chain = chain[chain < outside][:missing]
-        if not len(chain) or (at := int(end[chain[-1]])) > body.data.size:
+    def __init__(self, data: np.ndarray, order: str, element: Element, at: int):
+        self._data, self._order, self._element = data, order, element
+        n, own = element.count, [self._kind(p.count_kind or p.kind).itemsize for p in element.properties]
+        if n * max(sum(own), 1) > data.size - at:
+            what = f"claims {n} of '{element.name}' but ends before them"
+            raise _Damaged(f"{what}: it is cut off, or its header is wrong")
+        lists = [p for p in element.properties if p.count_kind]
+        self.counts = dict(zip((p.name for p in lists), self._lengths(lists, at).T))
+        entries = {p.name: self.counts[p.name] * self._kind(p.kind).itemsize for p in lists}
+        size = sum(own) + sum(entries.values(), np.zeros(n, np.int64))
+        place = at + np.cumsum(size) - size
+        self.end = at + int(size.sum())
+        if self.end > data.size:
             raise _Damaged(f"ends within its '{element.name}' records, or they are damaged")
-        found.append(begin[chain])
-        for name, place in where.items():
-            places[name].append(place[chain])
-        missing -= len(chain)
-    return np.concatenate(found), {name: np.concatenate(place) for name, place in places.items()}, at
+        self.places: dict[str, np.ndarray] = {}
+        for p, bytes_of_it in zip(element.properties, own):
+            self.places[p.name] = place + bytes_of_it if p.count_kind else place
+            place = place + bytes_of_it + entries.get(p.name, 0)
 
+    def columns(self, names: tuple[str, ...]) -> np.ndarray | None:
+        """Several scalar properties side by side, (n, k), float64 where text; None where one is absent."""
+        kinds = {p.name: p.kind for p in self._element.properties if not p.count_kind}
+        if not set(names) <= kinds.keys():
+            return None
+        return np.stack([self._take(self.places[name], kinds[name]) for name in names], -1)
 
-def _possible(body: _Body, element: Element, begin: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Where a record that begins at each of `begin` would end, and where its lists' lengths would stand.
+    def entries(self, name: str) -> np.ndarray:
+        """The entries of all lists `name`, one list after the other."""
+        kind = next(p.kind for p in self._element.properties if p.name == name)
+        counts = self.counts[name]
+        inside = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        return self._take(np.repeat(self.places[name], counts) + inside * self._kind(kind).itemsize, kind)
 
-    What can't be a record ends behind the body, where every chain through it stops.
-    """
-    size = body.data.size
-    end, places = begin.copy(), {}
-    for p in element.properties:
-        if not p.count_kind:
-            end += body.size(p.kind)
-            continue
-        places[p.name] = end.copy()
-        inside = end + body.size(p.count_kind) <= size
-        count = np.full(end.shape, -1.0)
-        count[inside] = body.take(end[inside], p.count_kind)[:, 0]
-        good = (count >= 0) & (count <= size) & (count == np.floor(count))
-        length = body.size(p.count_kind) + np.where(good, count, 0).astype(np.int64) * body.size(p.kind)
-        end = np.where(good, end + length, size + 1)
-    return end, places
+    def _kind(self, kind: str) -> np.dtype:
+        return np.dtype(self._order + kind if self._order else np.float64)
 
+    def _take(self, at: np.ndarray, kind: str) -> np.ndarray:
+        """The value at each of the positions `at` ((k,) int)."""
+        found = self._kind(kind)
+        return self._data[at[:, None] + np.arange(found.itemsize)].view(found)[:, 0]
 
-def _scalars(
-    body: _Body, element: Element, starts: np.ndarray, lists: dict[str, np.ndarray], name: str
-) -> np.ndarray | None:
-    """The values of the scalar property `name`, (n,) in its own type (float64 where text); None where absent."""
-    at = starts
-    for p in element.properties:
-        if p.count_kind:
-            counts = body.take(lists[p.name], p.count_kind)[:, 0].astype(np.int64)
-            at = lists[p.name] + body.size(p.count_kind) + counts * body.size(p.kind)
-        elif p.name == name:
-            return body.take(at, p.kind)[:, 0]
-        else:
-            at = at + body.size(p.kind)
-    return None
+    def _lengths(self, lists: list[Property], at: int) -> np.ndarray:
+        """Entries of each list of each record, (n, lists) int64."""
+        n = self._element.count
+        if not n or not lists:
+            return np.zeros((n, len(lists)), np.int64)
+        first, size = self._walked(1, at)
+        if size * n <= self._data.size - at:  # lists as long as the first record's, which holds for nearly every mesh
+            place, same = at, True
+            for p in self._element.properties:
+                kind = self._kind(p.count_kind or p.kind)
+                if p.count_kind:
+                    count = first[0, lists.index(p)]
+                    same &= bool((np.ndarray((n,), kind, self._data, place, (size,)) == count).all())
+                    place += count * self._kind(p.kind).itemsize
+                place += kind.itemsize
+            if same:
+                return np.broadcast_to(first, (n, len(lists)))
+        return self._walked(n, at)[0]
 
-
-def _columns(
-    body: _Body, element: Element, starts: np.ndarray, lists: dict[str, np.ndarray], names: tuple[str, ...]
-) -> np.ndarray | None:
-    """Several scalar properties side by side, (n, k); None where one is absent."""
-    found = [_scalars(body, element, starts, lists, name) for name in names]
-    known = [values for values in found if values is not None]
-    return np.stack(known, -1) if len(known) == len(found) else None
+    def _walked(self, records: int, at: int) -> tuple[np.ndarray, int]:
+        """The same of the first records, one after the other, and the bytes that they take."""
+        begin, size, found = at, self._data.size, []
+        steps = []  # what lies before a list's length, how that is read, and how large an entry is
+        gap = 0
+        for p in self._element.properties:
+            kind = self._kind(p.count_kind or p.kind)
+            if p.count_kind:
+                read = struct.Struct((self._order or "=") + kind.char)
+                steps.append((gap, read.unpack_from, read.size, self._kind(p.kind).itemsize))
+                gap = 0
+            else:
+                gap += kind.itemsize
+        name = self._element.name
+        try:
+            for _ in range(records):
+                for before, read_length, own, each in steps:
+                    at += before
+                    (count,) = read_length(self._data, at)
+                    if not 0 <= count <= size or count != int(count):
+                        raise _Damaged(f"holds a list of {count} entries in '{name}': it is damaged")
+                    found.append(int(count))
+                    at += own + int(count) * each
+                at += gap
+        except struct.error:
+            raise _Damaged(f"ends within its '{name}' records: it is cut off") from None
+        return np.array(found, np.int64).reshape(records, len(steps)), at - begin
 
 
 def _triangles(
-    body: _Body, at: np.ndarray, count_kind: str, kind: str, vertices: np.ndarray
+    counts: np.ndarray, entries: np.ndarray, vertices: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Split the polygons whose lists stand at `at`.
+    """Split polygons of so many corners (`counts`, (f,)), whose `entries` follow each other.
 
     Returns
     -------
@@ -275,29 +236,21 @@ def _triangles(
     corner : (t, 3) int32
         Which of its corners they are.
     """
-    counts = body.take(at, count_kind)[:, 0].astype(np.int64)
-    pieces, sources, places = [np.zeros((0, 3), np.int32)], [np.zeros(0, np.int64)], [np.zeros((0, 3), np.int32)]
-    for corners in np.unique(counts[counts >= 3]).tolist():
-        faces = np.flatnonzero(counts == corners)
-        values = body.take(at[faces] + body.size(count_kind), kind, corners)
-        bad = ~((values >= 0) & (values < len(vertices)) & (values == np.floor(values)))
-        if bad.any():
-            face, corner = np.argwhere(bad)[0]
-            raise _Damaged(
-                f"has a face ({faces[face]}) that points to vertex {values[face, corner]} of {len(vertices)}"
-            )
-        polygon = values.astype(np.int32)
-        later = np.arange(1, corners - 1)
-        fan = np.broadcast_to(np.stack([0 * later, later, later + 1], -1), (len(faces), corners - 2, 3))
-        if corners == 4:
-            a, b, c, d = (vertices[polygon[:, i]] for i in range(4))
-            with np.errstate(invalid="ignore", over="ignore"):
-                shorter = ((b - d) ** 2).sum(1) < ((a - c) ** 2).sum(1)
-            fan = np.where(shorter[:, None, None], [[0, 1, 3], [1, 2, 3]], fan)
-        fan = fan.reshape(len(faces), -1)
-        pieces.append(np.take_along_axis(polygon, fan, 1).reshape(-1, 3))
-        places.append(fan.reshape(-1, 3).astype(np.int32))
-        sources.append(np.repeat(faces, corners - 2))
-    source = np.concatenate(sources)
-    order = np.argsort(source, kind="stable")
-    return np.concatenate(pieces)[order].astype(np.int32), source[order], np.concatenate(places)[order]
+    of_entry = np.repeat(np.arange(len(counts)), counts)
+    bad = ~((entries >= 0) & (entries < len(vertices)) & (entries == np.floor(entries))) & (counts[of_entry] >= 3)
+    if bad.any():
+        one = int(bad.argmax())
+        raise _Damaged(f"has a face ({of_entry[one]}) that points to vertex {entries[one]} of {len(vertices)}")
+    first, pieces = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
+    face = np.repeat(np.arange(len(counts)), pieces)
+    later = (1 + np.arange(len(face)) - np.repeat(np.cumsum(pieces) - pieces, pieces)).astype(np.int32)
+    corner = np.stack([0 * later, later, later + 1], -1)
+
+    quads = np.flatnonzero(counts == 4)
+    a, b, c, d = (vertices[entries[first[quads] + i].astype(np.int64)] for i in range(4))
+    with np.errstate(invalid="ignore", over="ignore"):
+        shorter = ((b - d) ** 2).sum(1) < ((a - c) ** 2).sum(1)
+    turned = np.isin(face, quads[shorter])
+    corner[turned & (later == 1)] = 0, 1, 3
+    corner[turned & (later == 2)] = 1, 2, 3
+    return entries[first[face, None] + corner].astype(np.int32), face, corner

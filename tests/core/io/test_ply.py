@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from addon.core.errors import BadInputError
-from addon.core.io import ply
 from addon.core.io.ply import read_ply
 
 VERTICES = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 2, 0)]
@@ -146,15 +145,6 @@ def test_a_hostile_count_takes_no_memory(tmp_path):
     assert peak < 1_000_000
 
 
-@pytest.mark.parametrize("window", [1, 30, 61, 200])
-def test_windows_do_not_matter(tmp_path, monkeypatch, window):
-    path = write(tmp_path, binary(FACES * 5, IDS * 5))
-    wanted = read_ply(path)
-    monkeypatch.setattr(ply, "WINDOW", window)
-    for a, b in zip(read_ply(path)[:3], wanted[:3]):
-        np.testing.assert_array_equal(a, b)
-
-
 @pytest.mark.parametrize("mixed", [False, True])
 def test_large_meshes_are_read_at_once(tmp_path, mixed):
     n = 100_000
@@ -182,3 +172,16 @@ def test_the_living_room(shared):
     mesh = read_ply(shared / "captures/living-room/mesh.ply")
     assert mesh.triangles.shape == (132001, 3) and mesh.uv.shape == (132001, 3, 2)
     assert len(np.unique(mesh.object_id)) == 64
+
+
+@pytest.mark.parametrize("sizes", [[3, 2_000_000, 4], list(range(3, 2000))], ids=["one long list", "all sizes"])
+def test_lists_of_any_length_take_time_by_their_entries(tmp_path, sizes):
+    """Once quadratic: minutes for either."""
+    head = "ply\nformat binary_little_endian 1.0\nelement vertex 8\n" + "".join(f"property float {a}\n" for a in "xyz")
+    head += f"element face {len(sizes)}\nproperty list int int vertex_indices\nend_header\n"
+    faces = b"".join(np.append(n, np.arange(n) % 8).astype("<i4").tobytes() for n in sizes)
+    started = time.process_time()
+    mesh = read_ply(write(tmp_path, head.encode() + np.eye(8, 3, dtype="<f4").tobytes() + faces))
+    assert time.process_time() - started < 20
+    assert np.array_equal(np.bincount(mesh.face), np.array(sizes) - 2)
+    assert (mesh.corner[mesh.face == 0] == [0, 1, 2]).all()
