@@ -35,6 +35,7 @@ from .truth_views import psnr, views
 LINES = "ablation.jsonl"
 WHOLE = ""
 """The name of no pass: the run that has all of them."""
+TOGETHER = "+"
 SURFACE = "surface"
 
 
@@ -50,7 +51,7 @@ class Ablation:
         Folder for the lines and the stages.
     seeds : sequence of int
     passes : sequence of str
-        Empty for all.
+        Empty for all. Names joined by '+' are taken out together.
     preset : str
     threads : int
     limit : float
@@ -71,9 +72,10 @@ class Ablation:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The passes to take out, in the registry's order."""
-        check(self.passes)
-        return tuple(one.name for one in PASSES if not self.passes or one.name in self.passes)
+        """What is taken out: the passes in the registry's order, then those that go together."""
+        check([name for one in self.passes for name in parts(one)])
+        together = tuple(one for one in self.passes if TOGETHER in one)
+        return tuple(one.name for one in PASSES if not self.passes or one.name in self.passes) + together
 
     @property
     def over(self) -> bool:
@@ -81,8 +83,12 @@ class Ablation:
 
     def settings(self, seed: int, name: str = WHOLE) -> Settings:
         """Of one run."""
-        without = () if name == WHOLE else (name,)
-        return replace(PRESETS[self.preset], seed=seed, threads=self.threads, without=without)
+        return replace(PRESETS[self.preset], seed=seed, threads=self.threads, without=parts(name))
+
+
+def parts(name: str) -> tuple[str, ...]:
+    """The passes of one line: none for the whole method, several where they were taken out together."""
+    return tuple(name.split(TOGETHER)) if name != WHOLE else ()
 
 
 def read_lines(paths: Sequence[Path]) -> list[dict[str, Any]]:
@@ -175,7 +181,7 @@ class Bench:
         other = self._folder.with_name(f"{self._folder.name}-without")
         shutil.rmtree(other, ignore_errors=True)
         try:
-            return self._run(name, other, stage_of(name))
+            return self._run(name, other, min(map(stage_of, parts(name)), key=RUN_STAGES.index))
         finally:
             shutil.rmtree(other, ignore_errors=True)
 
@@ -194,8 +200,8 @@ class Bench:
                 getattr(recovery, stage)()
                 if stage not in before:
                     seconds[stage] = round(time.process_time() - started, 2)
-                # Of a later stage it would not do: what is written looks at all of them.
-                if name != WHOLE and stage == first and self._same(stage, store):
+                # Of a later stage it would not do, nor for several passes: later ones may change later stages.
+                if name != WHOLE and TOGETHER not in name and stage == first and self._same(stage, store):
                     same = True
                     break
             figures = dict(self._whole["figures"]) if same else {}
