@@ -52,7 +52,7 @@ def room(tmp_path_factory) -> OnDisk:
 
 
 def asked(room, out, **more) -> Ablation:
-    return Ablation((room.root,), out, (0,), ("sun", "crease-error", "coat"), "draft", unwrap=room.unwrap, **more)
+    return Ablation((room.root,), out, (0,), ("sun", "interpolation", "coat"), "draft", unwrap=room.unwrap, **more)
 
 
 @pytest.mark.slow
@@ -61,15 +61,23 @@ def test_runs_that_are_there_are_not_done_again(room, tmp_path):
     path = run_ablation(asked(room, tmp_path), told.append)
     first = path.read_bytes()
     lines = read_lines([path])
-    assert [one["without"] for one in lines] == ["", "sun", "crease-error", "coat"] and len(told) == 4
-    whole, sun, crease, coat = lines
+    assert [one["without"] for one in lines] == ["", "sun", "interpolation", "coat"] and len(told) == 4
+    whole, sun, interpolation, coat = lines
     assert whole["figures"]["albedo"] > 25 and whole["figures"]["right"] == whole["figures"]["objects"] >= 6
     assert sun["same"] and sun["figures"] == whole["figures"] and set(sun["seconds"]) == {"shading"}
-    # The specular stage does not look at the error of E; the albedo does.
-    assert set(crease["seconds"]) == {"shading", "specular", "write"} and not crease["same"]
+    assert set(interpolation["seconds"]) == {"shading", "specular", "write"} and not interpolation["same"]
     assert set(coat["seconds"]) == {"write"}
     run_ablation(asked(room, tmp_path), told.append)
     assert path.read_bytes() == first and len(told) == 4
+
+
+@pytest.mark.slow
+def test_passes_that_are_taken_out_together(room, tmp_path):
+    """One line, from the first stage that any of them changes; what each says by itself is another's matter."""
+    together = Ablation((room.root,), tmp_path, (0,), ("sun+coat", "coat"), "draft", unwrap=room.unwrap)
+    _, coat, both = read_lines([run_ablation(together)])
+    assert (coat["without"], both["without"]) == ("coat", "sun+coat")
+    assert {"shading", "write"} <= set(both["seconds"]) and both["figures"] == coat["figures"]
 
 
 def test_a_torn_last_line_is_done_again(room, tmp_path):
