@@ -174,7 +174,7 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None) -> str:
         "matter, all figures jump: gains of a single seed say little.",
         "",
         "What parts of the mesh denoising gain on meshes with known noise: "
-        "[benchmark/mesh_denoising.md](benchmark/mesh_denoising.md) (`scripts/measure_denoising.py`).",
+        "[benchmark/mesh_denoising.md](benchmark/mesh_denoising.md).",
         "",
         f"Rooms ({', '.join(presets)} preset): {', '.join(_room(one) for one in rooms)}. "
         f"Seeds: {', '.join(str(seed) for seed in sorted({seed for _, seed, _ in runs}))}. "

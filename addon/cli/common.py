@@ -7,7 +7,8 @@ import contextlib
 import importlib
 import os
 import sys
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TextIO
 
@@ -20,25 +21,19 @@ from ..settings_info import setting_infos
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
     """How the capture is to be read, where its folder does not tell: one option for each field of `Reading`."""
-    group = parser.add_argument_group("the capture")
-    group.add_argument(
+    add = parser.add_argument_group("the capture").add_argument
+    add(
         "--format",
         metavar="NAME",
         default="",
-        help="its layout, such as nerfstudio (default: found from what the folder holds)",
+        help="its layout, such as nerfstudio (default: found from what it holds)",
     )
-    group.add_argument("--mesh", metavar="FILE", type=Path, help="the mesh, where it is not the format's own")
-    group.add_argument("--outside", action="store_true", help="let its files name others outside of its folder")
-    group.add_argument(
-        "--transfer",
-        metavar="CURVE",
-        default="",
-        help="curve of 8 and 16-bit pictures: srgb, linear, a gamma such as 2.2; auto calibrates them (default)",
-    )
-    group.add_argument("--exposures", metavar="CSV", type=Path, help="exposure of each frame: lines of name, exposure")
-    group.add_argument(
-        "--convention", metavar="NAME", default="", help="a correction of all poses, as `info` proposes it"
-    )
+    add("--mesh", metavar="FILE", type=Path, help="the mesh, where it is not the format's own")
+    add("--outside", action="store_true", help="let its files name others outside of its folder")
+    curves = "curve of 8 and 16-bit pictures: srgb, linear, a gamma such as 2.2; auto calibrates them (default)"
+    add("--transfer", metavar="CURVE", default="", help=curves)
+    add("--exposures", metavar="CSV", type=Path, help="exposure of each frame: lines of name, exposure")
+    add("--convention", metavar="NAME", default="", help="a correction of all poses, as `info` proposes it")
 
 
 def reading_from(arguments: argparse.Namespace):
@@ -48,26 +43,15 @@ def reading_from(arguments: argparse.Namespace):
     def import_mesh(path: Path):
         return need("data.import_mesh").import_mesh(path)  # only now: most captures need no Blender to be read
 
-    return Reading(
-        arguments.format,
-        arguments.mesh,
-        arguments.outside,
-        arguments.transfer,
-        arguments.exposures,
-        arguments.convention,
-        import_mesh,
-    )
+    told = {field.name: getattr(arguments, field.name) for field in fields(Reading) if field.compare}
+    return Reading(**told, import_mesh=import_mesh)
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
     """One option for each field of `Settings`."""
     group = parser.add_argument_group("settings")
-    group.add_argument(
-        "--preset",
-        choices=tuple(PRESETS),
-        default="normal",
-        help="what the settings below start from; 'paper' is the published method (default normal)",
-    )
+    text = "what the settings below start from; 'paper' is the published method (default normal)"
+    group.add_argument("--preset", choices=tuple(PRESETS), default="normal", help=text)
     for info in setting_infos():
         text = f"{info.help} (default {info.default})".replace("%", "%%")
         option = f"--{info.name.replace('_', '-')}"
@@ -90,25 +74,13 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
 
 def add_leash(parser: argparse.ArgumentParser) -> None:
     """Options for programs that start a run and follow it."""
-    group = parser.add_argument_group("for programs that start a run")
-    group.add_argument(
-        "--progress",
-        choices=("text", "json"),
-        default="text",
-        help="json: one line of JSON for each event instead of text (default text)",
-    )
-    group.add_argument(
-        "--stop-with-stdin",
-        action="store_true",
-        help="stop when standard input says 'stop' or ends, so that the run never outlives its starter",
-    )
-    group.add_argument(
-        "--memory-limit",
-        type=float,
-        metavar="GB",
-        default=0.0,
-        help="stop when the run takes more gigabytes (default 0, no limit)",
-    )
+    add = parser.add_argument_group("for programs that start a run").add_argument
+    lines = "json: one line of JSON for each event instead of text (default text)"
+    add("--progress", choices=("text", "json"), default="text", help=lines)
+    ends = "stop when standard input says 'stop' or ends, so that the run never outlives its starter"
+    add("--stop-with-stdin", action="store_true", help=ends)
+    limit = "stop when the run takes more gigabytes (default 0, no limit)"
+    add("--memory-limit", type=float, metavar="GB", default=0.0, help=limit)
 
 
 def add_common(parser: argparse.ArgumentParser, function, quiet: bool = True) -> None:
@@ -132,6 +104,18 @@ def console_run(arguments: argparse.Namespace, stream: TextIO):
         finally:
             guard.close()
             listener.close()
+
+
+def tell_end(
+    arguments: argparse.Namespace, stream: TextIO, listener, remarks: Iterable[str], line: str, kind="Warning", **done
+) -> None:
+    """How a run ended, with its remarks: to a program that follows it as events, the last with `done`; else as text."""
+    if isinstance(listener, JsonProgress):
+        for remark in remarks:
+            listener.tell("warning", text=remark)
+        listener.tell("done", **done)
+    elif not arguments.quiet:
+        print(*(f"{kind}: {remark}" for remark in remarks), line, sep="\n", file=stream)
 
 
 def need(module: str):

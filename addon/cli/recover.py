@@ -9,8 +9,7 @@ from typing import TextIO
 from ..console import duration
 from ..core.errors import EXIT_OK, BadInputError
 from ..core.stages import RUN_STAGES, WRITE
-from ..leash import JsonProgress
-from .common import add_reading, console_run, need, needed_packages, reading_from, settings_from
+from .common import add_reading, console_run, need, needed_packages, reading_from, settings_from, tell_end
 from .refit import add_override
 
 UNWRAPS = ("blender", "xatlas", "own")
@@ -26,47 +25,25 @@ def add_recover(commands, epilog: str) -> argparse.ArgumentParser:
         description="Recover a capture and write scene.blend, its images and a report. A stopped or repeated run goes "
         "on from the finished stages in RESULT.",
     )
-    parser.add_argument(
-        "capture",
-        metavar="CAPTURE",
-        type=Path,
-        help="folder with transforms.json, mesh.ply, info_semantic.json and the frames",
-    )
-    parser.add_argument("--out", metavar="RESULT", type=Path, required=True, help="folder to write, made if missing")
+    add = parser.add_argument
+    holds = "folder with transforms.json, mesh.ply, info_semantic.json and the frames"
+    add("capture", metavar="CAPTURE", type=Path, help=holds)
+    add("--out", metavar="RESULT", type=Path, required=True, help="folder to write, made if missing")
     add_reading(parser)
-    parser.add_argument(
-        "--until",
-        metavar="STAGE",
-        choices=RUN_STAGES,
-        default=WRITE,
-        help=f"last stage to do: {', '.join(RUN_STAGES)} (default write, which is all)",
-    )
-    parser.add_argument(
-        "--from-stage",
-        metavar="STAGE",
-        choices=RUN_STAGES,
-        help="do this stage and all later ones anew, though they are stored",
-    )
-    parser.add_argument(
-        "--scene",
-        action=argparse.BooleanOptionalAction,
-        default=True,
-        help="also write scene.blend, which takes Blender's bpy (default yes)",
-    )
-    parser.add_argument(
-        "--unwrap",
-        choices=UNWRAPS,
-        default="",
-        help="with --no-scene: what lays out the atlas; own: the mesh's own texture coordinates (default: the first of "
-        "them that is installed)",
-    )
+    last = f"last stage to do: {', '.join(RUN_STAGES)} (default write, which is all)"
+    add("--until", metavar="STAGE", choices=RUN_STAGES, default=WRITE, help=last)
+    anew = "do this stage and all later ones anew, though they are stored"
+    add("--from-stage", metavar="STAGE", choices=RUN_STAGES, help=anew)
+    scene = "also write scene.blend, which takes Blender's bpy (default yes)"
+    add("--scene", action=argparse.BooleanOptionalAction, default=True, help=scene)
+    layout = "with --no-scene: what lays out the atlas; own: the mesh's own texture coordinates (default: the first of "
+    add("--unwrap", choices=UNWRAPS, default="", help=f"{layout}them that is installed)")
     add_override(parser)
     return parser
 
 
 def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`recover CAPTURE --out RESULT`."""
-
     settings = settings_from(arguments)
     if arguments.unwrap and arguments.scene:
         raise BadInputError("Option --unwrap goes with --no-scene: the scene is laid out by Blender.")
@@ -87,15 +64,8 @@ def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
         from ..core.pipeline.run import progress_of_run
     with console_run(arguments, stream) as console:
         report = run(arguments.capture, arguments.out, settings, progress_of_run(**console), **how)
-    if isinstance(console["listener"], JsonProgress):
-        for warning in report.get("warnings", ()):
-            console["listener"].tell("warning", text=warning)
-        console["listener"].tell(
-            "done", seconds=report["seconds"], result=str(arguments.out.absolute()), until=arguments.until
-        )
-    elif not arguments.quiet:
-        for warning in report.get("warnings", ()):
-            print(f"Warning: {warning}", file=stream)
-        made = "stages" if arguments.until != WRITE else "scene.blend" if arguments.scene else "materials.json"
-        print(f"Done in {duration(report['seconds'])}: {arguments.out / made}", file=stream)
+    made = "stages" if arguments.until != WRITE else "scene.blend" if arguments.scene else "materials.json"
+    line = f"Done in {duration(report['seconds'])}: {arguments.out / made}"
+    told = {"seconds": report["seconds"], "result": str(arguments.out.absolute()), "until": arguments.until}
+    tell_end(arguments, stream, console["listener"], report.get("warnings", ()), line, **told)
     return EXIT_OK

@@ -8,18 +8,13 @@ from typing import TextIO
 
 from ..console import duration
 from ..core.errors import EXIT_OK
-from ..leash import JsonProgress
-from .common import console_run, need
+from .common import console_run, need, tell_end
 
 
 def add_override(parser: argparse.ArgumentParser) -> None:
     """The options by which a run is given what is known of objects."""
-    parser.add_argument(
-        "--override",
-        metavar="FILE",
-        type=Path,
-        help="JSON of what is known of objects; merged into RESULT/overrides.json, which runs heed",
-    )
+    known = "JSON of what is known of objects; merged into RESULT/overrides.json, which runs heed"
+    parser.add_argument("--override", metavar="FILE", type=Path, help=known)
     parser.add_argument("--no-overrides", action="store_true", help="don't heed what RESULT/overrides.json keeps")
 
 
@@ -33,18 +28,10 @@ def add_refit(commands, epilog: str) -> argparse.ArgumentParser:
         "result anew. The capture is not needed; RESULT has to hold its stages.",
     )
     parser.add_argument("result", metavar="RESULT", type=Path, help="folder that 'recover' wrote")
-    parser.add_argument(
-        "--object",
-        metavar="ID",
-        type=int,
-        action="append",
-        default=[],
-        dest="objects",
-        help="object to fit, may be repeated (default those of which something new is given)",
-    )
-    parser.add_argument(
-        "--scene", action=argparse.BooleanOptionalAction, default=True, help="also write scene.blend anew (default yes)"
-    )
+    which = "object to fit, may be repeated (default those of which something new is given)"
+    parser.add_argument("--object", metavar="ID", type=int, action="append", default=[], dest="objects", help=which)
+    scene = "also write scene.blend anew (default yes)"
+    parser.add_argument("--scene", action=argparse.BooleanOptionalAction, default=True, help=scene)
     add_override(parser)
     return parser
 
@@ -63,16 +50,8 @@ def refit_command(arguments: argparse.Namespace, stream: TextIO) -> int:
             not arguments.no_overrides,
             arguments.scene,
         )
-    seconds = report["refit"]["seconds"]
-    if isinstance(console["listener"], JsonProgress):
-        for warning in report["warnings"]:
-            console["listener"].tell("warning", text=warning)
-        console["listener"].tell(
-            "done", seconds=seconds, result=str(arguments.result.absolute()), objects=report["refit"]["objects"]
-        )
-    elif not arguments.quiet:
-        for warning in report["warnings"]:
-            print(f"Warning: {warning}", file=stream)
-        again = ", ".join(map(str, report["refit"]["objects"]))
-        print(f"Fitted again in {duration(seconds)}: object {again} of {arguments.result}", file=stream)
+    seconds, objects = report["refit"]["seconds"], report["refit"]["objects"]
+    line = f"Fitted again in {duration(seconds)}: object {', '.join(map(str, objects))} of {arguments.result}"
+    told = {"seconds": seconds, "result": str(arguments.result.absolute()), "objects": objects}
+    tell_end(arguments, stream, console["listener"], report["warnings"], line, **told)
     return EXIT_OK

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TextIO
 
 from ..core.errors import EXIT_OK, BadInputError
-from .common import console_run, need
+from .common import console_run, need, tell_end
 
 
 def add_relight(commands, epilog: str) -> argparse.ArgumentParser:
@@ -22,54 +22,32 @@ def add_relight(commands, epilog: str) -> argparse.ArgumentParser:
     )
     parser.add_argument("result", metavar="RESULT", type=Path, help="folder that 'recover' wrote")
     parser.add_argument("--out", metavar="FILE", type=Path, required=True, help="picture to write: .png, .jpg or .exr")
-    light = parser.add_argument_group("light")
-    light.add_argument(
-        "--lamps",
-        metavar="on|off|NAME=FACTOR,...",
-        default=None,
-        help="the lamps of the scan; a name means one lamp or all of its class (default as saved)",
-    )
-    light.add_argument(
-        "--world",
-        metavar="on|off|DEGREES",
-        default=None,
-        help="the light from outside; an angle turns it, anticlockwise from above (default as saved)",
-    )
-    light.add_argument(
-        "--world-strength", metavar="FACTOR", type=positive, help="of the light from outside (default as saved)"
-    )
-    light.add_argument("--hdri", metavar="FILE", type=Path, help="equirectangular picture to put around the room")
+    add = parser.add_argument_group("light").add_argument
+    which = "the lamps of the scan; a name means one lamp or all of its class (default as saved)"
+    add("--lamps", metavar="on|off|NAME=FACTOR,...", help=which)
+    turned = "the light from outside; an angle turns it, anticlockwise from above (default as saved)"
+    add("--world", metavar="on|off|DEGREES", help=turned)
+    add("--world-strength", metavar="FACTOR", type=positive, help="of the light from outside (default as saved)")
+    add("--hdri", metavar="FILE", type=Path, help="equirectangular picture to put around the room")
     for name, text in (
         ("window", "a window's soft light from the side"),
         ("softbox", "a studio light by the camera"),
         ("spot", "a spot from above"),
         ("sun", "a low, warm sun from the side"),
     ):
-        light.add_argument(
-            f"--{name}", metavar="STRENGTH", type=strength, nargs="?", const=(1.0, "ROOM"), help=f"add {text}"
-        )
-    light.add_argument(
-        "--kelvin",
-        metavar="KELVIN",
-        type=positive,
-        help="temperature of the new lights, 1700 to 20000 (default what suits each)",
-    )
-    picture = parser.add_argument_group("picture")
-    picture.add_argument("--camera", metavar="NUMBER|NAME", help="frame to look through, from 0 (default the first)")
-    picture.add_argument("--before-after", action="store_true", help="the captured light beside the new one")
-    picture.add_argument(
-        "--samples", metavar="INT", type=int, default=0, help="for each pixel, 0 takes the scene's (default 0)"
-    )
-    picture.add_argument("--size", metavar="PERCENT", type=int, default=100, help="of the frame (default 100)")
-    picture.add_argument(
-        "--engine", choices=("cycles", "eevee"), default="cycles", help="eevee needs a graphics card (default cycles)"
-    )
-    picture.add_argument(
-        "--device",
-        metavar="cpu|gpu|KIND",
-        help="what Cycles renders on; KIND is optix, cuda, hip, metal or oneapi (default the processor)",
-    )
-    picture.add_argument("--scene", metavar="NAME", help="where the file holds several (default its active one)")
+        add(f"--{name}", metavar="STRENGTH", type=strength, nargs="?", const=(1.0, "ROOM"), help=f"add {text}")
+    kelvin = "temperature of the new lights, 1700 to 20000 (default what suits each)"
+    add("--kelvin", metavar="KELVIN", type=positive, help=kelvin)
+    add = parser.add_argument_group("picture").add_argument
+    add("--camera", metavar="NUMBER|NAME", help="frame to look through, from 0 (default the first)")
+    add("--before-after", action="store_true", help="the captured light beside the new one")
+    add("--samples", metavar="INT", type=int, default=0, help="for each pixel, 0 takes the scene's (default 0)")
+    add("--size", metavar="PERCENT", type=int, default=100, help="of the frame (default 100)")
+    engine = "eevee needs a graphics card (default cycles)"
+    add("--engine", choices=("cycles", "eevee"), default="cycles", help=engine)
+    device = "what Cycles renders on; KIND is optix, cuda, hip, metal or oneapi (default the processor)"
+    add("--device", metavar="cpu|gpu|KIND", help=device)
+    add("--scene", metavar="NAME", help="where the file holds several (default its active one)")
     return parser
 
 
@@ -95,7 +73,6 @@ def strength(text: str) -> tuple[float, str]:
 def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`relight RESULT --out FILE`."""
     from ..core.progress import Progress
-    from ..leash import JsonProgress
 
     if arguments.samples < 0 or not 1 <= arguments.size <= 1000:
         raise BadInputError("Option --samples takes a number of at least 0, and --size 1 to 1000 percent.")
@@ -122,10 +99,6 @@ def relight_command(arguments: argparse.Namespace, stream: TextIO) -> int:
             arguments.device,
             arguments.scene,
         )
-    if isinstance(console["listener"], JsonProgress):
-        for remark in remarks:
-            console["listener"].tell("warning", text=remark)
-        console["listener"].tell("done", picture=str(arguments.out.absolute()))
-    elif not arguments.quiet:
-        print(*(f"Note: {remark}" for remark in remarks), f"Done: {arguments.out}", sep="\n", file=stream)
+    told = {"picture": str(arguments.out.absolute())}
+    tell_end(arguments, stream, console["listener"], remarks, f"Done: {arguments.out}", kind="Note", **told)
     return EXIT_OK
