@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from ..errors import BadInputError
+from ..json_values import numbers
 from ..kinds import Limit
 from ..scene.model import Camera
 
@@ -16,6 +21,24 @@ OFF: Limit[int] = 100
 """How many of the frame's sides the principal point may lie from its corner."""
 STRONGEST: Limit[float] = 1e9
 """Bound of a lens's coefficients; those of a telephoto lens's high powers are large."""
+
+
+def pinhole(told: Any, names: Sequence[str], path: Path) -> Camera:
+    """The camera, without a pose, of which a JSON object tells width, height, fx, fy, cx and cy under some `names`.
+
+    Raises
+    ------
+    BadInputError
+        One is missing or can't be; `path` is the file.
+    """
+    found = numbers(told, names)
+    if found is None or min(found[:4]) <= 0 or any(value != int(value) for value in found[:2]):
+        raise BadInputError(
+            f"'{path}' lacks a number among {', '.join(names)}, or one of the first four is not above 0 or no whole "
+            "pixels; mend it."
+        )
+    width, height, fx, fy, cx, cy = found
+    return Camera(int(width), int(height), float(fx), float(fy), float(cx), float(cy), np.eye(4))
 
 
 def check_camera(camera: Camera, name: str) -> None:

@@ -6,6 +6,7 @@ COLMAP's world has no up and, unless it was given measures, no metres; it is tak
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +18,9 @@ from ..scene.model import Camera, Frame
 from ..scene.pose import MAX_DISTANCE, check_pose
 from . import instances
 from .colmap_model import ColmapImage, ColmapModel, is_pose, model_files, read_model
-from .layout import Layout, RawMesh, Reader, Reading
+from .files import inside
+from .layout import Layout, RawMesh, Reader, Reading, usable
 from .meshes import IMPORTED, MESH, find_mesh, read_mesh
-from .paths import EscapesError, inside
 
 MODELS = ("", "sparse/0", "sparse", "colmap/sparse/0", "colmap/sparse", "colmap/0", "colmap", "dense/sparse")
 """Where in a capture a model may lie."""
@@ -81,30 +82,27 @@ def frames_of(
     if not model.images:
         raise BadInputError(f"'{model.images_file}' lists no images; export the model again.")
     cameras, wrong = _cameras(model)
-    frames, problems = [], []
     seen: set[str] = set()
-    for image in sorted(model.images, key=lambda one: one.name):
+
+    def frame(image: ColmapImage) -> Frame:
         name = image.name.encode("utf-8", "replace").decode()
-        try:
-            if image.name in seen:
-                raise BadInputError(f"Frame '{name}' is listed twice in '{model.images_file}'; keep one of the two.")
-            if image.camera in wrong:
-                raise BadInputError(
-                    f"Frame '{name}' has camera {image.camera}, which can't be used: "
-                    f"{wrong[image.camera]}; mend '{model.cameras_file}'."
-                )
-            if image.camera not in cameras:
-                raise BadInputError(
-                    f"Frame '{name}' has camera {image.camera}, which '{model.cameras_file}' does not "
-                    "list; export cameras and images together."
-                )
-            frames.append(_frame(image, name, *cameras[image.camera], root, folder, reading))
-        except EscapesError:
-            raise
-        except BadInputError as error:
-            problems.append(str(error))
-            continue
+        if image.name in seen:
+            raise BadInputError(f"Frame '{name}' is listed twice in '{model.images_file}'; keep one of the two.")
+        if image.camera in wrong:
+            raise BadInputError(
+                f"Frame '{name}' has camera {image.camera}, which can't be used: "
+                f"{wrong[image.camera]}; mend '{model.cameras_file}'."
+            )
+        if image.camera not in cameras:
+            raise BadInputError(
+                f"Frame '{name}' has camera {image.camera}, which '{model.cameras_file}' does not "
+                "list; export cameras and images together."
+            )
+        made = _frame(image, name, *cameras[image.camera], root, folder, reading)
         seen.add(image.name)
+        return made
+
+    frames, problems = usable(partial(frame, one) for one in sorted(model.images, key=lambda one: one.name))
     return frames, problems, _notes(model, frames)
 
 

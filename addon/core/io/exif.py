@@ -10,8 +10,8 @@ import math
 import struct
 from pathlib import Path
 
-from ..errors import BadInputError
 from ..kinds import Code, Limit
+from .files import read_bytes
 
 EXIF: Code[int] = 0x8769
 EXPOSURE_TIME: Code[int] = 0x829A
@@ -87,7 +87,7 @@ def exposure_tags(data: bytes, pointer: int | None = None, order: str = "", base
 
 def exif_exposure(path: Path) -> dict[int, float]:
     """Exposure time in seconds, f-number and ISO of the JPEG or TIFF `path`, by tag, as far as it tells."""
-    data = _head(path)
+    data = read_bytes(path, "Picture ", HEAD)
     if not data.startswith(JPEG_MAGIC):
         try:
             return exposure_tags(*_directory(data, path))
@@ -95,14 +95,6 @@ def exif_exposure(path: Path) -> dict[int, float]:
             return {}
     at = data.find(b"Exif\0\0")
     return exposure_tags(data[at + 6 :]) if at >= 0 else {}
-
-
-def _head(path: Path) -> bytes:
-    try:
-        with open(path, "rb") as file:
-            return file.read(HEAD)
-    except OSError as error:
-        raise BadInputError(f"Picture '{path}' can't be read ({error.strerror or error}); check its rights.") from error
 
 
 def _directory(data: bytes, path: Path) -> tuple[bytes, int, str, int]:

@@ -16,7 +16,7 @@ from typing import BinaryIO
 
 from ..errors import BadInputError
 from ..kinds import Code, Limit
-from .paths import absence
+from .files import absence
 from .picture import MAX_PIXELS
 
 MAGIC = b"\x76\x2f\x31\x01"

@@ -9,18 +9,19 @@ the list, `train/segmentation/000.exr` ...; its camera has x left, y up and look
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..errors import BadInputError
 from ..json_values import is_number
-from ..kinds import Limit
 from ..scene.model import Camera, Frame
 from ..scene.pose import check_pose
-from .jsonfile import read_json
-from .layout import Layout, Reader, Reading
+from .files import read_json, read_text
+from .layout import Layout, Reader, Reading, usable
 from .meshes import read_mesh
 from .pictures import picture_size
 
@@ -28,22 +29,22 @@ MESH, SPLIT = "scene.obj", "train"
 POSES, CAMERAS, INTRINSICS = "transforms.json", "cam.txt", "K_list.txt"
 TO_OPENGL = np.diag([-1.0, 1.0, -1.0, 1.0])
 """From x left, y up, z forward to x right, y up, z backward."""
-MAX_BYTES: Limit[int] = 1 << 26
 MAX_LEAN = 0.1
 """Cosine between the direction of view and `up` from which on they are no camera's; the authors allow 0.002."""
 
 
-def _read(root: Path, reading: Reading, folder: Path, cameras: list[Callable[[Path, str], Camera]]) -> Layout:
-    """The layout of a capture whose pictures lie in `folder`; each of `cameras` is made from a picture and a name."""
+def _read(
+    root: Path, reading: Reading, folder: Path, cameras: Sequence[Any], make: Callable[[Any, Path, str], Camera]
+) -> Layout:
+    """The layout of a capture whose pictures lie in `folder`: what is told of each of its `cameras` makes it."""
     mesh = read_mesh(reading.mesh or root / MESH, reading)
-    frames, problems = [], []
-    for i, make in enumerate(cameras):
-        name = f"{i:03d}"
+
+    def frame(index: int, told: Any) -> Frame:
+        name = f"{index:03d}"
         path, ids = folder / "Image" / f"{name}_0001.exr", folder / "segmentation" / f"{name}.exr"
-        try:
-            frames.append(Frame(name, path, make(path, name), id_path=ids if ids.is_file() else None))
-        except BadInputError as error:
-            problems.append(str(error))
+        return Frame(name, path, make(told, path, name), id_path=ids if ids.is_file() else None)
+
+    frames, problems = usable(partial(frame, *one) for one in enumerate(cameras))
     return Layout(frames, mesh, problems=problems)
 
 
@@ -63,16 +64,13 @@ def read_synthetic(root: Path, reading: Reading) -> Layout:
     if not is_number(angle) or not 0 < angle < math.pi:
         raise BadInputError(f"'{path}' has a camera_angle_x of {angle!r}; give radians between 0 and pi.")
 
-    def camera(entry) -> Callable[[Path, str], Camera]:
-        def make(picture: Path, name: str) -> Camera:
-            pose = check_pose(entry.get("transform_matrix") if isinstance(entry, dict) else None, name)
-            width, height = picture_size(picture)
-            focal = width / 2 / math.tan(angle / 2)
-            return Camera(width, height, focal, focal, width / 2, height / 2, pose @ TO_OPENGL)
+    def camera(entry: Any, picture: Path, name: str) -> Camera:
+        pose = check_pose(entry.get("transform_matrix") if isinstance(entry, dict) else None, name)
+        width, height = picture_size(picture)
+        focal = width / 2 / math.tan(angle / 2)
+        return Camera(width, height, focal, focal, width / 2, height / 2, pose @ TO_OPENGL)
 
-        return make
-
-    return _read(root, reading, root / SPLIT, [camera(entry) for entry in entries])
+    return _read(root, reading, root / SPLIT, entries, camera)
 
 
 def read_real(root: Path, reading: Reading) -> Layout:
@@ -90,18 +88,15 @@ def read_real(root: Path, reading: Reading) -> Layout:
             " export both again."
         )
 
-    def camera(pose: np.ndarray, k: np.ndarray) -> Callable[[Path, str], Camera]:
-        def make(picture: Path, name: str) -> Camera:
-            width, height = picture_size(picture)
-            origin, target, up = pose
-            fx, fy, cx, cy = (float(k[i]) for i in ((0, 0), (1, 1), (0, 2), (1, 2)))
-            if not (np.isfinite(k).all() and fx > 0 and fy > 0):
-                raise BadInputError(f"Frame '{name}' has no focal length above 0 in {INTRINSICS}; export it again.")
-            return Camera(width, height, fx, fy, cx, cy, _look_at(origin, target, up, name))
+    def camera(told: tuple[np.ndarray, np.ndarray], picture: Path, name: str) -> Camera:
+        (origin, target, up), k = told
+        width, height = picture_size(picture)
+        fx, fy, cx, cy = (float(k[i]) for i in ((0, 0), (1, 1), (0, 2), (1, 2)))
+        if not (np.isfinite(k).all() and fx > 0 and fy > 0):
+            raise BadInputError(f"Frame '{name}' has no focal length above 0 in {INTRINSICS}; export it again.")
+        return Camera(width, height, fx, fy, cx, cy, _look_at(origin, target, up, name))
 
-        return make
-
-    return _read(root, reading, root, [camera(*pair) for pair in zip(poses, intrinsics)])
+    return _read(root, reading, root, list(zip(poses, intrinsics)), camera)
 
 
 def _look_at(origin: np.ndarray, target: np.ndarray, up: np.ndarray, name: str) -> np.ndarray:
@@ -121,15 +116,11 @@ def _look_at(origin: np.ndarray, target: np.ndarray, up: np.ndarray, name: str) 
 
 def _triples(path: Path) -> np.ndarray:
     """The 3 x 3 numbers of each camera in a table that begins with their count, (n, 3, 3) float64."""
+    words = read_text(path).split()
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise BadInputError(f"'{path}' is too large for a table of cameras; export it again.")
-        words = path.read_text(encoding="utf-8").split()
         count = int(words[0]) if words else 0
         values = np.array(words[1:], np.float64)
-    except OSError as error:
-        raise BadInputError(f"'{path}' can't be read ({error.strerror or error}); check its rights.") from error
-    except ValueError as error:  # no numbers, or no text
+    except ValueError as error:
         raise BadInputError(f"'{path}' holds something that is no number; export it again.") from error
     if count < 1 or values.size != 9 * count:
         raise BadInputError(

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import BadInputError
 from ..kinds import Limit
 from ..scene.model import Instance
-from .jsonfile import read_json
+from .files import read_json
 
 FILE = "info_semantic.json"
 MAX_ID: Limit[int] = 2**31 - 2

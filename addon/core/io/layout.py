@@ -6,14 +6,16 @@ pixels through nor checks what is checked for all formats alike (`read.py` does 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import BadInputError
 from ..scene.model import Frame, KnownMirror, LitTiles
+from .files import EscapesError
 
 
 @dataclass(frozen=True)
@@ -107,6 +109,25 @@ class Layout:
     problems: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     mirrors: list[KnownMirror] = field(default_factory=list)
+
+
+def usable(makers: Iterable[Callable[[], Frame]]) -> tuple[list[Frame], list[str]]:
+    """The frames that can be made, in their order, and a sentence on each of the others.
+
+    Raises
+    ------
+    EscapesError
+        A path leads out of the capture: no slip of one frame.
+    """
+    frames, problems = [], []
+    for make in makers:
+        try:
+            frames.append(make())
+        except EscapesError:
+            raise
+        except BadInputError as error:
+            problems.append(str(error))
+    return frames, problems
 
 
 class Reader(NamedTuple):

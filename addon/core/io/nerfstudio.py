@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -20,12 +21,11 @@ from ..scene.model import Frame
 from ..scene.pose import check_pose
 from . import instances
 from .conventions import AS_READ
-from .jsonfile import read_json
-from .layout import Layout, RawMesh, Reader, Reading
+from .files import inside, read_json
+from .layout import Layout, RawMesh, Reader, Reading, usable
 from .meshes import MESH, find_mesh, read_mesh
 from .nerfstudio_camera import check_model, lens_notes, positive, read_camera
 from .nerfstudio_exposures import ended, read_brackets, with_settings
-from .paths import EscapesError, inside
 
 FILE = "transforms.json"
 SPLITS = ("transforms_train.json", "transforms_val.json")
@@ -83,29 +83,24 @@ def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], l
             str(entry.get("file_path", i)) if isinstance(entry, dict) else str(i)
             for i, (_, entry, _) in enumerate(listed)
         ]
-    frames: list[Frame] = []
-    told: list[tuple[dict[str, Any], dict[str, Any]]] = []
-    problems: list[str] = []
-    seen: set[Path] = set()
+    told: dict[Path, tuple[dict[str, Any], dict[str, Any]]] = {}
+
+    def frame(name: str, top: dict[str, Any], entry: Any, model: str) -> Frame:
+        made = _frame(root, top, entry, name, model, reading)
+        if made.path in told:
+            raise BadInputError(f"Frame '{name}' is listed twice; keep the entry with the right pose.")
+        told[made.path] = top, entry
+        return made
+
+    makers, problems = [], []
     for name, (top, entry, path) in zip(names, listed):
-        if not isinstance(entry, dict):
+        if isinstance(entry, dict):
+            makers.append(partial(frame, name, top, entry, check_model(top, entry, path)))
+        else:
             problems.append(f"Frame '{name}' is no JSON object in '{path}'.")
-            continue
-        model = check_model(top, entry, path)
-        try:
-            frame = _frame(root, top, entry, name, model, reading)
-            if frame.path in seen:
-                raise BadInputError(f"Frame '{name}' is listed twice; keep the entry with the right pose.")
-        except EscapesError:
-            raise
-        except BadInputError as error:
-            problems.append(str(error))
-            continue
-        seen.add(frame.path)
-        frames.append(frame)
-        told.append((top, entry))
-    frames, said = with_settings(frames, told)
-    return frames, problems, list(dict.fromkeys(notes + said))
+    frames, more = usable(makers)
+    frames, said = with_settings(frames, list(told.values()))
+    return frames, problems + more, list(dict.fromkeys(notes + said))
 
 
 def _without_test(top: dict[str, Any], entries: list[Any]) -> tuple[list[Any], list[str]]:

@@ -10,8 +10,8 @@ from typing import Any
 from ..errors import BadInputError
 from ..scene.model import Frame, Shot
 from .exposures import EXPOSURE, Settings, from_settings, settings_of
+from .files import inside
 from .nerfstudio_camera import positive
-from .paths import inside
 from .pictures import ENDINGS
 
 Entry = dict[str, Any]

@@ -9,8 +9,8 @@ import numpy as np
 from ..errors import BadInputError
 from . import exr_header, radiance_hdr
 from .exr import exr_note, read_exr, read_header
+from .files import absence
 from .oiio import CODED, coded_header, read_coded
-from .paths import absence
 from .picture import Picture
 from .radiance_hdr import hdr_size, read_hdr
 from .transfer import decode

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import BadInputError
-from .paths import absence
+from .files import absence, read_bytes
 from .ply_header import Element, Property, parse_header
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
@@ -64,14 +64,11 @@ def read_ply(path: Path | str) -> PlyMesh:
     try:
         if what := absence(path):
             raise BadInputError(f"Mesh '{path}' {what}; a capture needs its mesh there.")
-        return _parse(path.read_bytes())
+        return _parse(read_bytes(path, "Mesh "))
     except (_Damaged, ValueError) as error:
         raise BadInputError(f"Mesh '{path}' {error}; export it again.") from error
     except MemoryError as error:
         raise BadInputError(f"Mesh '{path}' does not fit in memory; simplify it.") from error
-    except OSError as error:
-        reason = error.strerror or error
-        raise BadInputError(f"Mesh '{path}' can't be read ({reason}); check the file and its rights.") from error
 
 
 def _parse(content: bytes) -> PlyMesh:

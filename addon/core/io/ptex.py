@@ -15,6 +15,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..kinds import Code
+from .files import read_bytes
 
 THRESHOLD: Code[int] = 16
 """Up to so many elements are left to the final insertion sort."""
@@ -59,11 +60,7 @@ def read_sorted_faces(path: Path, faces: int) -> list[np.ndarray]:
     BadInputError
         It can't be read, or does not list each of `faces` faces once.
     """
-    try:
-        with open(path, "rb") as file:
-            content = file.read(64 + 12 * faces)  # more than a chunk for each face takes
-    except OSError as error:
-        raise BadInputError(f"'{path}' can't be read ({error.strerror or error}); check its rights.") from error
+    content = read_bytes(path, most=64 + 12 * faces)  # more than a chunk for each face takes
     words = np.frombuffer(content[: len(content) // 4 * 4], "<u4").astype(np.int64)
     chunks, at = [], 2
     while at + 2 <= len(words):

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..kinds import Code, Limit
+from .files import read_bytes
 from .picture import MAX_PIXELS, Picture
 from .primaries import CIE_XYZ, to_rec709
 
@@ -70,7 +71,7 @@ class _Header:
 
 def hdr_size(path: Path | str) -> tuple[int, int]:
     """Width and height in pixels, from the header alone; raises `BadInputError`."""
-    return _Header(_read(Path(path), HEADER_BYTES), Path(path)).size
+    return _Header(read_bytes(Path(path), "Picture ", HEADER_BYTES), Path(path)).size
 
 
 def read_hdr(path: Path | str) -> Picture:
@@ -84,7 +85,7 @@ def read_hdr(path: Path | str) -> Picture:
         The file is absent, damaged, cut off, or of another kind.
     """
     path = Path(path)
-    content = _read(path)
+    content = read_bytes(path, "Picture ")
     header = _Header(content[:HEADER_BYTES], path)
     lines = _lines(content, header, path)
     # color.h: the half is the middle of what the mantissa was cut from; an exponent of 0 is black.
@@ -199,11 +200,3 @@ def _numbers(text: bytes, count: int, path: Path) -> np.ndarray:
     if len(numbers) != count or not all(math.isfinite(number) for number in numbers):
         raise BadInputError(f"Picture '{path}' has a damaged header; write or copy it again.")
     return np.array(numbers)
-
-
-def _read(path: Path, limit: int = -1) -> bytes:
-    try:
-        with open(path, "rb") as file:
-            return file.read(limit)
-    except OSError as error:
-        raise BadInputError(f"Picture '{path}' can't be read ({error.strerror or error}); check its rights.") from error

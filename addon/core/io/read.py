@@ -20,11 +20,11 @@ from .camera_check import check_camera
 from .clipping import find_clipping
 from .conventions import parse, upright
 from .exposures import from_csv, from_exif
+from .files import EscapesError, absence, check_links
 from .frame_codes import with_curves
 from .id_pictures import read_ids
 from .layout import AS_FOUND, Layout, Reading
 from .mesh_repair import repair
-from .paths import EscapesError, check_links
 from .pictures import picture_note, picture_size, read_picture
 from .readers import reader_for
 
@@ -50,6 +50,10 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
         raise BadInputError(f"Capture '{root}' {what}; give the folder that holds the mesh and the poses.")
     reader = reader_for(root, reading.format)
     layout = reader.read(root, reading)
+    # Told before any header is looked at: of a hundred thousand frames that takes minutes.
+    missing = [(frame.path, what) for frame in layout.frames if (what := absence(frame.path))]
+    absent = [f"Picture '{path}' {what}; check the capture's paths." for path, what in missing]
+    _refuse_too_many(root, layout, [*layout.problems, *absent])
     convention = parse(reading.convention)
     layout = replace(layout, frames=convention.frames(layout.frames), mesh=convention.mesh(layout.mesh))
     frames, more = _usable(root, _exposed(layout, reading), reading.outside)
@@ -128,14 +132,9 @@ def _usable(root: Path, layout: Layout, outside: bool) -> tuple[list[Frame], lis
             problems.append(str(error))
         else:
             good.append(frame)
-    total = len(layout.frames) + len(layout.problems)
     warnings = list(layout.notes)
     if problems:
-        few = " ".join(problems[:LISTED]) + (f" And {len(problems) - LISTED} more." if len(problems) > LISTED else "")
-        if len(problems) > MAX_BAD_SHARE * total:
-            raise BadInputError(
-                f"Capture '{root}' has {len(problems)} bad frames of {total}, too many to leave out; mend these: {few}"
-            )
+        total, few = _refuse_too_many(root, layout, problems)
         warnings.append(f"{len(problems)} of {total} frames are left out: {few}")
     if len(good) == 1:
         warnings.append(
@@ -143,6 +142,17 @@ def _usable(root: Path, layout: Layout, outside: bool) -> tuple[list[Frame], lis
             "see stays unknown."
         )
     return good, warnings
+
+
+def _refuse_too_many(root: Path, layout: Layout, problems: list[str]) -> tuple[int, str]:
+    """How many frames there are, and the first of their `problems`; raises `BadInputError` where these are too many."""
+    total = len(layout.frames) + len(layout.problems)
+    few = " ".join(problems[:LISTED]) + (f" And {len(problems) - LISTED} more." if len(problems) > LISTED else "")
+    if len(problems) > MAX_BAD_SHARE * total:
+        raise BadInputError(
+            f"Capture '{root}' has {len(problems)} bad frames of {total}, too many to leave out; mend these: {few}"
+        )
+    return total, few
 
 
 def _check_frame(frame: Frame) -> None:

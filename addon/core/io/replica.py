@@ -19,8 +19,8 @@ from ..json_values import is_number
 from ..kinds import Code, Limit
 from ..scene.model import KnownMirror, LitTiles
 from . import nerfstudio, traj
+from .files import read_json
 from .instances import FILE, read_instances
-from .jsonfile import read_json
 from .layout import Layout, RawMesh, Reader, Reading
 from .ply import PlyMesh, read_ply
 from .ptex import read_sorted_faces, split_faces

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError
-from ..json_values import numbers
-from ..scene.model import Camera, Frame
+from ..scene.model import Frame
 from . import colmap
+from .camera_check import pinhole
 from .colmap_model import model_files, read_model
+from .files import read_json
 from .instances import MAX_ID
-from .jsonfile import read_json
 from .layout import Layout, RawMesh, Reader, Reading
 from .meshes import read_mesh
 
@@ -127,14 +127,9 @@ def _group(group: Any, i: int, root: Path) -> tuple[int, list[int]]:
 
 def _undistorted(frames: list[Frame], root: Path) -> list[Frame]:
     """The frames with the pinhole camera of the undistorted pictures."""
-    found = numbers(read_json(root / PINHOLE), ("w", "h", "fl_x", "fl_y", "cx", "cy"))
-    if found is None or min(found[:4]) <= 0 or any(v != int(v) for v in found[:2]):
-        raise BadInputError(
-            f"'{root / PINHOLE}' does not give w, h, fl_x, fl_y, cx and cy; undistort the pictures again."
-        )
-    width, height, fx, fy, cx, cy = found
-    pinhole = Camera(int(width), int(height), float(fx), float(fy), float(cx), float(cy), np.eye(4))
-    return [replace(frame, camera=replace(pinhole, camera_to_world=frame.camera.camera_to_world)) for frame in frames]
+    path = root / PINHOLE
+    camera = pinhole(read_json(path), ("w", "h", "fl_x", "fl_y", "cx", "cy"), path)
+    return [replace(frame, camera=replace(camera, camera_to_world=frame.camera.camera_to_world)) for frame in frames]
 
 
 def _chosen(frames: list[Frame], root: Path) -> tuple[list[Frame], list[str]]:

@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import BadInputError
-from ..json_values import numbers
-from ..kinds import Limit
 from ..scene.model import Camera, Frame
 from ..scene.pose import check_pose
 from . import instances
-from .jsonfile import read_json
-from .layout import Layout, RawMesh, Reader, Reading
+from .camera_check import pinhole
+from .files import read_json, read_text
+from .layout import Layout, RawMesh, Reader, Reading, usable
 from .meshes import IMPORTED, find_mesh, read_mesh
 from .pictures import ENDINGS
 
@@ -28,7 +28,6 @@ POSES, PARAMETERS, FOLDER = "traj.txt", "cam_params.json", "results"
 TO_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 """From x right, y down, z forward to x right, y up, z backward."""
 PICTURE = re.compile(r"^frame(\d+)$", re.IGNORECASE)
-MAX_BYTES: Limit[int] = 1 << 28
 
 
 def read(root: Path, reading: Reading) -> Layout:
@@ -53,18 +52,15 @@ def read_frames(root: Path) -> tuple[list[Frame], list[str], list[str]]:
         raise BadInputError(
             f"Folder '{root / FOLDER}' has no pictures called frame000000.exr and so on; put the frames there."
         )
-    frames, problems = [], []
-    for i, path in sorted(pictures.items()):
+
+    def frame(index: int, path: Path) -> Frame:
         name = path.stem
-        if i >= len(lines):
-            problems.append(f"Frame '{name}' has no line in '{root / POSES}', which has {len(lines)}.")
-            continue
-        try:
-            pose = check_pose(_matrix(lines[i], name), name)
-        except BadInputError as error:
-            problems.append(str(error))
-            continue
-        frames.append(Frame(name, path, replace(camera, camera_to_world=pose @ TO_OPENGL)))
+        if index >= len(lines):
+            raise BadInputError(f"Frame '{name}' has no line in '{root / POSES}', which has {len(lines)}.")
+        pose = check_pose(_matrix(lines[index], name), name)
+        return Frame(name, path, replace(camera, camera_to_world=pose @ TO_OPENGL))
+
+    frames, problems = usable(partial(frame, *one) for one in sorted(pictures.items()))
     idle = len(lines) - len(set(pictures) & set(range(len(lines))))
     notes = [f"{idle} of {len(lines)} lines of {POSES} have no picture."] if idle else []
     return frames, problems, notes
@@ -80,29 +76,12 @@ def _camera(root: Path) -> Camera:
         )
     top = read_json(path)
     values = top.get("camera", top)
-    names = ("w", "h", "fx", "fy", "cx", "cy")
-    found = numbers(values, names)
-    if found is None or min(found[:4]) <= 0:
-        raise BadInputError(
-            f"'{path}' lacks a number among {', '.join(names)}, or one of the first four is not above 0; mend it."
-        )
-    if any(value != int(value) for value in found[:2]):
-        raise BadInputError(f"'{path}' has a size of {found[0]} x {found[1]}; give whole pixels as w and h.")
-    width, height, fx, fy, cx, cy = found
-    return Camera(int(width), int(height), float(fx), float(fy), float(cx), float(cy), np.eye(4))
+    return pinhole(values, ("w", "h", "fx", "fy", "cx", "cy"), path)
 
 
 def _lines(path: Path) -> list[str]:
     """The lines that hold anything."""
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise BadInputError(f"'{path}' is too large for a list of poses; export it again.")
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise BadInputError(f"'{path}' can't be read ({error.strerror or error}); check its rights.") from error
-    except ValueError as error:
-        raise BadInputError(f"'{path}' is no text; export it again.") from error
-    lines = [line for line in text.splitlines() if line.strip()]
+    lines = [line for line in read_text(path).splitlines() if line.strip()]
     if not lines:
         raise BadInputError(f"'{path}' holds no poses; export it again.")
     return lines

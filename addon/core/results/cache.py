@@ -23,13 +23,8 @@ class Cleared:
 
 def is_result(folder: Path) -> bool:
     """Whether a run wrote a folder: it has a store's lock file and its folder of stages; no links."""
-    return (
-        folder.is_dir()
-        and not folder.is_symlink()
-        and (folder / LOCK).is_file()
-        and (folder / STAGES).is_dir()
-        and not (folder / STAGES).is_symlink()
-    )
+    stages = folder / STAGES
+    return (folder / LOCK).is_file() and stages.is_dir() and not folder.is_symlink() and not stages.is_symlink()
 
 
 def results(parent: Path | str) -> list[Path]:
@@ -65,10 +60,8 @@ def clear(folders: Iterable[Path]) -> Cleared:
                 (folder / STAGES).mkdir()  # by which the folder is known
             freed += before
             touched += 1
-        except (ScanRelightError, OSError) as error:
-            left.append(
-                str(error)
-                if isinstance(error, ScanRelightError)
-                else f"'{folder.name}' can't be cleared ({error.strerror or error})."
-            )
+        except ScanRelightError as error:
+            left.append(str(error))
+        except OSError as error:
+            left.append(f"'{folder.name}' can't be cleared ({error.strerror or error}).")
     return Cleared(freed, touched, tuple(left))

@@ -67,18 +67,23 @@ def layout_of(folder: Path | str) -> str:
 
 
 def _told(folder: Path | str, name: str) -> str:
-    try:
-        key = json.loads((Path(folder) / MATERIALS).read_text(encoding="utf-8")).get(name)
-    except (OSError, ValueError, AttributeError):
-        return ""
+    key = _materials(folder).get(name)
     return key if isinstance(key, str) else ""
+
+
+def _materials(folder: Path | str) -> dict[str, Any]:
+    """What `MATERIALS` tells; nothing where it is absent or damaged."""
+    try:
+        told = json.loads((Path(folder) / MATERIALS).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return told if isinstance(told, dict) else {}
 
 
 def objects_of(folder: Path | str) -> set[int]:
     """The objects of a folder's result, lamps that the run found by itself among them; none where there is none."""
     try:
-        told = json.loads((Path(folder) / MATERIALS).read_text(encoding="utf-8"))["objects"]
-        return {int(one["object_id"]) for one in told}
+        return {int(one["object_id"]) for one in _materials(folder).get("objects", ())}
     except DAMAGE:
         return set()
 
@@ -211,12 +216,7 @@ def _picture(told: dict[str, Any]) -> dict[str, Any]:
 
 def capture_name(folder: Path | str) -> str:
     """Name of the room that a result is of: its capture's folder, or the result's own where that is not told."""
-    folder = Path(folder)
-    try:
-        told = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))["capture"]
-    except DAMAGE:
-        told = ""
-    return told if told and isinstance(told, str) else folder.name
+    return _told(folder, "capture") or Path(folder).name
 
 
 def root_of(folder: Path | str) -> Path | None:

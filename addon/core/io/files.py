@@ -1,12 +1,19 @@
-"""Paths that a capture's files name: within its folder, unless the user allows more."""
+"""Files of a capture: read with care, and within its folder, unless the user allows more."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 from ..errors import BadInputError
+from ..kinds import Limit
 from ..scene.model import Frame
+
+MAX_TEXT: Limit[int] = 1 << 28
+"""Bytes of a table of poses or cameras."""
 
 
 class EscapesError(BadInputError):
@@ -16,6 +23,46 @@ class EscapesError(BadInputError):
 def absence(path: Path) -> str:
     """Why no file can be read at `path`, as the end of a sentence; '' where one can: pipes and devices never end."""
     return "" if path.is_file() else "is not a file" if path.exists() else "does not exist"
+
+
+@contextmanager
+def readable(what: str, remedy: str = "check the file and its rights") -> Iterator[None]:
+    """Turn what the system refuses as `what` is read into one sentence, a `BadInputError`."""
+    try:
+        yield
+    except OSError as error:
+        raise BadInputError(f"{what} can't be read ({error.strerror or error}); {remedy}.") from error
+
+
+def read_bytes(path: Path, what: str = "", most: int = -1) -> bytes:
+    """A file's content, or the first `most` bytes of it; errors name it as `what` 'path'."""
+    with readable(f"{what}'{path}'"), open(path, "rb") as file:
+        return file.read(most)
+
+
+def read_text(path: Path) -> str:
+    """A table of poses or cameras; raises `BadInputError` where it is absent, no text, or larger than any such."""
+    content = read_bytes(path, most=MAX_TEXT + 1)
+    if len(content) > MAX_TEXT:
+        raise BadInputError(f"'{path}' is too large for a table of poses or cameras; export it again.")
+    try:
+        return content.decode("utf-8")
+    except ValueError as error:
+        raise BadInputError(f"'{path}' is no text; export it again.") from error
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """The object in the file `path`; raises `BadInputError` where it is absent, not JSON, or no object."""
+    try:
+        with readable(f"'{path}'", "check the capture"):
+            if what := absence(path):
+                raise BadInputError(f"'{path}' {what}; check the capture.")
+            value = json.loads(path.read_text(encoding="utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise BadInputError(f"'{path}' is not valid JSON ({error}); export it again.") from error
+    if not isinstance(value, dict):
+        raise BadInputError(f"'{path}' holds no JSON object; export it again.")
+    return value
 
 
 def inside(root: Path, value: Any, name: str, outside: bool = False, folder: Path | None = None) -> Path:
