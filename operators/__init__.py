@@ -1,32 +1,19 @@
 """The operators `bpy.ops.scan_relight.*`, the sidebar's panels, the preferences: one thin file each."""
 
-from __future__ import annotations
-
 
 def classes() -> tuple[type, ...]:
     """Everything that Blender has to know, in the order in which menus and panels show it."""
     from . import manual, menus
     from .base import job_operator
-    from .correct import correct, paint, white
+    from .correct import correct
     from .correct import panel as correct_panel
     from .correct import props as correct_props
     from .preferences import ScanRelightPreferences
-    from .recover import (
-        assets,
-        capture_from_scene,
-        captures,
-        files,
-        link_room,
-        panel_capture,
-        panel_recover,
-        restore_materials,
-        scene_props,
-        stages,
-    )
-    from .relight import before_after, export, exposure, lights, probe, setup, view, virtual
+    from .recover import files, panel_capture, panel_recover, room, scene_props, stages
+    from .relight import export, lights, view
     from .relight import panel as relight_panel
     from .relight import props as relight_props
-    from .results import find, folders, look, select
+    from .results import find, look
     from .results import panel as results_panel
 
     def own(*modules, kinds: tuple[str, ...]) -> list[type]:
@@ -35,13 +22,8 @@ def classes() -> tuple[type, ...]:
         found = [(module, one) for module in modules for name, one in vars(module).items() if name.startswith(starts)]
         return [one for module, one in found if one.__module__ == module.__name__]
 
-    operators = own(
-        *(captures, stages, job_operator, link_room, folders, find, files),
-        *(capture_from_scene, restore_materials, select, look),
-        *(lights, exposure, setup, probe, view, virtual, before_after, export, correct, white, paint),
-        *(assets, manual, menus),
-        kinds=("OT", "MT", "FH"),
-    )
+    modules = stages, job_operator, room, find, files, look, lights, view, export, correct, manual, menus
+    operators = own(*modules, kinds=("OT", "MT", "FH"))
     panels = own(
         *(find, panel_capture, panel_recover, results_panel, correct_panel, look, relight_panel, export),
         kinds=("PT", "UL"),
@@ -78,7 +60,7 @@ def handlers() -> tuple[tuple[list, object], ...]:
     from bpy.app.handlers import load_post, load_pre, save_post, save_pre
 
     from .base.job_operator import forget_job
-    from .correct.paint import keep_painted
+    from .correct.correct import keep_painted
     from .results import find
 
     return (
@@ -91,7 +73,7 @@ def handlers() -> tuple[tuple[list, object], ...]:
 
 
 def register():
-    """Register every class, an operator with its docstring as the tooltip, and hang the property groups up."""
+    """Register every class, an operator by its name with its docstring as the tooltip; hang the property groups up."""
     import bpy
 
     from . import keymaps, manual, menus, translations
@@ -99,6 +81,7 @@ def register():
 
     for cls in classes():
         if issubclass(cls, bpy.types.Operator):
+            cls.bl_idname = cls.__name__.lower().replace("_ot_", ".")
             cls.bl_description = " ".join(cls.__doc__.split())
         bpy.utils.register_class(cls)
     for owner, name, group in pointers():

@@ -1,7 +1,5 @@
 """Keys of the artist's choice: entries of the 3D view without a key, to be given one in the preferences."""
 
-from __future__ import annotations
-
 import bpy
 
 ENTRIES = (

@@ -1,6 +1,5 @@
 """The documentation that comes with the extension: "?" in the panels, and Blender's own Online Manual (right click)."""
 
-# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 from pathlib import Path
 
 import bpy
@@ -59,7 +58,6 @@ def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
 class SCAN_RELIGHT_OT_manual(bpy.types.Operator):
     """Open the documentation in the browser; it came with the extension and needs no network"""
 
-    bl_idname = "scan_relight.manual"
     bl_label = "Scan Relight Manual"
 
     page: bpy.props.StringProperty(

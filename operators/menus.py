@@ -1,7 +1,5 @@
 """Where Blender's own menus and bars tell of us: File > Import, and the progress of a run in the status bar."""
 
-from __future__ import annotations
-
 import bpy
 
 from ..addon.core.kinds import Shown

@@ -1,6 +1,5 @@
 """The add-on's preferences: where results are kept, and what of the machine a run may take."""
 
-# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import threading
 import time
 from pathlib import Path
@@ -11,6 +10,7 @@ from ..addon.bridge.results import home
 from ..addon.core.kinds import Shown
 from . import keymaps
 from .base.job_operator import areas
+from .base.panel import fields
 
 PACKAGE = home.PACKAGE
 
@@ -45,9 +45,7 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
     )
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop(self, "results_folder")
+        layout = fields(self.layout, self, "results_folder")
         row = layout.row()
         row.label(text=size_text(), icon="FILE_FOLDER")
         row.operator("scan_relight.clear_cache", icon="TRASH")
@@ -60,8 +58,7 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
                 icon="ERROR",
             )
             row.operator("scan_relight.move_results", icon="EXPORT")
-        layout.prop(self, "threads")
-        layout.prop(self, "memory_limit")
+        fields(layout, self, "threads", "memory_limit")
         keymaps.draw(layout, context)
         layout.operator("scan_relight.manual", icon="HELP")
 
@@ -79,10 +76,7 @@ def results_folder() -> Path:
 
 
 def result_folder(chosen: str, capture_folder: str, scene: bpy.types.Scene | None = None) -> Path:
-    """The result folder that `chosen` means for a capture: itself, or where it is empty the capture's own.
-
-    That is where `scene` has its room from, else beside the saved .blend, else in `results_folder`.
-    """
+    """The result folder that `chosen` means for a capture: itself, or where it is empty the capture's own."""
     if chosen:
         return Path(bpy.path.abspath(chosen))
     return home.result_folder(Path(bpy.path.abspath(capture_folder)).absolute(), results_folder(), scene)

@@ -257,3 +257,9 @@ def test_docstrings_have_numpys_sections():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 assert not run_in.search(ast.get_docstring(node) or ""), f"{relative(path)}:{node.lineno}"
+
+
+def test_blenders_half_has_annotations_that_blender_can_read():
+    """Blender reads an operator's properties off its annotations; so they are none of them put off."""
+    for path in (*(ROOT / "addon" / "bridge").rglob("*.py"), *(ROOT / "operators").rglob("*.py")):
+        assert "from __future__ import annotations" not in path.read_text(encoding="utf-8"), relative(path)

@@ -3,8 +3,6 @@
 They need no registered add-on, so that a file keeps its meaning where the extension is not installed.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 OBJECT_ID = "object_id"

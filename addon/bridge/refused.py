@@ -1,7 +1,5 @@
 """What the system or one of Blender's operators refuses, in one sentence."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

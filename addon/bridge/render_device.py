@@ -3,8 +3,6 @@
 A process of its own starts with factory settings, so what the artist's preferences say has to be handed over in words.
 """
 
-from __future__ import annotations
-
 import bpy
 
 from ..core.errors import BadInputError
@@ -83,6 +81,5 @@ def _enable(kind: str, wanted: set[str]) -> bool:
 
 
 def _preferences():
-    """Cycles' preferences; None where Cycles is switched off."""
     addon = bpy.context.preferences.addons.get("cycles")
     return addon.preferences if addon else None

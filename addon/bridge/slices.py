@@ -1,7 +1,5 @@
 """Work in slices: a generator that yields the share done, so that a window can be drawn in between."""
 
-from __future__ import annotations
-
 from collections.abc import Generator
 
 

@@ -40,12 +40,12 @@ def refit_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`refit RESULT --object ID`."""
     from ..core.progress import Progress
 
-    refit = need("job.refit")
+    refit = need("job.run")
     with console_run(arguments, stream) as console:
         report = refit.refit(
             arguments.result,
             arguments.objects,
-            Progress(weights=refit.WEIGHTS, **console),
+            Progress(weights=refit.REFIT_WEIGHTS, **console),
             arguments.override,
             not arguments.no_overrides,
             arguments.scene,

@@ -4,8 +4,6 @@ The operator keeps no reference to Blender's data while the job runs: undo, othe
 artist's as ever. ESC over a 3D view stops it.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Generator
@@ -200,7 +198,6 @@ class JobOperator:
         self._timer = manager.event_timer_add(0.01 if fast else PERIOD, window=context.window)
 
     def _tell(self, context) -> None:
-        """Draw what has changed."""
         job = self.job
         text, now = bar(job)[1], time.monotonic()
         state = job.stage, job.state, job.stopping, job.facts["phase"]
@@ -239,7 +236,6 @@ def active() -> jobs.Job | None:
 class SCAN_RELIGHT_OT_stop(bpy.types.Operator):
     """Stop the run within a second; finished stages are kept and the next run goes on from them"""
 
-    bl_idname = "scan_relight.stop"
     bl_label = "Stop Recovery"
 
     @classmethod

@@ -2,8 +2,6 @@
 sentences are laid over several lines.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import bpy
@@ -30,6 +28,21 @@ def say(layout, sentence: str, icon: str = "NONE") -> None:
             column.label(text=line)
         else:
             column.label(text=line, icon="BLANK1" if number else icon)
+
+
+def fields(layout, owner=None, *names: str):
+    """The layout, with labels beside what is entered; below each other the properties of an owner."""
+    layout.use_property_split, layout.use_property_decorate = True, False
+    for name in names:
+        layout.prop(owner, name)
+    return layout
+
+
+def folded(layout, key: str, text: str):
+    """What lies within a part that is folded away at first, under a heading; None while it is."""
+    header, body = layout.panel(f"scan_relight_{key}", default_closed=True)
+    header.label(text=text)
+    return body
 
 
 def region_width() -> int:

@@ -1,14 +1,112 @@
-"""`bpy.ops.scan_relight.*` by which an artist says what an object is, and has it fitted again under that."""
+"""`bpy.ops.scan_relight.*` by which an artist says what an object is, or paints what no frame saw."""
 
-# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+from pathlib import Path
+
 import bpy
+from mathutils import Vector
 
-from ...addon.bridge.corrections import corrections
+from ...addon.bridge.corrections import corrections, known_white, refitted, unseen
+from ...addon.bridge.job import job as jobs
+from ...addon.bridge.job.command import command
+from ...addon.bridge.light.room import cast, depsgraph_of
 from ...addon.bridge.marks import OBJECT_ID
-from ...addon.core.errors import BadInputError
-from ..base import poll
-from .base import CorrectOperator, RefitOperator, chosen, in_room, on_selected
-from .props import SMOOTH_ANGLE, STATEMENTS
+from ...addon.bridge.slices import whole
+from ...addon.core.errors import BadInputError, ScanRelightError
+from ..base.job_operator import FOLLOWED, JobOperator
+from ..base.operator import TURNING, AtOnce, OneSentence, has_scene, mouse_ray, needs, no_run, object_mode
+from ..results import told
+from .props import ALBEDO, SMOOTH_ANGLE, STATEMENTS
+
+
+def chosen(context) -> list[bpy.types.Object]:
+    """The recovered objects that are selected; the active one, where it is none of those, alone."""
+    active = context.view_layer.objects.active if context.view_layer else None
+    found = [thing for thing in context.selected_objects if corrections.correctable(thing)]
+    if corrections.correctable(active) and active not in found:
+        return [active]
+    return found
+
+
+def on_selected(cls):
+    """Class decorator: for what is said of the selected objects."""
+    return needs(chosen, "Select a recovered object first.")(object_mode(has_scene(cls)))
+
+
+def in_room(cls):
+    """Class decorator: for what is said of any object of the room."""
+    any_there = needs(
+        lambda context: any(map(corrections.correctable, context.scene.objects)), "The scene holds no recovered object."
+    )
+    return any_there(object_mode(has_scene(cls)))
+
+
+class CorrectOperator(AtOnce):
+    """Changes recovered objects at once, in one undo step; `work` returns remarks."""
+
+    remarks = "INFO"
+
+
+@no_run
+class RefitOperator(OneSentence, JobOperator):
+    """States something of the selected objects (`state`) and fits them again, all in one undo step."""
+
+    bl_options = {"REGISTER", "UNDO"}
+    always = False
+    asks_for = ""
+    """Property that is asked for where nobody gave it: from a menu or the search."""
+
+    def invoke(self, context, event):
+        if self.asks_for and not self.properties.is_property_set(self.asks_for):
+            return context.window_manager.invoke_props_dialog(self)
+        return self.execute(context)
+
+    def state(self, context, things) -> list[bpy.types.Object]:
+        """Say it; returns the objects that are to be fitted again."""
+        return things
+
+    def execute(self, context):
+        """State it, then refit behind the window, or here in the background."""
+        self._stated = False
+
+        def work() -> set[str]:
+            things = self.state(context, chosen(context))
+            self._stated = True
+            if not self.always and not context.scene.scan_relight_correct.refit_automatically:
+                return {"FINISHED"}
+            return self.refit(context, things)
+
+        return self._verdict(self.attempt(work))
+
+    def refit(self, context, things):
+        folder, words, before = refitted.words(context.scene, things)
+        facts = {"title": self.bl_label, "result_folder": str(folder), "before": before}
+        if not bpy.app.background:
+            return self.start(context, command(words, **FOLLOWED), **facts)
+        job = jobs.begin(command(words, **FOLLOWED), phase="run", **facts)
+        job.wait()
+        job.facts["phase"] = "end"
+        if job.state != jobs.DONE:
+            raise ScanRelightError(job.sentence)
+        for sentence in (*job.warnings, *whole(self.change(context.scene, self.load(job)))):
+            self.report({"WARNING"}, sentence)
+        return {"FINISHED"}
+
+    def load(self, job):
+        folder = Path(job.facts["result_folder"])
+        return folder, job.facts["before"], refitted.fitted(folder)
+
+    def change(self, scene, loaded):
+        warnings = yield from refitted.bringing(scene, *loaded)
+        told.forget()
+        return warnings
+
+    def _leave(self, context, verdict):
+        return super()._leave(context, self._verdict(verdict))
+
+    def _verdict(self, verdict):
+        """What was stated stays, and is an undo step, also where the refit was stopped or failed."""
+        return {"FINISHED"} if verdict == {"CANCELLED"} and self._stated and not self.always else verdict
+
 
 _KEYS = {"model": "model", "roughness": "roughness", "f0": "F0", "base_color": "colour", "same_as": "likeness"}
 
@@ -18,7 +116,6 @@ class SCAN_RELIGHT_OT_refit(RefitOperator, bpy.types.Operator):
     """Fit the selected objects again under what is given of them, the rest of the room held; takes seconds. What is
     given is kept in the result folder's overrides.json"""
 
-    bl_idname = "scan_relight.refit"
     bl_label = "Refit"
     always = True
 
@@ -27,7 +124,6 @@ class SCAN_RELIGHT_OT_refit(RefitOperator, bpy.types.Operator):
 class SCAN_RELIGHT_OT_this_is(RefitOperator, bpy.types.Operator):
     """Say what the selected objects are made of, and fit them again under that"""
 
-    bl_idname = "scan_relight.this_is"
     bl_label = "This Is"
 
     model: bpy.props.EnumProperty(name="Model", description="What they are", items=STATEMENTS)
@@ -44,7 +140,7 @@ class SCAN_RELIGHT_OT_this_is(RefitOperator, bpy.types.Operator):
         return things
 
 
-@poll.needs(
+@needs(
     lambda context: len(chosen(context)) > 1 or context.scene.scan_relight_correct.like is not None,
     "Choose the other object, or select it too, last of all.",
 )
@@ -53,7 +149,6 @@ class SCAN_RELIGHT_OT_same_as(RefitOperator, bpy.types.Operator):
     """The selected objects have the same highlight as another one, each with its own colours: the one that is chosen in
     the panel, else the active object"""
 
-    bl_idname = "scan_relight.same_as"
     bl_label = "The Same As"
 
     object_id: bpy.props.IntProperty(
@@ -80,12 +175,11 @@ class SCAN_RELIGHT_OT_same_as(RefitOperator, bpy.types.Operator):
         return others
 
 
-@poll.needs(lambda context: any(map(corrections.given, chosen(context))), "Nothing is given of the selected objects.")
+@needs(lambda context: any(map(corrections.given, chosen(context))), "Nothing is given of the selected objects.")
 @on_selected
 class SCAN_RELIGHT_OT_take_back(RefitOperator, bpy.types.Operator):
     """Take back what is given of the selected objects: show, and fit, what the frames say"""
 
-    bl_idname = "scan_relight.take_back"
     bl_label = "Back to What Was Found"
 
     key: bpy.props.EnumProperty(
@@ -121,7 +215,6 @@ class SCAN_RELIGHT_OT_smooth_by_angle(CorrectOperator, bpy.types.Operator):
     """Shade recovered objects smooth, with edges above an angle sharp; 0 makes them flat again. It stays when the room
     is recovered again"""
 
-    bl_idname = "scan_relight.smooth_by_angle"
     bl_label = "Smooth by Angle"
 
     angle: SMOOTH_ANGLE
@@ -129,12 +222,160 @@ class SCAN_RELIGHT_OT_smooth_by_angle(CorrectOperator, bpy.types.Operator):
         name="Whole Room", description="All recovered objects of the scene, not the selected ones alone"
     )
 
-    def work(self, context, things):
-        from ...addon.bridge.corrections.smoothing import smooth
-
-        if self.everything:
-            things = [thing for thing in context.scene.objects if corrections.correctable(thing)]
+    def work(self, context):
+        things = filter(corrections.correctable, context.scene.objects) if self.everything else chosen(context)
+        things = list(things)
         if not things:
             raise BadInputError("No recovered object is selected; select some, or choose the whole room.")
-        count = smooth(things, self.angle)
+        count = corrections.smooth(things, self.angle)
         return [f"{count} object{'s' * (count != 1)} shaded {'smooth' if self.angle else 'flat'}"]
+
+
+@on_selected
+class SCAN_RELIGHT_OT_this_is_white(RefitOperator, bpy.types.Operator):
+    """The active object's albedo is known: the albedo of the whole room is scaled with it, channel by channel, and with
+    it the colour of the light"""
+
+    bl_label = "This Is White"
+
+    albedo: ALBEDO
+    asks_for = "albedo"
+
+    def state(self, context, things):
+        thing = context.view_layer.objects.active
+        thing = thing if thing in things else things[0]
+        corrections.say_white(thing, self.albedo)
+        self.report(
+            {"INFO"},
+            f"The whole room's albedo is scaled so that '{thing.name}' has "
+            f"{', '.join(f'{part:.2f}' for part in self.albedo)}",
+        )
+        return [thing]
+
+
+@needs(lambda context: corrections.white_of(context.view_layer.objects.active) is not None, "No white is given.")
+@on_selected
+class SCAN_RELIGHT_OT_white_back(RefitOperator, bpy.types.Operator):
+    """Take back the known white: the frames alone say how bright the room's surfaces are"""
+
+    bl_label = "No Known White"
+
+    def state(self, context, things):
+        corrections.take_white_back(context.view_layer.objects.active)
+        return things[:1]
+
+
+@in_room
+class SCAN_RELIGHT_OT_pick_white(RefitOperator, bpy.types.Operator):
+    """Click on a spot of the room whose albedo is known, such as a grey card or white paint; the whole room's albedo is
+    scaled with it. ESC stops"""
+
+    bl_label = "Pick White Spot"
+
+    albedo: ALBEDO
+    origin: bpy.props.FloatVectorProperty(
+        name="From",
+        description="Where the ray to the spot begins, in metres",
+        size=3,
+        subtype="TRANSLATION",
+        options={"SKIP_SAVE"},
+    )
+    direction: bpy.props.FloatVectorProperty(
+        name="Direction", description="Of the ray to the spot", size=3, subtype="DIRECTION", options={"SKIP_SAVE"}
+    )
+
+    def invoke(self, context, event):
+        self._picking = True
+        context.window_manager.modal_handler_add(self)
+        context.window.cursor_modal_set("EYEDROPPER")
+        context.workspace.status_text_set("Click on the spot whose albedo is known   ESC or right click: stop")
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        if not getattr(self, "_picking", False):
+            return super().modal(context, event)
+        if event.type in {"ESC", "RIGHTMOUSE"}:
+            self._end(context)
+            return {"CANCELLED"}
+        if event.type != "LEFTMOUSE" or event.value != "PRESS":
+            return {"PASS_THROUGH"} if event.type in TURNING | {"MOUSEMOVE", "TIMER"} else {"RUNNING_MODAL"}
+        ray = mouse_ray(context, event)
+        if ray is None:
+            return {"RUNNING_MODAL"}
+        self._end(context)
+        self.origin, self.direction = ray
+        return self.execute(context)
+
+    def state(self, context, things):
+        hit = cast(context.scene, Vector(self.origin), Vector(self.direction)) if any(self.direction) else None
+        if hit is None or not corrections.correctable(hit.thing):
+            raise BadInputError("There is no recovered object at that spot; click on one.")
+        albedo = known_white.of_object(hit.thing, hit.place, tuple(self.albedo), depsgraph_of(context.scene))
+        corrections.say_white(hit.thing, albedo)
+        self.report({"INFO"}, f"The whole room's albedo is scaled by that spot on '{hit.thing.name}'")
+        return [hit.thing]
+
+    def _end(self, context) -> None:
+        self._picking = False
+        context.window.cursor_modal_restore()
+        context.workspace.status_text_set(None)
+
+
+@on_selected
+class SCAN_RELIGHT_OT_paint_unseen(CorrectOperator, bpy.types.Operator):
+    """Paint what no frame saw of the active object in Texture Paint, on an image of your own that no run writes over;
+    what was seen is masked"""
+
+    bl_label = "Paint"
+
+    masked: bpy.props.BoolProperty(
+        name="Only Unseen Spots", description="Protect what any frame saw by a stencil mask", default=True
+    )
+
+    def work(self, context):
+        thing = context.view_layer.objects.active
+        if thing not in chosen(context):
+            raise BadInputError("Make the object that is to be painted the active one: click on it.")
+        colour = corrections.effective(thing).get("base_color")
+        unseen.paint(context, thing, context.scene.scan_relight.images, colour, self.masked)
+        return [f"Painting '{unseen.painted(thing).name}'; leave Texture Paint for object mode when done"]
+
+
+@on_selected
+class SCAN_RELIGHT_OT_fill_unseen(CorrectOperator, bpy.types.Operator):
+    """Fill what no frame saw of the selected objects from the measured spots around, on an image of your own that no
+    run writes over"""
+
+    bl_label = "Fill"
+
+    def work(self, context):
+        count, remarks = unseen.fill(chosen(context), context.scene.scan_relight.images)
+        if not count:
+            raise BadInputError(" ".join(remarks))
+        return [f"{count} texels filled", *remarks]
+
+
+@needs(
+    lambda context: any(map(unseen.painted, chosen(context))), "Nothing was painted or filled on the selected objects."
+)
+@on_selected
+class SCAN_RELIGHT_OT_restore_painted(CorrectOperator, bpy.types.Operator):
+    """Show what was found instead of what was painted or filled on the selected objects"""
+
+    bl_label = "Restore"
+
+    discard: bpy.props.BoolProperty(
+        name="Forget What Was Painted",
+        description="Take it out of your image too; else Paint shows it again",
+        default=False,
+    )
+
+    def work(self, context):
+        count = unseen.restore(chosen(context), self.discard)
+        return [f"{count} object{'s' * (count != 1)} restored"]
+
+
+@bpy.app.handlers.persistent
+def keep_painted(*_) -> None:
+    """Before the file is saved: what was painted goes with it."""
+    unseen.keep_painted()

@@ -1,15 +1,13 @@
 """Within Results: what the artist knows better of the active object, and of spots that no frame saw."""
 
-from __future__ import annotations
-
 import bpy
 
 from ...addon.bridge.corrections import corrections, unseen
 from ...addon.core.brdf.registry import named, shown
 from ...addon.core.photo import MIDDLE_GREY
 from ..base.job_operator import active, bar
-from ..base.panel import SidebarPanel
-from .base import chosen
+from ..base.panel import SidebarPanel, fields
+from .correct import chosen
 from .props import STATEMENTS
 
 
@@ -73,8 +71,7 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
             rows += [("f0", "colour")] if metal else [("f0", "f0")]
         if brdf.has_diffuse:
             rows += [("base_color", "colour")]
-        column = layout.column(align=True)
-        column.use_property_split, column.use_property_decorate = True, False
+        column = fields(layout.column(align=True))
         for key, name in rows:
             pinned = key in said or (metal and name == "colour" and "base_color" in said)
             row = column.row(align=True)

@@ -3,7 +3,6 @@
 The properties of objects hold nothing: they read and write what the bridge keeps with object and material.
 """
 
-# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 from math import radians
 
 import bpy
@@ -126,10 +125,6 @@ class ScanRelightCorrection(bpy.types.PropertyGroup):
     )
 
 
-def _recovered(self, thing) -> bool:
-    return corrections.correctable(thing)
-
-
 class ScanRelightCorrecting(bpy.types.PropertyGroup):
     """`Scene.scan_relight_correct`."""
 
@@ -148,7 +143,7 @@ class ScanRelightCorrecting(bpy.types.PropertyGroup):
         name="Like",
         description="The object whose highlight the selected ones have",
         type=bpy.types.Object,
-        poll=_recovered,
+        poll=lambda self, thing: corrections.correctable(thing),
     )
     albedo: ALBEDO
     smooth_angle: SMOOTH_ANGLE

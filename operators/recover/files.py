@@ -1,6 +1,5 @@
 """`bpy.ops.scan_relight.*` for what lies on disk: File > Import, files that are dropped, finished results."""
 
-# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 from functools import partial
 from pathlib import Path
 
@@ -8,11 +7,10 @@ import bpy
 
 from ...addon.core.errors import BadInputError
 from ...addon.core.io import folder as folders
-from ..base import poll
-from ..base.at_once import AtOnce, OneSentence
-from ..base.panel import SidebarPanel
+from ..base.operator import FOLDERS, AtOnce, Choosing, OneSentence, free_scene, has_scene, no_run
+from ..base.panel import SidebarPanel, fields
 from ..translations import OWN
-from . import room_window
+from . import room
 from .settings_props import preset_items
 
 NEXT = (
@@ -61,7 +59,7 @@ def given_path(operator) -> Path:
     raise BadInputError("Choose the folder of a scan first, or one of its files.")
 
 
-@poll.free_scene
+@free_scene
 class FileOperator(OneSentence):
     """Takes a path to a scan or to a result; errors become one sentence."""
 
@@ -116,10 +114,9 @@ def choose(context, content: folders.Content) -> None:
     show_tab(context)
 
 
-class SCAN_RELIGHT_OT_open_capture(FileOperator, bpy.types.Operator):
+class SCAN_RELIGHT_OT_open_capture(Choosing, FileOperator, bpy.types.Operator):
     """Choose the folder of a scan, or of a finished result, by itself or by one of its files"""
 
-    bl_idname = "scan_relight.open_capture"
     bl_label = "Import Scan Relight Capture"
     bl_options = {"REGISTER", "UNDO", "PRESET"}
 
@@ -127,13 +124,8 @@ class SCAN_RELIGHT_OT_open_capture(FileOperator, bpy.types.Operator):
         name="Filter", description="Which files are shown", default=FILTER, options={"HIDDEN"}
     )
 
-    def invoke(self, context, event):
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
+        layout = fields(self.layout)
         layout.prop(self, "then", expand=True)
         column = layout.column()
         column.enabled = self.then == "RUN"
@@ -143,7 +135,6 @@ class SCAN_RELIGHT_OT_open_capture(FileOperator, bpy.types.Operator):
 class SCAN_RELIGHT_OT_drop(FileOperator, bpy.types.Operator):
     """Choose the scan, or open the finished result, that the dropped file belongs to"""
 
-    bl_idname = "scan_relight.drop"
     bl_label = "Open Scan or Result"
     bl_options = {"UNDO", "INTERNAL"}
 
@@ -177,12 +168,11 @@ class SCAN_RELIGHT_FH_json(bpy.types.FileHandler):
         return context.area is not None and context.area.type == "VIEW_3D"
 
 
-@poll.no_run
-@poll.has_scene
+@no_run
+@has_scene
 class SCAN_RELIGHT_OT_use_folder(bpy.types.Operator):
     """Choose this folder as the capture"""
 
-    bl_idname = "scan_relight.use_folder"
     bl_label = "Use This Folder"
     bl_options = {"UNDO", "INTERNAL"}
 
@@ -193,12 +183,12 @@ class SCAN_RELIGHT_OT_use_folder(bpy.types.Operator):
         return {"FINISHED"}
 
 
-@poll.free_scene
-class SCAN_RELIGHT_OT_open_result(AtOnce, bpy.types.Operator):
+@free_scene
+class SCAN_RELIGHT_OT_open_result(Choosing, AtOnce, bpy.types.Operator):
     """Bring the recovered room of a finished result into this file, as a scene of its own"""
 
-    bl_idname = "scan_relight.open_result"
     bl_label = "Open Scan Relight Result"
+    given = "folder"
 
     folder: bpy.props.StringProperty(
         name="Folder", description="Result folder of a finished run", subtype="DIR_PATH", options={"SKIP_SAVE"}
@@ -206,15 +196,7 @@ class SCAN_RELIGHT_OT_open_result(AtOnce, bpy.types.Operator):
     directory: bpy.props.StringProperty(
         name="Folder", description="What the file browser chooses", subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"}
     )
-    filter_folder: bpy.props.BoolProperty(
-        name="Folders", description="Only folders are shown", default=True, options={"HIDDEN", "SKIP_SAVE"}
-    )
-
-    def invoke(self, context, event):
-        if self.folder:
-            return self.execute(context)
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+    filter_folder: FOLDERS
 
     def work(self, context):
         folder = Path(bpy.path.abspath(self.folder or self.directory))
@@ -230,7 +212,7 @@ class SCAN_RELIGHT_OT_open_result(AtOnce, bpy.types.Operator):
         from ...addon.bridge.slices import whole
 
         brought = whole(bringing(content.folder))
-        room_window.show(context.scene, brought.scene)
+        room.show(context.scene, brought.scene)
         brought.scene.scan_relight.result_folder = str(content.folder)
         show_tab(context)
         return brought.warnings

@@ -1,13 +1,12 @@
 """What was found in captures, by folder and way of reading. Kept while Blender runs, never in the file."""
 
-from __future__ import annotations
-
 import json
 import time
 
 import bpy
 
 from ...addon.bridge.job import job as jobs
+from ...addon.bridge.job.command import command
 from ...addon.core.io.folder import CAPTURE, Content, look_into
 from ...addon.core.kinds import Shown
 from ..base.job_operator import redraw
@@ -54,8 +53,6 @@ def put(choices, found: dict | str) -> None:
 
 def begin(choices) -> None:
     """Read the capture beside the window; a panel shows what was found once it is there."""
-    from ...addon.bridge.job.command import command
-
     for one in _found.values():
         if isinstance(one, jobs.Job):
             one.stop()  # the folder before: nobody waits for it any more

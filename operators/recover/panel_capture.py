@@ -1,13 +1,11 @@
 """The tab's first part: which capture, what was found in it, and what is wrong with it."""
 
-from __future__ import annotations
-
 import bpy
 
 from ...addon.bridge.job import job as jobs
 from ...addon.core.kinds import Shown
 from ...addon.core.naming import object_name
-from ..base.panel import SidebarPanel
+from ..base.panel import SidebarPanel, fields, folded
 from . import findings, reading_props
 
 SHOWN: Shown[int] = 12
@@ -27,11 +25,8 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
         layout.prop(choices, "capture_folder", text="")
         if not choices.capture_folder:
             self.say(layout, "Choose the folder of a scan: its mesh, its HDR frames and their poses.", "INFO")
-        header, body = layout.panel("scan_relight_reading", default_closed=True)
-        header.label(text="How it is read")
-        if body is not None:
-            body.use_property_split, body.use_property_decorate = True, False
-            reading_props.draw(body, choices.reading)
+        if body := folded(layout, "reading", "How it is read"):
+            fields(body, choices.reading, *reading_props.NAMES)
         wrong = findings.wrong_folder(choices)
         if wrong is not None:
             self.wrong(layout, context, wrong)
@@ -80,9 +75,7 @@ class SCAN_RELIGHT_PT_capture(SidebarPanel, bpy.types.Panel):
             if name not in TOLD:
                 self.other(layout, context, name, value)
         instances = found.get("instances", ())
-        header, body = layout.panel("scan_relight_objects", default_closed=True)
-        header.label(text=f"{len(instances)} objects")
-        if body is not None:
+        if body := folded(layout, "objects", f"{len(instances)} objects"):
             column = body.column(align=True)
             column.scale_y = 0.8
             for one in instances[:SHOWN]:
@@ -111,7 +104,5 @@ class SCAN_RELIGHT_PT_own_scene(SidebarPanel, bpy.types.Panel):
         layout, choices = self.layout, context.scene.scan_relight
         self.say(layout, "Select the room's objects; the EXR pictures behind the cameras are the frames.")
         layout.operator("scan_relight.capture_from_scene", icon="SCENE_DATA")
-        column = layout.column()
-        column.use_property_split, column.use_property_decorate = True, False
-        column.prop(choices, "copies")
+        fields(layout.column(), choices, "copies")
         layout.operator("scan_relight.restore_materials", icon="LOOP_BACK")

@@ -1,7 +1,5 @@
 """The tab's second part: settings, the run and its progress."""
 
-from __future__ import annotations
-
 import bpy
 
 from ...addon.bridge.job import job as jobs
@@ -15,7 +13,7 @@ from ...addon.core.stages import LABELS, STAGES
 from ...addon.settings_info import setting_infos
 from .. import preferences
 from ..base.job_operator import active, bar
-from ..base.panel import SidebarPanel
+from ..base.panel import SidebarPanel, fields, folded
 from . import findings
 
 GROUPS = (
@@ -60,11 +58,8 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
     def choices(self, layout, context) -> None:
         """Preset, folder, settings."""
         choices = context.scene.scan_relight
-        layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop(choices, "preset")
-        changed = choices.settings.changed(choices.preset)
-        layout.prop(choices.settings, "detail")
-        layout.prop(choices.settings, "shading_rays")
+        fields(layout, choices, "preset")
+        fields(layout, choices.settings, "detail", "shading_rays")
         layout.prop(choices, "result_folder")
         if not choices.result_folder and choices.capture_folder:
             folder = preferences.result_folder("", choices.capture_folder, context.scene)
@@ -72,15 +67,13 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         layout.prop(choices, "images")
         if choices.images == images.FOLDER and not bpy.data.filepath:
             self.say(layout, images.NEVER_SAVED, "ERROR")
-        header, body = layout.panel("scan_relight_settings", default_closed=True)
-        header.label(text="Settings" + (f" ({len(changed)} changed)" if changed else ""))
-        if body is not None:
+        changed = choices.settings.changed(choices.preset)
+        if body := folded(layout, "settings", "Settings" + (f" ({len(changed)} changed)" if changed else "")):
             for heading, names in groups():
                 if names:
                     column = body.column()
                     column.label(text=heading)
-                    for name in names:
-                        column.prop(choices.settings, name)
+                    fields(column, choices.settings, *names)
 
     def start(self, context) -> None:
         """The button; where a run was stopped, it goes on, and there is another to start anew."""
@@ -118,9 +111,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
             return
         changes = room_changes.shown(scene)
         if changes:
-            header, body = layout.panel("scan_relight_changes", default_closed=True)
-            header.label(text=f"{len(changes)} objects differ from the run before")
-            if body is not None:
+            if body := folded(layout, "changes", f"{len(changes)} objects differ from the run before"):
                 for one in changes[:CHANGES]:
                     self.say(body, one["text"], "DOT")
         if len(bpy.data.scenes) > 1:
@@ -140,8 +131,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         else:
             self.say(layout, f"{job.facts.get('title', 'Run')}: done in {duration(job.seconds)}.", "CHECKMARK")
         if job.warnings:
-            header, body = layout.panel("scan_relight_warnings", default_closed=True)
-            header.label(text=f"{len(job.warnings)} warning{'s' * (len(job.warnings) > 1)}")
-            if body is not None:
+            count = len(job.warnings)
+            if body := folded(layout, "warnings", f"{count} warning{'s' * (count > 1)}"):
                 for sentence in job.warnings:
                     self.say(body, sentence, "ERROR")

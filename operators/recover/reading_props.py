@@ -1,6 +1,5 @@
 """How a capture is to be read, as properties of operators and of the scene; one for each field of `Reading`."""
 
-# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 from pathlib import Path
 
 import bpy
@@ -80,9 +79,3 @@ def options(owner) -> list[str]:
     given = {name: getattr(asked, name) for name in ("format", "mesh", "transfer", "exposures", "convention")}
     words = [word for name, value in given.items() if value for word in (f"--{name}", str(value))]
     return [*words, "--outside"] if asked.outside else words
-
-
-def draw(layout, owner) -> None:
-    """All of them, one below the other."""
-    for name in NAMES:
-        layout.prop(owner, name)

@@ -1,6 +1,5 @@
 """What the artist chose, kept in the scene: plain choices only. What a run does at the moment is nobody's to save."""
 
-# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 from contextlib import suppress
 from dataclasses import replace
 

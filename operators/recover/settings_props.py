@@ -1,6 +1,5 @@
 """The settings as properties of an operator, made from the `Settings` dataclass; and what all operators share."""
 
-# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import contextlib
 import importlib.util
 from dataclasses import replace
@@ -8,6 +7,7 @@ from functools import cache
 
 import bpy
 
+from ...addon.bridge.job.command import command
 from ...addon.bridge.results import home
 from ...addon.core.errors import BadInputError
 from ...addon.core.settings import PRESETS, Settings
@@ -15,11 +15,11 @@ from ...addon.core.stages import LABELS, RUN_STAGES, WRITE
 from ...addon.leash import MemoryGuard
 from ...addon.settings_info import SettingInfo, setting_infos
 from .. import preferences
-from ..base import poll
-from ..base.at_once import OneSentence
 from ..base.job_operator import FOLLOWED, JobOperator
+from ..base.operator import OneSentence, free_scene, needs
+from ..base.panel import fields
 from ..translations import OWN
-from . import reading_props, room_window
+from . import reading_props, room
 from .reading_props import ReadingProps
 from .settings_words import words
 
@@ -111,11 +111,11 @@ def missing_packages() -> tuple[str, ...]:
 
 def startable(operator):
     """Class decorator: what everything asks in `poll` that reads a capture, or starts another operator that does."""
-    packages = poll.needs(
+    packages = needs(
         lambda context: not missing_packages(),
         lambda: f"{' and '.join(missing_packages())} missing: install the extension again.",
     )
-    return poll.free_scene(packages(operator))
+    return free_scene(packages(operator))
 
 
 def preset_items() -> list[tuple[str, str, str]]:
@@ -125,10 +125,7 @@ def preset_items() -> list[tuple[str, str, str]]:
 
 @startable
 class CaptureOperator(ReadingProps, OneSentence, JobOperator):
-    """What every operator has: a capture folder, and errors that become one sentence.
-
-    With a window the work is a job of its own that `modal` follows; in the background `execute` does it itself.
-    """
+    """Works on a capture: a job of its own that `modal` follows; in the background `execute` does it itself."""
 
     bl_options = {"UNDO", "PRESET"}
     capture_folder: bpy.props.StringProperty(
@@ -198,10 +195,7 @@ class StageOperator(SettingsProps, CaptureOperator):
 
     def draw(self, context):
         """The dialog: what is to be decided; all else comes from the preset or from who calls."""
-        layout = self.layout
-        layout.use_property_split, layout.use_property_decorate = True, False
-        for name in ("capture_folder", "result_folder", "preset", "from_stage"):
-            layout.prop(self, name)
+        fields(self.layout, self, "capture_folder", "result_folder", "preset", "from_stage")
 
     def settings(self) -> Settings:
         """The preset with every setting that was given; threads are the preferences' where they are not."""
@@ -249,8 +243,6 @@ class StageOperator(SettingsProps, CaptureOperator):
 
     def begin(self, context):
         """Start the run as a job; the command line's own, so that its result is the same."""
-        from ...addon.bridge.job.command import command
-
         capture, result, settings = self.folder("capture_folder"), self.folder("result_folder"), self.settings()
         words = command(
             ["recover", capture, *reading_props.options(self)],
@@ -290,7 +282,7 @@ class SceneStageOperator(StageOperator):
             into=self.into,
         )
         if self.into == "OWN":
-            room_window.show_own(scene, self.folder("capture_folder"))
+            room.show_own(scene, self.folder("capture_folder"))
         return warnings
 
     def begin(self, context):
@@ -328,6 +320,6 @@ class SceneStageOperator(StageOperator):
             loaded.folder, scene if self.into == "SCENE" else None, self.images, known=not self.import_first
         )
         if self.into == "OWN":
-            room_window.show(scene, brought.scene)
+            room.show(scene, brought.scene)
         self.job.facts["room"] = brought.scene.name
         return brought.warnings

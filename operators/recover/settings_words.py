@@ -3,8 +3,6 @@
 The command line's help is the `Settings` docstring; a setting that is not listed here is told in those words.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from ...addon.settings_info import SettingInfo

@@ -1,6 +1,5 @@
 """`bpy.ops.scan_relight.export` and the tab's last part: the room as glTF or USD."""
 
-# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 from pathlib import Path
 
 import bpy
@@ -8,7 +7,7 @@ import bpy
 from ...addon.bridge.export import export
 from ...addon.core.errors import BadInputError
 from ...addon.core.results.room_file import capture_name
-from ..base import poll
+from ..base.operator import needs
 from ..base.panel import SidebarPanel
 from .base import SceneOperator, default_folder
 
@@ -25,13 +24,10 @@ SCOPES = (
 )
 
 
-@poll.needs(
-    lambda context: any(thing.type == "MESH" for thing in context.scene.objects), "The scene has no mesh to export."
-)
+@needs(lambda context: any(thing.type == "MESH" for thing in context.scene.objects), "The scene has no mesh to export.")
 class SCAN_RELIGHT_OT_export(SceneOperator, bpy.types.Operator):
     """Write the room with plain materials that other programs understand; the scene stays as it is"""
 
-    bl_idname = "scan_relight.export"
     bl_label = "Export Room"
     bl_options = {"REGISTER", "PRESET"}
 

@@ -1,19 +1,40 @@
-"""`bpy.ops.scan_relight.*` for the light: switch and restore lamps, add lights, another picture around the room."""
+"""`bpy.ops.scan_relight.*` for the light: lamps, new lights and set-ups, the outside, exposure, EEVEE's preview."""
 
-# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import atexit
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import bpy
+from bl_operators.presets import AddPresetBase
 
 from ...addon.bridge.light import lamps, outside
-from ...addon.bridge.relight import lights, setup
-from ...addon.core.errors import BadInputError
-from ..base import poll
-from ..results.select import make_active
-from .base import RelightOperator
-from .exposure import follow
+from ...addon.bridge.relight import exposure, lights, probe, setup
+from ...addon.core.errors import BadInputError, ScanRelightError
+from ..base.operator import Choosing, has_scene, needs
+from ..results.look import make_active
+from .base import RelightOperator, follow, has_room
 from .props import AIM, KELVIN, UNIT
+
+
+class SCAN_RELIGHT_OT_expose(RelightOperator, bpy.types.Operator):
+    """Measure the light in a small picture and set the exposure so that its median is middle grey; takes some
+    seconds"""
+
+    bl_label = "Expose for This Light"
+
+    def work(self, context):
+        exposure.expose(context.scene)
+
+
+class SCAN_RELIGHT_OT_restore_exposure(RelightOperator, bpy.types.Operator):
+    """Set the exposure back to what it was before it was measured"""
+
+    bl_label = "Captured Exposure"
+
+    def work(self, context):
+        exposure.restore(context.scene)
+
 
 PRESETS = (
     ("WINDOW", "Window", "A window's soft, cool light from the side"),
@@ -21,7 +42,7 @@ PRESETS = (
     ("SPOT", "Spot", "A spot from above, a little on the camera's side"),
     ("SUN", "Evening Sun", "A low, warm sun: through an opening of the scan, else as a window would let it in"),
 )
-FOLDER = Path(__file__).resolve().parents[1] / "thumbnails"
+PICTURES = Path(__file__).resolve().parents[1] / "thumbnails"
 _pictures = None
 
 
@@ -35,7 +56,7 @@ def picture(name: str) -> int:
 
         _pictures = previews.new()
         atexit.register(forget_pictures)
-    path = FOLDER / f"{name.lower()}.png"
+    path = PICTURES / f"{name.lower()}.png"
     if name not in _pictures:
         _pictures.load(name, str(path), "IMAGE")
     return _pictures[name].icon_id
@@ -55,7 +76,6 @@ def forget_pictures() -> None:
 class SCAN_RELIGHT_OT_switch_lamps(RelightOperator, bpy.types.Operator):
     """Switch all lamps of the scan on or off; their strength and colour stay"""
 
-    bl_idname = "scan_relight.switch_lamps"
     bl_label = "Switch All Lamps"
 
     on: bpy.props.BoolProperty(name="On", description="On or off", default=False)
@@ -69,7 +89,6 @@ class SCAN_RELIGHT_OT_switch_lamps(RelightOperator, bpy.types.Operator):
 class SCAN_RELIGHT_OT_restore_lamp(RelightOperator, bpy.types.Operator):
     """Make this lamp exactly what the scan found"""
 
-    bl_idname = "scan_relight.restore_lamp"
     bl_label = "Restore Lamp"
 
     name: bpy.props.StringProperty(name="Lamp", description="Name of its material, or its class")
@@ -80,11 +99,10 @@ class SCAN_RELIGHT_OT_restore_lamp(RelightOperator, bpy.types.Operator):
         follow(context.scene)
 
 
-@poll.needs(lambda context: setup.is_relit(context.scene), "The light is as it was captured.")
+@needs(lambda context: setup.is_relit(context.scene), "The light is as it was captured.")
 class SCAN_RELIGHT_OT_restore_light(RelightOperator, bpy.types.Operator):
     """Make lamps and outside exactly what was recovered, and remove the lights that were added here"""
 
-    bl_idname = "scan_relight.restore_light"
     bl_label = "Restore Captured Light"
 
     def work(self, context):
@@ -95,7 +113,6 @@ class SCAN_RELIGHT_OT_restore_light(RelightOperator, bpy.types.Operator):
 class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
     """Add a light inside the room"""
 
-    bl_idname = "scan_relight.add_light"
     bl_label = "Add Light"
 
     preset: bpy.props.EnumProperty(name="Light", description="What kind of light", items=PRESETS)
@@ -123,11 +140,10 @@ class SCAN_RELIGHT_OT_add_light(RelightOperator, bpy.types.Operator):
         follow(context.scene)
 
 
-@poll.needs(lambda context: lights.added_lights(context.scene), "No light was added here.")
+@needs(lambda context: lights.added_lights(context.scene), "No light was added here.")
 class SCAN_RELIGHT_OT_remove_lights(RelightOperator, bpy.types.Operator):
     """Remove all lights that were added here"""
 
-    bl_idname = "scan_relight.remove_lights"
     bl_label = "Remove New Lights"
 
     def work(self, context):
@@ -141,22 +157,16 @@ def put_around(scene, picture: str) -> list[str]:
     return outside.remarks(scene)
 
 
-class SCAN_RELIGHT_OT_use_hdri(RelightOperator, bpy.types.Operator):
+class SCAN_RELIGHT_OT_use_hdri(Choosing, RelightOperator, bpy.types.Operator):
     """Put an equirectangular HDR picture around the room; the recovered outside is kept"""
 
-    bl_idname = "scan_relight.use_hdri"
     bl_label = "Picture Around the Room"
+    given = "filepath"
 
     filepath: bpy.props.StringProperty(
         name="Picture", description="EXR or HDR file", subtype="FILE_PATH", options={"SKIP_SAVE"}
     )
     filter_glob: bpy.props.StringProperty(default="*.exr;*.hdr;*.png;*.jpg", options={"HIDDEN"})
-
-    def invoke(self, context, event):
-        if self.filepath:
-            return self.execute(context)
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
 
     def work(self, context):
         if not self.filepath:
@@ -174,16 +184,83 @@ def _studio_items(operator, context):
     return _items
 
 
-@poll.needs(
-    lambda context: outside.studio_lights(), "This Blender comes without its HDR pictures; choose a file instead."
-)
+@needs(lambda context: outside.studio_lights(), "This Blender comes without its HDR pictures; choose a file instead.")
 class SCAN_RELIGHT_OT_use_studio_light(RelightOperator, bpy.types.Operator):
     """Put one of the HDR pictures that come with Blender around the room"""
 
-    bl_idname = "scan_relight.use_studio_light"
     bl_label = "Blender's Pictures"
 
     picture: bpy.props.EnumProperty(name="Picture", description="Which one", items=_studio_items)
 
     def work(self, context):
         return put_around(context.scene, self.picture)
+
+
+SETUPS = "scan_relight/light"
+
+
+class SCAN_RELIGHT_MT_light_presets(bpy.types.Menu):
+    """The set-ups that were saved."""
+
+    bl_label = "My Lights"
+    bl_description = "Light this room as another one was lit"
+    preset_subdir = SETUPS
+    preset_operator = "script.execute_preset"
+    draw = bpy.types.Menu.draw_preset
+
+
+@needs(lambda context: has_room(context.scene), "The scene holds no scanned room to light.")
+@has_scene
+class SCAN_RELIGHT_OT_light_preset_add(AddPresetBase, bpy.types.Operator):
+    """Save the lights that were added, the lamps' factors and the outside under a name, to light other rooms the same
+    way"""
+
+    bl_label = "Save This Light"
+    preset_menu = "SCAN_RELIGHT_MT_light_presets"
+    preset_subdir = SETUPS
+    preset_defines = ["studio = bpy.context.scene.scan_relight_studio"]
+    preset_values = ["studio.setup"]
+
+
+class SCAN_RELIGHT_OT_bake_preview(RelightOperator, bpy.types.Operator):
+    """Bake how light bounces through the room for EEVEE, and make its preview about as bright as the picture by Cycles
+    through several of the cameras. Bake again after the light has changed. The status bar shows how far it is, ESC
+    ends it"""
+
+    bl_label = "Bake Preview Light"
+
+    _wait = True
+
+    def invoke(self, context, event):
+        """From a button: the window stays alive meanwhile."""
+        self._wait = False
+        return self.execute(context)
+
+    def work(self, context):
+        probe.bake(context.scene, self._wait)
+        if self._wait:
+            probe.fit(context.scene)
+        else:
+            bpy.app.timers.register(partial(_fit_when_baked, context.scene.name), first_interval=0.5)
+
+
+def _fit_when_baked(name: str) -> float | None:
+    """A timer: once Blender's own bake has ended, bring it to Cycles' brightness."""
+    baking = {one.bl_idname for window in bpy.context.window_manager.windows for one in window.modal_operators}
+    if "OBJECT_OT_lightprobe_cache_bake" in baking:
+        return 0.5
+    scene = bpy.data.scenes.get(name)
+    if scene is not None:
+        with suppress(ScanRelightError):  # then the light stays as it was baked
+            probe.fit(scene)
+    return None
+
+
+@needs(lambda context: probe.probes(context.scene), "No preview light was baked here.")
+class SCAN_RELIGHT_OT_remove_preview(RelightOperator, bpy.types.Operator):
+    """Remove the light that was baked for EEVEE"""
+
+    bl_label = "Remove Preview Light"
+
+    def work(self, context):
+        probe.remove(context.scene)

@@ -1,7 +1,5 @@
 """The tab's part Relight: the lamps of the scan, the outside, new lights, the view, objects, before and after."""
 
-from __future__ import annotations
-
 import bpy
 
 from ...addon.bridge.data.cameras import frame_cameras
@@ -10,9 +8,8 @@ from ...addon.bridge.light import outside as relight_outside
 from ...addon.bridge.relight import exposure, lights, match_frame
 from ...addon.core.kinds import Shown
 from ...addon.core.naming import in_order
-from ..base.panel import NamedRows, SidebarPanel, places
-from .base import has_room
-from .exposure import look_soon
+from ..base.panel import NamedRows, SidebarPanel, fields, places
+from .base import has_room, look_soon
 from .lights import PRESETS, picture
 
 NAME: Shown[float] = 0.6
@@ -21,10 +18,7 @@ ICONS = {"WINDOW": "LIGHT_AREA", "SOFTBOX": "MESH_PLANE", "SPOT": "LIGHT_SPOT", 
 
 
 class SCAN_RELIGHT_UL_lamps(NamedRows, bpy.types.UIList):
-    """The lamps of the scan, each by the first object that wears it.
-
-    Not a list of materials: for each of those Blender renders a picture, and its shaders, before it draws the panel.
-    """
+    """The lamps by the first object that wears each: of materials Blender would first render pictures."""
 
     lamps: dict = {}  # what the last `filter_items` found, as it comes before the rows
 
@@ -91,13 +85,10 @@ class SCAN_RELIGHT_PT_relight(SidebarPanel, bpy.types.Panel):
 
     def numbers(self, layout, context, lamp) -> None:
         """What a lamp emits, now and as found."""
-        column = layout.column()
-        column.use_property_split, column.use_property_decorate = True, False
+        column = fields(layout.column())
         column.prop(lamp.scan_relight_lamp, "factor")
-        colour = column.column()
-        colour.enabled = relight_lamps.colour(lamp) is not None
-        colour.prop(lamp.scan_relight_lamp, "kelvin")
-        colour.prop(lamp.scan_relight_lamp, "colour")
+        coloured = relight_lamps.colour(lamp) is not None
+        fields(column.column(), lamp.scan_relight_lamp, "kelvin", "colour").enabled = coloured
         now, found = (
             " ".join(f"{c:.3g}" for c in values)
             for values in (relight_lamps.radiance(lamp), relight_lamps.recovered_radiance(lamp))
@@ -117,17 +108,13 @@ class SCAN_RELIGHT_PT_outside(RelightPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        layout, world = self.layout, context.scene.world
-        layout.use_property_split, layout.use_property_decorate = True, False
+        layout, world = fields(self.layout), context.scene.world
         if not relight_outside.has_outside(context.scene):
             self.say(layout, "The scan saw no light from outside.", "INFO")
         else:
             outside = world.scan_relight_outside
             layout.prop(outside, "on")
-            column = layout.column()
-            column.enabled = outside.on
-            column.prop(outside, "factor")
-            column.prop(outside, "rotation")
+            fields(layout.column(), outside, "factor", "rotation").enabled = outside.on
         row = layout.row(align=True)
         row.operator("scan_relight.use_hdri", text="HDR File", icon="FILE_FOLDER")
         if relight_outside.studio_lights():
@@ -141,13 +128,9 @@ class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):
     bl_parent_id = "SCAN_RELIGHT_PT_relight"
 
     def draw(self, context):
-        layout, studio = self.layout, context.scene.scan_relight_studio
-        layout.use_property_split, layout.use_property_decorate = True, False
-        layout.prop(studio, "aim")
-        layout.prop(studio, "unit")
+        studio = context.scene.scan_relight_studio
         field = {"ROOM": "strength", "WATT": "watts", "LUMEN": "lumens"}[studio.unit]
-        layout.prop(studio, field)
-        layout.prop(studio, "kelvin")
+        layout = fields(self.layout, studio, "aim", "unit", field, "kelvin")
         grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
         for name, text, _ in PRESETS:
             cell = grid.column(align=True)
@@ -180,8 +163,7 @@ class SCAN_RELIGHT_PT_exposure(RelightPanel, bpy.types.Panel):
     bl_parent_id = "SCAN_RELIGHT_PT_relight"
 
     def draw(self, context):
-        layout, scene = self.layout, context.scene
-        layout.use_property_split, layout.use_property_decorate = True, False
+        layout, scene = fields(self.layout), context.scene
         column = layout.column(align=True)
         # Half of a narrow sidebar is too little for these words.
         column.use_property_split = column.use_property_decorate = False
@@ -207,9 +189,8 @@ class SCAN_RELIGHT_PT_view(SidebarPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        layout, scene = self.layout, context.scene
+        layout, scene = fields(self.layout), context.scene
         cameras, studio = frame_cameras(scene), scene.scan_relight_studio
-        layout.use_property_split, layout.use_property_decorate = True, False
         row = layout.row(align=True)
         row.operator("scan_relight.match_frame", text="", icon="TRIA_LEFT").step = -1
         row.prop(studio, "frame", text="")
@@ -221,12 +202,8 @@ class SCAN_RELIGHT_PT_view(SidebarPanel, bpy.types.Panel):
         name = cameras[index].name if index >= 0 else "The camera is none of the capture's."
         self.say(layout, f"{name} ({index + 1} of {len(cameras)})" if index >= 0 else name)
         layout.operator("scan_relight.follow_track", icon="ANIM")
-        layout.prop(studio, "match_size")
-        layout.prop(studio, "show_frame")
-        column = layout.column()
-        column.enabled = studio.show_frame
-        column.prop(studio, "frame_front")
-        column.prop(studio, "frame_alpha")
+        fields(layout, studio, "match_size", "show_frame")
+        fields(layout.column(), studio, "frame_front", "frame_alpha").enabled = studio.show_frame
 
 
 class SCAN_RELIGHT_PT_virtual(RelightPanel, bpy.types.Panel):
@@ -237,10 +214,8 @@ class SCAN_RELIGHT_PT_virtual(RelightPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        layout, studio = self.layout, context.scene.scan_relight_studio
-        layout.use_property_split, layout.use_property_decorate = True, False
-        for name in ("place", "shape", "look", "size"):
-            layout.prop(studio, name)
+        studio = context.scene.scan_relight_studio
+        layout = fields(self.layout, studio, "place", "shape", "look", "size")
         button = layout.operator("scan_relight.add_virtual", icon="ADD")
         button.shape, button.look, button.size, button.place = studio.shape, studio.look, studio.size, studio.place
         layout.label(text="The selected object")
@@ -257,9 +232,7 @@ class SCAN_RELIGHT_PT_before_after(RelightPanel, bpy.types.Panel):
     bl_parent_id = "SCAN_RELIGHT_PT_relight"
 
     def draw(self, context):
-        layout, studio = self.layout, context.scene.scan_relight_studio
-        layout.use_property_split, layout.use_property_decorate = True, False
-        for name in ("engine", "samples", "percentage"):
-            layout.prop(studio, name)
+        studio = context.scene.scan_relight_studio
+        layout = fields(self.layout, studio, "engine", "samples", "percentage")
         button = layout.operator("scan_relight.before_after", text="Render Both", icon="RENDER_STILL")
         button.engine, button.samples, button.percentage = studio.engine, studio.samples, studio.percentage

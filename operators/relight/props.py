@@ -3,17 +3,17 @@
 The properties of lamps and outside hold nothing: they read and write what the bridge keeps with material and world.
 """
 
-# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
+import math
+
 import bpy
 
-from ...addon.bridge.data.cameras import frame_cameras
 from ...addon.bridge.light import lamps, outside, units
 from ...addon.bridge.light.kelvin import HIGHEST, LOWEST
 from ...addon.bridge.relight import match_frame
 from ...addon.bridge.relight import setup as relight_setup
 from ..results.panel import active_row, choose_row
 from ..translations import OWN
-from .exposure import follow, follow_soon
+from .base import follow, follow_soon
 
 UNITS = (
     ("ROOM", "Room's Light", "Relative to the light that the room was scanned in, so that the exposure can stay"),
@@ -32,6 +32,10 @@ LOOKS = (
     ("MIRROR", "Mirror", "Polished metal, to see the room's light in"),
 )
 
+
+_FACTOR = {"min": 0.0, "soft_max": 4.0, "step": 5, "precision": 2}
+_TEMPERATURE = {"subtype": "TEMPERATURE", "max": HIGHEST, "step": 10000, "precision": 0}
+_LUMENS = {"min": 0.0, "soft_max": 100000.0, "step": 1000, "precision": 0}
 
 # Shared by the panel's choices and the operators that they go to.
 SHAPE = bpy.props.EnumProperty(
@@ -58,11 +62,8 @@ UNIT = bpy.props.EnumProperty(name="Strength In", description="What a new light'
 KELVIN = bpy.props.FloatProperty(
     name="Temperature",
     description="Colour of a new light: 2700 a warm bulb, 6500 daylight; 0 takes what suits its kind",
-    subtype="TEMPERATURE",
     min=0.0,
-    max=HIGHEST,
-    step=10000,
-    precision=0,
+    **_TEMPERATURE,
 )
 PLACE = bpy.props.EnumProperty(name="Place", description="Where an object is set down", items=PLACES)
 SAMPLES = bpy.props.IntProperty(
@@ -79,36 +80,36 @@ PERCENTAGE = bpy.props.IntProperty(
 )
 
 
-def _lamp(group):
-    return group.id_data if lamps.is_lamp(group.id_data) else None
+def _kept(read, change) -> dict:
+    """Getter and setter of a property that the bridge keeps with its owner; the exposure follows a change."""
 
-
-def _change(change, group, value) -> None:
-    """Change a lamp or the outside, and have the exposure follow; nothing where `change` is None."""
-    if change:
+    def set_value(group, value):
         change(group.id_data, value)
         follow_soon()
+
+    return {"get": lambda group: read(group.id_data), "set": set_value}
+
+
+def _of_lamp(read, change, otherwise) -> dict:
+    """The same of a material, as long as it is a lamp's."""
+    return _kept(
+        lambda material: read(material) if lamps.is_lamp(material) else otherwise,
+        lambda material, value: change(material, value) if lamps.is_lamp(material) else None,
+    )
 
 
 class ScanRelightLamp(bpy.types.PropertyGroup):
     """`Material.scan_relight_lamp`."""
 
     on: bpy.props.BoolProperty(
-        name="On",
-        description="Whether this lamp shines",
-        get=lambda self: bool(_lamp(self)) and lamps.is_on(self.id_data),
-        set=lambda self, value: _change(_lamp(self) and lamps.set_on, self, value),
+        name="On", description="Whether this lamp shines", **_of_lamp(lamps.is_on, lamps.set_on, False)
     )
     factor: bpy.props.FloatProperty(
         name="Strength x",
         description="Times the radiance that the scan found; 1 is the lamp as captured",
-        min=0.0,
         max=lamps.MAX_FACTOR,
-        soft_max=4.0,
-        step=5,
-        precision=2,
-        get=lambda self: lamps.factor(self.id_data),
-        set=lambda self, value: _change(_lamp(self) and lamps.set_factor, self, value),
+        **_FACTOR,
+        **_of_lamp(lamps.factor, lamps.set_factor, 1.0),
     )
     colour: bpy.props.FloatVectorProperty(
         name="Colour",
@@ -117,20 +118,14 @@ class ScanRelightLamp(bpy.types.PropertyGroup):
         size=3,
         min=0.0,
         soft_max=1.0,
-        get=lambda self: (_lamp(self) and lamps.colour(self.id_data)) or (1.0, 1.0, 1.0),
-        set=lambda self, value: _change(_lamp(self) and lamps.set_colour, self, value),
+        **_of_lamp(lambda material: lamps.colour(material) or (1.0,) * 3, lamps.set_colour, (1.0,) * 3),
     )
-
     kelvin: bpy.props.FloatProperty(
         name="Temperature",
         description="Colour of its light as a temperature, at the same luminance: 2700 a warm bulb, 6500 daylight",
-        subtype="TEMPERATURE",
         min=LOWEST,
-        max=HIGHEST,
-        step=10000,
-        precision=0,
-        get=lambda self: lamps.kelvin(self.id_data) if _lamp(self) else 6500.0,
-        set=lambda self, value: _change(_lamp(self) and lamps.set_kelvin, self, value),
+        **_TEMPERATURE,
+        **_of_lamp(lamps.kelvin, lamps.set_kelvin, 6500.0),
     )
 
 
@@ -140,12 +135,8 @@ class ScanRelightLight(bpy.types.PropertyGroup):
     lumens: bpy.props.FloatProperty(
         name="Lumens",
         description="Luminous flux in lumens, a sun's in lux: 683 for each radiant watt of white light",
-        min=0.0,
-        soft_max=100000.0,
-        step=1000,
-        precision=0,
-        get=lambda self: units.lumens(self.id_data),
-        set=lambda self, value: _change(units.set_lumens, self, value),
+        **_LUMENS,
+        **_kept(units.lumens, units.set_lumens),
     )
 
 
@@ -155,29 +146,23 @@ class ScanRelightOutside(bpy.types.PropertyGroup):
     on: bpy.props.BoolProperty(
         name="Light from Outside",
         description="Whether light comes in from outside the scanned room",
-        get=lambda self: outside.is_on(self.id_data),
-        set=lambda self, value: _change(outside.set_on, self, value),
+        **_kept(outside.is_on, outside.set_on),
     )
     factor: bpy.props.FloatProperty(
         name="Strength",
         description="Times the light from outside that was recovered, or the picture's",
-        min=0.0,
         max=outside.MAX_FACTOR,
-        soft_max=4.0,
-        step=5,
-        precision=2,
-        get=lambda self: outside.factor(self.id_data),
-        set=lambda self, value: _change(outside.set_factor, self, value),
+        **_FACTOR,
+        **_kept(outside.factor, outside.set_factor),
     )
     rotation: bpy.props.FloatProperty(
         name="Rotation",
         description="Turns the outside about the vertical, anticlockwise from above",
         subtype="ANGLE",
-        soft_min=-3.141593,
-        soft_max=3.141593,
+        soft_min=-math.pi,
+        soft_max=math.pi,
         step=100,
-        get=lambda self: outside.rotation(self.id_data),
-        set=lambda self, value: _change(outside.set_rotation, self, value),
+        **_kept(outside.rotation, outside.set_rotation),
     )
 
 
@@ -192,10 +177,6 @@ def look_through(studio, index: int, size: bool = False) -> str:
         bpy.path.abspath(studio.id_data.scan_relight.capture_folder),
         size or studio.match_size,
     )
-
-
-def _set_frame(studio, index):
-    look_through(studio, min(max(index, 0), max(len(frame_cameras(studio.id_data)) - 1, 0)))
 
 
 def _frame_changed(studio, context):
@@ -217,7 +198,7 @@ class ScanRelightStudio(bpy.types.PropertyGroup):
         name="Frame",
         description="Look through the camera of this frame of the capture",
         get=lambda self: max(match_frame.current(self.id_data), 0),
-        set=_set_frame,
+        set=lambda self, index: look_through(self, index),
     )
     match_size: bpy.props.BoolProperty(
         name="Match Render Size",
@@ -261,11 +242,8 @@ class ScanRelightStudio(bpy.types.PropertyGroup):
     strength: bpy.props.FloatProperty(
         name="Strength x",
         description="Of a new light, times what keeps the scene's exposure readable",
-        min=0.0,
-        soft_max=4.0,
         default=1.0,
-        step=5,
-        precision=2,
+        **_FACTOR,
     )
     watts: bpy.props.FloatProperty(
         name="Power",
@@ -279,11 +257,8 @@ class ScanRelightStudio(bpy.types.PropertyGroup):
     lumens: bpy.props.FloatProperty(
         name="Lumens",
         description="Luminous flux of a new light: 683 lm for each radiant watt of white; of a sun in lux",
-        min=0.0,
-        soft_max=100000.0,
         default=800.0,
-        step=1000,
-        precision=0,
+        **_LUMENS,
     )
     kelvin: KELVIN
     place: PLACE

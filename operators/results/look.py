@@ -1,34 +1,75 @@
-"""`bpy.ops.scan_relight.look` and the tab's fourth part: what the viewport shows on the recovered objects."""
+"""`bpy.ops.scan_relight.*` for recovered objects: select one, choose what the viewport shows; the tab's fourth part."""
 
-# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 import bpy
 
+from ...addon.bridge.marks import OBJECT_ID
 from ...addon.bridge.results import look
-from ..base import poll
-from ..base.at_once import AtOnce
+from ...addon.core.errors import BadInputError
+from ..base.operator import AtOnce, has_scene, needs, object_mode
 from ..base.panel import SidebarPanel
 
 
-def look_items() -> list[tuple[str, str, str]]:
-    """Items of an enumeration of the looks."""
-    return [(name, one.label, one.text) for name, one in look.LOOKS.items()]
+def result_objects(scene) -> dict[int, bpy.types.Object]:
+    """The recovered objects of a scene by `object_id`; of several imports the last one's."""
+    return {
+        thing[OBJECT_ID]: thing
+        for thing in scene.objects
+        if thing.type == "MESH" and isinstance(thing.get(OBJECT_ID), int)
+    }
 
 
-needs_recovered = poll.needs(
+def make_active(context, thing: bpy.types.Object, extend: bool = False) -> None:
+    """Select an object, with `extend` beside what is selected, and make it the active one."""
+    if not extend:
+        for other in context.view_layer.objects.selected:
+            other.select_set(False)
+    thing.select_set(True)
+    context.view_layer.objects.active = thing
+
+
+def select(context, thing: bpy.types.Object, extend: bool = False) -> None:
+    """Select an object and make it the active one; raises `BadInputError` where it can't be."""
+    if thing.name not in context.view_layer.objects:
+        raise BadInputError(f"Object '{thing.name}' is not in this view layer; include its collection first.")
+    if not thing.visible_get():
+        raise BadInputError(f"Object '{thing.name}' is hidden; show it first.")
+    make_active(context, thing, extend)
+
+
+@object_mode
+@has_scene
+class SCAN_RELIGHT_OT_select_result_object(AtOnce, bpy.types.Operator):
+    """Select this object in the scene"""
+
+    bl_label = "Select Object"
+
+    object_id: bpy.props.IntProperty(name="Object", description="Number of the object in the capture", min=0)
+    extend: bpy.props.BoolProperty(
+        name="Extend", description="Keep what is selected", default=False, options={"SKIP_SAVE"}
+    )
+
+    def work(self, context):
+        thing = result_objects(context.scene).get(self.object_id)
+        if thing is None:
+            raise BadInputError(f"Object {self.object_id} is not in this scene; import the capture first.")
+        select(context, thing, self.extend)
+
+
+LOOKS = [(name, one.label, one.text) for name, one in look.LOOKS.items()]
+needs_recovered = needs(
     lambda context: context.scene is not None and look.recovered(context.scene),
     "No object of this scene wears recovered materials; run the recovery first.",
 )
 
 
-@poll.object_mode
+@object_mode
 @needs_recovered
 class SCAN_RELIGHT_OT_look(AtOnce, bpy.types.Operator):
     """What the viewport shows on the recovered objects; renders and materials stay as they are"""
 
-    bl_idname = "scan_relight.look"
     bl_label = "Show Look"
 
-    look: bpy.props.EnumProperty(name="Look", description="What the viewport shows", items=look_items())
+    look: bpy.props.EnumProperty(name="Look", description="What the viewport shows", items=LOOKS)
     switch_view: bpy.props.BoolProperty(
         name="Switch the View",
         description="Turn viewports that show no materials (Solid, Wireframe) to Material "

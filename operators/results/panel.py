@@ -1,6 +1,5 @@
 """The tab's third part: what was found of each object, how sure it is, and the stages that led there."""
 
-# No `from __future__ import annotations` here: Blender reads the properties off the annotations.
 from contextlib import suppress
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from ...addon.core.stages import LABELS, RUN_STAGES
 from .. import preferences
 from ..base.panel import NamedRows, SidebarPanel, places
 from . import told as results
-from .select import select
+from .look import select
 
 NAME: Shown[float] = 0.62
 """Share of a row that the name has where there are figures beside it."""

@@ -1,7 +1,5 @@
 """What a result folder says of its objects, for the panel: read when a file changed, kept in memory, never saved."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +19,7 @@ GIVEN = {"model": "model", "roughness": "roughness", "f0": "F0", "base_color": "
 
 
 def folder_of(scene: bpy.types.Scene) -> Path | None:
-    """The result folder that a scene's panel is about.
-
-    That of the active object where its run lies there, else the chosen one, else that of the recovered objects.
-    """
+    """The result folder that a scene's panel is about: the active object's, else the chosen one, else the room's."""
     state, result = standing(active(scene))
     if state == FITS:
         return result.folder
@@ -90,11 +85,7 @@ def label(model: str) -> str:
 
 
 def interval_width(one: dict[str, Any]) -> float | None:
-    """How unsure an object's material is, 0...1: the greater of two widths of 90 % intervals.
-
-    That of its roughness where it has a highlight, and half of that of its albedo, relative to it, where it has one.
-    None where nothing is known of either.
-    """
+    """How unsure an object's material is, 0...1: by its roughness, or half by its relative albedo; None if unknown."""
     found = []
     low, high = one.get("roughness_low"), one.get("roughness_high")
     brdf = shown(one.get("model"))
@@ -157,7 +148,6 @@ def facts(one: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _told(value) -> str:
-    """A given value in words."""
     if isinstance(value, (list, tuple)):
         return " ".join(map(_told, value))
     return f"{value:.2f}" if isinstance(value, float) else label(str(value))

@@ -3,8 +3,6 @@
 `scripts/collect_strings.py` lists what there is to translate.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from functools import lru_cache

@@ -4,8 +4,6 @@ An object's property `marks.GIVEN` holds it, so that it is saved and undone with
 `overrides.json`, which runs heed, is brought in line with the scene whenever a run or refit begins (`keep`).
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from pathlib import Path
@@ -19,10 +17,10 @@ from ...core.brdf.registry import shown
 from ...core.errors import BadInputError
 from ...core.results.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
 from ...core.results.place import write_capture
-from ..marks import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, WHITE
+from ..marks import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, SMOOTH, WHITE
 from ..results import file, look
 from ..scene.as_made import is_corrected, our_own
-from . import material, smoothing, unseen
+from . import material, unseen
 from .unseen import room_of
 
 ROUGHNESS = 0.3
@@ -189,13 +187,48 @@ def reapply(thing: bpy.types.Object) -> list[str]:
     list of str
         Sentences on what no longer fits.
     """
-    smoothing.reapply(thing)
+    if thing.type == "MESH" and SMOOTH in thing and not thing.data.library:
+        _shade(thing.data, thing[SMOOTH])
     if not correctable(thing) or is_corrected(material.worn_material(thing)):
         return []
     material.renew(thing, given(thing))
     said = unseen.reapply(thing)
     show(thing)
     return said
+
+
+def smooth(things: Iterable[bpy.types.Object], angle: float) -> int:
+    """Shade objects smooth but for edges sharper than `angle` radians; 0 makes them flat again.
+
+    The scan's geometric normals are what the light was divided by; smoothing changes how it is shown, not what was
+    found.
+
+    Returns
+    -------
+    int
+        How many meshes were changed.
+    """
+    changed = set()
+    for thing in things:
+        if angle > 0:
+            thing[SMOOTH] = float(angle)
+        elif SMOOTH in thing:
+            del thing[SMOOTH]
+        if thing.data not in changed:
+            _shade(thing.data, angle)
+            changed.add(thing.data)
+    return len(changed)
+
+
+def _shade(data: bpy.types.Mesh, angle: float) -> None:
+    if angle > 0:
+        data.shade_smooth()
+        data.set_sharp_from_angle(angle=angle)
+    else:
+        if "sharp_edge" in data.attributes:
+            data.attributes.remove(data.attributes["sharp_edge"])
+        data.shade_flat()
+    data.update()
 
 
 def say_white(thing: bpy.types.Object, albedo) -> None:
@@ -231,20 +264,17 @@ def folder_for(things: Iterable[bpy.types.Object]) -> Path:
 
 def keep_for_run(scene: bpy.types.Scene, folder: Path, capture: Path) -> None:
     """`keep` before a capture is run into `folder`, which may be another one than the scene's room came from."""
+    room = {thing for part in bpy.data.collections if part.get(CAPTURE) == str(capture) for thing in part.all_objects}
     things = [
         thing
         for thing in look.recovered(scene)
-        if result_folder(thing) == folder or str(capture) in [thing.get(CAPTURE), *_captures(thing)]
+        if result_folder(thing) == folder or thing.get(CAPTURE) == str(capture) or thing in room
     ]
     if any(GIVEN in thing or WHITE in thing for thing in things) or _written.get(folder):
         if not folder.exists():
             folder.mkdir(parents=True)
             write_capture(folder, capture)  # from the first file on it is that capture's
         keep(scene, folder, things)
-
-
-def _captures(thing: bpy.types.Object) -> list[str]:
-    return [part[CAPTURE] for part in bpy.data.collections if CAPTURE in part and thing.name in part.all_objects]
 
 
 def keep(scene: bpy.types.Scene, folder: Path, things: Iterable[bpy.types.Object] | None = None) -> set[int]:

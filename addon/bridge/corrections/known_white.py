@@ -1,7 +1,5 @@
 """A spot of known albedo: what its whole object's mean albedo has to be for the spot to come out as known."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy
@@ -76,7 +74,6 @@ def _around(thing, uv) -> list[float]:
 
 
 def _uv(thing, place, depsgraph):
-    """Atlas coordinates of a place on an object."""
     data = thing.data
     local = thing.matrix_world.inverted() @ place
     _, near, _, face = thing.closest_point_on_mesh(local, depsgraph=depsgraph)

@@ -4,8 +4,6 @@ Before the first change the object notes what was found (`marks.FOUND`) and the 
 back needs neither the result folder nor this add-on's memory.
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any
 
@@ -27,7 +25,7 @@ from ..data.materials import (
     f0_of,
     principled,
 )
-from ..data.nodes import mix_node
+from ..data.nodes import feed, mix_node
 from ..marks import FOUND
 
 WORN = "scan_relight_worn"
@@ -50,10 +48,7 @@ def worn_material(thing: bpy.types.Object) -> bpy.types.Material | None:
 
 
 def found(thing: bpy.types.Object, entry: dict[str, Any]) -> dict[str, Any]:
-    """`model`, `roughness`, `f0` and `base_color` as they were found; None where there is no such thing.
-
-    `entry` is what materials.json says of the object; {} where that is not known.
-    """
+    """`model`, `roughness`, `f0` and `base_color` as found, or None; `entry` is what materials.json says, if known."""
     return worn(thing, entry) | json.loads(thing.get(FOUND, "{}"))
 
 
@@ -170,10 +165,8 @@ def _tint(material, colour, mean) -> None:
     factors = [wished / is_ for wished, is_ in zip(colour, mean, strict=True)]
     if max(abs(factor - 1) for factor in factors) < 0.005:
         return
-    mix, amount, texture, factor, out = mix_node(tree.nodes)
-    mix.name = mix.label = TINT
-    mix.blend_type, mix.location = "MULTIPLY", (-200, 200)
-    amount.default_value = 1.0
-    factor.default_value = (*factors, 1)
-    tree.links.new(socket.links[0].from_socket, texture)
-    tree.links.new(out, socket)
+    texture = socket.links[0].from_socket
+    out = mix_node(
+        tree, 1.0, texture, (*factors, 1), name=TINT, label=TINT, blend_type="MULTIPLY", location=(-200, 200)
+    )
+    feed(socket, out)

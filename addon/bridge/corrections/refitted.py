@@ -1,7 +1,5 @@
 """Some objects of a room fitted again under what the artist gives, and brought into the scene where they are."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Generator, Iterable
 from pathlib import Path
@@ -96,7 +94,8 @@ def bringing(
             if is_corrected(worn_material(thing)):
                 by_hand.append(thing.name)
                 continue
-            _dress(thing, now, _own_image(thing) or image)
+            shown = (getattr(node, "image", None) for node in worn_material(thing).node_tree.nodes)
+            _dress(thing, now, next((one for one in shown if one and UV_MAP in one), image))
             warnings += corrections.reapply(thing)
     for collection in scene.collection.children_recursive:
         if collection.get(RESULT) and Path(collection[RESULT]) == folder:
@@ -107,13 +106,6 @@ def bringing(
 
         warnings.append(f"{few(by_hand)}: the material was edited by hand and stays.")
     return tuple(warnings)
-
-
-def _own_image(thing: bpy.types.Object) -> bpy.types.Image | None:
-    """The image of an object's own part of the atlas that its material shows; None where that is the room's."""
-    nodes = worn_material(thing).node_tree.nodes
-    images = (node.image for node in nodes if node.type == "TEX_IMAGE" and node.image)
-    return next((image for image in images if UV_MAP in image), None)
 
 
 def _dress(thing: bpy.types.Object, entry: dict, image: bpy.types.Image | None) -> None:

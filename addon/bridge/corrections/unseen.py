@@ -4,14 +4,13 @@ It starts as a copy of the result's Base Color and lies in the .blend or beside 
 no run writes over it. One image serves all objects that share an atlas; each object that shows it is marked.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
 import numpy as np
+from mathutils import Color
 
 from ...core.errors import BadInputError
 from ...core.scene.atlas import Atlas
@@ -93,10 +92,7 @@ def source_of(image: bpy.types.Image) -> bpy.types.Image:
 
 
 def restore(things: Iterable[bpy.types.Object], discard: bool = False) -> int:
-    """Let objects show what was found again; returns how many did not.
-
-    The painted image stays in the file and comes back with `own_image`, but for these objects with `discard`.
-    """
+    """Let objects show what was found again; how many did not. Only `discard` takes it out of the image too."""
     count = 0
     for thing in things:
         image, node = painted(thing), texture_node(thing)
@@ -113,7 +109,15 @@ def restore(things: Iterable[bpy.types.Object], discard: bool = False) -> int:
 
 
 def reapply(thing: bpy.types.Object) -> list[str]:
-    """Show an object's painted image again after a run; a sentence where its texture coordinates are others now."""
+    """Bring back what the artist did to an object whose mesh or material a run has just made anew.
+
+    Its corrected values, its painted image, its smooth shading. For whoever updates a room, at the end of each object.
+
+    Returns
+    -------
+    list of str
+        Sentences on what no longer fits.
+    """
     image, node = painted(thing), texture_node(thing)
     if image is None or node is None or node.image == image:
         return []
@@ -143,10 +147,7 @@ def keep_painted() -> None:
 
 
 def unseen_mask(thing: bpy.types.Object) -> np.ndarray:
-    """Where in its atlas no frame saw the surface, (h, w) bool, row 0 at the bottom.
-
-    Raises `BadInputError`: the result folder's coverage is gone, or of another size.
-    """
+    """Where in its atlas no frame saw the surface, (h, w) bool, row 0 at the bottom; raises as `coverage`."""
     return coverage(thing)[..., 0] < 0.5
 
 
@@ -174,6 +175,45 @@ def stencil(thing: bpy.types.Object) -> bpy.types.Image:
     if earlier := bpy.data.images.get(name):
         bpy.data.images.remove(earlier)
     return array_image(name, (~unseen_mask(thing)).astype(np.float32), DATA)
+
+
+def paint(context: bpy.types.Context, thing: bpy.types.Object, where: str, colour, masked: bool = True) -> None:
+    """Canvas, stencil mask and brush for the active object, then Blender's own Texture Paint.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+        `thing` is its active object.
+    where : str
+        Where the canvas goes, see `own_image`.
+    colour : (3,) of float or None
+        Linear Rec.709: what the brush begins with.
+    masked : bool
+        Protect what any frame saw.
+
+    Raises
+    ------
+    BadInputError, StorageError
+        As of `own_image` and `unseen_mask`.
+    """
+    if masked:
+        unseen_mask(thing)  # raises before anything is changed
+    tools = context.scene.tool_settings
+    settings = tools.image_paint
+    settings.mode, settings.canvas = "IMAGE", own_image(thing, where)
+    layers = thing.data.uv_layers
+    layers.active = layers[ATLAS_UV]
+    settings.use_stencil_layer = masked
+    if masked:
+        settings.stencil_image, settings.invert_stencil = stencil(thing), False
+        thing.data.uv_layer_stencil = layers[ATLAS_UV]
+    bpy.ops.object.mode_set(mode="TEXTURE_PAINT")
+    unified = getattr(settings, "unified_paint_settings", None) or tools.unified_paint_settings
+    brush = unified if unified.use_unified_color else settings.brush
+    if colour and brush is not None:
+        colour = Color(colour)
+        gamma = brush.bl_rna.properties["color"].subtype == "COLOR_GAMMA"  # sRGB up to 4.5
+        brush.color = [min(max(c, 0.0), 1.0) for c in (colour.from_scene_linear_to_srgb() if gamma else colour)]
 
 
 def fill(things: Iterable[bpy.types.Object], where: str = images.PACK) -> tuple[int, list[str]]:
@@ -257,7 +297,6 @@ def _sharing(thing: bpy.types.Object) -> list[bpy.types.Object]:
 
 
 def _elements(things: list[bpy.types.Object], size: int) -> Atlas:
-    """The texels of objects with their place; `object_id` counts `things`."""
     from ...core.scene.elements import make_atlas
 
     vertices, triangles, uv, number, first = [], [], [], [], 0
@@ -282,7 +321,6 @@ def _renew(image, source, thing) -> None:
 
 
 def _show_pixels(image, pixels) -> None:
-    """Give an image these pixels; one that is packed holds them at once."""
     image.pixels.foreach_set(pixels.ravel())
     image.update()
     if image.packed_file:

@@ -1,7 +1,5 @@
 """Data that is added to the open file: so that it can be taken away again, and in collections of its own."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import bpy

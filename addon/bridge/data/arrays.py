@@ -1,7 +1,5 @@
 """Blender's meshes as arrays, and back."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 

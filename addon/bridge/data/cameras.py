@@ -4,8 +4,6 @@ Panoramas and fisheyes become panoramic cameras, which Cycles alone renders; len
 counterpart, and become the perspective without distortion. One more, animated, goes along the capture's track.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -70,11 +68,7 @@ def use_camera(scene: bpy.types.Scene, thing: bpy.types.Object, size: bool = Tru
 
 
 def best_view(frames: Iterable[Frame], mesh: Mesh) -> int:
-    """Index of the frame that a room is first seen through: the first one with the most objects' middles in it.
-
-    What stands in whose way is not asked: a frame from the room's edge that looks into it has most, one of a wall or
-    ceiling few.
-    """
+    """Index of the frame that a room is first seen through: the first one with the most objects' middles in it."""
     _, owner = np.unique(mesh.object_id, return_inverse=True)
     centres = mesh.vertices[mesh.triangles].mean(1)
     middles = np.stack([np.bincount(owner, centres[:, axis]) for axis in range(3)], -1) / np.bincount(owner)[:, None]
@@ -125,10 +119,7 @@ def frame_cameras(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def differing(frames: Iterable[Frame]) -> str:
-    """One sentence if the frames don't all share one size and pixel shape ('' if they do).
-
-    Those are settings of the scene in Blender, not of a camera.
-    """
+    """One sentence if the frames don't share one size and pixel shape, which scenes have and not cameras; '' if so."""
     kinds = {(f.camera.width, f.camera.height, round(f.camera.fx / f.camera.fy, 6)) for f in frames}
     if len(kinds) < 2:
         return ""
@@ -150,14 +141,9 @@ def kept_lens(thing: bpy.types.Object) -> tuple[Lens, tuple[float, ...]] | None:
 
 def unlike(frames: Iterable[Frame]) -> str:
     """One sentence if Blender has no camera like some of the frames' lenses ('' if it has): how far they are off."""
-    worst: dict[tuple, tuple[float, Camera]] = {}
-    for frame in frames:
-        camera = frame.camera
-        if camera.lens is not None:
-            key = (camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.lens)
-            if key not in worst:
-                worst[key] = off_by(camera), camera
-    far, camera = max(worst.values(), key=lambda pair: pair[0], default=(0.0, None))
+    bent = [frame.camera for frame in frames if frame.camera.lens is not None]
+    kinds = {(c.width, c.height, c.fx, c.fy, c.cx, c.cy, c.lens): c for c in bent}
+    far, camera = max(((off_by(one), one) for one in kinds.values()), key=lambda pair: pair[0], default=(0.0, None))
     if far < _TOLD:
         return ""
     return (
@@ -197,8 +183,7 @@ def _is_wide(camera: Camera) -> bool:
 def _angles(camera: Camera) -> np.ndarray:
     """Coefficients of the ray's angle as a polynomial of the distance in millimetres from the principal point, (4,).
 
-    Cycles has no other fisheye with free coefficients; least squares in pixels over the frame, the mean of all
-    directions where a lens is not round.
+    Least squares in pixels over the frame, the mean of all directions where a lens is not round.
     """
     corners = np.array([(x, y) for x in (0, camera.width) for y in (0, camera.height)], float)
     reach = np.linalg.norm((corners - (camera.cx, camera.cy)) / (camera.fx, camera.fy), axis=1).max()
@@ -278,10 +263,7 @@ NO_FRAME: Code[int] = -1
 
 
 def make_track(cameras: Sequence[bpy.types.Object], collection: bpy.types.Collection) -> bpy.types.Object | None:
-    """Make the camera from those of the frames, in the capture's order; None of fewer than two.
-
-    Its lens, size and pixel shape are the first frame's. The timeline's frame k shows the capture's k-th, from 1.
-    """
+    """The camera along those of the frames, the timeline's frame k showing the k-th; None of fewer than two."""
     if len(cameras) < 2:
         return None
     thing = cameras[0].copy()

@@ -1,7 +1,5 @@
 """Images: the result folder's EXR files as Blender images, and arrays as generated ones."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

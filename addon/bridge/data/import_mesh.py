@@ -1,12 +1,11 @@
 """Meshes that the core has no reader for, through Blender's importers; what is open in Blender stays as it is."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -25,9 +24,8 @@ NUMBERED = re.compile(r"^(.*?)(?:\.(\d{3,}))?$", re.DOTALL)
 def import_mesh(path: Path) -> RawMesh:
     """Read an OBJ, glTF or GLB file: polygons as triangles, each object (or group) an instance of its name.
 
-    An OBJ file's coordinates are taken as they are; glTF's, which are +Y up, are turned to +Z up. Materials and
-    pictures are not looked at. Where there is but one object, `object_id` is None. Raises `BadInputError`: the file is
-    absent, damaged, holds no surface, or names files elsewhere.
+    OBJ as it is, glTF turned to +Z up; `object_id` is None for one object. Raises `BadInputError`: the file is absent,
+    damaged, holds no surface, or names files elsewhere.
     """
     path = Path(path)
     if not path.is_file():
@@ -61,14 +59,8 @@ def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> None:
         try:
             if path.suffix.lower() == ".obj":
                 copy, named = copy_obj(path, folder)
-                bpy.ops.wm.obj_import(
-                    filepath=str(copy),
-                    forward_axis="Y",
-                    up_axis="Z",
-                    use_split_objects=named,
-                    use_split_groups=not named,
-                    validate_meshes=True,
-                )
+                split = {"use_split_objects": named, "use_split_groups": not named}
+                bpy.ops.wm.obj_import(filepath=str(copy), forward_axis="Y", up_axis="Z", validate_meshes=True, **split)
                 return
             copy = copy_gltf(path, folder)
             if not hasattr(bpy.types, "IMPORT_SCENE_OT_gltf"):  # its add-on is switched off
@@ -93,40 +85,40 @@ def _scene_apart() -> Iterator[bpy.types.Scene]:
         made.remove()
 
 
-def _parts(scene: bpy.types.Scene) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray | None]]:
-    """Name, vertices, triangles and texture coordinates of each object with a surface, in the order of their names."""
+class _Part(NamedTuple):
+    """World positions (v, 3) float64, triangles (t, 3), and texture coordinates (t, 3, 2) if any, of a named object."""
+
+    name: str
+    vertices: np.ndarray
+    triangles: np.ndarray
+    uv: np.ndarray | None
+
+
+def _parts(scene: bpy.types.Scene) -> list[_Part]:
     scene.view_layers[0].update()  # world matrices of children
     found = []
     for thing in scene.collection.all_objects:
-        if thing.type == "MESH":
+        triangles = triangles_of(thing.data) if thing.type == "MESH" else ()
+        if len(triangles):
+            layer, mirrored = thing.data.uv_layers.active, thing.matrix_world.is_negative
+            uv = layer and layer_of(thing.data, layer.name)[triangles_of(thing.data, "loops")]
+            if mirrored:  # its triangles are wound the other way
+                triangles, uv = triangles[:, [0, 2, 1]], None if uv is None else uv[:, [0, 2, 1]]
             name, number = NUMBERED.match(thing.name).groups()
-            vertices, triangles, uv = _geometry(thing.data, np.array(thing.matrix_world, np.float64))
-            if len(triangles):
-                found.append(((name, int(number or 0)), vertices, triangles, uv))
-    return [(name, *rest) for (name, _), *rest in sorted(found, key=lambda part: part[0])]
+            part = _Part(name, vertices_of(thing.data, thing.matrix_world), triangles, uv)
+            found.append(((name, int(number or 0)), part))
+    return [part for _, part in sorted(found, key=lambda one: one[0])]
 
 
-def _geometry(mesh: bpy.types.Mesh, matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
-    """World positions ((v, 3) float64), triangles ((t, 3) int32) and texture coordinates of their corners."""
-    triangles, layer = triangles_of(mesh), mesh.uv_layers.active
-    uv = None if layer is None else layer_of(mesh, layer.name)[triangles_of(mesh, "loops")]
-    if np.linalg.det(matrix[:3, :3]) < 0:  # a mirrored object's triangles are wound the other way
-        triangles = triangles[:, [0, 2, 1]]
-        uv = None if uv is None else uv[:, [0, 2, 1]]
-    return vertices_of(mesh, matrix), triangles, uv
-
-
-def _joined(parts: list, name: str) -> RawMesh:
-    """One mesh; the parts are its objects if there are several."""
-    begin = np.cumsum([0, *(len(vertices) for _, vertices, _, _ in parts)])
-    vertices = np.concatenate([vertices for _, vertices, _, _ in parts])
-    triangles = np.concatenate([part[2] + offset for part, offset in zip(parts, begin)]).astype(np.int32)
+def _joined(parts: list[_Part], name: str) -> RawMesh:
+    begin = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    vertices = np.concatenate([part.vertices for part in parts])
+    triangles = np.concatenate([part.triangles + first for part, first in zip(parts, begin)]).astype(np.int32)
     uv = None
-    if any(part[3] is not None for part in parts):
-        uv = np.concatenate(
-            [np.zeros((len(part[2]), 3, 2), np.float32) if part[3] is None else part[3] for part in parts]
-        )
+    if any(part.uv is not None for part in parts):
+        blank = [np.zeros((len(part.triangles), 3, 2), np.float32) for part in parts]
+        uv = np.concatenate([other if part.uv is None else part.uv for part, other in zip(parts, blank)])
     if len(parts) == 1:
         return RawMesh(vertices, triangles, uv=uv, name=name)
-    ids = np.repeat(np.arange(len(parts)), [len(part[2]) for part in parts])
-    return RawMesh(vertices, triangles, ids, uv, {i: part[0] for i, part in enumerate(parts)}, name)
+    ids = np.repeat(np.arange(len(parts)), [len(part.triangles) for part in parts])
+    return RawMesh(vertices, triangles, ids, uv, {i: part.name for i, part in enumerate(parts)}, name)

@@ -1,7 +1,5 @@
 """Principled materials. The only module that knows the names of the node's sockets (Blender 4.x and 5.x)."""
 
-from __future__ import annotations
-
 import bpy
 
 from ...core.brdf.material import ObjectMaterial
@@ -9,7 +7,7 @@ from ...core.brdf.model import Brdf
 from ...core.brdf.registry import find
 from ..marks import UV_MAP
 from .mesh_objects import ATLAS_UV
-from .nodes import find_node, fresh_tree, mix_node
+from .nodes import add_node, feed, find_node, fresh_tree, mix_node
 
 MODEL = "scan_relight_model"
 """Custom property of each recovered material: the name of its description's model."""
@@ -72,24 +70,20 @@ def dress(
     one_sided: bool = False,
 ) -> bpy.types.Material:
     """`make_material` with a material that is there: its nodes go, its name and whoever wears it stay."""
-    nodes, links, principled = _fresh_tree(material)
-    value, shown = principled.inputs, description.model.principled(description)
-    # The fitted lobe is single scattering.
-    principled.distribution = "GGX"
-    if shown.roughness is not None:
-        value[ROUGHNESS].default_value = shown.roughness
-    value[METALLIC].default_value, value[ALPHA].default_value = shown.metallic, shown.alpha
-    value[SPECULAR_LEVEL].default_value, value[IOR].default_value = shown.specular_level, shown.ior
-    value[BASE_COLOR].default_value = (*(shown.base_color or (0.5,) * 3), 1)
+    shown = description.model.principled(description)
+    value = _fresh_principled(material)
+    principled(material).distribution = "GGX"  # the fitted lobe is single scattering
+    _set(value, METALLIC, shown.metallic, ALPHA, shown.alpha, SPECULAR_LEVEL, shown.specular_level, IOR, shown.ior)
+    _set(value, ROUGHNESS, shown.roughness, BASE_COLOR, (*(shown.base_color or (0.5,) * 3), 1))
     for name, number in shown.further.items():
         if name in value:
             value[name].default_value = number
     if shown.base_color is None and base_color is not None:
-        _show_image(nodes, links, base_color, value[BASE_COLOR])
+        _show_image(base_color, value[BASE_COLOR])
     if shown.emission is not None:
         _emit(value, shown.emission)
         if one_sided:
-            _front_only(nodes, links, value[EMISSION_COLOR])
+            _front_only(value[EMISSION_COLOR])
     material[MODEL] = description.model.name
     told = {_ALPHA: description.alpha, _F0: description.f0, _TRANSMISSION: description.transmission}
     for name in (*told, *_BEFORE.values()):
@@ -103,6 +97,20 @@ def dress(
 def principled(material: bpy.types.Material | None) -> bpy.types.ShaderNode | None:
     """A material's Principled node; None where it has none."""
     return find_node(material, "BSDF_PRINCIPLED")
+
+
+def emission_socket(material: bpy.types.Material) -> bpy.types.NodeSocket | None:
+    """The input that holds the colour of its light, also on a lamp with a black back; None where a picture gives it."""
+    socket = principled(material).inputs[EMISSION_COLOR]
+    if socket.links and socket.links[0].from_node.type == "MIX":
+        socket = next(one for one in socket.links[0].from_node.inputs if one.type == "RGBA")
+    return None if socket.links else socket
+
+
+def emission(material: bpy.types.Material) -> tuple[float, float, float]:
+    """Radiance that a material emits to its front, linear Rec.709; (0, 0, 0) for none."""
+    socket, strength = emission_socket(material), principled(material).inputs[EMISSION_STRENGTH].default_value
+    return tuple(strength * c for c in (socket.default_value[:3] if socket else (1.0, 1.0, 1.0)))
 
 
 def opacity(material: bpy.types.Material) -> float:
@@ -122,61 +130,52 @@ def plain_material(
     base_color: bpy.types.Image | None = None,
     alpha: float = 1.0,
 ) -> bpy.types.Material:
-    """A Principled material of plain numbers and at most a picture over the atlas, such as any program understands.
-
-    `specular` is Specular IOR Level, 0.5 being what `ior` says; `colour` and `emission` are linear Rec.709.
-    """
+    """A Principled material of plain numbers, linear Rec.709, and at most a picture, which any program understands."""
     material = bpy.data.materials.new(name)
-    nodes, links, principled = _fresh_tree(material)
-    value = principled.inputs
-    value[BASE_COLOR].default_value = (*colour, 1)
-    value[ROUGHNESS].default_value, value[METALLIC].default_value = roughness, metallic
-    value[SPECULAR_LEVEL].default_value, value[IOR].default_value = specular, ior
-    value[EMISSION_STRENGTH].default_value, value[ALPHA].default_value = 0.0, alpha
-    if any(emission):
-        _emit(value, emission)
+    value = _fresh_principled(material)
+    _set(value, BASE_COLOR, (*colour, 1), ROUGHNESS, roughness, METALLIC, metallic, ALPHA, alpha)
+    _set(value, SPECULAR_LEVEL, specular, IOR, ior)
+    _emit(value, emission)
     if base_color is not None:
-        _show_image(nodes, links, base_color, value[BASE_COLOR])
+        _show_image(base_color, value[BASE_COLOR])
     return material
 
 
-def _emit(value, radiance):
+def _emit(value, radiance) -> None:
     """Emit exactly `radiance`: strength is the largest component, so that colours stay within 1."""
-    strength = max(max(radiance), 0.0)
-    value[EMISSION_COLOR].default_value = (*(max(c, 0.0) / strength if strength else 1.0 for c in radiance), 1)
-    value[EMISSION_STRENGTH].default_value = strength
+    strength = max(*radiance, 0.0)
+    colour = (*(max(c, 0.0) / strength if strength else 1.0 for c in radiance), 1)
+    _set(value, EMISSION_COLOR, colour, EMISSION_STRENGTH, strength)
 
 
-def _front_only(nodes, links, socket):
+def _front_only(socket) -> None:
     """Blacken an emission colour where the surface is seen from behind; the strength stays a plain number."""
-    mix, factor, front, back, mixed = mix_node(nodes)
-    mix.location = (-250, -300)
-    geometry = nodes.new("ShaderNodeNewGeometry")
-    geometry.location = (-450, -350)
-    links.new(geometry.outputs["Backfacing"], factor)
-    front.default_value = tuple(socket.default_value)
-    back.default_value = (0, 0, 0, 1)
-    links.new(mixed, socket)
+    tree = socket.id_data
+    geometry = add_node(tree, "ShaderNodeNewGeometry", location=(-450, -350))
+    front = tuple(socket.default_value)
+    feed(socket, mix_node(tree, geometry.outputs["Backfacing"], front, (0, 0, 0, 1), location=(-250, -300)))
 
 
-def _show_image(nodes, links, image, socket):
-    """Show an image over the atlas, or its part of it."""
-    coordinates = nodes.new("ShaderNodeUVMap")
-    coordinates.uv_map = image.get(UV_MAP, ATLAS_UV)
-    coordinates.location = (-650, 200)
-    texture = nodes.new("ShaderNodeTexImage")
-    texture.image = image
-    texture.extension = "REPEAT" if image.get(REPEATS) else "EXTEND"
-    texture.location = (-400, 200)
-    links.new(coordinates.outputs[0], texture.inputs[0])
-    links.new(texture.outputs["Color"], socket)
+def _show_image(image, socket) -> None:
+    feed(socket, texture(socket.id_data, image, image.get(UV_MAP, ATLAS_UV)))
 
 
-def _fresh_tree(material):
-    """Nodes, links and the Principled node of an otherwise empty tree."""
-    nodes, links = fresh_tree(material)
-    principled = nodes.new("ShaderNodeBsdfPrincipled")
-    output = nodes.new("ShaderNodeOutputMaterial")
-    output.location = (300, 0)
-    links.new(principled.outputs[0], output.inputs["Surface"])
-    return nodes, links, principled
+def texture(tree: bpy.types.NodeTree, image: bpy.types.Image, uv_map: str, **settings) -> bpy.types.NodeSocket:
+    """The colour of an image that is laid out by a UV map."""
+    place = add_node(tree, "ShaderNodeUVMap", uv_map=uv_map, location=(-650, 200))
+    settings |= {"image": image, "extension": "REPEAT" if image.get(REPEATS) else "EXTEND", "location": (-400, 200)}
+    return add_node(tree, "ShaderNodeTexImage", place.outputs[0], **settings).outputs["Color"]
+
+
+def _set(value, *names_and_values) -> None:
+    """Give inputs values, name and value in turn; None leaves one."""
+    for name, one in zip(names_and_values[::2], names_and_values[1::2], strict=True):
+        feed(value[name], one)
+
+
+def _fresh_principled(material):
+    """Inputs of the Principled node of an otherwise empty tree."""
+    tree = fresh_tree(material)
+    shader = add_node(tree, "ShaderNodeBsdfPrincipled")
+    add_node(tree, "ShaderNodeOutputMaterial", shader.outputs[0], location=(300, 0))
+    return shader.inputs

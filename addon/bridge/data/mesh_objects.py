@@ -1,7 +1,5 @@
 """The room's triangles as Blender objects: one for each instance."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 
 import bpy

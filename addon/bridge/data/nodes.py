@@ -1,18 +1,49 @@
-"""Node trees of materials and worlds."""
-
-from __future__ import annotations
+"""Node trees of materials, worlds and modifiers; the world: light from directions where no surface was scanned."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import bpy
 
+from .images import load_image
 
-def fresh_tree(owner: bpy.types.Material | bpy.types.World) -> tuple[bpy.types.Nodes, bpy.types.NodeLinks]:
-    """Nodes and links of an owner's tree, emptied."""
+
+def fresh_tree(owner: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:
+    """An owner's tree, emptied."""
     if owner.node_tree is None:  # from Blender 5.0 on each has its tree and the switch is deprecated
         owner.use_nodes = True
     owner.node_tree.nodes.clear()
-    return owner.node_tree.nodes, owner.node_tree.links
+    return owner.node_tree
+
+
+def add_node(tree: bpy.types.NodeTree, kind: str, *inputs, **settings) -> bpy.types.Node:
+    """A node with some settings; for its first inputs the outputs that they are linked to, values, or None."""
+    node = tree.nodes.new(kind)
+    for name, value in settings.items():
+        setattr(node, name, value)
+    for socket, value in zip(node.inputs, inputs):
+        feed(socket, value)
+    return node
+
+
+def feed(socket: bpy.types.NodeSocket, value) -> None:
+    """Link an input to an output, or give it a value; None leaves it."""
+    if isinstance(value, bpy.types.NodeSocket):
+        socket.id_data.links.new(value, socket)
+    elif value is not None:
+        socket.default_value = value
+
+
+def mix_node(tree: bpy.types.NodeTree, factor, first, second, **settings) -> bpy.types.NodeSocket:
+    """The output of a node that mixes two colours, where `factor` is 0 and 1; each as for `add_node`."""
+    mix = add_node(tree, "ShaderNodeMix", data_type="RGBA", **settings)
+    # By type, as the node has sockets of the same name for each of its data types.
+    colours = [socket for socket in mix.inputs if socket.type == "RGBA"]
+    for socket, value in zip(
+        (next(one for one in mix.inputs if one.type == "VALUE"), *colours), (factor, first, second)
+    ):
+        feed(socket, value)
+    return next(socket for socket in mix.outputs if socket.type == "RGBA")
 
 
 def find_node(owner: bpy.types.Material | bpy.types.World | None, kind: str) -> bpy.types.Node | None:
@@ -21,27 +52,47 @@ def find_node(owner: bpy.types.Material | bpy.types.World | None, kind: str) -> 
     return next((node for node in nodes if node.type == kind), None)
 
 
-def behind(socket: bpy.types.NodeSocket) -> Iterator[bpy.types.Node]:
-    """The nodes that an input comes from, through whatever lies between."""
-    waiting, seen = [socket], set()
-    while waiting:
-        for link in waiting.pop().links:
-            if link.from_node not in seen:
-                seen.add(link.from_node)
-                yield link.from_node
-                waiting.extend(link.from_node.inputs)
-
-
 def image_node(socket: bpy.types.NodeSocket) -> bpy.types.ShaderNode | None:
-    """The node whose image an input shows; None where it shows none."""
-    return next((node for node in behind(socket) if node.type == "TEX_IMAGE" and node.image), None)
+    """The node whose image an input shows, through whatever lies between; None where it shows none."""
+    return next((node for node in _behind(socket, set()) if node.type == "TEX_IMAGE" and node.image), None)
 
 
-def mix_node(nodes: bpy.types.Nodes) -> tuple:
-    """A node that mixes two colours, and its sockets: factor, the colours where that is 0 and 1, result."""
-    mix = nodes.new("ShaderNodeMix")
-    mix.data_type = "RGBA"
-    # By type, as the node has sockets of the same name for each of its data types.
-    factor = next(socket for socket in mix.inputs if socket.type == "VALUE")
-    colours = [socket for socket in mix.inputs if socket.type == "RGBA"]
-    return mix, factor, *colours, next(socket for socket in mix.outputs if socket.type == "RGBA")
+def _behind(socket: bpy.types.NodeSocket, seen: set) -> Iterator[bpy.types.Node]:
+    for link in socket.links:
+        if link.from_node not in seen:
+            seen.add(link.from_node)
+            yield link.from_node
+            for inner in link.from_node.inputs:
+                yield from _behind(inner, seen)
+
+
+def set_world(scene: bpy.types.Scene, environment: Path | str | None, strength: float = 1.0) -> bpy.types.World:
+    """Give a scene a world of its own.
+
+    Parameters
+    ----------
+    environment : Path, str or None
+        Equirectangular radiance, linear Rec.709, as docs/architecture.md states: u = 0.5 - atan2(y, x) / (2 pi),
+        v = 0.5 + asin(z) / pi. None: black.
+    strength : float
+        Factor on the radiance.
+
+    Raises
+    ------
+    BadInputError
+        The file is missing or is no image.
+    """
+    image = None if environment is None else load_image(environment, "Scan Relight environment", keep=False)
+    scene.world = make_world("Scan Relight", image, strength)
+    return scene.world
+
+
+def make_world(name: str, image: bpy.types.Image | None, strength: float) -> bpy.types.World:
+    """A world that shows an equirectangular picture, or black."""
+    world = bpy.data.worlds.new(name)
+    tree = fresh_tree(world)
+    texture = image and add_node(tree, "ShaderNodeTexEnvironment", image=image, location=(-300, 0)).outputs[0]
+    background = add_node(tree, "ShaderNodeBackground", (0, 0, 0, 1), strength)
+    feed(background.inputs[0], texture)
+    add_node(tree, "ShaderNodeOutputWorld", background.outputs[0], location=(300, 0))
+    return world

@@ -4,8 +4,6 @@
 other become islands of their own, and islands that waste the square are cut.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import bpy
@@ -70,7 +68,8 @@ def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0, polygons: P
     """
     if not len(mesh.triangles):
         return np.zeros((0, 3, 2), np.float32)
-    whole = _without_repeats(mesh.triangles)
+    a, b, c = mesh.triangles.T
+    whole = (a != b) & (b != c) & (c != a)  # Blender can't hold others
     triangles, object_id = mesh.triangles[whole], mesh.object_id[whole]
     uv = np.zeros((len(mesh.triangles), 3, 2), np.float32)
     if polygons is not None:
@@ -172,12 +171,6 @@ def _packed(points, corners, uv, size, margin_texels):
             margin *= 1.05 * wanted / border
         found.append(packed)
     return max(found, key=lambda packed: areas(packed).sum())
-
-
-def _without_repeats(triangles):
-    """Triangles of three different vertices, (t,) bool; Blender can't hold others."""
-    a, b, c = triangles.T
-    return (a != b) & (b != c) & (c != a)
 
 
 def _split(vertices, triangles, label):

@@ -1,7 +1,5 @@
 """The demo's closing table: what was recovered of each object beside what is true."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -16,17 +14,7 @@ from ...core.scene.model import Capture
 from ...core.scene.rays import RayScene
 from ..data.arrays import layer_of, read
 from ..data.images import image_array
-from ..data.materials import (
-    BASE_COLOR,
-    EMISSION_COLOR,
-    EMISSION_STRENGTH,
-    METALLIC,
-    ROUGHNESS,
-    alpha_of,
-    brdf_of,
-    f0_of,
-    principled,
-)
+from ..data.materials import BASE_COLOR, METALLIC, ROUGHNESS, alpha_of, brdf_of, emission, f0_of, principled
 from ..data.mesh_objects import ATLAS_UV
 from ..marks import OBJECT_ID
 from .room import room
@@ -53,54 +41,36 @@ def comparison(capture: Path, result: Path) -> str:
     things = {thing[OBJECT_ID]: thing for thing in bpy.data.objects if OBJECT_ID in thing}
     rows = [("object", "model", "base colour", "(true)", "roughness", "(true)", "F0", "(true)", "lamp", "(true)")]
     for known in truth:
-        thing = things.get(known["id"])
-        if thing is None:
-            rows.append((known["class_name"], "missing", *[""] * 8))
-            continue
-        found = describe(thing, measured)
-        emitter, gloss = known["emission"] is not None, known["alpha"] is not None
-        rows.append(
-            (
-                known["class_name"],
-                found["model"],
-                colour(found["base_color"]),
-                "" if emitter else colour(true_colours[known["id"]]),
-                number(found["roughness"]),
-                number(known["alpha"] ** 0.5) if gloss else "",
-                number(found["f0"]),
-                number(known["f0"]) if gloss else "",
-                colour(found["emission"]),
-                colour(known["emission"]),
-            )
-        )
-    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+        row = [known["class_name"]]
+        if known["id"] in things:
+            found, gloss = describe(things[known["id"]], measured), known["alpha"] is not None
+            true_colour = None if known["emission"] is not None else true_colours[known["id"]]
+            row += [found["model"], numbers(found["base_color"]), numbers(true_colour)]
+            row += [numbers(found["roughness"]), numbers(known["alpha"] ** 0.5 if gloss else None)]
+            row += [numbers(found["f0"]), numbers(known["f0"] if gloss else None)]
+            row += [numbers(found["emission"]), numbers(known["emission"])]
+        else:
+            row += ["missing", *[""] * 8]
+        rows.append(row)
+    widths = [max(map(len, column)) for column in zip(*rows)]
     return "\n".join("  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows)
 
 
-def colour(value) -> str:
-    """Three numbers, or nothing."""
-    return "" if value is None else " ".join(f"{c:.2f}" for c in value)
-
-
-def number(value) -> str:
-    """One number, or nothing."""
-    return "" if value is None else f"{value:.2f}"
+def numbers(value) -> str:
+    """One number or several, or nothing."""
+    return "" if value is None else " ".join(f"{one:.2f}" for one in np.atleast_1d(value))
 
 
 def describe(thing, measured: np.ndarray) -> dict:
     """What the material of a recovered object says: model, mean base colour, roughness, F0, radiance."""
     material = thing.data.materials[0]
-    shader = principled(material)
-    brdf = brdf_of(material)
-    glossy = alpha_of(material) is not None
-    emission = shader.inputs[EMISSION_COLOR].default_value[:3]
-    strength = shader.inputs[EMISSION_STRENGTH].default_value
+    value, brdf = principled(material).inputs, brdf_of(material)
     return {
         "model": brdf.name,
-        "base_color": None if brdf.gives_light else mean_base_color(thing, shader.inputs[BASE_COLOR], measured),
-        "roughness": shader.inputs[ROUGHNESS].default_value if glossy else None,
-        "f0": f0_of(material) if not shader.inputs[METALLIC].default_value else None,
-        "emission": tuple(c * strength for c in emission) if brdf.gives_light else None,
+        "base_color": None if brdf.gives_light else mean_base_color(thing, value[BASE_COLOR], measured),
+        "roughness": None if alpha_of(material) is None else value[ROUGHNESS].default_value,
+        "f0": None if value[METALLIC].default_value else f0_of(material),
+        "emission": emission(material) if brdf.gives_light else None,
     }
 
 

@@ -1,7 +1,5 @@
 """Renders the demo's room with Cycles into a capture folder, exactly as a scanner's would look."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
@@ -19,8 +17,8 @@ from ...core.progress import Progress
 from ..data.added import Made
 from ..data.arrays import set_layer
 from ..data.images import array_image
-from ..data.materials import BASE_COLOR, IOR, ROUGHNESS, SPECULAR_LEVEL
-from ..data.nodes import fresh_tree
+from ..data.materials import BASE_COLOR, plain_material, principled, texture
+from ..data.nodes import add_node, feed, fresh_tree
 from ..refused import reason_of
 from ..relight.pictures import can_denoise
 from .room import FIELD_OF_VIEW, Paint, Thing, frame_path, room, tour, write_all_but_frames
@@ -142,23 +140,21 @@ def build(thing: Thing):
 
 def material(name: str, paint: Paint):
     """The paint as a Cycles material: emission, or a Principled."""
+    if not paint.emission:
+        plain = paint.albedo.ndim == 1
+        made = plain_material(
+            name,
+            tuple(paint.albedo.tolist()) if plain else (0.5, 0.5, 0.5),
+            paint.roughness,
+            0.5 if paint.f0 else 0.0,
+            ior=ior_of(paint.f0) if paint.f0 else 1.5,
+        )
+        principled(made).distribution = "GGX"
+        if not plain:
+            picture = array_image(name, paint.albedo)
+            feed(principled(made).inputs[BASE_COLOR], texture(made.node_tree, picture, "uv"))
+        return made
     made = bpy.data.materials.new(name)
-    nodes, links = fresh_tree(made)
-    output = nodes.new("ShaderNodeOutputMaterial")
-    if paint.emission:
-        shader = nodes.new("ShaderNodeEmission")
-        shader.inputs["Color"].default_value = (*paint.emission, 1)
-    else:
-        shader = nodes.new("ShaderNodeBsdfPrincipled")
-        shader.distribution = "GGX"
-        shader.inputs[ROUGHNESS].default_value = paint.roughness
-        shader.inputs[IOR].default_value = ior_of(paint.f0) if paint.f0 else 1.5
-        shader.inputs[SPECULAR_LEVEL].default_value = 0.5 if paint.f0 else 0.0
-        if paint.albedo.ndim == 1:
-            shader.inputs[BASE_COLOR].default_value = (*paint.albedo.tolist(), 1)
-        else:
-            texture = nodes.new("ShaderNodeTexImage")
-            texture.image, texture.extension = array_image(name, paint.albedo), "EXTEND"
-            links.new(texture.outputs["Color"], shader.inputs[BASE_COLOR])
-    links.new(shader.outputs[0], output.inputs["Surface"])
+    tree = fresh_tree(made)
+    add_node(tree, "ShaderNodeOutputMaterial", add_node(tree, "ShaderNodeEmission", (*paint.emission, 1)).outputs[0])
     return made

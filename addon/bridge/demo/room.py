@@ -4,8 +4,6 @@ disk, as a capture but for its pictures.
 Everything is made of quads; metres, +Z up. `demo.render` turns it into a scene for Cycles and into a capture.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The demo: a room whose truth is known is rendered, recovered, compared and lit anew."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Recovered materials as assets of Blender's Asset Browser."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -1,15 +1,10 @@
-"""The room as glTF or USD, through Blender's own exporters.
+"""The room as glTF or USD, through Blender's own exporters."""
 
-They understand plain Principled materials only. So a copy of each object is exported that shares its mesh and wears
-such a material; the copies are deleted afterwards and nothing of the scene has changed.
-"""
-
-from __future__ import annotations
-
+import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import bpy
@@ -18,13 +13,11 @@ import numpy as np
 from ...core.errors import BadInputError
 from ..data.added import Made
 from ..data.arrays import faces_of, layer_of
-from ..data.materials import opacity
+from ..data.materials import MODEL, opacity
 from ..data.mesh_objects import PARTS_UV
 from ..marks import OBJECT_ID
 from ..refused import refused
-from .files import put, textures_of
 from .material import plain_copy
-from .names import Names, own_name, unique
 
 FORMATS = {".glb": "GLB", ".gltf": "GLTF_SEPARATE", ".usdc": "USD", ".usd": "USD", ".usda": "USD", ".usdz": "USD"}
 """By ending."""
@@ -143,10 +136,7 @@ def copies(
     textures: Path,
     level: bool = True,
 ) -> Iterator[bpy.types.Collection]:
-    """A collection of copies with plain materials; afterwards no trace of it is left.
-
-    `textures` gets the 8-bit sRGB pictures that the materials show; for `level` see `plain_copy`.
-    """
+    """A collection of copies with plain materials, their 8-bit pictures in `textures`; no trace is left afterwards."""
     world, names, made = scene.world, Names(), Made()
     try:
         textures.mkdir(parents=True)
@@ -200,7 +190,6 @@ def _tiles(thing: bpy.types.Object) -> frozenset[int]:
 
 
 def _with_own_pictures(world: bpy.types.World, textures: Path) -> bpy.types.World:
-    """A copy of a world whose pictures lie in `textures`."""
     copy = world.copy()
     for node in copy.node_tree.nodes:
         image = node.image if node.type == "TEX_ENVIRONMENT" else None
@@ -220,7 +209,6 @@ def _with_own_pictures(world: bpy.types.World, textures: Path) -> bpy.types.Worl
 
 
 def _write(path: Path, ending: str, collection: bpy.types.Collection) -> None:
-    """Have Blender's exporter write the collection."""
     if FORMATS[ending] == "USD":
         bpy.ops.wm.usd_export(
             filepath=str(path),
@@ -249,3 +237,111 @@ def _write(path: Path, ending: str, collection: bpy.types.Collection) -> None:
         export_animations=False,
         use_active_scene=True,
     )
+
+
+def textures_of(path: Path) -> str:
+    """Name of the folder for a file's pictures, beside it: no other file's, though its stem or ending be the same."""
+    return f"{path.name} textures"
+
+
+def put(made: Path, path: Path) -> None:
+    """Bring what was written into the folder `made` to its place beside `path`, `path` itself last.
+
+    An earlier export of that file is replaced with its textures, nothing else is touched; all is back where it fails
+    (`OSError`).
+    """
+    if not (made / path.name).is_file() or not (made / path.name).stat().st_size:
+        raise OSError(0, "Blender's exporter wrote nothing")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    names = sorted({one.name for one in made.iterdir()} | {textures_of(path)}, key=lambda name: name == path.name)
+    partial, before = ({name: path.parent / f".{kind}-{name}" for name in names} for kind in ("partial", "before"))
+    done = []
+    try:
+        for name in names:
+            _remove(partial[name], before[name])
+            if (made / name).is_dir() and any((made / name).iterdir()):
+                shutil.copytree(made / name, partial[name])
+            elif (made / name).is_file():
+                shutil.copyfile(made / name, partial[name])
+        for name in names:
+            if (path.parent / name).exists():
+                (path.parent / name).replace(before[name])
+            done.append(name)
+            if partial[name].exists():
+                partial[name].replace(path.parent / name)
+    except OSError:
+        with suppress(OSError):
+            for name in reversed(done):
+                _remove(path.parent / name)
+                if before[name].exists():
+                    before[name].replace(path.parent / name)
+        raise
+    finally:
+        _remove(*partial.values())
+    _remove(*before.values())
+
+
+def _remove(*paths: Path) -> None:
+    for path in paths:
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+
+
+_ASIDE = "Scan Relight keeps "
+_SUFFIX = re.compile(r"\.\d{3,}$")
+
+
+def identifier(name: str) -> str:
+    """A name as USD writes it: letters, digits and underscores, no digit first."""
+    legal = re.sub(r"\W", "_", name)
+    return f"_{legal}" if legal[:1].isdigit() else legal
+
+
+def own_name(thing: bpy.types.ID) -> str:
+    """An object's or material's name; of a recovered one without the '.001' that Blender adds to the second room's."""
+    return _SUFFIX.sub("", thing.name) if OBJECT_ID in thing or MODEL in thing else thing.name
+
+
+def unique(names: Iterable[str]) -> list[str]:
+    """The names, those after the first of their kind with a number: no two are one in USD, nor on any file system."""
+    taken, result = set(), []
+    for name in names:
+        found, number = name, 1
+        while identifier(found).casefold() in taken:
+            number += 1
+            found = f"{name} ({number})"
+        taken.add(identifier(found).casefold())
+        result.append(found)
+    return result
+
+
+class Names:
+    """Who bears which name for the moment, and the way back."""
+
+    def __init__(self) -> None:
+        self._before: list[tuple[bpy.types.ID, str]] = []
+
+    def give(self, kind: str, item: bpy.types.ID, name: str) -> None:
+        """Let `item` of ``bpy.data``'s collection `kind` be called `name`; nothing happens to linked data."""
+        if item.library or item.name == name:
+            return
+        known = getattr(bpy.data, kind)
+        bearer = known.get((name, None))
+        if bearer is not None:
+            self._rename(bearer, f"{_ASIDE}{len(self._before)}")
+        self._rename(item, name)
+
+    def _rename(self, item: bpy.types.ID, name: str) -> None:
+        self._before.append((item, item.name))
+        item.name = name
+
+    def put_back(self) -> None:
+        """Everything is called what it was; copies have to be gone."""
+        for item, name in reversed(self._before):
+            try:
+                item.name = name
+            except ReferenceError:  # a copy, gone by now
+                continue
+        self._before.clear()

@@ -1,7 +1,5 @@
 """A recovered material in plain Principled terms: numbers, one 8-bit picture over the atlas, one colour of light."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -17,12 +15,12 @@ from ..data.materials import (
     ALPHA,
     BASE_COLOR,
     EMISSION_COLOR,
-    EMISSION_STRENGTH,
     IOR,
     METALLIC,
     REPEATS,
     ROUGHNESS,
     SPECULAR_LEVEL,
+    emission,
     plain_material,
     principled,
 )
@@ -88,15 +86,6 @@ def plain_copy(
     )
     made.use_backface_culling = bool(value[EMISSION_COLOR].links) and lamps.is_lamp(material)
     return made
-
-
-def emission(material: bpy.types.Material) -> tuple[float, float, float]:
-    """Radiance that a material emits to its front, linear Rec.709; (0, 0, 0) for none."""
-    if lamps.is_lamp(material):
-        return lamps.radiance(material)
-    shader = principled(material)
-    strength = shader.inputs[EMISSION_STRENGTH].default_value
-    return tuple(strength * c for c in shader.inputs[EMISSION_COLOR].default_value[:3])
 
 
 def _one_tile(image: bpy.types.Image, tiles: frozenset[int]) -> tuple[bpy.types.Image, int]:

@@ -1,7 +1,5 @@
 """How this add-on's command line is started as a process of its own from within Blender."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Sequence
@@ -29,10 +27,8 @@ sys.exit(main(told["arguments"]))
 def command(arguments: Sequence[str], **options: object) -> list[str]:
     """The words of a command that runs `scan-relight ARGUMENTS`, with an option for each of `options` but for None.
 
-    In Blender it is Blender itself, without a window and with factory settings: so no preference, startup file or other
-    add-on has a say in the result, and it does not matter how this one was installed or enabled. Packages are looked
-    for where this process finds them, in the same order. Where `bpy` is a Python module it is Python. It has a
-    lower priority, so that the window gets the processor when it needs it.
+    In Blender it is Blender itself, without a window and with factory settings, so that no preference, startup file or
+    other add-on has a say; packages are looked for where this process finds them. It has a lower priority.
     """
     arguments = [str(one) for one in arguments]
     for name, value in options.items():

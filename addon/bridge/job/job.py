@@ -4,8 +4,6 @@ A run shares nothing with Blender's window but two pipes: it can't hold the wind
 crash on either side can't harm the other. Nothing of it is kept in Blender's data. This module knows no Blender.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import json

@@ -1,8 +1,8 @@
-"""A whole run: capture in, result folder out. The command line and the operators both call this."""
-
-from __future__ import annotations
+"""A whole run, capture in, result folder out, and a few objects fitted again: what command line and operators call."""
 
 import time
+from collections.abc import Collection
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -11,8 +11,11 @@ import bpy
 from ...core.io.layout import AS_FOUND, Reading
 from ...core.io.read import read_capture
 from ...core.pipeline.recover import Recovery
-from ...core.pipeline.run import Run, check_run
+from ...core.pipeline.refit import REPORT, Refit, open_result
+from ...core.pipeline.run import Run, check_run, package_versions, told_in_a_sentence
 from ...core.progress import Progress
+from ...core.results.overrides import OVERRIDES
+from ...core.results.store import Store
 from ...core.scene.model import Capture
 from ...core.settings import Settings
 from ...core.stages import READ, WRITE
@@ -26,8 +29,10 @@ from ..scene.parts import imported
 from ..scene.write import write_scene
 from ..slices import whole
 
-OWN, SCENE = "OWN", "SCENE"
-"""Where a room goes: into a scene of its own, or into the one that is open."""
+SCENE = "scene.blend"
+REFIT_WEIGHTS = {READ: 1, "surface": 2, "lit_diffuse": 0.1, "shading": 0.1, "specular": 3, WRITE: 5}
+"""Rough cost of a refit's parts, for the estimate of the time left."""
+OUTDATED = f"{SCENE} shows the room as it was before objects were fitted again."
 
 
 def run(
@@ -45,7 +50,7 @@ def run(
     copies: bool = False,
     override: Path | None = None,
     heed_kept: bool = True,
-    into: str = OWN,
+    into: str = "OWN",
 ) -> dict:
     """Recover a capture up to a stage; stages that the result folder holds already are not done again.
 
@@ -97,33 +102,81 @@ def run(
     elif scene is not None and not import_first:
         imported(capture.root)
     whole_run = Run(capture, out_folder, settings, progress, reading, override, heed_kept, versions(), started)
-    faces = polygons_of(capture.root, capture.mesh)
 
     def write(recovery: Recovery, facing: Capture) -> tuple[str, ...]:
-        surface, materials, folder = recovery.surface(), recovery.materials(), recovery.store.folder
-        warnings = write_scene(
-            folder / "scene.blend",
-            facing,
-            surface.atlas.uv,
-            materials,
-            folder,
-            recovery.median_radiance(),
-            fresh=scene is None,
-            facing=True,
-            parts=recovery.parts,
-        )
-        if scene is not None and own:
-            return warnings + whole(writing_back(scene, capture, surface.first_uv, materials, folder, images, copies))
-        if scene is not None:
-            return (
-                warnings
-                + whole(bringing(folder, scene if into == SCENE else None, images, known=not import_first)).warnings
-            )
-        return warnings
+        warnings = write_recovered(recovery, facing, fresh=scene is None)
+        surface, folder = recovery.surface(), recovery.store.folder
+        if scene is None:
+            return warnings
+        if own:
+            onto = scene, capture, surface.first_uv, recovery.materials(), folder, images, copies
+            return warnings + whole(writing_back(*onto))
+        brought = whole(bringing(folder, scene if into == "SCENE" else None, images, known=not import_first))
+        return warnings + brought.warnings
 
     with whole_run:
-        report = whole_run.stages(partial(unwrap, polygons=faces), until, from_stage)
+        lay_out = partial(unwrap, polygons=polygons_of(capture.root, capture.mesh))
+        report = whole_run.stages(lay_out, until, from_stage)
         return whole_run.write(write) if until == WRITE else report
+
+
+def refit(
+    folder: Path | str,
+    objects: Collection[int],
+    progress: Progress,
+    override: Path | None = None,
+    heed_kept: bool = True,
+    scene: bool = True,
+) -> dict:
+    """Fit objects of a result again with all else held; `progress`, `override`, `heed_kept` and errors as in `run`.
+
+    Parameters
+    ----------
+    folder : path
+        The result folder.
+    objects : collection of int
+        Those to fit; those of which something new is given are fitted besides.
+    scene : bool
+        Also write scene.blend, from an empty file: what is open in this process is lost.
+
+    Returns
+    -------
+    dict
+        What report.json holds.
+    """
+    started = time.monotonic()
+    progress.stage(READ)
+    result = open_result(folder, objects, override, heed_kept)
+    with Store(folder) as store, told_in_a_sentence(store.folder):
+        again = Refit(result, store, progress)
+        progress.done()
+        again.refit()
+        if override is not None and heed_kept:
+            store.write_json(OVERRIDES, again.overrides.as_dict())
+        progress.stage(WRITE)
+        again.look_closer()
+        for name in (REPORT, SCENE) if scene else (REPORT,):
+            store.path(name).unlink(missing_ok=True)  # a stopped run must not leave the last one's among new images
+        again.write()
+        progress.update(0.7)
+        report = again.report()
+        report["warnings"] = [one for one in report["warnings"] if one != OUTDATED] + [OUTDATED] * (not scene)
+        if scene:
+            capture = result.room.capture
+            frames = again.room_poses().of(capture.frames)
+            write_recovered(again, replace(capture, frames=frames, mesh=again.written_mesh()), fresh=True)
+        report["versions"] = versions() | package_versions()
+        report["refit"] = {"objects": sorted(again.touched), "seconds": round(time.monotonic() - started, 2)}
+        store.write_json(REPORT, report)
+        progress.done()
+    return report
+
+
+def write_recovered(done: Recovery | Refit, facing: Capture, fresh: bool) -> tuple[str, ...]:
+    """Write scene.blend of what was recovered; `facing`: the capture with the mesh that is written."""
+    uv, materials, folder = done.surface().atlas.uv, done.materials(), done.store.folder
+    how = {"fresh": fresh, "facing": True, "parts": done.parts}
+    return write_scene(folder / SCENE, facing, uv, materials, folder, done.median_radiance(), **how)
 
 
 def versions() -> dict[str, str]:

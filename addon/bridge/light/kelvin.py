@@ -5,8 +5,6 @@ The locus of black bodies is that of Kim et al. (US patent 7024034, 2006), 1667.
 2800 and 6500 K and to some per cent beyond.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...core.errors import BadInputError

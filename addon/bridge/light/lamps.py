@@ -4,15 +4,13 @@ A lamp is a material whose model gives light. Its state is kept with the materia
 saved with the file and needs no registered add-on; the node tree always shows it.
 """
 
-from __future__ import annotations
-
 import bpy
 
 from ...core.brdf.emitter import LAMP_ALBEDO as UNLIT_GREY
 from ...core.errors import BadInputError
 from ...core.kinds import Limit
 from ...core.naming import in_order, numbered
-from ..data.materials import BASE_COLOR, EMISSION_COLOR, EMISSION_STRENGTH, brdf_of, principled
+from ..data.materials import BASE_COLOR, EMISSION_STRENGTH, brdf_of, emission, emission_socket, principled
 from .kelvin import HIGHEST, LOWEST, kelvin_of, luminance, rgb_of
 
 _STRENGTH, _COLOUR, _BASE = (f"scan_relight_recovered_{name}" for name in ("strength", "colour", "base"))
@@ -21,6 +19,9 @@ _OFF, _FACTOR = "scan_relight_lamp_off", "scan_relight_lamp_factor"
 MAX_FACTOR: Limit[float] = 1000.0
 _DARK = ("window", "screen", "monitor", "tv", "television", "display", "laptop")
 """Classes that are nearly black when off: what is behind them is unlit."""
+
+radiance = emission
+"""What a lamp emits now, linear Rec.709 in the frames' unit."""
 
 
 def is_lamp(material: bpy.types.Material | None) -> bool:
@@ -47,10 +48,7 @@ def lamps_by_object(scene: bpy.types.Scene) -> dict[str, list[bpy.types.Material
 
 
 def lamp_named(scene: bpy.types.Scene, name: str) -> list[bpy.types.Material]:
-    """The lamps that a name means: that very material, or all of that class, whatever the case.
-
-    Raises `BadInputError`: there is none; the sentence lists the known ones.
-    """
+    """The lamps that a name means: that very material, or all of that class; raises `BadInputError` without any."""
     lamps = find_lamps(scene)
     wanted = name.strip().casefold()
     found = [m for m in lamps if m.name.casefold() == wanted] or [
@@ -90,14 +88,14 @@ def set_factor(material: bpy.types.Material, value: float) -> None:
 
 def colour(material: bpy.types.Material) -> tuple[float, float, float] | None:
     """Colour of the light, linear Rec.709, its largest component 1 as recovered; None where a picture gives it."""
-    socket = _colour_socket(material)
+    socket = emission_socket(material)
     return None if socket is None else tuple(socket.default_value[:3])
 
 
 def set_colour(material: bpy.types.Material, value: tuple[float, float, float]) -> None:
     """Give the light another colour at the same strength; without effect where a picture gives it."""
     _keep(material)
-    socket = _colour_socket(material)
+    socket = emission_socket(material)
     if socket is not None:
         socket.default_value = (*(max(float(c), 0.0) for c in value), 1)
 
@@ -117,16 +115,10 @@ def set_kelvin(material: bpy.types.Material, value: float) -> None:
 
 def recovered_radiance(material: bpy.types.Material) -> tuple[float, float, float]:
     """What the scan found, linear Rec.709 in the frames' unit."""
-    node, socket = principled(material), _colour_socket(material)
+    node, socket = principled(material), emission_socket(material)
     strength = material.get(_STRENGTH, node.inputs[EMISSION_STRENGTH].default_value)
     tint = material.get(_COLOUR) or (socket.default_value[:3] if socket is not None else (1.0, 1.0, 1.0))
     return tuple(float(strength) * float(c) for c in tint)
-
-
-def radiance(material: bpy.types.Material) -> tuple[float, float, float]:
-    """What the lamp emits now, linear Rec.709 in the frames' unit."""
-    strength = principled(material).inputs[EMISSION_STRENGTH].default_value
-    return tuple(strength * c for c in colour(material) or (1.0, 1.0, 1.0))
 
 
 def is_changed(material: bpy.types.Material) -> bool:
@@ -145,7 +137,7 @@ def restore(material: bpy.types.Material) -> None:
     """Make a lamp exactly what was recovered."""
     if _STRENGTH not in material:
         return
-    inputs, socket = principled(material).inputs, _colour_socket(material)
+    inputs, socket = principled(material).inputs, emission_socket(material)
     inputs[EMISSION_STRENGTH].default_value = material[_STRENGTH]
     inputs[BASE_COLOR].default_value = material[_BASE]
     if socket is not None:
@@ -156,12 +148,8 @@ def restore(material: bpy.types.Material) -> None:
 
 def snapshot(material: bpy.types.Material) -> dict:
     """The state of a lamp for `put_back`."""
-    return {
-        "on": is_on(material),
-        "factor": factor(material),
-        "colour": colour(material),
-        "touched": _STRENGTH in material,
-    }
+    state = {"on": is_on(material), "factor": factor(material), "colour": colour(material)}
+    return state | {"touched": _STRENGTH in material}
 
 
 def put_back(material: bpy.types.Material, state: dict) -> None:
@@ -189,7 +177,9 @@ def state_sockets(material: bpy.types.Material) -> list[bpy.types.NodeSocket]:
     if _STRENGTH not in material or not is_lamp(material):
         return []
     inputs = principled(material).inputs
-    return [one for one in (inputs[EMISSION_STRENGTH], inputs[BASE_COLOR], _colour_socket(material)) if one is not None]
+    return [
+        one for one in (inputs[EMISSION_STRENGTH], inputs[BASE_COLOR], emission_socket(material)) if one is not None
+    ]
 
 
 def _keep(material):
@@ -204,16 +194,7 @@ def _keep(material):
 
 
 def _show(material):
-    """Bring the node tree in line with the state."""
     inputs, on = principled(material).inputs, is_on(material)
     inputs[EMISSION_STRENGTH].default_value = material[_STRENGTH] * factor(material) * on
     grey = 0.02 if numbered(material.name.casefold())[0] in _DARK else UNLIT_GREY
     inputs[BASE_COLOR].default_value = material[_BASE] if on else (grey, grey, grey, 1)
-
-
-def _colour_socket(material):
-    """The socket that holds the colour: the shader's own, or that of the node that blackens a lamp's back."""
-    socket = principled(material).inputs[EMISSION_COLOR]
-    if socket.links and socket.links[0].from_node.type == "MIX":
-        socket = next(s for s in socket.links[0].from_node.inputs if s.type == "RGBA")
-    return None if socket.links else socket

@@ -3,8 +3,6 @@
 As with lamps, the state is kept with the world as custom properties and its node tree shows it.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
@@ -15,10 +13,9 @@ from mathutils import Vector
 from ...core.errors import BadInputError
 from ...core.kinds import Limit
 from ..data.images import RADIANCE, image_array
-from ..data.nodes import find_node
-from ..data.world import make_world
+from ..data.nodes import add_node, feed, find_node, make_world
 from .kelvin import LUMINANCE
-from .room import bounds, leaves, room_light
+from .room import bounds, leaves, room_light, sphere
 
 RECOVERED = "scan_relight_recovered_world"
 """Custom property of the scene: its world before another picture took its place."""
@@ -73,19 +70,15 @@ def set_rotation(world: bpy.types.World, angle: float) -> None:
     texture = find_node(world, "TEX_ENVIRONMENT")
     if texture is None:
         return
-    nodes, links = world.node_tree.nodes, world.node_tree.links
-    turn = nodes.get(_TURN)
+    tree, turn = world.node_tree, world.node_tree.nodes.get(_TURN)
     if not angle:
-        for name in (_TURN, _PLACE):
-            if nodes.get(name):
-                nodes.remove(nodes[name])
+        for node in filter(None, map(tree.nodes.get, (_TURN, _PLACE))):
+            tree.nodes.remove(node)
         return
     if turn is None:
-        place, turn = nodes.new("ShaderNodeTexCoord"), nodes.new("ShaderNodeMapping")
-        place.name, turn.name = _PLACE, _TURN
-        place.location, turn.location = (-700, 0), (-500, 0)
-        links.new(place.outputs["Generated"], turn.inputs["Vector"])
-        links.new(turn.outputs["Vector"], texture.inputs["Vector"])
+        place = add_node(tree, "ShaderNodeTexCoord", name=_PLACE, location=(-700, 0))
+        turn = add_node(tree, "ShaderNodeMapping", place.outputs["Generated"], name=_TURN, location=(-500, 0))
+        feed(texture.inputs["Vector"], turn.outputs["Vector"])
     # The node turns the direction that is looked up, and so the picture the other way round.
     turn.inputs["Rotation"].default_value = (0, 0, -angle)
 
@@ -177,18 +170,10 @@ def usual_radiance(scene: bpy.types.Scene) -> float:
 
 def is_open(scene: bpy.types.Scene) -> bool:
     """Whether light from outside can reach what the camera looks at, or the room's middle: any of 256 rays leaves."""
-    low, high = bounds(scene)
-    places = [(low + high) / 2]
+    places = [sum(bounds(scene), Vector()) / 2]
     if scene.camera:
         places.append(scene.camera.matrix_world.translation)
-    golden = math.pi * (3 - math.sqrt(5))
-    for place in places:
-        for k in range(128):
-            z = 1 - (2 * k + 1) / 128
-            r = math.sqrt(1 - z * z)
-            if leaves(scene, place, Vector((r * math.cos(golden * k), r * math.sin(golden * k), z))):
-                return True
-    return False
+    return any(leaves(scene, place, direction) for place in places for direction in sphere(128))
 
 
 def remarks(scene: bpy.types.Scene) -> list[str]:
@@ -247,32 +232,39 @@ def _show(world):
         node.inputs["Strength"].default_value = world[_KEPT] * factor(world) * is_on(world)
 
 
-_ROWS, _COLUMNS = 16, 32
+_ROWS, _COLUMNS = 8, 16
 _maps: dict[tuple, np.ndarray] = {}
 
 
-def sky(world: bpy.types.World, direction: Vector, turn: float) -> float:
-    """Luminance from a direction at strength 1, in the frames' unit; 0 where the world shows no picture or colour.
+def sky(world: bpy.types.World, turn: float) -> list[tuple[Vector, float]]:
+    """What a world sends in at strength 1, field by field; nothing where it shows no light.
 
     Parameters
     ----------
-    direction : Vector
-        Unit, from the room outwards.
     turn : float
         Radians by which the picture is turned about +Z, anticlockwise from above.
+
+    Returns
+    -------
+    list of (Vector, float)
+        Unit direction to a field; its luminance in the frames' unit times its solid angle.
     """
     node = find_node(world, "BACKGROUND")
-    if node is None:
-        return 0.0
-    socket = node.inputs["Color"]
-    image = getattr(socket.links[0].from_node, "image", None) if socket.links else None
-    if image is None:
-        return 0.0 if socket.links else float(np.array(socket.default_value[:3]) @ LUMINANCE)
+    socket = node.inputs["Color"] if node is not None else None
+    if socket is None or socket.links and getattr(socket.links[0].from_node, "image", None) is None:
+        return []
+    if socket.links:
+        light = _fields(socket.links[0].from_node.image)
+    else:
+        light = np.full((_ROWS, _COLUMNS), float(np.array(socket.default_value[:3]) @ LUMINANCE))
     # As Cycles lays it: the picture's middle is -X, and its rows go from below to above.
-    across = 0.5 - (math.atan2(direction.y, direction.x) - turn) / (2 * math.pi)
-    up = 0.5 + math.asin(min(max(direction.z, -1.0), 1.0)) / math.pi
-    fields = _fields(image)
-    return float(fields[min(int(up * _ROWS), _ROWS - 1), int(across * _COLUMNS) % _COLUMNS])
+    rims = np.sin(np.linspace(-math.pi / 2, math.pi / 2, _ROWS + 1))
+    found = []
+    for row, column in np.ndindex(light.shape):
+        angle, z = turn + math.pi * (1 - (2 * column + 1) / _COLUMNS), (rims[row] + rims[row + 1]) / 2
+        level, part = math.sqrt(1 - z * z), (rims[row + 1] - rims[row]) * 2 * math.pi / _COLUMNS
+        found.append((Vector((level * math.cos(angle), level * math.sin(angle), z)), float(light[row, column] * part)))
+    return found
 
 
 def _fields(image: bpy.types.Image) -> np.ndarray:
@@ -280,13 +272,8 @@ def _fields(image: bpy.types.Image) -> np.ndarray:
     key = image.name, image.filepath, tuple(image.size)
     if key not in _maps:
         pixels = np.nan_to_num(image_array(image)[..., :3], posinf=0.0).clip(0) @ LUMINANCE
-        height, width = pixels.shape
-        rows, columns = (
-            np.linspace(0, size, count + 1).astype(int)[:-1]
-            for size, count in ((height, min(_ROWS, height)), (width, min(_COLUMNS, width)))
-        )
-        summed = np.add.reduceat(np.add.reduceat(pixels, rows, 0), columns, 1)
-        counts = np.outer(np.diff([*rows, height]), np.diff([*columns, width]))
-        small = summed / counts
-        _maps[key] = small[np.arange(_ROWS) * len(rows) // _ROWS][:, np.arange(_COLUMNS) * len(columns) // _COLUMNS]
+        for axis, count in enumerate((_ROWS, _COLUMNS)):
+            pixels = pixels.repeat(max(-(-count // pixels.shape[axis]), 1), axis)
+            pixels = np.stack([part.mean(axis) for part in np.array_split(pixels, count, axis)], axis)
+        _maps[key] = pixels
     return _maps[key]

@@ -1,8 +1,7 @@
 """What a new light or thing has to know of the room: its bounds, what is looked at, what is hit, how bright it is."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import bpy
@@ -70,6 +69,14 @@ def leaves(scene: bpy.types.Scene, origin: Vector, direction: Vector) -> bool:
     return False
 
 
+def sphere(count: int) -> Iterator[Vector]:
+    """Unit directions, spread evenly over all of them."""
+    for k in range(count):
+        angle, z = math.pi * (3 - math.sqrt(5)) * k, 1 - (2 * k + 1) / count
+        level = math.sqrt(1 - z * z)
+        yield Vector((level * math.cos(angle), level * math.sin(angle), z))
+
+
 def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:
     """The evaluated state of a scene, also of one that no window shows."""
     layer = bpy.context.view_layer if bpy.context.scene == scene else scene.view_layers[0]
@@ -126,11 +133,7 @@ def view_direction(scene: bpy.types.Scene) -> Vector:
 
 
 def room_light(scene: bpy.types.Scene) -> float:
-    """How much light falls on the scanned room's surfaces: median irradiance in the frames' unit.
-
-    From the recovered shading where the file has its picture, else from the exposure that `scene.py` set, which shows
-    the median radiance as middle grey.
-    """
+    """Median irradiance of the scanned room's surfaces in the frames' unit: by the shading, else by the exposure."""
     kept = scene.get(ROOM_LIGHT)
     if kept:
         return float(kept)

@@ -6,8 +6,6 @@ the light's colour: 1 W of white light is 683 lm, of Rec.709's green 488 lm. The
 electric: about 8 W of an LED for the 800 lm that 1.2 W of ours give. A sun has watts per square metre, and so lux.
 """
 
-from __future__ import annotations
-
 import bpy
 
 from ...core.kinds import Unit

@@ -4,8 +4,6 @@ Blender keeps a lens as millimetres over a sensor, and which side of the picture
 picture; a capture keeps pixels. Backgrounds tell which picture a camera took.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -130,22 +128,14 @@ def camera_of(
 
 def cameras_with_pictures(scene: bpy.types.Scene, among: Iterable[bpy.types.Object] = ()) -> list[bpy.types.Object]:
     """The cameras of `among` (of the scene, where there is none) that have a picture behind them, by name."""
-    chosen = [thing for thing in among if thing.type == "CAMERA"] or [
-        thing for thing in scene.objects if thing.type == "CAMERA"
-    ]
-    return sorted((thing for thing in chosen if background(thing.data)), key=lambda thing: thing.name)
+    cameras = [thing for thing in among if thing.type == "CAMERA"] or scene.objects
+    found = (thing for thing in cameras if thing.type == "CAMERA" and background(thing.data))
+    return sorted(found, key=lambda thing: thing.name)
 
 
 def background(data: bpy.types.Camera) -> bpy.types.CameraBackgroundImage | None:
     """The first background that holds a picture."""
-    return next(
-        (one for one in data.background_images if (one.image if one.source == "IMAGE" else one.clip) is not None), None
-    )
-
-
-def is_moving(back: bpy.types.CameraBackgroundImage) -> bool:
-    """Whether a background holds a picture for each moment."""
-    return back.source == "MOVIE_CLIP" or back.image.source in ("SEQUENCE", "MOVIE")
+    return next((one for one in data.background_images if (one.image if one.source == "IMAGE" else one.clip)), None)
 
 
 def views(
@@ -176,7 +166,9 @@ def views(
     """
     problems = [] if problems is None else problems
     if how == AUTO:
-        how = ANIMATION if len(things) == 1 and is_moving(background(things[0].data)) else OBJECTS
+        back = background(things[0].data)
+        moving = back.source == "MOVIE_CLIP" or back.image.source in ("SEQUENCE", "MOVIE")
+        how = ANIMATION if len(things) == 1 and moving else OBJECTS
     moments: Iterable[int | None] = (None,)
     if how == ANIMATION:
         things = [scene.camera] if scene.camera in things else things[:1]
@@ -202,19 +194,12 @@ def views(
 
 def _view(scene, depsgraph, thing, moment, name) -> View:
     back = background(thing.data)
-    if (
-        abs(back.scale - 1) > 1e-6
-        or max(map(abs, back.offset)) > 1e-6
-        or abs(back.rotation) > 1e-6
-        or back.use_flip_x
-        or back.use_flip_y
-    ):
+    moved = abs(back.scale - 1), *map(abs, back.offset), abs(back.rotation)
+    if max(moved) > 1e-6 or back.use_flip_x or back.use_flip_y:
         raise BadInputError(f"The background of camera '{thing.name}' is moved, scaled, turned or flipped; reset it.")
     path = picture(back, moment, thing.name)
-    size = read_header(path)
-    camera = camera_of(thing.evaluated_get(depsgraph), size, frame_size(scene, thing), back.frame_method)
-    known = {name: float(thing[key]) for key, name in PROPERTIES if key in thing}
-    return View(name, camera, path, **known)
+    camera = camera_of(thing.evaluated_get(depsgraph), read_header(path), frame_size(scene, thing), back.frame_method)
+    return View(name, camera, path, **{name: float(thing[key]) for key, name in PROPERTIES if key in thing})
 
 
 def picture(back: bpy.types.CameraBackgroundImage, moment: int, owner: str) -> Path:
@@ -222,60 +207,45 @@ def picture(back: bpy.types.CameraBackgroundImage, moment: int, owner: str) -> P
 
     Numbers of sequences follow `BKE_image_user_frame_get` and `get_sequence_fname` in Blender's source.
     """
-    if back.source == "MOVIE_CLIP":
-        clip = back.clip
-        path, kind = Path(bpy.path.abspath(clip.filepath, library=clip.library)), clip.source
-        number = _number(path) + moment - clip.frame_start + clip.frame_offset
-    else:
-        image, user = back.image, back.image_user
-        path, kind = Path(bpy.path.abspath(image.filepath, library=image.library)), image.source
-        if kind == "SEQUENCE":
-            count, position = user.frame_duration, moment - user.frame_start + 1
+    clip = back.source == "MOVIE_CLIP"
+    shown = back.clip if clip else back.image
+    path, problem = Path(bpy.path.abspath(shown.filepath, library=shown.library)), ""
+    if shown.source == "SEQUENCE":
+        if clip:
+            first = _DIGITS.search(path.stem)
+            moment += (int(first[1]) if first else 0) - shown.frame_start + shown.frame_offset
+        else:
+            user = back.image_user
+            count, moment = user.frame_duration, moment - user.frame_start + 1
             if user.use_cyclic and count:
-                position = (position - 1) % count + 1
-            if count and not 1 <= position <= count:
-                raise BadInputError(f"Camera '{owner}' has no picture at frame {moment}.")
-            number = position + user.frame_offset
-        elif kind == "FILE" and image.packed_file and not path.is_file():
-            raise BadInputError(
-                f"The picture behind camera '{owner}' is packed into the file; unpack it (File, "
-                "External Data) so that it can be read."
-            )
-    if kind == "SEQUENCE":
-        path = _with_number(path, number)
-    elif kind == "MOVIE":
-        raise BadInputError(
+                moment = (moment - 1) % count + 1
+            if count and not 1 <= moment <= count:
+                raise BadInputError(f"Camera '{owner}' has no picture at frame {moment + user.frame_start - 1}.")
+            moment += user.frame_offset
+        path = path.with_stem(_DIGITS.sub(lambda found: f"{moment:0{len(found[1])}d}", path.stem, count=1))
+    elif shown.source == "FILE" and shown.packed_file and not path.is_file():
+        problem = (
+            f"The picture behind camera '{owner}' is packed into the file; unpack it (File, External Data) so that it "
+            "can be read."
+        )
+    elif shown.source == "MOVIE":
+        problem = (
             f"Camera '{owner}' has the film '{path.name}' behind it; materials need linear radiance: "
             "give a sequence of EXR pictures."
         )
-    if path.suffix.lower() != ".exr":
-        raise BadInputError(
-            f"Camera '{owner}' has the picture '{path.name or back.image.name}' behind it, which is no "
-            "EXR; materials need linear radiance."
+    if not problem and path.suffix.lower() != ".exr":
+        problem = (
+            f"Camera '{owner}' has the picture '{path.name or shown.name}' behind it, which is no EXR; materials need "
+            "linear radiance."
         )
-    if not path.is_file():
-        raise BadInputError(
-            f"The picture '{path}' behind camera '{owner}' is missing; find it again (File, External Data)."
-        )
+    if not problem and not path.is_file():
+        problem = f"The picture '{path}' behind camera '{owner}' is missing; find it again (File, External Data)."
+    if problem:
+        raise BadInputError(problem)
     return path
 
 
 _DIGITS = re.compile(r"(\d+)(?!.*\d)")
-
-
-def _number(path: Path) -> int:
-    found = _DIGITS.search(path.stem)
-    return int(found[1]) if found else 0
-
-
-def _with_number(path: Path, number: int) -> Path:
-    """`path` with its last number replaced, as wide as it was."""
-    found = _DIGITS.search(path.stem)
-    if not found:
-        return path
-    return path.with_name(
-        f"{path.stem[: found.start()]}{number:0{len(found[1])}d}{path.stem[found.end() :]}{path.suffix}"
-    )
 
 
 def _plain(name: str) -> str:

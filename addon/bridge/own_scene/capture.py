@@ -4,15 +4,11 @@ The folder is one that every reader of nerfstudio's layout takes. Two more files
 object each instance is) and `faces.npz` (which corners of its faces each triangle has).
 """
 
-from __future__ import annotations
-
-import io
 import json
 import os
 import shutil
-from collections import Counter
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -109,7 +105,12 @@ def capture_scene(
     parts = gather(context.evaluated_depsgraph_get(), things)
     if not parts:
         raise BadInputError("No object with faces is selected; select the room's objects first.")
-    mesh = _without_flat(joined(parts))
+    mesh = joined(parts)
+    # Only the triangles that the reader will keep, so that its triangles are the file's, one by one.
+    numbered = RawMesh(mesh.vertices, mesh.triangles, np.arange(len(mesh.triangles)), name="of the scene")
+    kept = repair(numbered)[0].object_id
+    polygons = mesh.polygons._replace(corner=mesh.polygons.corner[kept])
+    mesh = replace(mesh, triangles=mesh.triangles[kept], object_id=mesh.object_id[kept], polygons=polygons)
     problems: list[str] = []
     now = scene.frame_current, scene.frame_subframe
     try:
@@ -130,27 +131,20 @@ def capture_scene(
     ) + _doubts(parts)
 
 
-def _without_flat(mesh: SceneMesh) -> SceneMesh:
-    """Only the triangles that the reader will keep, so that its triangles are the file's, one by one."""
-    numbered = RawMesh(mesh.vertices, mesh.triangles, np.arange(len(mesh.triangles)), name="of the scene")
-    kept = repair(numbered)[0].object_id
-    polygons = mesh.polygons._replace(corner=mesh.polygons.corner[kept])
-    return SceneMesh(mesh.vertices, mesh.triangles[kept], mesh.object_id[kept], polygons, mesh.corner_start)
-
-
 def _doubts(parts: list[Part]) -> tuple[str, ...]:
     """Sentences on objects whose materials can't simply be put back."""
     made = [part.name for part in parts if not part.own]
     linked = [part.name for part in parts if part.own and (part.thing.library or part.thing.override_library)]
-    found = []
-    if made:
-        found.append(f"{few(made)}: modifiers or instances make the faces, so the materials can only go onto a copy.")
-    if linked:
-        found.append(
-            f"{few(linked)}: linked from another file, so the materials can't go there; make it local first "
-            "(Object, Relations, Make Local)."
-        )
-    return tuple(found)
+    local = "make it local first (Object, Relations, Make Local)"
+    return sentences(
+        (made, "modifiers or instances make the faces, so the materials can only go onto a copy"),
+        (linked, f"linked from another file, so the materials can't go there; {local}"),
+    )
+
+
+def sentences(*told: tuple[list[str], str]) -> tuple[str, ...]:
+    """One on all objects of which the same is to be said, by their names; none where there are none."""
+    return tuple(f"{few(names)}: {what}." for names, what in told if names)
 
 
 def few(names: list[str]) -> str:
@@ -184,33 +178,22 @@ def _write(folder: Path, mesh: SceneMesh, parts: list[Part], views: list[scene_c
     (folder / "images").mkdir()
     frames = []
     for view in views:
-        place = f"images/{view.name}.exr"
+        place, camera, pose = f"images/{view.name}.exr", view.camera, view.camera.camera_to_world.copy()
         bring(view.path, folder / place)
-        camera, pose = view.camera, view.camera.camera_to_world.copy()
         pose[:3, 3] *= metre
-        frame = {
-            "file_path": place,
-            "w": camera.width,
-            "h": camera.height,
-            "fl_x": camera.fx,
-            "fl_y": camera.fy,
-            "cx": camera.cx,
-            "cy": camera.cy,
-            "transform_matrix": pose.tolist(),
-        }
+        frame = {"file_path": place, "w": camera.width, "h": camera.height, "fl_x": camera.fx, "fl_y": camera.fy}
+        frame |= {"cx": camera.cx, "cy": camera.cy, "transform_matrix": pose.tolist()}
         if camera.lens is not None:
             frame[OWN_LENS] = told_lens(camera.lens)
-        frames.append(
-            frame | {key: value for key in ("exposure", "saturation") if (value := getattr(view, key)) is not None}
-        )
+        known = {key: getattr(view, key) for key in ("exposure", "saturation")}
+        frames.append(frame | {key: value for key, value in known.items() if value is not None})
     _json(folder / "transforms.json", {"camera_model": "PINHOLE", "frames": frames})
     told = [
         Source(one.object_id, one.name, one.thing.name, one.own, one.topology, mesh.corner_start[one.object_id])
         for one in parts
     ]
-    packed = io.BytesIO()
-    np.savez(packed, **mesh.polygons._asdict())
-    (folder / FACES).write_bytes(packed.getvalue())
+    with (folder / FACES).open("wb") as file:
+        np.savez(file, **mesh.polygons._asdict())
     _json(folder / OBJECTS, {"objects": [asdict(one) for one in told]})
 
 
@@ -219,25 +202,15 @@ def _json(path: Path, value) -> None:
 
 
 def bring(source: Path, target: Path) -> None:
-    """Let `target` be the picture `source`: the same file by another name, or a copy on another disk.
-
-    Not a symbolic link: one that leads out of a capture is refused where nobody asked for it.
-    """
-    source = source.resolve()
-    for way in (os.link, shutil.copy2):
-        try:
-            way(source, target)
-            return
-        except OSError as error:
-            failed = error
-    raise failed
+    """Let `target` be the picture `source`: a hard link, as symbolic ones out of a capture are refused, or a copy."""
+    try:
+        os.link(source.resolve(), target)
+    except OSError:
+        shutil.copy2(source, target)
 
 
 def sources(folder: Path | str) -> tuple[Source, ...]:
-    """The objects of a capture that was made of a scene; empty where it was not.
-
-    Raises `BadInputError`: the list is damaged.
-    """
+    """The objects of a capture that was made of a scene, else none; raises `BadInputError`: the list is damaged."""
     path = Path(folder) / OBJECTS
     if not path.is_file():
         return ()
@@ -266,8 +239,3 @@ def polygons_of(folder: Path | str, mesh: Mesh) -> Polygons | None:
         and np.array_equal(found.vertex[found.corner], mesh.triangles)
     )
     return found if same else None
-
-
-def sharing() -> Counter:
-    """How many objects of the file show each mesh."""
-    return Counter(thing.data for thing in bpy.data.objects if thing.type == "MESH")

@@ -4,8 +4,6 @@ What is read is what the viewport shows: modifiers and instances evaluated, in w
 object, so each object becomes an instance of the capture; so does each object that an instanced collection shows.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -118,10 +116,12 @@ def gather(depsgraph: bpy.types.Depsgraph, things: Iterable[bpy.types.Object]) -
         part.own &= (
             not shown.is_instance and not part.pieces and owner.type == "MESH" and same_topology(data, owner.data)
         )
-        piece = _piece(data, np.array(shown.matrix_world, np.float64))
-        if not np.isfinite(piece[0]).all():
+        vertices, loops = vertices_of(data, shown.matrix_world), triangles_of(data, "loops")
+        if not np.isfinite(vertices).all():
             raise BadInputError(f"Object '{owner.name}' has vertices that are not finite; mend its mesh first.")
-        part.pieces.append(piece)
+        if shown.matrix_world.is_negative:  # mirrored: front is where the other order of corners says
+            loops = loops[:, [0, 2, 1]]
+        part.pieces.append((vertices, *faces_of(data), loops))
     parts = [found[key] for key in sorted(found) if any(len(loops) for *_, loops in found[key].pieces)]
     kinds: dict[bpy.types.ID, str] = {}
     for number, part in enumerate(parts):
@@ -145,34 +145,19 @@ def topology_hash(pieces: Iterable[tuple[np.ndarray, np.ndarray]]) -> str:
     return digest.hexdigest()
 
 
-def _piece(data, matrix):
-    loops = triangles_of(data, "loops")
-    if np.linalg.det(matrix[:3, :3]) < 0:  # mirrored: front is where the other order of corners says
-        loops = loops[:, [0, 2, 1]]
-    return vertices_of(data, matrix), *faces_of(data), loops
-
-
 def joined(parts: Iterable[Part]) -> SceneMesh:
-    """One mesh of all parts.
-
-    Triangles keep the order of the objects' faces; `mesh_repair` may leave some out later.
-    """
-    vertices, starts, corners, loops, ids = [], [], [], [], []
+    """One mesh of all parts; triangles keep the order of the objects' faces."""
+    columns = vertices, starts, corners, loops, ids = [], [], [], [], []
     first_vertex = first_corner = 0
     corner_start = {}
     for part in parts:
         corner_start[part.object_id] = first_corner
         for points, start, corner, loop in part.pieces:
-            vertices.append(points)
-            starts.append(start[:-1] + first_corner)
-            corners.append(corner + first_vertex)
-            loops.append(loop + first_corner)
-            ids.append(np.full(len(loop), part.object_id, np.int32))
+            shifted = points, start[:-1] + first_corner, corner + first_vertex, loop + first_corner
+            for column, values in zip(columns, (*shifted, np.full(len(loop), part.object_id))):
+                column.append(values)
             first_vertex += len(points)
             first_corner += len(corner)
-    corner = np.concatenate(corners).astype(np.int32)
-    loop = np.concatenate(loops).astype(np.int32)
-    start = np.append(np.concatenate(starts), first_corner).astype(np.int32)
-    return SceneMesh(
-        np.concatenate(vertices), corner[loop], np.concatenate(ids), Polygons(start, corner, loop), corner_start
-    )
+    start, corner, loop, ids = (np.concatenate(one).astype(np.int32) for one in (starts, corners, loops, ids))
+    polygons = Polygons(np.append(start, np.int32(first_corner)), corner, loop)
+    return SceneMesh(np.concatenate(vertices), corner[loop], ids, polygons, corner_start)

@@ -5,8 +5,7 @@ is kept on the object as references to the materials themselves: they survive re
 several objects share is copied for each, as each has a place of its own in the atlas; the shared one is kept likewise.
 """
 
-from __future__ import annotations
-
+from collections import Counter
 from collections.abc import Generator, Iterable
 from pathlib import Path
 
@@ -24,7 +23,7 @@ from ..data.mesh_objects import ATLAS_UV
 from ..light.room import depsgraph_of
 from ..marks import OBJECT_ID, RESULT, RUN, mark
 from ..results import images
-from .capture import Source, check_own, few, polygons_of, sharing, sources
+from .capture import Source, check_own, polygons_of, sentences, sources
 from .mesh import Part, gather, same_topology
 from .mesh import topology_hash as hash_of
 
@@ -112,14 +111,13 @@ def writing_back(
     copied = [one for one in made if copies or "copies" in one[1].get(BEFORE, {})]
     left = [one[0].name for one in made if one not in copied]
     edited += work.copy(copied)
-    told = [
+    return sentences(
         (gone, "deleted or renamed since the capture, so no material went there"),
         (edited, "edited since the capture and left as it is; capture the scene again"),
         (locked, "linked from another file, so no material went there; make it local (Object, Relations, Make Local)"),
         (left, "modifiers or instances make the faces, so no material went there; write again with Make Copies on"),
         (torn_names, "faces that fold onto themselves show the texture of one part only"),
-    ]
-    return tuple(f"{few(names)}: {what}." for names, what in told if names)
+    )
 
 
 def corners_of(polygons, atlas_uv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -136,7 +134,8 @@ class _Work:
     """What dressing one object after the other needs to know."""
 
     def __init__(self, scene, folder: Path, base_color):
-        self.scene, self.folder, self.base_color, self.shown = scene, folder, base_color, sharing()
+        self.scene, self.folder, self.base_color = scene, folder, base_color
+        self.shown = Counter(thing.data for thing in bpy.data.objects if thing.type == "MESH")
         self.run = run_of(folder)
 
     def dress(self, thing: bpy.types.Object, source: Source, description: ObjectMaterial, uv: np.ndarray) -> None:
@@ -245,10 +244,17 @@ def restore(things: Iterable[bpy.types.Object]) -> tuple[int, tuple[str, ...]]:
             elif not ours.users:
                 bpy.data.meshes.remove(ours)
         else:
-            _without_ours(thing.data, "aside" in before)
+            layers = thing.data.uv_layers
+            if ATLAS_UV in layers:
+                layers.remove(layers[ATLAS_UV])
+            if "aside" in before and ASIDE in layers:
+                layers[ASIDE].name = ATLAS_UV
         old = [one.get("material") for one in before.get("slots", ())]
         if not old and len(thing.material_slots) == 1:
-            _without_slot(thing.data)
+            number = read(thing.data.polygons, "material_index", kind=np.int32)
+            thing.data.materials.clear()
+            if number.any():  # else an attribute would appear that was not there
+                thing.data.polygons.foreach_set("material_index", number)
         elif len(old) != len(thing.material_slots):
             slots.append(thing.name)
         for slot, material in zip(thing.material_slots, old):
@@ -258,11 +264,10 @@ def restore(things: Iterable[bpy.types.Object]) -> tuple[int, tuple[str, ...]]:
                 del thing[key]
         drop_ours(worn)
     images.drop_unused({thing[RESULT] for thing in bpy.data.objects if RESULT in thing})
-    told = [
+    return count, sentences(
         (edited, "edited since; the mesh from before is back, and the edited one is kept among the file's meshes"),
         (slots, "material slots were added or removed since; as many old materials as there are slots are back"),
-    ]
-    return count, tuple(f"{few(names)}: {what}." for names, what in told if names)
+    )
 
 
 def wearing(things: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
@@ -291,22 +296,6 @@ def undo_copies(thing: bpy.types.Object) -> None:
 def same_shape(one: bpy.types.Mesh, other: bpy.types.Mesh) -> bool:
     """Whether two meshes have the same faces and vertices at the same places."""
     return same_topology(one, other) and np.array_equal(vertices_of(one), vertices_of(other))
-
-
-def _without_slot(data: bpy.types.Mesh) -> None:
-    """Take the one slot away; the faces keep the slot numbers that they have."""
-    number = read(data.polygons, "material_index", kind=np.int32)
-    data.materials.clear()
-    if number.any():  # else an attribute would appear that was not there
-        data.polygons.foreach_set("material_index", number)
-
-
-def _without_ours(data: bpy.types.Mesh, aside: bool) -> None:
-    layers = data.uv_layers
-    if ATLAS_UV in layers:
-        layers.remove(layers[ATLAS_UV])
-    if aside and ASIDE in layers:
-        layers[ASIDE].name = ATLAS_UV
 
 
 def drop_ours(materials: Iterable[bpy.types.Material | None]) -> None:

@@ -4,8 +4,6 @@ In background mode the pictures are rendered here. Beside a window the command l
 (`save_copy`), so that the window never freezes, nothing of the open scene changes, and a stop ends a process.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import tempfile
@@ -81,10 +79,7 @@ def picture_folder(scene: bpy.types.Scene, chosen: str = "") -> tuple[Path, bool
 
 
 def save_copy(folder: Path) -> None:
-    """Save what is open as a copy that the command `relight` can open; what is open stays as it is.
-
-    Raises `StorageError`: the copy can't be written.
-    """
+    """Save what is open as a copy that the command `relight` can open; what is open stays as it is."""
     with refused(f"A copy of the scene can't be saved to '{folder}'", "free some space"):
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / COPY), copy=True, compress=False, relative_remap=True)
 

@@ -1,7 +1,5 @@
 """The command `relight`: a result's scene rendered under another light; the file itself is not changed."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -145,10 +143,10 @@ def apply_light(scene: bpy.types.Scene, light: Light) -> list[str]:
     if light.hdri is not None:
         outside.use_hdri(scene, light.hdri, outside.usual_radiance(scene))
     if scene.world is not None and light.world is not None:
-        turn = world_rotation(light.world)
-        outside.set_on(scene.world, turn is not None)
         if light.world not in ("on", "off"):
-            outside.set_rotation(scene.world, math.radians(turn))
+            told = f"Option --world takes on, off or an angle in degrees, not '{light.world}'."
+            outside.set_rotation(scene.world, math.radians(_number(light.world, told)))
+        outside.set_on(scene.world, light.world != "off")
     if scene.world is not None and light.world_strength is not None:
         outside.set_factor(scene.world, light.world_strength)
     for preset, (strength, unit) in light.added.items():
@@ -158,48 +156,37 @@ def apply_light(scene: bpy.types.Scene, light: Light) -> list[str]:
 
 def set_lamps(scene: bpy.types.Scene, text: str) -> None:
     """Obey the option ``--lamps``; every part of it is checked before anything changes."""
-    if text in ("on", "off"):
-        for lamp in relight_lamps.find_lamps(scene):
-            relight_lamps.set_on(lamp, text == "on")
-        return
     wanted = []
-    for part in text.split(","):
+    for part in text.split(",") if text not in ("on", "off") else ():
         name, sign, value = part.rpartition("=")
         if not sign:
             raise BadInputError(f"Option --lamps takes on, off or NAME=FACTOR, separated by commas, not '{part}'.")
-        lamps = relight_lamps.lamp_named(scene, name)
         factor = {"off": None, "on": 1.0}
         if value not in factor:
             factor[value] = _number(value, f"Option --lamps takes factors of at least 0, not '{value}'.", 0.0)
-        wanted.append((lamps, factor[value]))
-    for lamps, value in wanted:
-        for lamp in lamps:
-            relight_lamps.set_on(lamp, value is not None)
-            if value is not None:
-                relight_lamps.set_factor(lamp, value)
-
-
-def world_rotation(text: str) -> float | None:
-    """Degrees that the option ``--world`` asks for; None: off."""
+        wanted += [(lamp, factor[value]) for lamp in relight_lamps.lamp_named(scene, name)]
+    for lamp, value in wanted:
+        relight_lamps.set_on(lamp, value is not None)
+        if value is not None:
+            relight_lamps.set_factor(lamp, value)
     if text in ("on", "off"):
-        return 0.0 if text == "on" else None
-    return _number(text, f"Option --world takes on, off or an angle in degrees, not '{text}'.")
+        for lamp in relight_lamps.find_lamps(scene):
+            relight_lamps.set_on(lamp, text == "on")
 
 
 def camera_named(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
     """The camera of a frame, by its number from 0 or its name; raises `BadInputError`."""
     cameras = frame_cameras(scene)
-    found = next((c for c in cameras if c.name == name), None)
-    if found is None and name.lstrip("-").isdigit() and 0 <= int(name) < len(cameras):
-        found = cameras[int(name)]
-    if found is None:
-        some = ", ".join(f"'{c.name}'" for c in cameras[:3])
-        raise BadInputError(
-            f"There is no camera '{name}'; take a number from 0 to {len(cameras) - 1} or a name such as {some}."
-            if cameras
-            else f"There is no camera '{name}'; the scene has none at all."
-        )
-    return found
+    found = {str(number): one for number, one in enumerate(cameras)} | {one.name: one for one in reversed(cameras)}
+    if name in found:
+        return found[name]
+    some = ", ".join(f"'{c.name}'" for c in cameras[:3])
+    known = (
+        f"take a number from 0 to {len(cameras) - 1} or a name such as {some}"
+        if cameras
+        else "the scene has none at all"
+    )
+    raise BadInputError(f"There is no camera '{name}'; {known}.")
 
 
 def _number(text: str, otherwise: str, least: float = -math.inf) -> float:

@@ -3,8 +3,6 @@
 As `scene.py` does with the median of the frames, so that the captured light asks for about the captured exposure.
 """
 
-from __future__ import annotations
-
 import math
 
 import bpy
@@ -12,7 +10,7 @@ import bpy
 from ...core.errors import BadInputError
 from ...core.kinds import Limit
 from ...core.photo import MIDDLE_GREY
-from ..scene.settings import EXPOSURE
+from ..scene.parts import EXPOSURE
 from . import estimate
 from .pictures import small_median
 
@@ -24,10 +22,7 @@ _MOST: Limit[float] = 32.0
 
 
 def measure(scene: bpy.types.Scene) -> float:
-    """The exposure in stops that shows the median of the present picture as middle grey.
-
-    Raises `BadInputError`: there is no camera, or no light at all; `StorageError`: the small picture can't be written.
-    """
+    """The exposure in stops that shows the median of the present picture as middle grey."""
     if scene.camera is None:
         raise BadInputError("The scene has no camera to measure the light through; choose a frame first.")
     median = small_median(scene)
@@ -62,10 +57,7 @@ def captured_exposure(scene: bpy.types.Scene) -> float:
 
 
 def follow(scene: bpy.types.Scene) -> None:
-    """Set the exposure to what the light asks for by `relight.estimate`: no picture is rendered, none is lost.
-
-    Without effect where nothing can be estimated: no camera, no light.
-    """
+    """Set the exposure to what the light asks for by `relight.estimate`, if that is known; nothing is rendered."""
     stops = estimate.estimate(scene)
     if stops is None or stops == estimate.NO_LIGHT:
         return
@@ -78,10 +70,7 @@ def follow(scene: bpy.types.Scene) -> None:
 
 
 def darkness(scene: bpy.types.Scene) -> str:
-    """A sentence where the picture is much darker or brighter than the captured one was; '' else, or if unknown.
-
-    By `relight.estimate.stops`, which renders nothing.
-    """
+    """A sentence where the picture is much darker or brighter than the captured one, by an estimate; '' else."""
     stops = estimate.stops(scene)
     if stops is None:
         return ""

@@ -12,8 +12,6 @@ follows from the irradiance E that they are to throw on the target, straight on,
 Colours are temperatures, which keep the luminance.
 """
 
-from __future__ import annotations
-
 import math
 
 import bpy
@@ -87,9 +85,13 @@ def add_light(
     if unit != ROOM:
         set_strength(data, strength, unit)
     data.name = _name(scene, preset, subject, place)
+    return put_light(scene, preset, data, Matrix.LocRotScale(place.origin, place.rotation, None))
+
+
+def put_light(scene: bpy.types.Scene, preset: str, data: bpy.types.Light, pose: Matrix) -> bpy.types.Object:
+    """Have a lamp of Blender's in the room as one of the new lights."""
     light = bpy.data.objects.new(data.name, data)
-    light.matrix_world = Matrix.LocRotScale(place.origin, place.rotation, None)
-    light[KIND] = preset
+    light.matrix_world, light[KIND] = pose, preset
     light.visible_camera = False  # it lights the picture; it is not part of it
     own_collection(scene, COLLECTION).objects.link(light)
     return light

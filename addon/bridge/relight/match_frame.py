@@ -1,7 +1,5 @@
 """Looking at the scene exactly as a frame of the capture did, with that frame behind or before it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy

@@ -1,7 +1,5 @@
 """Pictures of a scene as files: rendered whole or not at all, two beside each other, every setting put back."""
 
-from __future__ import annotations
-
 import errno
 import os
 import tempfile
@@ -43,30 +41,17 @@ def check_format(path: Path | str) -> str:
     return ending
 
 
-def engine_name(engine: str) -> str:
-    """What this Blender calls an engine (`CYCLES` or `EEVEE`), as EEVEE's name changed with 5.0."""
-    if engine != EEVEE:
-        return engine
-    return "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0) else "BLENDER_EEVEE"
-
-
 @contextmanager
 def settings_kept(scene: bpy.types.Scene) -> Iterator[None]:
     """Put back a scene's settings of rendering, its camera and its picture format, whatever happens."""
     groups = [(scene.render, _RENDER), (scene.render.image_settings, _IMAGE), (scene.view_settings, _VIEW)]
-    if hasattr(scene, "cycles"):
-        groups.append((scene.cycles, _CYCLES))
+    groups += [(getattr(scene, "cycles", None), _CYCLES), (scene.eevee, ["taa_render_samples"]), (scene, ["camera"])]
     kept = [(group, name, getattr(group, name)) for group, names in groups for name in names if hasattr(group, name)]
-    eevee = getattr(scene.eevee, "taa_render_samples", None)
-    camera = scene.camera
     try:
         yield
     finally:
         for group, name, value in kept:
             setattr(group, name, value)
-        if eevee is not None:
-            scene.eevee.taa_render_samples = eevee
-        scene.camera = camera
 
 
 @contextmanager
@@ -105,7 +90,8 @@ def prepare(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 0, perc
         Of the scene's size; 0: the scene's.
     """
     render = scene.render
-    render.engine = engine_name(engine)
+    eevee = "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0) else "BLENDER_EEVEE"
+    render.engine = eevee if engine == EEVEE else engine
     render.use_border = render.use_sequencer = False
     if percentage:
         render.resolution_percentage = percentage
@@ -125,10 +111,7 @@ def can_denoise() -> bool:
 
 
 def shoot(scene: bpy.types.Scene, path: Path | str) -> None:
-    """Render to a file, in the format of its ending; raises `StorageError` where it can't be written.
-
-    PNG and JPEG show the scene's view transform and exposure, EXR holds linear radiance.
-    """
+    """Render to a file: PNG and JPEG as the scene shows it, EXR linear; raises `StorageError`."""
     path = Path(path)
     kind, depth = FORMATS[check_format(path)]
     image = scene.render.image_settings
@@ -146,10 +129,7 @@ def shoot(scene: bpy.types.Scene, path: Path | str) -> None:
 
 
 def small_median(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 16, width: int = 64) -> float:
-    """Median luminance of a small picture through the scene's camera, linear; nothing of the scene's settings changes.
-
-    Raises `BadInputError`: EEVEE finds no graphics card; `StorageError`: the picture can't be written.
-    """
+    """Median luminance of a small picture through the scene's camera, linear; the scene's settings stay."""
     from ...core.io.exr import read_exr  # not earlier: Blender's start should not wait for OpenEXR
 
     with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, result_kept(), settings_kept(scene):
@@ -248,7 +228,6 @@ def beside(left: Path, right: Path, out: Path) -> None:
 
 
 def _rgba(pixels: np.ndarray) -> np.ndarray:
-    """Pixels with four channels, opaque."""
     out = np.ones((*pixels.shape[:2], 4), np.float32)
     out[..., :3] = pixels[..., :3]
     return out

@@ -6,8 +6,6 @@ docs/relighting.md). The volume goes beyond the walls, whose light it else mixes
 shines in, the walls' backs count as such.
 """
 
-from __future__ import annotations
-
 import math
 import tempfile
 from contextlib import suppress
@@ -53,16 +51,8 @@ def add_volume(scene: bpy.types.Scene) -> bpy.types.Object:
     thing.matrix_world = Matrix.LocRotScale((low + high) / 2, None, half)
     for axis, extent in zip("xyz", half, strict=True):
         setattr(data, f"resolution_{axis}", min(max(math.ceil(2 * extent / _STEP), 3), _MOST))
-    _set(
-        data,
-        bake_samples=1024,
-        capture_world=True,
-        capture_indirect=True,
-        capture_emission=True,
-        clamp_direct=0.0,
-        clamp_indirect=0.0,
-        surfel_density=15,
-    )
+    _set(data, bake_samples=1024, capture_world=True, capture_indirect=True, capture_emission=True)
+    _set(data, clamp_direct=0.0, clamp_indirect=0.0, surfel_density=15)
     thing[PROBE] = True
     own_collection(scene, COLLECTION).objects.link(thing)
     return thing
@@ -86,15 +76,8 @@ def bake(scene: bpy.types.Scene, wait: bool = True) -> bpy.types.Object:
     if bpy.app.background:  # where a card may be missing, and baking says nothing of it
         _try_eevee(scene)
     thing = add_volume(scene)
-    _set(
-        scene.eevee,
-        use_raytracing=True,
-        use_shadows=True,
-        light_threshold=0.001,
-        clamp_surface_direct=0.0,
-        clamp_surface_indirect=0.0,
-        gi_irradiance_pool_size="64",
-    )
+    _set(scene.eevee, use_raytracing=True, use_shadows=True, light_threshold=0.001, gi_irradiance_pool_size="64")
+    _set(scene.eevee, clamp_surface_direct=0.0, clamp_surface_indirect=0.0)
     for material in {slot.material for one in room_objects(scene) for slot in one.material_slots if slot.material}:
         # Places behind a wall count as within it then: they lend the wall neither the night nor the sun outside.
         material.use_backface_culling_lightprobe_volume = True
@@ -102,18 +85,16 @@ def bake(scene: bpy.types.Scene, wait: bool = True) -> bpy.types.Object:
     layer.update()
     active, layer.objects.active = layer.objects.active, thing
     try:
-        done = bpy.ops.object.lightprobe_cache_bake("EXEC_DEFAULT" if wait else "INVOKE_DEFAULT", subset="ACTIVE") <= {
-            "FINISHED",
-            "RUNNING_MODAL",
-        }
-        reason = ""
-    except RuntimeError as error:
-        done, reason = False, reason_of(error)
+        how = "EXEC_DEFAULT" if wait else "INVOKE_DEFAULT"
+        if "CANCELLED" in bpy.ops.object.lightprobe_cache_bake(how, subset="ACTIVE"):
+            raise BadInputError(_NO_CARD)
+    except (RuntimeError, BadInputError) as error:
+        remove(scene)
+        if isinstance(error, BadInputError):
+            raise
+        raise BadInputError(f"Blender can't bake the preview's light here: {reason_of(error)}.") from error
     finally:
         layer.objects.active = active
-    if not done:
-        remove(scene)
-        raise BadInputError(f"Blender can't bake the preview's light here: {reason}." if reason else _NO_CARD)
     return thing
 
 
@@ -121,50 +102,28 @@ def fit(scene: bpy.types.Scene) -> float:
     """Set the intensity of the baked volume so that EEVEE is as bright as Cycles; returns it, 1 where nothing tells.
 
     EEVEE's median luminance through a camera is about a + b * intensity, which two small pictures tell, and a third one
-    by Cycles what it should be. Of several cameras the logarithms of the ratios count, squared. Raises `StorageError`:
-    a small picture can't be written.
+    by Cycles what it should be. Of several cameras the logarithms of the ratios count, squared.
     """
     volumes, cameras = probes(scene), _views(scene)
     if not volumes or not cameras:
         return 1.0
-    data = volumes[0].data
-    seen = np.zeros((len(cameras), 3))
-    before = scene.camera
+    data, before = volumes[0].data, scene.camera
+    seen = np.zeros((3, len(cameras)))
     try:
-        for column, (engine, intensity, samples) in enumerate(((CYCLES, 1.0, 16), (EEVEE, 1.0, 4), (EEVEE, 2.0, 4))):
+        for row, (engine, intensity, samples) in enumerate(((CYCLES, 1.0, 16), (EEVEE, 1.0, 4), (EEVEE, 2.0, 4))):
             data.intensity = intensity
-            for row, camera in enumerate(cameras):
+            for column, camera in enumerate(cameras):
                 scene.camera = camera
                 with suppress(BadInputError):  # EEVEE's is black
                     seen[row, column] = small_median(scene, engine, samples)
     finally:
         scene.camera, data.intensity = before, 1.0
-    wanted, once, twice = seen.T
-    data.intensity = fitted_intensity(wanted, once, twice)
+    wanted, once, twice = seen[:, (seen[0] > 0) & (seen[1] > 0) & (seen[2] > seen[1])]
+    if len(wanted):
+        intensities = np.geomspace(_LEAST, _GREATEST, 241)
+        got = np.maximum(once + (twice - once) * (intensities[:, None] - 1), 1e-3 * once)
+        data.intensity = float(intensities[np.argmin((np.log2(got / wanted) ** 2).sum(1))])
     return data.intensity
-
-
-def fitted_intensity(wanted: np.ndarray, once: np.ndarray, twice: np.ndarray) -> float:
-    """The intensity whose luminances come nearest to those wanted, in the mean square of stops.
-
-    Parameters
-    ----------
-    wanted, once, twice : (n,) float
-        Median luminances by view: by Cycles, and by EEVEE at intensities of 1 and 2. Views that are black by either
-        engine tell nothing.
-
-    Returns
-    -------
-    float
-        1 where no view tells anything.
-    """
-    tells = (wanted > 0) & (once > 0) & (twice > once)
-    if not tells.any():
-        return 1.0
-    wanted, once, twice = wanted[tells], once[tells], twice[tells]
-    intensities = np.geomspace(_LEAST, _GREATEST, 241)
-    got = np.maximum(once + (twice - once) * (intensities[:, None] - 1), 1e-3 * once)
-    return float(intensities[np.argmin((np.log2(got / wanted) ** 2).sum(1))])
 
 
 def _views(scene) -> list[bpy.types.Object]:
@@ -175,7 +134,6 @@ def _views(scene) -> list[bpy.types.Object]:
 
 
 def _try_eevee(scene) -> None:
-    """Raise `BadInputError` where EEVEE gives black pictures."""
     with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, settings_kept(scene):
         prepare(scene, EEVEE, 1)
         scene.render.resolution_x = scene.render.resolution_y = 8

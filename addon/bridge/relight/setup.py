@@ -4,8 +4,6 @@ New lights are kept as seen by the camera, in units of the room's size and of it
 the colour that the artist gave them; the outside by its factor and turn, a picture around the room by its path.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator
@@ -15,11 +13,10 @@ import bpy
 from mathutils import Matrix, Vector
 
 from ...core.errors import BadInputError
-from ..data.added import own_collection
 from ..light import lamps as relight_lamps
 from ..light import outside as relight_outside
 from ..light.room import bounds, cast, room_light, view_direction
-from .lights import COLLECTION, KIND, PRESETS, added_lights, remove_lights
+from .lights import KIND, PRESETS, added_lights, put_light, remove_lights
 
 _NUMBERS = ("angle", "spread", "spot_size", "spot_blend", "temperature")
 _LENGTHS = ("size", "size_y", "shadow_soft_size")
@@ -28,47 +25,27 @@ _CLEAR = 0.15
 
 def setup_of(scene: bpy.types.Scene) -> str:
     """The light of a scene as JSON; raises `BadInputError` where it holds no room."""
-    frame, size, light = _frame(scene), _size(scene), room_light(scene)
-    back = frame.inverted()
+    back, size, light, world = _frame(scene).inverted(), _size(scene), room_light(scene), scene.world
     lights = []
     for thing in added_lights(scene):
         data = thing.data
-        told = {
-            "kind": thing[KIND],
-            "type": data.type,
-            "name": thing.name,
-            "shown": not thing.hide_render,
-            "pose": [list(row) for row in back @ thing.matrix_world],
-            "color": list(data.color),
-            "use_temperature": data.use_temperature,
-            # The power of a lamp goes with the square of its distance; a sun's strength does not.
-            "energy": data.energy / light / (1.0 if data.type == "SUN" else size**2),
-        }
-        told.update({name: getattr(data, name) for name in _NUMBERS if hasattr(data, name)})
-        told.update({name: getattr(data, name) / size for name in _LENGTHS if hasattr(data, name)})
+        told = {"kind": thing[KIND], "type": data.type, "name": thing.name, "shown": not thing.hide_render}
+        told["pose"] = [list(row) for row in back @ thing.matrix_world]
+        told |= {"color": list(data.color), "use_temperature": data.use_temperature}
+        told["energy"] = data.energy / light / _power(data.type, size)
+        told |= {name: getattr(data, name) for name in _NUMBERS if hasattr(data, name)}
+        told |= {name: getattr(data, name) / size for name in _LENGTHS if hasattr(data, name)}
         lights.append(told)
-    lamps = {}
-    for lamp in relight_lamps.find_lamps(scene):
-        if relight_lamps.is_changed(lamp):
-            # Its colour only where it is the artist's: another room's lamps have colours of their own.
-            tint = relight_lamps.colour(lamp) if relight_lamps.is_coloured(lamp) else None
-            lamps[_class(lamp)] = [relight_lamps.is_on(lamp), relight_lamps.factor(lamp), tint]
-    world = scene.world
-    outside = (
-        None
-        if world is None
-        else [relight_outside.is_on(world), relight_outside.factor(world), relight_outside.rotation(world)]
-    )
-    dark = not any(map(relight_lamps.is_on, relight_lamps.find_lamps(scene)))
-    return json.dumps(
-        {
-            "lights": lights,
-            "lamps": lamps,
-            "dark": dark,
-            "outside": outside,
-            "picture": world.get(relight_outside.HDRI) if world is not None else None,
-        }
-    )
+    lamps = relight_lamps.find_lamps(scene)
+    changed = {}
+    for lamp in filter(relight_lamps.is_changed, lamps):
+        # Its colour only where it is the artist's: another room's lamps have colours of their own.
+        tint = relight_lamps.colour(lamp) if relight_lamps.is_coloured(lamp) else None
+        changed[_class(lamp)] = [relight_lamps.is_on(lamp), relight_lamps.factor(lamp), tint]
+    state = relight_outside.snapshot(world)
+    told = {"lights": lights, "lamps": changed, "dark": not any(map(relight_lamps.is_on, lamps))}
+    told["outside"] = [state[name] for name in ("on", "factor", "rotation")] if state else None
+    return json.dumps(told | {"picture": world.get(relight_outside.HDRI) if world is not None else None})
 
 
 def apply_setup(scene: bpy.types.Scene, text: str) -> list[str]:
@@ -86,9 +63,9 @@ def apply_setup(scene: bpy.types.Scene, text: str) -> list[str]:
     """
     try:
         told = json.loads(text)
-        lights, lamps, outside = told["lights"], dict(told["lamps"]), told["outside"]
+        lights, outside = told["lights"], told["outside"]
         poses = [Matrix(one["pose"]) for one in lights]
-        states = {name: (bool(one[0]), float(one[1]), one[2] if len(one) > 2 else None) for name, one in lamps.items()}
+        states = {name: (bool(one[0]), float(one[1]), [*one, None][2]) for name, one in dict(told["lamps"]).items()}
         known = all(math.isfinite(c) for pose in poses for row in pose for c in row) and all(
             one["kind"] in PRESETS and one["type"] in ("AREA", "SPOT", "SUN", "POINT") for one in lights
         )
@@ -100,35 +77,33 @@ def apply_setup(scene: bpy.types.Scene, text: str) -> list[str]:
     remove_lights(scene)
     for one, pose in zip(lights, poses, strict=True):
         data = bpy.data.lights.new(one["name"], one["type"])
-        data.energy = one["energy"] * light * (1.0 if one["type"] == "SUN" else size**2)
+        data.energy = one["energy"] * light * _power(data.type, size)
         data.color, data.use_temperature = one["color"], one["use_temperature"]
-        for names, factor in ((_NUMBERS, 1.0), (_LENGTHS, size)):
-            for name in names:
-                if name in one and hasattr(data, name):
-                    setattr(data, name, one[name] * factor)
-        if one["type"] == "AREA":
+        for name in (*_NUMBERS, *_LENGTHS):
+            if name in one and hasattr(data, name):
+                setattr(data, name, one[name] * (size if name in _LENGTHS else 1.0))
+        if data.type == "AREA":
             data.shape = "RECTANGLE"
-        thing = bpy.data.objects.new(one["name"], data)
-        thing[KIND], thing.hide_render, thing.visible_camera = one["kind"], not one["shown"], False
         place = frame @ pose
-        if one["type"] != "SUN":
+        if data.type != "SUN":
             place.translation = _within(scene, frame.translation, place.translation)
-        thing.matrix_world = Matrix.LocRotScale(place.translation, place.to_quaternion(), None)
-        own_collection(scene, COLLECTION).objects.link(thing)
+        pose = Matrix.LocRotScale(place.translation, place.to_quaternion(), None)
+        put_light(scene, one["kind"], data, pose).hide_render = not one["shown"]
     for lamp in relight_lamps.find_lamps(scene):
-        relight_lamps.restore(lamp)
         on, factor, tint = states.get(_class(lamp), (not told.get("dark"), 1.0, None))
-        if tint is not None:
-            relight_lamps.set_colour(lamp, tint)
-        if not on or factor != 1.0:
-            relight_lamps.set_factor(lamp, factor)
-            relight_lamps.set_on(lamp, on)
+        touched = tint is not None or not on or factor != 1.0
+        state = {"on": on, "factor": factor, "colour": tint, "touched": touched}
+        relight_lamps.put_back(lamp, state)
     remarks = _put_picture(scene, told.get("picture"))
     if outside is not None and scene.world is not None:
-        relight_outside.set_on(scene.world, outside[0])
-        relight_outside.set_factor(scene.world, outside[1])
-        relight_outside.set_rotation(scene.world, outside[2])
+        state = dict(zip(("on", "factor", "rotation"), outside, strict=True))
+        relight_outside.put_back(scene.world, state | {"touched": True})
     return remarks
+
+
+def _power(kind: str, size: float) -> float:
+    """What power goes with in a room: the square of its size, but a sun's does not."""
+    return 1.0 if kind == "SUN" else size**2
 
 
 def _put_picture(scene, picture: str | None) -> list[str]:
@@ -170,7 +145,6 @@ def _within(scene, eye: Vector, place: Vector) -> Vector:
 
 
 def _class(lamp) -> str:
-    """A lamp's class: its name without its number."""
     return lamp.name.casefold().rpartition(" ")[0] or lamp.name.casefold()
 
 

@@ -1,8 +1,8 @@
 """Things that were not scanned, set onto the room's surfaces; being in the scene, they take and throw its light."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import bmesh
 import bpy
@@ -32,6 +32,7 @@ _UPRIGHT = 0.5
 _FLAT = 0.18
 """Metres around a place over which it has to be level to be taken for a floor or a table."""
 _PROBES = 400
+_DOWN = Vector((0, 0, -1))
 
 
 def add_virtual(
@@ -68,17 +69,17 @@ def add_virtual(
         bmesh.ops.create_monkey(build)
     build.to_mesh(mesh)
     build.free()
-    if shape != CUBE:
-        mesh.shade_smooth()
     thing = bpy.data.objects.new(NAMES[shape], mesh)
-    if shape == MONKEY:
-        thing.modifiers.new("Smooth", "SUBSURF").render_levels = 2
     thing.scale = (size / float(np.ptp(vertices_of(mesh), axis=0).max()),) * 3
     own_collection(scene, COLLECTION).objects.link(thing)
     set_look(thing, look)
-    if shape == MONKEY and scene.camera:
-        way = scene.camera.matrix_world.translation - at.place
-        thing.rotation_euler.z = math.atan2(way.y, way.x) + math.pi / 2
+    if shape != CUBE:
+        mesh.shade_smooth()
+    if shape == MONKEY:
+        thing.modifiers.new("Smooth", "SUBSURF").render_levels = 2
+        if scene.camera:
+            way = scene.camera.matrix_world.translation - at.place
+            thing.rotation_euler.z = math.atan2(way.y, way.x) + math.pi / 2
     stand(scene, thing, at)
     return thing
 
@@ -109,25 +110,23 @@ def stand(scene: bpy.types.Scene, thing: bpy.types.Object, at: Hit | None = None
         There is no surface below.
     """
     at = at or place_in_view(scene, thing)
-    corners = _points(scene, thing)
-    hidden = thing.hide_viewport
-    thing.hide_viewport = True  # else it would stand on itself
-    try:
-        pivot = Vector(((corners.min(0) + corners.max(0)) / 2)[:2].tolist() + [corners[:, 2].min()])
+    corners = np.array([thing.matrix_world @ Vector(corner) for corner in thing.bound_box])
+    if thing.type == "MESH":  # all of its vertices, modifiers and all
+        evaluated = thing.evaluated_get(depsgraph_of(scene))
+        corners = vertices_of(evaluated.data, evaluated.matrix_world)
+    with _hidden(thing):  # else it would stand on itself
+        low, high = corners.min(0), corners.max(0)
+        pivot = Vector((*((low + high) / 2)[:2], low[2]))
         radius = float(np.linalg.norm(corners[:, :2] - np.array(pivot[:2]), axis=1).max())
-        tall = float(np.ptp(corners[:, 2]))
-        place = at.place + at.normal * (radius + 0.01) if at.normal.z < _UPRIGHT else at.place.copy()
+        place = at.place
         if at.normal.z < _UPRIGHT:
-            below = cast(scene, place, Vector((0, 0, -1)))
+            below = cast(scene, place + at.normal * (radius + 0.01), _DOWN)
             if below is None:
                 raise BadInputError("There is no surface below that place to stand on; choose a floor or a table top.")
             place = below.place
-        place = _clear_of_walls(scene, place, radius, tall)
-        moved = corners + np.array(place - pivot)
-        drop = _drop(scene, moved, place.z)
-        shift = place - pivot - Vector((0, 0, drop))
-    finally:
-        thing.hide_viewport = hidden
+        place = _clear_of_walls(scene, place, radius, float(high[2] - low[2]))
+        shift = place - pivot
+        shift.z -= _drop(scene, corners + np.array(shift), place.z)
     if thing.parent:
         thing.matrix_world = Matrix.Translation(shift) @ thing.matrix_world
     else:
@@ -136,33 +135,35 @@ def stand(scene: bpy.types.Scene, thing: bpy.types.Object, at: Hit | None = None
     depsgraph_of(scene)
 
 
-def place_in_view(scene: bpy.types.Scene, ignored: bpy.types.Object | None = None) -> Hit:
-    """The surface to stand on that is nearest the middle of the picture, else below the 3D cursor or the room's middle.
-
-    Raises `BadInputError`: there is none.
-    """
-    hidden = ignored.hide_viewport if ignored else False
-    if ignored:
-        ignored.hide_viewport = True
+@contextmanager
+def _hidden(thing: bpy.types.Object | None) -> Iterator[None]:
+    """Within: no ray meets an object."""
+    hidden = thing is not None and thing.hide_viewport
     try:
+        if thing is not None:
+            thing.hide_viewport = True
+        yield
+    finally:
+        if thing is not None:
+            thing.hide_viewport = hidden
+
+
+def place_in_view(scene: bpy.types.Scene, ignored: bpy.types.Object | None = None) -> Hit:
+    """The surface to stand on that is nearest the picture's middle, else below the 3D cursor or the room's middle."""
+    with _hidden(ignored):
         low, high = bounds(scene)
         starts = [scene.cursor.location + Vector((0, 0, 0.05)), (low + high) / 2]
         if scene.camera:
-            seen = _flat_in_view(scene)
-            if seen:
+            if seen := _flat_in_view(scene):
                 return seen
             origin, direction = picture_ray(scene)
-            hit = cast(scene, origin, direction)
-            if hit:
+            if hit := cast(scene, origin, direction):
                 starts.insert(0, hit.place - direction * min(0.8, 0.4 * hit.distance))
         for start in starts:
             inside = all(low[k] <= start[k] <= high[k] + 0.05 for k in range(3))
-            hit = cast(scene, start, Vector((0, 0, -1))) if inside else None
+            hit = cast(scene, start, _DOWN) if inside else None
             if hit and hit.normal.z >= _UPRIGHT:
                 return hit
-    finally:
-        if ignored:
-            ignored.hide_viewport = hidden
     raise BadInputError("There is no surface below the middle of the view; set the 3D cursor over a floor or a table.")
 
 
@@ -175,7 +176,7 @@ def _flat_in_view(scene: bpy.types.Scene) -> Hit | None:
         if hit is None or hit.normal.z < 0.95:
             continue
         around = [
-            cast(scene, hit.place + Vector((dx, dy, 0.05)), Vector((0, 0, -1)), 0.1)
+            cast(scene, hit.place + Vector((dx, dy, 0.05)), _DOWN, 0.1)
             for dx, dy in ((_FLAT, 0), (-_FLAT, 0), (0, _FLAT), (0, -_FLAT))
         ]
         if not all(one and abs(one.place.z - hit.place.z) < 0.02 for one in around):
@@ -188,24 +189,16 @@ def _flat_in_view(scene: bpy.types.Scene) -> Hit | None:
 
 def below_cursor(scene: bpy.types.Scene) -> Hit:
     """The surface straight below the 3D cursor; raises `BadInputError` where there is none."""
-    hit = cast(scene, scene.cursor.location + Vector((0, 0, 0.05)), Vector((0, 0, -1)))
+    hit = cast(scene, scene.cursor.location + Vector((0, 0, 0.05)), _DOWN)
     if hit is None:
         raise BadInputError("There is no surface below the 3D cursor; set it above a floor or a table.")
     return hit
 
 
-def _points(scene, thing) -> np.ndarray:
-    """The object's vertices in the world, modifiers and all; those of its box where it has no mesh. (n, 3)."""
-    if thing.type != "MESH":
-        return np.array([thing.matrix_world @ Vector(c) for c in thing.bound_box])
-    evaluated = thing.evaluated_get(depsgraph_of(scene))
-    return vertices_of(evaluated.data, evaluated.matrix_world)
-
-
 def _clear_of_walls(scene, place: Vector, radius: float, tall: float) -> Vector:
     """Move a place so that a thing of `radius` that stands there keeps off upright surfaces around it."""
     for _ in range(3):
-        push = Vector((0, 0, 0))
+        push = Vector()
         for k in range(12):
             angle = k * math.pi / 6
             way = Vector((math.cos(angle), math.sin(angle), 0))
@@ -227,7 +220,7 @@ def _drop(scene, points: np.ndarray, height: float) -> float:
     gaps = []
     for x, y, z in points[chosen].tolist():
         # From as high as the thing's middle: what reaches over it, a table top above the floor, is not below it.
-        hit = cast(scene, Vector((x, y, min(z, height) + lift)), Vector((0, 0, -1)))
+        hit = cast(scene, Vector((x, y, min(z, height) + lift)), _DOWN)
         if hit:
             gaps.append(z - hit.place.z)
     return min(gaps, default=0.0)

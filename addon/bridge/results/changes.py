@@ -1,7 +1,5 @@
 """What a run found of each object beside what the last one found, so that an artist sees what is new."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

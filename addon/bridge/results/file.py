@@ -3,8 +3,6 @@
 An object's number alone says nothing: every room counts from 0, and a folder may hold another run than it did.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -81,10 +79,7 @@ def forget() -> None:
 
 
 def standings(things: Iterable[bpy.types.Object]) -> dict[bpy.types.Object, tuple[str, Result | None]]:
-    """How each recovered object stands to its result (`FITS` and its neighbours), and that result.
-
-    Objects that nothing was recovered of are left out. Each folder is looked at once, so ask for many at a time.
-    """
+    """How each recovered object stands to its result (`FITS` and its neighbours), and that result."""
     found, folders = {}, {}
     for thing in things:
         if thing.type != "MESH" or OBJECT_ID not in thing:

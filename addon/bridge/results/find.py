@@ -3,8 +3,6 @@
 A result is known by its run's key, never by its name alone.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import time
@@ -99,10 +97,7 @@ def known_overtaken() -> list[Path]:
 
 
 def overtaken() -> list[Path]:
-    """Results that were recovered anew with their images laid out otherwise than the open file's objects ask for.
-
-    Of files that no Blender with the extension saved: else the images of their layout were kept (`images.keep`).
-    """
+    """Results that were recovered anew with their images laid out otherwise than the open file's objects ask for."""
     return sorted({result_of(Path(one[IMAGE])) for one in _overtaken()})
 
 
@@ -134,7 +129,8 @@ def missing() -> list[Missing]:
     for one in of_results():
         source = Path(one[IMAGE])
         if not one.packed_file and not is_there(path_of(one)):
-            lost.setdefault(_result_of(source, runs), []).append(source.name)
+            folder = next((folder for folder in runs if source.is_relative_to(folder)), source.parent)
+            lost.setdefault(folder, []).append(source.name)
     found = []
     for folder in sorted({*runs, *lost}):
         gone = not (folder / MATERIALS).is_file()
@@ -147,11 +143,7 @@ def missing() -> list[Missing]:
 
 
 def search(home: Path) -> list[str]:
-    """Look for what is missing where it most likely is, and point the open file there; a sentence on each find.
-
-    Looked at are the result folder itself, the .blend's folder, that of results beside it, and `home`; no folder is
-    walked through.
-    """
+    """Look for what is missing where it most likely is, and point the open file there; a sentence on each find."""
     told = []
     for image in _overtaken():
         kept = kept_path(Path(image[IMAGE]), image[LAYOUT])
@@ -185,10 +177,7 @@ def search(home: Path) -> list[str]:
 
 
 def find(one: Missing, chosen: Path) -> Path:
-    """The result that is missing, in a chosen folder, or one level below or above it.
-
-    Raises `BadInputError`: it is not there, or another run's is.
-    """
+    """The missing result in a chosen folder, or one level below or above; raises `BadInputError` where it isn't."""
     try:
         below = sorted(part for part in chosen.iterdir() if part.is_dir())[:LOOKED_AT]
     except OSError as error:
@@ -244,7 +233,6 @@ def repoint(old: Path, new: Path) -> int:
 
 
 def _show(image: bpy.types.Image, path: Path) -> None:
-    """Let an image show another file."""
     image.filepath = str(path)
     if bpy.data.filepath:
         relative_to(image, Path(bpy.data.filepath).parent)
@@ -252,10 +240,7 @@ def _show(image: bpy.types.Image, path: Path) -> None:
 
 
 def move(folder: Path, home: Path) -> Path:
-    """Move a result into a folder of results and point the open file there; it is whole in one place at any time.
-
-    Raises `BadInputError`: a run is writing it; `StorageError`: it can't be moved, and stays where it is.
-    """
+    """Move a result into a folder of results and point the open file there; it is whole in one place at any time."""
     with Store(folder):
         pass  # no run is writing it
     known = captures(folder)
@@ -284,7 +269,6 @@ def _copy(folder: Path, target: Path) -> None:
 
 
 def _owners() -> Iterable[bpy.types.ID]:
-    """The open file's own objects and collections that say where they came from."""
     return [
         one for kind in (bpy.data.objects, bpy.data.collections) for one in kind if one.get(RESULT) and not one.library
     ]
@@ -295,11 +279,6 @@ def _keeps(place: Path, one: Missing) -> bool:
     kept = [path_of(image) for image in of_results()]
     kept = [path.relative_to(one.folder) for path in kept if path.is_relative_to(one.folder / KEPT)]
     return bool(kept) and all(is_there(place / path) for path in kept)
-
-
-def _result_of(source: Path, folders: Iterable[Path]) -> Path:
-    """The result folder that an image's file lies in, however deep."""
-    return next((folder for folder in folders if source.is_relative_to(folder)), source.parent)
 
 
 def _holds(place: Path, folder: Path) -> bool:

@@ -1,7 +1,5 @@
 """Where results go: beside the .blend or among the artist's documents, never where removing the extension clears."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from pathlib import Path

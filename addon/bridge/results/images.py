@@ -1,7 +1,5 @@
 """A result folder's images in the open file: referred to, copied beside the file, or packed into it."""
 
-from __future__ import annotations
-
 import filecmp
 import os
 import shutil
@@ -59,23 +57,15 @@ def bring(folder: Path | str, where: str = RESULT) -> bpy.types.Image | None:
 def image(
     folder: Path | str, name: str, where: str = RESULT, keep: bool = True, share: bool = False
 ) -> bpy.types.Image:
-    """One image of a result folder, with the colour space that its content asks for; raises as `bring`.
-
-    `keep` gives it a fake user; with `share` one that is there already is read again.
-    """
+    """One image of a result folder in its content's colour space; `share`: one that is there already, read again."""
     source = Path(folder).absolute() / name
-    earlier = next((one for one in bpy.data.images if one.get(IMAGE) == str(source) and not one.library), None)
-    if share and earlier is not None:
-        if not earlier.packed_file:
-            earlier.reload()
-        return earlier
-    path = source if where != FOLDER else _beside(source)
-    loaded = load_image(path, image_name(capture_name(source.parent), name), COLOUR_SPACES[name], where == PACK, keep)
-    loaded[IMAGE] = str(source)
-    if earlier is not None:
-        replace(earlier, loaded)
-    if where != PACK and bpy.data.filepath:
-        relative_to(loaded, Path(bpy.data.filepath).parent)
+    earlier = [one for one in bpy.data.images if share and one.get(IMAGE) == str(source) and not one.library]
+    if earlier:
+        if not earlier[0].packed_file:
+            earlier[0].reload()
+        return earlier[0]
+    loaded = load_image(source, image_name(capture_name(source.parent), name), COLOUR_SPACES[name], keep=keep)
+    settle([loaded], where)
     return loaded
 
 
@@ -129,9 +119,8 @@ def settle(images: Iterable[bpy.types.Image], where: str = RESULT) -> None:
     for number, (one, source) in places.items():
         if number in gone:
             continue
-        for earlier in [
-            other for other in bpy.data.images if other != one and other.get(IMAGE) == str(source) and not other.library
-        ]:
+        same = [other for other in bpy.data.images if other.get(IMAGE) == str(source) and not other.library]
+        for earlier in [other for other in same if other != one]:
             gone.add(earlier.session_uid)
             replace(earlier, one)
         if one.packed_file:
@@ -214,20 +203,15 @@ def is_there(path: Path) -> bool:
     return path.is_file() or bool(tiles_of(path))
 
 
-def _of_one_result(one: Path, other: Path) -> bool:
-    """Whether two folders are one, or one lies in the other, as objects' own images do."""
-    return one.is_relative_to(other) or other.is_relative_to(one)
-
-
 def _beside(source: Path) -> Path:
     """A copy of `source` in the folder of images beside the saved file; each result and layout has one of its own."""
     check(FOLDER)
     saved, layout = Path(bpy.data.filepath), layout_of(result_of(source))
-    theirs = {
-        path_of(one).parent
-        for one in bpy.data.images
-        if one.get(IMAGE) and not _of_one_result(Path(one[IMAGE]).parent, source.parent)
-    }
+    theirs = set()
+    for one in bpy.data.images:
+        folder = Path(one[IMAGE]).parent if one.get(IMAGE) else source.parent
+        if not folder.is_relative_to(source.parent) and not source.is_relative_to(folder):  # objects' lie deeper
+            theirs.add(path_of(one).parent)
     names = (f"{saved.stem} images{f' {number}' if number > 1 else ''}" for number in count(1))
     target = next(one for one in (saved.parent / name / layout for name in names) if one not in theirs) / source.name
     with refused(f"'{target}' can't be written", "free some space or save the file elsewhere"):

@@ -5,8 +5,6 @@ tree of an object is touched, a render never evaluates the modifier (its switch 
 where a file is opened without the add-on. One material serves a whole room, as all its objects share one atlas.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -17,8 +15,9 @@ import bpy
 from ...core.errors import BadInputError
 from ...core.kinds import Shown
 from ..data.images import RADIANCE
+from ..data.materials import texture
 from ..data.mesh_objects import ATLAS_UV
-from ..data.nodes import fresh_tree, mix_node
+from ..data.nodes import add_node, fresh_tree, mix_node
 from ..marks import OBJECT_ID, RESULT
 from .file import FITS, standings
 from .images import image
@@ -156,17 +155,13 @@ def set_look(scene: bpy.types.Scene, look: str) -> int:
 
 
 def clear(scene: bpy.types.Scene, but: Iterable[bpy.types.NodeTree] = ()) -> int:
-    """Let the viewport show the materials themselves; returns how many objects showed something else.
-
-    The node groups `but` are kept for what comes next.
-    """
+    """Let the viewport show the materials themselves, keeping node groups `but`; how many objects showed others."""
     count = _take_off(scene.objects)
     _sweep(but)
     return count
 
 
 def _take_off(things: Iterable[bpy.types.Object]) -> int:
-    """Remove the look's modifiers; returns how many there were."""
     count = 0
     for thing in things:
         modifier = thing.modifiers.get(NAME)
@@ -197,111 +192,76 @@ def refresh(scene: bpy.types.Scene) -> None:
 
 
 def _group(material: bpy.types.Material, look: str) -> bpy.types.NodeTree:
-    """Geometry nodes that set a material on all there is."""
     group = bpy.data.node_groups.new(NAME, "GeometryNodeTree")
     group[MARK] = look
     for way in ("INPUT", "OUTPUT"):
         group.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
-    start, put, end = (
-        group.nodes.new(kind) for kind in ("NodeGroupInput", "GeometryNodeSetMaterial", "NodeGroupOutput")
-    )
-    put.location, end.location = (200, 0), (400, 0)
+    start = add_node(group, "NodeGroupInput")
+    put = add_node(group, "GeometryNodeSetMaterial", start.outputs[0], location=(200, 0))
     put.inputs["Material"].default_value = material
-    group.links.new(start.outputs[0], put.inputs["Geometry"])
-    group.links.new(put.outputs[0], end.inputs[0])
+    add_node(group, "NodeGroupOutput", put.outputs[0], location=(400, 0))
     return group
 
 
 def _material(scene: bpy.types.Scene, look: str, folder: Path) -> bpy.types.Material:
-    """The image as pure emission."""
     material = bpy.data.materials.new(f"{NAME}: {LOOKS[look].label}")
     material[MARK] = look
-    fresh_tree(material)
-    tree = material.node_tree
-    output, shine = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new("ShaderNodeEmission")
-    tree.links.new(shine.outputs[0], output.inputs["Surface"])
-    strength = 1.0
+    tree, strength = fresh_tree(material), 1.0
     if look == COVERAGE:
-        colour = _ramp(tree, _often(tree, _texture(tree, folder, LOOKS[look].file)), _never(tree, folder, False))
+        count = _channels(tree, folder, LOOKS[look].file)[0]
+        often = _math(tree, "LOGARITHM", _math(tree, "MAXIMUM", count, 1.0), OFTEN)
+        colour = _ramp(tree, often, _never(tree, folder, 0, 0.5))
     elif look == CERTAINTY:
-        colour = _ramp(tree, _sure(tree, folder), _never(tree, folder, True))
+        colour = _ramp(tree, _sure(tree, folder), _never(tree, folder, 2, 1.5))
     else:
         colour = _texture(tree, folder, LOOKS[look].file)
         strength = 1 / math.pi if look == SHADING else 1.0  # what leaves white paint is E / pi
-    tree.links.new(colour, shine.inputs["Color"])
-    shine.inputs["Strength"].default_value = strength
+    shine = add_node(tree, "ShaderNodeEmission", colour, strength)
+    add_node(tree, "ShaderNodeOutputMaterial", shine.outputs[0])
     if not LOOKS[look].light:
         _without_exposure(scene, shine.inputs["Strength"])
     return material
 
 
 def _texture(tree, folder: Path, name: str):
-    place = tree.nodes.new("ShaderNodeUVMap")
-    place.uv_map = ATLAS_UV
-    texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image = image(folder, name, keep=False, share=True)
-    texture.extension = "EXTEND"
+    picture = image(folder, name, keep=False, share=True)
     # Between an island's texels and the next nothing may be mixed into counts.
-    texture.interpolation = "Linear" if texture.image.colorspace_settings.name == RADIANCE else "Closest"
-    tree.links.new(place.outputs[0], texture.inputs[0])
-    return texture.outputs["Color"]
+    kind = "Linear" if picture.colorspace_settings.name == RADIANCE else "Closest"
+    return texture(tree, picture, ATLAS_UV, interpolation=kind)
+
+
+def _channels(tree, folder: Path, name: str):
+    return add_node(tree, "ShaderNodeSeparateColor", _texture(tree, folder, name)).outputs
 
 
 def _math(tree, operation: str, *values):
-    node = tree.nodes.new("ShaderNodeMath")
-    node.operation = operation
-    for socket, value in zip(node.inputs, values):
-        if isinstance(value, bpy.types.NodeSocket):
-            tree.links.new(value, socket)
-        else:
-            socket.default_value = value
-    return node.outputs[0]
-
-
-def _channel(tree, colour, number: int):
-    node = tree.nodes.new("ShaderNodeSeparateColor")
-    tree.links.new(colour, node.inputs[0])
-    return node.outputs[number]
-
-
-def _often(tree, coverage):
-    """0...1 for 1...`OFTEN` observations, by their logarithm."""
-    count = _math(tree, "MAXIMUM", _channel(tree, coverage, 0), 1.0)
-    return _math(tree, "DIVIDE", _math(tree, "LOGARITHM", count, 2.0), math.log2(OFTEN))
+    return add_node(tree, "ShaderNodeMath", *values, operation=operation).outputs[0]
 
 
 def _sure(tree, folder: Path):
     """0...1 for relative errors of the albedo from `DOUBTFUL` down to 1/16 of it, by their logarithm."""
     error, albedo = (
-        _math(tree, "ADD", _math(tree, "ADD", *(_channel(tree, colour, k) for k in (0, 1))), _channel(tree, colour, 2))
-        for colour in (_texture(tree, folder, name) for name in ("albedo_error.exr", "albedo.exr"))
+        _math(tree, "ADD", _math(tree, "ADD", red, green), blue)
+        for red, green, blue in (_channels(tree, folder, name) for name in ("albedo_error.exr", "albedo.exr"))
     )
     relative = _math(tree, "DIVIDE", error, _math(tree, "MAXIMUM", albedo, 1e-3))
     relative = _math(tree, "MAXIMUM", relative, DOUBTFUL / 64)
-    return _math(tree, "DIVIDE", _math(tree, "LOGARITHM", _math(tree, "DIVIDE", DOUBTFUL, relative), 2.0), 4.0)
+    return _math(tree, "LOGARITHM", _math(tree, "DIVIDE", DOUBTFUL, relative), 16.0)
 
 
-def _never(tree, folder: Path, measured: bool):
-    """1 where no frame saw a spot (or, with `measured`, where its albedo was not measured), else 0."""
-    coverage = _texture(tree, folder, "coverage.exr")
-    if measured:
-        return _math(tree, "LESS_THAN", _channel(tree, coverage, 2), 1.5)
-    return _math(tree, "LESS_THAN", _channel(tree, coverage, 0), 0.5)
+def _never(tree, folder: Path, channel: int, least: float):
+    """1 where a number of the coverage is too low: no frame saw the spot, or its albedo was not measured."""
+    return _math(tree, "LESS_THAN", _channels(tree, folder, "coverage.exr")[channel], least)
 
 
 def _ramp(tree, value, never):
-    node = tree.nodes.new("ShaderNodeValToRGB")
+    node = add_node(tree, "ShaderNodeValToRGB", value)
     elements = node.color_ramp.elements
     while len(elements) < len(RAMP):
         elements.new(0.5)
     for k, (element, colour) in enumerate(zip(elements, RAMP)):
         element.position, element.color = k / (len(RAMP) - 1), (*colour, 1)
-    tree.links.new(value, node.inputs[0])
-    _, factor, seen, unseen, mixed = mix_node(tree.nodes)
-    tree.links.new(never, factor)
-    tree.links.new(node.outputs[0], seen)
-    unseen.default_value = NEVER
-    return mixed
+    return mix_node(tree, never, node.outputs[0], NEVER)
 
 
 def _without_exposure(scene: bpy.types.Scene, socket) -> None:

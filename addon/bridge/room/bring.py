@@ -4,8 +4,6 @@ A capture has one room in a file. Where it is there already, `bringing` updates 
 to it stays.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,8 +18,7 @@ from ..marks import IMAGE, OWN_SCENE, RESULT, UV_MAP, mark
 from ..results import changes as room_changes
 from ..results import images
 from ..scene.as_made import stamp, stamp_tree
-from ..scene.parts import find_room, hide_cameras, imported, own_scene, rooms, scene_name
-from ..scene.settings import dress, take_settings
+from ..scene.parts import dress, find_room, hide_cameras, imported, own_scene, rooms, scene_name, take_settings
 from .update import commit, note_known, plan
 
 SCENE_FILE = "scene.blend"
@@ -95,7 +92,7 @@ def bringing(
         yield 0.0
         shell = _append(folder / SCENE_FILE)
         yield 0.4
-        fresh = _top(shell)
+        fresh = next(iter(rooms(shell)), shell.collection.children[0])  # an older one is not marked
         run = run_of(folder)
         things = list(fresh.all_objects)
         for owner in (fresh, *things):
@@ -136,11 +133,15 @@ def bringing(
         one.name = label
     brought = Brought(place, top, steps is not None, (*warnings, *kept), differences)
     yield 0.98
-    if brought.scene.camera is not None:
-        show_camera(brought.scene, brought.scene.camera)
-    # Without this no matrix_world is right before the scene is looked at.
-    brought.scene.view_layers[0].update()
+    ready(place)
     return brought
+
+
+def ready(scene: bpy.types.Scene) -> None:
+    """Show the camera that a scene is looked through; without the update no matrix_world is right before it is."""
+    if scene.camera is not None:
+        show_camera(scene, scene.camera)
+    scene.view_layers[0].update()
 
 
 def _append(path: Path) -> bpy.types.Scene:
@@ -160,7 +161,6 @@ def _append(path: Path) -> bpy.types.Scene:
 
 
 def _images(made: Made, folder: Path) -> list[bpy.types.Image]:
-    """The images that came, marked with their files of the result folder."""
     found = [image for image in made.new("images") if image.source in ("FILE", "TILED") and image.filepath]
     for image in found:
         path = Path(image.filepath.replace("\\", "/"))
@@ -178,24 +178,16 @@ def _replace_images(made: Made, top: bpy.types.Collection) -> None:
             images.replace(image, came[path.name])
 
 
-def _top(shell: bpy.types.Scene) -> bpy.types.Collection:
-    """The room's collection in an appended scene; an older one is not marked."""
-    return next(iter(rooms(shell)), shell.collection.children[0])
-
-
 def _place(top, shell, scene, root: str, new: bool) -> tuple[bpy.types.Scene, list[str]]:
     """Have the room in `scene`, or in one of its own: the scene to see it in, and what stays as the artist has it."""
     kept: list[str] = []
     own = None if new else own_scene(top)
     if own is not None:
         kept = take_settings(own, shell)
-    if scene is not None and top not in scene.collection.children_recursive:
-        scene.collection.children.link(top)
-        hide_cameras(scene, top)
+    if scene is not None:
+        link_room(top, scene)
     if scene is None and own is None:
-        if not new:
-            shell.collection.children.link(top)
-            hide_cameras(shell, top)
+        link_room(top, shell)
         shell.name, shell[OWN_SCENE] = scene_name(root), True
         dress(shell)
         return shell, kept

@@ -1,7 +1,5 @@
 """A capture as it was scanned, in the open file: its objects without materials, its cameras with their frames."""
 
-from __future__ import annotations
-
 from collections.abc import Generator
 
 import bpy
@@ -9,13 +7,13 @@ import numpy as np
 
 from ...core.scene.model import Capture
 from ..data.added import Made
-from ..data.cameras import make_cameras, make_track, show_camera, use_camera
+from ..data.cameras import make_cameras, make_track, use_camera
 from ..data.mesh_objects import each_object
 from ..marks import CAPTURE, OWN_SCENE
 from ..relight.match_frame import show_picture
 from ..scene.as_made import stamp
-from ..scene.parts import CAMERAS, ROOM, find_room, hide_cameras, new_room, part_of, scene_name, scenes_with
-from .bring import Brought
+from ..scene.parts import CAMERAS, ROOM, find_room, new_room, part_of, scene_name, scenes_with
+from .bring import Brought, link_room, ready
 from .update import note_known
 
 
@@ -32,17 +30,11 @@ def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generat
     """
     top = find_room(capture.root)
     if top is not None:
-        if scene is not None and top not in scene.collection.children_recursive:
-            scene.collection.children.link(top)
-        return Brought(
-            scene or scenes_with(top)[0],
-            top,
-            True,
-            (
-                f"Capture '{capture.root.name}' is in this file already, in its scene "
-                f"'{scenes_with(top)[0].name}'; it stays as it is.",
-            ),
-        )
+        known = scenes_with(top)[0]
+        if scene is not None:
+            link_room(top, scene)
+        told = f"Capture '{capture.root.name}' is in this file already, in its scene '{known.name}'; it stays as it is."
+        return Brought(scene or known, top, True, (told,))
     made = Made()
     try:
         top = new_room(capture.root)
@@ -74,9 +66,6 @@ def importing(capture: Capture, scene: bpy.types.Scene | None = None) -> Generat
         scene.frame_start, scene.frame_end = 1, max(len(cameras), 1)
         if cameras:
             use_camera(scene, cameras[0])
-    scene.collection.children.link(top)
-    hide_cameras(scene, top)
-    if scene.camera is not None:
-        show_camera(scene, scene.camera)
-    scene.view_layers[0].update()
+    link_room(top, scene)
+    ready(scene)
     return Brought(scene, top)

@@ -1,9 +1,4 @@
-"""A room that is in the file already becomes that of a new result; what the artist did to it stays.
-
-First all is compared (`plan`, in slices, nothing changes), then all changes at once (`commit`).
-"""
-
-from __future__ import annotations
+"""A room that is in the file already becomes that of a new result; what the artist did to it stays."""
 
 import json
 from collections.abc import Generator, Iterable
@@ -11,16 +6,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
+import numpy as np
+from mathutils import Matrix
 
 from ..corrections import corrections
-from ..data.arrays import layer_of, set_layer
+from ..data.arrays import faces_of, layer_of, read, set_layer, vertices_of
 from ..data.cameras import FRAME_INDEX, NO_FRAME
+from ..data.mesh_objects import ATLAS_UV
 from ..light import lamps as relight_lamps
 from ..marks import CAPTURE, OBJECT_ID, RESULT, RUN
-from ..own_scene.capture import few
+from ..own_scene.capture import sentences
+from ..own_scene.mesh import same_topology
 from ..scene.as_made import NAME, PLACE, SHAPE, is_corrected, is_edited, is_ours, is_renamed, made_at
 from ..scene.parts import LAMPS, PART, ROOM, part_of
-from .atlas_transfer import atlas_onto
 
 KNOWN = "scan_relight_known"
 """Of a room's collection: all things that were brought, as JSON; one that is gone was deleted by the artist."""
@@ -163,16 +161,17 @@ def note_known(top: bpy.types.Collection, things: Iterable[bpy.types.Object]) ->
 
 
 def _told(steps: Steps) -> list[str]:
-    groups = [
-        (
-            [pair.old.name for pair in steps.pairs if pair.edited],
-            "the mesh was edited and is left as it is; the material is new",
-        ),
-        ([pair.old.name for pair in steps.pairs if pair.corrected], "the material was corrected and stays"),
-        (steps.deleted, "was deleted and stays so; delete the room's scene and run again to have it back"),
-        (steps.kept_removed, "is no longer part of the result, but was edited and stays"),
-    ]
-    return [f"{few(names)}: {what}." for names, what in groups if names]
+    edited, corrected = (
+        [pair.old.name for pair in steps.pairs if getattr(pair, one)] for one in ("edited", "corrected")
+    )
+    return list(
+        sentences(
+            (edited, "the mesh was edited and is left as it is; the material is new"),
+            (corrected, "the material was corrected and stays"),
+            (steps.deleted, "was deleted and stays so; delete the room's scene and run again to have it back"),
+            (steps.kept_removed, "is no longer part of the result, but was edited and stays"),
+        )
+    )
 
 
 def _place(pair: Pair) -> None:
@@ -239,7 +238,6 @@ def _sort(thing: bpy.types.Object, top: bpy.types.Collection, lamp: bool) -> Non
 
 
 def _track(old: bpy.types.Object, new: bpy.types.Object, steps: Steps) -> None:
-    """Give the animated camera the new way."""
     animated = old.animation_data_create()
     if animated.action is not None:
         steps.replaced.append(animated.action.session_uid)
@@ -247,3 +245,38 @@ def _track(old: bpy.types.Object, new: bpy.types.Object, steps: Steps) -> None:
     animated.action = new.animation_data.action
     if hasattr(animated, "action_slot"):
         animated.action_slot = new.animation_data.action_slot
+
+
+def atlas_onto(data: bpy.types.Mesh, place: Matrix, source: bpy.types.Mesh, source_place: Matrix) -> None:
+    """Give an edited mesh the atlas coordinates of `source`, each mesh standing at its place.
+
+    Where only vertices were moved, those of the same corner. Else each face continues the map of the nearest triangle
+    of `source`, so that no face is spread over two islands of the atlas.
+    """
+    if not len(data.polygons) or not len(source.polygons) or ATLAS_UV not in source.uv_layers:
+        return
+    uv = layer_of(source, ATLAS_UV)
+    if same_topology(data, source):
+        set_layer(data, ATLAS_UV, uv).active_render = True
+        return
+    from scipy.spatial import cKDTree  # not earlier: Blender's start should not wait for it
+
+    corners = _corners(source, source_place)
+    triangles, maps = corners.reshape(-1, 3, 3), uv.reshape(-1, 3, 2)
+    total = read(data.polygons, "loop_total", kind=np.int32)
+    face = np.repeat(np.arange(len(total)), total)
+    own = _corners(data, place)
+    middle = np.stack([np.bincount(face, own[:, axis], len(total)) for axis in range(3)], 1) / total[:, None]
+    nearest = cKDTree(triangles.mean(1)).query(middle)[1][face]
+    first = triangles[nearest, 0]
+    edges = triangles[nearest, 1:] - first[:, None]
+    # Least squares on the triangle's plane; a sliver's pseudo-inverse stays finite.
+    share = np.einsum("ijk,ik->ij", np.linalg.pinv(edges.transpose(0, 2, 1)), own - first)
+    steps = maps[nearest, 1:] - maps[nearest, :1]
+    new = (maps[nearest, 0] + np.einsum("ij,ijk->ik", share, steps)).clip(0, 1)
+    set_layer(data, ATLAS_UV, new).active_render = True
+
+
+def _corners(data: bpy.types.Mesh, place: Matrix) -> np.ndarray:
+    """Where each corner of a mesh is that stands at a place, (c, 3)."""
+    return vertices_of(data, place)[faces_of(data)[1]]

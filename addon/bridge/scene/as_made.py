@@ -3,8 +3,6 @@
 All of it are custom properties: they are saved with the file and need no registered add-on.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re
@@ -94,10 +92,7 @@ def is_corrected(owner: bpy.types.Material | bpy.types.World) -> bool:
 
 @contextmanager
 def our_own(owner: bpy.types.Material | bpy.types.World) -> Iterator[None]:
-    """What is changed within is shown on the artist's behalf and can be shown again: no edit of nodes by hand.
-
-    `is_corrected` says afterwards what it said before.
-    """
+    """What is changed within is shown on the artist's behalf: `is_corrected` says afterwards what it said before."""
     noted = WRITTEN in owner and not is_corrected(owner)
     yield
     if noted:
@@ -137,7 +132,6 @@ def _values(owner) -> dict[str, object]:
 
 
 def _plain(value):
-    """A socket's value with the digits that single precision holds."""
     if isinstance(value, (bool, int)):
         return value
     if isinstance(value, float):

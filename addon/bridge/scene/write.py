@@ -1,11 +1,8 @@
 """The recovered room as a Blender scene: built into any scene, or saved as a file that renders when opened."""
 
-from __future__ import annotations
-
 import errno
 import math
 import os
-import struct
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -15,22 +12,23 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
+from ...core.brdf.emitter import EMITTER
 from ...core.brdf.material import ObjectMaterial, undescribed
+from ...core.luminance import rgb
 from ...core.photo import MIDDLE_GREY
-from ...core.results.room_file import run_of
+from ...core.results.room_file import openings_of, run_of
 from ...core.scene.model import Capture
 from ..data.added import Made
+from ..data.arrays import make_mesh
 from ..data.cameras import best_view, differing, make_cameras, make_track, make_view, unlike, use_camera
 from ..data.images import image_name, load_image, load_parts, relative_to
 from ..data.materials import make_material
 from ..data.mesh_objects import each_object, is_open
-from ..data.world import set_world
+from ..data.nodes import set_world
 from ..marks import OWN_SCENE, mark
 from ..refused import refused
 from .as_made import stamp, stamp_tree
-from .openings import make_openings
-from .parts import CAMERAS, LAMPS, ROOM, hide_cameras, new_room, part_of, scene_name
-from .settings import EXPOSURE
+from .parts import CAMERAS, EXPOSURE, LAMPS, ROOM, hide_cameras, new_room, part_of, scene_name
 
 if TYPE_CHECKING:
     from ...core.pipeline.parts import Parts
@@ -74,7 +72,7 @@ def build_scene(
     median_radiance: float = 0.0,
     own: bool = False,
     facing: bool = False,
-    parts: Parts | None = None,
+    parts: "Parts | None" = None,
 ) -> BuiltScene:
     """Add the recovered room to a scene as a new collection; nothing that is there is changed.
 
@@ -152,8 +150,23 @@ def build_scene(
     return BuiltScene(top, objects, cameras, shown, warnings)
 
 
+def make_openings(folder: Path, collection: bpy.types.Collection) -> list[bpy.types.Object]:
+    """What is bright behind openings, as panels that shine into the room, unseen by cameras; linked to a collection."""
+    made = []
+    for number, (corners, radiance) in enumerate(openings_of(folder), 1):
+        vertices, place = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+        quads = place.reshape(-1, 4)
+        material = ObjectMaterial(number, "opening", EMITTER, emission=rgb(radiance))
+        data = make_mesh(material.name, vertices, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+        thing = bpy.data.objects.new(material.name, data)
+        thing.visible_camera = False
+        data.materials.append(make_material(material, one_sided=True))
+        collection.objects.link(thing)
+        made.append(thing)
+    return made
+
+
 def _overview(capture: Capture, collection: bpy.types.Collection) -> bpy.types.Object:
-    """A camera for a capture that has none."""
     from ...core.scene.overview import overview  # not earlier: Blender's start should not wait for embreex
 
     return make_view("overview", overview(capture.mesh), collection)
@@ -168,7 +181,7 @@ def write_scene(
     median_radiance: float = 0.0,
     fresh: bool | None = None,
     facing: bool = False,
-    parts: Parts | None = None,
+    parts: "Parts | None" = None,
 ) -> tuple[str, ...]:
     """Save the recovered room as a .blend of its own that renders when opened.
 
@@ -229,43 +242,21 @@ def _save(name, scene, built, fresh):
 
 
 def _save_whole(path: Path, scene: bpy.types.Scene, built: BuiltScene, fresh: bool) -> None:
-    """Save beside `path` and put the whole file in its place."""
     writing = path.parent / _WRITING
     try:
         with refused(f"{path} can't be saved", "free some space or choose another folder"):
             path.parent.mkdir(parents=True, exist_ok=True)
             writing.unlink(missing_ok=True)
             _save(str(writing), scene, built, fresh)
-            if not is_whole(writing):
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            try:  # Blender does not notice a full disk while it compresses, but it does when it reads
+                with bpy.data.libraries.load(str(writing)):
+                    pass
+            except OSError as error:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)) from error
             writing.replace(path)
     finally:
         with suppress(OSError):
             writing.unlink(missing_ok=True)
-
-
-def is_whole(path: Path) -> bool:
-    """Whether a compressed .blend was written to its end.
-
-    Blender does not notice a full disk while it compresses (4.5, 5.2). The file's last frame lists the sizes of all
-    others (zstd's seekable format), so it tells what should be there.
-    """
-    with open(path, "rb") as file:
-        size = file.seek(0, os.SEEK_END)
-        file.seek(max(size - _FOOTER.size, 0))
-        footer = file.read()
-        if len(footer) < _FOOTER.size:
-            return False
-        frames, _, magic = _FOOTER.unpack(footer)
-        table = frames * _FRAME.size
-        if magic != _SEEKABLE or table + _FOOTER.size + 8 > size:
-            return False
-        file.seek(size - _FOOTER.size - table)
-        packed = sum(frame[0] for frame in _FRAME.iter_unpack(file.read(table)))
-    return packed + 8 + table + _FOOTER.size == size
-
-
-_FOOTER, _FRAME, _SEEKABLE = struct.Struct("<IBI"), struct.Struct("<II"), 0x8F92EAB1
 
 
 def _prepare(scene, median_radiance):

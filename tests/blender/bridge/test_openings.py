@@ -8,7 +8,7 @@ import bpy
 import pytest
 
 from addon.bridge.light.lamps import find_lamps, recovered_radiance
-from addon.bridge.scene.openings import make_openings
+from addon.bridge.scene.write import make_openings
 from addon.core.results.room_file import OPENINGS
 
 QUAD = [[0, 0, 2], [0, 1, 2], [1, 1, 2], [1, 0, 2]]

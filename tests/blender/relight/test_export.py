@@ -15,7 +15,7 @@ from addon.bridge.data.arrays import make_mesh  # noqa: E402
 from addon.bridge.data.images import image_array, load_image  # noqa: E402
 from addon.bridge.data.materials import make_material  # noqa: E402
 from addon.bridge.data.mesh_objects import ATLAS_UV, PARTS_UV  # noqa: E402
-from addon.bridge.data.world import set_world  # noqa: E402
+from addon.bridge.data.nodes import set_world  # noqa: E402
 from addon.bridge.export import export as exporting  # noqa: E402
 from addon.bridge.light import lamps  # noqa: E402
 from addon.bridge.marks import OBJECT_ID, UV_MAP  # noqa: E402

@@ -7,7 +7,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge.data.world import set_world  # noqa: E402
+from addon.bridge.data.nodes import set_world  # noqa: E402
 from addon.bridge.light import outside as outside  # noqa: E402
 from addon.core.errors import BadInputError  # noqa: E402
 from addon.core.io.exr import write_exr  # noqa: E402

@@ -1,0 +1,133 @@
+"""`bpy.ops.scan_relight.*` for the room in the file: in another scene, its materials as assets, or taken off."""
+
+import bpy
+
+from ...addon.bridge.export import assets
+from ...addon.bridge.results import look
+from ...addon.bridge.scene import parts
+from ...addon.bridge.scene.parts import find_room, own_scene, rooms
+from ...addon.core.errors import BadInputError
+from ..base.operator import AtOnce, NothingDone, has_scene, needs, object_mode
+from ..results.look import needs_recovered
+
+
+def show(before: bpy.types.Scene, scene: bpy.types.Scene) -> None:
+    """Show a room's own scene in the window; its panel has what was chosen in the scene `before`."""
+    if scene != before:
+        take(scene.scan_relight, before.scan_relight)
+    parts.show(bpy.context.window, scene)
+
+
+def show_own(before: bpy.types.Scene, capture_folder: str) -> None:
+    """`show` the own scene of a capture's room, if it has one."""
+    top = find_room(capture_folder)
+    scene = own_scene(top) if top is not None else None
+    if scene is not None:
+        show(before, scene)
+
+
+def take(choices, before) -> None:
+    """Copy all that was chosen from one group of properties to another of its kind."""
+    for name, info in before.bl_rna.properties.items():
+        if name in ("rna_type", "name"):
+            continue
+        if info.type == "POINTER":
+            take(getattr(choices, name), getattr(before, name))
+        elif not info.is_readonly and getattr(choices, name) != getattr(before, name):
+            setattr(choices, name, getattr(before, name))
+
+
+_items: list[tuple[str, str, str]] = []  # Blender keeps no reference of its own
+
+
+def others(operator, context) -> list[tuple[str, str, str]]:
+    """The scenes that a room of this one can go to."""
+    _items[:] = [
+        (scene.name, scene.name, "Show the room in this scene as well")
+        for scene in bpy.data.scenes
+        if context.scene is not None and scene != context.scene and not scene.library
+    ]
+    return _items
+
+
+@needs(lambda context: len(bpy.data.scenes) > 1, "This file has no other scene to link the room into.")
+@needs(lambda context: rooms(context.scene), "The scene holds no scanned room; run the recovery first.")
+@has_scene
+class SCAN_RELIGHT_OT_link_room(AtOnce, bpy.types.Operator):
+    """Show the recovered room in another scene of this file as well: one room in two scenes, so that what is changed in
+    one is changed in the other"""
+
+    bl_label = "Link into Scene"
+    remarks = "INFO"
+
+    scene: bpy.props.EnumProperty(name="Scene", description="Where the room is linked", items=others)
+    outside: bpy.props.BoolProperty(
+        name="With Its Outside", description="Give that scene the room's world and exposure, too"
+    )
+
+    def work(self, context):
+        from ...addon.bridge.room.bring import link_room
+
+        target = bpy.data.scenes.get(self.scene)
+        if target is None:
+            raise BadInputError("Choose the scene to link the room into.")
+        for top in rooms(context.scene):
+            link_room(top, target, context.scene if self.outside else None)
+        return [f"The room is in scene '{target.name}' as well."]
+
+
+@needs_recovered
+class SCAN_RELIGHT_OT_mark_assets(AtOnce, bpy.types.Operator):
+    """Put the recovered materials into the Asset Browser, with tags and previews, or take them out again"""
+
+    bl_label = "Mark Materials as Assets"
+    remarks = "INFO"
+
+    selected_only: bpy.props.BoolProperty(
+        name="Selected Only", description="Only what the selected objects wear", default=False
+    )
+    clear: bpy.props.BoolProperty(
+        name="Take Out", description="They are no assets any more", default=False, options={"SKIP_SAVE"}
+    )
+
+    def work(self, context):
+        things = look.recovered(context.scene)
+        if self.selected_only:
+            things = [thing for thing in things if thing.select_get()]
+        count = assets.clear(things) if self.clear else assets.mark(things, not bpy.app.background)
+        if not count:
+            raise NothingDone(
+                "None of these materials is an asset." if self.clear else "No recovered object is selected."
+            )
+        done = "no assets any more" if self.clear else "in the Asset Browser, Current File"
+        return [f"{count} material{'s' * (count > 1)} {done}."]
+
+
+def _wearing(context) -> bool:
+    from ...addon.bridge.own_scene.write_back import wearing
+
+    return bool(wearing(context.scene.objects))
+
+
+@needs(_wearing, "No object of this scene wears a recovered material over its own.")
+@object_mode
+@has_scene
+class SCAN_RELIGHT_OT_restore_materials(AtOnce, bpy.types.Operator):
+    """Give your objects back the materials and UV maps that they had before the recovered ones; copies that were made
+    for recovered materials are removed"""
+
+    bl_label = "Restore Materials"
+
+    selected_only: bpy.props.BoolProperty(
+        name="Selected Only", description="Leave the objects that are not selected as they are", default=False
+    )
+
+    def work(self, context):
+        from ...addon.bridge.own_scene.write_back import restore
+
+        count, warnings = restore(list(context.selected_objects if self.selected_only else context.scene.objects))
+        look.refresh(context.scene)
+        if not count:
+            raise NothingDone("None of the selected objects wears a recovered material over its own.")
+        self.report({"INFO"}, f"{count} object{'s' * (count > 1)} restored")
+        return warnings
