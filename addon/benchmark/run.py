@@ -62,11 +62,7 @@ def check_stages(stages: Sequence[str]) -> tuple[str, ...]:
 
 
 def load(stage: str) -> Callable[[Options], Iterable[Table]]:
-    """The function of a stage; imported when it is wanted: not all of them need what others import."""
-    if stage == "pipeline":
-        from .pipeline import run
-
-        return run
+    """The function of a stage; imported when it is wanted, as it takes what the command's help needs not."""
     from . import stages
 
     return partial(stages.run, stage)

@@ -1,14 +1,14 @@
-"""One stage under each of its alternatives, over the same stages before it: how wrong its result is, what it costs.
+"""A stage, or all of them, under each of some alternatives: how wrong what comes out is, and what it costs.
 
 Alternatives are settings, so what is measured is what a user gets; the paper's are among them. Wrong is what differs
-from the same stage under the settings of `FINEST`; of the specular stage, from the capture's truth.
+from the same stage under the settings of `FINEST`; of the specular stage and of all together, from the capture's truth.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,18 +16,23 @@ import numpy as np
 
 from ..api import unwrapper
 from ..core.io.read import read_capture
+from ..core.memory import peak_memory
 from ..core.pipeline.recover import Recovery
 from ..core.progress import Progress
 from ..core.results.store import Store
-from ..core.settings import Settings
+from ..core.settings import PRESETS, Settings
 from ..core.stages import STAGES
 from .run import Options, SkippedStage, room_and_scratch
 from .table import BASELINE, Curves, Table
 from .timing import Timing, once
-from .truth_materials import UNTOLD, found_roughness, true_roughness
+from .truth_materials import UNTOLD, found_kind, found_roughness, true_kind, true_roughness
+from .truth_views import psnr, views
 
 Changes = dict[str, Any]
 PAPERS = "as in the paper"
+WHOLE = "pipeline"
+FEW_RAYS: Changes = {"shading_rays": 100, "specular_rays": 100}
+"""The smaller of the paper's two settings; its 10,000 rays at each texel would take hours."""
 ALTERNATIVES: dict[str, tuple[tuple[str, Changes], ...]] = {
     "lit_diffuse": (
         ("default", {}),
@@ -46,10 +51,15 @@ ALTERNATIVES: dict[str, tuple[tuple[str, Changes], ...]] = {
         ("default", {}),
         (PAPERS, {"specular": "target", "refine": 0, "specular_rays": 1000}),
     ),
+    WHOLE: tuple(
+        (PAPERS if name == "paper" else name, asdict(preset) | (FEW_RAYS if name == "paper" else {}))
+        for name, preset in PRESETS.items()
+    ),
 }
-"""Name and changed settings of each, by stage; those of one name are a line in the plot."""
+"""Name and changed settings of each, by stage; those of one name are a line in the plot. Of all stages: the presets."""
 ALONE: dict[str, Changes] = {"lit_diffuse": {"refine_poses": False, "sharpen": False}}
 """What is left out of a stage in all of its alternatives: the median is measured by itself."""
+AGAINST_TRUTH = ("specular", WHOLE)
 FINEST: dict[str, Changes] = {
     "lit_diffuse": {"median": "exact"},
     "shading": {"shading_rays": 2048, "emitter_rays": 512, "portal_rays": 512, "interpolate": False},
@@ -58,70 +68,78 @@ ERRORS = {
     "lit_diffuse": "RMS log error of L_d",
     "shading": "relative RMSE of E",
     "specular": "roughness error by object",
+    WHOLE: "roughness error by object",
 }
 
 
 def run(stage: str, options: Options) -> Iterator[Table]:
     """The table of a stage of `ALTERNATIVES`."""
+    columns = ("capture", "alternative", BASELINE, "settings", ERRORS[stage], "seconds", "CPU seconds")
+    notes = ("Error of elements that frames saw, against the finest settings.",)
+    if stage in AGAINST_TRUTH:
+        columns += ("right models", "albedo PSNR (dB)", "peak MiB")
+        notes = ("Against the capture's truth; albedo where it has held-out views. Peak memory only grows downwards.",)
     with room_and_scratch(options) as (folder, scratch):
-        yield Table(
-            stage,
-            f"{stage.replace('_', ' ').capitalize()}: its alternatives",
-            ("capture", "alternative", BASELINE, "settings", ERRORS[stage], "seconds", "CPU seconds"),
-            list(_rows(stage, folder, scratch, options)),
-            ("Error of elements that frames saw, against the finest settings; of the specular stage, against truth.",),
-            Curves("capture", "alternative", "CPU seconds", ERRORS[stage]),
-        )
+        title = f"{stage.replace('_', ' ').capitalize()}: its alternatives"
+        rows = list(_rows(stage, folder, scratch, options))
+        yield Table(stage, title, columns, rows, notes, Curves("capture", "alternative", "CPU seconds", ERRORS[stage]))
 
 
 def _rows(stage: str, folder: Path, scratch: Path, options: Options) -> Iterator[tuple]:
     capture, unwrap = read_capture(folder), unwrapper()
-    base = Settings(threads=options.threads, seed=options.seed, detail=2.0 if options.large else 1.0)
-    before = STAGES[: STAGES.index(stage)]
+    base = replace(Settings(**ALONE.get(stage, {})), detail=2.0 if options.large else 1.0)
+    measured = STAGES if stage == WHOLE else (stage,)
 
     def under(changes: Changes) -> tuple[Recovery, Timing]:
         with Store(scratch / "stages") as store:
-            store.drop([stage])
-            recovery = Recovery(capture, store, replace(base, **ALONE.get(stage, {}), **changes), Progress(), unwrap)
-            for one in before:
+            store.drop(measured)
+            settings = replace(base, **changes | {"threads": options.threads, "seed": options.seed})
+            recovery = Recovery(capture, store, settings, Progress(), unwrap)
+            for one in STAGES[: STAGES.index(measured[0])]:
                 getattr(recovery, one)()
-            return recovery, once(getattr(recovery, stage))
+            return recovery, once(lambda: [getattr(recovery, one)() for one in measured])
 
-    error = _against_truth(folder) if stage == "specular" else _against(stage, under(FINEST[stage])[0])
+    judge = _against_truth(folder) if stage in AGAINST_TRUTH else _against(stage, under(FINEST[stage])[0])
     for done, (name, changes) in enumerate(ALTERNATIVES[stage]):
         recovery, timing = under(changes)
-        told = ", ".join(f"{key} {value}" for key, value in changes.items())
-        yield folder.name, name, name == PAPERS, told, error(recovery), timing.seconds, timing.cpu_seconds
+        told = "" if stage == WHOLE else ", ".join(f"{key} {value}" for key, value in changes.items())
+        error, *more = judge(recovery)
+        yield folder.name, name, name == PAPERS, told, error, timing.seconds, timing.cpu_seconds, *more
         options.progress.update((done + 1) / len(ALTERNATIVES[stage]))
 
 
-def _against(stage: str, finest: Recovery) -> Callable[[Recovery], float]:
+def _against(stage: str, finest: Recovery) -> Callable[[Recovery], tuple]:
     """How far L_d or E is from that of the finest settings, where frames saw the surface."""
     seen = finest.lit_diffuse().seen
 
-    def of_lit_diffuse(one: Recovery) -> float:
+    def of_lit_diffuse(one: Recovery) -> tuple:
         found, true = one.lit_diffuse().radiance, finest.lit_diffuse().radiance
         both = seen[:, None] & (found > 0) & (true > 0)
-        return float(np.sqrt(np.mean(np.log(found[both] / true[both]) ** 2)))
+        return (float(np.sqrt(np.mean(np.log(found[both] / true[both]) ** 2))),)
 
-    def of_shading(one: Recovery) -> float:
+    def of_shading(one: Recovery) -> tuple:
         found, true = one.shading().irradiance[seen].mean(1), finest.shading().irradiance[seen].mean(1)
         lit = true > 0
-        return float(np.sqrt(np.mean((found[lit] / true[lit] - 1) ** 2)))
+        return (float(np.sqrt(np.mean((found[lit] / true[lit] - 1) ** 2))),)
 
     return {"lit_diffuse": of_lit_diffuse, "shading": of_shading}[stage]
 
 
-def _against_truth(folder: Path) -> Callable[[Recovery], float]:
-    """Mean absolute error of roughness over the objects that have one in truth."""
+def _against_truth(folder: Path) -> Callable[[Recovery], tuple]:
+    """Mean absolute error of roughness, right models of all, PSNR of Base Color, and the memory that it took."""
     path = folder / "truth" / "materials.json"
     if not path.is_file():
         raise SkippedStage("It needs a capture with truth/materials.json beside its frames.")
-    truth = {one["id"]: true_roughness(one) for one in json.loads(path.read_text(encoding="utf-8"))}
+    truth = {one["id"]: one for one in json.loads(path.read_text(encoding="utf-8"))}
+    has_views = (folder / "truth" / "transforms.json").is_file()
 
-    def error(one: Recovery) -> float:
-        pairs = [(found_roughness(m), truth.get(m.object_id)) for m in one.materials()]
+    def judge(one: Recovery) -> tuple:
+        known = [(m, truth[m.object_id]) for m in one.materials() if m.object_id in truth]
+        pairs = [(found_roughness(m), true_roughness(t)) for m, t in known]
         off = [abs((UNTOLD if found is None else found) - true) for found, true in pairs if true is not None]
-        return float(np.mean(off))
+        right = sum(found_kind(m) == true_kind(t) for m, t in known)
+        albedo = psnr(views(folder, one), one.base_color()) if has_views else None
+        memory = peak_memory()
+        return float(np.mean(off)), f"{right} of {len(known)}", albedo, None if memory is None else memory / 2**20
 
-    return error
+    return judge

@@ -53,7 +53,8 @@ def true_kind(known: Mapping[str, Any]) -> str:
         return "emitter"
     if known["metallic"]:
         return "metal"
-    return "lambertian" if known["bsdf"] == "diffuse" else "specular"
+    diffuse = known["alpha"] is None if "bsdf" not in known else known["bsdf"] == "diffuse"  # the demo has none
+    return "lambertian" if diffuse else "specular"
 
 
 def found_roughness(material: ObjectMaterial) -> float | None:

@@ -8,14 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from ..core.io.exr import read_exr
-from ..core.io.read import read_capture
 from ..core.kinds import Workload
 from ..core.pipeline.recover import Recovery
-from ..core.progress import Progress
-from ..core.results.store import Store
 from ..core.scene.elements import ElementLookup
 from ..core.scene.model import Camera
-from ..core.settings import Settings
 
 SHIFTS: Workload[tuple[tuple[float, float], ...]] = ((-0.25, -0.25), (0.25, 0.25), (-0.25, 0.25), (0.25, -0.25))
 
@@ -82,11 +78,3 @@ def projected_truth(seen: list[dict], count: int, fallback: np.ndarray) -> np.nd
                 total[:, c] += np.bincount(element[ok], view["truth"][ok, c], count)
             hits += np.bincount(element[ok], minlength=count)
     return np.where(hits[:, None] > 0, total / np.maximum(hits, 1)[:, None], fallback)
-
-
-def albedo_psnr(capture: Path, result: Path) -> float:
-    """PSNR (dB) of a result's Base Color over the capture's held-out views; finished stages are taken from it."""
-    settings = Settings(**json.loads((result / "report.json").read_text())["settings"])
-    with Store(result) as store:
-        recovery = Recovery(read_capture(capture), store, settings, Progress(), None)
-        return psnr(views(capture, recovery), recovery.base_color())

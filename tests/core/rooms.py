@@ -242,3 +242,19 @@ def radiosity(room: Room, albedo: dict[int, object], emission: dict[int, object]
 def albedo_in(room, lit, found):
     """The `Albedo` that L_d has under the E of a `Shading`."""
     return albedo_of(room.atlas, lit, found.irradiance, found.relative_error, room.instances, found.emitters)
+
+
+def cut_in_four(mesh: Mesh, times: int) -> Mesh:
+    """The same surface with four times the triangles, `times` over."""
+    for _ in range(times):
+        a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
+        count, first = len(mesh.triangles), len(mesh.vertices)
+        middles = np.concatenate([(a + b) / 2, (b + c) / 2, (c + a) / 2])
+        ab, bc, ca = (np.arange(count, dtype=np.int32) + first + i * count for i in range(3))
+        i, j, k = mesh.triangles.T
+        triangles = np.stack([np.stack(t, 1) for t in ((i, ab, ca), (ab, j, bc), (ca, bc, k), (ab, bc, ca))], 1)
+        mesh = Mesh(
+            np.concatenate([mesh.vertices, middles]), triangles.reshape(-1, 3).astype(np.int32),
+            np.repeat(mesh.object_id, 4),
+        )  # fmt: skip
+    return mesh

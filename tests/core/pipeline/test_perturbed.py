@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.benchmark.pipeline import cut_in_four
 from addon.core.io.exr import read_exr
 from addon.core.io.read import read_capture
 from addon.core.passes.pose_refinement import poses as poses_found
@@ -21,7 +20,7 @@ from addon.core.results.store import Store
 from addon.core.scene.mesh_noise import noise_of, tilt
 from addon.core.scene.weld import point_normals, welded
 from tests.core.on_disk import ALBEDO, CHEAP, LAMP, OnDisk
-from tests.core.rooms import make_room, patches, quad, split
+from tests.core.rooms import cut_in_four, make_room, patches, quad, split
 
 SCRIPT = Path(__file__).resolve().parents[3] / "scripts" / "perturb_capture.py"
 pytestmark = pytest.mark.usefixtures("few_samples")
