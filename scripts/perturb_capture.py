@@ -29,12 +29,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from addon.core.io.exr import read_exr, write_exr
 from addon.core.io.ply import read_ply
 from addon.core.io.ply_header import parse_header
+from addon.core.scene.weld import point_normals, same_place
 
 WAVES = 200
 SHORTEST, LONGEST = 0.25, 2.0
@@ -44,31 +46,12 @@ SEAM = 1e-5
 DEFAULTS = {"poses": (5.0, 0.2), "mesh": 5.0, "noise": 0.02, "exposure": 2.0, "clip": 4.0}
 
 
-def rotation(vector: np.ndarray) -> np.ndarray:
-    """The (3, 3) rotation about `vector` ((3,)) by its length in radians (Rodrigues)."""
-    angle = float(np.linalg.norm(vector))
-    x, y, z = vector / max(angle, 1e-12)
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
-
-
 def perturbed_pose(matrix: list, metres: float, radians: float, rng: np.random.Generator) -> list:
     """A camera-to-world matrix moved and turned by amounts whose root mean squares are `metres` and `radians`."""
     pose = np.array(matrix, np.float64)
     pose[:3, 3] += rng.normal(0, metres / np.sqrt(3), 3)
-    pose[:3, :3] = pose[:3, :3] @ rotation(rng.normal(0, radians / np.sqrt(3), 3))
+    pose[:3, :3] = pose[:3, :3] @ Rotation.from_rotvec(rng.normal(0, radians / np.sqrt(3), 3)).as_matrix()
     return pose.tolist()
-
-
-def vertex_normals(vertices: np.ndarray, triangles: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Normals by place ((p, 3)): the mean over all triangles that meet there, by area; 0 where they cancel out."""
-    corners = vertices[triangles]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal = np.zeros((place.max() + 1, 3))
-    for k in range(3):
-        for axis in range(3):
-            normal[:, axis] += np.bincount(place[triangles[:, k]], area[:, axis], len(normal))
-    return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
 
 
 def offsets(points: np.ndarray, metres: float, share: float, rng: np.random.Generator) -> np.ndarray:
@@ -90,11 +73,8 @@ def perturb_mesh(source: Path, target: Path, metres: float, share: float, rng: n
         raise SystemExit(f"'{source}' does not begin with its vertices.")
     ply = read_ply(source)
     vertices, triangles = np.asarray(ply.vertices, np.float64), np.asarray(ply.triangles)
-    _, first, place = np.unique(
-        np.round(vertices / SEAM).astype(np.int64), axis=0, return_index=True, return_inverse=True
-    )
-    place = place.ravel()
-    normal = vertex_normals(vertices, triangles, place)
+    first, place = same_place(vertices, SEAM)
+    normal = point_normals(vertices[first], place[triangles])
     moved = vertices + (normal * offsets(vertices[first], metres, share, rng)[:, None])[place]
     at = [next(i for i, p in enumerate(head.properties) if p.name == name) for name in "xyz"]
     if order:

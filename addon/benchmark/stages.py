@@ -6,11 +6,13 @@ from the same stage under the settings of `FINEST`; of the specular stage and of
 
 from __future__ import annotations
 
+import gc
 import json
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,7 +26,6 @@ from ..core.settings import PRESETS, Settings
 from ..core.stages import STAGES
 from .run import Options, SkippedStage, room_and_scratch
 from .table import BASELINE, Curves, Table
-from .timing import Timing, once
 from .truth_materials import UNTOLD, found_kind, found_roughness, true_kind, true_roughness
 from .truth_views import psnr, views
 
@@ -70,6 +71,22 @@ ERRORS = {
     "specular": "roughness error by object",
     WHOLE: "roughness error by object",
 }
+
+
+class Timing(NamedTuple):
+    """Seconds by the clock on the wall; of all threads of this process, which others disturb less; what came back."""
+
+    seconds: float
+    cpu_seconds: float
+    value: Any
+
+
+def once(function: Callable[[], Any]) -> Timing:
+    """One call, timed."""
+    gc.collect()  # not in the middle, at one alternative's expense
+    started, cpu_started = time.perf_counter(), time.process_time()
+    value = function()
+    return Timing(time.perf_counter() - started, time.process_time() - cpu_started, value)
 
 
 def run(stage: str, options: Options) -> Iterator[Table]:

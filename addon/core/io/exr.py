@@ -13,9 +13,8 @@ from ..errors import BadInputError, StorageError
 from ..kinds import Unit
 from .exr_header import ExrHeader, parse_headers, window_size
 from .exr_layers import ExrLayer, choose_layer
-from .luma_chroma import to_rgb
 from .picture import Picture
-from .primaries import REC709, to_rec709
+from .primaries import REC709, to_rec709, to_rgb
 
 HALF_MAX: Unit[float] = 65504.0
 

@@ -24,7 +24,7 @@ from .conventions import AS_READ
 from .files import inside, read_json
 from .layout import Layout, RawMesh, Reader, Reading, usable
 from .meshes import MESH, find_mesh, read_mesh
-from .nerfstudio_camera import check_model, lens_notes, positive, read_camera
+from .nerfstudio_camera import Entry, check_model, lens_notes, read_camera
 from .nerfstudio_exposures import ended, read_brackets, with_settings
 
 FILE = "transforms.json"
@@ -74,7 +74,8 @@ def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], l
             raise BadInputError(f"'{path}' lists no frames; export the capture again.")
         entries, said = _without_test(top, entries)
         listed += [(top, entry, path) for entry in entries]
-        notes += said + _unexposed(top, entries) + lens_notes(top, entries) + _orientation(top)
+        notes += said + _unexposed(top, entries) + _orientation(top)
+        notes += lens_notes([Entry(top, entry, "") for entry in entries if isinstance(entry, dict)])
     if (root / TEST_SPLIT).is_file() and not (root / FILE).is_file():
         notes.append(f"The frames of '{TEST_SPLIT}' were left out; put those to be used into '{FILE}'.")
     names = [_name(entry, i) for i, (_, entry, _) in enumerate(listed)]
@@ -83,19 +84,20 @@ def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], l
             str(entry.get("file_path", i)) if isinstance(entry, dict) else str(i)
             for i, (_, entry, _) in enumerate(listed)
         ]
-    told: dict[Path, tuple[dict[str, Any], dict[str, Any]]] = {}
+    told: dict[Path, Entry] = {}
 
-    def frame(name: str, top: dict[str, Any], entry: Any, model: str) -> Frame:
-        made = _frame(root, top, entry, name, model, reading)
+    def frame(entry: Entry) -> Frame:
+        made = _frame(root, entry, reading)
         if made.path in told:
-            raise BadInputError(f"Frame '{name}' is listed twice; keep the entry with the right pose.")
-        told[made.path] = top, entry
+            raise BadInputError(f"Frame '{entry.name}' is listed twice; keep the entry with the right pose.")
+        told[made.path] = entry
         return made
 
     makers, problems = [], []
-    for name, (top, entry, path) in zip(names, listed):
-        if isinstance(entry, dict):
-            makers.append(partial(frame, name, top, entry, check_model(top, entry, path)))
+    for name, (top, own, path) in zip(names, listed):
+        if isinstance(own, dict):
+            makers.append(partial(frame, entry := Entry(top, own, name)))
+            check_model(entry, path)
         else:
             problems.append(f"Frame '{name}' is no JSON object in '{path}'.")
     frames, more = usable(makers)
@@ -153,16 +155,15 @@ def _name(entry: Any, index: int) -> str:
     return (isinstance(path, str) and PurePosixPath(path.replace("\\", "/")).stem) or f"#{index}"
 
 
-def _frame(root: Path, top: dict[str, Any], entry: dict[str, Any], name: str, model: str, reading: Reading) -> Frame:
+def _frame(root: Path, entry: Entry, reading: Reading) -> Frame:
     """One frame; raises `BadInputError` where it can't be used."""
-    path = ended(inside(root, entry.get("file_path"), name, reading.outside), name)
-    mask = entry.get("mask_path")
-    pose = check_pose(entry.get("transform_matrix"), name)
-    exposure = positive(top, entry, "exposure", name, 1.0)
-    saturation = positive(top, entry, "saturation", name, math.inf)
-    camera = read_camera(top, entry, name, path, model, pose)
+    name, mask = entry.name, entry.own.get("mask_path")
+    path = ended(inside(root, entry.own.get("file_path"), name, reading.outside), name)
+    pose = check_pose(entry.own.get("transform_matrix"), name)
+    exposure, saturation = entry.positive("exposure", 1.0), entry.positive("saturation", math.inf)
+    camera = read_camera(entry, path, pose)
     mask_path = None if mask in (None, "") else inside(root, mask, name, reading.outside)
-    brackets = read_brackets(root, top, entry, name, reading.outside)
+    brackets = read_brackets(root, entry, reading.outside)
     return Frame(name, path, camera, mask_path, exposure, saturation, brackets=brackets)
 
 

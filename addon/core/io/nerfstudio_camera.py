@@ -7,6 +7,8 @@ or, for all frames, at the top of the file.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -26,41 +28,71 @@ FISHEYE, FISHEYE624, PANORAMA = "OPENCV_FISHEYE", "FISHEYE624", "EQUIRECTANGULAR
 MODELS = (*PERSPECTIVE, FISHEYE, FISHEYE624, PANORAMA)
 RADIAL, TANGENTIAL = ("k1", "k2", "k3", "k4", "k5", "k6"), ("p1", "p2")
 LISTED = "distortion_params"
-CROP = "fisheye_crop_radius"
 D = TypeVar("D", float, None)
 OWN_LENS = "scan_relight_lens"
 """A frame's lens as `lenses_told` writes it; stands in captures of a scene, which know more lenses than nerfstudio."""
 
 
-def check_model(top: dict[str, Any], entry: dict[str, Any], path: Path) -> str:
-    """The camera model; raises `BadInputError` for one that is not known."""
-    model = entry.get("camera_model", top.get("camera_model", MODELS[0]))
-    if model not in MODELS:
+@dataclass(frozen=True)
+class Entry:
+    """What the file tells of a frame: its `own` keys, then those at the `top`. `name` is the frame's, for messages."""
+
+    top: dict[str, Any]
+    own: dict[str, Any]
+    name: str
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """The value of a key as it stands."""
+        return self.own.get(key, self.top.get(key, default))
+
+    def positive(self, key: str, default: D) -> float | D:
+        """A number above 0, or the default; raises `BadInputError` for anything else."""
+        value = self.get(key)
+        if value is None or value == math.inf and default == math.inf:
+            return default
+        if not is_number(value) or not value > 0:
+            raise BadInputError(f"Frame '{self.name}' has {key} = {value!r}; give a number above 0.")
+        return float(value)
+
+    def numbers(self, keys: Sequence[str]) -> list[float]:
+        """Finite numbers, 0 where nothing is told; raises `BadInputError` for anything else."""
+        values = [0.0 if self.get(key) is None else self.get(key) for key in keys]
+        for key, value in zip(keys, values):
+            if not is_number(value):
+                raise BadInputError(f"Frame '{self.name}' has {key} = {value!r}; give a number.")
+        return [float(value) for value in values]
+
+    @property
+    def model(self) -> str:
+        """Name of the camera model."""
+        return self.get("camera_model", MODELS[0])
+
+
+def check_model(entry: Entry, path: Path) -> None:
+    """Raise `BadInputError` for a camera model that is not known."""
+    if entry.model not in MODELS:
         raise BadInputError(
-            f"'{path}' has frames of camera model '{model}', which aren't supported; undistort them to "
+            f"'{path}' has frames of camera model '{entry.model}', which aren't supported; undistort them to "
             f"one of {', '.join(MODELS)}."
         )
-    return model
 
 
-def read_camera(
-    top: dict[str, Any], entry: dict[str, Any], name: str, picture: Path, model: str, pose: np.ndarray
-) -> Camera:
+def read_camera(entry: Entry, picture: Path, pose: np.ndarray) -> Camera:
     """The camera of a frame; raises `BadInputError` where a number is missing or impossible."""
-    wide, high = (positive(top, entry, key, name, None) for key in ("w", "h"))
+    wide, high = (entry.positive(key, None) for key in ("w", "h"))
     if wide is None or high is None:
         wide, high = picture_size(picture)
     if wide != int(wide) or high != int(high):
-        raise BadInputError(f"Frame '{name}' has a size of {wide} x {high}; give whole pixels as w and h.")
+        raise BadInputError(f"Frame '{entry.name}' has a size of {wide} x {high}; give whole pixels as w and h.")
     width, height = int(wide), int(high)
-    fx, fy = _focal_lengths(top, entry, name, width, height, model)
-    centre = [entry.get(key, top.get(key, half)) for key, half in (("cx", width / 2), ("cy", height / 2))]
+    fx, fy = _focal_lengths(entry, width, height)
+    centre = [entry.get("cx", width / 2), entry.get("cy", height / 2)]
     if not all(is_number(value) for value in centre):
-        raise BadInputError(f"Frame '{name}' has a principal point that is no number; mend its cx and cy.")
-    told = entry.get(OWN_LENS)
-    lens = _lens(top, entry, name, model) if told is None else _own_lens(told, name)
-    if model in (FISHEYE, FISHEYE624):
-        radius = positive(top, entry, CROP, name, None)
+        raise BadInputError(f"Frame '{entry.name}' has a principal point that is no number; mend its cx and cy.")
+    told = entry.own.get(OWN_LENS)
+    lens = _lens(entry) if told is None else _own_lens(told, entry.name)
+    if entry.model in (FISHEYE, FISHEYE624):
+        radius = entry.positive("fisheye_crop_radius", None)
         if radius is not None and lens is not None:
             lens = Cropped(lens, radius / fx, radius / fy)
     return Camera(width, height, fx, fy, float(centre[0]), float(centre[1]), pose, lens)
@@ -73,24 +105,12 @@ def _own_lens(told: Any, name: str) -> Lens | None:
         raise BadInputError(f"Frame '{name}' has a {OWN_LENS} that is none; capture the scene again.") from error
 
 
-def positive(top: dict[str, Any], entry: dict[str, Any], key: str, name: str, default: D) -> float | D:
-    """The number `key` of the frame, else of the file, else `default`; raises `BadInputError` unless above 0."""
-    value = entry.get(key, top.get(key))
-    if value is None or value == math.inf and default == math.inf:
-        return default
-    if not is_number(value) or not value > 0:
-        raise BadInputError(f"Frame '{name}' has {key} = {value!r}; give a number above 0.")
-    return float(value)
-
-
-def lens_notes(top: dict[str, Any], entries: list[Any]) -> list[str]:
+def lens_notes(entries: Sequence[Entry]) -> list[str]:
     """A sentence where the file's distortion may mean something else than what it was taken for."""
-    for entry in (e for e in entries if isinstance(e, dict)):
-        if entry.get("camera_model", top.get("camera_model", MODELS[0])) not in PERSPECTIVE[:5]:
+    for entry in entries:
+        if entry.model not in PERSPECTIVE[:5] or LISTED in entry.own or LISTED in entry.top:
             continue
-        if LISTED in entry or LISTED in top:
-            continue
-        radial = [entry.get(key, top.get(key)) or 0 for key in RADIAL]
+        radial = [entry.get(key) or 0 for key in RADIAL]
         if any(radial[4:]):
             return [
                 "k5 or k6 is given, which nerfstudio does not know: k1 to k6 were taken as OpenCV's rational model "
@@ -104,34 +124,29 @@ def lens_notes(top: dict[str, Any], entries: list[Any]) -> list[str]:
     return []
 
 
-def _focal_lengths(
-    top: dict[str, Any], entry: dict[str, Any], name: str, width: int, height: int, model: str
-) -> tuple[float, float]:
-    fx = positive(top, entry, "fl_x", name, None)
-    fy = positive(top, entry, "fl_y", name, None)
-    if model == PANORAMA:  # nerfstudio's focal lengths are half the width, for pi; `Equirectangular` counts in radians
-        return (fx or width / 2) / math.pi, (fy or fx or height) / math.pi
-    for key, extent in (("camera_angle_x", width), ("camera_angle_y", height)):
-        angle = positive(top, entry, key, name, None)
+def _focal_lengths(entry: Entry, width: int, height: int) -> tuple[float, float]:
+    found = [entry.positive(key, None) for key in ("fl_x", "fl_y")]
+    if entry.model == PANORAMA:  # nerfstudio's are half the width, for pi; `Equirectangular` counts in radians
+        return (found[0] or width / 2) / math.pi, (found[1] or found[0] or height) / math.pi
+    fisheye = entry.model in (FISHEYE, FISHEYE624)
+    for axis, (key, extent) in enumerate((("camera_angle_x", width), ("camera_angle_y", height))):
+        angle = entry.positive(key, None)
         if angle is not None and not angle < math.pi:
-            raise BadInputError(f"Frame '{name}' has a {key} of {angle}; give radians below pi.")
-        if angle is None or model in (FISHEYE, FISHEYE624):
-            continue
-        if key == "camera_angle_x":
-            fx = fx or extent / 2 / math.tan(angle / 2)
-        else:
-            fy = fy or extent / 2 / math.tan(angle / 2)
-    fx, fy = fx or fy, fy or fx
+            raise BadInputError(f"Frame '{entry.name}' has a {key} of {angle}; give radians below pi.")
+        if angle is not None and not fisheye:
+            found[axis] = found[axis] or extent / 2 / math.tan(angle / 2)
+    fx, fy = found[0] or found[1], found[1] or found[0]
     if fx is None or fy is None:
-        wanted = "fl_x" if model in (FISHEYE, FISHEYE624) else "fl_x or camera_angle_x"
-        raise BadInputError(f"Frame '{name}' has no focal length; give {wanted}.")
+        wanted = "fl_x" if fisheye else "fl_x or camera_angle_x"
+        raise BadInputError(f"Frame '{entry.name}' has no focal length; give {wanted}.")
     return fx, fy
 
 
-def _lens(top: dict[str, Any], entry: dict[str, Any], name: str, model: str) -> Lens | None:
+def _lens(entry: Entry) -> Lens | None:
+    model, name = entry.model, entry.name
     if model == PANORAMA:
         return Equirectangular()
-    listed = _listed(top, entry, name)
+    listed = _listed(entry)
     if model == FISHEYE624:
         if len(listed) != 12:
             raise BadInputError(
@@ -145,7 +160,7 @@ def _lens(top: dict[str, Any], entry: dict[str, Any], name: str, model: str) -> 
             raise BadInputError(f"Frame '{name}' has {len(listed)} {LISTED}; give six: k1 to k4, p1, p2.")
         radial, tangential = [*listed[:4], 0.0, 0.0], listed[4:6] if len(listed) == 6 else [0.0, 0.0]
     else:
-        radial, tangential = ([_number(top, entry, key, name) for key in keys] for keys in (RADIAL, TANGENTIAL))
+        radial, tangential = entry.numbers(RADIAL), entry.numbers(TANGENTIAL)
     if model == FISHEYE:
         return polynomial(model, fisheye=True, numerator=radial[:4], tangential=tangential)
     if any(radial[4:]) or model == "FULL_OPENCV":
@@ -153,20 +168,11 @@ def _lens(top: dict[str, Any], entry: dict[str, Any], name: str, model: str) -> 
     return polynomial(model, numerator=radial[:4], tangential=tangential)
 
 
-def _listed(top: dict[str, Any], entry: dict[str, Any], name: str) -> list[float]:
-    own = any(entry.get(key) is not None for key in (*RADIAL, *TANGENTIAL))
-    values = entry.get(LISTED, None if own else top.get(LISTED))
+def _listed(entry: Entry) -> list[float]:
+    told_apart = any(entry.own.get(key) is not None for key in (*RADIAL, *TANGENTIAL))
+    values = entry.own.get(LISTED, None if told_apart else entry.top.get(LISTED))
     if values is None:
         return []
-    if not isinstance(values, list) or not all(is_number(v) and math.isfinite(v) for v in values):
-        raise BadInputError(f"Frame '{name}' has {LISTED} that are no list of numbers; mend them.")
+    if not isinstance(values, list) or not all(is_number(v) for v in values):
+        raise BadInputError(f"Frame '{entry.name}' has {LISTED} that are no list of numbers; mend them.")
     return [float(v) for v in values]
-
-
-def _number(top: dict[str, Any], entry: dict[str, Any], key: str, name: str) -> float:
-    value = entry.get(key, top.get(key))
-    if value is None:
-        return 0.0
-    if not is_number(value) or not math.isfinite(value):
-        raise BadInputError(f"Frame '{name}' has {key} = {value!r}; give a number.")
-    return float(value)

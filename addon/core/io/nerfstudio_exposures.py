@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from ..errors import BadInputError
 from ..scene.model import Frame, Shot
 from .exposures import EXPOSURE, Settings, from_settings, settings_of
 from .files import inside
-from .nerfstudio_camera import positive
+from .nerfstudio_camera import Entry
 from .pictures import ENDINGS
-
-Entry = dict[str, Any]
 
 
 def ended(path: Path, name: str) -> Path:
@@ -36,7 +33,7 @@ def ended(path: Path, name: str) -> Path:
     return path if path.suffix else path.with_name(path.name + ENDINGS[0])
 
 
-def read_brackets(root: Path, top: Entry, entry: Entry, name: str, outside: bool) -> tuple[Shot, ...]:
+def read_brackets(root: Path, entry: Entry, outside: bool) -> tuple[Shot, ...]:
     """Further exposures of a frame: its `brackets`, a list of {file_path, exposure, saturation}.
 
     Raises
@@ -44,7 +41,7 @@ def read_brackets(root: Path, top: Entry, entry: Entry, name: str, outside: bool
     BadInputError
         They are no such list, or lead out of the capture.
     """
-    listed = entry.get("brackets")
+    listed, name = entry.own.get("brackets"), entry.name
     if listed in (None, []):
         return ()
     if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
@@ -53,38 +50,37 @@ def read_brackets(root: Path, top: Entry, entry: Entry, name: str, outside: bool
         )
     if any(one.get(EXPOSURE) is None for one in listed):
         raise BadInputError(f"Frame '{name}' has brackets without an exposure; give each its own.")
-    saturation = {"saturation": entry.get("saturation", top.get("saturation"))}
+    saturation = {"saturation": entry.get("saturation")}
     return tuple(
         Shot(
-            ended(inside(root, one.get("file_path"), name, outside), name),
-            positive({}, one, EXPOSURE, name, 1.0),
-            positive(saturation, one, "saturation", name, math.inf),
+            ended(inside(root, one.own.get("file_path"), name, outside), name),
+            one.positive(EXPOSURE, 1.0),
+            one.positive("saturation", math.inf),
         )
-        for one in listed
+        for one in (Entry(saturation, told, name) for told in listed)
     )
 
 
-def with_settings(frames: Sequence[Frame], told: Sequence[tuple[Entry, Entry]]) -> tuple[list[Frame], list[str]]:
+def with_settings(frames: Sequence[Frame], told: Sequence[Entry]) -> tuple[list[Frame], list[str]]:
     """Give the frames exposures by what the camera was set to, unless any of them states an exposure.
 
     Parameters
     ----------
-    told : sequence of (top, entry)
+    told : sequence of Entry
         For each frame.
 
     Returns
     -------
     As `exposures.from_settings`.
     """
-    if any(one.get(EXPOSURE) is not None for pair in told for one in pair):
+    if any(keys.get(EXPOSURE) is not None for one in told for keys in (one.top, one.own)):
         return list(frames), []
-    settings = [_settings(entry, frame.name) for frame, (_, entry) in zip(frames, told)]
-    return from_settings(frames, settings, "the camera's settings in the poses' file")
+    return from_settings(frames, [_settings(one) for one in told], "the camera's settings in the poses' file")
 
 
-def _settings(entry: Entry, name: str) -> Settings | None:
+def _settings(entry: Entry) -> Settings | None:
     """What the camera was set to; None also where what is told is no number (`auto`)."""
     try:
-        return settings_of(entry, name)
+        return settings_of(entry.own, entry.name)
     except BadInputError:
         return None

@@ -1,7 +1,7 @@
-"""From a picture's own primaries to linear Rec.709.
+"""From a picture's own primaries to linear Rec.709, and from luminance and chroma to its primaries.
 
 Source: SMPTE RP 177 (primaries and white to XYZ); K. M. Lam's linear Bradford transform (white to white), as ICC.1:2022
-Annex E gives it.
+Annex E gives it. Luminance and chroma as OpenEXR stores them: openexr.com, "Technical Introduction"; `ImfRgbaYca`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ CIE_XYZ: Code[tuple[float, ...]] = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 MAX_GAIN: Limit[int] = 5000
 """Primaries that need a greater factor span no colours."""
+TAPS = np.array([0.002128, -0.007540, 0.019597, -0.043159, 0.087929, -0.186077, 0.627123])
+"""Weights of the stored samples at the distances 13, 11, ... 1 from a pixel between two of them, on each side."""
 
 
 def rgb_to_xyz(chromaticities: tuple[float, ...]) -> np.ndarray:
@@ -26,12 +28,6 @@ def rgb_to_xyz(chromaticities: tuple[float, ...]) -> np.ndarray:
     xyz = np.stack([x, y, 1 - x - y])
     xyz[:, 3] /= y[3]
     return xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])
-
-
-def luminance_weights(chromaticities: tuple[float, ...]) -> np.ndarray:
-    """Share of R, G and B in the luminance Y, (3,) float64 with sum 1."""
-    weights = rgb_to_xyz(chromaticities)[1]
-    return weights / weights.sum()
 
 
 def to_rec709(rgb: np.ndarray, chromaticities: tuple[float, ...], name: object) -> np.ndarray:
@@ -58,3 +54,44 @@ def to_rec709(rgb: np.ndarray, chromaticities: tuple[float, ...], name: object) 
         raise BadInputError(f"Picture '{name}' names primaries that span no colours; write it in linear Rec.709.")
     with np.errstate(all="ignore"):
         return rgb @ matrix.T.astype(np.float32)
+
+
+def to_rgb(y: np.ndarray, ry: np.ndarray, by: np.ndarray, chromaticities: tuple[float, ...]) -> np.ndarray:
+    """Give linear RGB of the file's own primaries: RY = (R - Y) / Y, BY = (B - Y) / Y, Y = R w_R + G w_G + B w_B.
+
+    Parameters
+    ----------
+    y : (h, w) float32
+    ry, by : (h, w) or (ceil(h / 2), ceil(w / 2)) float32
+
+    Returns
+    -------
+    (h, w, 3) float32
+    """
+    weights = rgb_to_xyz(chromaticities)[1]
+    weights /= weights.sum()
+    height, width = y.shape
+    red, blue = ((_full(chroma, (height, width)) + 1) * y for chroma in (ry, by))
+    green = (y - weights[0] * red - weights[2] * blue) / weights[1]
+    return np.stack([red, green, blue], -1).astype(np.float32)
+
+
+def _full(chroma: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Chroma at every pixel of `shape`."""
+    if chroma.shape == shape:
+        return chroma
+    chroma = np.nan_to_num(chroma, nan=0.0, posinf=0.0, neginf=0.0)  # one bad sample would spread over 27 pixels
+    return _doubled(_doubled(chroma, shape[1]).T, shape[0]).T
+
+
+def _doubled(lines: np.ndarray, length: int) -> np.ndarray:
+    """(n, length) from (n, ceil(length / 2)): the samples, and between them the filter; the ends go on as they are."""
+    reach = len(TAPS)
+    result = np.repeat(lines, 2, 1)[:, :length]
+    padded = np.pad(lines, ((0, 0), (reach - 1, reach)), mode="edge")
+    between = length // 2
+    result[:, 1::2] = sum(
+        tap * (padded[:, k : k + between] + padded[:, 2 * reach - 1 - k : 2 * reach - 1 - k + between])
+        for k, tap in enumerate(TAPS)
+    )
+    return result

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from ..kinds import Unit
 from ..lit_diffuse.from_texture import face_edge
 from ..origin import OWN, of_thing
 from ..passes.mesh_denoising.denoise import without_noise
 from ..scene.elements import Elements, uv_scale
 from ..scene.model import Capture, Mesh
-from ..scene.recentre import near_origin
 from ..scene.surface import Surface, build_surface, from_uv
 from ..scene.two_sides import with_backs
 from ..scene.unwrap import Unwrap, by_xatlas
@@ -26,11 +26,31 @@ from .source import CORE, digest
 from .stage import Stage
 
 STAGE = Stage("surface", Path(__file__), (), ("texel_size", "detail", "atlas_size", "denoise_mesh"))
+COARSE: Unit[float] = 1e-6
+"""Step of float32, as a share of the room's diagonal, from which on the room is moved."""
 
 
 def taken_in(capture: Capture) -> Capture:
-    """A capture as the stages take it: around the origin, where it lies far from it."""
-    return near_origin(capture)
+    """A capture as the stages take it: around the origin, if float32 is coarse where it lies; else as it is.
+
+    In a national grid's coordinates a room lies thousands of kilometres off, where float32 tells no two of its walls
+    apart. Poses and vertices are double as they are read, so nothing is lost where they are moved before rays, elements
+    and trees round them.
+    """
+    used = capture.mesh.vertices[capture.mesh.triangles.ravel()]
+    low, high = used.min(0), used.max(0)
+    step = float(np.spacing(np.float32(np.abs([low, high]).max())))
+    if step <= COARSE * float(np.linalg.norm(high - low)):
+        return capture
+    centre = (low + high) / 2
+    frames = []
+    for frame in capture.frames:
+        pose = frame.camera.camera_to_world.copy()
+        pose[:3, 3] -= centre
+        frames.append(replace(frame, camera=replace(frame.camera, camera_to_world=pose)))
+    mesh = replace(capture.mesh, vertices=capture.mesh.vertices - centre)
+    mirrors = tuple(replace(mirror, point=mirror.point - centre) for mirror in capture.mirrors)
+    return replace(capture, mesh=mesh, frames=tuple(frames), mirrors=mirrors)
 
 
 def laid_out_by(unwrap: Unwrap) -> str:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -282,12 +283,8 @@ def _given(object_id: int, entry: Any, known: set[int], name: str) -> tuple[Give
         if model not in allowed:
             raise BadInputError(f"{where}: 'model' is {model!r}; give one of {', '.join(allowed)}.")
         found["model"] = model
-    if "roughness" in said:
-        found["roughness"] = _share(said["roughness"], f"{where}: 'roughness'")
-    if "f0" in said:
-        found["f0"] = _colour(said["f0"], f"{where}: 'f0'", keep_number=True)
-    if "base_color" in said:
-        found["base_color"] = _colour(said["base_color"], f"{where}: 'base_color'", number=False)
+    parsers = _share, partial(_colour, keep_number=True), partial(_colour, number=False)
+    found |= {name: parse(said[name], f"{where}: '{name}'") for name, parse in zip(VALUES, parsers) if name in said}
     if "same_as" in said:
         found["same_as"] = _object(said["same_as"], known, f"{where}, 'same_as'")
     also = [key for key in LOBE if key in said]

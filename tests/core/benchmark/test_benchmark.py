@@ -14,8 +14,7 @@ import pytest
 from addon import cli
 from addon.benchmark import run as bench
 from addon.benchmark import stages
-from addon.benchmark.machine import describe_machine
-from addon.benchmark.run import Options, SkippedStage, run_benchmark
+from addon.benchmark.run import Options, SkippedStage, describe_machine, run_benchmark
 from addon.benchmark.table import Curves, Table
 from addon.core.errors import BadInputError, InterruptedRun
 from addon.core.progress import Progress
@@ -141,10 +140,8 @@ def test_the_machine_is_described_without_its_name():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("stage", "exact"), [("lit_diffuse", "exact"), ("shading", None), ("specular", None), ("pipeline", None)]
-)
-def test_a_stage_is_measured_under_its_alternatives(stage, exact, disk, tmp_path, monkeypatch):
+@pytest.mark.parametrize("stage", bench.STAGES)
+def test_a_stage_is_measured_under_its_alternatives(stage, disk, tmp_path, monkeypatch):
     """On a capture with truth; the alternative that is the reference has no error, the paper's has one."""
     capture = tmp_path / "capture"
     shutil.copytree(disk.root, capture)

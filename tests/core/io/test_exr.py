@@ -16,8 +16,7 @@ import pytest
 from addon.core.errors import BadInputError, StorageError
 from addon.core.io import exr_header
 from addon.core.io.exr import HALF_MAX, exr_note, read_exr, read_header, write_exr
-from addon.core.io.luma_chroma import to_rgb
-from addon.core.io.primaries import REC709
+from addon.core.io.primaries import REC709, to_rgb
 
 ROOT = Path(__file__).resolve().parents[3]
 PICTURE = np.random.default_rng(0).random((40, 70, 4), np.float32)
