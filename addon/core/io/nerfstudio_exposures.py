@@ -23,7 +23,7 @@ def ended(path: Path, name: str) -> Path:
         No file can be called so.
     """
     try:
-        if path.is_file():
+        if path.is_file() or path.suffix.lower() in ENDINGS:
             return path
         found = [full for full in (path.with_name(path.name + ending) for ending in ENDINGS) if full.is_file()]
     except (OSError, ValueError) as error:  # a name that the system can't even ask for
