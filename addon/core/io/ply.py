@@ -209,7 +209,7 @@ class _Records:
             for _ in range(records):
                 for before, read_length, own, each in steps:
                     at += before
-                    (count,) = read_length(self._data, at)
+                    (count,) = read_length(self._data.data, at)
                     if not 0 <= count <= size or count != int(count):
                         raise _Damaged(f"holds a list of {count} entries in '{name}': it is damaged")
                     found.append(int(count))

@@ -11,7 +11,7 @@ As JSON, with every key optional; what is not given is fitted under what is give
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
@@ -283,6 +283,7 @@ def _given(object_id: int, entry: Any, known: set[int], name: str) -> tuple[Give
         if model not in allowed:
             raise BadInputError(f"{where}: 'model' is {model!r}; give one of {', '.join(allowed)}.")
         found["model"] = model
+    parsers: tuple[Callable[..., Any], ...]
     parsers = _share, partial(_colour, keep_number=True), partial(_colour, number=False)
     found |= {name: parse(said[name], f"{where}: '{name}'") for name, parse in zip(VALUES, parsers) if name in said}
     if "same_as" in said:
