@@ -42,13 +42,15 @@ def read_bytes(path: Path, what: str = "", most: int = -1) -> bytes:
 
 def read_text(path: Path) -> str:
     """A table of poses or cameras; raises `BadInputError` where it is absent, no text, or larger than any such."""
-    content = read_bytes(path, most=MAX_TEXT + 1)
-    if len(content) > MAX_TEXT:
-        raise BadInputError(f"'{path}' is too large for a table of poses or cameras; export it again.")
-    try:
-        return content.decode("utf-8")
-    except ValueError as error:
-        raise BadInputError(f"'{path}' is no text; export it again.") from error
+    with readable(f"'{path}'"):
+        if what := absence(path):
+            raise BadInputError(f"'{path}' {what}; check the capture.")
+        if path.stat().st_size > MAX_TEXT:
+            raise BadInputError(f"'{path}' is too large for a table of poses or cameras; export it again.")
+        try:
+            return path.read_text(encoding="utf-8")
+        except ValueError as error:
+            raise BadInputError(f"'{path}' is no text; export it again.") from error
 
 
 def read_json(path: Path) -> dict[str, Any]:
