@@ -68,14 +68,15 @@ class SCAN_RELIGHT_PT_missing(SidebarPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        return context.scene is not None and bool(_found or find.known_missing() or find.known_overtaken())
+        return context.scene is not None and bool(_found or any(find.known()))
 
     def draw(self, context):
         layout = self.layout
-        for one in find.known_missing():
+        missing, overtaken = find.known()
+        for one in missing:
             self.say(layout, one.sentence, "ERROR")
             layout.operator("scan_relight.find_result", icon="FILE_FOLDER").missing = str(one.folder)
-        for folder in find.known_overtaken():
+        for folder in overtaken:
             self.say(
                 layout,
                 f"'{folder.name}' was recovered anew with other textures since this file was saved: its objects show "

@@ -70,30 +70,26 @@ class Missing:
         )
 
 
-_known: dict = {"time": -FRESH, "found": [], "overtaken": []}
+_known: tuple[float, list[Missing], list[Path]] = -FRESH, [], []
 
 
 def forget() -> None:
     """Look up again what is missing."""
-    _known["time"] = -FRESH
+    global _known
+    _known = (-FRESH, *_known[1:])
 
 
-def known_missing() -> list[Missing]:
-    """`missing`, looked up every `FRESH` seconds at most."""
-    if time.monotonic() - _known["time"] >= FRESH:
-        before, now = _known["found"], missing()
-        _known.update(found=now, overtaken=overtaken(), time=time.monotonic())
-        left = {one.folder for one in now}
+def known() -> tuple[list[Missing], list[Path]]:
+    """`missing` and `overtaken`, looked up every `FRESH` seconds at most."""
+    global _known
+    looked, before, _ = _known
+    if time.monotonic() - looked >= FRESH:
+        _known = time.monotonic(), missing(), overtaken()
+        left = {one.folder for one in _known[1]}
         for one in before:
             if one.folder not in left and not bpy.app.background:  # put back by hand; not now: a panel may be drawing
                 bpy.app.timers.register(partial(reload, one.folder))
-    return _known["found"]
-
-
-def known_overtaken() -> list[Path]:
-    """`overtaken`, looked up along with `known_missing`."""
-    known_missing()
-    return _known["overtaken"]
+    return _known[1:]
 
 
 def overtaken() -> list[Path]:
