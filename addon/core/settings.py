@@ -58,8 +58,6 @@ class Settings:
     refine : int
         Rounds after the fit: 1 takes the fitted specular out of the lit diffuse texture; 2 also lights the room with
         what glossy things really reflect; 0 leaves both.
-    coat : bool
-        Give objects of which too little was seen to look for a highlight a plausible dielectric's coat in the scene.
     threads : int
         0 takes all cores.
     seed : int
@@ -85,7 +83,6 @@ class Settings:
     specular: str = "frames"
     specular_rays: int = 256
     refine: int = 2
-    coat: bool = True
     threads: int = 0
     seed: int = 0
     without: tuple[str, ...] = ()
@@ -133,7 +130,6 @@ PAPER = Settings(
     specular="target",
     specular_rays=10000,
     refine=0,
-    coat=False,
 )
 """Haefner et al. 2021 and nothing else: `paper/`."""
 DRAFT = Settings(detail=0.5, sharpen=False, shading_rays=48, emitter_rays=16, portal_rays=16, specular_rays=96)

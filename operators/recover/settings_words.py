@@ -92,11 +92,6 @@ WORDS = {
         "0 stops after the first fit; 1 takes the highlights out of the texture; 2 lights "
         "the room with what glossy things reflect, too",
     ),
-    "coat": Words(
-        "Assume a Coat",
-        "Give objects that were seen too little to look for a highlight a plausible coat, "
-        "as paint or plastic has, instead of none",
-    ),
     "threads": Words("Threads", "Processor threads that the run takes; 0 takes all"),
     "seed": Words("Seed", "Another number gives other noise; the same one gives the same result again"),
 }

@@ -138,9 +138,6 @@ def facts(one: dict[str, Any]) -> list[tuple[str, str]]:
         found.append(("Seen", f"{evidence['seen_share']:.0%} of {evidence.get('area', 0):.3g} m\u00b2"))
     if evidence.get("observations") is not None:
         found.append(("Views", f"{evidence['observations']:.0f}"))
-    coat = one.get("coat")
-    if coat:
-        found.append(("Assumed coat", f"roughness {coat.get('roughness', 0):.2f}, F0 {coat.get('f0', 0):.2f}"))
     said = one.get("given")
     if said:
         found.append(("Given", ", ".join(f"{GIVEN.get(key, key)} {_told(value)}" for key, value in said.items())))

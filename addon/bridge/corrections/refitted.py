@@ -21,7 +21,7 @@ from ..scene.write import BASE_COLOR
 from . import corrections, unseen
 from .material import worn_material
 
-_WORN = ("model", "alpha", "f0", "emission", "transmission", "surfaces", "coat", "given")
+_WORN = ("model", "alpha", "f0", "emission", "transmission", "surfaces", "given")
 """Of an entry of materials.json, what its object's material is made of."""
 
 

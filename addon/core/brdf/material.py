@@ -59,8 +59,6 @@ class ObjectMaterial:
         Why a richer model was not taken, or what is doubtful; '' if nothing is.
     given : dict
         What the artist gave of it, as `overrides.Given.as_dict` has it.
-    coat : dict of str to float
-        Lambertian only, for lack of evidence: `f0` and `roughness` (Blender's) of a dielectric's coat that is assumed.
     """
 
     object_id: int
@@ -82,7 +80,6 @@ class ObjectMaterial:
     scores: dict[str, float] = field(default_factory=dict)
     note: str = ""
     given: dict[str, Any] = field(default_factory=dict)
-    coat: dict[str, float] = field(default_factory=dict)
 
     @property
     def name(self) -> str:

@@ -115,7 +115,6 @@ PASSES = (
         wide_prior="Widens the neighbourhood for as long as it stays alike.",
         object_spread="Takes the spread of single observations from others of the object.",
         compensation="Raises Base Color for the light that the Principled coat keeps from the diffuse part.",
-        coat="Gives objects that were hardly seen a plausible coat.",
     ),
 )  # fmt: skip
 """All of them in the order of the stages."""

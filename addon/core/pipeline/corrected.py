@@ -12,8 +12,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ..brdf.compensation import layer_reflectance
-from ..brdf.dielectric import SATIN, USUAL_F0
 from ..brdf.material import ObjectMaterial, base_colors, with_metals
 from ..evidence.collect import Evidence, collect
 from ..evidence.findings import Findings
@@ -67,9 +65,7 @@ class Corrected(Stages):
     @cached_property
     def _materials(self) -> list[ObjectMaterial]:
         light = np.ones(3) if self.white is None else self.white.of_light
-        known = corrected(self.specular().materials, self.overrides, light)
-        wanted = self.settings.coat and "coat" not in self.settings.without
-        return coated(known, self.albedo, self.surface().atlas) if wanted else known
+        return corrected(self.specular().materials, self.overrides, light)
 
     @cached_property
     def white(self) -> WhiteScale | None:
@@ -240,29 +236,5 @@ def corrected(materials: tuple[ObjectMaterial, ...], overrides: Overrides, light
         if m.model.lobe_alone and given.base_color is not None and given.f0 is None:
             mean = float(np.mean(given.base_color))
             m = replace(m, f0=m.model.as_f0(given.base_color), f0_low=mean, f0_high=mean)
-        result.append(m)
-    return result
-
-
-def coated(materials: list[ObjectMaterial], albedo: Albedo, atlas: Atlas) -> list[ObjectMaterial]:
-    """Descriptions with a plausible coat on what was seen too little to look for any highlight.
-
-    Not on what was looked at and showed none, or is of a class that did, nor on what is too dark to reflect as much as
-    the coat does. The roughness is the median of the dielectrics that were identified in the class, else in the room.
-    """
-    diffuse = {m.class_name for m in materials if not m.model.has_lobe and m.model.has_albedo and m.scores}
-    rough: dict[str, list[float]] = {}
-    for m in materials:
-        if m.model.layered and m.alpha is not None:
-            rough.setdefault(m.class_name, []).append(float(np.sqrt(m.alpha)))
-    everywhere = [one for alike in rough.values() for one in alike]
-    result = []
-    for m in materials:
-        plain = not m.model.has_lobe and m.model.has_albedo and not m.scores
-        if plain and m.class_name not in diffuse and m.given.keys() <= {"base_color"}:
-            own = atlas.object_id == m.object_id
-            roughness = float(np.median(rough.get(m.class_name) or everywhere or [SATIN]))
-            if own.any() and np.median(albedo.rho[own], 0).min() > layer_reflectance(USUAL_F0, roughness**2):
-                m = replace(m, coat={"f0": USUAL_F0, "roughness": roughness})
         result.append(m)
     return result

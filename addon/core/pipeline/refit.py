@@ -307,7 +307,7 @@ class Refit(Recovery):
         old, new = self.result.report, super().report()
         models = {
             name: new["figures"][name]
-            for name in ("models", "coats", "evidence", "white_scale", "white_light")
+            for name in ("models", "evidence", "white_scale", "white_light")
             if name in new["figures"]
         }
         figures = {name: value for name, value in old["figures"].items() if not name.startswith("white_")} | models

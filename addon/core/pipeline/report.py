@@ -44,7 +44,6 @@ def make_report(run: Corrected) -> dict[str, Any]:
     if "specular" in run.done:
         models = [m.model.name for m in run.materials()]
         figures["models"] = {model: models.count(model) for model in sorted(set(models))}
-        figures["coats"] = sum(bool(m.coat) for m in run.materials())
         figures["evidence"] = _evidence_figures(run)
         if run.white is not None:
             figures["white_scale"] = [float(x) for x in run.white.of_irradiance]

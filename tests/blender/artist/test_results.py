@@ -90,8 +90,6 @@ def test_facts_name_what_is_known(results):
     assert dict(results.facts(OBJECTS[3])) == {"Model": "Lamp", "Radiance": "3, 2, 1", "Certainty": "Unknown"}
     given = OBJECTS[2] | {"given": {"model": "metal", "f0": [0.9, 0.6, 0.3]}}
     assert dict(results.facts(given))["Given"] == "model Metal, F0 0.90 0.60 0.30"
-    coated = OBJECTS[1] | {"coat": {"f0": 0.04, "roughness": 0.5}}
-    assert dict(results.facts(coated))["Assumed coat"] == "roughness 0.50, F0 0.04"
     assert results.facts({"model": "something new"})[0] == ("Model", "something new")
 
 

@@ -7,7 +7,7 @@ from addon.core.brdf.compensation import base_color
 from addon.core.brdf.dielectric import DIELECTRIC
 from addon.core.brdf.emitter import EMITTER, LAMP_ALBEDO
 from addon.core.brdf.lambertian import LAMBERTIAN
-from addon.core.brdf.material import ObjectMaterial, base_colors
+from addon.core.brdf.material import ObjectMaterial
 from addon.core.brdf.metal import METAL
 
 bpy = pytest.importorskip("bpy")
@@ -104,19 +104,6 @@ def test_furnace_specular(scene, shoot, look, white_world, phi, psi):
         f"phi {phi} psi {psi}: specular {specular.mean():.4f}, method {expected[0] - 0.2:.4f}; whole {whole / expected}"
     )
     np.testing.assert_allclose(whole, expected, rtol=0.03)
-
-
-def test_a_coat_that_is_assumed_makes_nothing_brighter(scene, shoot, look, white_world):
-    scene.render.film_transparent = True
-    look((0, 0, 3))
-    albedo = np.float32([0.7, 0.4, 0.15])
-    ball = ObjectMaterial(0, "Ball", LAMBERTIAN, coat={"f0": 0.04, "roughness": 0.5})
-    color = base_colors(albedo[None], np.zeros(1, int), [ball])[0]
-    assert (color < albedo).all()
-    thing = add("sphere", make_material(ball, plain(color)), subdivisions=5)
-    coated = disc_mean(shoot(16, 16, 400))
-    thing.data.materials[0] = make_material(ObjectMaterial(0, "Ball", LAMBERTIAN), plain(albedo))
-    assert np.allclose(coated, disc_mean(shoot(16, 16, 64)), atol=0.01)
 
 
 def test_furnace_metal(scene, shoot, look, white_world):

@@ -52,7 +52,9 @@ def room(tmp_path_factory) -> OnDisk:
 
 
 def asked(room, out, **more) -> Ablation:
-    return Ablation((room.root,), out, (0,), ("sun", "interpolation", "coat"), "draft", unwrap=room.unwrap, **more)
+    return Ablation(
+        (room.root,), out, (0,), ("sun", "interpolation", "compensation"), "draft", unwrap=room.unwrap, **more
+    )
 
 
 @pytest.mark.slow
@@ -61,12 +63,12 @@ def test_runs_that_are_there_are_not_done_again(room, tmp_path):
     path = run_ablation(asked(room, tmp_path), told.append)
     first = path.read_bytes()
     lines = read_lines([path])
-    assert [one["without"] for one in lines] == ["", "sun", "interpolation", "coat"] and len(told) == 4
-    whole, sun, interpolation, coat = lines
+    assert [one["without"] for one in lines] == ["", "sun", "interpolation", "compensation"] and len(told) == 4
+    whole, sun, interpolation, compensation = lines
     assert whole["figures"]["albedo"] > 25 and whole["figures"]["right"] == whole["figures"]["objects"] >= 6
     assert sun["same"] and sun["figures"] == whole["figures"] and set(sun["seconds"]) == {"shading"}
     assert set(interpolation["seconds"]) == {"shading", "specular", "write"} and not interpolation["same"]
-    assert set(coat["seconds"]) == {"write"}
+    assert set(compensation["seconds"]) == {"write"}
     run_ablation(asked(room, tmp_path), told.append)
     assert path.read_bytes() == first and len(told) == 4
 
@@ -74,10 +76,10 @@ def test_runs_that_are_there_are_not_done_again(room, tmp_path):
 @pytest.mark.slow
 def test_passes_that_are_taken_out_together(room, tmp_path):
     """One line, from the first stage that any of them changes; what each says by itself is another's matter."""
-    together = Ablation((room.root,), tmp_path, (0,), ("sun+coat", "coat"), "draft", unwrap=room.unwrap)
-    _, coat, both = read_lines([run_ablation(together)])
-    assert (coat["without"], both["without"]) == ("coat", "sun+coat")
-    assert {"shading", "write"} <= set(both["seconds"]) and both["figures"] == coat["figures"]
+    together = Ablation((room.root,), tmp_path, (0,), ("sun+compensation", "compensation"), "draft", unwrap=room.unwrap)
+    _, compensation, both = read_lines([run_ablation(together)])
+    assert (compensation["without"], both["without"]) == ("compensation", "sun+compensation")
+    assert {"shading", "write"} <= set(both["seconds"]) and both["figures"] == compensation["figures"]
 
 
 def test_a_torn_last_line_is_done_again(room, tmp_path):
@@ -125,7 +127,7 @@ def test_gains_and_their_error(tmp_path):
     assert np.isclose(gain.error, np.sqrt(2 * (1 / 2 + 1)) / 2)
     assert np.isclose(gain_of(FIGURES[2], "sun", runs).mean, 25)  # 1/1000; less is better
     assert np.isclose(seconds_of("sun", runs), (1 + 1 + 3) / 3)
-    assert gain_of(FIGURES[0], "coat", runs) is None
+    assert gain_of(FIGURES[0], "compensation", runs) is None
     (tmp_path / "ablation-one.jsonl").write_text("\n".join(json.dumps(one) for one in lines[:3]))
     (tmp_path / "ablation-two.jsonl").write_text("\n".join(json.dumps(one) for one in lines[3:]))
     write_report(tmp_path, tmp_path / "table.md")

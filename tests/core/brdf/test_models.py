@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +38,6 @@ class Material:
     emission: tuple | None = None
     transmission: float | None = None
     surfaces: float | None = None
-    coat: dict = field(default_factory=dict)
 
 
 @pytest.fixture
@@ -118,8 +117,6 @@ def test_what_blender_is_told():
     metal = METAL.principled(Material(0.04, (0.9, 0.6, 1.2)))
     assert (metal.metallic, metal.base_color, metal.roughness) == (1, (0.9, 0.6, 1.0), pytest.approx(0.2))
     assert LAMBERTIAN.principled(Material()).specular_level == 0
-    coat = LAMBERTIAN.principled(Material(coat={"f0": 0.04, "roughness": 0.5}))
-    assert (coat.specular_level, coat.roughness) == (0.5, 0.5)
 
 
 def test_a_name_is_one_models(beckmann):

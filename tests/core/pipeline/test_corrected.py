@@ -7,15 +7,12 @@ import json
 import numpy as np
 import pytest
 
-from addon.core.brdf.dielectric import DIELECTRIC
 from addon.core.brdf.emitter import EMITTER
 from addon.core.brdf.lambertian import LAMBERTIAN
-from addon.core.brdf.material import ObjectMaterial
-from addon.core.passes.albedo.albedo import MEASURED, NONE, Albedo
-from addon.core.pipeline.corrected import coated
+from addon.core.passes.albedo.albedo import MEASURED, NONE
 from addon.core.results.overrides import parse
 from tests.core.on_disk import ALBEDO, CHEAP, LAMP
-from tests.core.rooms import lit_box, make_room, radiosity
+from tests.core.rooms import radiosity
 
 pytestmark = pytest.mark.usefixtures("few_samples")
 
@@ -123,27 +120,3 @@ def test_keys_stay_where_nothing_is_given(recovered, folder):
     again = recovered({"objects": {"3": {}}})
     assert json.loads((folder / "materials.json").read_text())["run"] == first != other
     assert all(again.stored.values())
-
-
-def test_a_coat_is_for_what_nothing_is_known_of():
-    room = make_room(lit_box(), 0.5)
-    bright = {3: 0.02}
-    rho = room.by_object(bright, 0.5)
-    albedo = Albedo(rho, np.full(len(rho), MEASURED, np.int8), np.zeros(len(rho), np.float32))
-    looked = {"scores": {"lambertian": 1.0, "specular": 1.001}}
-    found = coated(
-        [
-            ObjectMaterial(0, "wood", DIELECTRIC, alpha=0.09, f0=0.05),
-            ObjectMaterial(1, "wood", LAMBERTIAN),
-            ObjectMaterial(2, "wall", LAMBERTIAN, **looked),
-            ObjectMaterial(3, "wood", LAMBERTIAN),
-            ObjectMaterial(4, "cloth", LAMBERTIAN, given={"model": "lambertian"}),
-            ObjectMaterial(5, "door", LAMBERTIAN),
-            ObjectMaterial(6, "wall", LAMBERTIAN),
-        ],
-        albedo,
-        room.atlas,
-    )
-    assert found[1].coat == {"f0": 0.04, "roughness": pytest.approx(0.3)} and found[1].model == LAMBERTIAN
-    assert found[5].coat["roughness"] == pytest.approx(0.3)  # no door has one: the room's
-    assert not any(found[i].coat for i in (0, 2, 3, 4, 6))  # glossy; looked at; too dark; given; as wall 2

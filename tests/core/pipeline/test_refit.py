@@ -93,7 +93,6 @@ def test_as_a_whole_run_with_the_same_corrections(disk, finished, result, tmp_pa
             "given",
             "note",
             "observations",
-            "coat",
         ):
             assert ours[i][name] == theirs[i][name], name
         for name in ("albedo", "albedo_low", "albedo_high"):
