@@ -21,8 +21,8 @@ class CalibrationParams:
     solved, solved_sky, rough_light : float
         Relative error of light that no frame looked at: lamps and a sun that were solved for, sky that was; and,
         besides the error of their albedo, surfaces: the light on them is gathered roughly. (An unseen ceiling lamp came
-        out at 0.93 to 1.08 of its radiance in the rooms, at 0.99 in the living room; four bulbs in shades at 0.93 to
-        1.24.)
+        out at 0.93 to 1.08 of its radiance in the rooms, at 0.99 in the living room; four bulbs in shades at 0.98 to
+        1.43: what their shades' unseen insides throw is put to them.)
     poorly : float
         Relative error of what is known poorly: clipped surfaces (a lower bound), the specular part that was taken out
         (psi is known to 30 %).

@@ -42,32 +42,3 @@ class UnseenParams:
 
 
 UNSEEN = UnseenParams()
-
-
-@dataclass(frozen=True)
-class ShadesParams:
-    """Of `shades`.
-
-    Attributes
-    ----------
-    strongly : float
-        What is lit so many times as strongly as what was seen of its object hangs by the lamp's light.
-    reach : float
-        Radii of a ball of the lamp's surface within which a shade is looked for.
-    places : int
-        Elements of a shade that are looked at.
-    bounces : int
-        Of light inside a shade; of paper of albedo .7 each passes a third on.
-    darkest, lightest : float
-        Albedo of what no element tells of, and bounds for the others'.
-    """
-
-    strongly: float = 3.0
-    reach: float = 12.0
-    places: int = 1000
-    bounces: int = 3
-    darkest: float = 0.05
-    lightest: float = 0.85
-
-
-SHADES = ShadesParams()

@@ -31,7 +31,6 @@ from ...scene.model import Instance
 from ...significance import LEVELS
 from .params import UNSEEN
 from .refine_light import Sky, all_light, refined, shared_by_class
-from .shades import by_way_of_shade
 from .unseen_lamps import needed, solve_lamps, solve_sky
 from .whole_sky import with_whole_sky
 
@@ -175,19 +174,12 @@ def find_light(
     sky = Sky([G[lit] for G in sky_contributions], guess, clipped_sky, [zone.told for zone in zones])
     colours = shared_by_class(colours or {}, unseen_objects, instances)
 
-    def solve(contribution: dict[int, np.ndarray], sky: Sky) -> tuple[list[Lamp], Sky, np.ndarray]:
-        """Lamps, the sky (changed in place, too) and log(L_d / E), (k, 3)."""
-        for _ in range(UNSEEN.sweeps if zones else 1):
-            lamps = solve_lamps(sample, contribution, least, instances, seen, sky, received[lit], colours)
-            solve_sky(sample, lamps, contribution, sky, received[lit])
-        lamps, sky = needed(sample, lamps, contribution, sky, received[lit], colours)
-        E = all_light(received[lit], lamps, contribution, sky)
-        return lamps, sky, np.log(np.maximum(sent, 1e-9) / np.maximum(E, 1e-12))
-
-    lamps, sky, log_albedo = solve(contribution, sky)
-    if lamps and earlier is None and "shades" not in without:
-        contribution |= _by_shades(field, lamps, even, sample, log_albedo, contribution, seed)
-        lamps, sky, log_albedo = solve(contribution, sky)
+    for _ in range(UNSEEN.sweeps if zones else 1):
+        lamps = solve_lamps(sample, contribution, least, instances, seen, sky, received[lit], colours)
+        solve_sky(sample, lamps, contribution, sky, received[lit])
+    lamps, sky = needed(sample, lamps, contribution, sky, received[lit], colours)
+    E = all_light(received[lit], lamps, contribution, sky)
+    log_albedo = np.log(np.maximum(sent, 1e-9) / np.maximum(E, 1e-12))
     class_of = {i.object_id: i.class_name for i in instances}
     kind = kinds_of(sample.object_id, log_albedo, class_of)
     sample = replace(sample, kind=kind, cap=LIGHT_FIT.clipped_cap if clipped else LIGHT_FIT.cap)
@@ -202,24 +194,6 @@ def find_light(
     sure = find_seen(atlas.object_id[element], field.radiance[element], everything)
     kept = Contributions(sunless, sky_contributions, sample.element, contribution, least)
     return Light(tuple(sure) + tuple(lamps), environment, found + tuple(sky.notes()), element, everything, kept)
-
-
-def _by_shades(
-    field: LightField,
-    lamps: list[Lamp],
-    even: np.ndarray,
-    sample: Sample,
-    log_albedo: np.ndarray,
-    direct: dict[int, np.ndarray],
-    seed: int,
-) -> dict[int, np.ndarray]:
-    """E at the sample from each of some lamps at radiance 1, with what comes by way of its shade."""
-    level = np.log(np.pi) + log_albedo.mean(1)
-    albedo = {int(i): float(np.exp(np.median(level[sample.object_id == i]))) for i in np.unique(sample.object_id)}
-    return {
-        lamp.object_id: direct[lamp.object_id] + by_way_of_shade(field, lamp, albedo, even, sample.element, seed)
-        for lamp in lamps
-    }
 
 
 def lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
