@@ -12,7 +12,7 @@ import numpy as np
 from ..core.atomic import write_bytes
 from ..core.errors import BadInputError
 from ..core.passes.registry import PASSES, Pass
-from .ablation import WHOLE, read_lines
+from .ablation import TOGETHER, WHOLE, read_lines
 from .run import plots_are_possible
 
 Line = Mapping[str, Any]
@@ -38,6 +38,8 @@ class Figure:
     digits: int = 2
 
 
+OLDER = "benchmark/ablation_older.md"
+"""Beside the page, if there is any: what was measured of older sources."""
 ALBEDO = Figure("albedo", "albedo, dB")
 FIGURES = (
     ALBEDO,
@@ -145,16 +147,18 @@ def write_report(folder: Path, path: Path) -> None:
     if plotted:
         image.parent.mkdir(parents=True, exist_ok=True)
         _plot(runs, image)
-    write_bytes(path, _markdown(runs, f"images/{image.name}" if plotted else None).encode())
+    older = (path.parent / OLDER).is_file()
+    write_bytes(path, _markdown(runs, f"images/{image.name}" if plotted else None, older).encode())
 
 
-def _markdown(runs: Mapping[tuple, Line], image: str | None) -> str:
+def _markdown(runs: Mapping[tuple, Line], image: str | None, older: bool = False) -> str:
     rooms = sorted({room for room, _, _ in runs})
     acting = [one for one in PASSES if _acts(one.name, runs)]
     idle = [one for one in PASSES if _was_run(one.name, runs) and not _acts(one.name, runs)]
     missing = [one for one in PASSES if not _was_run(one.name, runs)]
     known = {one.name for one in PASSES}
-    gone = sorted({name for _, _, name in runs if name not in known and name != WHOLE})
+    others = sorted({name for _, _, name in runs if name not in known and name != WHOLE})
+    together, gone = ([name for name in others if (TOGETHER in name) is joined] for joined in (True, False))
     presets = sorted({preset for _, preset in rooms})
     codes = sorted({str(line["code"]) for line in runs.values() if "code" in line})
     lines = [
@@ -190,8 +194,9 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None) -> str:
     lines += ["## Albedo by room, dB", "", *_table(head, [_by_room(one, rooms, runs) for one in acting]), ""]
     whole = [["whole method", *(_whole(room, runs) for room in rooms)]]
     lines += ["## The whole method's albedo, dB", "", *_table(head, whole), ""]
-    if gone:
-        lines += ["## Taken out of the method since", "", *_table(columns, [_summary(name, runs) for name in gone]), ""]
+    for title, names in (("Taken out of the method since", gone), ("Taken out together", together)):
+        if names:
+            lines += [f"## {title}", "", *_table(columns, [_summary(name, runs) for name in names]), ""]
     if idle:
         lines += ["## Without effect in these rooms", "", "What these look for is in none of them.", ""]
         lines += _table(
@@ -199,6 +204,8 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None) -> str:
         ) + [""]
     if missing:
         lines += ["## Not measured", "", ", ".join(one.name for one in missing) + ".", ""]
+        if older:
+            lines += [f"Figures of older sources: [{OLDER}]({OLDER}).", ""]
     lines += ["## What they do", "", *_table(["pass", "first stage", "does"], [_does(one) for one in acting]), ""]
     return "\n".join(lines)
 

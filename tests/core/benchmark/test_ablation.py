@@ -136,10 +136,12 @@ def test_gains_and_their_error(tmp_path):
     assert row.endswith("| open |") and "+1.00 ± 0.87" in row and "-1.00 b" in row and "+3.00 a" in row
     assert "| -1.00 to +3.00 |" in row  # over b alone, over a alone
     assert "Taken out" not in text
-    (tmp_path / "ablation-three.jsonl").write_text(json.dumps(line("a", 0, "moonlight", 29.5, 0.1, {})))
+    others = [line("a", 0, "moonlight", 29.5, 0.1, {}), line("a", 0, "sun+coat", 27, 0.1, {})]
+    (tmp_path / "ablation-three.jsonl").write_text("\n".join(json.dumps(one) for one in others))
     write_report(tmp_path, tmp_path / "table.md")
     _, _, gone = (tmp_path / "table.md").read_text().partition("## Taken out of the method since")
-    assert "| moonlight | 1 of 1 | +0.50 |" in gone
+    gone, _, together = gone.partition("## Taken out together")
+    assert "| moonlight | 1 of 1 | +0.50 |" in gone and "| sun+coat | 1 of 1 | +3.00 |" in together
     # With one seed the rooms' deviation counts: gains of 2 and -1.
     first = {key: one for key, one in runs.items() if key[1] == 0}
     assert np.isclose(gain_of(FIGURES[0], "sun", first).error, np.std([2, -1], ddof=1) / np.sqrt(2))
