@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from addon.core.light.environment import Environment
 from addon.core.light.field import LightField
 from addon.core.passes.albedo.albedo import albedo_of
-from addon.core.scene.elements import make_atlas, triangle_geometry
+from addon.core.scene.elements import ElementLookup, make_atlas, triangle_geometry
 from addon.core.scene.model import Camera, Instance, Mesh, Pixels
 from addon.core.scene.rays import RayScene
 
@@ -83,6 +83,10 @@ class Room:
     @cached_property
     def atlas(self):
         return make_atlas(self.mesh, self.uv, self.size)
+
+    @cached_property
+    def lookup(self) -> ElementLookup:
+        return ElementLookup(self.mesh, self.atlas)
 
     @cached_property
     def normals(self) -> np.ndarray:

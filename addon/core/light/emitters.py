@@ -52,11 +52,9 @@ def triangle_luminance(field: LightField) -> np.ndarray:
     atlas = field.atlas
     luminance = field.radiance @ LUMINANCE
     t = len(field.mesh.triangles)
-    count = np.bincount(atlas.triangle, minlength=t)
-    mean = np.bincount(atlas.triangle, luminance, t) / np.maximum(count, 1)
-    bare = np.flatnonzero(count == 0).astype(np.int32)
-    third = np.full(len(bare), 1 / 3, np.float32)
-    mean[bare] = luminance[field.lookup(bare, third, third)]
+    mean = np.bincount(atlas.triangle, luminance, t) / np.maximum(np.bincount(atlas.triangle, minlength=t), 1)
+    bare, beside = field.lookup.bare
+    mean[bare] = luminance[beside]
     return mean
 
 
@@ -66,10 +64,11 @@ def bright_triangles(field: LightField) -> BrightTriangles:
     luminance = triangle_luminance(field)
     weight = field.atlas.weight
     mean = (field.radiance @ LUMINANCE * weight).sum() / max(weight.sum(), 1e-30)
-    power = np.where(luminance > GATHER.bright * mean, luminance * area, 0)
-    bright = np.argsort(-power)[: GATHER.max_triangles]
-    bright = np.sort(bright[power[bright] > 0])
-    chance = power[bright] / max(power[bright].sum(), 1e-30)
+    bright = np.flatnonzero((luminance > GATHER.bright * mean) & (luminance * area > 0))
+    power = luminance[bright] * area[bright]
+    most = np.sort(np.argsort(-power)[: GATHER.max_triangles])
+    bright, power = bright[most], power[most]
+    chance = power / max(power.sum(), 1e-30)
     density = np.zeros(len(area), np.float32)
     density[bright] = chance / area[bright]
     corners = field.mesh.vertices[field.mesh.triangles[bright]].astype(np.float32)

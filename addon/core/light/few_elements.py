@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..groups import by_label
 from ..kinds import Block
 from ..luminance import LUMINANCE
 from ..parallel import for_blocks
@@ -54,12 +55,12 @@ def barely_seen(field: LightField, good: np.ndarray) -> np.ndarray:
 
 def evened(field: LightField) -> np.ndarray:
     """L_d with the median of its object where nobody saw an element ((n, 3) float32): it is dark there in `field`."""
-    radiance, atlas = field.radiance.copy(), field.atlas
+    radiance = field.radiance.copy()
     seen = radiance.any(1)
-    for object_id in np.unique(atlas.object_id[~seen]):
-        own = atlas.object_id == object_id
-        if (own & seen).any():
-            radiance[own & ~seen] = np.median(radiance[own & seen], 0)
+    for own in by_label(field.atlas.object_id):
+        known = seen[own]
+        if known.any() and not known.all():
+            radiance[own[~known]] = np.median(radiance[own[known]], 0)
     return radiance
 
 

@@ -31,6 +31,8 @@ class LightField:
         Objects that give light. They do so on the side that the normals show, which is the side the frames see: a
         lamp that is a bare rectangle under a ceiling does not light the gap above it. So does each side of a sheet
         that has two (`Mesh.backs`).
+    lookup : ElementLookup, optional
+        Of this mesh and atlas, if there is one already.
     """
 
     def __init__(
@@ -41,6 +43,7 @@ class LightField:
         radiance: np.ndarray,
         environment: Environment,
         lamps: Iterable[int] = (),
+        lookup: ElementLookup | None = None,
     ):
         self.mesh, self.atlas, self.scene, self.environment = mesh, atlas, scene, environment
         self.radiance = np.ascontiguousarray(radiance, np.float32)
@@ -50,7 +53,7 @@ class LightField:
         self.sun: Sun | None = None
         self.openings: Openings | None = None
         self.mirror_of = np.full(len(mesh.triangles), -1, np.int8)
-        self.lookup = ElementLookup(mesh, atlas)
+        self.lookup = lookup or ElementLookup(mesh, atlas)
 
     @cached_property
     def room_box(self) -> tuple[np.ndarray, np.ndarray]:

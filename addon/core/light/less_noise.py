@@ -72,15 +72,15 @@ def _planes(position: np.ndarray, light: np.ndarray, group: np.ndarray, count: n
     def mean(values: np.ndarray) -> np.ndarray:
         return np.bincount(group, values, cells) / count
 
-    centre = np.stack([mean(position[:, k]) for k in range(3)], 1)
-    x = (position - centre[group]) / size
-    middle = np.stack([mean(light[:, c]) for c in range(3)], 1)
-    second = np.empty((cells, 3, 3))
-    both = np.empty((cells, 3, 3))
+    x = [(along - mean(along)[group]) / size for along in position.T]
+    second, both = np.empty((cells, 3, 3)), np.empty((cells, 3, 3))
     for i in range(3):
         for j in range(3):
-            second[:, i, j] = mean(x[:, i] * x[:, j]) if j >= i else second[:, j, i]
-            both[:, i, j] = mean(x[:, i] * light[:, j])
+            second[:, i, j] = mean(x[i] * x[j]) if j >= i else second[:, j, i]
+            both[:, i, j] = mean(x[i] * light[:, j])
     # Across a wall there is no slope to find.
     slope = np.linalg.solve(second + 1e-4 * np.eye(3), both)
-    return (middle[group] + np.einsum("mi,mij->mj", x, slope[group])).astype(np.float32)
+    fitted = np.empty_like(light)
+    for c in range(3):  # (m, 3, 3) slopes at once would be most of a large room's memory
+        fitted[:, c] = mean(light[:, c])[group] + sum(x[i] * slope[group, i, c] for i in range(3))
+    return fitted

@@ -28,11 +28,11 @@ def frame_order(count: int, seed: int) -> np.ndarray:
 def _choose(clear: Summary, saturated: Summary) -> LitDiffuse:
     """For each element the observations that the sensor did not clip; where there are none, the clipped ones."""
     tier = np.select([clear.count > 0, saturated.count > 0], [CLEAN, SATURATED], -1).astype(np.int8)
-    parts = {name: getattr(clear, name).copy() for name in ("median", "lower", "upper", "count")}
+    clipped = saturated.count / np.maximum(clear.count + saturated.count, 1)
+    parts = {name: np.ascontiguousarray(getattr(clear, name)) for name in ("median", "lower", "upper", "count")}
     chosen = tier == SATURATED
     for name, values in parts.items():
         values[chosen] = getattr(saturated, name)[chosen]
-    clipped = saturated.count / np.maximum(clear.count + saturated.count, 1)
     median, lower, upper, count = parts.values()
     return LitDiffuse(median, lower, upper, count, tier, clipped.astype(np.float32))
 

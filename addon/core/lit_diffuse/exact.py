@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..paper.p_square import QUARTILES, Summary, between
-from ..parallel import ordered_map
+from ..parallel import blocks, ordered_map
 
 
 class Exact:
@@ -105,11 +105,14 @@ class Exact:
         return quartiles, count
 
     def result(self) -> Summary:
-        parts = list(ordered_map(self._summarise, range(self._buckets), self._threads))
+        lower, median, upper = np.empty((len(QUARTILES), self._count, 3), np.float32)
+        count = np.empty(self._count, np.int32)
+        found = ordered_map(self._summarise, range(self._buckets), self._threads)
+        for part, (quartiles, seen) in zip(blocks(self._count, self.BUCKET), found, strict=True):
+            lower[part], median[part], upper[part] = quartiles.transpose(2, 0, 1)
+            count[part] = seen
         self.close()
-        quartiles = np.concatenate([np.zeros((0, 3, 3), np.float32)] + [q for q, _ in parts])
-        count = np.concatenate([np.zeros(0, np.int64)] + [c for _, c in parts]).astype(np.int32)
-        return Summary(quartiles[..., 1], quartiles[..., 0], quartiles[..., 2], count)
+        return Summary(median, lower, upper, count)
 
     def close(self) -> None:
         self._held.clear()

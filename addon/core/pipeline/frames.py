@@ -217,7 +217,10 @@ def all_passes(
     found = one_pass(surface, frames, Poses.as_read(frames), read, settings, folder, rounds)
     if settings.refine_poses and "pose-refinement" not in settings.without:
         lit = found.lit_diffuse
-        room = LightField(surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), found.environment)
+        room = LightField(
+            surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), found.environment,
+            lookup=surface.lookup,
+        )  # fmt: skip
         rounds.next()
         poses = refine_poses(frames, read, Texture(room, lit.seen), threads=settings.threads, progress=rounds)
         found = replace(found, poses=poses)

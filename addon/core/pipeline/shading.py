@@ -25,6 +25,7 @@ from ..passes.missing_light.missing_light import find_missing_light, is_missing
 from ..passes.unseen_light.unseen_light import Light
 from ..progress import Progress
 from ..scene.atlas import Atlas
+from ..scene.elements import ElementLookup
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.mesh_noise import tilt
 from ..scene.model import Capture, Instance, Mesh
@@ -80,6 +81,7 @@ def find_shading(
             interpolate=s.interpolate, threads=s.threads, seed=s.seed, progress=progress,
             find_mirrors=mirrors if s.mirrors else None, noise=surface.noise,
             colours=observed.fringes.colours(), patches=patches.objects if guessed else None, without=s.without,
+            lookup=surface.lookup,
         )  # fmt: skip
 
     if "clipped-lamps" in s.without:
@@ -99,7 +101,9 @@ def with_lamps_of(found: Shading, patches: Patches) -> Shading:
 def lit_room(surface: Surface, shading: Shading) -> LightField:
     """The room as a light source, with all that was found of its light."""
     lamps = [lamp.object_id for lamp in shading.lamps]
-    room = LightField(surface.mesh, surface.atlas, surface.scene, shading.radiance, shading.environment, lamps)
+    room = LightField(
+        surface.mesh, surface.atlas, surface.scene, shading.radiance, shading.environment, lamps, surface.lookup
+    )
     return room.with_mirrors(shading.mirrors).with_sun(shading.sun).with_openings(shading.openings)
 
 
@@ -128,6 +132,7 @@ def shade(
     colours: dict[int, np.ndarray] | None = None,
     patches: list[int] | None = None,
     without: Collection[str] = (),
+    lookup: ElementLookup | None = None,
 ) -> Shading:
     """Lamps and irradiance by aimed rays, interpolated.
 
@@ -144,6 +149,8 @@ def shade(
         Objects that were set apart as they were clipped; None where the capture tells of its objects.
     without : collection of str
         Passes left out.
+    lookup : ElementLookup, optional
+        Of this mesh and atlas, if there is one already.
 
     Raises
     ------
@@ -162,7 +169,7 @@ def shade(
 
     environment, sun = (environment, None) if "seen-sun" in without else taken_out(environment)
     # What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
-    field = LightField(mesh, atlas, scene, unseen_dark(lit_diffuse), environment).with_sun(sun)
+    field = LightField(mesh, atlas, scene, unseen_dark(lit_diffuse), environment, lookup=lookup).with_sun(sun)
     dark = field
     field, light = with_all_light(field, lit_diffuse, instances, find_mirrors, seed, tilted, colours, without)
     if patches is not None and "missing-light" not in without:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -52,7 +53,7 @@ class Atlas:
     def __len__(self) -> int:
         return len(self.texel)
 
-    @property
+    @cached_property
     def texel_edge(self) -> float:
         """Edge of a usual element, metres."""
         return float(np.sqrt(np.median(self.area)))
@@ -68,7 +69,7 @@ class Atlas:
         """Twice the object's number, plus 1 on the second side of a sheet, (n,) int64."""
         return 2 * self.object_id.astype(np.int64) + (0 if self.back is None else self.back)
 
-    @property
+    @cached_property
     def box(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper corner of the room, (3,) each: `room_box` of the elements."""
         return room_box(self.position)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -25,11 +26,8 @@ ROWS_AT_ONCE: Block[int] = 128
 
 
 def triangle_geometry(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """Unit normals ((t, 3) float32, by the winding) and areas ((t,) float64, square metres)."""
-    a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
-    cross = np.cross(b - a, c - a)
-    length = np.linalg.norm(cross, axis=1)
-    return (cross / np.maximum(length, 1e-300)[:, None]).astype(np.float32), length / 2
+    """`Mesh.geometry`: unit normals ((t, 3) float32, by the winding) and areas ((t,) float64, square metres)."""
+    return mesh.geometry
 
 
 def uv_scale(mesh: Mesh, uv: np.ndarray) -> float:
@@ -268,6 +266,13 @@ class ElementLookup:
         for u, v in ((0.01, 0.01), (0.98, 0.01), (0.01, 0.98), (1 / 3, 1 / 3)):
             point = np.full((2, len(every)), ((u,), (v,)), np.float32)
             self._close |= atlas.object_id[self._texel(every, *point)] != mesh.object_id
+
+    @cached_property
+    def bare(self) -> tuple[np.ndarray, np.ndarray]:
+        """Triangles without an element of their own, (k,) int32, and the element in the middle of each, (k,) int32."""
+        bare = np.flatnonzero(np.bincount(self._atlas.triangle, minlength=len(self._object_id)) == 0).astype(np.int32)
+        third = np.full(len(bare), 1 / 3, np.float32)
+        return bare, self(bare, third, third)
 
     def _texel(self, triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
         """The element whose texel the points fall in."""

@@ -7,16 +7,20 @@ centre lies at (0.5, 0.5); x runs right, y runs down. Radiance is linear Rec.709
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from ..kinds import Block
 from ..naming import object_name
+from ..parallel import blocks
 from .lens import Lens
 from .radiometry import Radiometry
 
 AUTO = "auto"
 """The curve of codes that nobody told: calibrated from what frames show together, sRGB's until then."""
+TRIANGLES_AT_ONCE: Block[int] = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -317,6 +321,20 @@ class Mesh:
     uv: np.ndarray | None = None
     lit: LitTiles | None = None
     backs: np.ndarray | None = None
+
+    @cached_property
+    def geometry(self) -> tuple[np.ndarray, np.ndarray]:
+        """Unit normals ((t, 3) float32, by the winding) and areas ((t,) float64, square metres); not to be changed."""
+        normal, area = np.empty((len(self.triangles), 3), np.float32), np.empty(len(self.triangles))
+        for part in blocks(len(area), TRIANGLES_AT_ONCE):
+            a, b, c = (self.vertices.take(corner, 0).T.astype(np.float64) for corner in self.triangles[part].T)
+            (x, y, z), (p, q, r) = b - a, c - a
+            cross = np.stack([y * r - z * q, z * p - x * r, x * q - y * p])
+            length = np.sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2])
+            normal[part] = (cross / np.maximum(length, 1e-300)).T
+            area[part] = length / 2
+        normal.flags.writeable = area.flags.writeable = False
+        return normal, area
 
 
 @dataclass(frozen=True)

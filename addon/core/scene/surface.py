@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from ..errors import BadInputError
 from .atlas import Atlas
-from .elements import Crumbs, Elements, find_elements, make_atlas, triangle_geometry, uv_scale
+from .elements import Crumbs, ElementLookup, Elements, find_elements, make_atlas, triangle_geometry, uv_scale
 from .model import Camera, Mesh
 from .orientation import Sides, seen_sides
 from .params import SURFACE
@@ -51,6 +52,11 @@ class Surface:
     def first_uv(self) -> np.ndarray:
         """`uv` of the capture's own triangles. Where a mesh must stay as it is, its sheets show the side seen more."""
         return self.uv[: len(self.uv) - len(self.backs)]
+
+    @cached_property
+    def lookup(self) -> ElementLookup:
+        """The element at any point."""
+        return ElementLookup(self.mesh, self.atlas)
 
     @property
     def backs(self) -> np.ndarray:

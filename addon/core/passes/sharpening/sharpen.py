@@ -20,12 +20,11 @@ from scipy.ndimage import uniform_filter
 from ...kinds import Unit
 from ...lit_diffuse.accumulate import accumulate
 from ...scene.atlas import Atlas
-from ...scene.elements import ElementLookup
 from ...scene.lit_diffuse import LitDiffuse
-from ...scene.model import Camera, Frame, Pixels
+from ...scene.model import Frame, Pixels
 from ...scene.params import VISIBILITY
 from ...scene.surface import Surface
-from ...scene.visibility import CLEAN
+from ...scene.visibility import CLEAN, FrameView
 from ...significance import LEVELS
 from .params import SHARPENING
 
@@ -63,18 +62,17 @@ def sharpened(
         From a progress.
     """
     atlas = surface.atlas
-    lookup = lookup or ElementLookup(surface.mesh, atlas)
+    lookup = lookup or surface.lookup
     floor = np.float32(max(LEVELS.dark * float(np.median(lit.radiance[lit.seen])), 1e-30))
     good = (lit.tier == CLEAN) & (lit.count >= VISIBILITY.enough) & _detailed(lit, atlas)
 
-    def ratios(frame: Frame) -> Pixels:
-        pixels = read(frame)
-        shown = _shown(frame.camera, surface, lookup, lit)
+    def ratios(frame: Frame, view: FrameView, pixels: Pixels) -> Pixels:
+        shown = _shown(view, surface, lookup, lit)
         known = np.isfinite(shown).all(-1)
         ratio = (np.maximum(pixels.radiance, 0) + floor) / (np.where(known[..., None], shown, 0) + floor)
         return replace(pixels, radiance=ratio.astype(np.float32), valid=pixels.valid & known)
 
-    found = accumulate(surface.mesh, atlas, surface.scene, frames, ratios, only=good, **how)
+    found = accumulate(surface.mesh, atlas, surface.scene, frames, read, only=good, change=ratios, **how)
     told = good & (found.tier == CLEAN) & (found.count >= VISIBILITY.enough)
     ratio = np.where(told[:, None], np.clip(found.radiance, 1 / SHARPENING.most, SHARPENING.most), 1).astype(np.float32)
     return replace(lit, radiance=lit.radiance * ratio, lower=lit.lower * ratio, upper=lit.upper * ratio)
@@ -91,21 +89,26 @@ def _detailed(lit: LitDiffuse, atlas: Atlas) -> np.ndarray:
     return np.abs(own - total / np.maximum(count, 1e-6)) > SHARPENING.detail * own
 
 
-def _shown(camera: Camera, surface: Surface, lookup: Callable, lit: LitDiffuse) -> np.ndarray:
+def _shown(view: FrameView, surface: Surface, lookup: Callable, lit: LitDiffuse) -> np.ndarray:
     """L_d as a camera shows it, (height, width, 3) float32; NaN where a pixel shows what has none."""
+    camera = view.camera
     width, height = camera.width, camera.height
+
+    def sent(triangle: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """L_d where rays hit, (k, 3) float32; NaN for triangle -1."""
+        met = np.flatnonzero(triangle >= 0)
+        element = lookup(triangle[met], u[met], v[met])
+        found = np.full((len(triangle), 3), np.nan, np.float32)
+        found[met[element >= 0]] = lit.radiance.take(element[element >= 0], 0)
+        return found
 
     def traced(places: np.ndarray) -> np.ndarray:
         directions, led = camera.rays(places)
         origins = np.broadcast_to(camera.centre.astype(np.float32), directions.shape)
         hits = surface.scene.intersect(origins, directions)
-        met = np.flatnonzero((hits.triangle >= 0) & led)
-        element = lookup(hits.triangle[met], hits.u[met], hits.v[met])
-        found = np.full((len(places), 3), np.nan, np.float32)
-        found[met[element >= 0]] = lit.radiance.take(element[element >= 0], 0)
-        return found
+        return sent(np.where(led, hits.triangle, -1), hits.u, hits.v)
 
-    middle = traced(camera.pixel_centres()).reshape(height, width, 3)
+    middle = sent(view.triangle.ravel(), view.u.ravel(), view.v.ravel()).reshape(height, width, 3)
     # Corners of those pixels alone that show an element: often few, where few objects are asked for.
     known = np.isfinite(middle).all(-1)
     wanted = np.zeros((height + 1, width + 1), bool)
