@@ -1,8 +1,17 @@
-"""Peak memory of this process."""
+"""Memory of this process: its peak, and giving back what is free."""
 
 from __future__ import annotations
 
+import ctypes
 import sys
+
+
+def give_back() -> None:
+    """Let the system have what was freed but is kept for later, where the C library does not by itself (glibc)."""
+    if sys.platform == "linux":
+        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+        if trim is not None:
+            trim(0)
 
 
 def peak_memory() -> int | None:
@@ -30,7 +39,6 @@ def _windows_peak() -> int | None:
     """PeakWorkingSetSize of GetProcessMemoryInfo (psapi.h)."""
     if sys.platform != "win32":
         return None
-    import ctypes
     from ctypes import wintypes
 
     sizes = (

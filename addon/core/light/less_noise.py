@@ -55,12 +55,18 @@ def cells(
     position: np.ndarray, normal: np.ndarray, shift: float, size: float = LESS_NOISE.cell
 ) -> tuple[np.ndarray, np.ndarray]:
     """Cell of each element, by place and by the way that it faces, (m,) int; and the elements in each."""
-    place = np.floor(position / size + shift).astype(np.int64)
-    facing = np.round(normal * LESS_NOISE.turned / 2).astype(np.int64) + LESS_NOISE.turned
     key = np.zeros(len(position), np.int64)
-    for part in (*place.T, *facing.T):
-        part = part - part.min(initial=0)
-        key = key * (int(part.max(initial=0)) + 1) + part
+
+    def tell_apart(part: np.ndarray) -> None:
+        part = part.astype(np.int64)
+        part -= part.min(initial=0)
+        key[:] = key * (int(part.max(initial=0)) + 1) + part
+
+    # One axis after the other: all six at once were the most memory that a large room took.
+    for along in position.T:
+        tell_apart(np.floor(along / size + shift))
+    for facing in normal.T:
+        tell_apart(np.round(facing * LESS_NOISE.turned / 2) + LESS_NOISE.turned)
     _, group, count = np.unique(key, return_inverse=True, return_counts=True)
     return group.ravel(), count
 

@@ -13,6 +13,7 @@ from ..brdf.lambertian import LAMBERTIAN
 from ..brdf.material import ObjectMaterial, from_json
 from ..light.field import LightField
 from ..light.lamps import Lamp
+from ..memory import give_back
 from ..parallel import ordered_map
 from ..passes.glossy_light.glossy_light import Excess, glossy_light
 from ..passes.see_through.see_through import look_behind
@@ -178,6 +179,8 @@ def fit_specular(
     }
     _same_as(by_id, given, set(kept))
     materials = tuple(by_id.values())
+    del chosen  # megabytes of observations for each object
+    give_back()
 
     specular = np.zeros((len(field.atlas), 3), np.float32)
     excess, hidden = np.zeros_like(specular), np.zeros(len(specular), bool)

@@ -19,7 +19,7 @@ from ..light.environment import Environment
 from ..light.field import LightField
 from ..light.mirrors import in_their_planes
 from ..light.shading import Shading
-from ..memory import peak_memory
+from ..memory import give_back, peak_memory
 from ..passes.pose_refinement.poses import Poses
 from ..passes.registry import check, followed, left_out_of
 from ..progress import Progress
@@ -158,6 +158,7 @@ class Stages:
             value = compute(stage.settings(self.settings))
             value = followed(name, value, self.done, self.settings.without)
             self.store.save(name, self.keys[name], *to_store(value))
+        give_back()
         self.log[name] = {"seconds": round(time.monotonic() - started, 2), "stored": stored is not None}
         self.log[name]["peak_memory_bytes"] = peak_memory()
         self.progress.done(stored=stored is not None)

@@ -39,8 +39,8 @@ def uv_scale(mesh: Mesh, uv: np.ndarray) -> float:
     return float(np.sqrt(uv_area / max(area.sum(), 1e-30)))
 
 
-def _cover(uv: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """For each texel the triangle over it (-1: none) and the barycentric point, by rays against the unwrapped mesh."""
+def _cover(uv: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Covered texels, the triangle over each and the barycentric point, by rays against the unwrapped mesh."""
     flat = np.concatenate([uv.reshape(-1, 2).astype(np.float64) * size, np.zeros((3 * len(uv), 1))], 1)
     plane = RayScene(flat, np.arange(3 * len(uv), dtype=np.int32).reshape(-1, 3))
     triangle = np.full(size * size, -1, np.int32)
@@ -75,7 +75,8 @@ def _cover(uv: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
         rows, columns = (np.clip(at + np.array([-1, 0, 1])[:, None], 0, size - 1) for at in covered)
         around = np.unique(rows[:, None] * size + columns[None])
         wanted = around[unasked[around]]
-    return triangle, u, v
+    texel = np.flatnonzero(triangle >= 0)
+    return texel, triangle[texel], u[texel], v[texel]
 
 
 def _padding(element: np.ndarray) -> np.ndarray:
@@ -138,9 +139,8 @@ def find_elements(
     whole = np.ones(len(uv), bool)
     if crumbs is not None:
         whole[crumbs.triangle] = False
-    triangle, u, v = _cover(uv if whole.all() else uv[whole], size)
-    texel = np.flatnonzero(triangle >= 0)
-    triangle, u, v = np.flatnonzero(whole).astype(np.int32)[triangle[texel]], u[texel], v[texel]
+    texel, triangle, u, v = _cover(uv if whole.all() else uv[whole], size)
+    triangle = np.flatnonzero(whole).astype(np.int32)[triangle]
     position = np.empty((len(texel), 3), np.float32)
     for part in blocks(len(texel), 1 << 18):
         a, b, c = (mesh.vertices[mesh.triangles[triangle[part], i]].astype(np.float64) for i in range(3))
