@@ -65,7 +65,7 @@ class Solution:
     ----------
     psi : (3, h) float32
     size : (h, views, elements) float32
-        Size of the relative residual.
+        Size of the relative residual, over the observation's `spread`.
     cost : (h, elements) float64
         Robust cost of each element's observations, summed, in units of scale^2; the rays' noise taken out.
     total : (h,) float64
@@ -110,7 +110,8 @@ def solve(
         R = dense.I - lobe.B
     shape = np.broadcast_shapes(t.shape, R.shape[1:])
     R = np.broadcast_to(R, (3, *shape))
-    weight = np.broadcast_to(dense.there, shape)
+    sure = dense.there / np.square(dense.spread)
+    weight = np.broadcast_to(sure, shape)
     fixed = None if psi is None else np.asarray(psi, np.float32)[:, None] * np.ones((1, shape[0]), np.float32)
     for _ in range(1 if lobe is None or fixed is not None else rounds):
         wt = weight * t
@@ -134,18 +135,18 @@ def solve(
                     up, down, clean = (np.broadcast_to(x.sum(0), x.shape) for x in (up, down, clean))
                 if prior is not None:
                     # errors of one element's channels and views go together: they count once
-                    sure = 3 * dense.views * (scale / prior.sigma) ** 2
-                    up, down, clean = up + sure * prior.psi, down + sure, clean + sure
+                    counts = 3 * dense.views * (scale / prior.sigma) ** 2
+                    up, down, clean = up + counts * prior.psi, down + counts, clean + counts
                 values = np.clip(up / np.maximum(np.maximum(clean, LOBE_FIT.least_signal * down), 1e-30), least_psi, 1)
             each = values[:, :, None, None]
             rest = R - each * A
             rest -= ((SR - values[..., None] * SA) / below)[:, :, None] * t
-        size = np.sqrt(np.einsum("chvg,chvg->hvg", rest, rest) / 3) * dense.inflate
-        weight = dense.there * np.minimum(1, LEVELS.outlier * scale / np.maximum(size, 1e-12))
+        size = np.sqrt(np.einsum("chvg,chvg->hvg", rest, rest) / 3) * (dense.inflate / dense.spread)
+        weight = sure * np.minimum(1, LEVELS.outlier * scale / np.maximum(size, 1e-12))
     cost = huber(size, scale)
     if lobe is not None:
         noise = (each * (each * lobe.AA + 2 * lobe.AB) + lobe.BB).sum(0)
-        cost -= weight * left / np.maximum(dense.there, 1e-20) * noise * (dense.inflate / scale) ** 2 / 6
+        cost -= weight * left * np.square(dense.spread * dense.inflate / scale) * noise / 6
     cost *= dense.there
     by_element = cost.sum(1, dtype=np.float64)
     total = by_element.sum(1)
@@ -166,7 +167,10 @@ def robust_scale(size: np.ndarray) -> float:
 
 
 def fit_lobe(
-    problem: Problem | DenseProblem, constraints: Constraints = FREE, psi: np.ndarray | None = None
+    problem: Problem | DenseProblem,
+    constraints: Constraints = FREE,
+    psi: np.ndarray | None = None,
+    as_weighed: bool = False,
 ) -> LobeFit:
     """Best phi, with its psi.
 
@@ -177,27 +181,34 @@ def fit_lobe(
         Of psi, as the model has them.
     psi : (3,) float, optional
         Given: phi alone is sought.
+    as_weighed : bool
+        Observations keep their `spread`, so that costs can be compared with those of the lobe that it is of.
     """
     dense = problem if isinstance(problem, DenseProblem) else DenseProblem(problem)
-    solved = functools.partial(solve, dense, constraints=constraints, psi=psi)
+    solved = functools.partial(solve, constraints=constraints, psi=psi)
     kappas = LOBE_FIT.kappas if "grazing" not in dense.without else (0.0,)
-    flat = solve(dense, None, kappas, 1.0).size
-    scale = robust_scale(dense.seen(flat[0]))
-    kappa = kappas[len(kappas) // 2]
-    # phi at a middling kappa, kappa at that phi, phi again; and the scale from the fit, or every outlier of the poor
-    # start would count as noise.
-    for _ in range(2):
-        costs = solved(slice(None), kappa, scale).total
-        best = int(np.argmin(costs))
-        by_kappa = solved(slice(best, best + 1), kappas, scale)
+    scale = robust_scale(dense.seen(solve(dense, None, kappas[:1], 1.0).size[0]))
+
+    def step(dense: DenseProblem, kappa: float, scale: float) -> tuple[int, np.ndarray, float, float]:
+        """phi at a kappa, kappa at that phi: index of phi, its psi, kappa, and the scale of what is left."""
+        best = int(np.argmin(solved(dense, slice(None), kappa, scale).total))
+        by_kappa = solved(dense, slice(best, best + 1), kappas, scale)
         at = int(np.argmin(by_kappa.total))
-        kappa = kappas[at]
-        scale = robust_scale(dense.seen(by_kappa.size[at]))
+        return best, by_kappa.psi[:, at], kappas[at], robust_scale(dense.seen(by_kappa.size[at]))
+
+    # From a middling kappa, then from the one found, and with the scale of the fit, or every outlier of the poor start
+    # would count as noise. Once more when it is known what is reflected, and so what is how sure.
+    _, _, kappa, scale = step(dense, kappas[len(kappas) // 2], scale)
+    best, shown, kappa, scale = step(dense, kappa, scale)
+    if not as_weighed:
+        dense = dense.expecting(float(dense.grid[best]), shown, scale)
+        best, _, kappa, scale = step(dense, kappa, scale)
     near = slice(max(best - 1, 0), best + 2)
-    found = solved(near, kappa, scale)
+    found = solved(dense, near, kappa, scale)
     costs = found.total
     middle = best - near.start
     root, best_psi = between(np.sqrt(dense.grid[near]), costs, found.psi, middle)
+    flat = solve(dense, None, kappas, 1.0).size
     flat_costs = huber(flat, scale) * dense.there
     flattest = int(np.argmin(flat_costs.sum((1, 2))))
     unit = scale**2 / dense.count

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.brdf.dielectric import PRIOR
+from addon.core.brdf.dielectric import DIELECTRIC, PRIOR
 from addon.core.brdf.metal import METAL
 from addon.core.brdf.model import Constraints
 from addon.core.fit.lobe_fit import between, fit_lobe, huber, robust_scale, solve
-from addon.core.fit.problem import DenseProblem
-from addon.core.light.lobes import GRID
-from tests.core.glossy_box import Box
+from addon.core.fit.problem import DenseProblem, Problem
+from addon.core.light.lobes import GRID, reflected_light
+from tests.core.glossy_box import WALLS, Box
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +70,24 @@ def test_a_coat_darkens_its_diffuse_part(box):
     fit = fit_lobe(box.problem(element, direction, 0.11, 0.06, paint(element) * dark))
     assert fit.kappa == pytest.approx(0.45, abs=0.16)
     assert steps(fit.phi, 0.11) <= 1 and fit.psi[0] == pytest.approx(0.06, rel=0.2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("phi", [0.06, 0.11])
+def test_a_window_that_is_told_too_bright_does_not_broaden_the_lobe(phi):
+    """The light field is off by half of itself in one place: views that show it must not outweigh all others."""
+    walls = np.array(WALLS)
+    walls[2] = 3
+    true = Box(walls)
+    walls[2] = 4.5
+    told = Box(walls)
+    element, direction, _ = true.views(150, 10)
+    A, B = true.lobe(element, direction, phi, across=24)
+    noise = np.exp(np.random.default_rng(0).normal(0, 0.03, A.shape))
+    seen = (paint(element) * (1 - 0.2 * (1 - direction[:, 2:]) ** 2) + 0.04 * A + B) * noise
+    light = reflected_light(told.field, told.bright, element, direction, rays=256, threads=2)
+    fit = fit_lobe(Problem(element, seen, light, direction[:, 2]), constraints=DIELECTRIC.constraints)
+    assert abs(np.sqrt(fit.phi) - np.sqrt(phi)) < 0.08
 
 
 def test_exposure_does_not_matter(box):
@@ -135,7 +153,8 @@ def test_what_is_known_of_psi_fills_in(box):
     blurred = box.problem(element, direction, 0.6, 0.04, paint(element), noise=0.05)
     assert abs(fit_lobe(blurred, constraints=Constraints(prior=PRIOR)).psi[0] - 0.04) < 0.015
     clear = box.problem(element, direction, 0.11, 0.08, paint(element))
-    assert fit_lobe(clear, constraints=Constraints(prior=PRIOR)).psi[0] == pytest.approx(0.08, rel=0.15)
+    # The light is known to a share of itself alone: an F0 four standard deviations out is believed most of the way.
+    assert 0.06 < fit_lobe(clear, constraints=Constraints(prior=PRIOR)).psi[0] < 0.09
 
 
 def test_between_grid_points():

@@ -66,12 +66,20 @@ def _gain(with_lobe: np.ndarray, without: np.ndarray) -> tuple[float, float]:
     """Share of the elements' costs that the lobe takes off, and that in standard errors."""
     saved = without - with_lobe
     error = saved.std() / np.sqrt(len(saved))
-    return float(saved.sum() / max(without.sum(), 1e-30)), float(saved.mean() / max(error, 1e-30))
+    # Elements seen once cost nothing either way, but for rounding.
+    return float(saved.sum() / max(without.sum(), 1e-6 * len(saved))), float(saved.mean() / max(error, 1e-30))
 
 
 def gain_of(fit: LobeFit, held: Problem) -> tuple[float, float]:
     """Share of the cost that a fit's lobe takes off elements it has not seen, and that in standard errors."""
-    return _gain(*element_costs(DenseProblem(held), fit, max(1.4826 * fit.residual, 1e-4)))
+    dense, scale = _weighed(DenseProblem(held), fit)
+    return _gain(*element_costs(dense, fit, scale))
+
+
+def _weighed(dense: DenseProblem, fit: LobeFit) -> tuple[DenseProblem, float]:
+    """An object's observations as sure as they are under its own fit, and the standard deviation of their residual."""
+    scale = max(1.4826 * fit.residual, 1e-4)
+    return dense.expecting(fit.phi, fit.psi, scale), scale
 
 
 def _dielectric(fit: LobeFit) -> bool:
@@ -91,7 +99,7 @@ def _bare_metal(
     f0 = metal_f0(problem, phi)
     lobe = dense.lobe(dense.at(phi))
     rest = dense.I - f0.astype(np.float32)[:, None, None, None] * lobe.A - lobe.B
-    size = np.sqrt(np.square(rest[:, 0]).mean(0))
+    size = np.sqrt(np.square(rest[:, 0]).mean(0)) / dense.spread
     return replace(fit, phi=float(phi), psi=f0, kappa=0.0), (huber(size, scale) * dense.there).sum(0, dtype=np.float64)
 
 
@@ -113,7 +121,7 @@ def _of_class(own: LobeFit, of_class: LobeFit, model: Brdf, problem: Problem | N
     shared = replace(own, phi=of_class.phi, psi=own.psi if model.lobe_alone else of_class.psi)
     if problem is None:
         return shared
-    dense, scale = DenseProblem(problem), max(1.4826 * own.residual, 1e-4)
+    dense, scale = _weighed(DenseProblem(problem), own)
     if model.lobe_alone:
         solved = solve(dense, dense.at(shared.phi), own.kappa, scale, constraints=model.constraints)
         shared = replace(shared, psi=solved.psi[:, 0])
@@ -136,7 +144,7 @@ def choose_model(problem: Problem, may_be_metal: bool = True) -> Choice:
         return with_lobe, without
 
     fit = fit_lobe(dense, constraints=DIELECTRIC.constraints)
-    scale = max(1.4826 * fit.residual, 1e-4)
+    dense, scale = _weighed(dense, fit)
     with_lobe, without = held_out(fit, DIELECTRIC)
     scores = {LAMBERTIAN.name: 1.0, DIELECTRIC.name: float(with_lobe.sum() / max(without.sum(), 1e-30))}
     gain, sigmas = _gain(with_lobe, without)
@@ -146,7 +154,7 @@ def choose_model(problem: Problem, may_be_metal: bool = True) -> Choice:
     )
     # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
     dielectric = replace(fit, psi=np.minimum(fit.psi, MOST_F0))
-    metal, likely = fit_lobe(dense, constraints=METAL.constraints), None
+    metal, likely = fit_lobe(dense, constraints=METAL.constraints, as_weighed=True), None
     if may_be_metal and _metallic(metal):
         with_metal, diffuse = held_out(metal, METAL)
         scores[METAL.name] = float(with_metal.sum() / max(diffuse.sum(), 1e-30))

@@ -42,7 +42,7 @@ def test_each_gets_the_simplest_model(seen):
     assert models == {"diffuse": LAMBERTIAN, "glossy": DIELECTRIC, "metal": METAL, "few": LAMBERTIAN}
     assert chosen["few"].fit is None and chosen["few"].note and chosen["diffuse"].note
     assert not chosen["glossy"].note and not chosen["metal"].note
-    assert steps(chosen["glossy"].fit.phi, 0.11) <= 1 and chosen["glossy"].fit.psi[0] == pytest.approx(0.08, rel=0.15)
+    assert steps(chosen["glossy"].fit.phi, 0.11) <= 1 and 0.06 < chosen["glossy"].fit.psi[0] < 0.09
     assert chosen["glossy"].gain > 0.02 and chosen["glossy"].sigmas > 3
     assert chosen["diffuse"].gain < 0.02
 
