@@ -11,7 +11,8 @@ import numpy as np
 
 from ..errors import BadInputError, one_line
 from ..kinds import Shown
-from ..scene.model import Capture, Frame, Mesh
+from ..scene.closing import Closing, close_holes
+from ..scene.model import Capture, Frame, Mesh, Pixels
 from ..scene.shape_parts import parts_of
 from ..scene.vote import vote
 from . import instances
@@ -23,9 +24,10 @@ from .exposures import from_csv, from_exif
 from .files import EscapesError, absence, check_links
 from .frame_codes import with_curves
 from .id_pictures import read_ids
-from .layout import AS_FOUND, Layout, Reading
+from .layout import AS_FOUND, Layout, RawMesh, Reading
 from .mesh_repair import repair
 from .pictures import picture_note, picture_size, read_picture
+from .pixels import read_pixels
 from .readers import reader_for
 
 MAX_BAD_SHARE = 0.2
@@ -99,6 +101,7 @@ def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str
     What tells the objects: the mesh's faces, objects or groups; else pictures of ids; else its shape.
     """
     raw, warnings = repair(layout.mesh)
+    count = len(raw.triangles)
     names = layout.names if layout.names is not None else raw.names
     found = raw.object_id
     told = found is not None or any(frame.id_path is not None for frame in frames)
@@ -106,15 +109,38 @@ def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str
         found, notes = vote(raw.vertices, raw.triangles, frames, read_ids)
         warnings += notes
     elif found is None:
-        found, names = parts_of(raw.vertices, raw.triangles)
+        parts = parts_of(raw.vertices, raw.triangles)
+        found, names = parts.part, parts.names
         warnings.append(
             "Nothing tells the mesh's objects: its faces have no object_id. By its shape it has "
             f"{len(names)}; none of them is taken for metal or glass unless you say so."
         )
+        if frames and parts.planes:
+            added = close_holes(raw.vertices, raw.triangles, parts, frames, _pixels)
+            raw, found, names = _with(raw, added), np.concatenate([found, added.part]), added.names
     ids, objects, more = instances.assign(found, names, layout.names_file or instances.FILE)
     if not told:
         objects = tuple(replace(one, guess=True) for one in objects)
-    return Mesh(raw.vertices, raw.triangles, ids, raw.uv, None if frames else raw.lit), objects, warnings + more
+    closed = np.arange(count, len(raw.triangles), dtype=np.int32)
+    lit = None if frames else raw.lit
+    mesh = Mesh(raw.vertices, raw.triangles, ids, raw.uv, lit, closed=closed if len(closed) else None)
+    return mesh, objects, warnings + more
+
+
+def _pixels(frame: Frame) -> Pixels:
+    """What a frame measured; nothing where it is damaged, which is told once it is needed."""
+    try:
+        return read_pixels(frame)
+    except BadInputError:
+        shape = frame.camera.height, frame.camera.width
+        return Pixels(np.zeros((*shape, 3), np.float32), np.zeros(shape, bool), np.zeros(shape, bool))
+
+
+def _with(mesh: RawMesh, added: Closing) -> RawMesh:
+    """A mesh with the faces that close its holes."""
+    triangles = np.concatenate([mesh.triangles, added.triangles + len(mesh.vertices)]).astype(np.int32)
+    uv = None if mesh.uv is None else np.concatenate([mesh.uv, np.zeros((len(added.triangles), 3, 2), np.float32)])
+    return replace(mesh, vertices=np.concatenate([mesh.vertices, added.vertices]), triangles=triangles, uv=uv)
 
 
 def _usable(root: Path, layout: Layout, outside: bool) -> tuple[list[Frame], list[str]]:

@@ -11,12 +11,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
+from ..kinds import Unit
 from ..luminance import LUMINANCE
 from .environment import Environment
 from .params import GATHER
 
 CELLS = 6 * GATHER.cells**2
 """Of all six sides: side (2 * axis, + 1 for the high one), row, column."""
+
+NOWHERE = np.zeros((0, 3), np.float32)
+BEFORE: Unit[float] = 1e-3
+"""Sizes of the box that a panel lies before a surface."""
 
 
 def within(low: np.ndarray, size: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -66,11 +71,14 @@ class Openings:
     low, size : (3,) float32
         The box, metres.
     radiance : (CELLS, 3) float32
+    share : float
+        Of all the light, that which comes from there.
     """
 
     low: np.ndarray
     size: np.ndarray
     radiance: np.ndarray
+    share: float = 0.0
 
     def __call__(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Radiance along rays that leave the mesh ((n, 3) float32), and which of them start inside of the box."""
@@ -100,16 +108,29 @@ class Openings:
         usual = np.median(self.radiance, 0)
         return replace(self, radiance=np.where(self.bright[:, None], usual, self.radiance).astype(np.float32))
 
-    def panels(self) -> list[Panel]:
-        """The bright cells, those that hang together as one."""
+    def behind(self, position: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The cells behind n places ((n, 3) float32) of a surface, (n,) int, and how far away they are, metres."""
+        cell, distance, _ = exits(self.low, self.size, position, -normal)
+        return cell, distance
+
+    def panels(self, position: np.ndarray = NOWHERE, normal: np.ndarray = NOWHERE) -> list[Panel]:
+        """The bright cells, those that hang together as one.
+
+        They lie before what closes the mesh there: n places ((n, 3) float32 each) of it.
+        """
         found = []
+        cell, distance = self.behind(position, normal)
+        inset = np.zeros(6)
+        np.maximum.at(inset, cell // GATHER.cells**2, distance + float(self.size.max()) * BEFORE)
         bright = self.bright.reshape(6, GATHER.cells, GATHER.cells)
         for side in range(6):
             label, count = ndimage.label(bright[side])
             for one in range(1, count + 1):
                 row, column = np.nonzero(label == one)
                 radiance = self.radiance[(side * GATHER.cells + row) * GATHER.cells + column].mean(0)
-                found.append(Panel(self._quads(side, row, column), radiance))
+                inward = np.eye(3, dtype=np.float32)[side // 2] * (-1) ** (side % 2)
+                quads = self._quads(side, row, column) + np.float32(inset[side]) * inward
+                found.append(Panel(quads, radiance))
         return found
 
     def _quads(self, side: int, row: np.ndarray, column: np.ndarray) -> np.ndarray:

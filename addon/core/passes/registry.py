@@ -58,6 +58,7 @@ def _of(stage: str, **does: str) -> tuple[Pass, ...]:
 PASSES = (
     *_of(
         "surface",
+        close_holes="Closes holes of a mesh without objects in its large planes, where frames see nothing there.",
         mesh_denoising="Takes a scan's noise out of its vertices.",
         unfolding="Where triangles are smaller than the noise, draws points towards their neighbours first.",
         angle_variance="Weights dihedral angles by their variance, from draws of the posterior.",

@@ -12,6 +12,7 @@ import numpy as np
 from ..atomic import write_bytes
 from ..evidence.page import make_page
 from ..parallel import ordered_map
+from ..passes.albedo.albedo import CLOSED
 from ..results.room_file import OPENINGS
 from ..settings import ROOM
 from .corrected import Corrected
@@ -52,13 +53,13 @@ class Recovery(Corrected):
         atlas, lit = self.surface().atlas, self.lit_diffuse()
         dark = max(1e-6 * self.median_radiance(), 1e-30)
         spread = (lit.upper - lit.lower).mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
-        coverage = np.stack([lit.count, np.nan_to_num(spread), self.albedo.origin], -1).astype(np.float32)
+        coverage = np.stack([lit.count, np.nan_to_num(spread), self.albedo.origin + CLOSED * self.closing], -1)
         images = {
             "albedo": self.albedo.rho,
             "base_color": self.base_color(),
             "shading": self.irradiance,
             "lit_diffuse": np.where(lit.seen[:, None], lit.radiance, 0).astype(np.float32),
-            "coverage": coverage,
+            "coverage": coverage.astype(np.float32),
             **self.evidence.images(),
         }
         images = {name: image for name, image in images.items() if wanted is None or name in wanted}
@@ -91,7 +92,8 @@ class Recovery(Corrected):
     def _write_openings(self) -> None:
         """What is bright behind the mesh's openings, as panels; no file where nothing is."""
         openings = self.shading().openings
-        panels = openings.panels() if openings is not None else []
+        atlas, closing = self.surface().atlas, self.closing & ~self.lit_diffuse().seen
+        panels = [] if openings is None else openings.panels(atlas.position[closing], atlas.normal[closing])
         if not panels:
             self.store.path(OPENINGS).unlink(missing_ok=True)
             return

@@ -24,7 +24,7 @@ from ..evidence.objects import object_evidence
 from ..evidence.params import CALIBRATION
 from ..evidence.texel import TexelEvidence, gloss_error
 from ..io.exr import read_exr
-from ..passes.albedo.albedo import MEASURED, Albedo
+from ..passes.albedo.albedo import CLOSED, MEASURED, Albedo
 from ..passes.albedo.params import ALBEDO
 from ..progress import Progress
 from ..results.overrides import Given, Overrides, heeded, parse
@@ -229,7 +229,7 @@ class Refit(Recovery):
 
     @cached_property
     def _albedo_before(self) -> Albedo:
-        origin = self._image("coverage")[:, 2].astype(np.int8)
+        origin = self._image("coverage")[:, 2].astype(np.int8) % CLOSED
         return Albedo(self._image("albedo"), origin, np.zeros(len(origin), np.float32))
 
     @cached_property

@@ -72,6 +72,13 @@ def _report_surface(run: Corrected, figures: dict[str, Any], warnings: list[str]
     _, area = triangle_geometry(surface.mesh)
     figures["two_sided_share"] = float(area[surface.backs].sum() / area.sum())
     figures["mesh_noise_metres"] = surface.noise
+    closed = float(area[surface.mesh.closed].sum()) if surface.mesh.closed is not None else 0.0
+    figures["closed_square_metres"] = closed
+    if closed:
+        warnings.append(
+            f"{closed:.1f} square metres of holes in the mesh's floor, walls and other planes were closed; "
+            "leave the pass close-holes out to keep them open."
+        )
     if surface.noise:
         captured = run.capture.mesh.vertices
         moved = np.linalg.norm(run.room_mesh().vertices[: len(captured)] - captured, axis=1)
@@ -136,6 +143,8 @@ def _report_shading(run: Corrected, figures: dict[str, Any], warnings: list[str]
         "lamps": [lamp.object_id for lamp in shading.lamps],
         "mirrors": [mirror.object_id for mirror in shading.mirrors],
     }
+    if shading.openings is not None:
+        figures["unknown_light_share"] = float(shading.openings.share)
     if shading.sun is not None:
         sun = shading.sun
         figures["sun"] = {"direction": [float(x) for x in sun.direction], "seen": sun.seen,

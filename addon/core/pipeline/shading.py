@@ -172,12 +172,13 @@ def shade(
     field = LightField(mesh, atlas, scene, unseen_dark(lit_diffuse), environment, lookup=lookup).with_sun(sun)
     dark = field
     field, light = with_all_light(field, lit_diffuse, instances, find_mirrors, seed, tilted, colours, without)
+    solved = np.zeros(len(atlas), bool)
     if patches is not None and "missing-light" not in without:
-        field, light = with_missing_light(dark, field, light, lit_diffuse, patches, seed)
+        field, light, solved = with_missing_light(dark, field, light, lit_diffuse, patches, seed)
 
     # Where there is no L_d to divide, the rough E does.
     emitters = {lamp.object_id for lamp in light.lamps}
-    told = lit_diffuse.seen | np.isin(atlas.object_id, list(emitters))
+    told = lit_diffuse.seen | solved | np.isin(atlas.object_id, list(emitters))
     E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
     if not told.all() and "unseen-surfaces" not in without:
         field, E, escaped = with_unseen_surfaces(field, told, lit_diffuse, instances, emitters, **how)
@@ -243,8 +244,10 @@ def with_all_light(
 
 def with_missing_light(
     dark: LightField, field: LightField, light: Light, lit_diffuse: LitDiffuse, patches: list[int], seed: int
-) -> tuple[LightField, Light]:
+) -> tuple[LightField, Light, np.ndarray]:
     """The room with the light of clipped patches and openings, if it lacks light; else as it is.
+
+    Last, the elements that no frame saw of which it tells what they send ((n,) bool).
 
     Parameters
     ----------
@@ -255,12 +258,14 @@ def with_missing_light(
     """
     good = (lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= VISIBILITY.enough)
     if not is_missing(field, good, seed):
-        return field, light
+        return field, light, np.zeros(len(field.atlas), bool)
     found = find_missing_light(dark, good, patches, seed)
     radiance = evened(dark)
     for one, solved in found.radiance.items():
         own = dark.atlas.object_id == one
         radiance[own] = np.maximum(radiance[own], solved)
+    atlas, shut = dark.atlas, found.shut
+    radiance[shut] = found.openings.radiance[found.openings.behind(atlas.position[shut], atlas.normal[shut])[0]]
     # What looked like a lamp for want of light may do so no more.
     seen = tuple(lamp for lamp in light.lamps if lamp.seen and lamp.object_id in found.brighter)
     for lamp in seen:
@@ -272,7 +277,7 @@ def with_missing_light(
     environment = found.openings.without_bright().filled(dark.environment, middle)
     field = field.with_light(radiance, environment, [lamp.object_id for lamp in lamps])
     light = replace(light, lamps=lamps, environment=environment, notes=found.notes)
-    return field.with_openings(found.openings).with_sun(dark.sun), light
+    return field.with_openings(found.openings).with_sun(dark.sun), light, shut
 
 
 def to_store(found: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
@@ -303,9 +308,14 @@ def from_store(a: dict[str, np.ndarray], meta: dict[str, Any]) -> Shading:
         a["irradiance"], a["escaped"], a["relative_error"], a["radiance"], lamps,
         Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
         None if meta["sun"] is None else _sun(**meta["sun"]),
-        Openings(*(a[f"openings_{one.name}"] for one in fields(Openings))) if "openings_low" in a else None,
+        _openings(a) if "openings_low" in a else None,
         Patches(*(a[f"patches_{one.name}"] for one in fields(Patches))),
     )  # fmt: skip
+
+
+def _openings(a: dict[str, np.ndarray]) -> Openings:
+    stored = {one.name: a[f"openings_{one.name}"] for one in fields(Openings) if f"openings_{one.name}" in a}
+    return Openings(stored["low"], stored["size"], stored["radiance"], float(stored.get("share", 0)))
 
 
 def _sun(direction: list[float], irradiance: list[float], **more: Any) -> Sun:

@@ -26,6 +26,7 @@ from ..progress import Progress
 from ..results.overrides import NONE as NO_OVERRIDES
 from ..results.overrides import Overrides
 from ..results.store import Store
+from ..scene.closing import opened
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Capture, Frame, Mesh
 from ..scene.samples import Samples
@@ -89,6 +90,8 @@ class Stages:
         overrides: Overrides = NO_OVERRIDES,
     ):
         check(settings.without)
+        if "close-holes" in settings.without:
+            capture = opened(capture)
         self.capture, self.store, self.settings, self.progress = capture, store, settings, progress
         self._as_read = capture
         self.overrides = overrides
@@ -177,6 +180,14 @@ class Stages:
             lambda found: surface.to_store(found, capture.mesh, self._laid_out_by),
             lambda arrays, meta: surface.from_store(arrays, meta, capture.mesh),
         )
+
+    @property
+    def closing(self) -> np.ndarray:
+        """Elements of faces that close the capture's holes, (n,) bool."""
+        mesh = self.surface().mesh
+        faces = np.zeros(len(mesh.triangles), bool)
+        faces[mesh.closed if mesh.closed is not None else []] = True
+        return faces[self.surface().atlas.triangle]
 
     def _needed_unwrap(self) -> Unwrap:
         if self._unwrap is None:

@@ -16,6 +16,7 @@ from ..kinds import Unit
 from ..lit_diffuse.from_texture import face_edge
 from ..origin import OWN, of_thing
 from ..passes.mesh_denoising.denoise import without_noise
+from ..scene.closing import as_scanned
 from ..scene.elements import Elements, uv_scale
 from ..scene.model import Capture, Mesh
 from ..scene.surface import Surface, build_surface, from_uv
@@ -66,10 +67,19 @@ def laid_out_by(unwrap: Unwrap) -> str:
     return " ".join(filter(None, (name, of, library)))
 
 
+def denoised(mesh: Mesh, settings: Settings) -> tuple[Mesh, float]:
+    """A mesh `without_noise`; what closes its holes has none."""
+    if mesh.closed is None:
+        return without_noise(mesh, settings.without)
+    scanned, noise = without_noise(as_scanned(mesh), settings.without)
+    vertices = np.concatenate([scanned.vertices, mesh.vertices[len(scanned.vertices) :]])
+    return replace(mesh, vertices=vertices), noise
+
+
 def make_surface(capture: Capture, unwrap: Unwrap, settings: Settings) -> Surface:
     """Lay surface elements out over the mesh of a capture `taken_in`. Raises `BadInputError`: no camera looks at it."""
     noisy = settings.denoise_mesh and "mesh-denoising" not in settings.without
-    mesh, noise = without_noise(capture.mesh, settings.without) if noisy else (capture.mesh, 0.0)
+    mesh, noise = denoised(capture.mesh, settings) if noisy else (capture.mesh, 0.0)
     texel = settings.texel_size
     if mesh.lit is not None:
         texel = texel or face_edge(mesh) / settings.detail

@@ -313,6 +313,8 @@ class Mesh:
     backs : (s,) int32 or None
         None in captures. The last s triangles are the second sides of these, in the same place with the other winding:
         sheets that frames see from both sides (`surface.two_sides`).
+    closed : (c,) int32 or None
+        Triangles that the capture lacks, by which its holes were closed (`closing`).
     """
 
     vertices: np.ndarray
@@ -321,6 +323,7 @@ class Mesh:
     uv: np.ndarray | None = None
     lit: LitTiles | None = None
     backs: np.ndarray | None = None
+    closed: np.ndarray | None = None
 
     @cached_property
     def geometry(self) -> tuple[np.ndarray, np.ndarray]:

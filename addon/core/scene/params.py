@@ -259,3 +259,31 @@ class SparseParams:
 
 
 SPARSE = SparseParams()
+
+
+@dataclass(frozen=True)
+class ClosingParams:
+    """What of a fused mesh's holes frames see past the room in (`closing`).
+
+    In the rooms looked at the outside is clipped in more than half of its observations, or brighter than nearly all of
+    the room; what was not fused is neither.
+
+    Attributes
+    ----------
+    samples : int
+        Places of the mesh that tell frames' gains, and how bright the room is.
+    block : int
+        Edge in cells of the squares that close what no frame saw, a power of 2: a third of a metre in a room.
+    clipped : float
+        Share of clipped observations from which on a hole shows the outside.
+    nearly_all : float
+        Of the mesh: the share that is darker than the outside, and that more frames see than what was not fused.
+    """
+
+    samples: int = 4000
+    block: int = 8
+    clipped: float = 0.5
+    nearly_all: float = 0.95
+
+
+CLOSING = ClosingParams()

@@ -8,7 +8,8 @@ its shape does: large planes first (floor, ceiling, walls, table tops), then wha
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -24,11 +25,42 @@ from .sphere import fibonacci
 
 @dataclass(frozen=True)
 class Plane:
-    """A large plane of a mesh: its unit normal (3,), a point on it (3,), its triangles (f,) int."""
+    """A large plane of a mesh.
+
+    Attributes
+    ----------
+    normal, point : (3,) float64
+        Its unit normal, towards the side that was seen, and a point on it.
+    faces : (f,) int
+        Its triangles.
+    part : int
+        The part that they are most of.
+    name : str
+        'floor', 'ceiling' or 'wall' where (nearly) all of the mesh lies in front of it, '' else.
+    """
 
     normal: np.ndarray
     point: np.ndarray
     faces: np.ndarray
+    part: int = -1
+    name: str = ""
+
+
+class Parts(NamedTuple):
+    """A mesh taken apart.
+
+    Attributes
+    ----------
+    part : (t,) int
+        Of each triangle, from 0, the largest surface first.
+    names : dict of int to str
+        What parts are by their shape, or their number.
+    planes : tuple of Plane
+    """
+
+    part: np.ndarray
+    names: dict[int, str]
+    planes: tuple[Plane, ...] = ()
 
 
 class _Faces:
@@ -184,24 +216,17 @@ def _name(plane: Plane, faces: _Faces, gap: float) -> str:
     return ("floor" if up > 0 else "ceiling") if abs(up) > np.cos(PARTS.tilt) else ""
 
 
-def shape_parts(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, dict[int, str]]:
-    """Take a mesh apart by its shape.
+def shape_parts(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
+    """Take a mesh apart by its shape; of its parts the outermost planes have names.
 
     Parameters
     ----------
     vertices : (v, 3) float64
         Welded: what touches shares them. +Z up; any unit of length.
     triangles : (t, 3) int
-
-    Returns
-    -------
-    part : (t,) int
-        From 0, the largest surface first.
-    names : dict of int to str
-        'floor', 'ceiling' and 'wall' of the outermost planes.
     """
     faces = _Faces(vertices, triangles)
-    gap = PARTS.gap * float(np.linalg.norm(np.ptp(vertices[triangles.ravel()], axis=0)))
+    gap = plane_gap(vertices[triangles.ravel()])
     planes = _planes(faces, gap)
     label = np.full(faces.count, -1)
     for k, plane in enumerate(planes):
@@ -217,11 +242,19 @@ def shape_parts(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray
     rank = np.empty(len(order), int)
     rank[order] = np.arange(len(order))
     part = rank[joined]
-    named = {int(part[first[k]]): _name(plane, faces, gap) for k, plane in zip(own, planes, strict=True)}
-    return part, {number: name for number, name in named.items() if name}
+    told = tuple(
+        replace(plane, part=int(part[first[k]]), name=_name(plane, faces, gap))
+        for k, plane in zip(own, planes, strict=True)
+    )
+    return Parts(part, {plane.part: plane.name for plane in told if plane.name}, told)
 
 
-def parts_of(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, dict[int, str]]:
+def plane_gap(points: np.ndarray) -> float:
+    """How far off a plane its triangles may lie in a mesh of these points ((n, 3)), in its unit."""
+    return PARTS.gap * float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def parts_of(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
     """Objects for a mesh that tells of none: its connected parts, or, where most of it hangs together, its shape's.
 
     Parameters
@@ -229,21 +262,14 @@ def parts_of(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, d
     vertices : (v, 3) float64
     triangles : (t, 3) int
         At least one; vertices used are finite.
-
-    Returns
-    -------
-    part : (t,) int
-    names : dict of int to str
-        A name of each part: what it is by its shape, or its number.
     """
-    part = connected_parts(vertices, triangles)
-    names: dict[int, str] = {}
+    part, names, planes = Parts(connected_parts(vertices, triangles), {})
     area = triangle_geometry(Mesh(vertices, triangles, part))[1]
     if area[part == 0].sum() > PARTS.hangs_together * area.sum():
         used, corner = np.unique(triangles.ravel(), return_inverse=True)
         place = weld(vertices[used])[corner.ravel()]
         point = np.empty((int(place.max()) + 1, 3))
         point[place] = vertices[triangles.ravel()]
-        part, names = shape_parts(point, place.reshape(-1, 3))
+        part, names, planes = shape_parts(point, place.reshape(-1, 3))
     count = int(part.max()) + 1
-    return part, {i: f"part_{i}" for i in range(count)} | names if count > 1 else {0: "room"}
+    return Parts(part, {i: f"part_{i}" for i in range(count)} | names if count > 1 else {0: "room"}, planes)

@@ -15,12 +15,15 @@ from addon.core.io.exr import write_exr
 from addon.core.io.id_pictures import read_ids
 from addon.core.io.png import write_png
 from addon.core.io.read import read_capture
+from addon.core.scene.closing import opened
 from addon.core.scene.connected_parts import connected_parts
 from addon.core.scene.model import Frame
 from addon.core.scene.params import SURFACE
 from addon.core.scene.rays import RayScene
 from addon.core.scene.vote import vote
 from tests.core.rooms import all_round, lit_box, make_room
+from tests.core.scene.test_closing import CEILING
+from tests.core.scene.test_closing import room as torn
 
 
 def boxes(*places, size=1.0):
@@ -163,3 +166,17 @@ def test_a_picture_that_loses_is_refused(tmp_path):
     path.write_bytes(b"\xff\xd8\xff\xe0" + bytes(40))
     with pytest.raises(BadInputError, match="loses nothing"):
         read_ids(Frame("a", path, all_round((1, 1, 1))[0], id_path=path))
+
+
+def test_holes_of_a_room_in_one_piece_are_closed_unless_objects_are_told(capture, text_of_ply):
+    """The faces come last, and belong to the part that they continue."""
+    vertices, triangles = torn(lambda centre, side: (side == CEILING) & (centre[:, 1] > 1.9) & (centre[:, 0] > 1.2))
+    capture.mesh(text_of_ply(vertices.tolist(), triangles.tolist(), [0] * len(triangles)))
+    assert read_capture(capture.root).mesh.closed is None
+    capture.mesh(text_of_ply(vertices.tolist(), triangles.tolist()))
+    (capture.root / "info_semantic.json").unlink()
+    read = read_capture(capture.root)
+    assert read.mesh.closed.tolist() == list(range(len(triangles), len(read.mesh.triangles)))
+    assert np.array_equal(opened(read).mesh.triangles, triangles)
+    names = {one.object_id: one.class_name for one in read.instances}
+    assert "ceiling" in {names[int(one)] for one in read.mesh.object_id[read.mesh.closed]}

@@ -51,3 +51,14 @@ def test_a_map_is_filled_where_no_frame_saw_and_without_what_is_written_as_panel
     filled = openings(*range(5 * 576, CELLS)).without_bright().filled(sky, LOW + SIZE / 2).radiance
     assert (filled[:4] == 7).all()
     assert filled[4:] == pytest.approx(np.broadcast_to(USUAL, (4, 16, 3)))
+
+
+@pytest.mark.parametrize("side", range(6))
+def test_a_panel_lies_before_what_closes_the_mesh(side):
+    axis, inward = side // 2, np.eye(3, dtype=np.float32)[side // 2] * (-1) ** (side % 2)
+    bright = openings((side * 24 + 7) * 24 + 11)
+    place = LOW + SIZE / 2
+    place[axis] = (LOW + SIZE * (side % 2))[axis] + 0.1 * inward[axis]
+    (panel,) = bright.panels(place[None], inward[None])
+    assert ((panel.corners - place) @ inward > 0).all()
+    assert np.abs((panel.corners - bright.panels()[0].corners) @ inward - 0.1).max() < 0.01

@@ -48,7 +48,7 @@ def purity(part, label):
 @pytest.mark.parametrize("noise", [0.0, 0.01])
 def test_a_furnished_room_in_one_piece(noise):
     vertices, triangles, label = fused(noise)
-    part, names = parts_of(vertices, triangles)
+    part, names, _ = parts_of(vertices, triangles)
     assert purity(part, label) > 0.95
     assert len(np.unique(part)) < 25
     named = {side: names[int(np.bincount(part[label == side]).argmax())] for side in range(6)}
@@ -70,7 +70,7 @@ def test_a_dome_is_one_part_and_its_floor_another():
     number = np.arange(81 * 81).reshape(81, 81)
     a, b, c, d = (n.ravel() for n in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]))
     triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
-    part, names = shape_parts(vertices, triangles)
+    part, names, _ = shape_parts(vertices, triangles)
     centre = vertices[triangles].mean(1)
     dome, floor = part[centre[:, 2] > 0.25], part[np.linalg.norm(centre[:, :2], axis=1) > 1]
     assert (floor == 0).all() and names == {0: "floor"}
@@ -78,5 +78,5 @@ def test_a_dome_is_one_part_and_its_floor_another():
 
 
 def test_a_few_triangles_without_any_area_are_no_error():
-    part, _ = parts_of(np.zeros((3, 3)), np.array([[0, 1, 2]]))
+    part, *_ = parts_of(np.zeros((3, 3)), np.array([[0, 1, 2]]))
     assert part.tolist() == [0]

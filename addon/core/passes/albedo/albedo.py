@@ -20,6 +20,8 @@ FILLED: Code[int] = 1
 NONE: Code[int] = 0
 """How an element's albedo came about: measured; filled in from its object; no reflectance (an emitter, an object
 nobody saw, or one that shows what is behind it)."""
+CLOSED: Code[int] = 4
+"""Added in `coverage.exr` where the element is of a face that the capture lacks, by which a hole was closed."""
 
 
 @dataclass(frozen=True)

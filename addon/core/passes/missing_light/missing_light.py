@@ -38,6 +38,8 @@ class MissingLight:
     brighter : frozenset of int
         Other objects that give more than they could reflect of all this light.
     openings : Openings
+    shut : (n,) bool
+        Elements of faces that close the mesh and that no frame saw: what they send was solved for like openings.
     notes : tuple of str
     """
 
@@ -45,6 +47,7 @@ class MissingLight:
     radiance: dict[int, np.ndarray]
     brighter: frozenset[int]
     openings: Openings
+    shut: np.ndarray
     notes: tuple[str, ...]
 
 
@@ -73,11 +76,12 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
     radiance = evened(field)
     own = {one: atlas.object_id == one for one in patches}
     bound = {one: np.median(radiance[which], 0).astype(np.float64) for one, which in own.items()}
-    hidden = np.isin(atlas.object_id, patches)
+    shut = unseen_closing(field)
+    hidden = np.isin(atlas.object_id, patches) | shut
     element = _sample(field, good & ~hidden, seed)
     radiance[hidden] = 0
     received = irradiance_at(field.with_openings(None).with_light(radiance, Environment.dark()), element, seed)
-    cell, through = _through_cells(field, element, seed)
+    cell, through = _through_cells(field, shut, element, seed)
     thrown = [contribution_of_object(field, element, one, seed) for one in patches]
     usual = np.median(radiance[element], 0).astype(np.float64)
     # What hardly any element sees says nothing, and lights nothing.
@@ -104,14 +108,14 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
     by_opening = np.tile(usual, (len(through.T), 1))
     by_opening[told] = found[len(patches) :]
     low, size = field.outer_box
-    openings = Openings(low, size, by_opening[cell].astype(np.float32))
     share = float((through[:, told] @ found[len(patches) :]).sum() / E.sum())
+    openings = Openings(low, size, by_opening[cell].astype(np.float32), share)
     note = (
         f"{share:.0%} of the light comes in by openings of the mesh, from where it was solved from what it throws: "
         "what no frame saw there may be a lamp."
     )
     brighter = frozenset(lamp.object_id for lamp in find_seen(atlas.object_id[element], sent, E))
-    return MissingLight(lamps, solved, brighter, openings, (note,) if share >= LEVELS.gain else ())
+    return MissingLight(lamps, solved, brighter, openings, shut, (note,) if share >= LEVELS.gain else ())
 
 
 def _sample(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:
@@ -124,8 +128,21 @@ def _sample(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:
     return np.sort(rng.choice(element, MISSING.samples, replace=False, p=weight / weight.sum()))
 
 
-def _through_cells(field: LightField, element: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which unknown each cell of the box belongs to, (CELLS,) int; E from each at radiance 1, (m, u) float64."""
+def unseen_closing(field: LightField) -> np.ndarray:
+    """Elements of faces that close the mesh, of which no frame saw what they send: it is dark, (n,) bool."""
+    closing = np.zeros(len(field.mesh.triangles), bool)
+    if field.mesh.closed is not None:
+        closing[field.mesh.closed] = True
+    return closing[field.atlas.triangle] & ~field.radiance.any(1)
+
+
+def _through_cells(
+    field: LightField, shut: np.ndarray, element: np.ndarray, seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which unknown each cell of the box belongs to, (CELLS,) int; E from each at radiance 1, (m, u) float64.
+
+    Elements that are `shut` ((n,) bool) let through what comes from there.
+    """
     side, row, column = np.unravel_index(np.arange(CELLS), (6, GATHER.cells, GATHER.cells))
     edge = -(-GATHER.cells // MISSING.merged)
     unknown = (side * edge + row // MISSING.merged) * edge + column // MISSING.merged
@@ -137,7 +154,8 @@ def _through_cells(field: LightField, element: np.ndarray, seed: int) -> tuple[n
         normal = field.atlas.normal[element[part]]
         directions = turned(patterns, normal, np.random.default_rng([seed, part.start]))[0].reshape(-1, 3)
         origins = np.repeat(field.scene.off_surface(field.atlas.position[element[part]], normal), MISSING.rays, 0)
-        out = np.flatnonzero(field.scene.intersect(origins, directions).triangle < 0)
+        hits = field.scene.intersect(origins, directions)
+        out = np.flatnonzero((hits.triangle < 0) | shut[field.elements(hits)])
         met = unknown[exits(low, size, origins[out], directions[out])[0]]
         np.add.at(through[part], (out // MISSING.rays, met), np.pi / MISSING.rays)
 

@@ -124,3 +124,22 @@ def test_light_through_a_hole_that_no_frame_saw_is_told_from_what_it_throws():
     assert off(irradiance_at(field, everything, 0), true) > 0.5
     assert field.environment is DARK
     assert "openings" in found.notes[0]
+
+
+def test_a_lamp_behind_faces_that_closed_a_hole_is_told_like_one_in_the_hole():
+    """No frame saw the faces: what they send is unknown, and solved for."""
+    whole, (rho, radiance) = box(), lit()
+    faces = np.arange(len(whole.mesh.triangles) - 32, len(whole.mesh.triangles), dtype=np.int32)
+    room = replace(whole, mesh=replace(whole.mesh, closed=faces))
+    field = room.field(np.where(in_lamp(room)[:, None], np.float32(0), radiance))
+    found = find_missing_light(field, ~in_lamp(room), [], 0)
+    assert np.array_equal(found.shut, in_lamp(room))
+    place, normal = (getattr(room.atlas, name)[found.shut] for name in ("position", "normal"))
+    solved = field.radiance.copy()
+    solved[found.shut] = found.openings.radiance[found.openings.behind(place, normal)[0]]
+    others = np.flatnonzero(~found.shut)
+    E = irradiance_at(field.with_light(solved), others, 0)
+    assert off(np.pi * radiance[others] / E, rho[others]) < 0.25
+    # In the scene it hangs before those faces.
+    for panel in found.openings.panels(place, normal):
+        assert panel.corners[..., 2].max() < place[:, 2].min()

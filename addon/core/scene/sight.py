@@ -1,0 +1,156 @@
+"""What frames see where a mesh could be closed: nothing, something behind, or what no mesh holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kinds import Limit
+from .model import Camera, Frame, Pixels
+from .params import CLOSING, VISIBILITY
+from .rays import RayScene
+
+FLOOR: Limit[float] = 1e-4
+"""Of radiance, before its logarithm is taken."""
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What frames see of n places.
+
+    Attributes
+    ----------
+    through : (n,) int
+        Frames that see the mesh behind it.
+    out : (n,) int
+        Frames that see no mesh along it.
+    place, frame, pixel : (m,) int
+        The observations counted in `out`; pixels row by row.
+    direction, distance : (m, 3) float32, (m,) float
+        From the camera, unit, and metres to the place.
+    """
+
+    through: np.ndarray
+    out: np.ndarray
+    place: np.ndarray
+    frame: np.ndarray
+    pixel: np.ndarray
+    direction: np.ndarray
+    distance: np.ndarray
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What frames show of what no mesh holds, and of the mesh.
+
+    Attributes
+    ----------
+    value : (m, 3) float
+        Log radiance of the observations of a `Sight`; NaN where invalid.
+    clipped : (m,) bool
+    bright : float
+        Mean log radiance that nearly all of the mesh stays below; NaN where frames show none of it.
+    views : float
+        Frames that see nearly all of the mesh: what so few see was not fused for that reason.
+    """
+
+    value: np.ndarray
+    clipped: np.ndarray
+    bright: float
+    views: float
+
+
+def _seen(camera: Camera, points: np.ndarray, normals: np.ndarray):
+    """Those of the points ((n, 3)) that face a camera and lie in its picture; their pixels, directions, distances."""
+    away = points - camera.centre
+    distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
+    xy, depth = camera.project(points)
+    facing = -(away * normals).sum(1) >= VISIBILITY.min_cosine * distance
+    inside = facing & (depth > 0) & (xy >= 0).all(1) & (xy < (camera.width, camera.height)).all(1)
+    at = np.flatnonzero(inside)
+    x, y = xy[at].astype(np.int64).T
+    return at, y * camera.width + x, (away[at] / distance[at, None]).astype(np.float32), distance[at]
+
+
+def sight_of(cameras: Sequence[Camera], scene: RayScene, points: np.ndarray, normals: np.ndarray, gap: float) -> Sight:
+    """What cameras see of points ((n, 3)) on planes with `normals`, and behind them.
+
+    `gap` metres before and behind a plane is the mesh's own.
+    """
+    through, out = np.zeros(len(points), int), np.zeros(len(points), int)
+    rows: list[tuple[np.ndarray, ...]] = []
+    for number, camera in enumerate(cameras):
+        at, pixel, direction, distance = _seen(camera, points, normals)
+        origin = np.broadcast_to(camera.centre.astype(np.float32), direction.shape)
+        hits = scene.intersect(origin, direction)
+        escapes = hits.triangle < 0
+        beyond = np.where(escapes, 0, hits.distance) - distance
+        height = beyond * (direction * normals[at]).sum(1)  # of what is met over the plane
+        through[at[~escapes & (height < -gap)]] += 1
+        out[at[escapes]] += 1
+        rows.append((at[escapes], np.full(escapes.sum(), number), pixel[escapes], direction[escapes],
+                     distance[escapes]))  # fmt: skip
+    return Sight(through, out, *(np.concatenate(column) for column in zip(*rows, strict=True)))
+
+
+def colours(
+    frames: Sequence[Frame], read: Callable[[Frame], Pixels], sight: Sight, scene: RayScene, points: np.ndarray,
+    normals: np.ndarray, gap: float
+) -> Shown:  # fmt: skip
+    """What frames show of what no mesh holds.
+
+    Parameters
+    ----------
+    points, normals : (n, 3) float
+        Places of the mesh, by which frames' gains are divided out.
+    """
+    value, clipped = np.full((len(sight.place), 3), np.nan), np.zeros(len(sight.place), bool)
+    used, views = np.unique(sight.frame), np.zeros(len(points))
+    shown = np.full((len(used), len(points), 3), np.nan)
+    for number, frame in enumerate(frames):
+        at, pixel, direction, distance = _seen(frame.camera, points, normals)
+        origin = np.broadcast_to(frame.camera.centre.astype(np.float32), direction.shape)
+        met = np.abs(scene.intersect(origin, direction).distance - distance) < gap
+        views[at[met]] += 1
+        row = int(np.searchsorted(used, number))
+        if row == len(used) or used[row] != number:
+            continue
+        pixels = read(frame)
+        log = np.log(np.maximum(pixels.radiance.reshape(-1, 3), FLOOR))
+        bad = ~pixels.valid.ravel() | pixels.saturated.ravel()
+        at, pixel = at[met], pixel[met]
+        shown[row, at] = np.where(bad[pixel, None], np.nan, log[pixel])
+        own = np.flatnonzero(sight.frame == number)
+        value[own] = np.where(pixels.valid.ravel()[sight.pixel[own], None], log[sight.pixel[own]], np.nan)
+        clipped[own] = pixels.saturated.ravel()[sight.pixel[own]]
+    gain = np.zeros((len(used), 1, 3))
+    for _ in range(3):
+        level = _median(shown - gain, 0)
+        gain = np.nan_to_num(_median(shown - level, 1))
+    value -= gain[np.searchsorted(used, sight.frame), 0]
+    known = level.mean(-1)[np.isfinite(level).all(-1)]
+    bright = float(np.quantile(known, CLOSING.nearly_all)) if len(known) else np.nan
+    few = float(np.quantile(views[views > 0], 1 - CLOSING.nearly_all)) if views.any() else 0.0
+    return Shown(value, clipped, bright, few)
+
+
+def _median(values: np.ndarray, axis: int) -> np.ndarray:
+    """Median along an axis, which stays; NaN counts for nothing, and is what there is none of."""
+    known = np.isfinite(values).any(axis, keepdims=True)
+    return np.where(known, np.nanmedian(np.where(known, values, 0), axis, keepdims=True), np.nan)
+
+
+def between_frames(value: np.ndarray, group: np.ndarray, frame: np.ndarray) -> float:
+    """Variance of what different frames ((m,) int) show ((m, 3)) within groups ((m,) int); inf where only one does."""
+    pair, label = np.unique(np.stack([group, frame], 1), axis=0, return_inverse=True)
+    mean = _means(value, label.ravel())
+    _, label = np.unique(pair[:, 0], return_inverse=True)
+    freedom = len(mean) - int(label.max()) - 1
+    return float(((mean - _means(mean, label)[label]) ** 2).sum() / (3 * freedom)) if freedom else np.inf
+
+
+def _means(value: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Of the values ((m, 3)) with each label ((m,) int, from 0)."""
+    return np.stack([np.bincount(label, column) for column in value.T], 1) / np.bincount(label)[:, None]

@@ -1,0 +1,146 @@
+"""Holes of a room in one piece: closed where nobody looked, open where frames look out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from addon.core.scene.closing import as_scanned, close_holes, opened
+from addon.core.scene.model import Camera, Capture, Frame, Instance, Mesh, Pixels
+from addon.core.scene.rays import RayScene
+from addon.core.scene.shape_parts import parts_of
+
+from .test_shape_parts import AIR, fused
+
+SIZE = np.array(AIR) / 10
+WALL, CEILING = 0, 5
+"""Sides: the wall at x = 0, which the cameras face, and the ceiling."""
+
+
+def room(cut):
+    """A room in one piece without the triangles that `cut` says of their centres and sides."""
+    vertices, triangles, side = fused()
+    kept = ~cut(vertices[triangles].mean(1), side)
+    return vertices, triangles[kept]
+
+
+def window(centre, side):
+    return (side == WALL) & (np.abs(centre[:, 1] - 1.2) < 0.4) & (np.abs(centre[:, 2] - 1.3) < 0.3)
+
+
+def frames(count=8):
+    """Cameras along the room's far end that look at the wall at x = 0; their pictures are never on disk."""
+    found = []
+    for i in range(count):
+        pose = np.eye(4)
+        pose[:3, :3] = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]])  # right is +y, up is +z, it looks along -x
+        pose[:3, 3] = 2.6, 0.8 + 0.8 * i / (count - 1), 1.2
+        found.append(Frame(str(i), Path(f"{i}.exr"), Camera(48, 36, 40.0, 40.0, 24.0, 18.0, pose)))
+    return tuple(found)
+
+
+def pictures(vertices, triangles, outside):
+    """What reads the frames: .1 where they see the mesh, else `outside` of the pixels' centres of view and rays."""
+    scene = RayScene(vertices, triangles)
+
+    def read(frame):
+        camera = frame.camera
+        rays = camera.directions(camera.pixel_centres()).astype(np.float32)
+        start = np.broadcast_to(camera.centre.astype(np.float32), rays.shape)
+        hit = scene.intersect(start, rays).triangle >= 0
+        value = np.where(hit, 0.1, outside(start, rays)).reshape(camera.height, camera.width)
+        shape = value.shape
+        return Pixels(np.repeat(value[..., None], 3, 2).astype(np.float32), np.ones(shape, bool), np.zeros(shape, bool))
+
+    return read
+
+
+def stripes(x):
+    """Dark enough for a room, and different from place to place."""
+    return 0.08 + 0.03 * np.sin(12 * x)
+
+
+def closing(mesh, outside=lambda start, rays: np.full(len(rays), 5.0), seen_by=8):
+    vertices, triangles = mesh
+    return close_holes(
+        vertices, triangles, parts_of(vertices, triangles), frames(seen_by), pictures(vertices, triangles, outside)
+    )
+
+
+def leaks(mesh, added, start=(1.6, 1.2, 1.9)):
+    """Share of the rays from a place in the room that leave it."""
+    vertices, triangles = mesh
+    if added is not None:
+        triangles = np.concatenate([triangles, added.triangles + len(vertices)])
+        vertices = np.concatenate([vertices, added.vertices])
+    rays = np.random.default_rng(1).normal(size=(4000, 3)).astype(np.float32)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    hits = RayScene(vertices, triangles).intersect(np.broadcast_to(np.float32(start), rays.shape), rays)
+    return float((hits.triangle < 0).mean())
+
+
+def test_what_nobody_looked_at_is_closed():
+    """The ceiling's border, which is torn, and a wall behind the cameras."""
+    mesh = room(lambda centre, side: ((side == CEILING) & (centre[:, 1] > 1.9) & (centre[:, 0] > 1.2)) | (side == 1))
+    assert leaks(mesh, None) > 0.1
+    added = closing(mesh)
+    assert leaks(mesh, added) < 1e-3  # hairlines between the scan's own triangles
+    middle = added.vertices[added.triangles].mean(1)
+    assert (middle > -0.1).all() and (middle < SIZE + 0.1).all()
+
+
+def test_faces_belong_to_the_part_that_they_continue():
+    mesh = room(lambda centre, side: (side == CEILING) & (centre[:, 1] > 1.9) & (centre[:, 0] > 1.2))
+    parts, added = parts_of(*mesh), closing(mesh)
+    a, b, c = (added.vertices[corner] for corner in added.triangles.T)
+    normal = np.cross(b - a, c - a)
+    down = normal[:, 2] < -0.9 * np.linalg.norm(normal, axis=1)
+    assert down.any() and {added.names[int(one)] for one in added.part[down]} == {"ceiling"}
+    assert added.names == parts.names
+
+
+def test_a_wall_that_nobody_saw_is_a_part_of_its_own():
+    mesh = room(lambda centre, side: side == 1)
+    parts, added = parts_of(*mesh), closing(mesh)
+    assert added.names == parts.names | {len(parts.names): "wall"}
+    assert (added.part == len(parts.names)).any()
+
+
+def test_a_window_stays_open():
+    mesh = room(window)
+    before = leaks(mesh, None)
+    assert before > 0.005
+    assert leaks(mesh, closing(mesh)) == pytest.approx(before, rel=0.15)
+
+
+def test_a_dark_view_stays_open_and_a_missed_surface_is_closed():
+    """The same colours in the same directions lie far away; the same at the same places, on the wall."""
+    mesh = room(window)
+    far = closing(mesh, lambda start, rays: stripes(rays[:, 1] / -rays[:, 0]))
+    here = closing(mesh, lambda start, rays: stripes(start[:, 1] + rays[:, 1] / -rays[:, 0] * start[:, 0]))
+    assert leaks(mesh, here) == 0 < leaks(mesh, far)
+
+
+def test_a_niche_stays_open():
+    """Frames see mesh behind the wall's plane."""
+    vertices, triangles = room(window)
+    back = np.array([[-0.3, 0.5, 0.7], [-0.3, 1.9, 0.7], [-0.3, 1.9, 1.9], [-0.3, 0.5, 1.9]])
+    triangles = np.concatenate([triangles, len(vertices) + np.array([[0, 1, 2], [0, 2, 3]])])
+    mesh = np.concatenate([vertices, back]), triangles
+    added = closing(mesh)
+    assert not window(added.vertices[added.triangles].mean(1), np.full(len(added.triangles), WALL)).any()
+
+
+def test_the_scan_comes_back():
+    vertices, triangles = room(window)
+    more = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+    mesh = Mesh(
+        np.concatenate([vertices, more]), np.concatenate([triangles, len(vertices) + np.array([[0, 1, 2]])]),
+        np.append(np.zeros(len(triangles), np.int32), 7), closed=np.array([len(triangles)], np.int32),
+    )  # fmt: skip
+    scan = as_scanned(mesh)
+    assert np.array_equal(scan.vertices, vertices) and np.array_equal(scan.triangles, triangles)
+    both = opened(Capture(Path(), mesh, (Instance(0, "room"), Instance(7, "wall")), ()))
+    assert [one.object_id for one in both.instances] == [0] and both.mesh.closed is None
