@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from ..scene.connected_parts import weld
 from ..scene.elements import triangle_geometry
 from ..scene.model import KnownMirror, Mesh
-from ..scene.weld import ring_of
+from ..scene.params import CREASES
+from ..scene.weld import ring_of, same_place
 
 SAME = np.cos(np.radians(5.0))
 """Triangles turned less than this against a mirror's plane are put into it: a scan's are off by a degree or two, bevels
@@ -91,8 +91,7 @@ def in_their_planes(mesh: Mesh, mirrors: tuple[Mirror, ...]) -> np.ndarray:
         if not len(face):
             continue
         own, corner = np.unique(mesh.triangles[face], return_inverse=True)
-        place = weld(vertices[own])
-        first = np.unique(place, return_index=True)[1]
+        first, place = same_place(vertices[own], CREASES.weld)
         corner = place[corner.reshape(-1, 3)]
         # Each connected part of it at the mean height of its area.
         _, part = connected_components(ring_of(corner, len(first)), directed=False)

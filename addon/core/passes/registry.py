@@ -90,6 +90,7 @@ PASSES = (
         portal_rays="Aims rays at the openings to the outside.",
         interpolation="Gathers irradiance at few points and interpolates between them.",
         lamp_noise="Takes the aimed rays' noise out of the lamps' irradiance.",
+        crease_error="Counts irradiance beside creases as less certain.",
         tilt_error="Counts irradiance on triangles that noise has turned as less certain.",
         unseen_surfaces="Lets what no frame sees reflect like the rest of its object.",
     ),
