@@ -37,6 +37,8 @@ choices.capture_folder, choices.result_folder = {str(tiny_capture)!r}, {str(resu
 choices.preset = "draft"
 choices.settings.shading_rays = {RAYS}
 """)
+    # Rows move when it is known what the capture holds: a button found before is not pressed after.
+    window.wait_for("isinstance(module('operators.recover.findings').look(bpy.context.scene.scan_relight), dict)")
     window.click("scan_relight.run(", "'recover'")
     window.ask("pause_in('shading')")  # drawn by software, the window is slower than the run
     window.picture(pictures / "04-progress.png")
