@@ -24,8 +24,9 @@ class CalibrationParams:
         out at 0.93 to 1.08 of its radiance in the rooms, at 0.99 in the living room; four bulbs in shades at 0.98 to
         1.43: what their shades' unseen insides throw is put to them.)
     poorly : float
-        Relative error of what is known poorly: clipped surfaces (a lower bound), the specular part that was taken out
-        (psi is known to 30 %).
+        Relative error of what is known poorly: clipped surfaces (a lower bound), what was only seen at depth edges
+        (another surface is mixed in; thin things: 0.4 to 0.7), the specular part that was taken out (psi is known to 30
+        %).
     surfaces : float
         Of the error of unseen surfaces' light: each errs by itself, and E adds many of them up.
     light_floor : float

@@ -12,6 +12,7 @@ from ..groups import by_label
 from ..passes.albedo.albedo import MEASURED, Albedo
 from ..scene.atlas import Atlas
 from ..scene.lit_diffuse import LitDiffuse
+from ..scene.visibility import EDGE
 from .light import LightEvidence
 from .params import CALIBRATION
 
@@ -61,6 +62,7 @@ def without_light(atlas: Atlas, lit: LitDiffuse, albedo: Albedo) -> np.ndarray:
     measured = albedo.origin == MEASURED
     texture = CALIBRATION.texture * contrast(atlas, albedo.rho.mean(1))
     error = np.square(CALIBRATION.own * albedo.error) + np.square(texture)
+    error += np.where(lit.tier == EDGE, np.float32(CALIBRATION.poorly**2), 0)
     spread, common, share = by_object(atlas, albedo, error)
     error += np.where(measured, 0, np.square(CALIBRATION.filled * spread) + CALIBRATION.filled_floor**2 + common)
     error += np.where(measured, 0, np.square(CALIBRATION.barely_seen * (1 - share) ** 2))

@@ -15,8 +15,9 @@ from ..scene.element_groups import ElementGroups
 from ..scene.elements import triangle_geometry
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Frame, Mesh, Pixels
+from ..scene.params import VISIBILITY
 from ..scene.rays import RayScene
-from ..scene.visibility import CLEAN, SATURATED, FrameView, Observations, observe, view_frame
+from ..scene.visibility import CLEAN, EDGE, SATURATED, FrameView, Observations, observe, view_frame
 from .medians import Summary, make_estimator
 
 
@@ -25,14 +26,25 @@ def frame_order(count: int, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).permutation(count)
 
 
-def _choose(clear: Summary, saturated: Summary) -> LitDiffuse:
-    """For each element the observations that the sensor did not clip; where there are none, the clipped ones."""
-    tier = np.select([clear.count > 0, saturated.count > 0], [CLEAN, SATURATED], -1).astype(np.int8)
-    clipped = saturated.count / np.maximum(clear.count + saturated.count, 1)
-    parts = {name: np.ascontiguousarray(getattr(clear, name)) for name in ("median", "lower", "upper", "count")}
-    chosen = tier == SATURATED
-    for name, values in parts.items():
-        values[chosen] = getattr(saturated, name)[chosen]
+def _choose(tiers: dict[int, Summary]) -> LitDiffuse:
+    """For each element the best tier that has enough, else the best that has any."""
+    clean, edge, saturated = tiers[CLEAN], tiers[EDGE], tiers[SATURATED]
+    tier = np.select(
+        [
+            clean.count >= VISIBILITY.enough,
+            (edge.count > 0) & (edge.count >= clean.count),
+            clean.count > 0,
+            saturated.count > 0,
+        ],
+        [CLEAN, EDGE, CLEAN, SATURATED],
+        -1,
+    ).astype(np.int8)
+    parts = {name: getattr(clean, name).copy() for name in ("median", "lower", "upper", "count")}
+    for other in (EDGE, SATURATED):
+        chosen = tier == other
+        for name, values in parts.items():
+            values[chosen] = getattr(tiers[other], name)[chosen]
+    clipped = saturated.count / np.maximum(clean.count + edge.count + saturated.count, 1)
     median, lower, upper, count = parts.values()
     return LitDiffuse(median, lower, upper, count, tier, clipped.astype(np.float32))
 
@@ -48,12 +60,13 @@ def accumulate(
     seed: int = 0,
     threads: int = 0,
     folder: Path | None = None,
+    edge_tier: bool = True,
     only: np.ndarray | None = None,
     change: Callable[[Frame, FrameView, Pixels], Pixels] | None = None,
     also: Callable[[int, FrameView, Pixels, Observations], None] | None = None,
     progress: Progress | Rounds | None = None,
 ) -> LitDiffuse:
-    """Project every frame onto the elements it sees and take the median, clipped observations apart.
+    """Project every frame onto the elements it sees and take the median, kinds of observations apart.
 
     Frames are streamed: a handful is in memory at once.
 
@@ -65,6 +78,8 @@ def accumulate(
         'adaptive', 'exact', 'p2' or 'mean'; see `medians`.
     folder : Path, optional
         Where the exact median, and at first the adaptive one, keeps observations meanwhile.
+    edge_tier : bool
+        Observations at depth edges count only where there are too few others.
     only : (n,) bool, optional
         Elements to ask for; all where not given.
     change : callable, optional
@@ -81,7 +96,7 @@ def accumulate(
     """
     normal, _ = triangle_geometry(mesh)
     groups = ElementGroups(atlas)
-    clear, saturated = (make_estimator(median, len(atlas), folder, threads) for _ in range(2))
+    estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
     wanted = frame_order(len(frames), seed)
 
     def look(index: int) -> tuple[int, FrameView, Pixels, Observations]:
@@ -94,14 +109,15 @@ def accumulate(
         return int(index), view, pixels, observe(view, pixels, atlas, scene, asked)
 
     with ExitStack() as stack:
-        for estimator in (clear, saturated):
+        for estimator in estimators.values():
             stack.callback(estimator.close)
         for done, (index, view, pixels, seen) in enumerate(ordered_map(look, wanted, threads)):
-            for estimator, own in ((clear, seen.tier != SATURATED), (saturated, seen.tier == SATURATED)):
-                chosen = np.flatnonzero(own)
+            tiers = seen.tier if edge_tier else np.where(seen.tier == EDGE, CLEAN, seen.tier)
+            for tier, estimator in estimators.items():
+                chosen = np.flatnonzero(tiers == tier)
                 estimator.add(seen.element.take(chosen), seen.radiance.take(chosen, 0))
             if also is not None:
                 also(index, view, pixels, seen)
             if progress is not None:
                 progress.update(0.9 * (done + 1) / len(wanted))
-        return _choose(clear.result(), saturated.result())
+        return _choose({tier: estimator.result() for tier, estimator in estimators.items()})

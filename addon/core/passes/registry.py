@@ -72,6 +72,7 @@ PASSES = (
         radiometric_calibration="Tells what codes mean, and exposures, by places that several frames show.",
         pose_refinement="Puts frames right that lie beside what all of them show together.",
         sharpening="Takes the projection's blur out of the lit diffuse texture.",
+        edge_tier="Uses observations at depth edges only where there are too few others.",
     ),
     *_of(
         "shading",

@@ -148,8 +148,8 @@ def lit_diffuse(
     if "lit_diffuse" in settings.published:
         return running_lit_diffuse(*where, threads=threads, also=also, progress=progress)
     return accumulate(
-        *where, median=settings.median, seed=settings.seed, threads=threads, folder=folder, also=also,
-        progress=progress,
+        *where, median=settings.median, edge_tier="edge-tier" not in settings.without, seed=settings.seed,
+        threads=threads, folder=folder, also=also, progress=progress,
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ class LitDiffuse:
     count : (n,) int32
         Observations that `radiance` rests on.
     tier : (n,) int8
-        CLEAN or SATURATED: whether it rests on observations that the sensor did not clip; -1 where there is none.
+        CLEAN, EDGE or SATURATED: the kind of observations it rests on; -1 where there is none.
     clipped : (n,) float32
         Share of all observations, those that `radiance` does not rest on included, that the sensor clipped.
     """

@@ -19,7 +19,7 @@ class VisibilityParams:
         A neighbouring pixel whose hit lies further than this share of the distance off the pixel's own plane lies
         beyond a depth edge.
     enough : int
-        Observations from which on the median of an element is taken for its radiance.
+        Clean observations from which on an element does without those at edges.
     """
 
     min_cosine: float = 0.2

@@ -17,7 +17,7 @@ from addon.core.evidence.texel import contrast, texel_evidence, without_light
 from addon.core.light.lamps import Lamp
 from addon.core.passes.albedo.albedo import FILLED, MEASURED, Albedo
 from addon.core.scene.lit_diffuse import LitDiffuse
-from addon.core.scene.visibility import CLEAN
+from addon.core.scene.visibility import CLEAN, EDGE
 from tests.core.rooms import DARK, box_sides, lit_box, make_room, radiosity
 
 ALBEDO = {i: (0.5, 0.4, 0.3) for i in range(6)}
@@ -75,8 +75,10 @@ def test_what_was_filled_in_is_less_certain_the_less_of_its_object_was_seen(box)
     assert errors[1] > 1.5 * errors[0]
 
 
-def test_texture_is_less_certain(box):
+def test_edges_and_texture_are_less_certain(box):
     plain = evidence(box, known(box), grey(box), sure_light(box)).albedo
+    edges = evidence(box, known(box, tier=EDGE), grey(box), sure_light(box)).albedo
+    assert (edges > 2 * plain).all()
     rho = np.where((box.atlas.position[:, :1] * 5).astype(int) % 2, 0.7, 0.2).astype(np.float32).repeat(3, 1)
     striped = Albedo(rho, grey(box).origin, grey(box).error)
     assert np.median(contrast(box.atlas, rho.mean(1))) > 0.3

@@ -228,7 +228,7 @@ SPOILS = {
     ),
     "another order": (lambda r: (r.root / "habitat/sorted_faces.bin").write_bytes(bytes(8)), "sorted_faces"),
     "a hostile order": (lambda r: (r.root / "habitat/sorted_faces.bin").write_bytes(b"\xff" * 64), "sorted_faces"),
-    "a cut mesh": (lambda r: (r.root / "mesh.ply").write_bytes((r.root / "mesh.ply").read_bytes()[:-99]), "damaged"),
+    "a cut mesh": (lambda r: (r.root / "mesh.ply").write_bytes((r.root / "mesh.ply").read_bytes()[:-99]), "cut off"),
 }
 
 

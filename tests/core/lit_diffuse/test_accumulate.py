@@ -13,7 +13,7 @@ from addon.core.lit_diffuse.medians import Summary
 from addon.core.progress import Progress
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.model import Frame
-from addon.core.scene.visibility import CLEAN, SATURATED
+from addon.core.scene.visibility import CLEAN, EDGE, SATURATED
 from tests.core.rooms import all_round, box_sides, look_at, make_room, picture, pixels_of, quad
 
 COLOURS = {i: np.float32([0.1 * (i + 1), 0.5, 2.0 - 0.2 * i]) for i in range(6)}
@@ -89,15 +89,18 @@ def summary(count, value) -> Summary:
     return Summary(values, values - 0.5, values + 0.5, np.array(count, np.int32))
 
 
-def test_clipped_observations_count_where_there_are_no_others():
-    """Elements: several clear ones; one; none; nothing at all."""
-    result = _choose(summary([3, 1, 0, 0], 1), summary([9, 9, 2, 0], 3))
-    assert result.tier.tolist() == [CLEAN, CLEAN, SATURATED, -1]
-    assert result.count.tolist() == [3, 1, 2, 0]
-    assert np.array_equal(result.radiance[:, 0], [1, 1, 3, np.nan], equal_nan=True)
-    assert np.array_equal(result.lower[:, 0], [0.5, 0.5, 2.5, np.nan], equal_nan=True)
-    assert result.seen.tolist() == [True] * 3 + [False]
-    assert result.clipped == pytest.approx([9 / 12, 9 / 10, 1, 0])
+def test_the_best_kind_of_observations_is_taken():
+    """Elements: enough clean; two clean, more at edges; two clean, one at an edge; edge; saturated; nothing."""
+    result = _choose({
+        CLEAN: summary([3, 2, 2, 0, 0, 0], 1),
+        EDGE: summary([9, 4, 1, 1, 0, 0], 2),
+        SATURATED: summary([9, 9, 9, 9, 2, 0], 3),
+    })  # fmt: skip
+    assert result.tier.tolist() == [CLEAN, EDGE, CLEAN, EDGE, SATURATED, -1]
+    assert result.count.tolist() == [3, 4, 2, 1, 2, 0]
+    assert np.array_equal(result.radiance[:, 0], [1, 2, 1, 2, 3, np.nan], equal_nan=True)
+    assert np.array_equal(result.lower[:, 0], [0.5, 1.5, 0.5, 1.5, 2.5, np.nan], equal_nan=True)
+    assert result.seen.tolist() == [True] * 5 + [False]
 
 
 def test_a_clipped_lamp_is_told_apart(box):

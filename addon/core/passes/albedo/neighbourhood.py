@@ -19,7 +19,7 @@ from ...kinds import Block
 from ...parallel import for_blocks
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
-from ...scene.visibility import CLEAN
+from ...scene.visibility import CLEAN, SATURATED
 from ...significance import LEVELS
 from .params import ALBEDO, PRIOR, PriorParams
 from .second_colour import Neighbourhood, shrunk_to_second_colour
@@ -51,7 +51,8 @@ def relative_error(
     if of_object:
         few = _single(spread, lit.seen & (lit.count >= 3) & (lit.tier == CLEAN), object_id, params)
     error = np.hypot(1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, few)) / np.sqrt(n), params.least_error)
-    return np.where(lit.tier == CLEAN, error, np.inf).astype(np.float32)
+    error = np.where(lit.tier == CLEAN, error, error + params.edge_error)
+    return np.where(lit.seen & (lit.tier != SATURATED), error, np.inf).astype(np.float32)
 
 
 def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray, params: PriorParams) -> np.ndarray:

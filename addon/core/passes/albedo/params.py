@@ -37,6 +37,8 @@ class PriorParams:
         It is taken for so many times this quantile (one standard deviation of a normal distribution) of the spreads
         that its object's other elements have (`object-spread`). Single observations are made where little is seen, so
         for more than theirs.
+    edge_error : float
+        Added to the relative standard error of observations at depth edges, where another surface is mixed in.
     """
 
     neighbours: int = 128
@@ -49,6 +51,7 @@ class PriorParams:
     single: float = 0.35
     least_single: float = 0.1
     single_factor: float = 2.0
+    edge_error: float = 0.3
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from addon.core.passes.albedo.albedo import FILLED, MEASURED, fill
 from addon.core.passes.albedo.neighbourhood import relative_error, shrink
 from addon.core.passes.albedo.params import PRIOR
 from addon.core.scene.lit_diffuse import LitDiffuse
-from addon.core.scene.visibility import CLEAN, SATURATED
+from addon.core.scene.visibility import CLEAN, EDGE, SATURATED
 from tests.core.rooms import make_room, quad
 
 GOOD, POOR, NONE = PRIOR.least_error, 0.8, np.inf
@@ -217,9 +217,9 @@ def test_a_single_observation_is_as_unsure_as_the_object_s_others(spread):
     assert other == pytest.approx(np.hypot(1.25 * PRIOR.single, PRIOR.least_error))
 
 
-def test_what_the_sensor_clipped_is_no_measurement():
-    clear, saturated = of_one(observed(1.0, 0.1, 20, [CLEAN, SATURATED]))
-    assert clear < PRIOR.sure and np.isinf(saturated)
+def test_edges_and_saturation_are_in_doubt():
+    clean, edge, saturated = of_one(observed(1.0, 0.1, 20, [CLEAN, EDGE, SATURATED]))
+    assert edge == pytest.approx(clean + PRIOR.edge_error) and saturated > edge > PRIOR.sure > clean
 
 
 def test_what_nobody_saw_is_no_measurement():
