@@ -115,10 +115,12 @@ def solve(
     cost = _Plausible(sent, received, unknown, pairs)
     low = np.log(np.maximum(unknown.least, 1e-6))
     start = cost.usual + np.log(MISSING.start)
-    found = minimize(
-        cost, np.maximum(start, low).ravel(), jac=True, method="L-BFGS-B",
-        bounds=[(one, 12.0) for one in low.ravel()], options={"maxiter": MISSING.steps},
-    ).x.reshape(low.shape)  # fmt: skip
+    found = low  # of a closed mesh without clipped patches nothing is unknown
+    if low.size:
+        found = minimize(
+            cost, np.maximum(start, low).ravel(), jac=True, method="L-BFGS-B",
+            bounds=[(one, 12.0) for one in low.ravel()], options={"maxiter": MISSING.steps},
+        ).x.reshape(low.shape)  # fmt: skip
 
     def spread(x: np.ndarray) -> float:
         a = cost.log_albedo(x).mean(1)

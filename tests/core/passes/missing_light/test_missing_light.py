@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from addon.core.light.few_elements import irradiance_at
 from addon.core.passes.clipped_lamps.patches import clipped_patches
 from addon.core.passes.missing_light.missing_light import find_missing_light, is_missing
+from addon.core.passes.missing_light.solve import Unknown, solve
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.visibility import CLEAN
 from tests.core.rooms import DARK, Room, around, box_sides, cut, make_room, split
@@ -143,3 +144,10 @@ def test_a_lamp_behind_faces_that_closed_a_hole_is_told_like_one_in_the_hole():
     # In the scene it hangs before those faces.
     for panel in found.openings.panels(place, normal):
         assert panel.corners[..., 2].max() < place[:, 2].min()
+
+
+def test_where_nothing_is_unknown_nothing_is_solved_for():
+    none = Unknown(np.zeros((40, 0)), np.zeros((0, 3)), np.zeros((0, 3)))
+    pairs = np.arange(40).reshape(-1, 2)
+    found, spread = solve(np.ones((40, 3)), np.full((40, 3), 4.0), none, pairs)
+    assert found.shape == (0, 3) and spread == (0, 0)
