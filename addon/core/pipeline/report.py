@@ -29,7 +29,7 @@ def make_report(run: Corrected) -> dict[str, Any]:
             for stage in run.done
             for one in following(stage, run.settings.without)
         ],
-        "warnings": list(run.capture.warnings) + run.read.bad,
+        "warnings": [*run.capture.warnings, *map(_done_anew, run.store.damaged), *run.read.bad],
     }
     figures: dict[str, Any] = {"frames": len(run.capture.frames), "triangles": len(run.capture.mesh.triangles)}
     if "surface" in run.done:
@@ -51,6 +51,13 @@ def make_report(run: Corrected) -> dict[str, Any]:
             result["warnings"] += [run.white.warning] if run.white.warning else []
     result["figures"] = figures
     return result
+
+
+def _done_anew(stage: str) -> str:
+    return (
+        f"The stage '{stage}' in the result folder was damaged, or changed since it was written; it was done anew. "
+        "If nobody changed it, check the disk."
+    )
 
 
 def _evidence_figures(run: Corrected) -> dict[str, float]:

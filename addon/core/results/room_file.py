@@ -7,26 +7,25 @@ from __future__ import annotations
 
 import json
 import math
-import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..atomic import replacing
 from ..brdf.material import ObjectMaterial
 from ..brdf.material import from_json as material
 from ..errors import BadInputError, MissingStageError
 from ..scene.lenses_told import lens_of, told_lens
 from ..scene.model import Camera, Capture, Frame, Instance, Mesh, Shot
+from .archive import Damaged, read_archive, write_archive
 
 ROOM = "room.npz"
 MATERIALS = "materials.json"
 OPENINGS = "openings.json"
 """Lamps and windows that no frame saw, where they hang in openings of the mesh; absent where none were found."""
 CAMERA = ("width", "height", "fx", "fy", "cx", "cy")
-DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, NotImplementedError)
+DAMAGE = (OSError, ValueError, KeyError, TypeError, Damaged)
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,6 @@ def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = Non
         "pictures": [_told_picture(frame) for frame in capture.frames],
     }
     arrays = {
-        "told": np.frombuffer(json.dumps(told).encode(), np.uint8),
         "vertices": mesh.vertices,
         "triangles": mesh.triangles,
         "object_id": mesh.object_id,
@@ -127,8 +125,7 @@ def write_room(folder: Path, capture: Capture, atlas_uv: np.ndarray | None = Non
     }
     if mesh.uv is not None:
         arrays["uv"] = mesh.uv
-    with replacing(folder / ROOM) as temporary, open(temporary, "wb") as file:
-        np.savez(file, **arrays)
+    write_archive(folder / ROOM, arrays, told)
 
 
 def read_room(folder: Path | str) -> Room:
@@ -159,9 +156,7 @@ def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
     """The capture in `ROOM`, and its `atlas_uv`; raises `BadInputError` where the file is absent or damaged."""
     folder = Path(folder)
     try:
-        with open(folder / ROOM, "rb") as file, np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-        told = json.loads(arrays["told"].tobytes())
+        told, arrays = read_archive(folder / ROOM)
         frames = tuple(
             Frame(name, Path(path), Camera(width, height, fx, fy, cx, cy, pose, lens_of(lens)))
             for (name, path, (width, height, fx, fy, cx, cy), lens), pose in zip(
@@ -222,13 +217,13 @@ def capture_name(folder: Path | str) -> str:
 def root_of(folder: Path | str) -> Path | None:
     """Folder of the capture that `ROOM` tells of, and nothing else of it; None where the file is absent or damaged."""
     try:
-        with open(Path(folder) / ROOM, "rb") as file, np.load(file, allow_pickle=False) as archive:
-            return Path(json.loads(archive["told"].tobytes())["root"])
+        return Path(read_archive(Path(folder) / ROOM, ())[0]["root"])
     except DAMAGE:
         return None
 
 
 def _damaged(folder: Path, error: Exception) -> BadInputError:
     return BadInputError(
-        f"The result in '{folder}' is damaged ({type(error).__name__}: {error}); run the recovery again."
+        f"The result in '{folder}' is damaged, changed or another version's ({type(error).__name__}: {error}); "
+        "run the recovery again."
     )

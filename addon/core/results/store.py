@@ -13,36 +13,22 @@ import os
 import re
 import shutil
 import sys
-import zipfile
-import zlib
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
 
-from ..atomic import TEMPORARY, replacing, write_bytes
+from ..atomic import TEMPORARY, write_bytes
 from ..errors import BadInputError, StorageError
 from ..json_values import plain
+from .archive import Damaged, read_archive, write_archive
 
 STAGES = "stages"
 SPILLED = "tmp-observations-"
 """How folders begin that an exact median keeps its observations in (`lit_diffuse.medians`)."""
 LOCK = ".lock"
-META = "__meta__"
 FULL = (errno.ENOSPC, errno.EDQUOT if hasattr(errno, "EDQUOT") else errno.ENOSPC)
-DAMAGE = (
-    OSError,
-    ValueError,
-    KeyError,
-    EOFError,
-    zipfile.BadZipFile,
-    zlib.error,
-    NotImplementedError,
-    TypeError,
-    AttributeError,
-)
-"""What reading a damaged archive raises."""
 
 
 class Store:
@@ -52,6 +38,11 @@ class Store:
     ----------
     folder : path
         Made where absent.
+
+    Attributes
+    ----------
+    damaged : list of str
+        Stages that were asked for and found damaged or changed.
 
     Raises
     ------
@@ -63,6 +54,7 @@ class Store:
 
     def __init__(self, folder: Path | str):
         self.folder = Path(folder)
+        self.damaged: list[str] = []
         self._lock = None
         try:
             (self.folder / STAGES).mkdir(parents=True, exist_ok=True)
@@ -111,54 +103,39 @@ class Store:
 
     def load(self, name: str, key: str) -> dict[str, np.ndarray] | None:
         """The arrays of stage `name`; None where it is absent, was made under another key, or is damaged."""
-        path = self._stage(name)
-        meta = _read_meta(path)
-        if meta is None or meta.get("key") != key:
+        if self.stored_key(name) != key:
             return None
-        try:
-            # Opened here: given a path, np.load leaves a damaged file open. Reading checks each array's CRC.
-            with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
-                return {array: archive[array] for array in archive.files if array != META}
-        except DAMAGE:
-            return None
+        found = self._read(name, None)
+        return None if found is None else found[1]
 
     def load_meta(self, name: str, key: str) -> dict[str, Any] | None:
         """What `save` was given as `meta`; None as for `load`."""
-        meta = _read_meta(self._stage(name))
-        return None if meta is None or meta.get("key") != key else meta.get("meta", {})
+        return self.stored_meta(name) if self.stored_key(name) == key else None
 
     def stored_meta(self, name: str) -> dict[str, Any]:
         """What the stage `name` was stored with as `meta`, under whatever key; empty where it is absent or damaged."""
-        return (_read_meta(self._stage(name)) or {}).get("meta") or {}
+        found = self._read(name, ())
+        return found[0]["meta"] if found else {}
 
     def stored_key(self, name: str) -> str | None:
         """The key under which the stage `name` is stored; None where it is absent or damaged."""
-        return (_read_meta(self._stage(name)) or {}).get("key")
+        found = self._read(name, ())
+        return found[0]["key"] if found else None
+
+    def _read(self, name: str, wanted: Container[str] | None) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
+        """A stage's archive; None where it is absent, or damaged, which is noted."""
+        try:
+            return read_archive(self._stage(name), wanted)
+        except FileNotFoundError:
+            return None
+        except Damaged:
+            if name not in self.damaged:
+                self.damaged.append(name)
+            return None
 
     def save(self, name: str, key: str, arrays: dict[str, np.ndarray], meta: dict[str, Any] | None = None) -> None:
-        """Store the finished stage `name`, in whole or not at all.
-
-        Uncompressed: compressing costs more time than it saves, as these are mostly noise in their low bits.
-
-        Raises
-        ------
-        StorageError
-            The disk is full or can't be written; what was stored before is still there.
-        ValueError
-            An array holds Python objects.
-        """
-        content = json.dumps({"key": key, "meta": plain(meta or {})}).encode()
-        arrays = {META: np.frombuffer(content, np.uint8), **arrays}
-        if any(np.asarray(array).dtype.hasobject for array in arrays.values()):
-            raise ValueError(f"stage '{name}' holds an array of objects")
-        # Not np.savez: it takes the array names as keywords, so 'file' could not be one, and stamps the time of day.
-        with replacing(self._stage(name)) as temporary, open(temporary, "wb") as file:
-            with zipfile.ZipFile(file, "w", zipfile.ZIP_STORED) as archive:
-                for array_name, array in arrays.items():
-                    with archive.open(zipfile.ZipInfo(f"{array_name}.npy"), "w", force_zip64=True) as entry:
-                        np.lib.format.write_array(entry, np.asarray(array), allow_pickle=False)
-            file.flush()
-            os.fsync(file.fileno())
+        """Store the finished stage `name`, in whole or not at all; raises as `archive.write_archive`."""
+        write_archive(self._stage(name), arrays, {"key": key, "meta": meta or {}})
 
     def drop(self, names: Iterable[str]) -> None:
         """Forget the stages `names`, so that they are done again; one that is not stored is no error."""
@@ -193,16 +170,6 @@ class Store:
         if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
             raise ValueError(f"'{name}' is no name for a stage")
         return self.folder / STAGES / f"{name}.npz"
-
-
-def _read_meta(path: Path) -> dict[str, Any] | None:
-    """The key and the meta of a stage's file; None where it is absent or damaged."""
-    try:
-        with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
-            meta = json.loads(archive[META].tobytes())
-    except DAMAGE:
-        return None
-    return meta if isinstance(meta, dict) else None
 
 
 def _take_lock(folder: Path):
