@@ -223,12 +223,13 @@ def run_without_scene(
     override: Path | None = None,
     heed_kept: bool = True,
     unwrap: Unwrap | str = "",
+    alone: bool = False,
 ) -> dict[str, Any]:
     """Recover a capture up to a stage, and write all but scene.blend; as `bridge.job.run.run`, without Blender."""
     check_run(capture, folder, until, from_stage)
     run, lay_out = _read(capture, folder, settings, progress, unwrap, reading, override, heed_kept)
     with run:
-        report = run.stages(lay_out, until, from_stage)
+        report = run.stages(lay_out, until, from_stage, alone)
         return run.write() if until == WRITE else report
 
 

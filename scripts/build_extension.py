@@ -31,6 +31,8 @@ LOCKS = tuple(ROOT / "requirements" / name for name in ("blender-5.2.txt", "exte
 WHEELS = ROOT / "wheels"
 CONTENT = ("__init__.py", "LICENSE", "README.md", "CHANGELOG.md", "addon", "operators")
 """What goes into the zip, besides the manifest and the wheels."""
+LEFT_OUT = "addon/farm"
+"""What does not: Blender's window has no use for it, and it talks to managers over the network."""
 PIP_PLATFORMS = {
     "linux-x64": "manylinux_2_28_x86_64",
     "windows-x64": "win_amd64",
@@ -165,6 +167,7 @@ def stage(folder: Path, platform: str, wheels: set[str]) -> None:
             shutil.copytree(source, folder / name, ignore=leave)
         else:
             shutil.copy2(source, folder / name)
+    shutil.rmtree(folder / LEFT_OUT)
     write_pages(ROOT / "docs", folder / "docs")
     (folder / "wheels").mkdir()
     for name in sorted(wheels):

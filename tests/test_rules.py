@@ -158,6 +158,19 @@ def test_nothing_under_addon_reaches_above_it():
         assert all(level <= depth for level, _ in imports(path)), path
 
 
+def test_the_farm_knows_the_core_and_the_command_line_alone():
+    for path in sorted((ROOT / "addon" / "farm").rglob("*.py")):
+        above = [name for level, name in imports(path) if level == 2]
+        assert {name.split(".")[0] for name in above} <= {"cli", "console", "core", "settings_info"}, relative(path)
+        assert not absolute(path) - set(sys.stdlib_module_names) - {"__future__"}, relative(path)
+    for path in (
+        *CORE,
+        *sorted((ROOT / "addon" / "bridge").rglob("*.py")),
+        *sorted((ROOT / "operators").rglob("*.py")),
+    ):
+        assert not [name for _, name in imports(path) if "farm" in name.split(".")], relative(path)
+
+
 @pytest.mark.parametrize("name", ["__init__.py", "addon/cli/__init__.py", "operators/__init__.py"])
 def test_no_blender_at_module_level(name):
     found = imports(ROOT / name, nodes=ast.iter_child_nodes)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import importlib.util
 import os
 import sys
 import traceback
@@ -108,6 +109,10 @@ def make_parser() -> argparse.ArgumentParser:
 
     add_common(add_benchmark(commands, EXIT_CODES), benchmark_command)
     add_common(add_ablation(commands, EXIT_CODES), ablation_command)
+    if importlib.util.find_spec("..farm", __package__):  # the extension's zip has none
+        from ..farm.commands import add_farm
+
+        add_farm(commands, EXIT_CODES)
     return parser
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from ..console import duration
 from ..core.errors import EXIT_OK, BadInputError
@@ -34,36 +36,45 @@ def add_recover(commands, epilog: str) -> argparse.ArgumentParser:
     add("--until", metavar="STAGE", choices=RUN_STAGES, default=WRITE, help=last)
     anew = "do this stage and all later ones anew, though they are stored"
     add("--from-stage", metavar="STAGE", choices=RUN_STAGES, help=anew)
-    scene = "also write scene.blend, which takes Blender's bpy (default yes)"
-    add("--scene", action=argparse.BooleanOptionalAction, default=True, help=scene)
-    layout = "with --no-scene: what lays out the atlas; own: the mesh's own texture coordinates (default: the first of "
-    add("--unwrap", choices=UNWRAPS, default="", help=f"{layout}them that is installed)")
-    add_override(parser)
+    add_home(parser)
     return parser
 
 
-def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
-    """`recover CAPTURE --out RESULT`."""
-    settings = settings_from(arguments)
+def add_home(parser: argparse.ArgumentParser) -> None:
+    """How the result is made: with Blender or without, and with what is known of objects."""
+    scene = "also write scene.blend, which takes Blender's bpy (default yes)"
+    parser.add_argument("--scene", action=argparse.BooleanOptionalAction, default=True, help=scene)
+    layout = "with --no-scene: what lays out the atlas; own: the mesh's own texture coordinates (default: the first of "
+    parser.add_argument("--unwrap", choices=UNWRAPS, default="", help=f"{layout}them that is installed)")
+    add_override(parser)
+
+
+def run_from(arguments: argparse.Namespace) -> Callable[..., dict[str, Any]]:
+    """The run that was asked for, but for its stages: called with capture, result, settings and progress."""
     if arguments.unwrap and arguments.scene:
         raise BadInputError("Option --unwrap goes with --no-scene: the scene is laid out by Blender.")
-    how = {
-        "until": arguments.until,
+    how: dict[str, Any] = {
         "reading": reading_from(arguments),
-        "from_stage": arguments.from_stage,
         "override": arguments.override,
         "heed_kept": not arguments.no_overrides,
     }
     with needed_packages():
         if arguments.scene:
-            run = need("job.run").run
-        else:
-            from ..api import run_without_scene as run
+            return partial(need("job.run").run, **how)
+        from ..api import run_without_scene
 
-            how["unwrap"] = arguments.unwrap
+        return partial(run_without_scene, unwrap=arguments.unwrap, **how)
+
+
+def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
+    """`recover CAPTURE --out RESULT`."""
+    settings = settings_from(arguments)
+    run = run_from(arguments)
+    with needed_packages():
         from ..core.pipeline.run import progress_of_run
+    stages = {"until": arguments.until, "from_stage": arguments.from_stage}
     with console_run(arguments, stream) as console:
-        report = run(arguments.capture, arguments.out, settings, progress_of_run(**console), **how)
+        report = run(arguments.capture, arguments.out, settings, progress_of_run(**console), **stages)
     made = "stages" if arguments.until != WRITE else "scene.blend" if arguments.scene else "materials.json"
     line = f"Done in {duration(report['seconds'])}: {arguments.out / made}"
     told = {"seconds": report["seconds"], "result": str(arguments.out.absolute()), "until": arguments.until}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,7 +26,8 @@ def replacing(path: Path | str) -> Iterator[Path]:
         Where the system refuses to write (disk full, read-only, folder gone).
     """
     path = Path(path)
-    temporary = path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
+    # Two machines that write into one folder may have the same process id.
+    temporary = path.with_name(f"{TEMPORARY}{os.getpid()}-{secrets.token_hex(4)}-{path.name}")
     try:
         try:
             yield temporary

@@ -51,6 +51,7 @@ def run(
     override: Path | None = None,
     heed_kept: bool = True,
     into: str = "OWN",
+    alone: bool = False,
 ) -> dict:
     """Recover a capture up to a stage; stages that the result folder holds already are not done again.
 
@@ -78,6 +79,8 @@ def run(
         False leaves out, for this run, what the result folder keeps.
     into : str
         `OWN`: the room has a scene of its own; `SCENE`: it comes into `scene`.
+    alone : bool
+        Do `until` and none that comes before it; see `Run.stages`.
 
     Returns
     -------
@@ -116,7 +119,7 @@ def run(
 
     with whole_run:
         lay_out = partial(unwrap, polygons=polygons_of(capture.root, capture.mesh))
-        report = whole_run.stages(lay_out, until, from_stage)
+        report = whole_run.stages(lay_out, until, from_stage, alone)
         return whole_run.write(write) if until == WRITE else report
 
 

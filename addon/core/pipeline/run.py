@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..agreement.look import look
-from ..errors import BadInputError, StorageError
+from ..errors import BadInputError, MissingStageError, StorageError
 from ..io.conventions import AS_READ
 from ..io.layout import AS_FOUND, Reading
 from ..io.pixels import read_pixels
@@ -119,10 +119,24 @@ class Run:
     def __exit__(self, *exception: object) -> None:
         self._store.close()
 
-    def stages(self, unwrap: Unwrap, until: str = WRITE, from_stage: str | None = None) -> dict[str, Any]:
+    def stages(
+        self, unwrap: Unwrap, until: str = WRITE, from_stage: str | None = None, alone: bool = False
+    ) -> dict[str, Any]:
         """Do the stages up to `until`, and all from `from_stage` on anew; returns the report of a run that ends there.
 
         What was written before stays untouched where `until` is `WRITE`: `write` is to follow.
+
+        Parameters
+        ----------
+        unwrap : callable(Mesh, int) -> (t, 3, 2) float32
+        until, from_stage : str
+        alone : bool
+            Do `until` and none that comes before it.
+
+        Raises
+        ------
+        MissingStageError
+            With `alone`: one that comes before is not stored.
         """
         store = self._store
         with told_in_a_sentence(self.folder):
@@ -134,6 +148,11 @@ class Run:
             self._progress.done()
             self.recovery = Recovery(self.capture, store, self._settings, self._progress, unwrap, self._given)
             for stage in STAGES:
+                if alone and stage != until and store.stored_key(stage) != self.recovery.keys[stage]:
+                    raise MissingStageError(
+                        f"Result folder '{self.folder}' holds no stage '{stage}' of this capture, these settings and "
+                        "this version; do it first."
+                    )
                 getattr(self.recovery, stage)()
                 if stage == until:
                     break

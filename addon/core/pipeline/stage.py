@@ -27,12 +27,15 @@ class Stage:
         Those whose results it is computed from.
     heeds : tuple of str
         The fields of `Settings` that it heeds.
+    divided_by : str
+        What its work can be divided by between workers, with the same bytes in the end; '' where it can't be.
     """
 
     name: str
     source: Path
     takes: tuple[Stage, ...]
     heeds: tuple[str, ...]
+    divided_by: str = ""
 
     @property
     def after(self) -> frozenset[str]:

@@ -1,0 +1,185 @@
+"""The graph of a room's units of work: what every engine is given in its own language."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..core.atomic import write_bytes
+from ..core.errors import BadInputError, StorageError
+from ..core.stages import RUN_STAGES
+
+FOLDER = "farm"
+"""Where a result folder keeps its plan, the workers' locks, marks and logs."""
+PROGRAM = "scan-relight"
+
+
+@dataclass(frozen=True)
+class Task:
+    """One unit of work, which one worker does.
+
+    Attributes
+    ----------
+    name : str
+        Unique in its room: the stage's, with "-I-of-N" for a block.
+    stage : str
+    block : tuple of int or None
+        I and N, I from 1; None: the whole stage, or what joins its blocks.
+    after : tuple of str
+        Names of those that have to be done before.
+    """
+
+    name: str
+    stage: str
+    block: tuple[int, int] | None
+    after: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Room:
+    """A room to recover.
+
+    Attributes
+    ----------
+    capture, result : Path
+        Absolute, as the workers find them.
+    blocks : int
+        Into how many a stage is divided that can be.
+    program : tuple of str
+        What runs a command of ours on a worker.
+    options : tuple of str
+        The options of each unit: settings, how the capture is read.
+    """
+
+    capture: Path
+    result: Path
+    blocks: int = 1
+    program: tuple[str, ...] = (PROGRAM,)
+    options: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """What the room is called."""
+        return self.result.name
+
+    @property
+    def farm(self) -> Path:
+        """Where the plan, locks, marks and logs are."""
+        return self.result / FOLDER
+
+    def tasks(self, divided: tuple[str, ...]) -> tuple[Task, ...]:
+        """The units of work, each after those it waits for; the stages that are `divided` by blocks."""
+        tasks: list[Task] = []
+        before: tuple[str, ...] = ()
+        for stage in RUN_STAGES:
+            if stage in divided and self.blocks > 1:
+                parts = [
+                    Task(unit_name(stage, (i, self.blocks)), stage, (i, self.blocks), before)
+                    for i in range(1, self.blocks + 1)
+                ]
+                tasks += parts
+                before = tuple(part.name for part in parts)
+            tasks.append(Task(stage, stage, None, before))
+            before = (stage,)
+        return tuple(tasks)
+
+    def command(self, stage: str, block: str = "") -> list[str]:
+        """The command line of a unit of work; `block` as "I/N", or what an engine puts there."""
+        divided = ["--block", block] if block else []
+        unit = ["stage", str(self.capture), "--out", str(self.result), "--stage", stage, *divided]
+        return [*self.program, *unit, *self.options]
+
+    def as_dict(self, divided: tuple[str, ...]) -> dict[str, Any]:
+        """The graph, for JSON."""
+        tasks = [
+            {
+                "name": one.name,
+                "stage": one.stage,
+                "block": list(one.block) if one.block else None,
+                "after": list(one.after),
+                "command": self.command(one.stage, "{}/{}".format(*one.block) if one.block else ""),
+            }
+            for one in self.tasks(divided)
+        ]
+        told = {"room": self.name, "capture": str(self.capture), "result": str(self.result), "blocks": self.blocks}
+        return told | {"program": list(self.program), "options": list(self.options), "tasks": tasks}
+
+    def write(self, name: str, content: str) -> Path:
+        """Write a file of the room's farm folder, whole or not at all. Raises `StorageError`."""
+        make_folder(self.farm)
+        path = self.farm / name
+        write_bytes(path, content.encode())
+        return path
+
+
+def unit_name(stage: str, block: tuple[int, int] | None) -> str:
+    """What a unit of work is called."""
+    return f"{stage}-{block[0]}-of-{block[1]}" if block else stage
+
+
+def make_folder(folder: Path) -> None:
+    """Make a farm folder; raises `StorageError`."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(
+            f"Folder '{folder}' can't be made ({error.strerror or error}); choose another result folder."
+        ) from error
+
+
+def rooms_from(
+    captures: list[Path], listed: Path | None, results: Path, blocks: int, program: str, options: list[str]
+) -> list[Room]:
+    """The rooms that a command names.
+
+    Parameters
+    ----------
+    captures : list of Path
+        Their result folders are called as they are, below `results`.
+    listed : Path, optional
+        File with a capture in each line, and behind a tab its result folder, if it is another.
+    results : Path
+    blocks : int
+    program : str
+        As a shell would split it.
+    options : list of str
+
+    Raises
+    ------
+    BadInputError
+        There is no room, two would have one result folder, or the list can't be read.
+    """
+    if blocks < 1:
+        raise BadInputError(f"A stage can't be divided into {blocks} blocks; give 1 or more.")
+    wanted = [(one, results / one.absolute().name) for one in captures]
+    if listed is not None:
+        try:
+            lines = listed.read_text(encoding="utf-8").splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            raise BadInputError(f"List of rooms '{listed}' can't be read ({error}); give a text file.") from error
+        for line in filter(str.strip, lines):
+            capture, _, result = line.partition("\t")
+            one = listed.parent / capture.strip()
+            wanted.append((one, listed.parent / result.strip() if result.strip() else results / one.absolute().name))
+    if not wanted:
+        raise BadInputError("No room is named; give the folders of captures, or --list FILE.")
+    command = tuple(shlex.split(program)) or (PROGRAM,)
+    rooms = [Room(capture.absolute(), result.absolute(), blocks, command, tuple(options)) for capture, result in wanted]
+    taken: dict[Path, Path] = {}
+    for room in rooms:
+        if room.result.resolve() == room.capture.resolve():
+            raise BadInputError(f"Result folder '{room.result}' is the capture itself; choose another with --out.")
+        if taken.setdefault(room.result, room.capture) != room.capture:
+            raise BadInputError(
+                f"Captures '{taken[room.result]}' and '{room.capture}' would both be written to '{room.result}'; "
+                "give --list FILE with a result folder behind each, parted by a tab."
+            )
+    return list(dict.fromkeys(rooms))
+
+
+def plan_text(room: Room, divided: tuple[str, ...]) -> str:
+    """The graph as a file has it."""
+    return json.dumps(room.as_dict(divided), indent=1, ensure_ascii=False) + "\n"

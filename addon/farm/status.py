@@ -1,0 +1,141 @@
+"""How far rooms are, read off the marks and locks in their result folders; no capture is read, no clock is asked."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..core.io.folder import REPORT
+from ..core.results.lock import owner
+from ..core.stages import LABELS, RUN_STAGES, WRITE
+from .plan import FOLDER
+from .unit import mark, stored_key
+
+DONE, FAILED, RUNNING, WAITING, UNKNOWN = "done", "failed", "running", "waiting", "no plan"
+COST = {"surface": 5, "lit_diffuse": 8, "shading": 17, "specular": 16, WRITE: 5}
+"""Rough cost of the stages, as `pipeline.run.WEIGHTS`, which takes NumPy."""
+PAGE = "report.html"
+
+
+@dataclass(frozen=True)
+class UnitState:
+    """A unit of work: its name, its state, who does it or did, its time, memory and error."""
+
+    name: str
+    stage: str
+    state: str
+    machine: str = ""
+    seconds: float = 0.0
+    memory: int = 0
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class RoomState:
+    """A room: its result folder, its state, the stage that it is in, the share that is done, and its units."""
+
+    result: Path
+    state: str
+    stage: str
+    share: float
+    error: str
+    units: tuple[UnitState, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        units = [vars(one) for one in self.units]
+        told = {"room": self.result.name, "result": str(self.result), "state": self.state, "stage": self.stage}
+        return told | {"share": round(self.share, 4), "error": self.error, "units": units}
+
+
+def look(result: Path) -> RoomState:
+    """How far a room is; a folder without a plan is no error."""
+    try:
+        plan = json.loads((result / FOLDER / "plan.json").read_text(encoding="utf-8"))
+        named = [(str(task["name"]), str(task["stage"])) for task in plan["tasks"]]
+    except FileNotFoundError:
+        named = [(stage, stage) for stage in RUN_STAGES] if (result / FOLDER).is_dir() else []
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        told = f"Its plan can't be read ({type(error).__name__}); submit it again."
+        return RoomState(result, FAILED, "", 0.0, told, ())
+    if not named:
+        done = (result / REPORT).is_file()  # by one machine
+        return RoomState(result, DONE if done else UNKNOWN, "", float(done), "", ())
+    units = [_unit(result, name, stage) for name, stage in named]
+    # What was joined needs its blocks no more.
+    joined = {one.stage for one in units if one.name == one.stage and one.state == DONE}
+    units = [UnitState(**(vars(one) | {"state": DONE})) if one.stage in joined else one for one in units]
+    cost = [COST.get(one.stage, 1) / sum(other.stage == one.stage for other in units) for one in units]
+    share = sum(c for c, one in zip(cost, units, strict=True) if one.state == DONE) / sum(cost)
+    left = [one for one in units if one.state != DONE]
+    state = next((s for s in (RUNNING, FAILED, WAITING) if any(one.state == s for one in left)), DONE)
+    stage = next((one.stage for one in left if one.state == state), "")
+    error = next((one.error for one in left if one.state == FAILED), "")
+    return RoomState(result, state, stage, share, error, tuple(units))
+
+
+def _unit(result: Path, name: str, stage: str) -> UnitState:
+    told = mark(result, name)
+    who, error = owner(result / FOLDER / f"{name}.lock"), str(told.get("error", ""))
+    if who:
+        return UnitState(name, stage, RUNNING, who)
+    if error:
+        return UnitState(name, stage, FAILED, str(told.get("machine", "")), error=error)
+    # A mark tells of what is there: stages may be cleared, or done anew.
+    there = (result / REPORT).is_file() if stage == WRITE else told.get("key") and stored_key(result, name)
+    if not told or not there or (stage != WRITE and told["key"] != there):
+        return UnitState(name, stage, WAITING)
+    seconds, memory = float(told.get("seconds", 0)), int(told.get("peak_memory_bytes", 0))
+    return UnitState(name, stage, DONE, str(told.get("machine", "")), seconds, memory)
+
+
+def table(rooms: list[RoomState]) -> str:
+    """The rooms as lines of text."""
+    rows = [("room", "state", "stage", "done", "")]
+    rows += [(r.result.name, r.state, LABELS.get(r.stage, r.stage), f"{r.share:.0%}", r.error) for r in rooms]
+    width = [max(len(row[i]) for row in rows) for i in range(4)]
+    lines = [
+        "  ".join([*(cell.ljust(w) for cell, w in zip(row, width, strict=False)), row[4]]).rstrip() for row in rows
+    ]
+    return "\n".join(lines)
+
+
+def page(rooms: list[RoomState], folder: Path) -> str:
+    """An HTML page over all rooms, which lies in `folder`: it names the rooms' pages by their way from there."""
+    body = []
+    for room in rooms:
+        name, there = html.escape(room.result.name), room.result.absolute() / PAGE
+        if there.is_file():
+            name = f'<a href="{html.escape(_link(there, folder))}">{name}</a>'
+        seconds = sum(one.seconds for one in room.units)
+        memory = max((one.memory for one in room.units), default=0)
+        cells = [name, room.state, html.escape(LABELS.get(room.stage, room.stage)), f"{room.share:.0%}"]
+        cells += [f"{seconds:.0f} s", f"{memory / 2**30:.1f} GiB", html.escape(room.error)]
+        cells = "".join(f"<td>{cell}</td>" for cell in cells)
+        body.append(f'<tr class="{room.state.replace(" ", "-")}">{cells}</tr>')
+    head = "".join(f"<th>{one}</th>" for one in ("Room", "State", "Stage", "Done", "Time", "Memory", "Error"))
+    done = sum(room.state == DONE for room in rooms)
+    return _PAGE.format(done=done, count=len(rooms), head=head, body="\n".join(body))
+
+
+def _link(path: Path, folder: Path) -> str:
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:  # another drive
+        return path.as_uri()
+
+
+_PAGE = """<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>Rooms</title><style>
+body {{ font: 15px/1.5 sans-serif; margin: 2em; }} table {{ border-collapse: collapse; }}
+td, th {{ padding: .2em 1em; border-bottom: 1px solid #ccc; text-align: left; }}
+.failed td {{ background: #fdd; }} .done td {{ background: #dfd; }} .running td {{ background: #ffd; }}
+</style></head><body><h1>Rooms</h1><p>{done} of {count} are done.</p>
+<table><thead><tr>{head}</tr></thead><tbody>
+{body}
+</tbody></table></body></html>
+"""
