@@ -6,9 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import BadInputError
 from .plan import Room
 
-TEMPLATE = "openjd.json"
+TEMPLATE, PARAMETERS = "openjd.json", "openjd-parameters.json"
 
 
 def template(room: Room, divided: tuple[str, ...]) -> dict[str, Any]:
@@ -22,7 +23,12 @@ def template(room: Room, divided: tuple[str, ...]) -> dict[str, Any]:
         words = room.command(task.stage, "{{Task.Param.Block}}/{{Param.Blocks}}" if task.block else "")
         # The folders are the job's parameters, so that a farm may map their paths.
         known = {str(room.capture): "{{Param.Capture}}", str(room.result): "{{Param.Result}}"}
-        words = [known.get(word, word if "{{" in word and task.block else _plain(word)) for word in words]
+        for word in room.command(task.stage):
+            if "{{" in word and word not in known:
+                raise BadInputError(
+                    f"Open Job Description would take '{word}' for its own; there is no way to quote it."
+                )
+        words = [known.get(word, word) for word in words]
         step: dict[str, Any] = {"name": name}
         if after := list(dict.fromkeys(names[one] for one in task.after)):
             step["dependencies"] = [{"dependsOn": one} for one in after]
@@ -31,9 +37,10 @@ def template(room: Room, divided: tuple[str, ...]) -> dict[str, Any]:
             step["parameterSpace"] = {"taskParameterDefinitions": [blocks]}
         run = {"command": words[0], "args": words[1:]}
         steps.append(step | {"script": {"actions": {"onRun": run}}})
+    # Without defaults: only paths below the template's folder may be those.
     folders = [
-        {"name": name, "type": "PATH", "objectType": "DIRECTORY", "dataFlow": flow, "default": str(path)}
-        for name, flow, path in (("Capture", "IN", room.capture), ("Result", "INOUT", room.result))
+        {"name": name, "type": "PATH", "objectType": "DIRECTORY", "dataFlow": flow}
+        for name, flow in (("Capture", "IN"), ("Result", "INOUT"))
     ]
     blocks = {"name": "Blocks", "type": "INT", "minValue": 1, "default": room.blocks}
     return {
@@ -44,11 +51,13 @@ def template(room: Room, divided: tuple[str, ...]) -> dict[str, Any]:
     }
 
 
-def _plain(word: str) -> str:
-    """A word that holds what a template would take for its own: there is no way to quote that."""
-    return word.replace("{{", "{ {").replace("}}", "} }")
-
-
 def write(room: Room, divided: tuple[str, ...]) -> Path:
-    """Write the room's template into its farm folder. Raises `StorageError`."""
+    """Write the room's template, and the values of its parameters beside it, into its farm folder.
+
+    Raises
+    ------
+    StorageError
+    """
+    given = {"Capture": str(room.capture), "Result": str(room.result), "Blocks": room.blocks}
+    room.write(PARAMETERS, json.dumps(given, indent=1, ensure_ascii=False) + "\n")
     return room.write(TEMPLATE, json.dumps(template(room, divided), indent=1, ensure_ascii=False) + "\n")

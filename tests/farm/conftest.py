@@ -17,8 +17,9 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 OPTIONS = (
     "--no-scene --unwrap xatlas --texel-size 0.2 --shading-rays 64 --emitter-rays 16 --specular-rays 16 --threads 1"
 ).split()
-WORKER = [sys.executable, "-c", "import sys; from addon import cli; sys.exit(cli.main())"]
-"""A process of its own for one command."""
+PROGRAM = f"import sys; sys.path.insert(0, {str(ROOT)!r}); from addon import cli"
+WORKER = [sys.executable, "-c", f"{PROGRAM}; sys.exit(cli.main())"]
+"""A process of its own for one command, wherever it is started."""
 
 
 @pytest.fixture(scope="session")
@@ -47,7 +48,7 @@ def do(capture: Path, result: Path, *stages: str) -> None:
 
 def start(*argv: str, before: str = "", **how) -> subprocess.Popen:
     """Start a command in a process of its own; `before` is run in it first."""
-    program = [sys.executable, "-c", f"import sys; from addon import cli\n{before}\nsys.exit(cli.main())"]
+    program = [sys.executable, "-c", f"{PROGRAM}\n{before}\nsys.exit(cli.main())"]
     return subprocess.Popen([*program, *argv], cwd=ROOT, stderr=subprocess.PIPE, text=True, **how)
 
 

@@ -1,0 +1,111 @@
+"""Flamenco 3: a room as a job of the type `scan_relight.js`, handed to the manager over its HTTP interface."""
+
+from __future__ import annotations
+
+import json
+import platform
+import urllib.error
+import urllib.parse
+import urllib.request
+from dataclasses import dataclass
+from http.client import HTTPException
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import BadInputError
+from ..core.kinds import Code, Shown
+from .plan import PROGRAM, Room
+
+SCRIPT = Path(__file__).parent / "scan_relight.js"
+JOB_TYPE: Code[str] = "scan-relight"
+"""What the manager makes of the script's name."""
+MANAGER: Code[str] = "http://localhost:8080/"
+SECONDS: Shown[float] = 30.0
+"""How long the manager may take for an answer."""
+PATHS = ("mesh", "exposures", "override")
+LONGEST: Shown[int] = 1 << 24
+"""Bytes of an answer that are read."""
+
+
+NO_MANAGER = "What answers at {} is no manager of Flamenco 3; check --manager."
+
+
+@dataclass(frozen=True)
+class Manager:
+    """A manager, by its address."""
+
+    address: str
+
+    def job_type(self) -> dict[str, Any]:
+        """What the manager knows of our job type. Raises `BadInputError`."""
+        try:
+            return self._ask(f"api/v3/jobs/type/{JOB_TYPE}")
+        except LookupError as error:
+            raise BadInputError(
+                f"Flamenco's manager at {self.address} has no job type '{JOB_TYPE}'; put {SCRIPT} into its folder "
+                "'scripts' and start it anew."
+            ) from error
+
+    def submit(self, job: dict[str, Any]) -> str:
+        """Hand a job over; returns its number. Raises `BadInputError`."""
+        try:
+            return str(self._ask("api/v3/jobs", job)["id"])
+        except (LookupError, TypeError) as error:
+            raise BadInputError(NO_MANAGER.format(self.address)) from error
+
+    def _ask(self, way: str, content: dict[str, Any] | None = None) -> Any:
+        """The manager's answer; LookupError where it knows no such way."""
+        data = None if content is None else json.dumps(content).encode()
+        headers = {"Content-Type": "application/json", "Accept": "application/json"}
+        try:
+            if urllib.parse.urlsplit(self.address).scheme not in ("http", "https"):
+                raise BadInputError(f"'{self.address}' is no manager's address; give --manager as {MANAGER}.")
+            address = urllib.parse.urljoin(self.address.rstrip("/") + "/", way)
+            request = urllib.request.Request(address, data, headers)
+            with urllib.request.urlopen(request, timeout=SECONDS) as answer:
+                return json.loads(answer.read(LONGEST))
+        except urllib.error.HTTPError as error:
+            with error:
+                told = _message(error.read(LONGEST))
+            if error.code == 404:
+                raise LookupError(told) from error
+            raise BadInputError(f"Flamenco's manager at {self.address} refused ({error.code}): {told}.") from error
+        except OSError as error:
+            reason = getattr(error, "reason", error)
+            raise BadInputError(f"Flamenco's manager at {self.address} can't be reached ({reason}).") from error
+        except (ValueError, HTTPException) as error:
+            raise BadInputError(NO_MANAGER.format(self.address)) from error
+
+
+def _message(content: bytes) -> str:
+    try:
+        return str(json.loads(content)["message"]).rstrip(". ")
+    except (ValueError, KeyError, TypeError):
+        return "no reason given"
+
+
+def job_of(room: Room, divided: tuple[str, ...], etag: str = "", priority: int = 50) -> dict[str, Any]:
+    """The room as a `SubmittedJob`."""
+    settings: dict[str, Any] = {"capture": str(room.capture), "result": str(room.result)}
+    settings["blocks"] = room.blocks if divided else 1
+    options = []
+    for option in room.options:
+        name, _, value = option.removeprefix("--").partition("=")
+        if name in PATHS:
+            settings[name] = value
+        else:
+            options.append(option)
+    settings["options"] = json.dumps(options)
+    if room.program != (PROGRAM,):
+        settings["program"], settings["program_args"] = room.program[0], json.dumps(list(room.program[1:]))
+    job = {"name": room.name, "type": JOB_TYPE, "priority": priority, "settings": settings}
+    job |= {"metadata": {"project": "Scan Relight"}, "submitter_platform": platform.system().lower()}
+    return job | ({"type_etag": etag} if etag else {})
+
+
+def submit(room: Room, divided: tuple[str, ...], address: str = "", priority: int = 50) -> str:
+    """Hand a room to the manager at an address; returns the job's number. Raises `BadInputError`."""
+    manager = Manager(address or MANAGER)
+    known = manager.job_type()
+    etag = str(known.get("etag", "")) if isinstance(known, dict) else ""
+    return manager.submit(job_of(room, divided, etag, priority))
