@@ -19,6 +19,7 @@ from .arrays import layer_of, triangles_of, vertices_of
 
 NUMBERED = re.compile(r"^(.*?)(?:\.(\d{3,}))?$", re.DOTALL)
 """Blender's ending of a name that was taken already."""
+PART = re.compile(r"^part (\d+)")
 
 
 def import_mesh(path: Path) -> RawMesh:
@@ -33,9 +34,9 @@ def import_mesh(path: Path) -> RawMesh:
             f"Mesh '{path}' {'is not a file' if path.exists() else 'does not exist'}; a capture needs its mesh there."
         )
     try:
-        with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, _scene_apart() as scene:
-            _import(path, Path(folder), scene)
-            parts = _parts(scene)
+        with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, _scene_apart() as (scene, made):
+            names = _import(path, Path(folder), scene)
+            parts = _parts(scene, made.new("objects"), names)
     except OSError as error:
         reason = error.strerror or error
         raise BadInputError(
@@ -48,8 +49,8 @@ def import_mesh(path: Path) -> RawMesh:
     return _joined(parts, path.name)
 
 
-def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> None:
-    """Run Blender's importer on a copy of `path` that names nothing else."""
+def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> dict[str, str]:
+    """Run Blender's importer on a copy of `path` that names nothing else; what objects are called there."""
     with bpy.context.temp_override(
         scene=scene,
         view_layer=scene.view_layers[0],
@@ -58,16 +59,17 @@ def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> None:
     ):
         try:
             if path.suffix.lower() == ".obj":
-                copy, named = copy_obj(path, folder)
+                copy, named, names = copy_obj(path, folder)
                 split = {"use_split_objects": named, "use_split_groups": not named}
                 bpy.ops.wm.obj_import(filepath=str(copy), forward_axis="Y", up_axis="Z", validate_meshes=True, **split)
-                return
-            copy = copy_gltf(path, folder)
+                return names
+            copy, names = copy_gltf(path, folder)
             if not hasattr(bpy.types, "IMPORT_SCENE_OT_gltf"):  # its add-on is switched off
                 import addon_utils
 
                 addon_utils.enable("io_scene_gltf2")
             bpy.ops.import_scene.gltf(filepath=str(copy), import_shading="FLAT", merge_vertices=False)
+            return names
         except (RuntimeError, AttributeError) as error:  # how an operator tells of anything that went wrong
             raise BadInputError(
                 f"Mesh '{path}' can't be read by Blender ({reason_of(error)[-150:]}); export it again."
@@ -75,12 +77,12 @@ def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> None:
 
 
 @contextlib.contextmanager
-def _scene_apart() -> Iterator[bpy.types.Scene]:
+def _scene_apart() -> Iterator[tuple[bpy.types.Scene, Made]]:
     """A scene of its own; it goes with all that came into it, and nothing else changes."""
     made = Made()
     scene = bpy.data.scenes.new("Scan Relight import")
     try:
-        yield scene
+        yield scene, made
     finally:
         made.remove()
 
@@ -94,19 +96,20 @@ class _Part(NamedTuple):
     uv: np.ndarray | None
 
 
-def _parts(scene: bpy.types.Scene) -> list[_Part]:
+def _parts(scene: bpy.types.Scene, things: list[bpy.types.Object], names: dict[str, str]) -> list[_Part]:
     scene.view_layers[0].update()  # world matrices of children
     found = []
-    for thing in scene.collection.all_objects:
+    for order, thing in enumerate(things):  # not all_objects: making that list takes its length squared
         triangles = triangles_of(thing.data) if thing.type == "MESH" else ()
         if len(triangles):
             layer, mirrored = thing.data.uv_layers.active, thing.matrix_world.is_negative
             uv = layer and layer_of(thing.data, layer.name)[triangles_of(thing.data, "loops")]
             if mirrored:  # its triangles are wound the other way
                 triangles, uv = triangles[:, [0, 2, 1]], None if uv is None else uv[:, [0, 2, 1]]
-            name, number = NUMBERED.match(thing.name).groups()
+            name, number = NUMBERED.match(names.get(thing.name, thing.name)).groups()
             part = _Part(name, vertices_of(thing.data, thing.matrix_world), triangles, uv)
-            found.append(((name, int(number or 0)), part))
+            place = PART.match(thing.name)
+            found.append(((name, int(number or 0), int(place[1]) if place else order), part))
     return [part for _, part in sorted(found, key=lambda one: one[0])]
 
 

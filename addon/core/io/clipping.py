@@ -16,12 +16,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Block
 from ..scene.model import Frame
 from .brackets import DIFFERENT
 from .exr import HALF_MAX
 
 LOOK = 32
 """Frames that are looked at, spread evenly; 0.4 s for 320 x 240."""
+MOST: Block[int] = 1 << 23
+"""Pixels of a picture of which all are looked at; of more, every second, third and so on."""
 WIDTH = 1e-3
 """Values within this share of the greatest are alike: a half float rounds by up to 5e-4."""
 PILE = 16
@@ -84,23 +87,26 @@ def find_clipping(frames: Sequence[Frame], read: Callable[[Path], np.ndarray]) -
     frames = tuple(frames)
     if any(np.isfinite(frame.saturation) for frame in frames):
         return frames, []
-    pictures, exposures = [], []
+    pictures, exposures, top = [], [], []
     for i in np.unique(np.linspace(0, len(frames) - 1, min(LOOK, len(frames))).astype(int)) if frames else ():
         try:
             values = read(frames[i].path).reshape(-1, 3)
         except BadInputError:
             continue  # told when the frame is read for what it shows
-        pictures.append(values[(np.isfinite(values) & (values < HALF_MAX)).all(1)])
+        values = values[(np.isfinite(values) & (values < HALF_MAX)).all(1)]
+        top.append(values.max(initial=0))
+        # Only what lies at a level or just below is counted, and no level is below a picture's greatest value.
+        pictures.append(values[values.max(1, initial=0) >= top[-1] * (1 - 11 * WIDTH)][:: len(values) // MOST + 1])
         exposures.append(frames[i].exposure)
     exposure = np.array(exposures)
     if not sum(len(values) for values in pictures):
         return frames, []
-    top = np.array([values.max(initial=0) for values in pictures])
+    tops = np.array(top)
     none = np.ones(len(top))
     found = []
     ways = [(none, exposure, "")] + ([(exposure, none, " times the exposure")] if np.ptp(exposure) > 0 else [])
     for scale, told, what in ways:
-        level = float((top / scale).max())
+        level = float((tops / scale).max())
         pile = _pile(pictures, level * scale)
         if level > 0 and _is_clipped(pile, told):
             found.append((int(pile.frames.sum()), level, what))

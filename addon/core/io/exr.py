@@ -56,7 +56,10 @@ def read_exr(path: Path | str) -> Picture:
     layer, _ = _supported(path)
     header = layer.header
     names = (*layer.colour, *([layer.alpha] if layer.alpha else []))
-    planes = [plane.astype(np.float32, copy=False) for plane in _planes(path, layer.part, names)]
+    planes = _planes(path, layer.part, names)
+    for i, plane in enumerate(planes):  # one after the other: a picture of 60 million pixels is large enough once
+        planes[i] = plane.astype(np.float32, copy=False)
+    del plane
     width, height = window_size(header.data_window)
     for name, plane in zip(names, planes):
         across, down = header.channels[name]

@@ -17,7 +17,7 @@ from typing import BinaryIO
 from ..errors import BadInputError
 from ..kinds import Code, Limit
 from .files import absence
-from .picture import MAX_PIXELS
+from .picture import MAX_PIXELS, too_large
 
 MAGIC = b"\x76\x2f\x31\x01"
 MAX_PARTS: Limit[int] = 1024
@@ -154,7 +154,7 @@ def _parse(head: bytes, size: int) -> tuple[tuple[ExrHeader, ...], int, list[_Ch
         header, pixel_bytes = _part(part)
         width, height = window_size(header.data_window)
         bytes_in_all += width * height * pixel_bytes
-        if bytes_in_all > max(FREE_BYTES, MAX_RATIO * size):
+        if bytes_in_all > max(FREE_BYTES, MAX_RATIO * size) or too_large(bytes_in_all, size):
             raise _Damaged(f"claims {width} x {height} pixels, more than its {size} bytes can hold")
         if bytes_in_all > MAX_BYTES:
             raise _Damaged(f"holds over {MAX_BYTES >> 30} GiB of pixels in all its channels, more than is read")

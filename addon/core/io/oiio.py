@@ -15,7 +15,8 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..kinds import Code, Limit
-from .picture import MAX_PIXELS
+from .files import read_bytes
+from .picture import MAX_PIXELS, too_large
 
 PNG, JPEG, TIFF = "PNG", "JPEG", "TIFF"
 CODED: dict[str, bytes | tuple[bytes, ...]] = {
@@ -33,6 +34,8 @@ PALETTE: Code[int] = 3
 """PNG's kind of colour."""
 MAX_RATIO: Limit[int] = 1100
 """No PNG packs more bytes of pixels than this into one of the file: deflate's limit is 1032."""
+MAX_SCANS: Limit[int] = 256
+"""Of a progressive JPEG, each of which takes a pass over all pixels; encoders write some ten."""
 LITTLE: Limit[int] = 1 << 16
 """A claim of fewer bytes is not doubted."""
 
@@ -93,6 +96,8 @@ def read_coded(path: Path | str) -> Stored:
     file = _open(path)
     spec = file.spec()
     width, height, _ = _checked(file, path)
+    if file.format_name() == "jpeg" and read_bytes(path).count(b"\xff\xda") > MAX_SCANS:
+        raise BadInputError(f"Picture '{path}' has over {MAX_SCANS} scans, as no encoder writes; write it again.")
     count = min(spec.nchannels, 4)
     try:
         pixels = file.read_image(0, count, spec.format)
@@ -154,14 +159,17 @@ def _checked(file: Any, path: Path) -> Header:
         raise BadInputError(
             f"Picture '{path}' has channels of {bits} bits ({depth}), which isn't supported; write PNG or EXR."
         )
+    size = path.stat().st_size
+    more = too_large(spec.image_bytes(), size)
     if file.format_name() == "png":
         bits, colour = _png_kind(path)
         larger = 4 if colour == PALETTE else 1  # what a pixel of the file becomes when a palette is looked up
-        if spec.image_bytes() * min(bits, 8) // 8 > max(LITTLE, larger * MAX_RATIO * path.stat().st_size):
-            raise BadInputError(
-                f"Picture '{path}' claims {width} x {height} pixels, more than it can hold; it is "
-                "damaged or cut off, so write or copy it again."
-            )
+        more |= spec.image_bytes() * min(bits, 8) // 8 > max(LITTLE, larger * MAX_RATIO * size)
+    if more:
+        raise BadInputError(
+            f"Picture '{path}' claims {width} x {height} pixels, more than it can hold; it is "
+            "damaged or cut off, so write or copy it again."
+        )
     return Header(width, height, DEPTHS[depth])
 
 

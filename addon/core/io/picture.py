@@ -12,6 +12,24 @@ MAX_PIXELS: Limit[int] = 1 << 26
 """Largest picture that is read at all: 67 million pixels, above the 48 of phones."""
 
 
+MIN_BYTES: Limit[float] = 1 / 64
+"""Bytes that a pixel of a camera's picture takes in its file at least: the noise of a sensor compresses no further."""
+FREE_PIXELS: Limit[int] = 1 << 22
+"""A picture of so many pixels may take fewer: it costs little, whatever it claims."""
+LARGE: Limit[tuple[int, int]] = (1 << 28, 400)
+"""Bytes of pixels beyond which a file has to hold one for so many of them, whatever its pixels are."""
+
+
+def too_large(stored: int, size: int) -> bool:
+    """Whether so many bytes of pixels (`stored`) are out of all proportion to a file of `size` bytes."""
+    return stored > max(LARGE[0], LARGE[1] * size)
+
+
+def too_few_bytes(width: int, height: int, size: int) -> bool:
+    """Whether a camera's picture of so many pixels can't be in a file of `size` bytes: it was made to fill memory."""
+    return width * height > max(FREE_PIXELS, size / MIN_BYTES)
+
+
 class Picture(NamedTuple):
     """A picture, row 0 at the top.
 

@@ -23,9 +23,10 @@ from .conventions import parse, upright
 from .exposures import from_csv, from_exif
 from .files import EscapesError, absence, check_links
 from .frame_codes import with_curves
-from .id_pictures import read_ids
+from .id_pictures import check_size, read_ids
 from .layout import AS_FOUND, Layout, RawMesh, Reading
 from .mesh_repair import repair
+from .picture import too_few_bytes
 from .pictures import picture_note, picture_size, read_picture
 from .pixels import read_pixels
 from .readers import reader_for
@@ -106,7 +107,7 @@ def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str
     found = raw.object_id
     told = found is not None or any(frame.id_path is not None for frame in frames)
     if found is None and told:
-        found, notes = vote(raw.vertices, raw.triangles, frames, read_ids)
+        found, notes = vote(raw.vertices, raw.triangles, frames, _ids)
         warnings += notes
     elif found is None:
         parts = parts_of(raw.vertices, raw.triangles)
@@ -125,6 +126,11 @@ def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str
     lit = None if frames else raw.lit
     mesh = Mesh(raw.vertices, raw.triangles, ids, raw.uv, lit, closed=closed if len(closed) else None)
     return mesh, objects, warnings + more
+
+
+def _ids(frame: Frame) -> np.ndarray:
+    check_size(frame)
+    return read_ids(frame)
 
 
 def _pixels(frame: Frame) -> Pixels:
@@ -185,9 +191,15 @@ def _check_frame(frame: Frame) -> None:
     """Look at a frame's camera and at the headers of its pictures; raises `BadInputError`."""
     check_camera(frame.camera, frame.name)
     wanted = frame.camera.width, frame.camera.height
-    paths = (*(shot.path for shot in frame.shots), frame.mask_path)
-    sizes = [(path, picture_size(path)) for path in paths if path is not None]
-    for path, (width, height) in sizes:
+    shots = [shot.path for shot in frame.shots]
+    for path in filter(None, (*shots, frame.mask_path)):
+        width, height = picture_size(path)
+        size = path.stat().st_size
+        if path in shots and too_few_bytes(width, height, size):
+            raise BadInputError(
+                f"Frame '{frame.name}': '{path}' claims {width} x {height} pixels in {size} bytes, fewer than any "
+                "camera's picture takes; give the picture as it was taken or rendered."
+            )
         if (width, height) != wanted:
             raise BadInputError(
                 f"Frame '{frame.name}': '{path}' has {width} x {height} pixels, but its camera has "

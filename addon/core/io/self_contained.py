@@ -25,17 +25,20 @@ MAX_BARE: Limit[int] = 1 << 24
 DROPPED = ("materials", "textures", "images", "samplers", "animations", "skins", "cameras", "extensions")
 COMPRESSED = "KHR_draco_mesh_compression"
 OBJ_DROPPED = re.compile(rb"^\s*(mtllib|usemtl|usemap|maplib|call|csh)\b")
+OBJ_PART = re.compile(rb"^([og] )(.*\S)\s*$")
 BLOCK: Block[int] = 1 << 20
 
 
-def copy_obj(path: Path, folder: Path) -> tuple[Path, bool]:
-    """Copy the OBJ file `path` into `folder` without its materials.
+def copy_obj(path: Path, folder: Path) -> tuple[Path, bool, dict[str, str]]:
+    """Copy the OBJ file `path` into `folder` without its materials, its objects or groups numbered.
 
     Returns
     -------
     copy : Path
     named : bool
         Whether it has objects (`o`); else its groups (`g`) are what tells its parts.
+    names : dict of str to str
+        What those that are numbered are called: of a thousand of one name Blender takes a second to name the next.
 
     Raises
     ------
@@ -43,19 +46,30 @@ def copy_obj(path: Path, folder: Path) -> tuple[Path, bool]:
         It can't be read, or the copy not written.
     """
     copy, named, inside = folder / "mesh.obj", False, False
+    names: dict[str, str] = {}
     with open(path, "rb") as source, open(copy, "wb") as target:
         # Lines of bounded length: a file without line ends is no reason to hold all of it.
         while line := source.readline(BLOCK):
             dropped = inside or OBJ_DROPPED.match(line) is not None
             inside = dropped and line.rstrip(b"\r\n").endswith(b"\\")
             named |= line.startswith(b"o ")
+            if not dropped and (told := OBJ_PART.match(line)):
+                number = f"part {len(names)}"
+                names[number] = told[2].decode("utf-8", "replace").strip()
+                line = told[1] + number.encode() + b"\n"
             if not dropped:
                 target.write(line)
-    return copy, named
+    return copy, named, names
 
 
-def copy_gltf(path: Path, folder: Path) -> Path:
+def copy_gltf(path: Path, folder: Path) -> tuple[Path, dict[str, str]]:
     """Copy the glTF or GLB file `path` into `folder`: geometry and nodes only, its buffers beside it.
+
+    Returns
+    -------
+    copy : Path
+    names : dict of str to str
+        As of `copy_obj`, of its nodes.
 
     Raises
     ------
@@ -92,16 +106,22 @@ def copy_gltf(path: Path, folder: Path) -> Path:
             kept = primitive.get("extensions")
             kept = {COMPRESSED: kept[COMPRESSED]} if isinstance(kept, dict) and COMPRESSED in kept else {}
             primitive["extensions"] = kept
-    for node in _list(top, "nodes", path):
+    names = {}
+    for i, node in enumerate(_list(top, "nodes", path)):
         for name in ("skin", "camera", "extensions"):
             node.pop(name, None)
+        if isinstance(node.get("name"), str) and node["name"]:
+            names[f"part {i}"], node["name"] = node["name"], f"part {i}"
     for name in ("extensionsUsed", "extensionsRequired"):
-        top[name] = [one for one in top.get(name) or [] if one in (COMPRESSED, "KHR_mesh_quantization")]
+        told = top.get(name, [])
+        if not isinstance(told, list):
+            raise BadInputError(f"Mesh '{path}' has '{name}' that is no list; export it again.")
+        top[name] = [one for one in told if one in (COMPRESSED, "KHR_mesh_quantization")]
         if not top[name]:
             del top[name]
     copy = folder / "mesh.gltf"
     copy.write_text(json.dumps(top))
-    return copy
+    return copy, names
 
 
 def _read(path: Path) -> tuple[dict[str, Any], tuple[int, int] | None]:

@@ -45,7 +45,7 @@ def test_a_file_of_more_channels_than_memory_should_hold_is_refused_by_its_heade
     write_with_library(path, {f"layer{i}.{c}": np.zeros((16, 16), np.float32) for i in range(12) for c in "RGB"})
     small, large = (struct.pack("<4i", 0, 0, size - 1, size - 1) for size in (16, 8192))
     # As long as a well packed file of that size could be.
-    path.write_bytes(path.read_bytes().replace(small, large) + bytes(1 << 22))
+    path.write_bytes(path.read_bytes().replace(small, large) + bytes(1 << 25))
     with pytest.raises(BadInputError, match="over 2 GiB of pixels in all its channels"):
         read_header(path)
 

@@ -22,8 +22,8 @@ def gltf(**changes):
 def test_an_obj_loses_its_libraries(tmp_path):
     (tmp_path / "a.obj").write_text("mtllib ../one.mtl \\\n ../two.mtl\no chair\nv 0 0 0\n  usemtl wood\ncall x.obj\n")
     (tmp_path / "copy").mkdir()
-    copy, named = copy_obj(tmp_path / "a.obj", tmp_path / "copy")
-    assert named and copy.read_text() == "o chair\nv 0 0 0\n"
+    copy, named, names = copy_obj(tmp_path / "a.obj", tmp_path / "copy")
+    assert named and copy.read_text() == "o part 0\nv 0 0 0\n" and names == {"part 0": "chair"}
 
 
 @pytest.mark.parametrize("binary", [False, True])
@@ -43,7 +43,7 @@ def test_a_gltf_keeps_its_surface_only(tmp_path, binary):
         (tmp_path / "mesh.bin").write_bytes(b"A" * 12)
         (tmp_path / "a.gltf").write_text(json.dumps(top))
     (tmp_path / "copy").mkdir()
-    copy = json.loads(copy_gltf(tmp_path / "a.gltf", tmp_path / "copy").read_text())
+    copy = json.loads(copy_gltf(tmp_path / "a.gltf", tmp_path / "copy")[0].read_text())
     assert "images" not in copy and "materials" not in copy and "material" not in copy["meshes"][0]["primitives"][0]
     assert copy["buffers"][0]["uri"] == "buffer0.bin" and (tmp_path / "copy/buffer0.bin").read_bytes() == b"A" * 12
 
@@ -63,6 +63,8 @@ def test_a_gltf_keeps_its_surface_only(tmp_path, binary):
         ({"bufferViews": [{"buffer": 0, "byteLength": 1 << 40}]}, "beyond its buffers"),
         ({"bufferViews": [{"buffer": "0", "byteLength": 1}]}, "beyond its buffers"),
         ({"accessors": [{"count": 1 << 40}]}, "more values than it holds"),
+        ({"extensionsUsed": "KHR_draco_mesh_compression"}, "'extensionsUsed' that is no list"),
+        ({"extensionsRequired": 3}, "'extensionsRequired' that is no list"),
         ({"asset": {"version": "1.0"}}, "no glTF 2.0"),
     ],
 )

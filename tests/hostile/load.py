@@ -1,0 +1,90 @@
+"""Captures that are large in one way: many frames, many objects, huge frames, tiny frames, many triangles."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from addon.core.io.exr import write_exr
+
+SIDE = 6.0
+"""Metres of the room, a cube whose boxes stand on its floor."""
+
+
+def box(low: np.ndarray, high: np.ndarray, inside: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """Corners (8, 3) and quads (6, 4) of a box, seen from outside or from inside."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    return low + corners * (high - low), quads[:, ::-1] if inside else quads
+
+
+def boxes(objects: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The room and `objects` - 1 boxes in it: vertices (v, 3), quads (q, 4), the object of each (q,)."""
+    found = [box(np.zeros(3), np.full(3, SIDE), inside=True)]
+    across = max(int(np.ceil(np.sqrt(objects))), 1)
+    for k in range(objects - 1):
+        at = np.array([*np.divmod(k, across), 0.0]) / across * SIDE
+        edge = SIDE / across
+        found.append(box(at + [0.2 * edge, 0.2 * edge, 0.0], at + [0.8 * edge, 0.8 * edge, 0.6 * edge]))
+    vertices = np.concatenate([one for one, _ in found])
+    quads = np.concatenate([one + 8 * k for k, (_, one) in enumerate(found)])
+    return vertices, quads, np.repeat(np.arange(len(found)), 6)
+
+
+def grid(triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The room's six sides in so many triangles or a few more, as one object."""
+    side = int(np.ceil(np.sqrt(triangles / 12)))
+    u, v = np.mgrid[0 : side + 1, 0 : side + 1].reshape(2, -1) * (SIDE / side)
+    first = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
+    quad = np.stack([first, first + 1, first + side + 2, first + side + 1], -1)
+    vertices, quads = [], []
+    for axis in range(3):
+        for end in (0.0, SIDE):
+            place = np.insert(np.stack([u, v], -1), axis, end, 1)
+            vertices.append(place)
+            quads.append((quad if (end == 0) != (axis == 1) else quad[:, ::-1]) + len(quads) * len(place))
+    quads = np.concatenate(quads)
+    return np.concatenate(vertices), quads, np.zeros(len(quads), int)
+
+
+def write(root: Path, mesh: tuple[np.ndarray, np.ndarray, np.ndarray], frames: int, size: tuple[int, int]) -> Path:
+    """A capture with a PLY mesh and frames of noise, as every pixel of a real one differs."""
+    vertices, quads, owner = mesh
+    (root / "images").mkdir(parents=True)
+    head = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
+        + "".join(f"property float {axis}\n" for axis in "xyz")
+        + f"element face {len(quads)}\nproperty list uchar int vertex_indices\nproperty int object_id\nend_header\n"
+    )
+    records = np.empty(len(quads), np.dtype([("n", "u1"), ("corners", "<i4", 4), ("owner", "<i4")]))
+    records["n"], records["corners"], records["owner"] = 4, quads, owner
+    (root / "mesh.ply").write_bytes(head.encode() + vertices.astype("<f4").tobytes() + records.tobytes())
+    names = [{"id": int(one), "class_name": "box" if one else "room"} for one in np.unique(owner)]
+    (root / "info_semantic.json").write_text(json.dumps({"objects": names}))
+    rng, entries = np.random.default_rng(0), []
+    width, height = size
+    for k in range(frames):
+        turn = 2 * np.pi * k / frames
+        back = np.array([np.cos(turn), np.sin(turn), 0.25]) / np.hypot(1, 0.25)
+        right = np.array([-np.sin(turn), np.cos(turn), 0.0])
+        pose = np.eye(4)
+        pose[:3] = np.stack([right, np.cross(back, right), back, np.full(3, SIDE / 2)], 1)
+        name = f"images/{k:05d}.exr"
+        write_exr(root / name, rng.random((height, width, 3), np.float32) * 0.2 + 0.3, half=True)
+        entries.append({"file_path": name, "transform_matrix": pose.tolist()})
+    told = {"w": width, "h": height, "fl_x": width / 2, "fl_y": width / 2, "cx": width / 2, "cy": height / 2}
+    (root / "transforms.json").write_text(json.dumps(told | {"frames": entries}))
+    return root
+
+
+LOADS: dict[str, Callable[[Path], Path]] = {
+    "2,000 frames of 64 x 48": lambda root: write(root, boxes(20), 2000, (64, 48)),
+    "5,000 objects, 12 frames of 160 x 120": lambda root: write(root, boxes(5000), 12, (160, 120)),
+    "one object, 12 frames of 160 x 120": lambda root: write(root, boxes(1), 12, (160, 120)),
+    "4 frames of 8000 x 4000": lambda root: write(root, boxes(20), 4, (8000, 4000)),
+    "50 frames of 1 x 1": lambda root: write(root, boxes(20), 50, (1, 1)),
+    "2 M triangles, 12 frames of 160 x 120": lambda root: write(root, grid(2_000_000), 12, (160, 120)),
+}
