@@ -46,6 +46,12 @@ def for_blocks(
 ) -> None:
     """Run function(block) for every block of range(count); raises what a block raised, or `InterruptedRun`."""
     todo = blocks(count, size)
+    if thread_count(threads) == 1 or len(todo) <= 1:  # a pool for one thread costs a switch of threads for each block
+        for done, block in enumerate(todo):
+            function(block)
+            if progress is not None:
+                progress.update((done + 1) / len(todo))
+        return
     with ThreadPoolExecutor(thread_count(threads)) as pool:
         waiting = {pool.submit(function, block) for block in todo}
         try:

@@ -157,7 +157,7 @@ def irradiance(
         lamps = blocks.evaluate(aim, step, GATHER.smooth, total.mean(1))
         shown, noise = lamps[:, :3], lamps[:, 3]
         if smooth:
-            shown, noise = less_noise(position, normal, shown, noise)
+            shown, noise = less_noise(position, normal, shown, noise, threads=threads)
         total += shown
     unsure = np.hypot(contrast * value[:, :3].mean(1), noise)
     if field.sun is not None:

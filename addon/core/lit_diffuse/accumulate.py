@@ -95,7 +95,7 @@ def accumulate(
         From `progress`.
     """
     normal, _ = triangle_geometry(mesh)
-    groups = ElementGroups(atlas)
+    groups = ElementGroups.of(atlas)
     estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
     wanted = frame_order(len(frames), seed)
 
@@ -104,9 +104,13 @@ def accumulate(
         pixels = read(frame)
         view = view_frame(frame.camera, mesh, scene, normal)
         pixels = pixels if change is None else change(frame, view, pixels)
-        asked = groups.candidates(view)
+        known = groups.seen(frame.camera, pixels.valid)
+        asked = groups.candidates(view) if known is None else known
         asked = asked if only is None else asked[only[asked]]
-        return int(index), view, pixels, observe(view, pixels, atlas, scene, asked)
+        found = observe(view, pixels, atlas, scene, asked, free=known is not None)
+        if known is None and only is None and change is None:
+            groups.remember(frame.camera, pixels.valid, found.element)
+        return int(index), view, pixels, found
 
     with ExitStack() as stack:
         for estimator in estimators.values():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -73,6 +74,11 @@ class Atlas:
     def box(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper corner of the room, (3,) each: `room_box` of the elements."""
         return room_box(self.position)
+
+    @cached_property
+    def kept(self) -> dict[str, Any]:
+        """What was found of these elements and will be asked for again, by name: for the modules that find it."""
+        return {}
 
     def place(self, index: np.ndarray) -> np.ndarray:
         """Elements (m,) as points (m, 6) whose nearest neighbours lie close and face the same way."""

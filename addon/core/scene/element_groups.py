@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import zlib
+
 import numpy as np
 
 from ..kinds import Block, Unit
@@ -21,6 +23,7 @@ class ElementGroups:
     """Elements of one object in one cell of space that face roughly one way: a ball, and a cone of normals.
 
     A group is left out only where no element of it could pass `visibility.observe`: nothing changes but the time.
+    What a camera was found to see is kept, and need not be found again by the next pass over the frames.
     """
 
     def __init__(self, atlas: Atlas):
@@ -50,6 +53,33 @@ class ElementGroups:
         cosine = np.einsum("ij,ij->i", normal, self._axis[group])
         widest = np.minimum.reduceat(cosine, start) if len(key) else cosine
         self._opening = np.arccos(np.clip(widest - SLACK, -1, 1))
+        self._seen: dict[tuple, tuple[object, bytes, bytes]] = {}
+
+    @staticmethod
+    def of(atlas: Atlas) -> ElementGroups:
+        """The atlas's, made once."""
+        if "groups" not in atlas.kept:
+            atlas.kept["groups"] = ElementGroups(atlas)
+        return atlas.kept["groups"]
+
+    @staticmethod
+    def _key(camera: Camera) -> tuple:
+        size = camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy
+        return *size, camera.camera_to_world.tobytes(), id(camera.lens)
+
+    def remember(self, camera: Camera, valid: np.ndarray, element: np.ndarray) -> None:
+        """Keep which elements ((k,) int32, sorted) a camera sees, of all, in the pixels that were valid."""
+        seen = np.zeros(len(self._group), bool)
+        seen[element] = True
+        # The lens is held, so that its id is nobody else's.
+        self._seen[self._key(camera)] = camera.lens, _packed(valid), _packed(seen)
+
+    def seen(self, camera: Camera, valid: np.ndarray) -> np.ndarray | None:
+        """What is remembered of a camera, (k,) int32; None where that is nothing, or other pixels are valid now."""
+        found = self._seen.get(self._key(camera))
+        if found is None or (valid.ravel() > _unpacked(found[1], valid.size)).any():
+            return None
+        return np.flatnonzero(_unpacked(found[2], len(self._group))).astype(np.int32)
 
     def candidates(self, view: FrameView) -> np.ndarray:
         """Elements that the frame may see, sorted: (k,) int32."""
@@ -87,3 +117,13 @@ class ElementGroups:
         angle = np.arccos(np.clip(-(away @ camera.camera_to_world[:3, 2]) / distance, -1, 1))
         ball = np.arcsin(np.minimum(self._radius / distance, 1))
         return (angle - ball < widest_angle(camera) + SLACK) | (distance <= self._radius)
+
+
+def _packed(marks: np.ndarray) -> bytes:
+    """Marks (bool) in a few bytes: they lie in rows."""
+    return zlib.compress(np.packbits(marks).tobytes(), 1)
+
+
+def _unpacked(packed: bytes, count: int) -> np.ndarray:
+    """The inverse of `_packed`, (count,) bool."""
+    return np.unpackbits(np.frombuffer(zlib.decompress(packed), np.uint8), count=count).view(bool)

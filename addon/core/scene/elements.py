@@ -10,7 +10,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from ..kinds import Block
-from ..parallel import blocks
+from ..parallel import blocks, for_blocks
 from .atlas import Atlas
 from .model import Mesh
 from .rays import RayScene
@@ -39,7 +39,7 @@ def uv_scale(mesh: Mesh, uv: np.ndarray) -> float:
     return float(np.sqrt(uv_area / max(area.sum(), 1e-30)))
 
 
-def _cover(uv: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _cover(uv: np.ndarray, size: int, threads: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Covered texels, the triangle over each and the barycentric point, by rays against the unwrapped mesh."""
     flat = np.concatenate([uv.reshape(-1, 2).astype(np.float64) * size, np.zeros((3 * len(uv), 1))], 1)
     plane = RayScene(flat, np.arange(3 * len(uv), dtype=np.int32).reshape(-1, 3))
@@ -57,9 +57,10 @@ def _cover(uv: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
         at = texels[found]
         triangle[at], u[at], v[at] = hits.triangle[found], hits.u[found], hits.v[found]
 
-    for row in range(0, size, ROWS_AT_ONCE):
-        texels = np.arange(row * size, min(row + ROWS_AT_ONCE, size) * size)
-        ask(texels, SUBSAMPLES[0])
+    def centres(rows: slice) -> None:
+        ask(np.arange(rows.start * size, rows.stop * size), SUBSAMPLES[0])
+
+    for_blocks(centres, size, ROWS_AT_ONCE, threads)
     # Only empty texels beside a covered one, or under a triangle too small for any centre, can be covered in part; what
     # is found so has neighbours in turn, along a sliver's whole length.
     corners = np.clip((uv.reshape(-1, 2) * size).astype(np.int64), 0, size - 1)
@@ -123,7 +124,12 @@ class Coarse(Protocol):
 
 
 def find_elements(
-    mesh: Mesh, uv: np.ndarray, size: int, coarse: Coarse | None = None, crumbs: Crumbs | None = None
+    mesh: Mesh,
+    uv: np.ndarray,
+    size: int,
+    coarse: Coarse | None = None,
+    crumbs: Crumbs | None = None,
+    threads: int = 0,
 ) -> Elements:
     """The elements at the texels that `uv` covers.
 
@@ -139,7 +145,7 @@ def find_elements(
     whole = np.ones(len(uv), bool)
     if crumbs is not None:
         whole[crumbs.triangle] = False
-    texel, triangle, u, v = _cover(uv if whole.all() else uv[whole], size)
+    texel, triangle, u, v = _cover(uv if whole.all() else uv[whole], size, threads)
     triangle = np.flatnonzero(whole).astype(np.int32)[triangle]
     position = np.empty((len(texel), 3), np.float32)
     for part in blocks(len(texel), 1 << 18):

@@ -154,7 +154,7 @@ def build_surface(
     texel = texel_size or sides.footprint / detail
     cells = SeenCells(towards, scene, cameras, texel, threads) if cameras and coarse_unseen else None
     uv, size, edge, crumbs = _laid_out(mesh, unwrap, texel, largest, cells)
-    elements = find_elements(towards, turned(uv, _every(mesh, sides.sign)), size, cells, crumbs)
+    elements = find_elements(towards, turned(uv, _every(mesh, sides.sign)), size, cells, crumbs, threads)
     return from_uv(mesh, sides.sign, uv, size, edge, known=elements, scene=scene)
 
 

@@ -186,7 +186,12 @@ def _tiers(view: FrameView, pixels: Pixels) -> np.ndarray:
 
 
 def observe(
-    view: FrameView, pixels: Pixels, atlas: Atlas, scene: RayScene, elements: np.ndarray | None = None
+    view: FrameView,
+    pixels: Pixels,
+    atlas: Atlas,
+    scene: RayScene,
+    elements: np.ndarray | None = None,
+    free: bool = False,
 ) -> Observations:
     """What a frame says of the surface elements.
 
@@ -197,6 +202,8 @@ def observe(
     ----------
     elements : (k,) int array, sorted, optional
         Ask only for these; all where not given.
+    free : bool
+        Nothing is known to hide them from the camera.
     """
     camera = view.camera
     centre = camera.centre.astype(np.float32)
@@ -224,10 +231,11 @@ def observe(
     to_camera = np.empty((len(at), 3), np.float32)
     for i in range(3):
         to_camera[:, i] = direction[i].take(angle)
-    origins = scene.off_surface(atlas.position.take(index, 0), normal)
-    reach = distance.take(angle) - np.float32(2 * scene.offset)
-    free = np.flatnonzero(~scene.occluded(origins, to_camera, reach))
-    index, to_camera, keep = index.take(free), to_camera.take(free, 0), keep.take(free)
+    if not free:
+        origins = scene.off_surface(atlas.position.take(index, 0), normal)
+        reach = distance.take(angle) - np.float32(2 * scene.offset)
+        open_ = np.flatnonzero(~scene.occluded(origins, to_camera, reach))
+        index, to_camera, keep = index.take(open_), to_camera.take(open_, 0), keep.take(open_)
 
     x, y, pixel = x.take(keep), y.take(keep), pixel.take(keep)
     tier = _tiers(view, pixels).take(pixel)

@@ -142,3 +142,24 @@ def test_a_wished_stop_is_heard(box, tmp_path):
     with pytest.raises(InterruptedRun):
         run(room, cameras, pictures, progress=Progress(should_stop=lambda: True), folder=tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_second_pass_finds_what_a_first_would():
+    """What the cameras were found to see is kept; pixels that are bad in one pass and good in another are seen anew."""
+    sheet = quad((2.2, 1.2, 0.2), (0, 0.8, 0), (0, 0, 1.5), 6)
+    cameras = [camera for eye in ((1, 1.5, 1.2), (3, 1.4, 1.1)) for camera in all_round(eye, 32)]
+
+    def pictures(bad: int):
+        found = [pixels_of(np.random.default_rng(i).random((32, 32, 3))) for i in range(len(cameras))]
+        for one in found:
+            one.valid[:, bad : bad + 8] = False
+        return found
+
+    def parts(room, bad, only=None):
+        found = run(room, cameras, pictures(bad), only=only)
+        return [getattr(found, name) for name in ("radiance", "lower", "count", "tier")]
+
+    room = make_room([*box_sides(), sheet], 0.1)
+    for bad, only in ((16, None), (0, None), (0, room.atlas.object_id == 6), (8, None)):
+        again, fresh = parts(room, bad, only), parts(make_room([*box_sides(), sheet], 0.1), bad, only)
+        assert all(np.array_equal(one, other, equal_nan=True) for one, other in zip(again, fresh, strict=True))

@@ -166,5 +166,5 @@ def glossy_light(
     # Spread like the light itself, the halves' difference has the noise that is left in it.
     found, noise = found[:, :3] - level, found[:, 3:].mean(1)
     if "glossy-smoothing" not in without:
-        found, _ = less_noise(position, normal, found, noise, GLOSSY.smooth)
+        found, _ = less_noise(position, normal, found, noise, GLOSSY.smooth, threads)
     return np.maximum(found, -GLOSSY.most_taken * irradiance).astype(np.float32)
