@@ -6,7 +6,12 @@ import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 
+from .kinds import Code
 from .progress import Progress, Rounds
+
+ONE_BLAS_THREAD: Code[dict[str, str]] = {"OPENBLAS_NUM_THREADS": "1"}
+"""Environment of a process that runs stages, from before NumPy is loaded. All cores are used already, and the products
+are of a few thousand numbers: BLAS's own threads wait for each other in loops (find_sun: half of its processor time)."""
 
 
 def thread_count(threads: int) -> int:

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 
 from ...core.errors import EXIT_INTERRUPTED, EXIT_OK, StorageError
 from ...core.kinds import Shown
+from ...core.parallel import ONE_BLAS_THREAD
 
 GRACE: Shown[float] = 0.5
 """Seconds between the polite wish to stop and the end of the process: finished stages are whole files by then."""
@@ -69,7 +70,12 @@ class Job:
             flags = {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS}
         try:
             self._process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **flags
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                env=ONE_BLAS_THREAD | os.environ,
+                **flags,  # fmt: skip
             )
         except OSError as error:
             raise StorageError(f"The run can't be started ({error.strerror or error}); start Blender anew.") from error

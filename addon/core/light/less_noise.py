@@ -104,7 +104,7 @@ def _planes(position: np.ndarray, light: np.ndarray, group: np.ndarray, count: n
 
 
 def _solved(symmetric: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solutions of k systems of three equations, (k, 3, 3); LAPACK, asked for each by itself, takes ten times as long."""
+    """Solutions of k systems of three equations, (k, 3, 3); LAPACK takes ten times as long over systems so small."""
     rows = symmetric.transpose(1, 0, 2)
     cofactors = np.stack([np.cross(rows[1], rows[2]), np.cross(rows[2], rows[0]), np.cross(rows[0], rows[1])], 1)
     determinant = np.einsum("kj,kj->k", rows[0], cofactors[:, 0])

@@ -124,12 +124,7 @@ class Coarse(Protocol):
 
 
 def find_elements(
-    mesh: Mesh,
-    uv: np.ndarray,
-    size: int,
-    coarse: Coarse | None = None,
-    crumbs: Crumbs | None = None,
-    threads: int = 0,
+    mesh: Mesh, uv: np.ndarray, size: int, coarse: Coarse | None = None, crumbs: Crumbs | None = None, threads: int = 0
 ) -> Elements:
     """The elements at the texels that `uv` covers.
 
