@@ -10,8 +10,8 @@ from .kinds import Code
 from .progress import Progress, Rounds
 
 ONE_BLAS_THREAD: Code[dict[str, str]] = {"OPENBLAS_NUM_THREADS": "1"}
-"""Environment of a process that runs stages, from before NumPy is loaded. All cores are used already, and the products
-are of a few thousand numbers: BLAS's own threads wait for each other in loops (find_sun: half of its processor time)."""
+"""Environment of a process that runs stages, from before NumPy is loaded. All cores are used already, and products are
+of a few thousand numbers: BLAS's own threads wait for each other in loops (`find_sun`: half of its processor time)."""
 
 
 def thread_count(threads: int) -> int:
@@ -52,10 +52,10 @@ def for_blocks(
     """Run function(block) for every block of range(count); raises what a block raised, or `InterruptedRun`."""
     todo = blocks(count, size)
     if thread_count(threads) == 1 or len(todo) <= 1:  # a pool for one thread costs a switch of threads for each block
-        for done, block in enumerate(todo):
+        for number, block in enumerate(todo, 1):
             function(block)
             if progress is not None:
-                progress.update((done + 1) / len(todo))
+                progress.update(number / len(todo))
         return
     with ThreadPoolExecutor(thread_count(threads)) as pool:
         waiting = {pool.submit(function, block) for block in todo}
