@@ -50,13 +50,24 @@ def grid(triangles: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.concatenate(vertices), quads, np.zeros(len(quads), int)
 
 
-def write(root: Path, mesh: tuple[np.ndarray, np.ndarray, np.ndarray], frames: int, size: tuple[int, int]) -> Path:
-    """A capture with a PLY mesh and frames of noise, as every pixel of a real one differs."""
+def write(
+    root: Path, mesh: tuple[np.ndarray, np.ndarray, np.ndarray], frames: int, size: tuple[int, int], uv: bool = False
+) -> Path:
+    """A capture with a PLY mesh and frames of noise, as every pixel of a real one differs.
+
+    With `uv` the mesh brings an atlas: a cell for each quad.
+    """
     vertices, quads, owner = mesh
+    if uv:
+        vertices, quads = vertices[quads.ravel()], np.arange(quads.size).reshape(-1, 4)
+        across = int(np.ceil(np.sqrt(len(quads))))
+        cell = np.stack(np.divmod(np.arange(len(quads)), across), -1)[:, None]
+        corners = np.array([[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.1, 0.9]])
+        vertices = np.concatenate([vertices, ((cell + corners) / across).reshape(-1, 2)], -1)
     (root / "images").mkdir(parents=True)
     head = (
         f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
-        + "".join(f"property float {axis}\n" for axis in "xyz")
+        + "".join(f"property float {axis}\n" for axis in ("xyzst" if uv else "xyz"))
         + f"element face {len(quads)}\nproperty list uchar int vertex_indices\nproperty int object_id\nend_header\n"
     )
     records = np.empty(len(quads), np.dtype([("n", "u1"), ("corners", "<i4", 4), ("owner", "<i4")]))

@@ -125,6 +125,8 @@ def _text_images(path: Path) -> list[ColmapImage]:
                 continue
             try:
                 number, *pose, camera, name = line.split(None, 9)
+                if len(pose) != 7:
+                    raise ValueError
                 values = tuple(map(float, pose))
                 images.append(ColmapImage(int(number), values[:4], values[4:], int(camera), _name(name.strip())))
             except ValueError:

@@ -101,7 +101,7 @@ def relative(settings: Sequence[Settings | None]) -> list[float | None]:
             values.append(None)
             continue
         time, f_number, iso = (1.0 if value is None else value for value in one)
-        value = time * iso / f_number**2 if f_number < 1e100 else 0.0
+        value = time * iso / f_number / f_number  # not its square, which may be 0
         values.append(value if 0 < value < math.inf else None)
     median = float(np.median([value for value in values if value is not None] or [1.0]))
     return [None if value is None else value / median for value in values]

@@ -28,7 +28,7 @@ from ..passes.albedo.albedo import CLOSED, MEASURED, Albedo
 from ..passes.albedo.params import ALBEDO
 from ..progress import Progress
 from ..results.overrides import Given, Overrides, heeded, parse
-from ..results.room_file import MATERIALS, Room, read_room
+from ..results.room_file import DAMAGE, MATERIALS, Room, read_room
 from ..results.store import Store
 from ..scene.model import Mesh
 from ..settings import ROOM, Settings
@@ -115,7 +115,7 @@ def open_result(
         result.settings, result.given  # noqa: B018  (what is damaged is told now)
     except FileNotFoundError as error:
         raise _again(folder, f"'{REPORT}' is missing") from error
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except DAMAGE as error:
         raise BadInputError(
             f"The result in '{folder}' is damaged ({type(error).__name__}: {error}); run recover again."
         ) from error

@@ -13,7 +13,7 @@ from itertools import count
 from pathlib import Path
 
 from ..atomic import write_bytes
-from .room_file import root_of
+from .room_file import DAMAGE, root_of
 
 CAPTURE = "capture.json"
 """File of a result folder that tells which capture it is of, from the first moment of a run on."""
@@ -45,7 +45,7 @@ def captures(folder: Path | str) -> tuple[Path, ...]:
         if told.get("relative"):
             found.append(Path(os.path.normpath(folder.absolute() / told["relative"])))
         return tuple(found)
-    except (OSError, ValueError, TypeError, KeyError, AttributeError):
+    except DAMAGE:
         pass
     root = root_of(folder)  # of an earlier version
     return () if root is None else (root,)

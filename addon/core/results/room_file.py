@@ -25,7 +25,8 @@ MATERIALS = "materials.json"
 OPENINGS = "openings.json"
 """Lamps and windows that no frame saw, where they hang in openings of the mesh; absent where none were found."""
 CAMERA = ("width", "height", "fx", "fy", "cx", "cy")
-DAMAGE = (OSError, ValueError, KeyError, TypeError, Damaged)
+DAMAGE = (OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError, Damaged)
+"""What reading a file raises that holds something else than it should."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,7 @@ def _materials(folder: Path | str) -> dict[str, Any]:
     """What `MATERIALS` tells; nothing where it is absent or damaged."""
     try:
         told = json.loads((Path(folder) / MATERIALS).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except DAMAGE:
         return {}
     return told if isinstance(told, dict) else {}
 
