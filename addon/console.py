@@ -170,6 +170,7 @@ def unexpected(error: Exception, folder: Path | str | None) -> str:
     if folder:
         log = Path(folder) / "error.log"
         try:
+            log.unlink(missing_ok=True)  # a link there stays within the folder
             log.write_text("".join(traceback.format_exception(error)), encoding="utf-8")
             return f"{sentence}; please report it with '{log}'."
         except OSError:

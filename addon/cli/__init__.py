@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from ..console import own_console, unexpected
 from ..core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, ScanRelightError
 from ..core.parallel import ONE_BLAS_THREAD
+from ..temporary import use_own_folder
 from ..version import VERSION
 from .ablation import ablation_command, add_ablation, joined
 from .benchmark import add_benchmark, benchmark_command
@@ -51,6 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as end:  # argparse has printed help, the version, or what is wrong
         return end.code if isinstance(end.code, int) else EXIT_BAD_INPUT
     os.environ.update(ONE_BLAS_THREAD | os.environ)
+    use_own_folder()
     try:
         with own_console(keep_others=arguments.debug) as stream:
             return arguments.function(arguments, stream)

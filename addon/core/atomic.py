@@ -5,13 +5,20 @@ from __future__ import annotations
 import contextlib
 import os
 import secrets
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import StorageError
+from .kinds import Shown
 
 TEMPORARY = ".partial-"
 """What a temporary name begins with; the process id follows, so that the remains of dead runs can be told."""
+
+HELD_OPEN = os.name == "nt"
+"""Whether a file that another program has open can't be replaced: Windows tells a sharing violation."""
+PAUSES: Shown[tuple[float, ...]] = (0.05, 0.1, 0.2, 0.4, 0.8)
+"""Seconds between one try and the next; scanners let go of a new file after some tenths."""
 
 
 @contextlib.contextmanager
@@ -31,7 +38,7 @@ def replacing(path: Path | str) -> Iterator[Path]:
     try:
         try:
             yield temporary
-            os.replace(temporary, path)
+            _move(temporary, path)
         except BaseException:
             with contextlib.suppress(OSError):
                 temporary.unlink()
@@ -40,6 +47,18 @@ def replacing(path: Path | str) -> Iterator[Path]:
         raise StorageError(
             f"'{path}' can't be written ({error.strerror or error}); free some space or choose another result folder."
         ) from error
+
+
+def _move(temporary: Path, path: Path) -> None:
+    """Move over what is there; where that may be held open by a virus scanner, try again."""
+    for pause in (*PAUSES, None) if HELD_OPEN else (None,):
+        try:
+            os.replace(temporary, path)
+            return
+        except PermissionError:
+            if pause is None:
+                raise
+            time.sleep(pause)
 
 
 def write_bytes(path: Path | str, *pieces: bytes | memoryview) -> None:

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from ...core.errors import EXIT_INTERRUPTED, EXIT_OK, StorageError
 from ...core.kinds import Shown
 from ...core.parallel import ONE_BLAS_THREAD
+from ...temporary import RunFolder
 
 GRACE: Shown[float] = 0.5
 """Seconds between the polite wish to stop and the end of the process: finished stages are whole files by then."""
@@ -68,16 +69,18 @@ class Job:
         flags = {"start_new_session": True}
         if os.name == "nt":
             flags = {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.BELOW_NORMAL_PRIORITY_CLASS}
+        self._folder = RunFolder()
         try:
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
-                env=ONE_BLAS_THREAD | os.environ,
+                env=ONE_BLAS_THREAD | os.environ | self._folder.environment,
                 **flags,  # fmt: skip
             )
         except OSError as error:
+            self._folder.close()
             raise StorageError(f"The run can't be started ({error.strerror or error}); start Blender anew.") from error
         _alive.add(self)
         self._readers = [
@@ -168,6 +171,7 @@ class Job:
         for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
             with contextlib.suppress(OSError, ValueError):
                 pipe.close()
+        self._folder.close()
         self.ended = time.monotonic()
         if code == EXIT_OK:
             state = DONE

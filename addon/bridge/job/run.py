@@ -1,5 +1,6 @@
 """A whole run, capture in, result folder out, and a few objects fitted again: what command line and operators call."""
 
+import os
 import time
 from collections.abc import Collection
 from dataclasses import replace
@@ -8,6 +9,7 @@ from pathlib import Path
 
 import bpy
 
+from ...core.errors import BadInputError
 from ...core.io.layout import AS_FOUND, Reading
 from ...core.io.read import read_capture
 from ...core.pipeline.recover import Recovery
@@ -94,6 +96,11 @@ def run(
     """
     capture_folder, out_folder = Path(capture_folder), Path(out_folder)
     check_run(capture_folder, out_folder, until, from_stage)
+    if os.sep == "/" and "\\" in str(out_folder.absolute()):
+        raise BadInputError(
+            f"Result folder '{out_folder.absolute()}' has a backslash in its path, which Blender takes for a slash; "
+            "choose one without, or run with --no-scene."
+        )
     if scene is not None:
         result_images.check(images)
     started = time.monotonic()

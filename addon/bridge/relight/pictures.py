@@ -203,6 +203,7 @@ def saving(path: Path) -> Iterator[Path]:
     with refused(f"'{path}' can't be written", "free some space or choose another result folder"):
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as temporary:
+            temporary.touch()  # a folder that can't be written is told before the picture is rendered, and by its name
             yield temporary
             content = temporary.read_bytes() if temporary.exists() else b""
             whole = content[-8:-4] == b"IEND" if path.suffix.lower() == ".png" else len(content) > 100

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-import shutil
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import ScanRelightError
-from .store import LOCK, STAGES, Store
+from .store import LOCK, STAGE_FILE, STAGES, Store
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,11 @@ def size(folder: Path | str) -> int:
     return total
 
 
+def _is_stage(path: Path) -> bool:
+    """Whether a file in the folder of stages is one: others may have a folder of that name, too."""
+    return not path.is_symlink() and path.is_file() and re.fullmatch(STAGE_FILE, path.name) is not None
+
+
 def clear(folders: Iterable[Path]) -> Cleared:
     """Clear the stages of result folders; what is no result is passed over.
 
@@ -55,10 +60,10 @@ def clear(folders: Iterable[Path]) -> Cleared:
     for folder in filter(is_result, dict.fromkeys(folders)):
         try:
             with Store(folder):
-                before = size(folder / STAGES)
-                shutil.rmtree(folder / STAGES)
-                (folder / STAGES).mkdir()  # by which the folder is known
-            freed += before
+                for path in filter(_is_stage, (folder / STAGES).iterdir()):
+                    stored = path.lstat().st_size
+                    path.unlink()
+                    freed += stored
             touched += 1
         except ScanRelightError as error:
             left.append(str(error))

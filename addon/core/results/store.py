@@ -25,8 +25,11 @@ from ..json_values import plain
 from .archive import Damaged, read_archive, write_archive
 
 STAGES = "stages"
+STAGE_FILE = r"[A-Za-z0-9_-]+\.npz"
 SPILLED = "tmp-observations-"
 """How folders begin that an exact median keeps its observations in (`lit_diffuse.medians`)."""
+OTHERS = ("objects", "kept")
+"""Further folders of a result: images of single objects, images that saved files show."""
 LOCK = ".lock"
 FULL = (errno.ENOSPC, errno.EDQUOT if hasattr(errno, "EDQUOT") else errno.ENOSPC)
 
@@ -56,6 +59,11 @@ class Store:
         self.folder = Path(folder)
         self.damaged: list[str] = []
         self._lock = None
+        for name in (STAGES, *OTHERS):
+            if (self.folder / name).is_symlink():
+                raise BadInputError(
+                    f"'{self.folder / name}' is a link, and a run would write elsewhere; put a folder in its place."
+                )
         try:
             (self.folder / STAGES).mkdir(parents=True, exist_ok=True)
             self._lock = _take_lock(self.folder)
@@ -167,7 +175,7 @@ class Store:
         return path
 
     def _stage(self, name: str) -> Path:
-        if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
+        if not re.fullmatch(STAGE_FILE, f"{name}.npz"):
             raise ValueError(f"'{name}' is no name for a stage")
         return self.folder / STAGES / f"{name}.npz"
 
@@ -177,7 +185,9 @@ def _take_lock(folder: Path):
 
     So a run that was killed leaves no lock behind, and no process id has to be asked whether it still lives.
     """
-    file = open(folder / LOCK, "a+b")
+    # A link in a folder that somebody else made must not have its target emptied.
+    no_link = getattr(os, "O_NOFOLLOW", 0)
+    file = open(folder / LOCK, "a+b", opener=lambda path, flags: os.open(path, flags | no_link, 0o666))
     try:
         if sys.platform == "win32":
             import msvcrt

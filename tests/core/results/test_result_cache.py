@@ -60,3 +60,16 @@ def test_a_folder_that_is_being_written_is_left(cache):
         done = clear(results(cache))
     assert done.results == 1 and "another run" in done.left[0]
     assert (cache / "room" / "stages" / "surface.npz").exists()
+
+
+def test_what_others_keep_among_the_stages_stays(cache, tmp_path):
+    """Whatever the folder of results is set to: a theatre's project may have a lock and a folder of stages."""
+    stages = cache / "hall" / "stages"
+    (stages / "act one").mkdir()
+    (stages / "act one" / "scene.npz").write_text("mine")
+    (stages / "plan.txt").write_text("mine")
+    (tmp_path / "mine.npz").write_text("mine")
+    (stages / "link.npz").symlink_to(tmp_path / "mine.npz")
+    assert not clear([cache / "hall"]).left
+    assert sorted(one.name for one in stages.iterdir()) == ["act one", "link.npz", "plan.txt"]
+    assert (stages / "act one" / "scene.npz").exists() and (tmp_path / "mine.npz").exists()

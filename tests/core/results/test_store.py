@@ -190,6 +190,71 @@ def test_an_interrupt_leaves_no_remains(store, monkeypatch):
     assert names(store) == [".lock"]
 
 
+# --- what other machines and programs do to files
+
+
+@pytest.mark.parametrize("held", [1, 3, 9])
+def test_a_file_that_a_scanner_holds_open_is_tried_again(store, monkeypatch, held):
+    from addon.core import atomic
+
+    tries, real = [], os.replace
+
+    def replace(*paths):
+        tries.append(paths)
+        if len(tries) <= held:
+            raise PermissionError(errno.EACCES, "The process cannot access the file")
+        real(*paths)
+
+    monkeypatch.setattr(atomic, "HELD_OPEN", True)
+    monkeypatch.setattr(atomic, "PAUSES", (0.001,) * 5)
+    monkeypatch.setattr(os, "replace", replace)
+    if held < 6:
+        store.write_json("a.json", {})
+        assert store.path("a.json").exists()
+    else:
+        with pytest.raises(StorageError, match="cannot access"):
+            store.write_json("a.json", {})
+
+
+def test_a_stale_handle_of_a_network_disk(store, monkeypatch):
+    """Read: the stage is done anew, and said. Written: one sentence."""
+    store.save("a", "k", ARRAYS)
+    real, stale = open, OSError(errno.ESTALE, os.strerror(errno.ESTALE))
+
+    def refuse(path, *args, **kwargs):
+        if str(path).endswith("a.npz"):
+            raise stale
+        return real(path, *args, **kwargs)
+
+    monkeypatch.setattr("builtins.open", refuse)
+    assert store.load("a", "k") is None and store.damaged == ["a"]
+    with pytest.raises(StorageError, match="[Ss]tale"):
+        store.save("a", "k", ARRAYS)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="descriptors are counted otherwise")
+def test_no_free_descriptors(tmp_path):
+    code = """
+import os, resource, sys
+from addon.core.errors import ScanRelightError
+from addon.core.results.store import Store
+store = Store(sys.argv[1])
+resource.setrlimit(resource.RLIMIT_NOFILE, (16, 16))
+held = []
+try:
+    while True:
+        held.append(os.open(os.devnull, os.O_RDONLY))
+except OSError:
+    pass
+try:
+    store.write_json("a.json", {})
+except ScanRelightError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], cwd=ROOT, capture_output=True, text=True)
+    assert "Too many open files" in done.stdout and not done.stderr, done.stderr
+
+
 # --- two runs, dead runs
 
 
