@@ -21,7 +21,9 @@ from tests.hostile.readers import readers
 ROOT = Path(__file__).resolve().parents[2]
 CORPUS = Path(__file__).with_name("corpus.txt")
 HANG = 10.0
-"""Seconds after which reading a few thousand bytes is a hang."""
+"""Seconds of processor time after which reading a few thousand bytes is a hang."""
+WAIT = 120.0
+"""Seconds after which a child that says nothing is killed: the machine may be busy with other things."""
 LIMIT = 6 << 30
 """Bytes of addresses that a child may take."""
 MEMORY = 300 << 20
@@ -46,18 +48,17 @@ class Child:
         self._process: subprocess.Popen | None = None
 
     def read(self, name: str, seed: int) -> Outcome:
-        new = self._process is None
-        if new:
+        if self._process is None:
             self._start()
         started = time.monotonic()
         try:
             self._process.stdin.write(json.dumps([name, seed]) + "\n")
             self._process.stdin.flush()
-            line = self._lines.get(timeout=HANG + (60 if new else 20))  # it may have to write the good file first
+            line = self._lines.get(timeout=WAIT)
         except (queue.Empty, OSError):
             line = None
         if not line:
-            code, hangs = self._process.poll(), time.monotonic() - started > HANG
+            code, hangs = self._process.poll(), time.monotonic() - started > WAIT - 1
             told = Path(self._errors.name).read_text(errors="replace")[-1500:]
             self.close()
             return Outcome(name, seed, "hang" if hangs and code is None else f"died ({code})", told, 0, 0)

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import BadInputError
+from ...core.io.gltf_nodes import Placed
 from ...core.io.layout import RawMesh
 from ...core.io.self_contained import copy_gltf, copy_obj
 from ..refused import reason_of
@@ -35,8 +36,9 @@ def import_mesh(path: Path) -> RawMesh:
         )
     try:
         with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, _scene_apart() as (scene, made):
-            names = _import(path, Path(folder), scene)
-            parts = _parts(scene, made.new("objects"), names)
+            placed = _import(path, Path(folder), scene)
+            scene.view_layers[0].update()  # world matrices
+            parts = _parts(made.new("objects"), placed)  # not all_objects: making that list takes its length squared
     except OSError as error:
         reason = error.strerror or error
         raise BadInputError(
@@ -49,8 +51,8 @@ def import_mesh(path: Path) -> RawMesh:
     return _joined(parts, path.name)
 
 
-def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> dict[str, str]:
-    """Run Blender's importer on a copy of `path` that names nothing else; what objects are called there."""
+def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> list[Placed]:
+    """Run Blender's importer on a copy of `path`, naming nothing else; how each 'part N' of it is called and lies."""
     with bpy.context.temp_override(
         scene=scene,
         view_layer=scene.view_layers[0],
@@ -59,17 +61,17 @@ def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> dict[str, str]:
     ):
         try:
             if path.suffix.lower() == ".obj":
-                copy, named, names = copy_obj(path, folder)
+                copy, named, placed = copy_obj(path, folder)
                 split = {"use_split_objects": named, "use_split_groups": not named}
                 bpy.ops.wm.obj_import(filepath=str(copy), forward_axis="Y", up_axis="Z", validate_meshes=True, **split)
-                return names
-            copy, names = copy_gltf(path, folder)
+                return placed
+            copy, placed = copy_gltf(path, folder)
             if not hasattr(bpy.types, "IMPORT_SCENE_OT_gltf"):  # its add-on is switched off
                 import addon_utils
 
                 addon_utils.enable("io_scene_gltf2")
             bpy.ops.import_scene.gltf(filepath=str(copy), import_shading="FLAT", merge_vertices=False)
-            return names
+            return placed
         except (RuntimeError, AttributeError) as error:  # how an operator tells of anything that went wrong
             raise BadInputError(
                 f"Mesh '{path}' can't be read by Blender ({reason_of(error)[-150:]}); export it again."
@@ -96,20 +98,27 @@ class _Part(NamedTuple):
     uv: np.ndarray | None
 
 
-def _parts(scene: bpy.types.Scene, things: list[bpy.types.Object], names: dict[str, str]) -> list[_Part]:
-    scene.view_layers[0].update()  # world matrices of children
+def _parts(things: list[bpy.types.Object], placed: list[Placed]) -> list[_Part]:
+    """The parts by their names; those of one name in the file's order."""
+    places: dict[int, list[tuple[int, Placed]]] = {}
+    for order, one in enumerate(placed):
+        places.setdefault(one.mesh, []).append((order, one))
     found = []
-    for order, thing in enumerate(things):  # not all_objects: making that list takes its length squared
+    for thing in things:
         triangles = triangles_of(thing.data) if thing.type == "MESH" else ()
-        if len(triangles):
-            layer, mirrored = thing.data.uv_layers.active, thing.matrix_world.is_negative
-            uv = layer and layer_of(thing.data, layer.name)[triangles_of(thing.data, "loops")]
-            if mirrored:  # its triangles are wound the other way
-                triangles, uv = triangles[:, [0, 2, 1]], None if uv is None else uv[:, [0, 2, 1]]
-            name, number = NUMBERED.match(names.get(thing.name, thing.name)).groups()
-            part = _Part(name, vertices_of(thing.data, thing.matrix_world), triangles, uv)
-            place = PART.match(thing.name)
-            found.append(((name, int(number or 0), int(place[1]) if place else order), part))
+        if not len(triangles):
+            continue
+        layer, known = thing.data.uv_layers.active, PART.match(thing.name)
+        uv = layer and layer_of(thing.data, layer.name)[triangles_of(thing.data, "loops")]
+        vertices = vertices_of(thing.data, thing.matrix_world)
+        unnamed = [(len(found), Placed(0, thing.name, np.eye(4)))]
+        for order, one in places.get(int(known[1]), unnamed) if known else unnamed:
+            corners = triangles, uv
+            if np.linalg.det(one.matrix[:3, :3]) < 0:  # its triangles are wound the other way
+                corners = triangles[:, [0, 2, 1]], None if uv is None else uv[:, [0, 2, 1]]
+            name, number = NUMBERED.match(one.name).groups()
+            part = _Part(name, vertices @ one.matrix[:3, :3].T + one.matrix[:3, 3], *corners)
+            found.append(((name, int(number or 0), order), part))
     return [part for _, part in sorted(found, key=lambda one: one[0])]
 
 

@@ -15,8 +15,11 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 from urllib.parse import unquote
 
+import numpy as np
+
 from ..errors import BadInputError
 from ..kinds import Block, Limit
+from .gltf_nodes import Placed, placed_meshes
 
 MAX_JSON: Limit[int] = 1 << 28
 """Bytes of glTF's JSON part that are read at most."""
@@ -29,16 +32,16 @@ OBJ_PART = re.compile(rb"^([og] )(.*\S)\s*$")
 BLOCK: Block[int] = 1 << 20
 
 
-def copy_obj(path: Path, folder: Path) -> tuple[Path, bool, dict[str, str]]:
-    """Copy the OBJ file `path` into `folder` without its materials, its objects or groups numbered.
+def copy_obj(path: Path, folder: Path) -> tuple[Path, bool, list[Placed]]:
+    """Copy the OBJ file `path` into `folder` without its materials, its objects or groups called 'part N'.
 
     Returns
     -------
     copy : Path
     named : bool
         Whether it has objects (`o`); else its groups (`g`) are what tells its parts.
-    names : dict of str to str
-        What those that are numbered are called: of a thousand of one name Blender takes a second to name the next.
+    placed : list of Placed
+        What each is called: of a thousand of one name Blender takes long to name the next.
 
     Raises
     ------
@@ -46,7 +49,7 @@ def copy_obj(path: Path, folder: Path) -> tuple[Path, bool, dict[str, str]]:
         It can't be read, or the copy not written.
     """
     copy, named, inside = folder / "mesh.obj", False, False
-    names: dict[str, str] = {}
+    placed: list[Placed] = []
     with open(path, "rb") as source, open(copy, "wb") as target:
         # Lines of bounded length: a file without line ends is no reason to hold all of it.
         while line := source.readline(BLOCK):
@@ -54,22 +57,21 @@ def copy_obj(path: Path, folder: Path) -> tuple[Path, bool, dict[str, str]]:
             inside = dropped and line.rstrip(b"\r\n").endswith(b"\\")
             named |= line.startswith(b"o ")
             if not dropped and (told := OBJ_PART.match(line)):
-                number = f"part {len(names)}"
-                names[number] = told[2].decode("utf-8", "replace").strip()
-                line = told[1] + number.encode() + b"\n"
+                line = told[1] + f"part {len(placed)}\n".encode()
+                placed.append(Placed(len(placed), told[2].decode("utf-8", "replace").strip(), np.eye(4)))
             if not dropped:
                 target.write(line)
-    return copy, named, names
+    return copy, named, placed
 
 
-def copy_gltf(path: Path, folder: Path) -> tuple[Path, dict[str, str]]:
-    """Copy the glTF or GLB file `path` into `folder`: geometry and nodes only, its buffers beside it.
+def copy_gltf(path: Path, folder: Path) -> tuple[Path, list[Placed]]:
+    """Copy the glTF or GLB file `path` into `folder`: its meshes, each in a node 'part N' of its own, buffers beside.
 
     Returns
     -------
     copy : Path
-    names : dict of str to str
-        As of `copy_obj`, of its nodes.
+    placed : list of Placed
+        Where the file's nodes have the meshes.
 
     Raises
     ------
@@ -106,12 +108,12 @@ def copy_gltf(path: Path, folder: Path) -> tuple[Path, dict[str, str]]:
             kept = primitive.get("extensions")
             kept = {COMPRESSED: kept[COMPRESSED]} if isinstance(kept, dict) and COMPRESSED in kept else {}
             primitive["extensions"] = kept
-    names = {}
-    for i, node in enumerate(_list(top, "nodes", path)):
-        for name in ("skin", "camera", "extensions"):
-            node.pop(name, None)
-        if isinstance(node.get("name"), str) and node["name"]:
-            names[f"part {i}"], node["name"] = node["name"], f"part {i}"
+    meshes = _list(top, "meshes", path)
+    placed = placed_meshes(_list(top, "nodes", path), len(meshes), path)
+    placed = [one._replace(name=one.name or str(meshes[one.mesh].get("name") or "")) for one in placed]
+    used = sorted({one.mesh for one in placed})
+    top["nodes"] = [{"mesh": number, "name": f"part {number}"} for number in used]
+    top["scenes"], top["scene"] = [{"nodes": list(range(len(used)))}], 0
     for name in ("extensionsUsed", "extensionsRequired"):
         told = top.get(name, [])
         if not isinstance(told, list):
@@ -121,7 +123,7 @@ def copy_gltf(path: Path, folder: Path) -> tuple[Path, dict[str, str]]:
             del top[name]
     copy = folder / "mesh.gltf"
     copy.write_text(json.dumps(top))
-    return copy, names
+    return copy, placed
 
 
 def _read(path: Path) -> tuple[dict[str, Any], tuple[int, int] | None]:

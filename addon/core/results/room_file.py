@@ -149,6 +149,8 @@ def read_room(folder: Path | str) -> Room:
     try:
         told = json.loads((folder / MATERIALS).read_text(encoding="utf-8"))
         return Room(capture, atlas_uv, tuple(material(one) for one in told["objects"]), folder, told.get("run", ""))
+    except BadInputError as error:  # such as a reflectance model that is not there
+        raise BadInputError(f"The result in '{folder}' can't be shown: {error}") from error
     except DAMAGE as error:
         raise _damaged(folder, error) from error
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import struct
 
+import numpy as np
 import pytest
 
 from addon.core.errors import BadInputError
+from addon.core.io.gltf_nodes import placed_meshes
 from addon.core.io.self_contained import copy_gltf, copy_obj
 
 
@@ -22,8 +24,8 @@ def gltf(**changes):
 def test_an_obj_loses_its_libraries(tmp_path):
     (tmp_path / "a.obj").write_text("mtllib ../one.mtl \\\n ../two.mtl\no chair\nv 0 0 0\n  usemtl wood\ncall x.obj\n")
     (tmp_path / "copy").mkdir()
-    copy, named, names = copy_obj(tmp_path / "a.obj", tmp_path / "copy")
-    assert named and copy.read_text() == "o part 0\nv 0 0 0\n" and names == {"part 0": "chair"}
+    copy, named, placed = copy_obj(tmp_path / "a.obj", tmp_path / "copy")
+    assert named and copy.read_text() == "o part 0\nv 0 0 0\n" and [one.name for one in placed] == ["chair"]
 
 
 @pytest.mark.parametrize("binary", [False, True])
@@ -65,6 +67,12 @@ def test_a_gltf_keeps_its_surface_only(tmp_path, binary):
         ({"accessors": [{"count": 1 << 40}]}, "more values than it holds"),
         ({"extensionsUsed": "KHR_draco_mesh_compression"}, "'extensionsUsed' that is no list"),
         ({"extensionsRequired": 3}, "'extensionsRequired' that is no list"),
+        ({"nodes": [{"mesh": 1}]}, "nodes that contradict"),
+        ({"nodes": [{"mesh": True}]}, "nodes that contradict"),
+        ({"nodes": [{"children": [1]}, {"children": [0]}]}, "nodes that contradict"),
+        ({"nodes": [{"children": [2]}, {"children": [2]}, {}]}, "nodes that contradict"),
+        ({"nodes": [{"mesh": 0, "scale": [1, 1]}]}, "not finite numbers"),
+        ({"nodes": [{"mesh": 0, "matrix": "x"}]}, "not finite numbers"),
         ({"asset": {"version": "1.0"}}, "no glTF 2.0"),
     ],
 )
@@ -81,3 +89,18 @@ def test_no_gltf_at_all(tmp_path, content):
     (tmp_path / "a.glb").write_bytes(content)
     with pytest.raises(BadInputError):
         copy_gltf(tmp_path / "a.glb", tmp_path)
+
+
+def test_where_nodes_place_meshes(tmp_path):
+    """A child turned by a quarter in a parent that is moved and stretched, both Y up."""
+    half = 0.5**0.5
+    nodes = [
+        {"children": [1], "translation": [1, 2, 3], "scale": [2, 2, 2], "mesh": 0},
+        {"mesh": 0, "name": "child", "rotation": [0, half, 0, half], "translation": [1, 0, 0]},
+    ]
+    first, second = placed_meshes(nodes, 1, tmp_path)
+    assert (first.name, second.name) == ("", "child")
+    np.testing.assert_allclose(first.matrix @ [0, 0, 0, 1], [1, -3, 2, 1])
+    # z of glTF's becomes x by the turn, and -y here; x becomes -z, and y here.
+    np.testing.assert_allclose(second.matrix @ [0, -1, 0, 1], [1 + 2 * (1 + 1), -3, 2, 1], atol=1e-12)
+    np.testing.assert_allclose(second.matrix @ [1, 0, 0, 1], [1 + 2, -3 + 2, 2, 1], atol=1e-12)
