@@ -94,6 +94,20 @@ def dress(
     return material
 
 
+def let_light_through(material: bpy.types.Material) -> None:
+    """Make a lamp's material shine from where nothing is: it reflects nothing and stops no light."""
+    tree, shader = material.node_tree, principled(material)
+    _set(shader.inputs, BASE_COLOR, (0, 0, 0, 1), SPECULAR_LEVEL, 0.0)
+    clear = add_node(tree, "ShaderNodeBsdfTransparent", (1, 1, 1, 1), location=(0, -650))
+    both = add_node(tree, "ShaderNodeAddShader", shader.outputs[0], clear.outputs[0], location=(300, -150))
+    feed(find_node(material, "OUTPUT_MATERIAL").inputs[0], both.outputs[0])
+
+
+def lets_light_through(material: bpy.types.Material) -> bool:
+    """Whether a material is as `let_light_through` makes it."""
+    return find_node(material, "BSDF_TRANSPARENT") is not None
+
+
 def principled(material: bpy.types.Material | None) -> bpy.types.ShaderNode | None:
     """A material's Principled node; None where it has none."""
     return find_node(material, "BSDF_PRINCIPLED")

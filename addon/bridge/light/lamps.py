@@ -10,7 +10,15 @@ from ...core.brdf.emitter import LAMP_ALBEDO as UNLIT_GREY
 from ...core.errors import BadInputError
 from ...core.kinds import Limit
 from ...core.naming import in_order, numbered
-from ..data.materials import BASE_COLOR, EMISSION_STRENGTH, brdf_of, emission, emission_socket, principled
+from ..data.materials import (
+    BASE_COLOR,
+    EMISSION_STRENGTH,
+    brdf_of,
+    emission,
+    emission_socket,
+    lets_light_through,
+    principled,
+)
 from .kelvin import HIGHEST, LOWEST, kelvin_of, luminance, rgb_of
 
 _STRENGTH, _COLOUR, _BASE = (f"scan_relight_recovered_{name}" for name in ("strength", "colour", "base"))
@@ -197,4 +205,6 @@ def _show(material):
     inputs, on = principled(material).inputs, is_on(material)
     inputs[EMISSION_STRENGTH].default_value = material[_STRENGTH] * factor(material) * on
     grey = 0.02 if numbered(material.name.casefold())[0] in _DARK else UNLIT_GREY
-    inputs[BASE_COLOR].default_value = material[_BASE] if on else (grey, grey, grey, 1)
+    inputs[BASE_COLOR].default_value = (
+        material[_BASE] if on or lets_light_through(material) else (grey, grey, grey, 1)
+    )

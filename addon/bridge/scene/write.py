@@ -22,7 +22,7 @@ from ..data.added import Made
 from ..data.arrays import make_mesh
 from ..data.cameras import best_view, differing, make_cameras, make_track, make_view, unlike, use_camera
 from ..data.images import image_name, load_image, load_parts, relative_to
-from ..data.materials import make_material
+from ..data.materials import let_light_through, make_material
 from ..data.mesh_objects import each_object, is_open
 from ..data.nodes import set_world
 from ..marks import OWN_SCENE, mark
@@ -156,11 +156,15 @@ def make_openings(folder: Path, collection: bpy.types.Collection) -> list[bpy.ty
     for number, (corners, radiance) in enumerate(openings_of(folder), 1):
         vertices, place = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
         quads = place.reshape(-1, 4)
+        faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+        faces = faces[(np.diff(np.sort(faces, 1), axis=1) > 0).all(1)]
         material = ObjectMaterial(number, "opening", EMITTER, emission=rgb(radiance))
-        data = make_mesh(material.name, vertices, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+        data = make_mesh(material.name, vertices, faces)
         thing = bpy.data.objects.new(material.name, data)
         thing.visible_camera = False
         data.materials.append(make_material(material, one_sided=True))
+        # Off, it would shade what closes the mesh behind it.
+        let_light_through(data.materials[0])
         collection.objects.link(thing)
         made.append(thing)
     return made

@@ -87,18 +87,25 @@ class Environment:
         """Radiance as `pattern` ((h, 2h) float32) has it, in all channels alike."""
         return Environment(np.repeat(pattern[..., None], 3, -1).astype(np.float32), np.zeros(pattern.shape, np.int32))
 
-    def unseen_zones(self) -> list[Zone]:
-        """The unseen directions above and below the horizon.
+    @property
+    def strange(self) -> np.ndarray:
+        """How little what frames saw says of each direction: 0 where they saw it, towards 1 far away; (h, 2h) float32.
 
-        The weight is 0 where a frame saw the direction, towards 1 the further it lies from those: near them the
-        neighbours' radiance is as good a guess as any. Within a zone radiance goes with the height as it does where the
-        frames saw it: skies change more with the height than around.
+        Near what was seen the neighbours' radiance is as good a guess as any.
         """
         unseen = self.observations == 0
         height, width = unseen.shape
         wide = np.concatenate([unseen] * 3, 1)  # directions wrap around
         angle = ndimage.distance_transform_edt(wide)[:, width : 2 * width] * (np.pi / height)
-        weight = (1 - np.exp(-angle / NEAR)).astype(np.float32)
+        return (1 - np.exp(-angle / NEAR)).astype(np.float32)
+
+    def unseen_zones(self) -> list[Zone]:
+        """The unseen directions above and below the horizon.
+
+        The weight is `strange`. Within a zone radiance goes with the height as it does where the
+        frames saw it: skies change more with the height than around.
+        """
+        weight, height = self.strange, len(self.observations)
         above = (np.arange(height) >= height / 2)[:, None]
         zones = [(np.where(side, weight, np.float32(0)), bool((self.told & side).any())) for side in (above, ~above)]
         profile = self._profile()[:, None]

@@ -19,7 +19,6 @@ from .params import GATHER
 CELLS = 6 * GATHER.cells**2
 """Of all six sides: side (2 * axis, + 1 for the high one), row, column."""
 
-NOWHERE = np.zeros((0, 3), np.float32)
 BEFORE: Unit[float] = 1e-3
 """Sizes of the box that a panel lies before a surface."""
 
@@ -54,7 +53,7 @@ class Panel:
     Attributes
     ----------
     corners : (q, 4, 3) float32
-        Of its quads; they face the room.
+        Of its quads; they face the room. A triangle's last corner stands twice.
     radiance : (3,) float32
     """
 
@@ -85,17 +84,17 @@ class Openings:
         return self.radiance[exits(self.low, self.size, origins, directions)[0]], within(self.low, self.size, origins)
 
     def filled(self, sky: Environment, place: np.ndarray) -> Environment:
-        """A map with these where it has no value, as a `place` ((3,)) sees them: for what knows maps alone."""
+        """A map with these where it has no value, as a `place` ((3,)) sees them: for what knows maps alone.
+
+        Beside what frames saw through a window the map goes on, or the window's rim would show the room's own colour.
+        """
         directions = sky.directions
         start = np.broadcast_to(np.asarray(place, np.float32), directions.shape)
         shown = self(start, directions)[0].reshape(sky.radiance.shape)
-        unknown = (sky.observations == 0) | sky.clipped
-        return replace(
-            sky,
-            radiance=np.where(
-                unknown[..., None], np.maximum(shown, sky.radiance * sky.clipped[..., None]), sky.radiance
-            ),
-        )
+        far = (sky.strange if sky.seen else np.ones(sky.observations.shape, np.float32))[..., None]
+        bound = np.maximum(shown, sky.radiance)
+        radiance = np.where(sky.clipped[..., None], bound, (1 - far) * sky.radiance + far * shown)
+        return replace(sky, radiance=radiance.astype(np.float32))
 
     @property
     def bright(self) -> np.ndarray:
@@ -113,34 +112,80 @@ class Openings:
         cell, distance, _ = exits(self.low, self.size, position, -normal)
         return cell, distance
 
-    def panels(self, position: np.ndarray = NOWHERE, normal: np.ndarray = NOWHERE) -> list[Panel]:
-        """The bright cells, those that hang together as one.
+    def panels(self, closing: np.ndarray | None = None, sky: Environment | None = None) -> list[Panel]:
+        """The bright cells; those that hang together, and are about as bright, as one.
 
-        They lie before what closes the mesh there: n places ((n, 3) float32 each) of it.
+        Where faces close the mesh before a cell, these shine in its stead: what was solved for came by them alone.
+
+        Parameters
+        ----------
+        closing : (t, 3, 3) float32, optional
+            Corners of the faces that close the mesh and that no frame saw.
+        sky : Environment, optional
+            What is seen through the cells where nothing closes the mesh; they give the rest.
         """
+        faces = np.zeros((0, 3, 3), np.float32) if closing is None else _as_small(closing, float(self.size.min()))
+        turned = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
+        double = np.linalg.norm(turned, axis=1, keepdims=True)
+        faces, normal, double = faces[double[:, 0] > 0], turned[double[:, 0] > 0], double[double[:, 0] > 0]
+        normal = normal / double
+        cell = self.behind(faces.mean(1), normal)[0]
+        lies = np.arange(CELLS) // GATHER.cells**2
+        facing = np.abs(normal[np.arange(len(cell)), lies[cell] // 2])
+        shut = np.bincount(cell, 0.5 * double[:, 0] * facing, CELLS)
+        before = faces + np.float32(self.size.max() * BEFORE) * normal[:, None]
+        quads = self._quads(lies, *np.divmod(np.arange(CELLS) % GATHER.cells**2, GATHER.cells))
+        area = np.linalg.norm(np.cross(quads[:, 1] - quads[:, 0], quads[:, 3] - quads[:, 0]), axis=1)
+        unshut = 2 * shut < area
+        rest = self.radiance
+        if sky is not None:
+            away = quads.mean(1) - (self.low + self.size / 2)
+            through = sky((away / np.linalg.norm(away, axis=1, keepdims=True)).astype(np.float32))
+            rest = np.maximum(self.radiance - through, 0)
         found = []
-        cell, distance = self.behind(position, normal)
-        inset = np.zeros(6)
-        np.maximum.at(inset, cell // GATHER.cells**2, distance + float(self.size.max()) * BEFORE)
-        bright = self.bright.reshape(6, GATHER.cells, GATHER.cells)
-        for side in range(6):
-            label, count = ndimage.label(bright[side])
-            for one in range(1, count + 1):
-                row, column = np.nonzero(label == one)
-                radiance = self.radiance[(side * GATHER.cells + row) * GATHER.cells + column].mean(0)
-                inward = np.eye(3, dtype=np.float32)[side // 2] * (-1) ** (side % 2)
-                quads = self._quads(side, row, column) + np.float32(inset[side]) * inward
-                found.append(Panel(quads, radiance))
+        for own in self._alike():
+            hangs = np.isin(cell, own)
+            if hangs.any():
+                # Of a triangle's corners the last stands twice.
+                found.append(Panel(before[hangs][:, [0, 1, 2, 2]], self.radiance[own].mean(0)))
+            free = own[unshut[own]]
+            if len(free) and rest[free].any():
+                found.append(Panel(quads[free], rest[free].mean(0)))
         return found
 
-    def _quads(self, side: int, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-        """Corners of some cells of a side, (q, 4, 3) float32."""
-        axis = side // 2
+    def _alike(self) -> list[np.ndarray]:
+        """Bright cells that lie side by side and are as bright, to the factor that makes one a lamp; flat indices."""
+        luminance = self.radiance @ LUMINANCE
+        step = np.log(np.maximum(luminance / max(float(np.median(luminance)), 1e-12), 1e-12))
+        step = np.floor(step / np.log(GATHER.lamp_in_opening)).astype(int).reshape(6, GATHER.cells, GATHER.cells)
+        bright = self.bright.reshape(step.shape)
+        found = []
+        for side in range(6):
+            for one in np.unique(step[side][bright[side]]):
+                label, count = ndimage.label(bright[side] & (step[side] == one))
+                found += [np.flatnonzero(label.ravel() == k) + side * GATHER.cells**2 for k in range(1, count + 1)]
+        return found
+
+    def _quads(self, side: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+        """Corners of some cells ((q,) int each), facing the room, (q, 4, 3) float32."""
         around = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
-        if side % 2:
-            around = around[::-1]
-        share = np.empty((len(row), 4, 3))
-        share[..., axis] = side % 2
-        share[..., (axis + 1) % 3] = (row[:, None] + around[:, 0]) / GATHER.cells
-        share[..., (axis + 2) % 3] = (column[:, None] + around[:, 1]) / GATHER.cells
+        around = np.where((side % 2)[:, None, None], around[::-1], around)
+        axis, at = side // 2, np.arange(len(side))
+        share = np.empty((len(side), 4, 3))
+        share[at, :, axis] = (side % 2)[:, None]
+        share[at, :, (axis + 1) % 3] = (row[:, None] + around[..., 0]) / GATHER.cells
+        share[at, :, (axis + 2) % 3] = (column[:, None] + around[..., 1]) / GATHER.cells
         return (self.low + share * self.size).astype(np.float32)
+
+
+def _as_small(faces: np.ndarray, size: float) -> np.ndarray:
+    """Triangles ((t, 3, 3)) in parts no larger than the cells of a box of that size, (s, 3, 3) float32."""
+    done = []
+    while len(faces):
+        large = np.linalg.norm(faces - np.roll(faces, 1, 1), axis=2).max(1) > 2 * size / GATHER.cells
+        done.append(faces[~large])
+        a, b, c = faces[large].transpose(1, 0, 2)
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        faces = np.concatenate([np.stack(part, 1) for part in parts])
+    return np.concatenate([*done, np.zeros((0, 3, 3))]).astype(np.float32)

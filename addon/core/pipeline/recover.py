@@ -91,9 +91,8 @@ class Recovery(Corrected):
 
     def _write_openings(self) -> None:
         """What is bright behind the mesh's openings, as panels; no file where nothing is."""
-        openings = self.shading().openings
-        atlas, closing = self.surface().atlas, self.closing & ~self.lit_diffuse().seen
-        panels = [] if openings is None else openings.panels(atlas.position[closing], atlas.normal[closing])
+        openings, sky = self.shading().openings, self.shading().environment
+        panels = [] if openings is None else openings.panels(self._unseen_closing(), sky)
         if not panels:
             self.store.path(OPENINGS).unlink(missing_ok=True)
             return
@@ -103,6 +102,14 @@ class Recovery(Corrected):
             {"radiance": (one.radiance * light).tolist(), "corners": (one.corners + shift).tolist()} for one in panels
         ]
         self.store.write_json(OPENINGS, {"openings": told})
+
+    def _unseen_closing(self) -> np.ndarray:
+        """Corners of the faces that close the mesh and that no frame saw, (t, 3, 3) float32."""
+        mesh, atlas = self.surface().mesh, self.surface().atlas
+        unseen = np.ones(len(mesh.triangles), bool)
+        unseen[atlas.triangle[self.lit_diffuse().seen]] = False
+        faces = [] if mesh.closed is None else mesh.closed[unseen[mesh.closed]]
+        return mesh.vertices[mesh.triangles[faces]].astype(np.float32)
 
     def report(self) -> dict[str, Any]:
         """What report.json holds so far: stages, settings, figures and warnings."""

@@ -16,7 +16,7 @@ from ..kinds import Unit
 from ..lit_diffuse.from_texture import face_edge
 from ..origin import OWN, of_thing
 from ..passes.mesh_denoising.denoise import without_noise
-from ..scene.closing import as_scanned
+from ..scene.closing import as_scanned, settled
 from ..scene.elements import Elements, uv_scale
 from ..scene.model import Capture, Mesh
 from ..scene.surface import Surface, build_surface, from_uv
@@ -73,7 +73,7 @@ def denoised(mesh: Mesh, settings: Settings) -> tuple[Mesh, float]:
         return without_noise(mesh, settings.without)
     scanned, noise = without_noise(as_scanned(mesh), settings.without)
     vertices = np.concatenate([scanned.vertices, mesh.vertices[len(scanned.vertices) :]])
-    return replace(mesh, vertices=vertices), noise
+    return settled(replace(mesh, vertices=vertices)), noise
 
 
 def make_surface(capture: Capture, unwrap: Unwrap, settings: Settings) -> Surface:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from ..significance import LEVELS
 from .elements import triangle_geometry
@@ -22,6 +23,7 @@ from .params import CLOSING, PARTS
 from .rays import RayScene
 from .shape_parts import Parts, Plane, plane_gap
 from .sight import Shown, Sight, between_frames, colours, sight_of
+from .uv_islands import connected
 
 
 @dataclass(frozen=True)
@@ -154,6 +156,62 @@ def as_scanned(mesh: Mesh) -> Mesh:
         mesh, vertices=mesh.vertices[:count], triangles=mesh.triangles[scanned], object_id=mesh.object_id[scanned],
         uv=uv, closed=None,
     )  # fmt: skip
+
+
+def settled(mesh: Mesh) -> Mesh:
+    """A mesh whose noise was taken out, with the faces that close it drawn up to the scan beside them.
+
+    They were laid out behind all of its noise. A step of a centimetre in a floor throws a shadow of several where light
+    comes in low. Faces that hang together move as one plane, so that none of their edges parts.
+    """
+    if mesh.closed is None or not len(mesh.closed):
+        return mesh
+    scan = as_scanned(mesh)
+    gap = plane_gap(scan.vertices)
+    centre, facing = scan.vertices[scan.triangles].mean(1).astype(np.float64), triangle_geometry(scan)[0]
+    tree, vertices = cKDTree(centre), mesh.vertices.copy()
+    closing, turned = mesh.triangles[mesh.closed], triangle_geometry(mesh)[0][mesh.closed]
+    label = connected(closing)
+    for piece in range(int(label.max()) + 1):
+        own = np.unique(closing[label == piece])
+        normal = turned[label == piece].mean(0)
+        normal = normal / max(float(np.linalg.norm(normal)), 1e-12)
+        at = mesh.vertices[own].astype(np.float64)
+        beside = np.unique(np.concatenate([np.zeros(0, int), *map(np.asarray, tree.query_ball_point(at, 2 * gap))]))
+        beside = beside.astype(int)
+        beside = beside[facing[beside] @ normal > np.cos(PARTS.tilt)]
+        height = (centre[beside] - at.mean(0)) @ normal
+        beside = beside[np.abs(height) < gap]
+        if len(beside) < LEVELS.few:
+            continue
+        lies = _plane_through(centre[beside] - at.mean(0), normal)
+        off = (centre[beside] - at.mean(0)) @ normal - lies(centre[beside] - at.mean(0))
+        spread = 1.4826 * float(np.median(np.abs(off)))
+        under = max(spread, CLOSING.under * gap)
+        rise = lies(at - at.mean(0)) - under - (at - at.mean(0)) @ normal
+        vertices[own] = at + np.clip(rise, -gap, gap)[:, None] * normal
+    return replace(mesh, vertices=vertices)
+
+
+def _plane_through(points: np.ndarray, normal: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """Height along a normal, of a plane fitted robustly to points ((n, 3)), as a function of places ((k, 3))."""
+    right, up = _axes(normal, [])
+    across = np.stack([points @ right, points @ up], 1)
+    # Tilted by no more than the points reach: beyond, it would be a guess.
+    reach = np.maximum(np.ptp(across, axis=0), 1e-9)
+    base = np.concatenate([np.ones((len(points), 1)), (across - across.mean(0)) / reach], 1)
+    height, weight = points @ normal, np.ones(len(points))
+    for _ in range(PARTS.fits):
+        slope = np.linalg.lstsq(base * weight[:, None], height * weight, rcond=None)[0]
+        off = np.abs(height - base @ slope)
+        weight = 1 / np.sqrt(1 + (off / max(1.4826 * float(np.median(off)), 1e-9)) ** 2)
+    middle = across.mean(0)
+
+    def at(places: np.ndarray) -> np.ndarray:
+        own = np.stack([places @ right, places @ up], 1)
+        return np.asarray(slope[0] + ((own - middle) / reach) @ slope[1:])
+
+    return at
 
 
 def opened(capture: Capture) -> Capture:

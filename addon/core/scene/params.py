@@ -307,12 +307,15 @@ class ClosingParams:
         Share of clipped observations from which on a hole shows the outside.
     nearly_all : float
         Of the mesh: the share that is darker than the outside, and that more frames see than what was not fused.
+    under : float
+        Cells that a face lies at least under the scan's denoised border, as the two cover each other: 1 mm in a room.
     """
 
     samples: int = 4000
     block: int = 8
     clipped: float = 0.5
     nearly_all: float = 0.95
+    under: float = 0.025
 
 
 CLOSING = ClosingParams()

@@ -1,5 +1,6 @@
 """The scan's lamps: off is gone, twice is twice, restored is exact."""
 
+import json
 import math
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from addon.bridge.light import lamps as lamps  # noqa: E402
+from addon.bridge.scene.write import make_openings  # noqa: E402
 from addon.core.errors import BadInputError  # noqa: E402
+from addon.core.results.room_file import OPENINGS  # noqa: E402
 from tests.blender.relight.sheets import sheet  # noqa: E402
 
 DOWN = (math.pi, 0, 0)
@@ -33,6 +36,22 @@ def test_off_takes_the_light_out_as_if_the_lamp_were_deleted(scene, shoot, look_
     bpy.data.objects.remove(left)
     gone = shoot(scene, 8, 8, 64)
     assert np.allclose(off.mean((0, 1)), gone.mean((0, 1)), rtol=0.03) and both.mean() > 1.5 * off.mean() > 0
+
+
+def test_a_panel_in_an_opening_that_is_off_is_not_there(scene, shoot, look_down, tmp_path):
+    sheet(scene, "floor", 4, (0, 0, 0))
+    sheet(scene, "lamp", 2, (0, 0, 3), DOWN, 1, WARM)
+    look_down()
+    gone = shoot(scene, 8, 8, 64).mean((0, 1))
+    quad = [[-3, -3, 2], [-3, 3, 2], [3, 3, 2], [3, -3, 2]]
+    (tmp_path / OPENINGS).write_text(json.dumps({"openings": [{"radiance": [3, 3, 3], "corners": [quad]}]}))
+    (panel,) = make_openings(tmp_path, scene.collection)
+    on = shoot(scene, 8, 8, 64).mean((0, 1))
+    lamps.set_on(panel.data.materials[0], False)
+    off = shoot(scene, 8, 8, 64).mean((0, 1))
+    assert np.allclose(off, gone, rtol=0.03) and (on > off + 0.5).all()
+    lamps.restore(panel.data.materials[0])
+    assert np.allclose(shoot(scene, 8, 8, 64).mean((0, 1)), on, rtol=1e-3)
 
 
 def test_an_unlit_lamp_is_no_black_hole(scene, shoot, look_down):
