@@ -205,6 +205,4 @@ def _show(material):
     inputs, on = principled(material).inputs, is_on(material)
     inputs[EMISSION_STRENGTH].default_value = material[_STRENGTH] * factor(material) * on
     grey = 0.02 if numbered(material.name.casefold())[0] in _DARK else UNLIT_GREY
-    inputs[BASE_COLOR].default_value = (
-        material[_BASE] if on or lets_light_through(material) else (grey, grey, grey, 1)
-    )
+    inputs[BASE_COLOR].default_value = material[_BASE] if on or lets_light_through(material) else (grey, grey, grey, 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
@@ -87,17 +88,59 @@ class Environment:
         """Radiance as `pattern` ((h, 2h) float32) has it, in all channels alike."""
         return Environment(np.repeat(pattern[..., None], 3, -1).astype(np.float32), np.zeros(pattern.shape, np.int32))
 
-    @property
+    @cached_property
     def strange(self) -> np.ndarray:
         """How little what frames saw says of each direction: 0 where they saw it, towards 1 far away; (h, 2h) float32.
 
         Near what was seen the neighbours' radiance is as good a guess as any.
         """
+        return (1 - np.exp(-self._to_seen()[0] / NEAR)).astype(np.float32)
+
+    def _to_seen(self) -> tuple[np.ndarray, np.ndarray]:
+        """Radians from each direction to the nearest that was seen, and its flat index; (h, 2h) each."""
         unseen = self.observations == 0
         height, width = unseen.shape
         wide = np.concatenate([unseen] * 3, 1)  # directions wrap around
-        angle = ndimage.distance_transform_edt(wide)[:, width : 2 * width] * (np.pi / height)
-        return (1 - np.exp(-angle / NEAR)).astype(np.float32)
+        away, (row, column) = ndimage.distance_transform_edt(wide, return_indices=True)
+        middle = np.s_[:, width : 2 * width]
+        return away[middle] * (np.pi / height), (row * width + column % width)[middle]
+
+    def clipped_parts(self, angle: float) -> np.ndarray:
+        """Parts of what is clipped, cells of so many radians either way; (h, 2h) int from 0, -1 where it is not.
+
+        Unseen directions belong to what the nearest seen one does.
+        """
+        height, width = self.observations.shape
+        row, column = np.mgrid[:height, :width]
+        cell = max(int(round(angle / np.pi * height)), 1)
+        part = np.full(height * width, -1)
+        chosen = self.clipped.ravel()
+        if chosen.any():
+            name = (row // cell * width + column // cell).ravel()[chosen]
+            part[chosen] = np.unique(name, return_inverse=True)[1].ravel()
+        return part[self._to_seen()[1]] if self.seen else part.reshape(height, width)
+
+    def at(self, image: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """What an image of the map's size ((h, 2h, ...)) has in unit `directions` ((n, 3)), (n, ...)."""
+        height, width = self.observations.shape
+        return image.reshape(height * width, *image.shape[2:]).take(_bin(directions, height), 0)
+
+    def with_clipped(self, part: np.ndarray, radiance: np.ndarray) -> Environment:
+        """The map whose clipped `part` k ((h, 2h) int, `clipped_parts`) has the mean radiance k ((k, 3)).
+
+        Its pattern stays that of the bounds; what no frame saw is filled in anew.
+        """
+        level = self.mean_of(part, len(radiance))
+        factor = np.concatenate([radiance / np.maximum(level, 1e-12), np.ones((1, 3))])
+        return self.refilled((self.radiance * factor[np.where(self.clipped, part, -1)]).astype(np.float32))
+
+    def mean_of(self, part: np.ndarray, count: int) -> np.ndarray:
+        """Mean of what is clipped in each `part` of so many, (count, 3) float64."""
+        weight = _solid(self.clipped)
+        own = np.where(self.clipped, part, count).ravel()
+        total = np.bincount(own, weight.ravel(), count + 1)[:count]
+        summed = [np.bincount(own, (weight * self.radiance[..., k]).ravel(), count + 1)[:count] for k in range(3)]
+        return np.stack(summed, 1) / np.maximum(total, 1e-20)[:, None]
 
     def unseen_zones(self) -> list[Zone]:
         """The unseen directions above and below the horizon.
@@ -234,10 +277,15 @@ class EnvironmentAccumulator:
         self._count += np.bincount(cells, minlength=len(self._count))
 
     def result(self) -> Environment:
-        """The map, unseen directions filled in from their neighbours; of clipped ones the greatest lower bound."""
+        """The map, unseen directions filled in from their neighbours; of clipped ones the greatest lower bound.
+
+        A direction is clipped if most of its observations are, and the others don't show more than those allow.
+        """
         shape = (self._height, 2 * self._height)
-        clipped = (self._count == 0) & (self._bounds > 0)
         mean = self._sum / np.maximum(self._count, 1)[:, None]
+        # Codes just below the greatest, as a JPEG has them in a white sky, contradict what the clipped ones bound.
+        contradicted = (self._bounds >= self._count) & (mean.mean(1) < self._bound.mean(1))
+        clipped = (self._bounds > 0) & ((self._count == 0) | contradicted)
         mean = np.where(clipped[:, None], self._bound, mean).astype(np.float32).reshape(*shape, 3)
         count = np.where(clipped, self._bounds, self._count).reshape(shape).astype(np.int32)
         return Environment(_filled(mean, count), count, clipped.reshape(shape))

@@ -106,9 +106,9 @@ class LightField:
         return other
 
     def with_openings(self, openings: Openings | None) -> LightField:
-        """The same room with light that comes in by its openings, in place of the environment's for rays from inside.
+        """The same room with light that comes in by its openings.
 
-        With dark openings instead of None, nothing comes in.
+        For rays from inside they stand in place of the environment, where no frame saw that nor nearly so.
         """
         other = self.with_light(self.radiance)
         other.openings = openings
@@ -119,7 +119,10 @@ class LightField:
         if self.openings is None or origins is None:
             return self.environment(directions)
         radiance, inside = self.openings(origins, directions)
-        return np.where(inside[:, None], radiance, self.environment(directions))
+        sky = self.environment
+        strange = sky.at(sky.strange, directions) if sky.seen else np.float32(1)
+        share = (inside * strange)[:, None]
+        return share * radiance + (1 - share) * sky(directions)
 
     def elements(self, hits: Hits) -> np.ndarray:
         """The element at each hit, (n,) int32; -1 where the ray escaped."""

@@ -122,7 +122,7 @@ class Openings:
         closing : (t, 3, 3) float32, optional
             Corners of the faces that close the mesh and that no frame saw.
         sky : Environment, optional
-            What is seen through the cells where nothing closes the mesh; they give the rest.
+            What is seen through the cells where nothing closes the mesh; they give the rest, as far as no frame saw it.
         """
         faces = np.zeros((0, 3, 3), np.float32) if closing is None else _as_small(closing, float(self.size.min()))
         turned = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
@@ -140,8 +140,9 @@ class Openings:
         rest = self.radiance
         if sky is not None:
             away = quads.mean(1) - (self.low + self.size / 2)
-            through = sky((away / np.linalg.norm(away, axis=1, keepdims=True)).astype(np.float32))
-            rest = np.maximum(self.radiance - through, 0)
+            away = (away / np.linalg.norm(away, axis=1, keepdims=True)).astype(np.float32)
+            strange = sky.at(sky.strange, away)[:, None] if sky.seen else 1
+            rest = np.maximum(self.radiance - sky(away), 0) * strange
         found = []
         for own in self._alike():
             hangs = np.isin(cell, own)

@@ -278,7 +278,7 @@ def with_missing_light(
     lamps = (*seen, *found.lamps)
     middle = np.median(dark.atlas.position, 0)
     # What is bright is written as lamps where it lies (`Openings.panels`).
-    environment = found.openings.without_bright().filled(dark.environment, middle)
+    environment = found.openings.without_bright().filled(found.environment, middle)
     field = field.with_light(radiance, environment, [lamp.object_id for lamp in lamps])
     light = replace(light, lamps=lamps, environment=environment, notes=found.notes)
     return field.with_openings(found.openings).with_sun(dark.sun), light, shut

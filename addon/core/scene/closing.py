@@ -184,7 +184,7 @@ def settled(mesh: Mesh) -> Mesh:
         beside = beside[np.abs(height) < gap]
         if len(beside) < LEVELS.few:
             continue
-        lies = _plane_through(centre[beside] - at.mean(0), normal)
+        lies = _plane_through(centre[beside] - at.mean(0), normal, at - at.mean(0))
         off = (centre[beside] - at.mean(0)) @ normal - lies(centre[beside] - at.mean(0))
         spread = 1.4826 * float(np.median(np.abs(off)))
         under = max(spread, CLOSING.under * gap)
@@ -193,12 +193,15 @@ def settled(mesh: Mesh) -> Mesh:
     return replace(mesh, vertices=vertices)
 
 
-def _plane_through(points: np.ndarray, normal: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """Height along a normal, of a plane fitted robustly to points ((n, 3)), as a function of places ((k, 3))."""
+def _plane_through(points: np.ndarray, normal: np.ndarray, wanted: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """Height along a normal, of a plane fitted robustly to points ((n, 3)), as a function of places ((k, 3)).
+
+    It is tilted only along what the points reach over half of the `wanted` places ((m, 3)): else it would be a guess.
+    """
     right, up = _axes(normal, [])
     across = np.stack([points @ right, points @ up], 1)
-    # Tilted by no more than the points reach: beyond, it would be a guess.
-    reach = np.maximum(np.ptp(across, axis=0), 1e-9)
+    reach = np.ptp(across, axis=0)
+    reach = np.where(2 * reach > np.ptp(np.stack([wanted @ right, wanted @ up], 1), axis=0), reach, np.inf)
     base = np.concatenate([np.ones((len(points), 1)), (across - across.mean(0)) / reach], 1)
     height, weight = points @ normal, np.ones(len(points))
     for _ in range(PARTS.fits):

@@ -55,7 +55,7 @@ def test_a_map_is_filled_where_no_frame_saw_and_without_what_is_written_as_panel
 
 @pytest.mark.parametrize("side", range(6))
 def test_a_panel_is_what_closes_the_mesh_before_its_cell(side):
-    axis, inward = side // 2, np.eye(3, dtype=np.float32)[side // 2] * (-1) ** (side % 2)
+    inward = np.eye(3, dtype=np.float32)[side // 2] * (-1) ** (side % 2)
     bright = openings((side * 24 + 7) * 24 + 11)
     (cell,) = bright.panels()[0].corners
     closing = cell[[[0, 1, 2], [0, 2, 3]]] + 0.1 * inward
@@ -75,10 +75,11 @@ def area(quads: np.ndarray) -> float:
 
 
 def test_a_panel_gives_what_the_sky_behind_it_lacks():
-    sky = Environment(np.full((8, 16, 3), 4, np.float32), np.ones((8, 16), np.int32))
+    sky = Environment(np.full((8, 16, 3), 4, np.float32), np.zeros((8, 16), np.int32))
     bright = openings(3 * 576 + 30)
     assert bright.panels(sky=sky)[0].radiance == pytest.approx([26, 16, 6])
     assert not bright.panels(sky=Environment(10 * sky.radiance, sky.observations))
+    assert not bright.panels(sky=Environment(sky.radiance, sky.observations + 1))
 
 
 def test_cells_of_which_one_is_far_brighter_are_two_panels():

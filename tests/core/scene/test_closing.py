@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.scene.closing import as_scanned, close_holes, opened
+from addon.core.scene.closing import as_scanned, close_holes, opened, settled
 from addon.core.scene.model import Camera, Capture, Frame, Instance, Mesh, Pixels
 from addon.core.scene.rays import RayScene
 from addon.core.scene.shape_parts import parts_of
@@ -144,3 +144,25 @@ def test_the_scan_comes_back():
     assert np.array_equal(scan.vertices, vertices) and np.array_equal(scan.triangles, triangles)
     both = opened(Capture(Path(), mesh, (Instance(0, "room"), Instance(7, "wall")), ()))
     assert [one.object_id for one in both.instances] == [0] and both.mesh.closed is None
+
+
+def test_what_closes_a_floor_lies_just_under_the_scan_beside_it():
+    """A step would throw a shadow where light comes in low. The floor is tilted, and the faces lie 2 cm under it."""
+    vertices, triangles = room(lambda centre, side: (side == 4) & (centre[:, 0] > 1.8))
+    vertices[:, 2] += 0.01 * vertices[:, 0]
+    cell = np.array([[0, 0], [0.1, 0], [0.1, 0.1], [0, 0.1]])
+    corners = [np.array([x, y]) + cell for x in np.arange(1.7, 2.9, 0.1) for y in np.arange(0.1, 2.2, 0.1)]
+    points, place = np.unique(np.round(np.concatenate(corners), 6), axis=0, return_inverse=True)
+    quads = place.reshape(-1, 4)
+    under = np.concatenate([points, np.full((len(points), 1), -0.005)], 1)
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    mesh = Mesh(
+        np.concatenate([vertices, under]), np.concatenate([triangles, len(vertices) + faces]),
+        np.zeros(len(triangles) + len(faces), np.int32), closed=np.arange(len(triangles), len(triangles) + len(faces)),
+    )  # fmt: skip
+    moved = settled(mesh)
+    assert np.array_equal(moved.vertices[: len(vertices)], vertices)
+    x, z = moved.vertices[len(vertices) :, [0, 2]].T
+    beside = x < 1.9
+    depth = 0.01 * x - z
+    assert (depth[beside] > 0).all() and (depth[beside] < 0.005).all() and (np.abs(depth) < 0.02).all()

@@ -38,6 +38,8 @@ class MissingLight:
     brighter : frozenset of int
         Other objects that give more than they could reflect of all this light.
     openings : Openings
+    environment : Environment
+        With what was solved for where it is clipped.
     shut : (n,) bool
         Elements of faces that close the mesh and that no frame saw: what they send was solved for like openings.
     notes : tuple of str
@@ -47,6 +49,7 @@ class MissingLight:
     radiance: dict[int, np.ndarray]
     brighter: frozenset[int]
     openings: Openings
+    environment: Environment
     shut: np.ndarray
     notes: tuple[str, ...]
 
@@ -81,16 +84,21 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
     element = _sample(field, good & ~hidden, seed)
     radiance[hidden] = 0
     received = irradiance_at(field.with_openings(None).with_light(radiance, Environment.dark()), element, seed)
-    cell, through = _through_cells(field, shut, element, seed)
+    sky = field.environment
+    part = sky.clipped_parts(MISSING.sky)
+    cell, through, shown, by_part = _through_cells(field, part, shut, element, seed)
+    received = received + shown
     thrown = [contribution_of_object(field, element, one, seed) for one in patches]
     usual = np.median(radiance[element], 0).astype(np.float64)
     # What hardly any element sees says nothing, and lights nothing.
-    told = through.mean(0) >= MISSING.least_seen
-    received = received + through[:, ~told].sum(1)[:, None] * usual
+    told, lit = (given.mean(0) >= MISSING.least_seen for given in (through, by_part))
+    level = sky.mean_of(part, len(lit))
+    received = received + through[:, ~told].sum(1)[:, None] * usual + by_part[:, ~lit] @ level[~lit]
+    clipped, cells = np.concatenate([np.reshape([bound[one] for one in patches], (-1, 3)), level[lit]]), int(told.sum())
     unknown = Unknown(
-        np.concatenate([np.reshape(thrown, (-1, len(element))).T, through[:, told]], 1),
-        np.concatenate([np.reshape([bound[one] for one in patches], (-1, 3)), np.full((int(told.sum()), 3), 1e-6)]),
-        np.concatenate([np.reshape([bound[one] for one in patches], (-1, 3)), np.tile(usual, (int(told.sum()), 1))]),
+        np.concatenate([np.reshape(thrown, (-1, len(element))).T, by_part[:, lit], through[:, told]], 1),
+        np.concatenate([clipped, np.full((cells, 3), 1e-6)]),
+        np.concatenate([clipped, np.tile(usual, (cells, 1))]),
     )
     sent = field.radiance[element].astype(np.float64)
     pairs = in_one_plane(atlas.position[element], atlas.normal[element], seed)
@@ -106,16 +114,18 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
         if strong[k] and (solved[one] > MISSING.lamp * bound[one]).all()
     )
     by_opening = np.tile(usual, (len(through.T), 1))
-    by_opening[told] = found[len(patches) :]
+    by_opening[told] = found[len(clipped) :]
+    level[lit] = found[len(patches) : len(clipped)]
     low, size = field.outer_box
-    share = float((through[:, told] @ found[len(patches) :]).sum() / E.sum())
+    share = float((unknown.contribution[:, len(patches) :] @ found[len(patches) :]).sum() / E.sum())
     openings = Openings(low, size, by_opening[cell].astype(np.float32), share)
     note = (
         f"{share:.0%} of the light comes in by openings of the mesh, from where it was solved from what it throws: "
         "what no frame saw there may be a lamp."
     )
     brighter = frozenset(lamp.object_id for lamp in find_seen(atlas.object_id[element], sent, E))
-    return MissingLight(lamps, solved, brighter, openings, shut, (note,) if share >= LEVELS.gain else ())
+    notes = (note,) if share >= LEVELS.gain else ()
+    return MissingLight(lamps, solved, brighter, openings, sky.with_clipped(part, level), shut, notes)
 
 
 def _sample(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:
@@ -137,27 +147,47 @@ def unseen_closing(field: LightField) -> np.ndarray:
 
 
 def _through_cells(
-    field: LightField, shut: np.ndarray, element: np.ndarray, seed: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Which unknown each cell of the box belongs to, (CELLS,) int; E from each at radiance 1, (m, u) float64.
+    field: LightField, part: np.ndarray, shut: np.ndarray, element: np.ndarray, seed: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """What comes to m elements from outside: as far as frames saw that, from the sky, else by the cells of the box.
 
     Elements that are `shut` ((n,) bool) let through what comes from there.
+
+    Returns
+    -------
+    unknown : (CELLS,) int
+        That each cell belongs to.
+    through : (m, u) float64
+        E from each of those at radiance 1.
+    shown : (m, 3) float64
+        E from where frames tell the sky.
+    by_part : (m, p) float64
+        E from each clipped `part` ((h, 2h) int) at radiance 1.
     """
     side, row, column = np.unravel_index(np.arange(CELLS), (6, GATHER.cells, GATHER.cells))
     edge = -(-GATHER.cells // MISSING.merged)
     unknown = (side * edge + row // MISSING.merged) * edge + column // MISSING.merged
     low, size = field.outer_box
+    sky = field.environment
+    strange = sky.strange if sky.seen else np.ones(sky.observations.shape, np.float32)
     patterns = cosine_patterns(MISSING.rays, seed)
     through = np.zeros((len(element), int(unknown.max()) + 1))
+    shown, by_part = np.zeros((len(element), 3)), np.zeros((len(element), int(part.max()) + 1))
 
-    def run(part: slice) -> None:
-        normal = field.atlas.normal[element[part]]
-        directions = turned(patterns, normal, np.random.default_rng([seed, part.start]))[0].reshape(-1, 3)
-        origins = np.repeat(field.scene.off_surface(field.atlas.position[element[part]], normal), MISSING.rays, 0)
+    def run(block: slice) -> None:
+        normal = field.atlas.normal[element[block]]
+        directions = turned(patterns, normal, np.random.default_rng([seed, block.start]))[0].reshape(-1, 3)
+        origins = np.repeat(field.scene.off_surface(field.atlas.position[element[block]], normal), MISSING.rays, 0)
         hits = field.scene.intersect(origins, directions)
-        out = np.flatnonzero((hits.triangle < 0) | shut[field.elements(hits)])
-        met = unknown[exits(low, size, origins[out], directions[out])[0]]
-        np.add.at(through[part], (out // MISSING.rays, met), np.pi / MISSING.rays)
+        closed = shut[field.elements(hits)] & (hits.triangle >= 0)
+        out = np.flatnonzero((hits.triangle < 0) | closed)
+        place, way = out // MISSING.rays, directions[out]
+        share = np.where(closed[out], 1, sky.at(strange, way)) * (np.pi / MISSING.rays)
+        np.add.at(through[block], (place, unknown[exits(low, size, origins[out], way)[0]]), share)
+        rest, own = np.pi / MISSING.rays - share, sky.at(part, way)
+        clipped = own >= 0
+        np.add.at(by_part[block], (place[clipped], own[clipped]), rest[clipped])
+        np.add.at(shown[block], place[~clipped], rest[~clipped, None] * sky(way[~clipped]))
 
     for_blocks(run, len(element), 64, 0)
-    return unknown, through
+    return unknown, through, shown, by_part

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class MissingLightParams:
@@ -25,6 +27,8 @@ class MissingLightParams:
         Of each of them into its hemisphere, to find through which cells it sees out.
     merged : int
         Cells along either axis that are one unknown.
+    sky : float
+        Radians either way of the parts in which clipped sky is solved for.
     least_seen : float
         Mean irradiance that an unknown of radiance 1 gives, below which it is left at the room's own radiance.
     neighbours, far : int
@@ -58,6 +62,7 @@ class MissingLightParams:
     samples: int = 5000
     rays: int = 1024
     merged: int = 2
+    sky: float = float(np.radians(30))
     least_seen: float = 2e-4
     neighbours: int = 8
     far: int = 8

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from addon.core.light.environment import Environment
 from addon.core.light.few_elements import irradiance_at
 from addon.core.passes.clipped_lamps.patches import clipped_patches
 from addon.core.passes.missing_light.missing_light import find_missing_light, is_missing
@@ -125,6 +126,27 @@ def test_light_through_a_hole_that_no_frame_saw_is_told_from_what_it_throws():
     assert off(irradiance_at(field, everything, 0), true) > 0.5
     assert field.environment is DARK
     assert "openings" in found.notes[0]
+
+
+def test_a_sky_that_every_frame_clips_is_told_from_what_it_throws():
+    """The hole shows the sky, as bright as the lamp; what frames see unclipped stays."""
+    whole, (_, radiance) = box(), lit()
+    room = box(hole=True)
+    same = cKDTree(whole.atlas.place(np.arange(len(whole.atlas)))).query(room.atlas.place(np.arange(len(room.atlas))))[
+        1
+    ]
+    up = np.repeat(np.arange(32) >= 16, 64).reshape(32, 64)
+    shown = np.where(up[..., None], np.float32(CLIPPED), np.float32(0.2)) * np.ones(3, np.float32)
+    sky = Environment(shown, np.ones((32, 64), np.int32), up)
+    field = room.field(radiance[same]).with_light(radiance[same], sky)
+    assert is_missing(field, np.ones(len(room.atlas), bool), 0)
+    found = find_missing_light(field, np.ones(len(room.atlas), bool), [], 0)
+    assert (found.environment.radiance[~up] == shown[~up]).all()
+    everything = np.arange(len(room.atlas))
+    E = irradiance_at(field.with_openings(found.openings).with_light(radiance[same], found.environment), everything, 0)
+    true = irradiance_at(whole.field(radiance), same, 0)
+    assert off(E, true) < 0.35
+    assert off(irradiance_at(field, everything, 0), true) > 0.45
 
 
 def test_a_lamp_behind_faces_that_closed_a_hole_is_told_like_one_in_the_hole():
