@@ -224,10 +224,11 @@ def run_without_scene(
     heed_kept: bool = True,
     unwrap: Unwrap | str = "",
     alone: bool = False,
+    white: str = "",
 ) -> dict[str, Any]:
     """Recover a capture up to a stage, and write all but scene.blend; as `bridge.job.run.run`, without Blender."""
     check_run(capture, folder, until, from_stage)
-    run, lay_out = _read(capture, folder, settings, progress, unwrap, reading, override, heed_kept)
+    run, lay_out = _read(capture, folder, settings, progress, unwrap, reading, override, heed_kept, white)
     with run:
         report = run.stages(lay_out, until, from_stage, alone)
         return run.write() if until == WRITE else report
@@ -242,6 +243,7 @@ def _read(
     reading: Reading,
     override: Path | None,
     heed_kept: bool = True,
+    white: str = "",
 ) -> tuple[Run, Unwrap]:
     """The run over a capture, which is read now unless it was, and what lays out its atlas."""
     started = time.monotonic()
@@ -250,4 +252,4 @@ def _read(
     if not isinstance(capture, Capture):
         capture = read_capture(capture, reading)
     versions = {"scan_relight": VERSION}
-    return Run(capture, folder, settings, progress, reading, override, heed_kept, versions, started), lay_out
+    return Run(capture, folder, settings, progress, reading, override, heed_kept, versions, started, white), lay_out

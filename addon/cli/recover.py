@@ -47,6 +47,8 @@ def add_home(parser: argparse.ArgumentParser) -> None:
     layout = "with --no-scene: what lays out the atlas; own: the mesh's own texture coordinates (default: the first of "
     parser.add_argument("--unwrap", choices=UNWRAPS, default="", help=f"{layout}them that is installed)")
     add_override(parser)
+    known = "a part of known albedo, by name or number: it fixes each channel's scale (default 0.8, white paint)"
+    parser.add_argument("--white", metavar="PART[=ALBEDO]", default="", help=known)
 
 
 def run_from(arguments: argparse.Namespace) -> Callable[..., dict[str, Any]]:
@@ -57,6 +59,7 @@ def run_from(arguments: argparse.Namespace) -> Callable[..., dict[str, Any]]:
         "reading": reading_from(arguments),
         "override": arguments.override,
         "heed_kept": not arguments.no_overrides,
+        "white": arguments.white,
     }
     with needed_packages():
         if arguments.scene:

@@ -7,7 +7,8 @@ import json
 import pytest
 
 from addon.core.errors import BadInputError
-from addon.core.results.overrides import NONE, Given, Overrides, White, heeded, merge, parse, read_overrides
+from addon.core.results.overrides import NONE, Given, Overrides, White, heeded, merge, parse, read_overrides, white_of
+from addon.core.scene.model import Instance
 
 KNOWN = range(5)
 
@@ -161,3 +162,21 @@ def test_a_run_heeds_what_is_kept_and_over_that_the_file(tmp_path):
     assert set(heeded(tmp_path, KNOWN, file, keep=False).objects) == {2}
     with pytest.raises(BadInputError, match=r"overrides\.json.*no object 1"):  # of another capture
         heeded(tmp_path, range(1))
+
+
+ROOM = Instance(0, "floor"), Instance(3, "ceiling"), Instance(4, "wall"), Instance(7, "wall")
+
+
+@pytest.mark.parametrize(
+    "text, part, albedo", [("ceiling", 3, 0.8), ("Wall 7=0.6", 7, 0.6), ("4 = .5", 4, 0.5), ("floor 0=1", 0, 1.0)]
+)
+def test_a_known_white_is_named_in_one_word(text, part, albedo):
+    assert white_of(text, ROOM) == White(part, (albedo,) * 3)
+
+
+@pytest.mark.parametrize(
+    "text, said", [("wall", "wall 4, wall 7"), ("door", "ceiling 3"), ("ceiling=9", "9"), ("ceiling=white", "white")]
+)
+def test_what_names_no_white_is_told(text, said):
+    with pytest.raises(BadInputError, match=said):
+        white_of(text, ROOM)

@@ -54,6 +54,7 @@ def run(
     heed_kept: bool = True,
     into: str = "OWN",
     alone: bool = False,
+    white: str = "",
 ) -> dict:
     """Recover a capture up to a stage; stages that the result folder holds already are not done again.
 
@@ -83,6 +84,8 @@ def run(
         `OWN`: the room has a scene of its own; `SCENE`: it comes into `scene`.
     alone : bool
         Do `until` and none that comes before it; see `Run.stages`.
+    white : str
+        A part of known albedo, such as 'ceiling' or 'wall=0.7'.
 
     Returns
     -------
@@ -111,7 +114,7 @@ def run(
         check_own(capture.root)  # what is absent is told now, not after the work
     elif scene is not None and not import_first:
         imported(capture.root)
-    whole_run = Run(capture, out_folder, settings, progress, reading, override, heed_kept, versions(), started)
+    whole_run = Run(capture, out_folder, settings, progress, reading, override, heed_kept, versions(), started, white)
 
     def write(recovery: Recovery, facing: Capture) -> tuple[str, ...]:
         warnings = write_recovered(recovery, facing, fresh=scene is None)

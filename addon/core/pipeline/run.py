@@ -18,7 +18,7 @@ from ..io.layout import AS_FOUND, Reading
 from ..io.pixels import read_pixels
 from ..memory import peak_memory
 from ..progress import Progress, ProgressEvent
-from ..results.overrides import OVERRIDES, heeded
+from ..results.overrides import OVERRIDES, Overrides, heeded, merge, white_of
 from ..results.place import write_capture
 from ..results.room_file import ROOM, objects_of, write_room
 from ..results.store import Store
@@ -76,6 +76,8 @@ class Run:
         What the report names besides Python and its packages.
     started : float, optional
         When it began, by `time.monotonic`; now, unless given.
+    white : str
+        A part of known albedo (`results.overrides.white_of`), kept as what is in `override` is; '' for none.
 
     Attributes
     ----------
@@ -101,13 +103,16 @@ class Run:
         heed_kept: bool = True,
         versions: Mapping[str, str] | None = None,
         started: float | None = None,
+        white: str = "",
     ):
         self._started = time.monotonic() if started is None else started
         self.capture, self.folder = capture, out_folder
         self._settings, self._progress, self._versions = settings, progress, dict(versions or {})
-        self._keep = override is not None and heed_kept
+        self._keep = (override is not None or bool(white)) and heed_kept
         known = {one.object_id for one in capture.instances} | objects_of(out_folder)
         self._given = heeded(out_folder, known, override, heed_kept)
+        if white:
+            self._given = merge(self._given, Overrides(white=white_of(white, capture.instances)))
         self._told = _look(capture, reading) if capture.frames else []
         if not heed_kept and (out_folder / OVERRIDES).is_file():
             self._told = [LEFT_OUT, *self._told]

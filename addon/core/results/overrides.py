@@ -21,6 +21,8 @@ from ..brdf.model import Brdf
 from ..brdf.registry import find, models
 from ..errors import BadInputError
 from ..json_values import is_number, key
+from ..kinds import Unit
+from ..scene.model import Instance
 
 OVERRIDES = "overrides.json"
 LOBE = ("model", "roughness", "f0")
@@ -141,6 +143,8 @@ class Overrides:
         return told
 
 
+WHITE_PAINT: Unit[float] = 0.8
+"""Albedo of white wall paint, as the panel has it."""
 NOTHING = Given()
 NONE = Overrides()
 
@@ -264,6 +268,33 @@ def parse(told: Any, name: str, known: Iterable[int]) -> Overrides:
             f"{name}: objects are the same as each other in a circle ({circle}); give one of them values of its own."
         )
     return found
+
+
+def white_of(text: str, instances: Iterable[Instance]) -> White:
+    """A known white as the command line says it: 'PART' or 'PART=ALBEDO', the part by its name or its number.
+
+    A class stands for its one object. Without an albedo the part counts as painted white (`WHITE_PAINT`).
+
+    Raises
+    ------
+    BadInputError
+        No part or several are called that, or the albedo is no share above 0.
+    """
+    named = {one.name.casefold(): one.object_id for one in instances}
+    part, _, told = text.partition("=")
+    wanted = part.strip().casefold()
+    of_class = [one for one in instances if wanted in (one.class_name.casefold(), str(one.object_id))]
+    if wanted not in named and len(of_class) != 1:
+        known = ", ".join(one.name for one in of_class or instances)
+        how = "means several parts" if of_class else "is no part of the capture"
+        raise BadInputError(f"--white: '{part.strip()}' {how}; name one of {known}.")
+    try:
+        albedo = float(told) if told else WHITE_PAINT
+    except ValueError:
+        albedo = 0.0
+    if not 0 < albedo <= 1:
+        raise BadInputError(f"--white: albedo '{told}' of '{part.strip()}' is no number above 0 and up to 1; give one.")
+    return White(named.get(wanted, of_class[0].object_id if of_class else 0), (albedo,) * 3)
 
 
 def _has_no(model: str | None) -> tuple[str, ...]:
