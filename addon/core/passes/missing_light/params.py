@@ -49,7 +49,10 @@ class MissingLightParams:
         Weight of the prior that an opening shows what the room does, and a patch its clipped value: a lamp is an
         exception (Student's t).
     unlike : float
-        Its scale, in log radiance.
+        Its scale, in log radiance, of all channels together.
+    tint : float
+        The same of what channels differ by: a lamp may be far brighter than the room, but hardly of another colour.
+        With the channels apart, a phone's room got cyan light from its ceiling.
     start : float
         Times that, where the search starts.
     steps : int
@@ -78,6 +81,7 @@ class MissingLightParams:
     highest: float = 0.85
     sources: float = 0.1
     unlike: float = 0.5
+    tint: float = 0.3
     start: float = 3.0
     steps: int = 200
     lamp: float = 2.0

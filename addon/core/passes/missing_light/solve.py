@@ -79,18 +79,22 @@ class _Plausible:
         off = (a.mean(1) - np.log(MISSING.mean_albedo)) / MISSING.deviation
         value += MISSING.level * 0.5 * float((off**2).mean())
         by_a += (MISSING.level / (MISSING.deviation * channels * m) * off)[:, None]
-        tint = (a - a.mean(1, keepdims=True)) / MISSING.grey
-        length = np.sqrt(1 + tint**2)
+        paint = (a - a.mean(1, keepdims=True)) / MISSING.grey
+        length = np.sqrt(1 + paint**2)
         value += MISSING.colour * float((length - 1).mean())
-        pull = MISSING.colour / (MISSING.grey * channels * m) * tint / length
+        pull = MISSING.colour / (MISSING.grey * channels * m) * paint / length
         by_a += pull - pull.mean(1, keepdims=True)
         above = np.maximum(a - np.log(MISSING.highest), 0) / 0.1
         value += MISSING.above * 0.5 * float((above**2).mean())
         by_a += MISSING.above / (0.1 * channels * m) * above
         gradient = -(self._G.T @ (by_a / E)) * radiance
-        odd = (x - self.usual) / MISSING.unlike
-        value += MISSING.sources / k * float(np.log1p(odd**2).sum())
-        gradient += MISSING.sources / k * 2 / MISSING.unlike * odd / (1 + odd**2)
+        odd = x - self.usual
+        level = odd.mean(1, keepdims=True) / MISSING.unlike
+        tint = (odd - odd.mean(1, keepdims=True)) / MISSING.tint
+        coloured = 1 + (tint**2).sum(1, keepdims=True)
+        weight = MISSING.sources * channels / k
+        value += weight * float(np.log1p(level**2).sum() + np.log(coloured).sum())
+        gradient += weight * 2 * (level / (channels * MISSING.unlike * (1 + level**2)) + tint / (MISSING.tint * coloured))
         return value, gradient.ravel()
 
 
