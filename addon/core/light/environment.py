@@ -14,6 +14,8 @@ from .params import SKY
 
 NEAR = np.radians(8)
 """Angle over which what was seen of the sky says something of its surroundings."""
+BESIDE = np.radians(3)
+"""Angle over which it goes on as it was seen."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,14 @@ class Environment:
         Near what was seen the neighbours' radiance is as good a guess as any.
         """
         return (1 - np.exp(-self._to_seen()[0] / NEAR)).astype(np.float32)
+
+    @cached_property
+    def unfamiliar(self) -> np.ndarray:
+        """The same over a few degrees only, as a window's rim hides of the sky behind; (h, 2h) float32.
+
+        A clipped sky may be a hundred times as bright as the room: a hundredth of it would still show.
+        """
+        return (1 - np.exp(-((self._to_seen()[0] / BESIDE) ** 2))).astype(np.float32)
 
     def _to_seen(self) -> tuple[np.ndarray, np.ndarray]:
         """Radians from each direction to the nearest that was seen, and its flat index; (h, 2h) each."""

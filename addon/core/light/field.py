@@ -120,8 +120,8 @@ class LightField:
             return self.environment(directions)
         radiance, inside = self.openings(origins, directions)
         sky = self.environment
-        strange = sky.at(sky.strange, directions) if sky.seen else np.float32(1)
-        share = (inside * strange)[:, None]
+        unfamiliar = sky.at(sky.unfamiliar, directions) if sky.seen else np.float32(1)
+        share = (inside * unfamiliar)[:, None]
         return share * radiance + (1 - share) * sky(directions)
 
     def elements(self, hits: Hits) -> np.ndarray:

@@ -91,7 +91,7 @@ class Openings:
         directions = sky.directions
         start = np.broadcast_to(np.asarray(place, np.float32), directions.shape)
         shown = self(start, directions)[0].reshape(sky.radiance.shape)
-        far = (sky.strange if sky.seen else np.ones(sky.observations.shape, np.float32))[..., None]
+        far = (sky.unfamiliar if sky.seen else np.ones(sky.observations.shape, np.float32))[..., None]
         bound = np.maximum(shown, sky.radiance)
         radiance = np.where(sky.clipped[..., None], bound, (1 - far) * sky.radiance + far * shown)
         return replace(sky, radiance=radiance.astype(np.float32))
@@ -141,8 +141,8 @@ class Openings:
         if sky is not None:
             away = quads.mean(1) - (self.low + self.size / 2)
             away = (away / np.linalg.norm(away, axis=1, keepdims=True)).astype(np.float32)
-            strange = sky.at(sky.strange, away)[:, None] if sky.seen else 1
-            rest = np.maximum(self.radiance - sky(away), 0) * strange
+            unfamiliar = sky.at(sky.unfamiliar, away)[:, None] if sky.seen else 1
+            rest = np.maximum(self.radiance - sky(away), 0) * unfamiliar
         found = []
         for own in self._alike():
             hangs = np.isin(cell, own)

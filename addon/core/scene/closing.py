@@ -254,7 +254,13 @@ def _shut(
         shown = colours(frames, read, sight, scene, vertices[triangles[some]].mean(1), normal[some], gap)
         closed &= (group < 0) | ~_outside(sight, group, groups, shown, gap)[group]
     told = zip(sheets, np.split(closed, ends), np.split(sight.out > 0, ends), strict=True)
-    return [(sheet.picture(own), sheet.picture(seen)) for sheet, own, seen in told]
+    return [(_without_specks(sheet.picture(own), sheet.open), sheet.picture(seen)) for sheet, own, seen in told]
+
+
+def _without_specks(shut: np.ndarray, able: np.ndarray) -> np.ndarray:
+    """Cells that are `shut`, and those `able` to be that lie in holes smaller than any window; (h, w) bool each."""
+    label, _ = ndimage.label(able & ~shut)
+    return shut | (able & ~shut & (np.bincount(label.ravel())[label] <= CLOSING.speck))
 
 
 def _outside(sight: Sight, group: np.ndarray, count: int, shown: Shown, gap: float) -> np.ndarray:

@@ -307,6 +307,8 @@ class ClosingParams:
         Share of clipped observations from which on a hole shows the outside.
     nearly_all : float
         Of the mesh: the share that is darker than the outside, and that more frames see than what was not fused.
+    speck : int
+        Cells that hang together, of 4 cm in a room: no window is so small, and a hole that is shows black.
     under : float
         Cells that a face lies at least under the scan's denoised border, as the two cover each other: 1 mm in a room.
     """
@@ -315,6 +317,7 @@ class ClosingParams:
     block: int = 8
     clipped: float = 0.5
     nearly_all: float = 0.95
+    speck: int = 4
     under: float = 0.025
 
 

@@ -49,7 +49,7 @@ def test_a_map_is_filled_where_no_frame_saw_and_without_what_is_written_as_panel
     observations[:32] = 3
     sky = Environment(np.full((64, 128, 3), 7, np.float32), observations)
     filled = openings(*range(5 * 576, CELLS)).without_bright().filled(sky, LOW + SIZE / 2).radiance
-    assert (filled[:32] == 7).all() and (filled[32] > 4).all()
+    assert (filled[:32] == 7).all() and (filled[32] > 2.5).all()
     assert filled[-1] == pytest.approx(np.broadcast_to(USUAL, (128, 3)), abs=0.01)
 
 

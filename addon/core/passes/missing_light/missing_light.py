@@ -169,7 +169,7 @@ def _through_cells(
     unknown = (side * edge + row // MISSING.merged) * edge + column // MISSING.merged
     low, size = field.outer_box
     sky = field.environment
-    strange = sky.strange if sky.seen else np.ones(sky.observations.shape, np.float32)
+    unfamiliar = sky.unfamiliar if sky.seen else np.ones(sky.observations.shape, np.float32)
     patterns = cosine_patterns(MISSING.rays, seed)
     through = np.zeros((len(element), int(unknown.max()) + 1))
     shown, by_part = np.zeros((len(element), 3)), np.zeros((len(element), int(part.max()) + 1))
@@ -182,7 +182,7 @@ def _through_cells(
         closed = shut[field.elements(hits)] & (hits.triangle >= 0)
         out = np.flatnonzero((hits.triangle < 0) | closed)
         place, way = out // MISSING.rays, directions[out]
-        share = np.where(closed[out], 1, sky.at(strange, way)) * (np.pi / MISSING.rays)
+        share = np.where(closed[out], 1, sky.at(unfamiliar, way)) * (np.pi / MISSING.rays)
         np.add.at(through[block], (place, unknown[exits(low, size, origins[out], way)[0]]), share)
         rest, own = np.pi / MISSING.rays - share, sky.at(part, way)
         clipped = own >= 0

@@ -94,7 +94,9 @@ class _Plausible:
         coloured = 1 + (tint**2).sum(1, keepdims=True)
         weight = MISSING.sources * channels / k
         value += weight * float(np.log1p(level**2).sum() + np.log(coloured).sum())
-        gradient += weight * 2 * (level / (channels * MISSING.unlike * (1 + level**2)) + tint / (MISSING.tint * coloured))
+        gradient += (
+            weight * 2 * (level / (channels * MISSING.unlike * (1 + level**2)) + tint / (MISSING.tint * coloured))
+        )
         return value, gradient.ravel()
 
 
