@@ -102,15 +102,24 @@ class Environment:
     def unfamiliar(self) -> np.ndarray:
         """The same over a few degrees only, as a window's rim hides of the sky behind; (h, 2h) float32.
 
-        A clipped sky may be a hundred times as bright as the room: a hundredth of it would still show.
+        A clipped sky may be a hundred times as bright as the room: a hundredth of it would still show. What frames saw
+        through a crack, narrower than three of the map's cells, may be the wall itself: it says nothing of what is
+        beside it.
         """
-        return (1 - np.exp(-((self._to_seen()[0] / BESIDE) ** 2))).astype(np.float32)
+        seen = self.observations > 0
+        wide = ndimage.binary_opening(np.concatenate([seen] * 3, 1), np.ones((3, 3)))[:, seen.shape[1] : -seen.shape[1]]
+        if not wide.any():
+            return (~seen).astype(np.float32)
+        away = self._to(wide)[0]
+        return np.where(seen, 0, 1 - np.exp(-((away / BESIDE) ** 2))).astype(np.float32)
 
     def _to_seen(self) -> tuple[np.ndarray, np.ndarray]:
-        """Radians from each direction to the nearest that was seen, and its flat index; (h, 2h) each."""
-        unseen = self.observations == 0
-        height, width = unseen.shape
-        wide = np.concatenate([unseen] * 3, 1)  # directions wrap around
+        return self._to(self.observations > 0)
+
+    def _to(self, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Radians from each direction to the nearest that was `seen` ((h, 2h) bool), and its flat index."""
+        height, width = seen.shape
+        wide = np.concatenate([~seen] * 3, 1)  # directions wrap around
         away, (row, column) = ndimage.distance_transform_edt(wide, return_indices=True)
         middle = np.s_[:, width : 2 * width]
         return away[middle] * (np.pi / height), (row * width + column % width)[middle]

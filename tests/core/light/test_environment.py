@@ -159,3 +159,24 @@ def test_the_ground_is_filled_in_from_the_ground():
     environment = accumulator.result()
     half = len(environment.radiance) // 2
     assert np.allclose(environment.radiance[:half], 1) and np.allclose(environment.radiance[half:], 5)
+
+
+def test_what_was_seen_through_a_crack_says_nothing_of_what_is_beside_it():
+    observations = np.zeros((64, 128), np.int32)
+    observations[20:30, 40:60] = 5  # a window
+    observations[50, 100] = 9  # a crack of one cell
+    found = Environment(np.ones((64, 128, 3), np.float32), observations).unfamiliar
+    assert (found[observations > 0] == 0).all()
+    assert 0 < found[30, 50] < 0.7 and found[36, 50] > 0.99 and found[51, 100] == found[60, 5] == 1
+
+
+def test_a_clipped_sky_stays_clipped_where_few_codes_lie_just_below():
+    room = make_room([FAR_BELOW])
+    accumulator = EnvironmentAccumulator(np.radians(100 / 16))
+    for k in range(5):
+        for camera in all_round((0, 0, 0), 16):
+            shown = np.full((16, 16, 3), 0.9 if k == 0 else 1.0)
+            add(accumulator, room, camera, shown, saturated=np.full((16, 16), k > 0))
+    found = accumulator.result()
+    seen = found.observations > 0
+    assert found.clipped[seen].all() and found.radiance[seen] == pytest.approx(1)
