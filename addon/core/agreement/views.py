@@ -45,7 +45,8 @@ def small_views(
             pixels = read(frame)
         except BadInputError:  # it will be told of where frames are read for good
             continue
-        step = max(1, round(frame.camera.width / AGREEMENT.width))
+        shorter = min(frame.camera.width, frame.camera.height)  # of a strip, edges are to be left
+        step = max(1, min(round(frame.camera.width / AGREEMENT.width), shorter // 2))
         camera = frame.camera.coarser(step)
         views.append(SmallView(frame.name, camera, _small(pixels, step), step))
     return views

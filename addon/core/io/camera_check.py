@@ -17,6 +17,8 @@ from ..scene.model import Camera
 
 FOCAL: Limit[tuple[float, float]] = (1e-3, 1e6)
 """Bounds of a focal length over the frame's longer side; a panorama has 0.16."""
+LEAST: Limit[int] = 2
+"""Pixels of a frame's shorter side: edges are differences of two."""
 OFF: Limit[int] = 100
 """How many of the frame's sides the principal point may lie from its corner."""
 STRONGEST: Limit[float] = 1e9
@@ -50,6 +52,10 @@ def check_camera(camera: Camera, name: str) -> None:
         One is not finite or beyond what any camera has.
     """
     side = max(camera.width, camera.height)
+    if min(camera.width, camera.height) < LEAST:
+        raise BadInputError(
+            f"Frame '{name}' has {camera.width} x {camera.height} pixels, too few to show anything; give larger ones."
+        )
     for key, value in (("fx", camera.fx), ("fy", camera.fy)):
         if not FOCAL[0] * side <= value <= FOCAL[1] * side:
             raise BadInputError(

@@ -453,3 +453,20 @@ def test_the_fingerprint_of_a_capture_that_goes_away(capture):
     (capture.root / "images/003.exr").unlink()
     with pytest.raises(BadInputError, match="003.exr"):
         fingerprint(result)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (640, 1)])
+def test_frames_of_one_pixel_are_told_before_any_work(tmp_path, size):
+    from tests.hostile.load import boxes, write
+
+    with pytest.raises(BadInputError, match=f"{size[0]} x {size[1]} pixels, too few"):
+        read_capture(write(tmp_path / "capture", boxes(3), 4, size))
+
+
+@pytest.mark.parametrize("size", [(2, 2), (640, 2)])
+def test_tiny_frames_and_strips_are_looked_at(tmp_path, size):
+    from addon.core.agreement.look import look
+    from addon.core.io.pixels import read_pixels
+    from tests.hostile.load import boxes, write
+
+    assert look(read_capture(write(tmp_path / "capture", boxes(3), 4, size)), read_pixels).sentence().endswith(".")
