@@ -8,7 +8,6 @@ but no direction puts its patch right over them.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -19,7 +18,6 @@ from ...light.environment import Environment
 from ...light.field import LightField
 from ...light.sun import Sun, around
 from ...luminance import LUMINANCE
-from ...parallel import ordered_map
 from ...scene.sphere import fibonacci
 from ...significance import LEVELS
 from .params import SUN
@@ -52,10 +50,9 @@ def _on_grid(even: Spots, environment: Environment) -> list[Guess]:
     weight = np.clip(excess[out], 0, 3)
     reached = np.bincount(ray[~hidden], weight[spot[~hidden]], len(way)) / max(weight.sum(), 1e-9)
     best = np.argsort(-reached, kind="stable")[: SUN.kept]
-    guesses = list(ordered_map(even.explained, [way[k] for k in best if reached[k] > SUN.reached], 0))
+    guesses = [even.explained(way[k]) for k in best if reached[k] > SUN.reached]
     # A patch may be narrower than the grid is wide, and the guess beside the sun then no better than any other.
-    search = functools.partial(_searched, even.explained, steps=SHARP[:2])
-    refined = list(ordered_map(search, _apart(guesses)[: SUN.refined], 0))
+    refined = [_searched(even.explained, one, SHARP[:2]) for one in _apart(guesses)[: SUN.refined]]
     return _apart(refined)[: SUN.tried]
 
 
@@ -166,7 +163,7 @@ def find_sun(
               for part, count in ((pool[near], SUN.dense * 2 // 3), (pool[~near], SUN.dense // 3))]  # fmt: skip
     dense = np.sort(np.concatenate(chosen))
     spots = Spots(field, dense, irradiance(dense))
-    tried = list(ordered_map(lambda one: _searched(spots.explained, spots.explained(one.direction), SHARP), guesses, 0))
+    tried = [_searched(spots.explained, spots.explained(one.direction), SHARP) for one in guesses]
     best, before = min(tried, key=lambda one: one.cost), spots.spread()
     if best.cost > (1 - LEVELS.gain) * before:
         return None
