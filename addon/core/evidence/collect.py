@@ -27,10 +27,13 @@ class Evidence:
     texels: TexelEvidence
     objects: list[ObjectEvidence]
 
-    def images(self) -> dict[str, np.ndarray]:
-        """What is written as pictures, (n, 3) float32 each, by name: see docs/result_folder.md."""
-        t = self.texels
-        return {"albedo_error": t.albedo, "evidence": np.stack([t.shading, t.clipped, t.unseen], -1)}
+    def albedo_error(self) -> np.ndarray:
+        """What the picture of that name shows, (n, 3) float32: see docs/result_folder.md."""
+        return self.texels.albedo
+
+    def shares(self) -> np.ndarray:
+        """What the picture 'evidence' shows, (n, 3) float32."""
+        return np.stack([self.texels.shading, self.texels.clipped, self.texels.unseen], -1)
 
 
 def collect(found: Findings) -> Evidence:

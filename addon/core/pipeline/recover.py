@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Container
+from collections.abc import Callable, Container
 from typing import Any
 
 import numpy as np
@@ -51,21 +51,20 @@ class Recovery(Corrected):
         """The result folder's images, all or the `wanted` ones by name, materials.json and report.html."""
         self.look_closer()
         atlas, lit = self.surface().atlas, self.lit_diffuse()
-        dark = max(1e-6 * self.median_radiance(), 1e-30)
-        spread = (lit.upper - lit.lower).mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
-        coverage = np.stack([lit.count, np.nan_to_num(spread), self.albedo.origin + CLOSED * self.closing], -1)
-        images = {
-            "albedo": self.albedo.rho,
-            "base_color": self.base_color(),
-            "shading": self.irradiance,
-            "lit_diffuse": np.where(lit.seen[:, None], lit.radiance, 0).astype(np.float32),
-            "coverage": coverage.astype(np.float32),
-            **self.evidence.images(),
+        # Each is made when its turn comes: all of them at once were a tenth of a large room's memory.
+        images: dict[str, Callable[[], np.ndarray]] = {
+            "albedo": lambda: self.albedo.rho,
+            "base_color": self.base_color,
+            "shading": lambda: self.irradiance,
+            "lit_diffuse": lambda: np.where(lit.seen[:, None], lit.radiance, np.float32(0)),
+            "coverage": self._coverage,
+            "albedo_error": self.evidence.albedo_error,
+            "evidence": self.evidence.shares,
         }
         images = {name: image for name, image in images.items() if wanted is None or name in wanted}
 
         def write(name: str) -> None:
-            self.store.write_exr(f"{name}.exr", atlas.image(images[name])[::-1])
+            self.store.write_exr(f"{name}.exr", atlas.image(images[name]())[::-1])
 
         begun = LOOKED if self._parting else 0.0
         for done, _ in enumerate(ordered_map(write, images, self.settings.threads)):
@@ -76,7 +75,7 @@ class Recovery(Corrected):
         if self.settings.atlas == ROOM:
             remove_parts(self)
         elif "base_color" in images and self._parting is not None:
-            self.parts = write_parts(self, self._parting, atlas.image(images["base_color"]))
+            self.parts = write_parts(self, self._parting, atlas.image(images["base_color"]()))
         known: dict[int, dict[str, Any]] = {
             one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects
         }
@@ -88,6 +87,14 @@ class Recovery(Corrected):
         self.store.write_json("materials.json", told)
         self.progress.update(0.6)
         write_bytes(self.store.path("report.html"), make_page(self.findings, self.evidence, self.report()).encode())
+
+    def _coverage(self) -> np.ndarray:
+        """Count of observations, their relative spread, and where the albedo comes from, (n, 3) float32."""
+        lit = self.lit_diffuse()
+        dark = max(1e-6 * self.median_radiance(), 1e-30)
+        spread = (lit.upper - lit.lower).mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
+        parts = (lit.count, np.nan_to_num(spread), self.albedo.origin + CLOSED * self.closing)
+        return np.stack([part.astype(np.float32) for part in parts], -1)
 
     def _write_openings(self) -> None:
         """What is bright behind the mesh's openings, as panels; no file where nothing is."""
