@@ -59,6 +59,8 @@ def read_json(path: Path) -> dict[str, Any]:
         with readable(f"'{path}'", "check the capture"):
             if what := absence(path):
                 raise BadInputError(f"'{path}' {what}; check the capture.")
+            if path.stat().st_size > MAX_TEXT:
+                raise BadInputError(f"'{path}' is too large for a table of a capture; export it again.")
             value = json.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise BadInputError(f"'{path}' is not valid JSON ({error}); export it again.") from error

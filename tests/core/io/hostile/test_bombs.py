@@ -129,3 +129,12 @@ def test_a_hundred_thousand_frames_that_are_missing(tmp_path):
     (tmp_path / "transforms.json").write_text(json.dumps(capture.transforms | {"frames": frames}))
     with pytest.raises(BadInputError, match="100000 bad frames of 100000.*does not exist.* And 99997 more"):
         read_capture(tmp_path, Reading())
+
+
+@pytest.mark.parametrize("name", ["transforms.json", "info_semantic.json"])
+def test_tables_of_more_bytes_than_any_has(tmp_path, name):
+    CaptureOnDisk(tmp_path, 1)
+    with open(tmp_path / name, "r+b") as file:
+        file.truncate(1 << 40)  # a hole, which takes no space
+    with pytest.raises(BadInputError, match=f"{name}' is too large"):
+        read_capture(tmp_path)
