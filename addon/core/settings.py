@@ -81,7 +81,7 @@ class Settings:
     interpolate: bool = True
     mirrors: bool = True
     specular: str = "frames"
-    specular_rays: int = 256
+    specular_rays: int = 128
     refine: int = 2
     threads: int = 0
     seed: int = 0
