@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..groups import by_label
 from ..kinds import Unit
 from ..naming import object_name
 from .lambertian import LAMBERTIAN
@@ -115,10 +116,10 @@ def base_colors(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[O
     object_id : (n,) int
     materials : iterable of ObjectMaterial
     """
-    color = albedo.copy()
+    color, elements = albedo.copy(), {int(object_id[own[0]]): own for own in by_label(object_id) if len(own)}
     for m in materials:
-        own = object_id == m.object_id
-        color[own] = m.model.base_color(color[own], m)
+        if (own := elements.get(m.object_id)) is not None:
+            color[own] = m.model.base_color(color[own], m)
     return color
 
 
