@@ -225,10 +225,11 @@ def run_without_scene(
     unwrap: Unwrap | str = "",
     alone: bool = False,
     white: str = "",
+    block: tuple[int, int] | None = None,
 ) -> dict[str, Any]:
     """Recover a capture up to a stage, and write all but scene.blend; as `bridge.job.run.run`, without Blender."""
-    check_run(capture, folder, until, from_stage)
-    run, lay_out = _read(capture, folder, settings, progress, unwrap, reading, override, heed_kept, white)
+    check_run(capture, folder, until, from_stage, block)
+    run, lay_out = _read(capture, folder, settings, progress, unwrap, reading, override, heed_kept, white, block)
     with run:
         report = run.stages(lay_out, until, from_stage, alone)
         return run.write() if until == WRITE else report
@@ -244,6 +245,7 @@ def _read(
     override: Path | None,
     heed_kept: bool = True,
     white: str = "",
+    block: tuple[int, int] | None = None,
 ) -> tuple[Run, Unwrap]:
     """The run over a capture, which is read now unless it was, and what lays out its atlas."""
     started = time.monotonic()
@@ -252,4 +254,6 @@ def _read(
     if not isinstance(capture, Capture):
         capture = read_capture(capture, reading)
     versions = {"scan_relight": VERSION}
-    return Run(capture, folder, settings, progress, reading, override, heed_kept, versions, started, white), lay_out
+    return Run(
+        capture, folder, settings, progress, reading, override, heed_kept, versions, started, white, block
+    ), lay_out

@@ -7,6 +7,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the programs set it before NumPy: another number, other bits
+
 import numpy as np
 import pytest
 

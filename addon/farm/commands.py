@@ -116,7 +116,7 @@ def options_of(arguments: argparse.Namespace) -> list[str]:
         if value is not None:
             given.append(f"--{'' if value else 'no-'}{option}" if info.kind is bool else f"--{option}={value}")
     given += [f"--without={name}" for name in arguments.without or ()]
-    texts = {name: getattr(arguments, name) for name in ("format", "transfer", "convention", "unwrap")}
+    texts = {name: getattr(arguments, name) for name in ("format", "transfer", "convention", "white", "unwrap")}
     paths = {name: getattr(arguments, name) for name in ("mesh", "exposures", "override")}
     given += [f"--{name}={text}" for name, text in texts.items() if text]
     given += [f"--{name}={path.absolute()}" for name, path in paths.items() if path]
@@ -131,11 +131,19 @@ def stage_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     with needed_packages():
         from ..core.pipeline.run import check_run, progress_of_run
         from .unit import unit
-    check_run(arguments.capture, arguments.out, arguments.stage)
+    check_run(arguments.capture, arguments.out, arguments.stage, block=arguments.block)
     with console_run(arguments, stream) as console:
         with unit(arguments.out, arguments.stage, arguments.block, console["should_stop"]):
             progress = progress_of_run(**console)
-            report = run(arguments.capture, arguments.out, settings, progress, until=arguments.stage, alone=True)
+            report = run(
+                arguments.capture,
+                arguments.out,
+                settings,
+                progress,
+                until=arguments.stage,
+                alone=True,
+                block=arguments.block,
+            )
     line = f"Done in {duration(report['seconds'])}: stage '{arguments.stage}' of {arguments.out}"
     told = {"seconds": report["seconds"], "result": str(arguments.out.absolute()), "until": arguments.stage}
     warnings = report.get("warnings", ()) if arguments.stage == WRITE else ()

@@ -122,6 +122,8 @@ def unit_name(stage: str, block: tuple[int, int] | None) -> str:
 
 def make_folder(folder: Path) -> None:
     """Make a farm folder; raises `StorageError`."""
+    if folder.is_symlink():
+        raise StorageError(f"'{folder}' is a link, and workers would write elsewhere; put a folder in its place.")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -25,7 +25,7 @@ const JOB_TYPE = {
 };
 
 const STAGES = ["surface", "lit_diffuse", "shading", "specular", "write"];
-const DIVIDED = [];
+const DIVIDED = ["specular"];
 const PATHS = ["mesh", "exposures", "override"];
 
 function compileJob(job) {

@@ -13,7 +13,7 @@ from addon.cli.common import settings_from
 from addon.core.stages import RUN_STAGES
 from addon.farm import commands
 from addon.farm.plan import Room
-from tests.farm.conftest import OPTIONS, do, unit
+from tests.farm.conftest import OPTIONS, assert_same, do, unit
 
 
 def plan(capsys, *argv) -> list[dict]:
@@ -30,13 +30,23 @@ def test_the_graph_says_the_same_as_the_command(capture, whole, tmp_path, capsys
         assert cli.main([*task["command"][1:], "--quiet"]) == 0
         done.add(task["name"])
     assert set(RUN_STAGES) <= done
+    assert "specular-2-of-2" in done
+    assert_same(tmp_path / "capture", whole)
     told = json.loads((tmp_path / "capture" / "report.json").read_text())["settings"]
     assert told == json.loads((whole / "report.json").read_text())["settings"]
 
 
 def test_all_options_reach_the_units(tmp_path, capsys):
     given = ["--preset=paper", "--seed=7", "--no-interpolate", "--without=sun", "--without=mirrors", "--transfer=2.2"]
-    given += ["--convention=x", "--outside", "--no-scene", "--unwrap=own", "--no-overrides", "--format=nerfstudio"]
+    given += [
+        "--convention=x",
+        "--outside",
+        "--no-scene",
+        "--unwrap=own",
+        "--no-overrides",
+        "--format=nerfstudio",
+        "--white=wall",
+    ]
     paths = [f"--{name}={tmp_path / name}" for name in ("mesh", "exposures", "override")]
     [room] = plan(capsys, "capture", "--out", tmp_path, *given, *paths)
     argv = room["tasks"][0]["command"][1:]
@@ -44,7 +54,7 @@ def test_all_options_reach_the_units(tmp_path, capsys):
     direct = parser.parse_args(["stage", "c", "--out", "r", "--stage", "surface", *given, *paths])
     arrived = parser.parse_args(argv)
     assert settings_from(arrived) == settings_from(direct) and settings_from(direct).seed == 7
-    names = ("format", "mesh", "outside", "transfer", "exposures", "convention", "scene", "unwrap", "override")
+    names = ("format", "mesh", "outside", "transfer", "exposures", "convention", "white", "scene", "unwrap", "override")
     assert [getattr(arrived, one) for one in names] == [getattr(direct, one) for one in names]
     assert arrived.no_overrides
 

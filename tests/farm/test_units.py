@@ -92,6 +92,40 @@ def test_two_workers_with_the_same_unit_and_a_clock_that_is_an_hour_off(capture,
     assert_same(result, whole)
 
 
+@pytest.mark.slow
+@pytest.mark.once
+def test_blocks_side_by_side_one_killed_one_twice_one_never(capture, whole, tmp_path):
+    result = tmp_path / "result"
+    do(capture, result, *STAGES[:3])
+    blocks = [("1/4", DIES.format(target="specular-1-of-4.npz")), ("2/4", ""), ("2/4", AN_HOUR_ON), ("3/4", "")]
+    workers = [start(*unit(capture, result, "specular", "--block", one), before=how) for one, how in blocks]
+    told = [worker.communicate()[1] for worker in workers]
+    assert [worker.returncode for worker in workers] == [-signal.SIGKILL, 0, 0, 0], told
+    stored = {path.name for path in (result / "stages").glob("specular*")}
+    assert stored == {"specular-2-of-4.npz", "specular-3-of-4.npz"}
+    do(capture, result, "specular 1/4", "specular", "write")
+    assert_same(result, whole)
+
+
+def test_what_blocks_found_is_what_is_taken(capture, whole, tmp_path, monkeypatch):
+    """With all blocks there, what joins them looks at no object again."""
+    from addon.core.pipeline import choose_models
+
+    result = tmp_path / "result"
+    do(capture, result, *STAGES[:3], "specular 1/2", "specular 2/2")
+    monkeypatch.setattr(choose_models, "_look", None)
+    do(capture, result, "specular")
+    monkeypatch.undo()
+    do(capture, result, "write")
+    assert_same(result, whole)
+
+
+def test_a_stage_that_is_not_divided_is_told(capture, tmp_path, capsys):
+    assert cli.main(unit(capture, tmp_path / "result", "shading", "--block=1/2")) == 2
+    assert "Stage 'shading' can't be divided" in capsys.readouterr().err
+    assert not Path(tmp_path / "result").exists()
+
+
 def test_bad_blocks_are_told(capture, tmp_path, capsys):
     for block in ("0/2", "3/2", "1", "a/b", "-1/2"):
         assert cli.main(unit(capture, tmp_path / "result", "specular", f"--block={block}")) == 2

@@ -55,6 +55,7 @@ def run(
     into: str = "OWN",
     alone: bool = False,
     white: str = "",
+    block: tuple[int, int] | None = None,
 ) -> dict:
     """Recover a capture up to a stage; stages that the result folder holds already are not done again.
 
@@ -86,6 +87,8 @@ def run(
         Do `until` and none that comes before it; see `Run.stages`.
     white : str
         A part of known albedo, such as 'ceiling' or 'wall=0.7'.
+    block : tuple of int, optional
+        Do a part of it alone; see `Run`.
 
     Returns
     -------
@@ -98,7 +101,7 @@ def run(
         One sentence for the user.
     """
     capture_folder, out_folder = Path(capture_folder), Path(out_folder)
-    check_run(capture_folder, out_folder, until, from_stage)
+    check_run(capture_folder, out_folder, until, from_stage, block)
     if os.sep == "/" and "\\" in str(out_folder.absolute()):
         raise BadInputError(
             f"Result folder '{out_folder.absolute()}' has a backslash in its path, which Blender takes for a slash; "
@@ -114,7 +117,9 @@ def run(
         check_own(capture.root)  # what is absent is told now, not after the work
     elif scene is not None and not import_first:
         imported(capture.root)
-    whole_run = Run(capture, out_folder, settings, progress, reading, override, heed_kept, versions(), started, white)
+    whole_run = Run(
+        capture, out_folder, settings, progress, reading, override, heed_kept, versions(), started, white, block
+    )
 
     def write(recovery: Recovery, facing: Capture) -> tuple[str, ...]:
         warnings = write_recovered(recovery, facing, fresh=scene is None)

@@ -8,8 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..brdf.lambertian import LAMBERTIAN
+from ..fit.lobe_fit import LobeFit
 from ..fit.problem import Problem
+from ..fit.transmission import SeeThrough
 from ..light.field import LightField
+from ..light.lobes import LobeLight
 from ..paper.target_frame import frame_scores, target_frame
 from ..parallel import ordered_map
 from ..passes.see_through.see_through import is_sure, judge, look_behind
@@ -17,7 +20,7 @@ from ..passes.specular.by_looks import coated_by_looks, metal_by_looks
 from ..passes.specular.given import fit_given
 from ..passes.specular.intervals import GlossInterval, gloss_interval
 from ..passes.specular.models import Choice, adopt_from_class, choose_model, set_apart
-from ..passes.specular.one_colour import compare, compare_coat
+from ..passes.specular.one_colour import Coated, OneColour, compare, compare_coat
 from ..passes.specular.params import FIT
 from ..passes.specular.problems import Problems
 from ..progress import Progress
@@ -74,6 +77,63 @@ class Chosen:
     intervals: dict[int, GlossInterval]
 
 
+@dataclass(frozen=True)
+class Looked:
+    """What an object's own frames say, before it is compared with its class.
+
+    Attributes
+    ----------
+    choice : Choice
+    problem : Problem or None
+        The observations that decided.
+    target : int
+        The target frame; -1 where there is none.
+    """
+
+    choice: Choice
+    problem: Problem | None
+    target: int
+
+
+LOOKED = {one.__name__: one for one in (Looked, Choice, Problem, LobeLight, LobeFit, SeeThrough, OneColour, Coated)}
+"""What a stored `Looked` may hold."""
+
+
+def look_at(
+    room: Room,
+    maker: Problems,
+    wanted: Sequence[int],
+    given: Mapping[int, Given],
+    rays: int,
+    threads: int,
+    without: Collection[str],
+    progress: Progress | None,
+    looked: Mapping[int, Looked] | None = None,
+) -> dict[int, Looked]:
+    """What the frames say of each of the `wanted` objects, by object_id; none depends on which others are wanted.
+
+    Parameters
+    ----------
+    looked : mapping of int to Looked, optional
+        What is known already.
+    """
+    guesses, known = {one.object_id for one in room.instances if one.guess}, looked or {}
+
+    def look(object_id: int) -> Looked:
+        if object_id in known:
+            return known[object_id]
+        if object_id in given:
+            return Looked(*fit_given(given[object_id], maker, object_id, room.irradiance, rays), -1)
+        return Looked(*_look(room, maker, object_id, rays, without, object_id in guesses))
+
+    found: dict[int, Looked] = {}
+    for object_id, one in zip(wanted, ordered_map(look, wanted, threads, ahead=len(wanted)), strict=True):
+        found[object_id] = one
+        if progress is not None:
+            progress.update(0.7 * len(found) / len(wanted))
+    return found
+
+
 def choose_models(
     room: Room,
     maker: Problems,
@@ -83,23 +143,19 @@ def choose_models(
     threads: int,
     without: Collection[str],
     progress: Progress | None,
+    looked: Mapping[int, Looked] | None = None,
 ) -> Chosen:
-    """Choose a model for each of the `wanted` objects; of those that are `given`, what is left to find."""
+    """Choose a model for each of the `wanted` objects; of those that are `given`, what is left to find.
 
-    guesses = {one.object_id for one in room.instances if one.guess}
-
-    def look(object_id: int) -> tuple[Choice, Problem | None, int]:
-        if object_id in given:
-            return *fit_given(given[object_id], maker, object_id, room.irradiance, rays), -1
-        return _look(room, maker, object_id, rays, without, object_id in guesses)
-
-    problems, choices, targets = {}, {}, {}
-    for object_id, found in zip(wanted, ordered_map(look, wanted, threads, ahead=len(wanted)), strict=True):
-        choices[object_id], problem, targets[object_id] = found
-        if problem is not None:
-            problems[object_id] = problem
-        if progress is not None:
-            progress.update(0.7 * len(choices) / len(wanted))
+    Parameters
+    ----------
+    looked : mapping of int to Looked, optional
+        What is known of them already.
+    """
+    found = look_at(room, maker, wanted, given, rays, threads, without, progress, looked)
+    choices = {i: one.choice for i, one in found.items()}
+    problems = {i: one.problem for i, one in found.items() if one.problem is not None}
+    targets = {i: one.target for i, one in found.items()}
     if "class-lobes" not in without:
         reflecting = {i: choice for i, choice in choices.items() if not choice.model.gives_light}
         adopted = adopt_from_class(reflecting, problems, {i.object_id: i.class_name for i in room.instances})

@@ -27,6 +27,7 @@ from ..scene.unwrap import Unwrap
 from ..settings import Settings
 from ..stages import READ, RUN_STAGES, STAGES, WRITE
 from .recover import Recovery
+from .stages import STAGES as DECLARED
 
 WEIGHTS: dict[str, float] = {READ: 1, "surface": 5, "lit_diffuse": 8, "shading": 17, "specular": 16, WRITE: 5}
 """Rough cost of the stages, for the estimate of the time left."""
@@ -44,11 +45,19 @@ def progress_of_run(
     return Progress(listener, should_stop, WEIGHTS)
 
 
-def check_run(capture_folder: Path, out_folder: Path, until: str = WRITE, from_stage: str | None = None) -> None:
-    """Raise `BadInputError` for a stage that does not exist and a result folder that is the capture's."""
+def check_run(
+    capture_folder: Path,
+    out_folder: Path,
+    until: str = WRITE,
+    from_stage: str | None = None,
+    block: tuple[int, int] | None = None,
+) -> None:
+    """Raise `BadInputError` for a stage that is not, or not divided, and a result folder that is the capture's."""
     for stage in (until, from_stage):
         if stage is not None and stage not in RUN_STAGES:
             raise BadInputError(f"There is no stage '{stage}'; choose one of {', '.join(RUN_STAGES)}.")
+    if block is not None and until not in [one.name for one in DECLARED if one.divided_by]:
+        raise BadInputError(f"Stage '{until}' can't be divided into blocks; leave --block out.")
     if out_folder.resolve() == capture_folder.resolve():
         raise BadInputError(f"Result folder '{out_folder}' is the capture itself; choose another.")
 
@@ -78,6 +87,8 @@ class Run:
         When it began, by `time.monotonic`; now, unless given.
     white : str
         A part of known albedo (`results.overrides.white_of`), kept as what is in `override` is; '' for none.
+    block : tuple of int, optional
+        I and N: of the last stage, this part alone; the result folder is shared with those who do the others.
 
     Attributes
     ----------
@@ -104,10 +115,12 @@ class Run:
         versions: Mapping[str, str] | None = None,
         started: float | None = None,
         white: str = "",
+        block: tuple[int, int] | None = None,
     ):
         self._started = time.monotonic() if started is None else started
         self.capture, self.folder = capture, out_folder
         self._settings, self._progress, self._versions = settings, progress, dict(versions or {})
+        self._block = block
         self._keep = (override is not None or bool(white)) and heed_kept
         known = {one.object_id for one in capture.instances} | objects_of(out_folder)
         self._given = heeded(out_folder, known, override, heed_kept)
@@ -118,7 +131,7 @@ class Run:
             self._told = [LEFT_OUT, *self._told]
 
     def __enter__(self) -> Run:
-        self._store = Store(self.folder)
+        self._store = Store(self.folder, shared=self._block is not None)
         return self
 
     def __exit__(self, *exception: object) -> None:
@@ -145,11 +158,12 @@ class Run:
         """
         store = self._store
         with told_in_a_sentence(self.folder):
-            write_capture(store.folder, self.capture.root)
-            if from_stage in STAGES:
-                store.drop(STAGES[STAGES.index(from_stage) :])
-            if self._keep:
-                store.write_json(OVERRIDES, self._given.as_dict())
+            if self._block is None:
+                write_capture(store.folder, self.capture.root)
+                if from_stage in STAGES:
+                    store.drop(STAGES[STAGES.index(from_stage) :])
+                if self._keep:
+                    store.write_json(OVERRIDES, self._given.as_dict())
             self._progress.done()
             self.recovery = Recovery(self.capture, store, self._settings, self._progress, unwrap, self._given)
             for stage in STAGES:
@@ -158,11 +172,14 @@ class Run:
                         f"Result folder '{self.folder}' holds no stage '{stage}' of this capture, these settings and "
                         "this version; do it first."
                     )
+                if stage == until and self._block is not None:
+                    getattr(self.recovery, f"{stage}_block")(self._block)
+                    break
                 getattr(self.recovery, stage)()
                 if stage == until:
                     break
             report = self._report(())
-            if until != WRITE:
+            if until != WRITE and self._block is None:
                 store.write_json("report.json", report)
             return report
 

@@ -28,7 +28,7 @@ from ..results.overrides import NOTHING, Given, Overrides
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Frame, Instance, Pixels
 from ..scene.samples import Samples
-from .choose_models import Chosen, Room, choose_models
+from .choose_models import Chosen, Looked, Room, choose_models, look_at
 from .frames import STAGE as FRAMES
 from .published.targets import fit_targets
 from .shading import STAGE as SHADING
@@ -36,7 +36,11 @@ from .stage import Stage
 from .surface import STAGE as SURFACE
 
 STAGE = Stage(
-    "specular", Path(__file__), (SURFACE, FRAMES, SHADING), ("specular", "specular_rays", "refine", "median", "seed")
+    "specular",
+    Path(__file__),
+    (SURFACE, FRAMES, SHADING),
+    ("specular", "specular_rays", "refine", "median", "seed"),
+    divided_by="objects",
 )
 
 
@@ -127,6 +131,7 @@ def fit_specular(
     held: Held | None = None,
     without: Collection[str] = (),
     as_published: bool = False,
+    looked: Mapping[int, Looked] | None = None,
     progress: Progress | None = None,
 ) -> Specular:
     """Fit every object to many of its views, choose its model, and find the specular part of L_d.
@@ -149,6 +154,8 @@ def fit_specular(
         Passes left out.
     as_published : bool
         Objects of which nothing is given get the lobe of their target frame instead (`fit_targets`).
+    looked : mapping of int to Looked, optional
+        What `look_at_block` found of objects.
 
     Raises
     ------
@@ -156,12 +163,9 @@ def fit_specular(
         From `progress`.
     """
     given = given or {}
-    # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
-    maker = Problems(field, samples, threads=1, seed=seed, without=without)
     refine = 0 if "specular-removal" in without else min(refine, 1) if "glossy-light" in without else refine
-    found_before = {lamp.object_id for lamp in lamps} | {mirror.object_id for mirror in field.mirrors}
-    wanted = _wanted(instances, found_before, given, held)
     room = Room(instances, field, lit_diffuse, irradiance, samples, frame_names, noise)
+    maker, wanted = _asked(room, lamps, given, held, seed, without)
     told: dict[int, ObjectMaterial] = {}
     if as_published:
         others = [i for i in instances if i.object_id in wanted and i.object_id not in given]
@@ -169,7 +173,7 @@ def fit_specular(
             others, field, lit_diffuse, samples, frame_names, rays=rays, threads=threads, seed=seed, progress=progress
         )
         wanted = [i for i in wanted if i not in told]
-    chosen = choose_models(room, maker, wanted, given, rays, threads, without, progress)
+    chosen = choose_models(room, maker, wanted, given, rays, threads, without, progress, looked)
 
     kept = {} if held is None else {m.object_id: m for m in held.found.materials if m.object_id not in held.only}
     lit_by = {lamp.object_id: lamp for lamp in lamps if lamp.object_id not in given}
@@ -201,6 +205,49 @@ def fit_specular(
             without=without,
         )  # fmt: skip
     return Specular(materials, specular, excess, hidden)
+
+
+def look_at_block(
+    room: Room,
+    lamps: tuple[Lamp, ...],
+    block: tuple[int, int],
+    *,
+    rays: int,
+    threads: int,
+    seed: int,
+    given: Mapping[int, Given],
+    without: Collection[str],
+    progress: Progress,
+) -> dict[int, Looked]:
+    """What `fit_specular` has to find of every N-th object, from the I-th of those on that it fits.
+
+    Parameters
+    ----------
+    block : tuple of int
+        I and N, I from 1.
+
+    Raises
+    ------
+    InterruptedRun
+        From `progress`.
+    """
+    maker, wanted = _asked(room, lamps, given, None, seed, without)
+    return look_at(room, maker, wanted[block[0] - 1 :: block[1]], given, rays, threads, without, progress)
+
+
+def _asked(
+    room: Room,
+    lamps: tuple[Lamp, ...],
+    given: Mapping[int, Given],
+    held: Held | None,
+    seed: int,
+    without: Collection[str],
+) -> tuple[Problems, list[int]]:
+    """What makes objects' problems, and the objects that a model is to be chosen for."""
+    found_before = {lamp.object_id for lamp in lamps} | {mirror.object_id for mirror in room.field.mirrors}
+    # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
+    maker = Problems(room.field, room.samples, threads=1, seed=seed, without=without)
+    return maker, _wanted(room.instances, found_before, given, held)
 
 
 def _wanted(

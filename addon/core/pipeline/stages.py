@@ -26,6 +26,7 @@ from ..progress import Progress
 from ..results.overrides import NONE as NO_OVERRIDES
 from ..results.overrides import Overrides
 from ..results.store import Store
+from ..results.values import packed, unpacked
 from ..scene.closing import opened
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Capture, Frame, Mesh
@@ -36,9 +37,10 @@ from ..scene.unwrap import Unwrap
 from ..settings import ROOM, Settings
 from ..stages import WRITE
 from . import frames, shading, specular, surface
+from .choose_models import LOOKED, Looked, Room
 from .frames import FrameReader, Observed
 from .source import digest
-from .specular import Held, Pictures, Specular, fit_specular
+from .specular import Held, Pictures, Specular, fit_specular, look_at_block
 from .stage import Stage
 
 STAGES = (surface.STAGE, frames.STAGE, shading.STAGE, specular.STAGE)
@@ -271,9 +273,40 @@ class Stages:
     def specular(self) -> Specular:
         """phi, psi and the model of every object."""
         self.shading()
-        return self._stage(
+        found = self._stage(
             specular.STAGE, self.fitted, lambda found: found.to_store(self.overrides), Specular.from_store
         )
+        self.store.drop(self.store.parts(specular.STAGE.name))  # they are in it
+        return found
+
+    def specular_block(self, block: tuple[int, int]) -> None:
+        """Store what is found of some of the objects, which `specular` begins with: the I-th of N parts, I from 1."""
+        name, key = f"{specular.STAGE.name}-{block[0]}-of-{block[1]}", self.keys[specular.STAGE.name]
+        settings, light = specular.STAGE.settings(self.settings), self.shading()
+        if self.store.stored_key(name) == key:
+            return
+        self.progress.stage(specular.STAGE.name)
+        names = [frame.name for frame in self.capture.frames]
+        room = Room(
+            self.capture.instances, self.field, self.lit_diffuse(), light.irradiance, self.samples(), names,
+            self.surface().noise,
+        )  # fmt: skip
+        found = look_at_block(
+            room, light.lamps, block, rays=settings.specular_rays, threads=settings.threads, seed=settings.seed,
+            given=self.overrides.lobes(), without=settings.without, progress=self.progress,
+        )  # fmt: skip
+        arrays: Arrays = {}
+        self.store.save(name, key, arrays, {"looked": packed(found, arrays)})
+        self.progress.done()
+
+    def _looked(self) -> dict[int, Looked]:
+        """What blocks of objects have stored."""
+        found: dict[int, Looked] = {}
+        for name in self.store.parts(specular.STAGE.name):
+            arrays = self.store.load(name, self.keys[specular.STAGE.name])
+            if arrays is not None:
+                found |= unpacked(self.store.stored_meta(name)["looked"], arrays, LOOKED)
+        return found
 
     def fitted(self, settings: Settings, held: Held | None = None) -> Specular:
         """The specular stage as it is computed, of all objects or with some `held`."""
@@ -284,7 +317,8 @@ class Stages:
             pictures=Pictures(self.frames, self.read, s.median, self.store.folder) if names else None,
             rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
             noise=self.surface().noise, given=self.overrides.lobes(), held=held, without=s.without,
-            as_published="specular" in s.published, progress=self.progress,
+            as_published="specular" in s.published, looked=None if held else self._looked(),
+            progress=self.progress,
         )  # fmt: skip
 
     def median_radiance(self) -> float:

@@ -11,6 +11,7 @@ import errno
 import json
 import os
 import re
+import secrets
 import shutil
 import sys
 from collections.abc import Container, Iterable
@@ -41,6 +42,8 @@ class Store:
     ----------
     folder : path
         Made where absent.
+    shared : bool
+        Others who open it so may have it at the same time: for workers of whom each writes a stage's part of its own.
 
     Attributes
     ----------
@@ -55,7 +58,7 @@ class Store:
         The disk is full.
     """
 
-    def __init__(self, folder: Path | str):
+    def __init__(self, folder: Path | str, shared: bool = False):
         self.folder = Path(folder)
         self.damaged: list[str] = []
         self._lock = None
@@ -66,14 +69,10 @@ class Store:
                 )
         try:
             (self.folder / STAGES).mkdir(parents=True, exist_ok=True)
-            self._lock = _take_lock(self.folder)
-            # With the lock held, whoever wrote these is dead.
-            for where in (self.folder, self.folder / STAGES):
-                for remains in where.glob(f"{TEMPORARY}*"):
-                    remains.unlink()
-            for remains in self.folder.glob(f"{SPILLED}*"):
-                shutil.rmtree(remains, ignore_errors=True)
-            probe = self.folder / f"{TEMPORARY}{os.getpid()}-probe"
+            self._lock = _take_lock(self.folder, shared)
+            if not shared:
+                self._clear()
+            probe = self.folder / f"{TEMPORARY}{os.getpid()}-{secrets.token_hex(4)}-probe"
             probe.write_bytes(b"probe")
             probe.unlink()
         except OSError as error:
@@ -90,6 +89,14 @@ class Store:
             raise BadInputError(
                 f"Result folder '{self.folder}' can't be written ({reason}); choose one that you may write."
             ) from error
+
+    def _clear(self) -> None:
+        """Remove what dead runs left: with the lock held by us alone, whoever wrote it is dead."""
+        for where in (self.folder, self.folder / STAGES):
+            for remains in where.glob(f"{TEMPORARY}*"):
+                remains.unlink()
+        for remains in self.folder.glob(f"{SPILLED}*"):
+            shutil.rmtree(remains, ignore_errors=True)
 
     def __enter__(self) -> Store:
         return self
@@ -145,6 +152,10 @@ class Store:
         """Store the finished stage `name`, in whole or not at all; raises as `archive.write_archive`."""
         write_archive(self._stage(name), arrays, {"key": key, "meta": meta or {}})
 
+    def parts(self, name: str) -> list[str]:
+        """Names under which parts of the stage `name` are stored, under whatever key."""
+        return sorted(path.stem for path in (self.folder / STAGES).glob(f"{name}-*-of-*.npz"))
+
     def drop(self, names: Iterable[str]) -> None:
         """Forget the stages `names`, so that they are done again; one that is not stored is no error."""
         for name in names:
@@ -180,9 +191,10 @@ class Store:
         return self.folder / STAGES / f"{name}.npz"
 
 
-def _take_lock(folder: Path):
-    """Lock `folder` and return the open lock file; the system frees it when it is closed or its process dies.
+def _take_lock(folder: Path, shared: bool = False):
+    """Lock `folder`, against all others or those alone that don't share it; returns the open lock file.
 
+    The system frees it when it is closed or its process dies.
     So a run that was killed leaves no lock behind, and no process id has to be asked whether it still lives.
     """
     # A link in a folder that somebody else made must not have its target emptied.
@@ -193,11 +205,12 @@ def _take_lock(folder: Path):
             import msvcrt
 
             file.seek(1 << 20)  # far behind the content: Windows won't let others read what is locked
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+            if not shared:  # it knows no shared ones
+                msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
         else:
             import fcntl
 
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
     except OSError as error:
         if error.errno in (errno.EAGAIN, errno.EACCES, errno.EDEADLK):
             file.seek(0)

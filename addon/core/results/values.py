@@ -1,0 +1,82 @@
+"""Frozen values as arrays and JSON, and back as they were: the same types, the same bits.
+
+For what one worker hands to another. Nothing of it is code: only classes that the reader names are made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from ..brdf.model import Brdf
+from ..brdf.registry import find
+
+Arrays = dict[str, np.ndarray]
+
+
+def packed(value: Any, arrays: Arrays) -> Any:
+    """A value in what JSON knows; its arrays, and NumPy's own numbers, are put into `arrays`.
+
+    Raises
+    ------
+    TypeError
+        There is something in it that is no value.
+    """
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if isinstance(value, np.ndarray | np.generic):
+        name = str(len(arrays))
+        arrays[name] = np.asarray(value)
+        return {"scalar" if isinstance(value, np.generic) else "array": name}
+    if isinstance(value, float):
+        return {"float": value.hex()}
+    if isinstance(value, Brdf):
+        return {"brdf": value.name}
+    if isinstance(value, dict):
+        return {"dict": [[packed(one, arrays) for one in pair] for pair in value.items()]}
+    for kind in (tuple, list, frozenset):
+        if type(value) is kind:
+            return {kind.__name__: [packed(one, arrays) for one in (sorted(value) if kind is frozenset else value)]}
+    if is_dataclass(value) and not isinstance(value, type):
+        told = {one.name: packed(getattr(value, one.name), arrays) for one in fields(value)}
+        return {"value": type(value).__name__, "fields": told}
+    raise TypeError(f"{type(value).__name__} is no value that can be stored")
+
+
+def unpacked(told: Any, arrays: Mapping[str, np.ndarray], kinds: Mapping[str, type]) -> Any:
+    """The inverse of `packed`.
+
+    Parameters
+    ----------
+    told
+        As JSON has it.
+    arrays : mapping of str to array
+    kinds : mapping of str to type
+        The frozen values that may be in it, by name.
+
+    Raises
+    ------
+    LookupError
+        Something in it is none of these, or an array or a reflectance model is not there.
+    """
+    if not isinstance(told, dict):
+        return told
+    if "value" in told:
+        return kinds[told["value"]](**{k: unpacked(one, arrays, kinds) for k, one in told["fields"].items()})
+    [(kind, content)] = told.items()
+    if kind == "array":
+        return arrays[content]
+    if kind == "scalar":
+        return arrays[content][()]
+    if kind == "float":
+        return float.fromhex(content)
+    if kind == "brdf":
+        if (found := find(content)) is None:
+            raise LookupError(f"there is no reflectance model '{content}'")
+        return found
+    if kind == "dict":
+        return {unpacked(k, arrays, kinds): unpacked(one, arrays, kinds) for k, one in content}
+    return {"tuple": tuple, "list": list, "frozenset": frozenset}[kind](unpacked(one, arrays, kinds) for one in content)
