@@ -12,3 +12,8 @@ def by_label(label: np.ndarray) -> list[np.ndarray]:
     """
     order = np.argsort(label, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+
+
+def by_number(label: np.ndarray) -> dict[int, np.ndarray]:
+    """`by_label`, by the label: hundreds of objects are asked for, and each comparison goes over all elements."""
+    return {int(label[own[0]]): own for own in by_label(label) if len(own)}

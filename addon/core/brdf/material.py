@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..groups import by_label
+from ..groups import by_number
 from ..kinds import Unit
 from ..naming import object_name
 from .lambertian import LAMBERTIAN
@@ -116,7 +116,7 @@ def base_colors(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[O
     object_id : (n,) int
     materials : iterable of ObjectMaterial
     """
-    color, elements = albedo.copy(), {int(object_id[own[0]]): own for own in by_label(object_id) if len(own)}
+    color, elements = albedo.copy(), by_number(object_id)
     for m in materials:
         if (own := elements.get(m.object_id)) is not None:
             color[own] = m.model.base_color(color[own], m)

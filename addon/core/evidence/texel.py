@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..brdf.material import ObjectMaterial
-from ..groups import by_label
+from ..groups import by_label, by_number
 from ..passes.albedo.albedo import MEASURED, Albedo
 from ..scene.atlas import Atlas
 from ..scene.lit_diffuse import LitDiffuse
@@ -125,10 +125,10 @@ def gloss_error(
     atlas: Atlas, albedo: Albedo, materials: list[ObjectMaterial], specular: np.ndarray, irradiance: np.ndarray
 ) -> np.ndarray:
     """Error of albedo by what a highlight left in the median, or by taking too much out, (n,) float32, absolute."""
-    result = np.full(len(atlas), CALIBRATION.left, np.float32)
+    result, elements = np.full(len(atlas), CALIBRATION.left, np.float32), by_number(atlas.object_id)
     for m in materials:
         if m.model.layered:
-            own = np.flatnonzero(atlas.object_id == m.object_id)
+            own = elements.get(m.object_id, np.zeros(0, np.int64))
             taken = np.pi * specular[own].mean(1) / np.maximum(irradiance[own].mean(1), 1e-20)
             known = albedo.origin[own] == MEASURED
             if known.any():

@@ -14,6 +14,7 @@ from collections.abc import Collection
 import numpy as np
 
 from ...brdf.material import ObjectMaterial
+from ...groups import by_number
 from ...light.emitters import bright_triangles
 from ...light.environment import Environment
 from ...light.field import LightField
@@ -53,11 +54,12 @@ class Excess(LightField):
         self._inside = specular.copy()
         alpha, kind = np.zeros(len(room.atlas), np.float32), np.zeros(len(room.atlas), np.int8)
         self._f0, microfacets = np.zeros((len(room.atlas), 3), np.float32), []
+        elements, none = by_number(room.atlas.object_id), np.zeros(0, np.int64)
         followed = {mirror.object_id for mirror in room.mirrors}
         for m in materials:
             if m.model.microfacets is None or m.alpha is None or m.object_id in followed:
                 continue
-            own = room.atlas.object_id == m.object_id
+            own = elements.get(m.object_id, none)
             alpha[own] = max(float(m.alpha), float(GRID[0]))
             if m.model.microfacets not in microfacets:
                 microfacets.append(m.model.microfacets)
