@@ -13,9 +13,10 @@ import numpy as np
 from ...brdf.dielectric import DIELECTRIC, MOST_F0, USUAL_F0
 from ...brdf.metal import METAL
 from ...fit.lobe_fit import LobeFit
+from ...fit.params import LOBE_FIT
 from ...fit.problem import Problem
 from ...significance import LEVELS
-from .models import Choice, metal_f0
+from .models import Choice, metal_f0, reflectance
 from .one_colour import Coated, OneColour
 from .params import LOOKS
 
@@ -26,12 +27,13 @@ def metal_by_looks(choice: Choice, looks: OneColour, problem: Problem) -> Choice
     For things that are small and thin: `problem` may hold elements of a single view. They are taken to be of one
     colour; where they are not, texture widens all spreads and the choice stays.
     """
-    if looks.other < LOOKS.metal_spread or looks.ratio > LOOKS.ratio or looks.sigmas < LEVELS.likely:
+    if looks.other < LOOKS.metal_spread or looks.ratio > LOOKS.ratio:
         return choice
-    f0 = metal_f0(problem, looks.phi)
-    if f0.min() <= MOST_F0:  # no metal is that dark in any channel, gold has .3 in blue; reddish wood had .06
+    # No metal is that dark in any channel: gold has .3 in blue, reddish wood had .06. None sends more than it gets,
+    # beyond what the light is known to: a white bowl under a lamp had 2.1.
+    if not MOST_F0 < reflectance(problem, looks.phi).min() <= 1 + LOBE_FIT.light_error:
         return choice
-    fit = _fit(looks.phi, f0, looks.metal, looks.diffuse)
+    fit = _fit(looks.phi, metal_f0(problem, looks.phi), looks.metal, looks.diffuse)
     if looks.sigmas < LEVELS.sigmas:
         return replace(choice, metal=choice.metal or fit)
     note = (

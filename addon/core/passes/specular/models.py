@@ -270,9 +270,14 @@ def _refused(lobe: LobeFit, own: LobeFit | None, problem: Problem | None) -> boo
 
 
 def metal_f0(problem: Problem, phi: float) -> np.ndarray:
-    """F0 of a metal, (3,): all its light is the lobe's, so I = F0 A + B; the median ratio over the observations."""
+    """F0 of a metal, (3,): what it reflects, held between what metals can."""
+    return np.clip(reflectance(problem, phi), 0.02, 1.0)
+
+
+def reflectance(problem: Problem, phi: float) -> np.ndarray:
+    """F0 of what has no diffuse part, (3,): all its light is the lobe's, so I = F0 A + B; the median ratio over the
+    observations. Above 1 it sends more than it gets."""
     at = nearest(problem.light.grid, phi)
     A, B = problem.light.A[:, at].astype(np.float64), problem.light.B[:, at].astype(np.float64)
     strong = A.mean(1) >= np.median(A.mean(1)) * 0.5
-    ratio = (problem.radiance[strong] - B[strong]) / np.maximum(A[strong], 1e-9)
-    return np.clip(np.median(ratio, 0), 0.02, 1.0)
+    return np.median((problem.radiance[strong] - B[strong]) / np.maximum(A[strong], 1e-9), 0)

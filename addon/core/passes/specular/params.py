@@ -74,7 +74,7 @@ class LooksParams:
     ----------
     ratio : float
         An object of one colour is metal, or coated, if that leaves less than this share of the spread that diffuse and
-        dielectric leave, by `LEVELS.sigmas`; by `LEVELS.likely` if others of its class are metal. Of 166 objects in the
+        dielectric leave, by `LEVELS.sigmas`; by whatever it is if others of its class are metal. Of 166 objects in the
         living room and five others, metals had 0.2 to 1.1 (the half of them below 0.8), everything else 0.92 and more,
         but for what `metal_spread` leaves out and a pane of glass (0.58); reddish wood in a perturbed scan had 0.78 and
         an F0 that no metal has (`metal_by_looks`). Of what was called Lambertian in six rooms and two perturbed scans,

@@ -88,7 +88,7 @@ def test_too_little_of_it(floor, irradiance):
 def test_likely_metals_follow_their_class(floor, irradiance):
     problem = floor(0.11, COPPER, 0.0)
     looks = compare(problem, irradiance)
-    sure, likely = metal_by_looks(UNSURE, looks, problem), metal_by_looks(UNSURE, replace(looks, sigmas=2.0), problem)
+    sure, likely = metal_by_looks(UNSURE, looks, problem), metal_by_looks(UNSURE, replace(looks, sigmas=0.0), problem)
     assert likely.model == LAMBERTIAN and likely.metal is not None
     result = adopt_from_class({0: sure, 1: likely}, {0: problem, 1: problem}, dict.fromkeys(range(2), "tap"))
     assert result[1].model == METAL
@@ -99,6 +99,13 @@ def test_likely_metals_follow_their_class(floor, irradiance):
 def test_reddish_wood_is_no_copper(floor, irradiance):
     """A dark lacquer that shows the room would need an F0 next to nothing in blue, which no metal has."""
     problem = floor(0.11, np.array([0.77, 0.19, 0.06]), 0.0)
+    assert metal_by_looks(UNSURE, compare(problem, irradiance), problem) is UNSURE
+
+
+def test_no_metal_sends_more_than_it_gets(floor, irradiance):
+    """A bowl whose light was taken for half of what it is looks like a metal that reflects twice what it gets."""
+    problem = floor(0.11, np.full(3, 2.0), 0.0)
+    assert compare(problem, irradiance).ratio < 0.5
     assert metal_by_looks(UNSURE, compare(problem, irradiance), problem) is UNSURE
 
 

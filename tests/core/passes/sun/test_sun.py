@@ -96,6 +96,13 @@ def test_what_a_lamp_lights_is_no_sun(room):
 
 
 @pytest.mark.slow
+def test_what_copper_throws_is_no_sun(room):
+    """A patch through the window whose light is redder than any sun's: a shade of copper throws such onto a table."""
+    found = run(room, sunny.light(room, sun=np.array([24.0, 12.0, 5.0])))
+    assert found.sun is None
+
+
+@pytest.mark.slow
 def test_no_sun_is_looked_for_where_frames_saw_the_sky(room):
     """The same patch, but every direction of the sky is known."""
     assert run(room, sunny.light(room), sky_map(np.ones((64, 128), np.int32))).sun is None
