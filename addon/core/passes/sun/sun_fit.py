@@ -213,8 +213,8 @@ def _of_a_sun(spots: Spots, contribution: np.ndarray) -> bool:
 def _coloured(spots: Spots, direction: np.ndarray, radius: float, before: float, after: float) -> Sun:
     """The sun with what each channel says of its irradiance, held near the luminance's."""
     *channels, luminance = _channels(spots, spots.contribution(direction, radius))
-    channels = np.clip(channels, luminance / SUN.colour, luminance * SUN.colour)
-    light = (channels * (luminance / float(channels @ LUMINANCE))).astype(np.float32)
+    held = np.clip(channels, luminance / SUN.colour, luminance * SUN.colour)
+    light = (held * (luminance / float(held @ LUMINANCE))).astype(np.float32)
     sun = Sun(np.asarray(direction, np.float32), light, radius)
     note = (
         f"A sun that no frame sees was solved from the patch of light that it throws: {sun.where()} "
