@@ -89,14 +89,14 @@ def from_sun(field: LightField, element: np.ndarray) -> np.ndarray:
     return sunlight(field.scene, field.sun, atlas.position[element], atlas.normal[element], atlas.texel_edge)[:, :3]
 
 
-def contribution_of_object(field: LightField, element: np.ndarray, object_id: int, seed: int) -> np.ndarray:
-    """E from one object at radiance 1 and nothing else, (m,) float64."""
-    alone = np.repeat((field.atlas.object_id == object_id)[:, None], 3, 1).astype(np.float32)
-    lit = field.with_sun(None).with_light(alone, Environment.dark(), [object_id])
+def contribution_of(field: LightField, element: np.ndarray, objects: list[int], seed: int) -> np.ndarray:
+    """E from these objects at radiance 1 and nothing else, (m,) float64."""
+    alone = np.repeat(np.isin(field.atlas.object_id, objects)[:, None], 3, 1).astype(np.float32)
+    lit = field.with_sun(None).with_light(alone, Environment.dark(), objects)
     return irradiance_at(lit, element, seed)[:, 0]
 
 
-def most_reflected(field: LightField, object_id: int, seed: int) -> float:
-    """Luminance that an object would send out at an albedo of `EMITTER_ALBEDO`, in the median over its elements."""
-    own = pick(field, field.atlas.object_id == object_id, seed, LIGHT_FIT.lamp_elements)
+def most_reflected(field: LightField, objects: list[int], seed: int) -> float:
+    """Luminance that objects would send out at an albedo of `EMITTER_ALBEDO`, in the median over their elements."""
+    own = pick(field, np.isin(field.atlas.object_id, objects), seed, LIGHT_FIT.lamp_elements)
     return LIGHT_FIT.emitter_albedo / np.pi * float(np.median(irradiance_at(field, own, seed) @ LUMINANCE))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..luminance import LUMINANCE
+from ..scene.atlas import Atlas
+from ..scene.model import Instance
 from .params import LIGHT_FIT
 
 
@@ -77,10 +79,50 @@ def find_seen(object_id: np.ndarray, radiance: np.ndarray, irradiance: np.ndarra
     return lamps
 
 
-def twin(object_id: int, luminance: float, class_of: dict[int, str], seen: list[Lamp]) -> Lamp | None:
-    """A seen lamp of the object's class with about the luminance that was solved for the object."""
+def mixed_lamps(lamps: Collection[Lamp], good: np.ndarray, instances: tuple[Instance, ...]) -> list[int]:
+    """Seen lamps whose radiance no pixel shows unmixed, of a class of which another's does.
+
+    Their pixels hold what is beside the lamp as well, so their radiance is to be solved for, too.
+
+    Parameters
+    ----------
+    good : (m,) int
+        Object of each element whose L_d rests on clean observations.
+    """
+    class_of, clean = {one.object_id: one.class_name for one in instances}, set(np.unique(good).tolist())
+    shining = {class_of.get(lamp.object_id) for lamp in lamps if lamp.object_id in clean}
+    return [
+        lamp.object_id
+        for lamp in lamps
+        if lamp.seen and lamp.object_id not in clean and class_of.get(lamp.object_id) in shining
+    ]
+
+
+def lamp_models(atlas: Atlas, instances: tuple[Instance, ...]) -> dict[int, int]:
+    """Which objects would be the same lamp hung several times: of one class, and of about the same area.
+
+    Returns
+    -------
+    dict of int
+        Of each object the first that is like it, or its own number.
+    """
+    area = np.bincount(atlas.object_id, atlas.area)
+    model: dict[int, int] = {}
+    firsts: dict[str, list[int]] = {}
+    for one in instances:
+        own = area[one.object_id] if one.object_id < len(area) else 0.0
+        known = firsts.setdefault(one.class_name, [])
+        like = [i for i in known if abs(own - area[i]) <= LIGHT_FIT.same_size * area[i]] if own else []
+        model[one.object_id] = like[0] if like else one.object_id
+        if own and not like:
+            known.append(one.object_id)
+    return model
+
+
+def twin(object_id: int, luminance: float, model: dict[int, int], seen: list[Lamp]) -> Lamp | None:
+    """A seen lamp of the object's model with about the luminance that was solved for the object."""
     for other in seen:
-        if class_of.get(other.object_id) == class_of.get(object_id):
+        if model.get(other.object_id) == model.get(object_id):
             if abs(luminance / float(other.radiance @ LUMINANCE) - 1) < LIGHT_FIT.alike:
                 return other
     return None

@@ -133,6 +133,8 @@ class LightFitParams:
     alike, same_colour : float
         Log albedo, of all channels together and apart, by which objects of one class may differ to be of one kind.
         Lamps that are off by a tenth part objects under them from others under the sky by up to .1.
+    same_size : float
+        Relative difference of area up to which two objects of a class can be the same lamp: a scan's noise and holes.
     reach : float
         The refined radiance stays within this factor of where it started.
     lamp_elements : int
@@ -151,6 +153,7 @@ class LightFitParams:
     flat: float = 0.99
     alike: float = 0.25
     same_colour: float = 0.1
+    same_size: float = 0.1
     reach: float = 3.0
     lamp_elements: int = 500
     rays: int = 256

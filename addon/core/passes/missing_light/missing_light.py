@@ -13,7 +13,7 @@ import numpy as np
 
 from ...light.directions import cosine_patterns, turned
 from ...light.environment import Environment
-from ...light.few_elements import contribution_of_object, evened, irradiance_at
+from ...light.few_elements import contribution_of, evened, irradiance_at
 from ...light.field import LightField
 from ...light.lamps import Lamp, find_seen
 from ...light.openings import CELLS, Openings, exits
@@ -88,7 +88,7 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
     part = sky.clipped_parts(MISSING.sky)
     cell, through, shown, by_part = _through_cells(field, part, shut, element, seed)
     received = received + shown
-    thrown = [contribution_of_object(field, element, one, seed) for one in patches]
+    thrown = [contribution_of(field, element, [one], seed) for one in patches]
     usual = np.median(radiance[element], 0).astype(np.float64)
     # What hardly any element sees says nothing, and lights nothing.
     told, lit = (given.mean(0) >= MISSING.least_seen for given in (through, by_part))

@@ -103,7 +103,7 @@ def refined(
     lamps: list[Lamp],
     contribution: dict[int, np.ndarray],
     least: dict[int, float],
-    instances: tuple[Instance, ...],
+    model: dict[int, int],
     seen: list[Lamp],
     sky: Sky,
     base: np.ndarray,
@@ -117,6 +117,8 @@ def refined(
         Unseen ones, as found one by one. One that took a seen lamp's radiance keeps it.
     least : dict of float
         Luminance below which each would be no lamp.
+    model : dict of int
+        `lamp_models`.
     base : (m, 3) float64
         E from all light that the frames show.
     colours : dict of (3,) float
@@ -157,22 +159,19 @@ def refined(
         return np.maximum([*(lamp.radiance for lamp in free), *(sky.radiance[i] for i in parts)], 1e-9)
 
     luminance = solve(LUMINANCE, now() @ LUMINANCE)
-    class_of = {i.object_id: i.class_name for i in instances}
     twins = {
         lamp.object_id: replace(lamp, radiance=same.radiance, twin=same.object_id, solved=float(s))
         for lamp, s in zip(free, luminance, strict=False)
-        if (same := twin(lamp.object_id, s, class_of, seen)) is not None
+        if (same := twin(lamp.object_id, s, model, seen)) is not None
     }
     if twins:
         fixed += twins.values()
         free = [lamp for lamp in free if lamp.object_id not in twins]
-        luminance = solve(LUMINANCE, now() @ LUMINANCE) if free or parts else luminance[:0]
+        if not free and not parts:
+            return [twins.get(lamp.object_id, lamp) for lamp in lamps]
+        luminance = solve(LUMINANCE, now() @ LUMINANCE)
     colour = now() * (luminance / (now() @ LUMINANCE))[:, None]
-    bright = (
-        all_light(base, fixed, contribution, others) @ LUMINANCE + contributions_of() @ luminance
-        if len(colour)
-        else None
-    )
+    bright = all_light(base, fixed, contribution, others) @ LUMINANCE + contributions_of() @ luminance
     told = np.array([lamp.object_id in colours for lamp in free] + [False] * len(parts), bool)
     fixed += [replace(lamp, radiance=colour[k].astype(np.float32)) for k, lamp in enumerate(free) if told[k]]
     free = [lamp for lamp in free if lamp.object_id not in colours]

@@ -12,18 +12,20 @@ from .params import UNSEEN
 from .refine_light import Sky, all_light
 
 
-def solve_lamps(sample: Sample, contribution, least, instances, seen, sky: Sky, base, colours) -> list[Lamp]:
-    """Unseen lamps, the one that explains most first; none once the gain falls below `lamp_gain`."""
-    class_of = {i.object_id: i.class_name for i in instances}
+def solve_lamps(sample: Sample, contribution, least, class_of, model, seen, sky: Sky, base, colours) -> list[Lamp]:
+    """Unseen lamps, the one that explains most first; none once the gain falls below `lamp_gain`.
+
+    Where another of its class shines, any gain will do: a small lamp lights too little of a room to gain much.
+    """
     sent = sample.radiance @ LUMINANCE
+    shining = {class_of.get(lamp.object_id) for lamp in seen}
+    gain = {i: 0.0 if class_of.get(i) in shining else UNSEEN.lamp_gain for i in contribution}
     lamps: list[Lamp] = []
     left = dict(contribution)
     while left:
         received = all_light(base, lamps, contribution, sky) @ LUMINANCE
         best = {i: sample.best(sent, received, G) for i, G in left.items()}
-        found = {
-            i: f for i, f in best.items() if f is not None and f[2] < (1 - UNSEEN.lamp_gain) * f[1] and f[0] > least[i]
-        }
+        found = {i: f for i, f in best.items() if f is not None and f[2] < (1 - gain[i]) * f[1] and f[0] > least[i]}
         if not found:
             break
         object_id = min(found, key=lambda i: found[i][2])
@@ -33,7 +35,7 @@ def solve_lamps(sample: Sample, contribution, least, instances, seen, sky: Sky, 
         ]
         known = colours.get(object_id)
         s, before, after = found[object_id]
-        lamps.append(_coloured(object_id, s, before, after, class_of, seen, sample.received, by_channel, known))
+        lamps.append(_coloured(object_id, s, before, after, class_of, model, seen, sample.received, by_channel, known))
         del left[object_id]
     return lamps
 
@@ -54,14 +56,14 @@ def needed(sample: Sample, lamps: list[Lamp], contribution, sky: Sky, base, colo
     return (lamps, sky) if with_lamps < (1 - UNSEEN.lamp_gain) * without else (shining, alone)
 
 
-def _coloured(object_id, s, before, after, class_of, seen, received, by_channel, known) -> Lamp:
+def _coloured(object_id, s, before, after, class_of, model, seen, received, by_channel, known) -> Lamp:
     """Give a solved luminance its colour.
 
-    A seen lamp's of the same class if they agree; else that which is `known` from its edges; else what each channel
+    A seen lamp's of the same model if they agree; else that which is `known` from its edges; else what each channel
     says by itself, if together they make that luminance; else that of the lamps, or of the light.
     """
     spread = float(before), float(after)
-    same = twin(object_id, s, class_of, seen)
+    same = twin(object_id, s, model, seen)
     if same is not None:
         return Lamp(int(object_id), same.radiance, False, spread=spread, twin=same.object_id, solved=float(s))
     if known is not None:

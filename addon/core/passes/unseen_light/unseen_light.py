@@ -15,7 +15,7 @@ import numpy as np
 from ...light.environment import Environment
 from ...light.few_elements import (
     barely_seen,
-    contribution_of_object,
+    contribution_of,
     evened,
     from_sun,
     irradiance_at,
@@ -24,7 +24,7 @@ from ...light.few_elements import (
     steady,
 )
 from ...light.field import LightField
-from ...light.lamps import Lamp, find_seen
+from ...light.lamps import Lamp, find_seen, lamp_models
 from ...light.light_fit import Sample, kinds_of, on_flat
 from ...light.params import LIGHT_FIT
 from ...scene.model import Instance
@@ -48,7 +48,7 @@ class Contributions:
     element : (k,) int
         Those of the sample that tell of lamps.
     lamps : dict of (k,) float64
-        E there from each unseen object at radiance 1.
+        E there at radiance 1 from each unseen object, and from those like it (`lamp_models`).
     least : dict of float
         Luminance below which each would be no lamp.
     """
@@ -161,30 +161,37 @@ def find_light(
     # About half of the elements are on flat spots, of large objects as of small ones.
     most = UNSEEN.samples / len(np.unique(atlas.object_id[element])) / 2 if clipped else np.inf
     sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit], most)
+    # The same lamp hung several times is one unknown.
+    model = lamp_models(atlas, instances)
+    alike: dict[int, list[int]] = {}
+    for one in unseen_objects:
+        alike.setdefault(model.get(one, one), []).append(one)
+    alike = {own[0]: own for own in alike.values()}
     earlier = old if old is not None and np.array_equal(old.element, sample.element) else None
     if earlier is not None:
         contribution, least = earlier.lamps, earlier.least
     else:
-        contribution = {i: contribution_of_object(field, sample.element, i, seed) for i in unseen_objects}
+        contribution = {i: contribution_of(field, sample.element, own, seed) for i, own in alike.items()}
         # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
         lit_room = field.with_light(even, environment)
-        least = {i: most_reflected(lit_room, i, seed) for i in unseen_objects}
+        least = {i: most_reflected(lit_room, own, seed) for i, own in alike.items()}
 
     clipped_sky = bool(zones) and bool(environment.clipped.any())
     sky = Sky([G[lit] for G in sky_contributions], guess, clipped_sky, [zone.told for zone in zones])
+    class_of = {i.object_id: i.class_name for i in instances}
     colours = shared_by_class(colours or {}, unseen_objects, instances)
 
     for _ in range(UNSEEN.sweeps if zones else 1):
-        lamps = solve_lamps(sample, contribution, least, instances, seen, sky, received[lit], colours)
+        lamps = solve_lamps(sample, contribution, least, class_of, model, seen, sky, received[lit], colours)
         solve_sky(sample, lamps, contribution, sky, received[lit])
     lamps, sky = needed(sample, lamps, contribution, sky, received[lit], colours)
     E = all_light(received[lit], lamps, contribution, sky)
     log_albedo = np.log(np.maximum(sent, 1e-9) / np.maximum(E, 1e-12))
-    class_of = {i.object_id: i.class_name for i in instances}
     kind = kinds_of(sample.object_id, log_albedo, class_of)
     sample = replace(sample, kind=kind, cap=LIGHT_FIT.clipped_cap if clipped else LIGHT_FIT.cap)
     if "joint-light" not in without:
-        lamps = refined(sample, lamps, contribution, least, instances, seen, sky, received[lit], colours)
+        lamps = refined(sample, lamps, contribution, least, model, seen, sky, received[lit], colours)
+    lamps = [replace(lamp, object_id=one) for lamp in lamps for one in alike[lamp.object_id]]
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))
     # With all light known, what looked like a lamp for want of it does so no more.

@@ -38,7 +38,7 @@ def test_a_lamp_and_the_sky_are_refined_together(bound):
     sky = Sky([sky_light], [TRUE[1] * (0.8 if bound else 2)], bound)
     sky.solved.add(0)
     start = Lamp(7, np.float32([12, 12, 12]), False, spread=(0.5, 0.4))
-    lamps = refined(found, [start], {7: lamp_light}, {7: 0.1}, (), [], sky, base, {})
+    lamps = refined(found, [start], {7: lamp_light}, {7: 0.1}, {}, [], sky, base, {})
     assert np.allclose(lamps[0].radiance, TRUE[0], rtol=0.08) and lamps[0].spread == (0.5, 0.4)
     assert np.allclose(sky.radiance[0], TRUE[1], rtol=0.1)
     assert ("clipped" in sky.notes()[0]) == bound
@@ -51,7 +51,7 @@ def test_a_known_colour_is_kept():
     sky.solved.add(0)
     told = TRUE[0] / (TRUE[0] @ LUMINANCE)
     start = Lamp(7, np.float32(12 * told), False, spread=(0.5, 0.4))
-    (lamp,) = refined(found, [start], {7: lamp_light}, {7: 0.1}, (), [], sky, base, {7: told})
+    (lamp,) = refined(found, [start], {7: lamp_light}, {7: 0.1}, {}, [], sky, base, {7: told})
     np.testing.assert_allclose(lamp.radiance / (lamp.radiance @ LUMINANCE), told, rtol=1e-5)
     assert lamp.radiance @ LUMINANCE == pytest.approx(TRUE[0] @ LUMINANCE, rel=0.08)
     assert np.allclose(sky.radiance[0], TRUE[1], rtol=0.1)
@@ -67,13 +67,13 @@ def test_a_lower_bound_holds():
     found, base, (lamp_light, sky_light) = sample()
     sky = Sky([sky_light], [2 * TRUE[1]], True)
     sky.solved.add(0)
-    refined(found, [Lamp(7, np.float32(TRUE[0]), False)], {7: lamp_light}, {7: 0.1}, (), [], sky, base, {})
+    refined(found, [Lamp(7, np.float32(TRUE[0]), False)], {7: lamp_light}, {7: 0.1}, {}, [], sky, base, {})
     assert (sky.radiance[0] >= 2 * TRUE[1] - 1e-6).all()
 
 
 def test_nothing_to_refine():
     found, base, _ = sample()
-    assert refined(found, [], {}, {}, (), [], Sky([], [], False), base, {}) == []
+    assert refined(found, [], {}, {}, {}, [], Sky([], [], False), base, {}) == []
 
 
 def test_flat_spots():
