@@ -79,27 +79,43 @@ def find_seen(object_id: np.ndarray, radiance: np.ndarray, irradiance: np.ndarra
     return lamps
 
 
-def mixed_lamps(lamps: Collection[Lamp], good: np.ndarray, instances: tuple[Instance, ...]) -> list[int]:
-    """Seen lamps whose radiance no pixel shows unmixed, of a class of which another's does.
+def of_shining_class(lamps: Collection[Lamp], clean: np.ndarray, instances: tuple[Instance, ...]) -> dict[int, float]:
+    """Objects of a class of which most that frames show unmixed are lamps, with the median luminance of those.
 
-    Their pixels hold what is beside the lamp as well, so their radiance is to be solved for, too.
+    The capture has to tell classes.
 
     Parameters
     ----------
-    good : (m,) int
-        Object of each element whose L_d rests on clean observations.
+    lamps : collection of Lamp
+        Those seen.
+    clean : (m,) int
+        Objects that have an element whose L_d rests on clean observations, each at least once.
     """
-    class_of, clean = {one.object_id: one.class_name for one in instances}, set(np.unique(good).tolist())
-    shining = {class_of.get(lamp.object_id) for lamp in lamps if lamp.object_id in clean}
-    return [
-        lamp.object_id
-        for lamp in lamps
-        if lamp.seen and lamp.object_id not in clean and class_of.get(lamp.object_id) in shining
-    ]
+    luminance = {lamp.object_id: float(lamp.radiance @ LUMINANCE) for lamp in lamps}
+    members: dict[str, list[int]] = {}
+    for one in instances:
+        members.setdefault(one.class_name, []).append(one.object_id)
+    shown = set(np.unique(clean).tolist())
+    found: dict[int, float] = {}
+    for name, own in members.items():
+        seen = shown & set(own)
+        shining = [luminance[i] for i in seen if i in luminance]
+        if name and len(shining) * 2 > len(seen):
+            found |= dict.fromkeys(own, float(np.median(shining)))
+    return found
+
+
+def mixed_lamps(lamps: Collection[Lamp], clean: np.ndarray, instances: tuple[Instance, ...]) -> list[int]:
+    """Seen lamps of a class that shines whose radiance no pixel shows unmixed (`of_shining_class`).
+
+    Their pixels hold what is beside the lamp as well, so their radiance is to be solved for, too.
+    """
+    kin, shown = of_shining_class(lamps, clean, instances), set(np.unique(clean).tolist())
+    return [lamp.object_id for lamp in lamps if lamp.seen and lamp.object_id in kin and lamp.object_id not in shown]
 
 
 def lamp_models(atlas: Atlas, instances: tuple[Instance, ...]) -> dict[int, int]:
-    """Which objects would be the same lamp hung several times: of one class, and of about the same area.
+    """Which objects would be the same lamp hung several times: of one class that was told, and of about the same area.
 
     Returns
     -------
@@ -110,7 +126,8 @@ def lamp_models(atlas: Atlas, instances: tuple[Instance, ...]) -> dict[int, int]
     model: dict[int, int] = {}
     firsts: dict[str, list[int]] = {}
     for one in instances:
-        own = area[one.object_id] if one.object_id < len(area) else 0.0
+        told = one.class_name and one.object_id < len(area)
+        own = area[one.object_id] if told else 0.0
         known = firsts.setdefault(one.class_name, [])
         like = [i for i in known if abs(own - area[i]) <= LIGHT_FIT.same_size * area[i]] if own else []
         model[one.object_id] = like[0] if like else one.object_id

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -12,6 +14,7 @@ from addon.core.light.mirrors import Mirror
 from addon.core.luminance import LUMINANCE
 from addon.core.pipeline.shading import shade
 from addon.core.scene.lit_diffuse import LitDiffuse
+from addon.core.scene.visibility import EDGE
 from tests.core.rooms import DARK, Quad, albedo_in, around, box_sides, cut, lit_box, make_room, quad, radiosity, split
 
 ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}
@@ -67,6 +70,42 @@ def test_a_lamp_that_no_frame_sees_is_solved_for(two_lamps, hidden, radiance):
     for object_id, rho in ALBEDO.items():
         own = room.atlas.object_id == object_id
         assert np.allclose(np.median(albedo.rho[own], 0), rho, rtol=0.15)
+
+
+@pytest.fixture(scope="module")
+def strips():
+    """Object 6 is large; 7 and 8 are the same small strip, of another radiance. All are told to be of one class."""
+    sides = box_sides()
+    ceiling = sides.pop(1)
+    for i, at in enumerate(((0.3, 0.7), (0.4, 0.5), (0.4, 0.5))):
+        third = cut(ceiling, (i / 3, (i + 1) / 3), (0, 1))
+        lamp = cut(third, at, (0.3, 0.7))
+        sides += [*around(third, at, (0.3, 0.7)), quad(lamp.corner, lamp.edge_u, lamp.edge_v, 6 + i)]
+    room = make_room(sides, 0.1)
+    instances = tuple(replace(one, class_name="lamp" if one.object_id > 5 else "side") for one in room.instances)
+    room = replace(room, instances=instances)
+    return room, radiosity(room, ALBEDO, {6: (10, 9, 8), 7: (20, 18, 16), 8: (20, 18, 16)})
+
+
+def test_a_lamp_smaller_than_a_pixel_is_solved_for_with_its_like(strips):
+    """One strip is seen at its edges alone, mixed with the dark beside it; no frame sees the other."""
+    room, L = strips
+    lit = measured(room, L, {8}, texture=0.1)
+    mixed = room.atlas.object_id == 7
+    lit.radiance[mixed] *= 0.5
+    lit.tier[mixed], lit.count[mixed] = EDGE, 1
+    found = {lamp.object_id: lamp for lamp in run(room, lit).lamps}
+    assert set(found) == {6, 7, 8} and found[6].seen and not found[7].seen
+    assert np.array_equal(found[7].radiance, found[8].radiance)
+    assert found[7].radiance @ LUMINANCE == pytest.approx(np.float32([20, 18, 16]) @ LUMINANCE, rel=0.2)
+
+
+def test_an_unlit_lamp_of_a_class_that_shines_stays_dark(strips):
+    room, _ = strips
+    L = radiosity(room, ALBEDO | {7: 0.5, 8: 0.5}, {6: (10, 9, 8)})
+    bright = {lamp.object_id for lamp in run(room, measured(room, L, {7, 8}, texture=0.1)).lamps}
+    assert 6 in bright
+    assert {7, 8} & bright == set()
 
 
 def test_the_only_lamp_may_be_unseen():

@@ -12,14 +12,15 @@ from .params import UNSEEN
 from .refine_light import Sky, all_light
 
 
-def solve_lamps(sample: Sample, contribution, least, class_of, model, seen, sky: Sky, base, colours) -> list[Lamp]:
+def solve_lamps(sample: Sample, contribution, least, class_of, model, kin, seen, sky: Sky, base, colours) -> list[Lamp]:
     """Unseen lamps, the one that explains most first; none once the gain falls below `lamp_gain`.
 
-    Where another of its class shines, any gain will do: a small lamp lights too little of a room to gain much.
+    A small lamp lights too little of a room to gain much. So of objects whose class shines (`kin`, with its luminance)
+    any gain will do; but noise alone gains a little from a faint lamp, so it has to be within `reach` of its class.
     """
     sent = sample.radiance @ LUMINANCE
-    shining = {class_of.get(lamp.object_id) for lamp in seen}
-    gain = {i: 0.0 if class_of.get(i) in shining else UNSEEN.lamp_gain for i in contribution}
+    gain = {i: 0.0 if i in kin else UNSEEN.lamp_gain for i in contribution}
+    least = {i: max(most, kin.get(i, 0.0) / LIGHT_FIT.reach) for i, most in least.items()}
     lamps: list[Lamp] = []
     left = dict(contribution)
     while left:

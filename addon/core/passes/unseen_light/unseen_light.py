@@ -24,7 +24,7 @@ from ...light.few_elements import (
     steady,
 )
 from ...light.field import LightField
-from ...light.lamps import Lamp, find_seen, lamp_models
+from ...light.lamps import Lamp, find_seen, lamp_models, of_shining_class
 from ...light.light_fit import Sample, kinds_of, on_flat
 from ...light.params import LIGHT_FIT
 from ...scene.model import Instance
@@ -162,7 +162,7 @@ def find_light(
     most = UNSEEN.samples / len(np.unique(atlas.object_id[element])) / 2 if clipped else np.inf
     sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit], most)
     # The same lamp hung several times is one unknown.
-    model = lamp_models(atlas, instances)
+    model, kin = lamp_models(atlas, instances), of_shining_class(seen, atlas.object_id[good], instances)
     alike: dict[int, list[int]] = {}
     for one in unseen_objects:
         alike.setdefault(model.get(one, one), []).append(one)
@@ -182,7 +182,7 @@ def find_light(
     colours = shared_by_class(colours or {}, unseen_objects, instances)
 
     for _ in range(UNSEEN.sweeps if zones else 1):
-        lamps = solve_lamps(sample, contribution, least, class_of, model, seen, sky, received[lit], colours)
+        lamps = solve_lamps(sample, contribution, least, class_of, model, kin, seen, sky, received[lit], colours)
         solve_sky(sample, lamps, contribution, sky, received[lit])
     lamps, sky = needed(sample, lamps, contribution, sky, received[lit], colours)
     E = all_light(received[lit], lamps, contribution, sky)
