@@ -76,7 +76,7 @@ def irradiance(
     finest : float
         Least distance of two gathering points in metres.
     smooth : bool
-        Take the aimed rays' noise out (`less_noise`).
+        Take out the noise of rays and of interpolation (`less_noise`).
 
     Returns
     -------
@@ -85,7 +85,7 @@ def irradiance(
     points : int
         How many places were gathered at.
     relative_error : (m,) float32
-        Relative error of E by interpolation, by the aimed rays' noise and at the edges of the sun's light.
+        Relative error of E by interpolation, by the rays' noise and at the edges of the sun's light.
     """
     atlas = field.atlas
     position, normal = atlas.position[element], atlas.normal[element]
@@ -152,14 +152,13 @@ def irradiance(
 
     value = blocks.evaluate(around, step, np.inf)
     total, escaped, contrast = value[:, :3].copy(), value[:, 3].copy(), value[:, 4]
-    noise = np.zeros(len(total), np.float32)
+    unsure = contrast * total.mean(1)
     if lamp_rays:
         lamps = blocks.evaluate(aim, step, GATHER.smooth, total.mean(1))
-        shown, noise = lamps[:, :3], lamps[:, 3]
-        if smooth:
-            shown, noise = less_noise(position, normal, shown, noise, threads=threads)
-        total += shown
-    unsure = np.hypot(contrast * value[:, :3].mean(1), noise)
+        total += lamps[:, :3]
+        unsure = np.hypot(unsure, lamps[:, 3])
+    if smooth:
+        total, unsure = less_noise(position, normal, total, unsure, threads=threads)
     if field.sun is not None:
         shone = blocks.evaluate(functools.partial(shine, field.sun), step, GATHER.smooth, total.mean(1))
         total += shone[:, :3]
