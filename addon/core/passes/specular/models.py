@@ -193,7 +193,8 @@ def adopt_from_class(
 
     The class's model is that of the member with the strongest evidence, its lobe the median over the members of that
     model, weighted by evidence. Members keep their own lobe where their frames set it apart from that. Objects
-    whose own frames decide nothing take over the class's, but not where it raises their cost by more than `excluded`.
+    whose own frames decide nothing take over the class's if all members' frames together are sure of a lobe, but not
+    where it raises their cost by more than `excluded`.
     What is set apart neither gives nor takes. Among metals, one whose frames favour metal without being sure of it is
     one, as rough as the others unless its frames are sure of something else. Among dielectrics, one that is a metal no
     more surely than it is one of them is one of them.
@@ -211,6 +212,7 @@ def adopt_from_class(
         clear = {i for i, one in judges.items() if not (one.dielectric if one.model.lobe_alone else one.metal)}
         source = max(sorted(clear) or judges, key=lambda i: found[i].sigmas)
         model = _pooled([c for c in judges.values() if c.model is found[source].model], found[source])
+        agreed = not model.model.layered or _agreed(members)
         for i, choice in members.items():
             turns = model.model.lobe_alone and not choice.model.lobe_alone
             if turns and choice.metal is not None:
@@ -221,7 +223,7 @@ def adopt_from_class(
                 note = "Like a metal, but not beyond doubt; others of its class are not."
                 fit = _of_class(choice.dielectric, model.lobe, model.model, problems.get(i))
                 result[i] = replace(choice, model=model.model, fit=fit, note=note)
-            elif not choice.model.has_lobe and not _refused(model.lobe, choice.fit, problems.get(i)):
+            elif not choice.model.has_lobe and agreed and not _refused(model.lobe, choice.fit, problems.get(i)):
                 note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
             elif choice.model is model.model and len(found) > 1 and i in problems:
@@ -237,14 +239,20 @@ def _together(members: dict[int, Choice]) -> dict[int, Choice]:
     none.
     """
     judged = {i: choice for i, choice in members.items() if choice.fit is not None}
-    counted = [c.sigmas if _dielectric(c.lobe) else min(c.sigmas, 0) for c in judged.values()]
-    if len(judged) < 2 or sum(counted) / np.sqrt(len(judged)) <= LEVELS.sigmas:
+    if len(judged) < 2 or not _agreed(members):
         return {}
     return {
         i: replace(choice, model=DIELECTRIC, note="Sure of its lobe together with others of its class.")
         for i, choice in judged.items()
         if choice.gain > CHOICE.min_gain and _dielectric(choice.lobe)
     }
+
+
+def _agreed(members: dict[int, Choice]) -> bool:
+    """Whether the frames of a class's members together are sure of a dielectric's lobe (Stouffer's sum of z-scores)."""
+    judged = [choice for choice in members.values() if choice.fit is not None]
+    counted = [c.sigmas if c.model.has_lobe or _dielectric(c.lobe) else min(c.sigmas, 0) for c in judged]
+    return bool(judged) and sum(counted) / np.sqrt(len(judged)) > LEVELS.sigmas
 
 
 def _pooled(found: list[Choice], best: Choice) -> Choice:

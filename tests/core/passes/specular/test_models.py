@@ -169,3 +169,12 @@ def test_what_is_no_lobe_makes_no_class_sure(seen):
     choices[2] = Choice(LAMBERTIAN, fit, 0.05, 2.5, "Not sure.")
     result = adopt_from_class(choices, {}, dict.fromkeys(choices, "curtain"))
     assert {choice.model for choice in result.values()} == {LAMBERTIAN}
+
+
+def test_one_that_errs_does_not_make_its_class_glossy(seen):
+    """One cupboard of twelve passes for glossy; the frames of the others speak against a lobe."""
+    fit = choose_model(seen["glossy"]).fit
+    choices = {0: Choice(DIELECTRIC, fit, 0.04, 3.2)}
+    choices |= {i: Choice(LAMBERTIAN, fit, -0.01, -0.5, "Not sure.") for i in range(1, 12)}
+    result = adopt_from_class(choices, {}, dict.fromkeys(choices, "cupboard"))
+    assert [choice.model for choice in result.values()] == [DIELECTRIC, *[LAMBERTIAN] * 11]
