@@ -110,8 +110,9 @@ def mixed_lamps(lamps: Collection[Lamp], clean: np.ndarray, instances: tuple[Ins
 
     Their pixels hold what is beside the lamp as well, so their radiance is to be solved for, too.
     """
-    kin, shown = of_shining_class(lamps, clean, instances), set(np.unique(clean).tolist())
-    return [lamp.object_id for lamp in lamps if lamp.seen and lamp.object_id in kin and lamp.object_id not in shown]
+    shown = np.unique(clean)
+    kin = of_shining_class(lamps, shown, instances).keys() - set(shown.tolist())
+    return [lamp.object_id for lamp in lamps if lamp.seen and lamp.object_id in kin]
 
 
 def lamp_models(atlas: Atlas, instances: tuple[Instance, ...]) -> dict[int, int]:
