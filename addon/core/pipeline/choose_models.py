@@ -135,24 +135,15 @@ def look_at(
 
 
 def choose_models(
-    room: Room,
-    maker: Problems,
-    wanted: Sequence[int],
-    given: Mapping[int, Given],
-    rays: int,
-    threads: int,
-    without: Collection[str],
-    progress: Progress | None,
-    looked: Mapping[int, Looked] | None = None,
+    room: Room, found: Mapping[int, Looked], given: Collection[int], threads: int, without: Collection[str]
 ) -> Chosen:
-    """Choose a model for each of the `wanted` objects; of those that are `given`, what is left to find.
+    """Choose a model for each object, by what its frames and its class say; of those that are `given`, by that alone.
 
     Parameters
     ----------
-    looked : mapping of int to Looked, optional
-        What is known of them already.
+    found : mapping of int to Looked
+        What `look_at` found of each of them.
     """
-    found = look_at(room, maker, wanted, given, rays, threads, without, progress, looked)
     choices = {i: one.choice for i, one in found.items()}
     problems = {i: one.problem for i, one in found.items() if one.problem is not None}
     targets = {i: one.target for i, one in found.items()}
@@ -160,8 +151,8 @@ def choose_models(
         reflecting = {i: choice for i, choice in choices.items() if not choice.model.gives_light}
         adopted = adopt_from_class(reflecting, problems, {i.object_id: i.class_name for i in room.instances})
         choices |= {i: choice for i, choice in adopted.items() if i not in given}
-    intervals = ordered_map(lambda i: gloss_interval(choices[i], problems.get(i)), wanted, threads)
-    return Chosen(choices, problems, targets, dict(zip(wanted, intervals, strict=True)))
+    intervals = ordered_map(lambda i: gloss_interval(choices[i], problems.get(i)), found, threads)
+    return Chosen(choices, problems, targets, dict(zip(found, intervals, strict=True)))
 
 
 def _look(

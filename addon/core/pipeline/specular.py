@@ -173,7 +173,8 @@ def fit_specular(
             others, field, lit_diffuse, samples, frame_names, rays=rays, threads=threads, seed=seed, progress=progress
         )
         wanted = [i for i in wanted if i not in told]
-    chosen = choose_models(room, maker, wanted, given, rays, threads, without, progress, looked)
+    found = look_at(room, maker, wanted, given, rays, threads, without, progress, looked)
+    chosen = choose_models(room, found, given, threads, without)
 
     kept = {} if held is None else {m.object_id: m for m in held.found.materials if m.object_id not in held.only}
     lit_by = {lamp.object_id: lamp for lamp in lamps if lamp.object_id not in given}
@@ -183,7 +184,7 @@ def fit_specular(
     }
     _same_as(by_id, given, set(kept))
     materials = tuple(by_id.values())
-    del chosen  # megabytes of observations for each object
+    del chosen, found  # megabytes of observations for each object
     give_back()
 
     specular = np.zeros((len(field.atlas), 3), np.float32)
