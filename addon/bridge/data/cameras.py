@@ -22,6 +22,8 @@ from ..marks import CAPTURE
 
 LENS = "lens_model"
 """Custom property of cameras with a lens: the lens, fx, fy, cx and cy as JSON, which Blender has no settings for."""
+TURNED = "frame_turned"
+"""Custom property of a frame's camera whose picture is shown as its EXIF turns it; absent where it is as stored."""
 FRAME_INDEX = "frame_index"
 """Custom property of a frame's camera: its place in the capture's order, from 0."""
 _SENSOR: Unit[float] = 36.0
@@ -45,13 +47,16 @@ def make_cameras(frames: Iterable[Frame], collection: bpy.types.Collection, firs
     list of bpy.types.Object
         Named after the frames. Custom properties ``width``, ``height`` (pixels) and ``pixel_aspect`` (fx / fy) tell
         the render size each one is exact for; `use_camera` sets it. ``frame_path`` and ``frame_exposure`` tell the
-        frame's picture and what its radiance was multiplied by; `LENS` is the lens, where there is one.
+        frame's picture and what its radiance was multiplied by; `LENS` is the lens, where there is one, and `TURNED` is
+        there where the picture is to be shown as its EXIF turns it.
     """
     made = []
     for index, frame in enumerate(frames, first):
         thing = make_view(frame.name, frame.camera, collection)
         thing[FRAME_INDEX] = index
         thing["frame_path"], thing["frame_exposure"] = str(Path(frame.path).absolute()), float(frame.exposure)
+        if frame.turned:
+            thing[TURNED] = True
         made.append(thing)
     return made
 
@@ -269,7 +274,7 @@ def make_track(cameras: Sequence[bpy.types.Object], collection: bpy.types.Collec
     thing = cameras[0].copy()
     thing.name, thing.data = TRACK, cameras[0].data.copy()
     thing.data.name = TRACK
-    for name in ("frame_path", "frame_exposure"):
+    for name in ("frame_path", "frame_exposure", TURNED):
         if name in thing:
             del thing[name]
     thing[FRAME_INDEX] = NO_FRAME

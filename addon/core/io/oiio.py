@@ -82,10 +82,21 @@ def coded_header(path: Path | str) -> Header:
     return _checked(_open(path), Path(path))
 
 
+def coded_orientation(path: Path | str) -> int:
+    """EXIF's number of how the camera was held that took the PNG, JPEG or TIFF `path`; 1: as it is stored.
+
+    Raises
+    ------
+    BadInputError
+        As `coded_header`.
+    """
+    return int(_open(path).spec().get_int_attribute("Orientation", 1))
+
+
 def read_coded(path: Path | str) -> Stored:
     """Read the pixels of the PNG, JPEG or TIFF `path`.
 
-    What a file says of colour spaces and of how a camera was held is not heeded: poses and curve are the capture's.
+    As stored: what the file says of colour spaces and of how the camera was held is not heeded here.
 
     Raises
     ------

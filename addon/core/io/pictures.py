@@ -10,8 +10,8 @@ from ..errors import BadInputError
 from . import exr_header, radiance_hdr
 from .exr import exr_note, read_exr, read_header
 from .files import absence
-from .oiio import CODED, coded_header, read_coded
-from .picture import Picture
+from .oiio import CODED, coded_header, coded_orientation, read_coded
+from .picture import Picture, turn
 from .radiance_hdr import hdr_size, read_hdr
 from .transfer import decode
 
@@ -48,8 +48,13 @@ def picture_kind(path: Path | str) -> str:
     )
 
 
-def picture_size(path: Path) -> tuple[int, int]:
+def picture_size(path: Path, turned: bool = False) -> tuple[int, int]:
     """Width and height in pixels, from the header alone; finds an OpenEXR file that was cut off.
+
+    Parameters
+    ----------
+    turned : bool
+        Of the picture as its EXIF shows it, in place of what is stored.
 
     Raises
     ------
@@ -58,8 +63,20 @@ def picture_size(path: Path) -> tuple[int, int]:
     """
     kind = picture_kind(path)
     if kind in CODED:
-        return coded_header(path)[:2]
+        width, height = coded_header(path)[:2]
+        return (height, width) if turned and coded_orientation(path) > 4 else (width, height)
     return {EXR: read_header, HDR: hdr_size}[kind](path)
+
+
+def picture_orientation(path: Path) -> int:
+    """EXIF's number of how a camera was held, 1 to 8; 1 where the file does not tell: as it is stored.
+
+    Raises
+    ------
+    BadInputError
+        As `picture_size`.
+    """
+    return coded_orientation(path) if picture_kind(path) in CODED else 1
 
 
 def picture_bits(path: Path) -> int:
@@ -78,13 +95,15 @@ def picture_note(path: Path) -> str:
     return exr_note(path) if picture_kind(path) == EXR else ""
 
 
-def read_picture(path: Path, transfer: str = "") -> Picture:
+def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Picture:
     """A frame's numbers, linear Rec.709; 1 is the greatest code of a picture of 8 or 16 bits.
 
     Parameters
     ----------
     transfer : str
         Curve of codes (`transfer.to_linear`).
+    turned : bool
+        As its EXIF shows it, in place of what is stored.
 
     Raises
     ------
@@ -99,6 +118,9 @@ def read_picture(path: Path, transfer: str = "") -> Picture:
     if not transfer and coded_header(path).bits:
         raise BadInputError(unstated(path))
     colour, alpha = read_coded(path)
+    if turned:
+        orientation = coded_orientation(path)
+        colour, alpha = turn(colour, orientation), None if alpha is None else turn(alpha, orientation)
     if colour.shape[2] == 1:
         colour = np.repeat(colour, 3, -1)
     if colour.dtype.kind == "f":

@@ -59,7 +59,7 @@ def as_codes(frame: Frame) -> Frame:
 def _exposed(frame: Frame, shot: Shot, seen: np.ndarray) -> Exposed:
     """One exposure of `frame`; `seen` ((h, w) bool) is False where no exposure says anything."""
     auto = frame.transfer == AUTO
-    rgb, alpha = read_picture(shot.path, LINEAR if auto else frame.transfer)
+    rgb, alpha = read_picture(shot.path, LINEAR if auto else frame.transfer, frame.turned)
     if rgb.shape[:2] != seen.shape:
         raise BadInputError(f"Frame '{frame.name}': '{shot.path}' changed its size during the run; start again.")
     # A half float overflows to inf: the pixel was bright, but it gives no value at all, not even a bound. Writers that

@@ -26,6 +26,7 @@ from .frame_codes import with_curves
 from .id_pictures import check_size, read_ids
 from .layout import AS_FOUND, Layout, RawMesh, Reading
 from .mesh_repair import repair
+from .orientation import oriented
 from .picture import too_few_bytes
 from .pictures import picture_note, picture_size, read_picture
 from .pixels import read_pixels
@@ -77,8 +78,8 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
 
 
 def _exposed(layout: Layout, reading: Reading) -> Layout:
-    """The layout with each frame's exposure and curve as the user or the pictures themselves tell."""
-    frames = layout.frames
+    """The layout with each frame's exposure, curve and orientation as the user or the pictures themselves tell."""
+    frames, turned = oriented(layout.frames)
     problems: list[str] = []
     if reading.exposures is not None:
         frames, problems, notes = from_csv(frames, reading.exposures)
@@ -86,7 +87,10 @@ def _exposed(layout: Layout, reading: Reading) -> Layout:
         frames, notes = from_exif(frames)
     frames, more, curves = with_curves(frames, reading.transfer)
     return replace(
-        layout, frames=frames, problems=[*layout.problems, *problems, *more], notes=[*layout.notes, *notes, *curves]
+        layout,
+        frames=frames,
+        problems=[*layout.problems, *problems, *more],
+        notes=[*layout.notes, *turned, *notes, *curves],
     )
 
 
@@ -193,7 +197,7 @@ def _check_frame(frame: Frame) -> None:
     wanted = frame.camera.width, frame.camera.height
     shots = [shot.path for shot in frame.shots]
     for path in filter(None, (*shots, frame.mask_path)):
-        width, height = picture_size(path)
+        width, height = picture_size(path, frame.turned and path in shots)
         size = path.stat().st_size
         if path in shots and too_few_bytes(width, height, size):
             raise BadInputError(

@@ -190,6 +190,7 @@ def _told_picture(frame: Frame) -> dict[str, Any]:
         "exposure": frame.exposure,
         "saturation": finite(frame.saturation),
         "transfer": frame.transfer,
+        "turned": frame.turned,
         "brackets": [[told(shot.path), shot.exposure, finite(shot.saturation)] for shot in frame.brackets],
     }
 
@@ -208,6 +209,7 @@ def _picture(told: dict[str, Any]) -> dict[str, Any]:
         "exposure": told["exposure"],
         "saturation": level(told["saturation"]),
         "transfer": told["transfer"],
+        "turned": told.get("turned", False),
         "brackets": brackets,
     }
 

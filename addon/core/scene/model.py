@@ -168,6 +168,8 @@ class Frame:
         Picture that holds each pixel's object.
     radiometry : Radiometry or None
         What calibration found of codes with the curve `AUTO`, in place of `exposure`.
+    turned : bool
+        Whether the camera is that of the pictures turned as their EXIF says, not of what is stored.
     """
 
     name: str
@@ -180,6 +182,7 @@ class Frame:
     brackets: tuple[Shot, ...] = ()
     id_path: Path | None = None
     radiometry: Radiometry | None = None
+    turned: bool = False
 
     @property
     def uncalibrated(self) -> bool:

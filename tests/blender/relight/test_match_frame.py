@@ -9,6 +9,7 @@ from bpy_extras.object_utils import world_to_camera_view  # noqa: E402
 from mathutils import Vector  # noqa: E402
 
 from addon.bridge.data.cameras import make_cameras  # noqa: E402
+from addon.bridge.data.images import image_array  # noqa: E402
 from addon.bridge.relight.match_frame import current, match_frame  # noqa: E402
 from addon.core.io.exr import write_exr  # noqa: E402
 from addon.core.scene.model import Camera, Frame  # noqa: E402
@@ -65,6 +66,20 @@ def test_a_picture_that_moved_is_found_in_the_captures_folder(scene, frames, tmp
     (tmp_path / "elsewhere").rename(tmp_path / "moved" / "images")
     assert match_frame(scene, 0, capture_folder=str(tmp_path / "moved"), size=True) == ""
     assert len(scene.camera.data.background_images) == 1
+
+
+def test_a_turned_picture_is_shown_turned(scene, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    codes = np.random.default_rng(0).integers(0, 256, (6, 8, 3), np.uint8)
+    exif = image.Exif()
+    exif[0x112] = 6
+    image.fromarray(codes).save(tmp_path / "a.png", exif=exif)
+    camera = Camera(6, 8, 6, 6, 3, 4, np.eye(4))
+    make_cameras([Frame("a", tmp_path / "a.png", camera, turned=True)], scene.collection)
+    assert match_frame(scene, 0, size=True) == ""
+    shown = scene.camera.data.background_images[0].image
+    assert shown.size[:] == (6, 8) and shown.packed_file
+    np.testing.assert_allclose(image_array(shown)[::-1, :, :3], np.rot90(codes, -1) / 255, atol=1e-3)
 
 
 def test_without_cameras_it_is_told(scene):
