@@ -177,6 +177,7 @@ def recover(
     unwrap: Unwrap | str = "",
     reading: Reading = AS_FOUND,
     overrides: Path | None = None,
+    white: str = "",
 ) -> Recovered:
     """Recover a capture: albedo, irradiance, materials and lamps.
 
@@ -198,6 +199,8 @@ def recover(
         How the capture is to be read, or was.
     overrides : path, optional
         JSON file of what is known of objects (docs/corrections.md), which the result folder then keeps.
+    white : str
+        What has a known albedo: a part, 'ceiling' or 'wall=0.7', or a frame's pixel, '0012:320,200=0.18'.
 
     Raises
     ------
@@ -206,7 +209,7 @@ def recover(
     """
     check_run(capture.root if isinstance(capture, Capture) else Path(capture), Path(folder))
     told = progress_of_run(progress, should_stop)
-    run, lay_out = _read(capture, Path(folder), settings or Settings(), told, unwrap, reading, overrides)
+    run, lay_out = _read(capture, Path(folder), settings or Settings(), told, unwrap, reading, overrides, white=white)
     with run:
         run.stages(lay_out)
     return Recovered(run)

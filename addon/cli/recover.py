@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -47,8 +48,18 @@ def add_home(parser: argparse.ArgumentParser) -> None:
     layout = "with --no-scene: what lays out the atlas; own: the mesh's own texture coordinates (default: the first of "
     parser.add_argument("--unwrap", choices=UNWRAPS, default="", help=f"{layout}them that is installed)")
     add_override(parser)
-    known = "a part of known albedo, by name or number: it fixes each channel's scale (default 0.8, white paint)"
-    parser.add_argument("--white", metavar="PART[=ALBEDO]", default="", help=known)
+    known = parser.add_mutually_exclusive_group()
+    part = "a part of known albedo, by name or number: it fixes each channel's scale (default 0.8, white paint)"
+    known.add_argument("--white", metavar="PART[=ALBEDO]", default="", help=part)
+    pixel = "a pixel, from the picture's top left, that shows a known albedo (default 0.18, a grey card): as --white"
+    known.add_argument("--grey", metavar="FRAME:X,Y[=ALBEDO]", dest="white", type=_grey, help=pixel)
+
+
+def _grey(text: str) -> str:
+    """The text of `--grey`, which `--white` would take as well, if it names a pixel."""
+    if not re.fullmatch(r".+:\s*\d+\s*,\s*\d+\s*(=.*)?", text):
+        raise argparse.ArgumentTypeError(f"'{text}' names no pixel; give FRAME:X,Y or FRAME:X,Y=ALBEDO")
+    return text
 
 
 def run_from(arguments: argparse.Namespace) -> Callable[..., dict[str, Any]]:

@@ -7,8 +7,7 @@ import json
 import pytest
 
 from addon.core.errors import BadInputError
-from addon.core.results.overrides import NONE, Given, Overrides, White, heeded, merge, parse, read_overrides, white_of
-from addon.core.scene.model import Instance
+from addon.core.results.overrides import NONE, Given, Overrides, White, heeded, merge, parse, read_overrides
 
 KNOWN = range(5)
 
@@ -33,6 +32,8 @@ def test_everything_that_can_be_given(tmp_path):
     assert found.of(0) == Given("specular", 0.3, 0.04, (0.1, 0.2, 1))
     assert found.of(1).f0 == (1, 0.8, 0.3) and found.of(2).same_as == 1 and found.of(3).model == "emitter"
     assert found.white == White(4, (0.8, 0.8, 0.8)) and not found.of(4).any
+    spot = read({"white": {"object": 4, "albedo": 0.8, "at": [1, 2.5, 0]}})
+    assert spot.white.at == (1.0, 2.5, 0.0) and read(spot.as_dict()) == spot
     assert read(found.as_dict()) == found  # what is written is what is read
 
 
@@ -74,6 +75,8 @@ def test_nothing_is_nothing():
         ({"white": {"object": 1, "albedo": 1.2}}, ("'white'", "0 to 1")),
         ({"white": {"object": 1, "albedo": [0.8, 0, 0.8]}}, ("'white'", "more than 0")),
         ({"white": 0.8}, ("'white'", "object, albedo")),
+        ({"white": {"object": 1, "albedo": 0.8, "at": [0, 1]}}, ("'at'", "three coordinates")),
+        ({"white": {"object": 1, "albedo": 0.8, "at": [0, 1, float("nan")]}}, ("'at'", "three coordinates")),
     ],
 )
 def test_faults_are_one_sentence_that_names_them(told, says):
@@ -162,21 +165,3 @@ def test_a_run_heeds_what_is_kept_and_over_that_the_file(tmp_path):
     assert set(heeded(tmp_path, KNOWN, file, keep=False).objects) == {2}
     with pytest.raises(BadInputError, match=r"overrides\.json.*no object 1"):  # of another capture
         heeded(tmp_path, range(1))
-
-
-ROOM = Instance(0, "floor"), Instance(3, "ceiling"), Instance(4, "wall"), Instance(7, "wall")
-
-
-@pytest.mark.parametrize(
-    "text, part, albedo", [("ceiling", 3, 0.8), ("Wall 7=0.6", 7, 0.6), ("4 = .5", 4, 0.5), ("floor 0=1", 0, 1.0)]
-)
-def test_a_known_white_is_named_in_one_word(text, part, albedo):
-    assert white_of(text, ROOM) == White(part, (albedo,) * 3)
-
-
-@pytest.mark.parametrize(
-    "text, said", [("wall", "wall 4, wall 7"), ("door", "ceiling 3"), ("ceiling=9", "9"), ("ceiling=white", "white")]
-)
-def test_what_names_no_white_is_told(text, said):
-    with pytest.raises(BadInputError, match=said):
-        white_of(text, ROOM)

@@ -86,7 +86,7 @@ def run(
     alone : bool
         Do `until` and none that comes before it; see `Run.stages`.
     white : str
-        A part of known albedo, such as 'ceiling' or 'wall=0.7'.
+        What has a known albedo: a part, 'ceiling' or 'wall=0.7', or a frame's pixel, '0012:320,200=0.18'.
     block : tuple of int, optional
         Do a part of it alone; see `Run`.
 

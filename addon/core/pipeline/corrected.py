@@ -164,12 +164,18 @@ def white_scale(run: Corrected) -> WhiteScale | None:
     if white is None:
         return None
     atlas, ones = run.surface().atlas, np.ones(3, np.float32)
-    name = next(i.name for i in run.capture.instances if i.object_id == white.object_id)
+    thing = next(i.name for i in run.capture.instances if i.object_id == white.object_id)
+    name = thing if white.at is None else f"the spot of {thing}"
     before, scale = run.irradiance_found, ones
     others = {i.object_id for i in run.capture.instances} - {white.object_id}
     for _ in range(CORRECTED.rounds):
         albedo = run.albedo_under(before * scale, run.specular().taken, others)
         own = (atlas.object_id == white.object_id) & (albedo.origin == MEASURED)
+        if white.at is not None:
+            own &= (
+                np.linalg.norm(atlas.position - np.array(white.at, np.float32), axis=1)
+                < CORRECTED.around * atlas.texel_edge
+            )
         mean = np.average(albedo.rho[own], 0, atlas.area[own]) if own.any() else np.zeros(3)
         if white.object_id in run.emitters or mean.min() <= 0:
             told = f"No albedo of {name} was measured, so it can't be the white; it was left out."

@@ -13,6 +13,8 @@ class CorrectedParams:
     ----------
     rounds : int
         Albedo is clamped at 1 and shrunk towards its neighbours, so its mean follows E but roughly.
+    around : float
+        Edges of an element around a spot of known albedo within which its elements lie: three by three of them.
     spots : int
         Elements that such a white is looked at by.
     least_light : float
@@ -24,6 +26,7 @@ class CorrectedParams:
     """
 
     rounds: int = 4
+    around: float = 1.5
     spots: int = 600
     least_light: float = 0.1
     doubtful: float = 1.5

@@ -18,7 +18,8 @@ from ..io.layout import AS_FOUND, Reading
 from ..io.pixels import read_pixels
 from ..memory import peak_memory
 from ..progress import Progress, ProgressEvent
-from ..results.overrides import OVERRIDES, Overrides, heeded, merge, white_of
+from ..results.known_white import white_of
+from ..results.overrides import OVERRIDES, Overrides, heeded, merge
 from ..results.place import write_capture
 from ..results.room_file import ROOM, objects_of, write_room
 from ..results.store import Store
@@ -86,7 +87,7 @@ class Run:
     started : float, optional
         When it began, by `time.monotonic`; now, unless given.
     white : str
-        A part of known albedo (`results.overrides.white_of`), kept as what is in `override` is; '' for none.
+        What has a known albedo (`results.known_white.white_of`), kept as what is in `override` is; '' for none.
     block : tuple of int, optional
         I and N: of the last stage, this part alone; the result folder is shared with those who do the others.
 
@@ -125,7 +126,7 @@ class Run:
         known = {one.object_id for one in capture.instances} | objects_of(out_folder)
         self._given = heeded(out_folder, known, override, heed_kept)
         if white:
-            self._given = merge(self._given, Overrides(white=white_of(white, capture.instances)))
+            self._given = merge(self._given, Overrides(white=white_of(white, capture)))
         self._told = _look(capture, reading) if capture.frames else []
         if not heed_kept and (out_folder / OVERRIDES).is_file():
             self._told = [LEFT_OUT, *self._told]

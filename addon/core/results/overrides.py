@@ -5,6 +5,8 @@ As JSON, with every key optional; what is not given is fitted under what is give
     {"objects": {"12": {"model": "metal", "roughness": 0.3}, "13": {"same_as": 12}},
      "white": {"object": 26, "albedo": 0.8}}
 
+The white may be a spot of the object: "at", its place in metres.
+
 `null` takes back what was given before. The result folder keeps all of it in `OVERRIDES`, and later runs heed it.
 """
 
@@ -21,8 +23,6 @@ from ..brdf.model import Brdf
 from ..brdf.registry import find, models
 from ..errors import BadInputError
 from ..json_values import is_number, key
-from ..kinds import Unit
-from ..scene.model import Instance
 
 OVERRIDES = "overrides.json"
 LOBE = ("model", "roughness", "f0")
@@ -84,10 +84,20 @@ class Given:
 
 @dataclass(frozen=True)
 class White:
-    """An object whose mean albedo, (3,) over what was measured of it, is known."""
+    """A known albedo.
+
+    Attributes
+    ----------
+    object_id : int
+    albedo : (3,) tuple of float
+        Linear Rec.709: the mean over what was measured of the object.
+    at : (3,) tuple of float or None
+        World, metres: the spot of the object that has this albedo in place of its mean.
+    """
 
     object_id: int
     albedo: Colour
+    at: Colour | None = None
 
 
 @dataclass(frozen=True)
@@ -140,11 +150,11 @@ class Overrides:
         told: dict[str, Any] = {"objects": objects}
         if self.white is not None:
             told["white"] = {"object": self.white.object_id, "albedo": list(self.white.albedo)}
+            if self.white.at is not None:
+                told["white"]["at"] = list(self.white.at)
         return told
 
 
-WHITE_PAINT: Unit[float] = 0.8
-"""Albedo of white wall paint, as the panel has it."""
 NOTHING = Given()
 NONE = Overrides()
 
@@ -270,33 +280,6 @@ def parse(told: Any, name: str, known: Iterable[int]) -> Overrides:
     return found
 
 
-def white_of(text: str, instances: Iterable[Instance]) -> White:
-    """A known white as the command line says it: 'PART' or 'PART=ALBEDO', the part by its name or its number.
-
-    A class stands for its one object. Without an albedo the part counts as painted white (`WHITE_PAINT`).
-
-    Raises
-    ------
-    BadInputError
-        No part or several are called that, or the albedo is no share above 0.
-    """
-    named = {one.name.casefold(): one.object_id for one in instances}
-    part, _, told = text.partition("=")
-    wanted = part.strip().casefold()
-    of_class = [one for one in instances if wanted in (one.class_name.casefold(), str(one.object_id))]
-    if wanted not in named and len(of_class) != 1:
-        known = ", ".join(one.name for one in of_class or instances)
-        how = "means several parts" if of_class else "is no part of the capture"
-        raise BadInputError(f"--white: '{part.strip()}' {how}; name one of {known}.")
-    try:
-        albedo = float(told) if told else WHITE_PAINT
-    except ValueError:
-        albedo = 0.0
-    if not 0 < albedo <= 1:
-        raise BadInputError(f"--white: albedo '{told}' of '{part.strip()}' is no number above 0 and up to 1; give one.")
-    return White(named.get(wanted, of_class[0].object_id if of_class else 0), (albedo,) * 3)
-
-
 def _has_no(model: str | None) -> tuple[str, ...]:
     """What a model does not have of what can be given."""
     brdf = find(model)
@@ -332,14 +315,21 @@ def _white(entry: Any, known: set[int], name: str) -> White | None:
     if entry is None:
         return None
     where = f"{name}, 'white'"
-    _keys(entry, ("object", "albedo"), where)
+    _keys(entry, ("object", "albedo", "at"), where)
     for part in ("object", "albedo"):
         if entry.get(part) is None:
             raise BadInputError(f"{where}: '{part}' is missing; give " + '{"object": 26, "albedo": 0.8}.')
     albedo = _colour(entry["albedo"], f"{where}: 'albedo'")
     if min(albedo) <= 0:
         raise BadInputError(f"{where}: 'albedo' is {entry['albedo']}; a known white is more than 0 in every channel.")
-    return White(_object(entry["object"], known, where), albedo)
+    at = entry.get("at")
+    if at is not None and not (isinstance(at, list) and len(at) == 3 and all(map(is_number, at))):
+        raise BadInputError(f"{where}: 'at' is {at!r}; give a spot's three coordinates in metres.")
+    return White(
+        _object(entry["object"], known, where),
+        albedo,
+        None if at is None else (float(at[0]), float(at[1]), float(at[2])),
+    )
 
 
 def _keys(entry: Any, allowed: tuple[str, ...], where: str) -> None:

@@ -88,6 +88,22 @@ def test_a_white_scales_all_albedo_and_the_light_makes_up_for_it(recovered, fold
     assert lamp[0] > scale[0] > 1 and lamp[2] < scale[2] < 1 and lamp[1] == pytest.approx(1, abs=0.02)
 
 
+def test_a_white_may_be_a_spot(recovered):
+    before = recovered()
+    atlas, albedo = before.atlas, before.albedo
+    own = np.flatnonzero((atlas.object_id == 1) & (albedo.origin == MEASURED))
+    spot = atlas.position[own[len(own) // 2]]
+    near = own[np.linalg.norm(atlas.position[own] - spot, axis=1) < 1.5 * atlas.texel_edge]
+    assert 1 < len(near) <= 9
+    here = np.average(albedo.rho[near], 0, atlas.area[near])
+    found = recovered({"white": {"object": 1, "albedo": (here / 1.1).tolist(), "at": spot.tolist()}})
+    assert np.allclose(found.report["figures"]["white_scale"], 1.1, rtol=0.01)
+    assert np.allclose(np.average(found.albedo.rho[near], 0, atlas.area[near]), here / 1.1, rtol=0.01)
+    nowhere = recovered({"white": {"object": 1, "albedo": 0.5, "at": [50, 50, 50]}})
+    assert any("No albedo of the spot" in one for one in nowhere.report["warnings"])
+    assert np.allclose(nowhere.report["figures"]["white_scale"], 1)
+
+
 @pytest.mark.slow
 def test_the_room_under_the_whites_light_looks_as_before(recovered, disk):
     """Radiosity, which knows nothing of the run, under the scaled lamps and albedos."""
