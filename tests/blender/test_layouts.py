@@ -15,6 +15,7 @@ from addon.bridge.data.unwrap import unwrap
 from addon.bridge.job.run import run
 from addon.core.io.layout import Reading
 from addon.core.io.pixels import read_pixels
+from addon.core.io.ply import read_ply
 from addon.core.io.read import read_capture
 from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
@@ -22,9 +23,11 @@ from addon.core.results.store import Store
 from addon.core.scene.model import Capture
 from addon.core.settings import Settings
 from tests.core.io import layouts_on_disk as on_disk
+from tests.core.io.hostile import cases
 from tests.core.on_disk import ALBEDO, LAMP
 from tests.core.replica_on_disk import ReplicaOnDisk
 from tests.core.rooms import lit_box, make_room, radiosity
+from tests.hostile.readers import mesh_files
 
 LIVING_ROOM = Path(__file__).resolve().parents[3] / "shared/captures/living-room"
 EVERY = 8
@@ -85,6 +88,17 @@ class Same:
 @pytest.fixture(scope="module")
 def same(tmp_path_factory) -> Same:
     return Same(tmp_path_factory.mktemp("same"))
+
+
+def test_polycams_own_mesh_is_moved_to_its_cameras(tmp_path):
+    cases.polycam(tmp_path)
+    told = read_capture(tmp_path).mesh  # a PLY of the same coordinates
+    corners = read_ply(tmp_path / "mesh.ply").vertices
+    (tmp_path / "mesh.ply").unlink()
+    mesh_files(tmp_path, "raw.glb", corners)
+    got = read_capture(tmp_path, READING)
+    box = [(mesh.vertices.min(0), mesh.vertices.max(0)) for mesh in (got.mesh, told)]
+    np.testing.assert_allclose(*box, atol=1e-5)
 
 
 @pytest.mark.slow

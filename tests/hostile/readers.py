@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -84,9 +84,9 @@ def picture(ending: str, write: Callable[[Path], None], reading: Reading) -> Rea
     return Reader(make, lambda root: capture(root, reading))
 
 
-def mesh_files(root: Path, name: str) -> Path:
+def mesh_files(root: Path, name: str, corners: Sequence = CORNERS) -> Path:
     """The mesh as OBJ, glTF or GLB, in place of the PLY."""
-    corners = np.array(CORNERS, np.float32)
+    corners = np.array(corners, np.float32)
     triangles = np.array([[q[0], q[i], q[i + 1]] for q in SIDES for i in (1, 2)], np.uint16)
     path = root / name
     if name.endswith(".obj"):

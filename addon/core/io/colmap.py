@@ -15,7 +15,7 @@ from ..errors import BadInputError
 from ..kinds import Limit
 from ..scene.lenses_colmap import Intrinsics, intrinsics
 from ..scene.model import Camera, Frame
-from ..scene.pose import MAX_DISTANCE, check_pose
+from ..scene.pose import MAX_DISTANCE, check_pose, rotation_of
 from . import instances
 from .colmap_model import ColmapImage, ColmapModel, is_pose, model_files, read_model
 from .files import inside
@@ -118,13 +118,7 @@ def camera_to_world(image: ColmapImage, name: str) -> np.ndarray:
         raise BadInputError(
             f"Frame '{name}' has a pose that is not finite or whose quaternion is 0; export the model again."
         )
-    quaternion = np.array(image.quaternion) / np.abs(image.quaternion).max()  # first: squares of huge numbers are inf
-    w, x, y, z = quaternion / np.linalg.norm(quaternion)
-    rotation = np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
+    rotation = rotation_of(np.array(image.quaternion))
     pose = np.eye(4)
     pose[:3, :3] = rotation.T * (1, -1, -1)
     if np.abs(image.translation).max() > 10 * MAX_DISTANCE:

@@ -132,7 +132,7 @@ def of_path(path: Path | str) -> Content:
 
 def _is_ours(path: Path) -> bool:
     """Whether a JSON is one that captures have: by its name; a damaged one is the reader's to tell of."""
-    return path.name.startswith(("transforms", "info_semantic", "cam_params", "segments"))
+    return path.name.startswith(("transforms", "info_semantic", "cam_params", "segments", "mesh_info", "metadata"))
 
 
 def _count(found: list[Path], word: str) -> str:

@@ -5,6 +5,8 @@ FORMATS = {
     "fipt": "train/transforms.json beside scene.obj",
     "fipt-real": "cam.txt and K_list.txt",
     "scannet++": "dslr/colmap and scans/mesh_aligned_0.05.ply",
+    "polycam": "keyframes/corrected_cameras or keyframes/cameras",
+    "record3d": "metadata.json beside rgb or rgbd",
     "traj": "traj.txt and results/frame000000.exr",
     "nerfstudio": "transforms.json",
     "colmap": "cameras and images of a COLMAP model (.bin or .txt)",

@@ -34,8 +34,13 @@ def read_mesh(path: Path, reading: Reading) -> RawMesh:
     return RawMesh(ply.vertices, ply.triangles, ply.object_id, ply.uv, name=path.name)
 
 
-def find_mesh(root: Path, reading: Reading) -> Path:
-    """The mesh that the user named, else `mesh.ply`, else the only mesh file of the folder.
+def find_mesh(root: Path, reading: Reading, name: str = MESH, remedy: str = "") -> Path:
+    """The mesh that the user named, else the file `name`, else the only mesh file of the folder.
+
+    Parameters
+    ----------
+    remedy : str
+        What to do where there is none, as the end of a sentence.
 
     Raises
     ------
@@ -44,7 +49,7 @@ def find_mesh(root: Path, reading: Reading) -> Path:
     """
     if reading.mesh is not None:
         return reading.mesh
-    usual = root / MESH
+    usual = root / name
     if usual.exists():
         return usual
     found = sorted(p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED) and p.is_file())
@@ -54,4 +59,6 @@ def find_mesh(root: Path, reading: Reading) -> Path:
         raise BadInputError(
             f"Capture '{root}' has several meshes ({', '.join(p.name for p in found[:3])}, ...); name one with --mesh."
         )
+    if remedy:
+        raise BadInputError(f"Capture '{root}' has no mesh; {remedy}")
     raise BadInputError(f"Mesh '{usual}' does not exist; a capture needs its mesh there, or named with --mesh.")

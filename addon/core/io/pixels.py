@@ -36,6 +36,9 @@ def read_pixels(frame: Frame) -> Pixels:
         if mask.shape != shape:
             raise BadInputError(f"Frame '{frame.name}': mask '{frame.mask_path}' differs in size; make it the frame's.")
         seen &= mask
+    if frame.margin:
+        for edge in (seen, seen[::-1], seen.T, seen.T[::-1]):
+            edge[: frame.margin] = False
     led = pixel_rays(frame.camera)[1] if frame.camera.lens is not None else None
     if led is not None:  # beyond the lens's image circle
         seen &= led

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..errors import BadInputError
 from ..origin import of_point, of_thing
-from . import colmap, fipt, nerfstudio, replica, scannetpp, traj
+from . import colmap, fipt, nerfstudio, polycam, record3d, replica, scannetpp, traj
 from .layout import Layout, Reader, Reading
 
 GROUP = "scan_relight.readers"
@@ -18,6 +18,8 @@ READERS: tuple[Reader, ...] = (
     fipt.SYNTHETIC,
     fipt.REAL,
     scannetpp.READER,
+    polycam.READER,
+    record3d.READER,
     traj.READER,
     nerfstudio.READER,
     colmap.READER,

@@ -191,6 +191,7 @@ def _told_picture(frame: Frame) -> dict[str, Any]:
         "saturation": finite(frame.saturation),
         "transfer": frame.transfer,
         "turned": frame.turned,
+        "margin": frame.margin,
         "brackets": [[told(shot.path), shot.exposure, finite(shot.saturation)] for shot in frame.brackets],
     }
 
@@ -210,6 +211,7 @@ def _picture(told: dict[str, Any]) -> dict[str, Any]:
         "saturation": level(told["saturation"]),
         "transfer": told["transfer"],
         "turned": told.get("turned", False),
+        "margin": told.get("margin", 0),
         "brackets": brackets,
     }
 

@@ -168,6 +168,8 @@ class Frame:
         Picture that holds each pixel's object.
     radiometry : Radiometry or None
         What calibration found of codes with the curve `AUTO`, in place of `exposure`.
+    margin : int
+        Pixels at each edge that say nothing, whatever the mask says.
     turned : bool
         Whether the camera is that of the pictures turned as their EXIF says, not of what is stored.
     """
@@ -182,6 +184,7 @@ class Frame:
     brackets: tuple[Shot, ...] = ()
     id_path: Path | None = None
     radiometry: Radiometry | None = None
+    margin: int = 0
     turned: bool = False
 
     @property

@@ -1,4 +1,4 @@
-"""Whether a camera's pose is one: finite, rigid, not mirrored."""
+"""Whether a camera's pose is one: finite, rigid, not mirrored; rotations of quaternions."""
 
 from __future__ import annotations
 
@@ -13,6 +13,17 @@ TOLERANCE: Unit[float] = 1e-3
 """How far R^T R may be from the identity; less is rounding, and is taken out."""
 MAX_DISTANCE: Limit[float] = 1e6
 """Metres from the origin from which on single precision can't hold a room."""
+
+
+def rotation_of(quaternion: np.ndarray) -> np.ndarray:
+    """The rotation of a quaternion w, x, y, z ((4,) float64, finite and not 0, of any length), (3, 3) float64."""
+    quaternion = quaternion / np.abs(quaternion).max()  # first: squares of huge numbers are inf
+    w, x, y, z = quaternion / np.linalg.norm(quaternion)
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
 
 
 def check_pose(matrix: Any, name: str) -> np.ndarray:

@@ -16,7 +16,7 @@ import numpy as np
 from addon.core.io.layout import Reading
 from addon.core.io.png import write_png
 from tests.core.io.colmap_files import images_of, write_binary, write_text
-from tests.core.io.conftest import CORNERS, HEIGHT, JPEG, SIDES, WIDTH, CaptureOnDisk
+from tests.core.io.conftest import CORNERS, HEIGHT, JPEG, SIDES, WIDTH, CaptureOnDisk, ply_text
 from tests.core.replica_on_disk import ReplicaOnDisk
 from tests.core.rooms import lit_box, make_room
 
@@ -158,6 +158,58 @@ def traj(root: Path) -> None:
     )
 
 
+Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+"""From +Z up to +Y up, as ARKit has it."""
+
+
+def turn_mesh(root: Path, move: np.ndarray) -> None:
+    """Move the vertices of `mesh.ply` by a (4, 4) matrix."""
+    corners = np.array(CORNERS, float) @ move[:3, :3].T + move[:3, 3]
+    (root / "mesh.ply").write_text(ply_text(corners.tolist(), SIDES, range(6)))
+
+
+def jpegs(root: Path, folder: str, name: Callable[[int], str]) -> None:
+    """JPEG frames in place of the EXR ones."""
+    shutil.rmtree(root / "images")
+    (root / folder).mkdir(parents=True)
+    for i in range(COUNT):
+        (root / folder / f"{name(i)}.jpg").write_bytes(JPEG)
+
+
+def polycam(root: Path, corrected: bool = True) -> None:
+    """Raw data as Polycam exports it; the mesh, a PLY, is turned and moved against the cameras."""
+    frames = mesh_only(root).transforms["frames"]
+    kind = "corrected_" if corrected else ""
+    jpegs(root, f"keyframes/{kind}images", lambda i: str(1000 + i))
+    (root / f"keyframes/{kind}cameras").mkdir()
+    for i, frame in enumerate(frames):
+        pose = Y_UP @ frame["transform_matrix"]
+        told = {f"t_{j}{k}": pose[j, k] for j in range(3) for k in range(4)}
+        told |= {"width": WIDTH, "height": HEIGHT, "fx": 6.0, "fy": 6.5, "cx": 4.0, "cy": 3.0, "blur_score": 90.0 + i}
+        (root / f"keyframes/{kind}cameras/{1000 + i}.json").write_text(json.dumps(told))
+    move = np.array([[0.0, 0, 1, 2], [0, 1, 0, -1], [-1, 0, 0, 0.5], [0, 0, 0, 1]])
+    turn_mesh(root, move @ Y_UP)
+    info = {"alignmentTransform": move.T.ravel().tolist(), "faceCount": 6}
+    (root / "mesh_info.json").write_text(json.dumps(info))
+
+
+def record3d(root: Path) -> None:
+    """A recording as Record3D exports it, and a mesh in its coordinates."""
+    frames = mesh_only(root).transforms["frames"]
+    jpegs(root, "rgbd", str)
+    poses = []
+    for frame in frames:
+        pose = Y_UP @ frame["transform_matrix"]
+        w = np.sqrt(max(1 + np.trace(pose[:3, :3]), 1e-12)) / 2
+        skew = pose[:3, :3] - pose[:3, :3].T
+        poses.append([*(np.array([skew[2, 1], skew[0, 2], skew[1, 0]]) / (4 * w)), w, *pose[:3, 3]])
+    told = {"w": WIDTH, "h": HEIGHT, "fps": 60, "K": [6.0, 0, 0, 0, 6.5, 0, 4.0, 3.0, 1]}
+    told["poses"] = [[float(x) for x in pose] for pose in poses]
+    told["perFrameIntrinsicCoeffs"] = [[6.0, 6.5, 4.0, 3.0]] * COUNT
+    (root / "metadata").write_text(json.dumps(told))
+    turn_mesh(root, Y_UP)
+
+
 def scannetpp(root: Path) -> None:
     capture = mesh_only(root)
     poses = [frame["transform_matrix"] for frame in capture.transforms["frames"]]
@@ -244,6 +296,9 @@ CASES = (
     Case("replica_panes", replica, "glass.sur"),
     Case("traj", traj, "traj.txt"),
     Case("traj_camera", traj, "cam_params.json"),
+    Case("polycam_camera", polycam, "keyframes/corrected_cameras/1001.json"),
+    Case("polycam_mesh_info", polycam, "mesh_info.json"),
+    Case("record3d", record3d, "metadata"),
     Case("scannetpp_segments", scannetpp, "scans/segments.json"),
     Case("scannetpp_objects", scannetpp, "scans/segments_anno.json"),
     Case("scannetpp_lists", scannetpp, "dslr/train_test_lists.json"),

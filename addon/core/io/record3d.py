@@ -1,0 +1,114 @@
+"""Record3D's recordings: `metadata.json` with all poses, pictures in `rgb` ("EXR + RGB") or `rgbd` (an unzipped .r3d).
+
+Depth and its confidence are not looked at.
+Source: marek-simonik/record3d, issues 27, 33, 36, 64, 83, 93; nerfstudio's process_data/record3d_utils.py.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..json_values import is_number
+from ..scene.model import Camera, Frame
+from ..scene.pose import check_pose, rotation_of
+from . import instances
+from .arkit import TO_Z_UP, read_y_up
+from .files import read_json
+from .layout import Layout, Reader, Reading, usable
+from .meshes import MESH, find_mesh
+from .pictures import ENDINGS
+
+METADATA, FOLDERS, ARCHIVE = ("metadata.json", "metadata"), ("rgb", "rgbd"), ".r3d"
+PICTURE = re.compile(r"\d{1,9}")
+MOST = 300
+"""Frames that are taken of a recording, evenly: 60 a second show nearly the same. nerfstudio's default."""
+EXPORT = (
+    "Record3D stores depth alone: fuse it to a mesh in the recording's coordinates, put it there as 'mesh.ply', or "
+    "name it with --mesh."
+)
+UP = (
+    "Record3D's +Y was taken as up; some recordings begin with the camera's own up instead. If the room does not stand "
+    "upright, name the axis that points up (--convention up:+y)."
+)
+
+
+def find(root: Path) -> bool:
+    """Whether a folder is such an export, or holds one that is still zipped."""
+    return _parts(root) is not None or any(root.glob(f"*{ARCHIVE}"))
+
+
+def read(root: Path, reading: Reading) -> Layout:
+    """Read the poses, the cameras and the mesh.
+
+    Raises
+    ------
+    BadInputError
+        The recording is zipped, its metadata can't be read, or there are no pictures or no mesh.
+    """
+    found = _parts(root)
+    if found is None:
+        packed = next(iter(sorted(root.glob(f"*{ARCHIVE}"))), root / f"recording{ARCHIVE}")
+        raise BadInputError(f"'{packed}' is a zip; unzip it, and choose the folder that holds its 'metadata'.")
+    path, folder = found
+    told = read_json(path)
+    poses = told.get("poses")
+    if not isinstance(poses, list) or not poses:
+        raise BadInputError(f"'{path}' lists no poses: only recordings of the LiDAR camera have them.")
+    pictures = {int(p.stem): p for p in sorted(folder.iterdir()) if PICTURE.fullmatch(p.stem)
+                and p.suffix.lower() in ENDINGS and p.is_file()}  # fmt: skip
+    if not pictures:
+        raise BadInputError(f"Folder '{folder}' has no pictures called 0.jpg and so on; export the recording again.")
+    chosen = sorted(pictures)
+    if len(chosen) > MOST:
+        chosen = [chosen[k] for k in np.linspace(0, len(chosen) - 1, MOST).astype(int)]
+
+    def frame(index: int) -> Frame:
+        if index >= len(poses):
+            raise BadInputError(f"Frame '{index}' has no pose in '{path}', which has {len(poses)}.")
+        return Frame(f"{index:06d}", pictures[index], _camera(told, index, _pose(poses[index], index), path))
+
+    frames, problems = usable(partial(frame, index) for index in chosen)
+    notes = [UP]
+    if len(chosen) < len(pictures):
+        notes.append(f"{len(chosen)} of {len(pictures)} frames were taken, evenly: others show nearly the same.")
+    mesh = read_y_up(find_mesh(root, reading, MESH, EXPORT), reading)
+    return Layout(frames, mesh, instances.names_in(root), instances.FILE, problems, notes)
+
+
+def _parts(root: Path) -> tuple[Path, Path] | None:
+    """The metadata and the folder of pictures, where both are there."""
+    metadata = next((root / name for name in METADATA if (root / name).is_file()), None)
+    folder = next((root / name for name in FOLDERS if (root / name).is_dir()), None)
+    return None if metadata is None or folder is None else (metadata, folder)
+
+
+def _pose(told: Any, index: int) -> np.ndarray:
+    """Camera to world, (4, 4), from a quaternion x, y, z, w and a position."""
+    if not isinstance(told, list) or len(told) != 7 or not all(map(is_number, told)) or not any(told[:4]):
+        raise BadInputError(f"Frame '{index}' has a pose that is no quaternion and place; export the recording again.")
+    pose = np.eye(4)
+    pose[:3, :3] = rotation_of(np.array([told[3], *told[:3]], np.float64))
+    pose[:3, 3] = told[4:]
+    return TO_Z_UP @ check_pose(pose, f"{index}")
+
+
+def _camera(told: dict[str, Any], index: int, pose: np.ndarray, path: Path) -> Camera:
+    """The frame's own camera, else that of the whole recording (`K`, column by column)."""
+    size, own, whole = [told.get("w"), told.get("h")], told.get("perFrameIntrinsicCoeffs"), told.get("K")
+    values: Any = own[index] if isinstance(own, list) and index < len(own) else None
+    if values is None and isinstance(whole, list) and len(whole) == 9:
+        values = [whole[k] for k in (0, 4, 6, 7)]
+    numbers = [*size, *values] if isinstance(values, list) else []
+    if len(numbers) != 6 or not all(map(is_number, numbers)) or min(numbers[:4]) <= 0:
+        raise BadInputError(f"'{path}' does not tell the camera of frame '{index}' (w, h and K); export it again.")
+    width, height, fx, fy, cx, cy = map(float, numbers)
+    return Camera(int(width), int(height), fx, fy, cx, cy, pose)
+
+
+READER = Reader("record3d", f"{METADATA[0]} beside {FOLDERS[0]} or {FOLDERS[1]}", find, read)
