@@ -25,10 +25,10 @@ def boxes(objects: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The room and `objects` - 1 boxes in it: vertices (v, 3), quads (q, 4), the object of each (q,)."""
     found = [box(np.zeros(3), np.full(3, SIDE), inside=True)]
     across = max(int(np.ceil(np.sqrt(objects))), 1)
+    size = np.random.default_rng(1).uniform(0.2, 0.8, objects) * SIDE / across  # of no two is one the same again
     for k in range(objects - 1):
         at = np.array([*np.divmod(k, across), 0.0]) / across * SIDE
-        edge = SIDE / across
-        found.append(box(at + [0.2 * edge, 0.2 * edge, 0.0], at + [0.8 * edge, 0.8 * edge, 0.6 * edge]))
+        found.append(box(at, at + size[k]))
     vertices = np.concatenate([one for one, _ in found])
     quads = np.concatenate([one + 8 * k for k, (_, one) in enumerate(found)])
     return vertices, quads, np.repeat(np.arange(len(found)), 6)
@@ -73,7 +73,7 @@ def write(
     records = np.empty(len(quads), np.dtype([("n", "u1"), ("corners", "<i4", 4), ("owner", "<i4")]))
     records["n"], records["corners"], records["owner"] = 4, quads, owner
     (root / "mesh.ply").write_bytes(head.encode() + vertices.astype("<f4").tobytes() + records.tobytes())
-    names = [{"id": int(one), "class_name": "box" if one else "room"} for one in np.unique(owner)]
+    names = [{"id": int(one), "class_name": f"box {one}" if one else "room"} for one in np.unique(owner)]
     (root / "info_semantic.json").write_text(json.dumps({"objects": names}))
     rng, entries = np.random.default_rng(0), []
     width, height = size

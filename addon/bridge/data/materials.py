@@ -71,8 +71,9 @@ def dress(
 ) -> bpy.types.Material:
     """`make_material` with a material that is there: its nodes go, its name and whoever wears it stay."""
     shown = description.model.principled(description)
-    value = _fresh_principled(material)
-    principled(material).distribution = "GGX"  # the fitted lobe is single scattering
+    shader = _fresh_principled(material)
+    value = shader.inputs
+    shader.distribution = "GGX"  # the fitted lobe is single scattering
     _set(value, METALLIC, shown.metallic, ALPHA, shown.alpha, SPECULAR_LEVEL, shown.specular_level, IOR, shown.ior)
     _set(value, ROUGHNESS, shown.roughness, BASE_COLOR, (*(shown.base_color or (0.5,) * 3), 1))
     for name, number in shown.further.items():
@@ -84,6 +85,7 @@ def dress(
         _emit(value, shown.emission)
         if one_sided:
             _front_only(value[EMISSION_COLOR])
+    _connect(shader)
     material[MODEL] = description.model.name
     told = {_ALPHA: description.alpha, _F0: description.f0, _TRANSMISSION: description.transmission}
     for name in (*told, *_BEFORE.values()):
@@ -146,12 +148,14 @@ def plain_material(
 ) -> bpy.types.Material:
     """A Principled material of plain numbers, linear Rec.709, and at most a picture, which any program understands."""
     material = bpy.data.materials.new(name)
-    value = _fresh_principled(material)
+    shader = _fresh_principled(material)
+    value = shader.inputs
     _set(value, BASE_COLOR, (*colour, 1), ROUGHNESS, roughness, METALLIC, metallic, ALPHA, alpha)
     _set(value, SPECULAR_LEVEL, specular, IOR, ior)
     _emit(value, emission)
     if base_color is not None:
         _show_image(base_color, value[BASE_COLOR])
+    _connect(shader)
     return material
 
 
@@ -181,15 +185,19 @@ def texture(tree: bpy.types.NodeTree, image: bpy.types.Image, uv_map: str, **set
     return add_node(tree, "ShaderNodeTexImage", place.outputs[0], **settings).outputs["Color"]
 
 
+def _connect(shader: bpy.types.ShaderNode) -> None:
+    """Make a node the surface of its material, last of all: Blender takes up what is seen of a tree after each change,
+    in a time that goes with the number of materials."""
+    output = add_node(shader.id_data, "ShaderNodeOutputMaterial", location=(300, 0))
+    feed(output.inputs[0], shader.outputs[0])
+
+
 def _set(value, *names_and_values) -> None:
     """Give inputs values, name and value in turn; None leaves one."""
     for name, one in zip(names_and_values[::2], names_and_values[1::2], strict=True):
         feed(value[name], one)
 
 
-def _fresh_principled(material):
-    """Inputs of the Principled node of an otherwise empty tree."""
-    tree = fresh_tree(material)
-    shader = add_node(tree, "ShaderNodeBsdfPrincipled")
-    add_node(tree, "ShaderNodeOutputMaterial", shader.outputs[0], location=(300, 0))
-    return shader.inputs
+def _fresh_principled(material: bpy.types.Material) -> bpy.types.ShaderNode:
+    """The Principled node of an otherwise empty tree, shown by nothing yet (`_connect`)."""
+    return add_node(fresh_tree(material), "ShaderNodeBsdfPrincipled")

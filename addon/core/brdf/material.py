@@ -100,9 +100,10 @@ class ObjectMaterial:
 def with_metals(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[ObjectMaterial]) -> np.ndarray:
     """Albedo, and F0 of metals: Base Color that makes up for nothing. Parameters as of `base_colors`."""
     color = albedo.copy()
+    groups = by_number(object_id)
     for m in materials:
-        if m.model.lobe_alone:
-            color[object_id == m.object_id] = m.f0
+        if m.model.lobe_alone and m.object_id in groups:
+            color[groups[m.object_id]] = m.f0
     return color
 
 

@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+from ..groups import by_number
 from ..kinds import Unit
 from ..light.environment import Environment
 from ..light.field import LightField
@@ -164,15 +165,14 @@ def _by_group(group: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarr
     """
     result, offset = np.empty(len(group)), {}
     of_kind = {kind: _variance(a[group % 2 == kind], b[group % 2 == kind]) for kind in (0, 1)}
-    for one in np.unique(group):
-        own = group == one
-        count = int(own.sum())
+    for one, own in by_number(group).items():
+        count = len(own)
         whole = of_kind[one % 2]
         result[own] = np.sqrt(
             (count * _variance(a[own], b[own]) + CALIBRATION.prior_spots * whole) / (count + CALIBRATION.prior_spots)
         )
         if one % 2:
-            offset[int(one) // 2] = float(np.median((a[own] + b[own]) / 2))
+            offset[one // 2] = float(np.median((a[own] + b[own]) / 2))
     return result, offset
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..groups import by_label
+from ..groups import by_label, by_number
 from ..kinds import Block
 from ..luminance import LUMINANCE
 from ..parallel import for_blocks
 from ..significance import LEVELS
+from .directions import cosine_patterns, turned
 from .emitters import bright_triangles
 from .environment import Environment
 from .field import LightField
@@ -24,13 +25,10 @@ def pick(field: LightField, good: np.ndarray, seed: int, samples: int) -> np.nda
     """At most so many good elements, evenly over the objects that have them."""
     rng = np.random.default_rng(seed)
     element = np.flatnonzero(good)
-    objects = field.atlas.object_id[element]
-    each = max(samples // max(len(np.unique(objects)), 1), 50)
-    chosen = []
-    for object_id in np.unique(objects):
-        own = element[objects == object_id]
-        chosen.append(own if len(own) <= each else rng.choice(own, each, replace=False))
-    return np.sort(np.concatenate(chosen)) if chosen else np.zeros(0, np.int64)
+    groups = by_label(field.atlas.object_id[element])
+    each = max(samples // len(groups), 50)
+    chosen = [own if len(own) <= each else rng.choice(own, each, replace=False) for own in (element[g] for g in groups)]
+    return np.sort(np.concatenate(chosen))
 
 
 def steady(field: LightField, good: np.ndarray, flat: np.ndarray) -> np.ndarray:
@@ -48,8 +46,9 @@ def barely_seen(field: LightField, good: np.ndarray) -> np.ndarray:
     luminance, atlas = field.radiance @ LUMINANCE, field.atlas
     seen = (luminance > 0) & ~np.isin(atlas.object_id, atlas.object_id[good])
     level = GATHER.bright * float((luminance * atlas.weight).sum() / max(atlas.weight.sum(), 1e-30))
-    objects = np.unique(atlas.object_id[seen])
-    bright = [i for i in objects if np.median(luminance[seen & (atlas.object_id == i)]) > level]
+    shown = np.flatnonzero(seen)
+    groups = by_number(atlas.object_id[shown])
+    bright = [i for i, own in groups.items() if np.median(luminance[shown[own]]) > level]
     return seen & np.isin(atlas.object_id, bright)
 
 
@@ -94,6 +93,28 @@ def contribution_of(field: LightField, element: np.ndarray, objects: list[int], 
     alone = np.repeat(np.isin(field.atlas.object_id, objects)[:, None], 3, 1).astype(np.float32)
     lit = field.with_sun(None).with_light(alone, Environment.dark(), objects)
     return irradiance_at(lit, element, seed)[:, 0]
+
+
+def reaching_most(field: LightField, element: np.ndarray, groups: list[list[int]], count: int, seed: int) -> list[int]:
+    """Of groups of objects the `count` that would light a few elements most, were all of one radiance: rising indices.
+
+    One trace for all groups, so that it takes no longer for thousands.
+    """
+    of_object = np.full(int(field.mesh.object_id.max(initial=0)) + 1, -1)
+    for index, objects in enumerate(groups):
+        of_object[objects] = index
+    position, normal = field.atlas.position[element], field.atlas.normal[element]
+    patterns, rng = cosine_patterns(LIGHT_FIT.emitter_rays, seed), np.random.default_rng(seed)
+    met = np.zeros(len(groups))
+
+    def run(part: slice) -> None:
+        start = np.repeat(field.scene.off_surface(position[part], normal[part]), LIGHT_FIT.emitter_rays, 0)
+        triangle = field.scene.intersect(start, turned(patterns, normal[part], rng)[0].reshape(-1, 3)).triangle
+        group = of_object[field.mesh.object_id[triangle[triangle >= 0]]]
+        np.add.at(met, group[group >= 0], 1)
+
+    for_blocks(run, len(element), ELEMENTS_AT_ONCE, 1)
+    return np.sort(np.argsort(-met, kind="stable")[:count]).tolist()
 
 
 def most_reflected(field: LightField, objects: list[int], seed: int) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..groups import by_number
 from ..luminance import LUMINANCE
 from ..scene.atlas import Atlas
 from ..scene.model import Instance
@@ -72,10 +73,9 @@ def find_seen(object_id: np.ndarray, radiance: np.ndarray, irradiance: np.ndarra
     """
     luminance, received = radiance @ LUMINANCE, irradiance @ LUMINANCE
     lamps = []
-    for one in np.unique(object_id):
-        own = object_id == one
+    for one, own in by_number(object_id).items():
         if np.median(np.pi * luminance[own] / np.maximum(received[own], 1e-12)) > LIGHT_FIT.emitter_albedo:
-            lamps.append(Lamp(int(one), np.median(radiance[own], 0), True))
+            lamps.append(Lamp(one, np.median(radiance[own], 0), True))
     return lamps
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
+from ..groups import by_label
 from ..scene.atlas import Atlas
 from .params import LIGHT_FIT
 
@@ -63,7 +64,7 @@ def kinds_of(object_id: np.ndarray, log_albedo: np.ndarray, class_of: dict[int, 
         `same_colour`; else the object's own.
     """
     ids, group = np.unique(object_id, return_inverse=True)
-    median = np.stack([np.median(log_albedo[group == k], 0) for k in range(len(ids))])
+    median = np.stack([np.median(log_albedo[own], 0) for own in by_label(group)])
     names = np.array([class_of.get(int(i), "") for i in ids])
     kind = np.arange(len(ids))
     classes = np.unique(names)

@@ -64,6 +64,7 @@ def accumulate(
     only: np.ndarray | None = None,
     change: Callable[[Frame, FrameView, Pixels], Pixels] | None = None,
     also: Callable[[int, FrameView, Pixels, Observations], None] | None = None,
+    groups: ElementGroups | None = None,
     progress: Progress | Rounds | None = None,
 ) -> LitDiffuse:
     """Project every frame onto the elements it sees and take the median, kinds of observations apart.
@@ -86,6 +87,8 @@ def accumulate(
         Makes a frame's pixels what is to be projected, once it is known what they show.
     also : callable, optional
         Called with each frame's index, view, pixels and observations, in this thread: others who want to see them.
+    groups : ElementGroups, optional
+        Of this atlas, if there are any already; they remember what frames see.
 
     Raises
     ------
@@ -95,7 +98,7 @@ def accumulate(
         From `progress`.
     """
     normal, _ = triangle_geometry(mesh)
-    groups = ElementGroups.of(atlas)
+    groups = groups or ElementGroups(atlas)
     estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
     wanted = frame_order(len(frames), seed)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from ..passes.specular.problems import Problems
 from ..progress import Progress
 from ..results.overrides import Given
 from ..scene.lit_diffuse import LitDiffuse
-from ..scene.model import Instance
+from ..scene.model import Instance, class_names
 from ..scene.samples import Samples
 from ..significance import LEVELS
 
@@ -55,6 +56,11 @@ class Room:
     samples: Samples
     frame_names: list[str]
     noise: float
+
+    @cached_property
+    def names(self) -> dict[int, str]:
+        """What the objects are called, by their number."""
+        return {one.object_id: one.name for one in self.instances}
 
 
 @dataclass(frozen=True)
@@ -149,7 +155,7 @@ def choose_models(
     targets = {i: one.target for i, one in found.items()}
     if "class-lobes" not in without:
         reflecting = {i: choice for i, choice in choices.items() if not choice.model.gives_light}
-        adopted = adopt_from_class(reflecting, problems, {i.object_id: i.class_name for i in room.instances})
+        adopted = adopt_from_class(reflecting, problems, class_names(room.instances))
         choices |= {i: choice for i, choice in adopted.items() if i not in given}
     intervals = ordered_map(lambda i: gloss_interval(choices[i], problems.get(i)), found, threads)
     return Chosen(choices, problems, targets, dict(zip(found, intervals, strict=True)))

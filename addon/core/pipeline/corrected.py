@@ -212,7 +212,7 @@ def with_base_colors(albedo: Albedo, atlas: Atlas, overrides: Overrides) -> Albe
         return albedo
     rho, error = albedo.rho.copy(), albedo.error.copy()
     for object_id, colour in given.items():
-        own = np.flatnonzero(atlas.object_id == object_id)
+        own = atlas.elements_of(object_id)
         if not len(own):
             continue
         told = own[albedo.origin[own] == MEASURED]

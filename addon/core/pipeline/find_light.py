@@ -8,7 +8,6 @@ import numpy as np
 
 from ..light.few_elements import from_sun, irradiance_at
 from ..light.field import LightField
-from ..light.lamps import mixed_lamps
 from ..light.sun import Sun
 from ..passes.sun.sun_fit import find_sun
 from ..passes.unseen_light.unseen_light import Light, find_light, lit_by
@@ -30,13 +29,7 @@ def find_all_light(
     sun keeps it.
     """
     light = find_light(field, good, unseen_objects, instances, seed, tilted, colours, without=without)
-    mixed = [] if "unseen-lamps" in without else mixed_lamps(light.lamps, field.atlas.object_id[good], instances)
-    if mixed:
-        unseen_objects = unseen_objects + mixed
-        field = field.with_light(
-            np.where(np.isin(field.atlas.object_id, mixed)[:, None], np.float32(0), field.radiance), field.environment
-        )
-        light = find_light(field, good, unseen_objects, instances, seed, tilted, colours, without=without)
+    field = light.without_mixed(field)
     if field.sun is not None or not len(light.received) or "sun" in without:
         return light, field.sun
     lamps = [lamp.object_id for lamp in light.lamps]

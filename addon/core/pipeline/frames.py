@@ -149,7 +149,7 @@ def lit_diffuse(
         return running_lit_diffuse(*where, threads=threads, also=also, progress=progress)
     return accumulate(
         *where, median=settings.median, edge_tier="edge-tier" not in settings.without, seed=settings.seed,
-        threads=threads, folder=folder, also=also, progress=progress,
+        threads=threads, folder=folder, also=also, groups=surface.groups, progress=progress,
     )  # fmt: skip
 
 
@@ -231,7 +231,7 @@ def all_passes(
         rounds.next()
         lit = sharpened(
             found.lit_diffuse, surface, found.poses.of(frames), read, median=settings.median, seed=settings.seed,
-            threads=settings.threads, folder=folder, progress=rounds,
+            threads=settings.threads, folder=folder, groups=surface.groups, progress=rounds,
         )  # fmt: skip
         found = replace(found, lit_diffuse=lit)
     return replace(found, calibration=calibration)

@@ -244,7 +244,7 @@ class Refit(Recovery):
         measured = before.rho[before.origin == MEASURED]
         middle = np.median(measured, 0) if len(measured) else np.full(3, 0.5, np.float32)
         for i in self.touched - self.emitters:
-            own = np.flatnonzero(atlas.object_id == i)
+            own = atlas.elements_of(i)
             if not (origin[own] == MEASURED).any() and not self.overrides.of(i).base_color:
                 # What is taken over from its class is held; a lamp had nothing.
                 was = before.rho[own]

@@ -239,9 +239,9 @@ def with_all_light(
     field = field.with_mirrors(()).with_sun(sun)
     radiance = field.radiance.copy()
     for lamp in light.lamps:
-        own = atlas.object_id == lamp.object_id
+        own = atlas.elements_of(lamp.object_id)
         # At its edges the surroundings are mixed in.
-        radiance[own & (tier != CLEAN) if lamp.seen else own] = lamp.radiance
+        radiance[own[tier[own] != CLEAN] if lamp.seen else own] = lamp.radiance
     field = field.with_light(radiance, light.environment, [lamp.object_id for lamp in light.lamps])
     return field.with_mirrors(find_mirrors(field, light.lamps) if find_mirrors else ()), light
 

@@ -25,8 +25,9 @@ from ..passes.specular.separate import specular_in_median, spread_over_object
 from ..passes.specular_removal.removal import SpecularPart, without_specular
 from ..progress import Progress, Rounds
 from ..results.overrides import NOTHING, Given, Overrides
+from ..scene.element_groups import ElementGroups
 from ..scene.lit_diffuse import LitDiffuse
-from ..scene.model import Frame, Instance, Pixels
+from ..scene.model import Frame, Instance, Pixels, class_names
 from ..scene.samples import Samples
 from .choose_models import Chosen, Looked, Room, choose_models, look_at
 from .frames import STAGE as FRAMES
@@ -104,12 +105,15 @@ class Pictures:
         As `accumulate` takes it.
     folder : Path
         Where the exact median keeps observations meanwhile.
+    groups : ElementGroups, optional
+        As `accumulate` takes them.
     """
 
     frames: Sequence[Frame]
     read: Callable[[Frame], Pixels]
     median: str
     folder: Path
+    groups: ElementGroups | None = None
 
 
 def fit_specular(
@@ -262,7 +266,7 @@ def _wanted(
         return wanted
     # Where nothing is given of an object, others of its class have their say.
     alike = {i.class_name for i in instances if i.object_id in held.only and i.object_id not in given}
-    class_of = {i.object_id: i.class_name for i in instances}
+    class_of = class_names(instances)
     return [i for i in wanted if i in held.only or i not in given and class_of[i] in alike]
 
 
@@ -271,9 +275,9 @@ def _describe(
 ) -> ObjectMaterial:
     """What is known of one object: a lamp, a flat mirror, or what its model was chosen to be."""
     field, number = room.field, i.object_id
-    own, choice = field.atlas.object_id == number, chosen.choices.get(number)
+    own, choice = field.atlas.elements_of(number), chosen.choices.get(number)
     if choice is not None and choice.model.gives_light:
-        seen = np.median(field.radiance[own], 0) if own.any() else np.zeros(3)
+        seen = np.median(field.radiance[own], 0) if len(own) else np.zeros(3)
         return lamp_material(i, seen, room.irradiance[own], given_note(given[number]))
     if choice is not None:
         target, sure = chosen.targets[number], chosen.intervals[number]
@@ -281,7 +285,7 @@ def _describe(
         found = described(i, choice, chosen.problems.get(number), name, sure)
         return as_given(found, given[number], choice, sure) if number in given else found
     if number in lamps:
-        note = lamps[number].note({one.object_id: one.name for one in room.instances})
+        note = lamps[number].note(room.names)
         return lamp_material(i, lamps[number].radiance, room.irradiance[own], note)
     mirror = next((one for one in field.mirrors if one.object_id == number), None)
     if mirror is not None and number not in given:
@@ -318,7 +322,7 @@ def _remove(
     found = without_specular(
         SpecularPart(field, glossy, rays, seed), field, room.lit_diffuse, own,
         [pictures.frames[i] for i in looking], pictures.read, median=pictures.median, seed=seed, threads=threads,
-        folder=pictures.folder, progress=Rounds(progress, 0.7, 1.0),
+        folder=pictures.folder, groups=pictures.groups, progress=Rounds(progress, 0.7, 1.0),
     )  # fmt: skip
     specular[own] = found.specular[own]
     return found.hidden
@@ -341,7 +345,7 @@ def _without_background(
     material: ObjectMaterial, field: LightField, seen: np.ndarray, maker: Problems, samples: Samples
 ) -> tuple[np.ndarray, np.ndarray]:
     """A glass object's elements (n,), and the part of their L_d that came from behind, (n, 3)."""
-    own = np.flatnonzero(field.atlas.object_id == material.object_id)
+    own = field.atlas.elements_of(material.object_id)
     index = maker.pick(material.object_id, FIT.separate_elements, FIT.separate_views, least=1, seed=2)
     if not len(index):
         return own, np.zeros((len(own), 3), np.float32)

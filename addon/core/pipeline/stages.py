@@ -308,13 +308,17 @@ class Stages:
                 found |= unpacked(self.store.stored_meta(name)["looked"], arrays, LOOKED)
         return found
 
+    @property
+    def _pictures(self) -> Pictures:
+        return Pictures(self.frames, self.read, self.settings.median, self.store.folder, self.surface().groups)
+
     def fitted(self, settings: Settings, held: Held | None = None) -> Specular:
         """The specular stage as it is computed, of all objects or with some `held`."""
         s, light, lit, samples = settings, self.shading(), self.lit_diffuse(), self.samples()
         names = [frame.name for frame in self.capture.frames]
         return fit_specular(
             self.capture.instances, self.field, lit, light.irradiance, light.lamps, samples, names,
-            pictures=Pictures(self.frames, self.read, s.median, self.store.folder) if names else None,
+            pictures=self._pictures if names else None,
             rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
             noise=self.surface().noise, given=self.overrides.lobes(), held=held, without=s.without,
             as_published="specular" in s.published, looked=None if held else self._looked(),

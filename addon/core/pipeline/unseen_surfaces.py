@@ -12,7 +12,7 @@ from ..light.params import GATHER
 from ..passes.albedo.albedo import fill, quotient
 from ..passes.albedo.params import UNSEEN_PRIOR
 from ..scene.lit_diffuse import LitDiffuse
-from ..scene.model import Instance
+from ..scene.model import Instance, class_names
 
 ROUGH: RayCounts = {"rays": 64, "emitter_rays": 4, "portal_rays": 8}
 
@@ -58,8 +58,7 @@ def with_unseen_surfaces(
     E[lit] = rough(field, lit, finest=GATHER.unseen_coarser * finest)[0]
     E[dark], escaped[dark], _, _ = rough(field, dark, finest=GATHER.unseen_coarser * finest)
     rho, valid = quotient(lit_diffuse.radiance, E)
-    classes = {i.object_id: i.class_name for i in instances}
-    guess = fill(atlas, rho, valid, classes, emitters, params=UNSEEN_PRIOR).rho
+    guess = fill(atlas, rho, valid, class_names(instances), emitters, params=UNSEEN_PRIOR).rho
     radiance = field.radiance.copy()
     radiance[dark] = guess[dark] * E[dark] / np.float32(np.pi)
     return field.with_light(radiance), E, escaped

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
+from ..groups import by_number
 from .params import SPARSE, SURFACE
 
 
@@ -76,9 +76,12 @@ class Atlas:
         return room_box(self.position)
 
     @cached_property
-    def kept(self) -> dict[str, Any]:
-        """What was found of these elements and will be asked for again, by name: for the modules that find it."""
-        return {}
+    def _elements_of(self) -> dict[int, np.ndarray]:
+        return by_number(self.object_id)
+
+    def elements_of(self, object_id: int) -> np.ndarray:
+        """Indices of an object's elements, (k,) int, rising."""
+        return self._elements_of.get(object_id, np.zeros(0, np.int64))
 
     def place(self, index: np.ndarray) -> np.ndarray:
         """Elements (m,) as points (m, 6) whose nearest neighbours lie close and face the same way."""

@@ -56,13 +56,6 @@ class ElementGroups:
         self._seen: dict[tuple, tuple[object, bytes, bytes]] = {}
 
     @staticmethod
-    def of(atlas: Atlas) -> ElementGroups:
-        """The atlas's, made once."""
-        if "groups" not in atlas.kept:
-            atlas.kept["groups"] = ElementGroups(atlas)
-        return atlas.kept["groups"]
-
-    @staticmethod
     def _key(camera: Camera) -> tuple:
         size = camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy
         return *size, camera.camera_to_world.tobytes(), id(camera.lens)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from ..groups import by_number
 from ..kinds import Block
 from ..parallel import blocks, for_blocks
 from .atlas import Atlas
@@ -236,9 +237,9 @@ def element_of_triangle(mesh: Mesh, atlas: Atlas) -> np.ndarray:
     under = atlas.padding[row * atlas.size + column]
     first[bare] = np.where(atlas.object_id[under] == mesh.object_id[bare], under, -1)
     centroid = mesh.vertices[mesh.triangles].mean(1)
-    for object_id in np.unique(mesh.object_id[first < 0]):
-        bare = np.flatnonzero((first < 0) & (mesh.object_id == object_id))
-        own = np.flatnonzero(atlas.object_id == object_id)
+    left = np.flatnonzero(first < 0)
+    for object_id, group in by_number(mesh.object_id[left]).items():
+        bare, own = left[group], atlas.elements_of(object_id)
         if not len(own):
             own = np.arange(len(atlas))
         first[bare] = own[cKDTree(atlas.position[own]).query(centroid[bare])[1]]

@@ -6,6 +6,7 @@ centre lies at (0.5, 0.5); x runs right, y runs down. Radiance is linear Rec.709
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -250,6 +251,11 @@ class Instance:
     def name(self) -> str:
         """What the object is called everywhere."""
         return object_name(self.class_name, self.object_id)
+
+
+def class_names(instances: Iterable[Instance]) -> dict[int, str]:
+    """Classes of objects, by their number."""
+    return {one.object_id: one.class_name for one in instances}
 
 
 @dataclass(frozen=True)

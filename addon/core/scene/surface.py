@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from .atlas import Atlas
+from .element_groups import ElementGroups
 from .elements import Crumbs, ElementLookup, Elements, find_elements, make_atlas, triangle_geometry, uv_scale
 from .model import Camera, Mesh
 from .orientation import Sides, seen_sides
@@ -57,6 +58,11 @@ class Surface:
     def lookup(self) -> ElementLookup:
         """The element at any point."""
         return ElementLookup(self.mesh, self.atlas)
+
+    @cached_property
+    def groups(self) -> ElementGroups:
+        """The elements in groups, and which of them frames were found to see."""
+        return ElementGroups(self.atlas)
 
     @property
     def backs(self) -> np.ndarray:

@@ -100,6 +100,21 @@ def test_a_lamp_smaller_than_a_pixel_is_solved_for_with_its_like(strips):
     assert found[7].radiance @ LUMINANCE == pytest.approx(np.float32([20, 18, 16]) @ LUMINANCE, rel=0.2)
 
 
+@pytest.mark.slow
+def test_an_unseen_lamp_is_found_among_many_unseen_things():
+    """A corner of the floor is in 100 pieces that no frame sees, each a thing of its own; so is the only lamp."""
+    floor, *others = lit_box()
+    corner = (0.0, 0.2)
+    pieces = split(cut(floor, corner, corner), 10)
+    pieces = [replace(one, object_id=7 + i) for i, one in enumerate(pieces)]
+    room = make_room([*around(floor, corner, corner), *others, *pieces], 0.05)
+    named = tuple(replace(one, class_name=f"thing {one.object_id}") for one in room.instances)
+    room = replace(room, instances=named)
+    L = radiosity(room, ALBEDO | {one.object_id: ALBEDO[0] for one in pieces}, {6: (10, 9, 8)}, parts=1)
+    lamps = run(room, measured(room, L, {6, *(one.object_id for one in pieces)}, texture=0.1)).lamps
+    assert len(pieces) == 100 and [lamp.object_id for lamp in lamps] == [6]
+
+
 def test_an_unlit_lamp_of_a_class_that_shines_stays_dark(strips):
     room, _ = strips
     L = radiosity(room, ALBEDO | {7: 0.5, 8: 0.5}, {6: (10, 9, 8)})

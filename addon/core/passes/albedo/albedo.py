@@ -11,7 +11,7 @@ from ...groups import by_label
 from ...kinds import Code
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
-from ...scene.model import Instance
+from ...scene.model import Instance, class_names
 from .neighbourhood import relative_error, shrink
 from .params import ALBEDO, MAX_ALBEDO, PRIOR, PriorParams
 
@@ -103,8 +103,7 @@ def albedo_of(
     """
     rho, valid = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
     error = np.hypot(relative_error(lit_diffuse, atlas.object_id, "object-spread" not in without), unsure)
-    class_of = {i.object_id: i.class_name for i in instances}
-    return fill(atlas, rho, valid & lit_diffuse.seen, class_of, emitters, error, without)
+    return fill(atlas, rho, valid & lit_diffuse.seen, class_names(instances), emitters, error, without)
 
 
 def fill(
@@ -137,22 +136,22 @@ def fill(
     error = np.where(valid, 0.0 if error is None else error, np.inf).astype(np.float32)
     left = error.copy()
     by_class: dict[str, list[np.ndarray]] = {}
-    bare = []
+    bare: dict[str, list[np.ndarray]] = {}
     for own in by_label(_parts(atlas, valid)):
         object_id = int(atlas.object_id[own[0]])
         if object_id in emitters:
             result[own], origin[own], left[own] = 0, NONE, 0
             continue
         if not valid[own].any():
-            bare.append((object_id, own))
+            bare.setdefault(class_of.get(object_id, ""), []).append(own)
             continue
         result[own], left[own] = shrink(
             atlas, own, result[own], error[own], most=MAX_ALBEDO, without=without, params=params
         )
         by_class.setdefault(class_of.get(object_id, ""), []).append(np.median(result[own][valid[own]], 0))
     known = [middle for alike in by_class.values() for middle in alike]
-    for object_id, own in bare:
-        alike = by_class.get(class_of.get(object_id, ""))
+    for name, groups in bare.items():
+        own, alike = np.concatenate(groups), by_class.get(name)
         result[own] = np.median(alike, 0) if alike else everywhere
         origin[own] = NONE
         left[own] = _spread(alike if alike and len(alike) > 2 else known)

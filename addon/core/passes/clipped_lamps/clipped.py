@@ -23,8 +23,9 @@ def clipped_objects(lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()) ->
     """Objects of which most of what was seen is clipped, with the luminance that they have at least; none of `but`."""
     bounds = {}
     for object_id in np.setdiff1d(atlas.object_id[lit.tier == SATURATED], list(but)):
-        own = lit.seen & (atlas.object_id == object_id)
-        clipped = own & (lit.tier == SATURATED)
+        own = atlas.elements_of(int(object_id))
+        own = own[lit.seen[own]]
+        clipped = own[lit.tier[own] == SATURATED]
         if atlas.area[clipped].sum() > FringeParams.least_share * atlas.area[own].sum():
             bounds[int(object_id)] = float(np.median(lit.radiance[clipped] @ LUMINANCE))
     return bounds

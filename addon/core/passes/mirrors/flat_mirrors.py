@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize
 
+from ...groups import by_number
 from ...light.field import FLAT, LightField
 from ...light.lamps import Lamp
 from ...light.mirrors import Mirror
@@ -27,7 +28,7 @@ from .params import MIRRORS
 def plane_of(field: LightField, object_id: int) -> tuple[np.ndarray, np.ndarray] | None:
     """Point and normal ((3,) float32 each) of the plane that most of an object lies in; None if it is not flat."""
     atlas = field.atlas
-    own = np.flatnonzero(atlas.object_id == object_id)
+    own = atlas.elements_of(object_id)
     if not len(own):
         return None
     position, normal, area = atlas.position[own], atlas.normal[own], atlas.area[own]
@@ -48,7 +49,8 @@ def find_mirrors(
 ) -> tuple[Mirror, ...]:
     """Flat objects whose frames show the room mirrored."""
     rng = np.random.default_rng(seed)
-    owner = field.atlas.object_id[samples.element]
+    clear = np.flatnonzero(~samples.saturated)
+    shown = by_number(field.atlas.object_id[samples.element[clear]])
     glowing = {lamp.object_id for lamp in lamps}
     mirrors = []
     for instance in instances:
@@ -56,7 +58,7 @@ def find_mirrors(
         if plane is None:
             continue
         point, normal = plane
-        own = np.flatnonzero((owner == instance.object_id) & ~samples.saturated)
+        own = clear[shown.get(instance.object_id, [])]
         own = own[field.atlas.normal[samples.element[own]] @ normal > FLAT]
         elements = np.unique(samples.element[own])
         if len(elements) > MIRRORS.elements:

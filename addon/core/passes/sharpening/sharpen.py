@@ -52,7 +52,7 @@ def sharpened(
     lookup : callable, optional
         As `ElementLookup` finds elements, but -1 where the atlas has none; that one over all of it where left out.
     **how
-        As `accumulate` takes it: median, order, seed, threads, folder, progress.
+        As `accumulate` takes it: median, order, seed, threads, folder, groups, progress.
 
     Raises
     ------

@@ -145,7 +145,7 @@ def without_specular(
     read : callable
         Gives a frame's pixels.
     **how
-        As `accumulate` takes it: median, seed, threads, folder, progress.
+        As `accumulate` takes it: median, seed, threads, folder, groups, progress.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from ...light.lamps import Lamp, twin
 from ...light.light_fit import Sample
 from ...light.params import LIGHT_FIT
 from ...luminance import LUMINANCE
-from ...scene.model import Instance
+from ...scene.model import Instance, class_names
 from .params import UNSEEN
 
 
@@ -89,13 +89,12 @@ def shared_by_class(
     colours: dict[int, np.ndarray], objects: list[int], instances: tuple[Instance, ...]
 ) -> dict[int, np.ndarray]:
     """The known colours, and for those of `objects` without one the mean of their class's."""
-    class_of = {i.object_id: i.class_name for i in instances}
-    result = dict(colours)
-    for one in objects:
-        alike = [colour for i, colour in colours.items() if class_of.get(i) == class_of.get(one)]
-        if one not in result and alike:
-            result[one] = np.mean(alike, 0)
-    return result
+    class_of = class_names(instances)
+    alike: dict[str | None, list[np.ndarray]] = {}
+    for i, colour in colours.items():
+        alike.setdefault(class_of.get(i), []).append(colour)
+    of_class = {name: np.mean(known, 0) for name, known in alike.items()}
+    return {i: of_class[class_of.get(i)] for i in objects if class_of.get(i) in of_class} | colours
 
 
 def refined(

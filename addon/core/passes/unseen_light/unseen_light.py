@@ -21,13 +21,14 @@ from ...light.few_elements import (
     irradiance_at,
     most_reflected,
     pick,
+    reaching_most,
     steady,
 )
 from ...light.field import LightField
-from ...light.lamps import Lamp, find_seen, lamp_models, of_shining_class
+from ...light.lamps import Lamp, find_seen, lamp_models, mixed_lamps, of_shining_class
 from ...light.light_fit import Sample, kinds_of, on_flat
 from ...light.params import LIGHT_FIT
-from ...scene.model import Instance
+from ...scene.model import Instance, class_names
 from ...significance import LEVELS
 from .params import UNSEEN
 from .refine_light import Sky, all_light, refined, shared_by_class
@@ -76,6 +77,8 @@ class Light:
     received : (m, 3) float64
         E there by all of this light.
     contribution : Contributions, optional
+    mixed : tuple of int
+        Lamps that frames show, but mixed with what is beside them (`mixed_lamps`): solved for as if unseen.
     """
 
     lamps: tuple[Lamp, ...]
@@ -84,6 +87,12 @@ class Light:
     element: np.ndarray
     received: np.ndarray
     contribution: Contributions | None = None
+    mixed: tuple[int, ...] = ()
+
+    def without_mixed(self, field: LightField) -> LightField:
+        """The field with lamps dark that frames show only mixed."""
+        own = np.isin(field.atlas.object_id, self.mixed)[:, None]
+        return field.with_light(np.where(own, np.float32(0), field.radiance)) if self.mixed else field
 
 
 def find_light(
@@ -113,10 +122,13 @@ def find_light(
     colours : dict of (3,) float, optional
         Colour of light that is known of unseen objects, of luminance 1.
     before : Light, optional
-        What was found in the same room without its sun.
+        What was found in the same room without its sun, or of its mixed lamps.
     without : collection of str
         Passes left out.
     """
+    shown, mixed = field, before.mixed if before is not None else ()
+    if before is not None:
+        field, unseen_objects = before.without_mixed(field), [*unseen_objects, *mixed]
     flat = on_flat(field.atlas)
     if tilted is not None:
         flat &= tilted < np.arccos(LIGHT_FIT.flat)
@@ -126,7 +138,7 @@ def find_light(
     usable &= ~np.isin(field.atlas.object_id, [mirror.object_id for mirror in field.mirrors])
     element = pick(field, usable, seed, UNSEEN.clipped * UNSEEN.samples if clipped else UNSEEN.samples)
     if not len(element):
-        return Light((), field.environment, (), element, np.zeros((0, 3)))
+        return Light((), field.environment, (), element, np.zeros((0, 3)), mixed=mixed)
     old = before.contribution if before is not None and field.environment.seen else None
     field, found = (field, ()) if "whole-sky" in without else with_whole_sky(field, element, seed)
     environment, atlas = field.environment, field.atlas
@@ -152,11 +164,16 @@ def find_light(
     guess = [environment.zone_mean(zone).astype(np.float64) for zone in zones]
     filled = received + sum(G[:, None] * s for G, s in zip(sky_contributions, guess, strict=True))
     seen = find_seen(atlas.object_id[element], field.radiance[element], filled)
+    if before is None and "unseen-lamps" not in without:
+        mixed = tuple(mixed_lamps(seen, atlas.object_id[good], instances))
+        if mixed:
+            told = Light((), shown.environment, (), element, filled, mixed=mixed)
+            return find_light(shown, good, unseen_objects, instances, seed, tilted, colours, told, without)
     lit = ~np.isin(atlas.object_id[element], [lamp.object_id for lamp in seen])
     if (lit & flat[element]).sum() >= LEVELS.many:
         lit &= flat[element]
     if lit.sum() < LEVELS.enough:
-        return Light(tuple(seen), environment, found, element, filled)
+        return Light(tuple(seen), environment, found, element, filled, mixed=mixed)
     sent = field.radiance[element[lit]].astype(np.float64)
     # About half of the elements are on flat spots, of large objects as of small ones.
     most = UNSEEN.samples / len(np.unique(atlas.object_id[element])) / 2 if clipped else np.inf
@@ -167,6 +184,11 @@ def find_light(
     for one in unseen_objects:
         alike.setdefault(model.get(one, one), []).append(one)
     alike = {own[0]: own for own in alike.values()}
+    if len(alike) > UNSEEN.candidates:
+        shining = [i for i in alike if i in kin]
+        others = [i for i in alike if i not in kin]
+        best = reaching_most(field, sample.element, [alike[i] for i in others], UNSEEN.candidates, seed)
+        alike = {i: alike[i] for i in [*shining, *(others[k] for k in best)][: UNSEEN.candidates]}
     earlier = old if old is not None and np.array_equal(old.element, sample.element) else None
     if earlier is not None:
         contribution, least = earlier.lamps, earlier.least
@@ -178,7 +200,7 @@ def find_light(
 
     clipped_sky = bool(zones) and bool(environment.clipped.any())
     sky = Sky([G[lit] for G in sky_contributions], guess, clipped_sky, [zone.told for zone in zones])
-    class_of = {i.object_id: i.class_name for i in instances}
+    class_of = class_names(instances)
     colours = shared_by_class(colours or {}, unseen_objects, instances)
 
     for _ in range(UNSEEN.sweeps if zones else 1):
@@ -200,12 +222,13 @@ def find_light(
     )
     sure = find_seen(atlas.object_id[element], field.radiance[element], everything)
     kept = Contributions(sunless, sky_contributions, sample.element, contribution, least)
-    return Light(tuple(sure) + tuple(lamps), environment, found + tuple(sky.notes()), element, everything, kept)
+    notes = found + tuple(sky.notes())
+    return Light(tuple(sure) + tuple(lamps), environment, notes, element, everything, kept, mixed)
 
 
 def lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
     """L_d with the radiance of lamps put in, and its object's where nobody saw an element, (n, 3) float32."""
     radiance = evened(field)
     for lamp in lamps:
-        radiance[field.atlas.object_id == lamp.object_id] = lamp.radiance
+        radiance[field.atlas.elements_of(lamp.object_id)] = lamp.radiance
     return radiance

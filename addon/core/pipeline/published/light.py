@@ -17,7 +17,7 @@ from ...passes.albedo.neighbourhood import relative_error
 from ...progress import Progress
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
-from ...scene.model import Instance, Mesh
+from ...scene.model import Instance, Mesh, class_names
 from ...scene.rays import RayScene
 from ...scene.visibility import SATURATED
 
@@ -56,5 +56,5 @@ def albedo_of(
     """
     rho = quotient(np.maximum(lit.radiance - specular, 0), irradiance)
     valid = np.isfinite(rho).all(1) & (lit.tier != SATURATED)
-    found = fill(atlas, rho, valid, {i.object_id: i.class_name for i in instances}, emitters)
+    found = fill(atlas, rho, valid, class_names(instances), emitters)
     return replace(found, error=np.where(found.origin == MEASURED, relative_error(lit, atlas.object_id), found.error))
