@@ -112,7 +112,7 @@ class Recovered:
     @cached_property
     def albedo(self) -> np.ndarray:
         """Diffuse albedo, 0...1."""
-        return self._image(self._recovery.albedo.rho)
+        return self._recovery.over_atlas("albedo", self._recovery.albedo.rho)[::-1]
 
     @cached_property
     def irradiance(self) -> np.ndarray:

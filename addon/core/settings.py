@@ -62,6 +62,8 @@ class Settings:
         0 takes all cores.
     seed : int
         Of every pseudo-random choice.
+    texture_fill : bool
+        Give what no frame saw, or too poorly, the texture of the measured part of its plane, where that has any.
     without : tuple of str
         Passes that are left out, by name (`passes.registry`); what each gains: docs/ablation.md.
     """
@@ -83,6 +85,7 @@ class Settings:
     specular: str = "frames"
     specular_rays: int = 128
     refine: int = 2
+    texture_fill: bool = True
     threads: int = 0
     seed: int = 0
     without: tuple[str, ...] = ()
@@ -130,6 +133,7 @@ PAPER = Settings(
     specular="target",
     specular_rays=10000,
     refine=0,
+    texture_fill=False,
 )
 """Haefner et al. 2021 and nothing else: `paper/`."""
 DRAFT = Settings(detail=0.5, sharpen=False, shading_rays=48, emitter_rays=16, portal_rays=16, specular_rays=96)

@@ -18,7 +18,7 @@ from . import findings
 
 GROUPS = (
     ("Capture", ("denoise_mesh", "refine_poses")),
-    ("Texture", ("texel_size", "detail", "atlas_size", "atlas", "median", "sharpen")),
+    ("Texture", ("texel_size", "detail", "atlas_size", "atlas", "median", "sharpen", "texture_fill")),
     ("Light", ("shading", "shading_rays", "emitter_rays", "portal_rays", "interpolate", "mirrors")),
     ("Highlights", ("specular", "specular_rays", "refine")),
     ("Computer", ("threads", "seed")),

@@ -92,6 +92,10 @@ WORDS = {
         "0 stops after the first fit; 1 takes the highlights out of the texture; 2 lights "
         "the room with what glossy things reflect, too",
     ),
+    "texture_fill": Words(
+        "Texture the Unseen",
+        "Give what no frame saw the texture of its plane's measured part; without it such a part has one even colour",
+    ),
     "threads": Words("Threads", "Processor threads that the run takes; 0 takes all"),
     "seed": Words("Seed", "Another number gives other noise; the same one gives the same result again"),
 }

@@ -67,7 +67,7 @@ def _around(thing, uv) -> list[float]:
     height, width = image.shape[:2]
     column, row = (min(max(int(at * size), 0), size - 1) for at, size in zip(uv, (width, height), strict=True))
     window = tuple(slice(max(at - AROUND, 0), at + AROUND + 1) for at in (row, column))
-    measured = quality[window] > 1.5
+    measured = unseen.was_measured(quality[window])
     if not measured.any():
         raise BadInputError(f"That spot on '{thing.name}' was not measured by any frame; click on another.")
     return [float(part) for part in np.median(image[window][measured], axis=0)]

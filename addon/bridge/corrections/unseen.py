@@ -169,6 +169,13 @@ def coverage(thing: bpy.types.Object) -> np.ndarray:
     return found
 
 
+def was_measured(origin: np.ndarray) -> np.ndarray:
+    """Where the coverage's last number tells of a measured albedo, on faces that close holes too."""
+    from ...core.passes.albedo.albedo import CLOSED, MEASURED
+
+    return np.rint(origin).astype(int) % CLOSED == MEASURED
+
+
 def stencil(thing: bpy.types.Object) -> bpy.types.Image:
     """A picture for Texture Paint's stencil mask: white, that is protected, where any frame saw the surface."""
     name = f"{painted(thing).name} {MASK}"
@@ -260,7 +267,7 @@ def _fill(things, seen, where, passed) -> int:
     filled, value, spots = np.zeros(len(atlas), bool), np.empty((len(atlas), 3), np.float32), {}
     for thing in things:
         own = np.flatnonzero(atlas.object_id == number[thing])
-        wanted, measured = own[observed[own] < 0.5], own[(observed[own] >= 0.5) & (quality[own] > 1.5)]
+        wanted, measured = own[observed[own] < 0.5], own[(observed[own] >= 0.5) & was_measured(quality[own])]
         if not len(wanted) or not len(measured):
             why = "frames saw all of it" if not len(wanted) else "no spot of it was measured to fill from"
             passed.setdefault(why, []).append(thing.name)

@@ -210,9 +210,9 @@ def _material(scene: bpy.types.Scene, look: str, folder: Path) -> bpy.types.Mate
     if look == COVERAGE:
         count = _channels(tree, folder, LOOKS[look].file)[0]
         often = _math(tree, "LOGARITHM", _math(tree, "MAXIMUM", count, 1.0), OFTEN)
-        colour = _ramp(tree, often, _never(tree, folder, 0, 0.5))
+        colour = _ramp(tree, often, _math(tree, "LESS_THAN", count, 0.5))
     elif look == CERTAINTY:
-        colour = _ramp(tree, _sure(tree, folder), _never(tree, folder, 2, 1.5))
+        colour = _ramp(tree, _sure(tree, folder), _unmeasured(tree, folder))
     else:
         colour = _texture(tree, folder, LOOKS[look].file)
         strength = 1 / math.pi if look == SHADING else 1.0  # what leaves white paint is E / pi
@@ -249,9 +249,12 @@ def _sure(tree, folder: Path):
     return _math(tree, "LOGARITHM", _math(tree, "DIVIDE", DOUBTFUL, relative), 16.0)
 
 
-def _never(tree, folder: Path, channel: int, least: float):
-    """1 where a number of the coverage is too low: no frame saw the spot, or its albedo was not measured."""
-    return _math(tree, "LESS_THAN", _channels(tree, folder, "coverage.exr")[channel], least)
+def _unmeasured(tree, folder: Path):
+    """1 where the albedo was not measured."""
+    from ...core.passes.albedo.albedo import CLOSED, MEASURED  # not earlier: Blender's start should not wait for it
+
+    origin = _math(tree, "MODULO", _channels(tree, folder, "coverage.exr")[2], float(CLOSED))
+    return _math(tree, "SUBTRACT", 1.0, _math(tree, "COMPARE", origin, float(MEASURED), 0.5))
 
 
 def _ramp(tree, value, never):

@@ -121,9 +121,12 @@ class Corrected(Stages):
 
     def base_color(self) -> np.ndarray:
         """Base Color of each element for Cycles' Principled, (n, 3) float32."""
-        if "compensation" in self.settings.without:
-            return with_metals(self.albedo.rho, self.surface().atlas.object_id, self.materials())
-        return base_colors(self.albedo.rho, self.surface().atlas.object_id, self.materials())
+        return self.base_color_of(self.albedo.rho, self.surface().atlas.object_id)
+
+    def base_color_of(self, rho: np.ndarray, object_id: np.ndarray) -> np.ndarray:
+        """The same of any albedo ((k, 3) float32) of objects ((k,) int), (k, 3) float32."""
+        described = with_metals if "compensation" in self.settings.without else base_colors
+        return described(rho, object_id, self.materials())
 
     @property
     def findings(self) -> Findings:

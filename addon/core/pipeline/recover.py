@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from collections.abc import Callable, Container
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,8 @@ import numpy as np
 from ..atomic import write_bytes
 from ..evidence.page import make_page
 from ..parallel import ordered_map
-from ..passes.albedo.albedo import CLOSED
+from ..passes.albedo.albedo import CLOSED, FILLED, MEASURED, TEXTURED
+from ..passes.texture_fill.texture_fill import NOTHING, Texture, texture_of
 from ..results.room_file import OPENINGS
 from ..settings import ROOM
 from .corrected import Corrected
@@ -50,7 +52,7 @@ class Recovery(Corrected):
     def write_images(self, wanted: Container[str] | None = None) -> None:
         """The result folder's images, all or the `wanted` ones by name, materials.json and report.html."""
         self.look_closer()
-        atlas, lit = self.surface().atlas, self.lit_diffuse()
+        lit, texture = self.lit_diffuse(), self.texture  # noqa: F841  (made once, before threads ask for it)
         # Each is made when its turn comes: all of them at once were a tenth of a large room's memory.
         images: dict[str, Callable[[], np.ndarray]] = {
             "albedo": lambda: self.albedo.rho,
@@ -64,7 +66,7 @@ class Recovery(Corrected):
         images = {name: image for name, image in images.items() if wanted is None or name in wanted}
 
         def write(name: str) -> None:
-            self.store.write_exr(f"{name}.exr", atlas.image(images[name]())[::-1])
+            self.store.write_exr(f"{name}.exr", self.over_atlas(name, images[name]())[::-1])
 
         begun = LOOKED if self._parting else 0.0
         for done, _ in enumerate(ordered_map(write, images, self.settings.threads)):
@@ -75,7 +77,7 @@ class Recovery(Corrected):
         if self.settings.atlas == ROOM:
             remove_parts(self)
         elif "base_color" in images and self._parting is not None:
-            self.parts = write_parts(self, self._parting, atlas.image(images["base_color"]()))
+            self.parts = write_parts(self, self._parting, self.over_atlas("base_color", images["base_color"]()))
         known: dict[int, dict[str, Any]] = {
             one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects
         }
@@ -87,6 +89,32 @@ class Recovery(Corrected):
         self.store.write_json("materials.json", told)
         self.progress.update(0.6)
         write_bytes(self.store.path("report.html"), make_page(self.findings, self.evidence, self.report()).encode())
+
+    @cached_property
+    def texture(self) -> Texture:
+        """Texture of what was filled in."""
+        if not self.settings.texture_fill or "texture-fill" in self.settings.without:
+            return NOTHING
+        surface, albedo = self.surface(), self.albedo
+        measured = albedo.origin == MEASURED
+        return texture_of(surface.atlas, surface.mesh, albedo.rho, measured, self._to_texture(), albedo.error)
+
+    def _to_texture(self) -> np.ndarray:
+        """Elements whose texels may get texture, (n,) bool."""
+        return self.albedo.origin == FILLED
+
+    def over_atlas(self, name: str, values: np.ndarray) -> np.ndarray:
+        """The image `name` of the elements' values ((n, c) float32), with texture where there is any, (s, s, c)."""
+        atlas, texture = self.surface().atlas, self.texture
+        image = atlas.image(values)
+        shown = image.reshape(-1, image.shape[2])  # a view
+        if name == "albedo":
+            shown[texture.texel] = texture.rho
+        elif name == "base_color":
+            shown[texture.texel] = self.base_color_of(texture.rho, atlas.object_id[atlas.padding[texture.texel]])
+        elif name == "coverage":
+            shown[texture.texel, 2] += TEXTURED - FILLED
+        return image
 
     def _coverage(self) -> np.ndarray:
         """Count of observations, their relative spread, and where the albedo comes from, (n, 3) float32."""

@@ -217,11 +217,28 @@ class Refit(Recovery):
 
     def _image(self, name: str) -> np.ndarray:
         """Values of the elements in an image of the result, (n, 3) float32."""
-        atlas = self.surface().atlas
+        image = self._image_before(name)
+        return image.reshape(-1, image.shape[-1])[self.surface().atlas.texel]
+
+    def _image_before(self, name: str) -> np.ndarray:
+        """An image of the result, (s, s, 3) float32, row 0 at the bottom."""
+        size = self.surface().atlas.size
         image = read_exr(self.store.path(f"{name}.exr")).rgb[::-1]
-        if image.shape[:2] != (atlas.size, atlas.size):
+        if image.shape[:2] != (size, size):
             raise _again(self.store.folder, f"'{name}.exr' is not the run's")
-        return image.reshape(-1, image.shape[-1])[atlas.texel].astype(np.float32)
+        return image.astype(np.float32)
+
+    def _to_texture(self) -> np.ndarray:
+        found = super()._to_texture()
+        return found if self.whole else found & self._own
+
+    def over_atlas(self, name: str, values: np.ndarray) -> np.ndarray:
+        """As `Recovery.over_atlas`; texels of what was not touched stay as they were."""
+        found = super().over_atlas(name, values)
+        if self.whole or name not in IMAGES:
+            return found
+        touched = self.surface().atlas.image(self._own, True)
+        return np.where(touched[..., None], found, self._image_before(name))
 
     @cached_property
     def _own(self) -> np.ndarray:
@@ -249,8 +266,9 @@ class Refit(Recovery):
                 # What is taken over from its class is held; a lamp had nothing.
                 was = before.rho[own]
                 rho[own] = was if was.any() else middle
-        own = self._own[:, None]
-        return Albedo(np.where(own, rho, before.rho), np.where(own[:, 0], origin, before.origin), before.error)
+        own = self._own
+        origin, error = np.where(own, origin, before.origin), np.where(own, found.error, before.error)
+        return Albedo(np.where(own[:, None], rho, before.rho), origin, error)
 
     def base_color(self) -> np.ndarray:
         """As `Recovery.base_color`, of the touched objects anew."""

@@ -14,13 +14,15 @@ from addon.core.brdf.metal import METAL
 from addon.core.errors import BadInputError, MissingStageError
 from addon.core.io.exr import read_exr
 from addon.core.io.read import read_capture
+from addon.core.passes.albedo.albedo import FILLED, TEXTURED
 from addon.core.pipeline.recover import Recovery
 from addon.core.pipeline.refit import Refit, open_result
 from addon.core.progress import Progress
 from addon.core.results.overrides import parse
 from addon.core.results.room_file import write_room
 from addon.core.results.store import Store
-from tests.core.on_disk import QUICK
+from tests.core.on_disk import ALBEDO, LAMP, QUICK, OnDisk
+from tests.core.rooms import radiosity
 
 pytestmark = pytest.mark.usefixtures("few_samples")
 IMAGES = ("albedo", "base_color", "albedo_error", "coverage", "shading", "lit_diffuse", "evidence", "environment")
@@ -217,3 +219,32 @@ def test_stages_of_another_run_are_refused(disk, result):
         Recovery(read_capture(disk.root), store, replace(QUICK, shading_rays=32), Progress(), disk.unwrap).shading()
         with pytest.raises(MissingStageError, match="another run's"):
             Refit(open_result(result, [3]), store, Progress())
+
+
+@pytest.mark.slow
+def test_texture_of_what_is_not_touched_stays(tmp_path):
+    """A tiled floor with a part that no frame shows: it is filled with tiles, and a wall's refit leaves them alone."""
+
+    def light(room):
+        L = radiosity(room, ALBEDO, {6: LAMP})
+        place, floor = room.atlas.position, room.atlas.object_id == 0
+        dark = floor & (np.floor(place[:, :2] / 0.4).astype(int).sum(1) % 2 > 0)
+        L[dark] *= 0.2
+        L[floor & (np.abs(place[:, :2] - (2.6, 1.4)) < (0.7, 0.6)).all(1)] = np.nan
+        return L.astype(np.float32)
+
+    disk, folder = OnDisk(tmp_path / "capture", light=light), tmp_path / "result"
+    recover(disk, folder)
+    before = {name: read_exr(folder / f"{name}.exr").rgb for name in IMAGES}
+    tiled = before["coverage"][..., 2] == TEXTURED
+    assert tiled.sum() > 100
+    assert np.std(before["albedo"][tiled].mean(1)) > 0.5 * np.std(
+        before["albedo"][before["albedo"][..., 0] > 0].mean(1)
+    )
+    refit(folder, told={"objects": {"4": {"model": "metal", "roughness": 0.2, "f0": [0.9, 0.6, 0.3]}}})
+    after = {name: read_exr(folder / f"{name}.exr").rgb for name in ("albedo", "base_color", "coverage")}
+    for name, image in after.items():
+        assert np.array_equal(image[tiled], before[name][tiled]), name
+    recover(disk, folder, settings=replace(QUICK, texture_fill=False))
+    flat = read_exr(folder / "albedo.exr").rgb[tiled], read_exr(folder / "coverage.exr").rgb[tiled]
+    assert np.std(flat[0].mean(1)) < 0.5 * np.std(before["albedo"][tiled].mean(1)) and (flat[1][:, 2] == FILLED).all()

@@ -20,6 +20,8 @@ FILLED: Code[int] = 1
 NONE: Code[int] = 0
 """How an element's albedo came about: measured; filled in from its object; no reflectance (an emitter, an object
 nobody saw, or one that shows what is behind it)."""
+TEXTURED: Code[int] = 3
+"""In `coverage.exr` alone: filled in, with texture of what was measured (`passes.texture_fill`)."""
 CLOSED: Code[int] = 4
 """Added in `coverage.exr` where the element is of a face that the capture lacks, by which a hole was closed."""
 

@@ -1,0 +1,82 @@
+"""How texture is carried into what no frame saw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class PlaneParams:
+    """Of `planes`: what lies in one plane, and the picture of it.
+
+    Attributes
+    ----------
+    tilt : float
+        Radians between an element's normal and the plane's: what is left of a scan's noise in it, no skirting's slope.
+    thickness : float
+        Metres to either side of the plane.
+    tries : int
+        Elements whose planes are tried for the largest one.
+    planes : int
+        Of an object, those with most unmeasured surface.
+    cells : int
+        Of a plane's picture, at most; it is made coarser where it would have more.
+    stretch : float
+        Times that an atlas's axis may be longer than the other, and a texel larger than the picture's cells.
+    """
+
+    tilt: float = float(np.radians(15))
+    thickness: float = 0.03
+    tries: int = 32
+    planes: int = 6
+    cells: int = 1_000_000
+    stretch: float = 1.5
+
+
+@dataclass(frozen=True)
+class TextureParams:
+    """Of `synthesis`, and of whether there is enough to go by.
+
+    Attributes
+    ----------
+    floor : float
+        Albedo that darker ones count for in logarithms.
+    sure : float
+        Relative standard error up to which an element is copied; or the better half of them, where that is more.
+    mostly : int
+        Cells along a square of which most have to be so sure for the one in its middle to be copied.
+    decay : float
+        A texture's scale is the lag at which its autocorrelation, averaged over directions, has fallen to this.
+    samples : float
+        Squares of the scale that the measured part of a plane has at least.
+    smooth : float
+        Scales: standard deviation of the mean that is taken out before anything is copied, and put back.
+    window : float
+        Scales: radius within which a copy is compared with what lies around.
+    blocks : int
+        That radius in blocks of cells, which take their offset together.
+    offsets : int
+        By which copies are tried.
+    unlike : float
+        Correlation that an offset counts for where it has less: textures without a pattern have no better ones.
+    again : float
+        What a place counts for in the choice of offsets once one more of them covers it.
+    """
+
+    floor: float = 0.01
+    sure: float = 0.15
+    mostly: int = 5
+    decay: float = float(np.exp(-1))
+    samples: float = 64.0
+    smooth: float = 4.0
+    window: float = 2.0
+    blocks: int = 4
+    offsets: int = 48
+    unlike: float = 0.02
+    again: float = 0.7
+
+
+PLANES = PlaneParams()
+TEXTURE = TextureParams()

@@ -1,0 +1,217 @@
+"""Planes of an object that were measured in part, and the picture of each: cells as the atlas's texels lie in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from ...scene.atlas import Atlas
+from ...scene.model import Mesh
+from ...scene.rays import RayScene
+from ...scene.tangent_frame import tangent_frame
+from ...significance import LEVELS
+from .params import PLANES, PlaneParams
+
+
+@dataclass(frozen=True)
+class Texels:
+    """Texels k of an atlas's images, islands' borders included, with their place on the surface.
+
+    Attributes
+    ----------
+    texel : (k,) int64
+        Flat index.
+    element : (k,) int
+        Whose value they show.
+    position : (k, 3) float64
+        Metres; a border's in the plane of the triangle beside it.
+    edge : (k,) float64
+        Metres.
+    """
+
+    texel: np.ndarray
+    element: np.ndarray
+    position: np.ndarray
+    edge: np.ndarray
+
+    def part(self, index: np.ndarray) -> Texels:
+        """Some of them."""
+        return Texels(self.texel[index], self.element[index], self.position[index], self.edge[index])
+
+
+def texels_of(atlas: Atlas, mesh: Mesh, wanted: np.ndarray) -> Texels:
+    """The texels that show one of some elements ((n,) bool)."""
+    shown = np.append(wanted, False)[atlas.padding]  # -1: none
+    texel = np.flatnonzero(shown)
+    size = atlas.size
+    flat = np.concatenate([atlas.uv.reshape(-1, 2).astype(np.float64) * size, np.zeros((3 * len(atlas.uv), 1))], 1)
+    scene = RayScene(flat, np.arange(len(flat), dtype=np.int32).reshape(-1, 3))
+    above = np.stack([texel % size + 0.5, texel // size + 0.5, np.ones(len(texel))], 1).astype(np.float32)
+    triangle = np.full(size * size, -1, np.int32)
+    triangle[texel] = scene.intersect(above, np.broadcast_to(np.array([0, 0, -1], np.float32), above.shape)).triangle
+    # A border's texels, beside a triangle: what is shown between two texels is the mean of both.
+    bare = texel[triangle[texel] < 0]
+    found = triangle[bare]
+    for step in (1, -1, size, -size, size + 1, size - 1, 1 - size, -1 - size):
+        beside = bare + step
+        inside = (beside >= 0) & (beside < len(triangle))
+        found = np.where((found < 0) & inside, triangle[np.where(inside, beside, 0)], found)
+    triangle[bare] = found
+    element, of = atlas.padding[texel], triangle[texel]
+    kept = of >= 0
+    kept[kept] = mesh.object_id[of[kept]] == atlas.object_id[element[kept]]
+    texel, element, of = texel[kept], element[kept], of[kept]
+    origin, along = texel_axes(atlas, mesh, of)
+    at = np.stack([texel % size, texel // size], 1) + 0.5
+    position = origin + np.einsum("kij,kj->ki", along, at)
+    edge = np.sqrt(np.linalg.norm(np.cross(along[..., 0], along[..., 1]), axis=1))
+    return Texels(texel, element, position, edge)
+
+
+def texel_axes(atlas: Atlas, mesh: Mesh, triangle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How the atlas lies on triangles ((k,) int): the position is origin + along @ (column, row).
+
+    Returns
+    -------
+    origin : (k, 3) float64
+    along : (k, 3, 2) float64
+        Metres a texel; 0 where the triangle has no area in the atlas.
+    """
+    corner = mesh.vertices[mesh.triangles[triangle]].astype(np.float64)
+    at = atlas.uv[triangle].astype(np.float64) * atlas.size
+    (a, b), (c, d) = np.moveaxis(at[:, 1:] - at[:, :1], 0, 2)
+    area = a * d - b * c
+    inverse = np.stack([np.stack([d, -b], 1), np.stack([-c, a], 1)], 2) / np.where(area, area, np.inf)[:, None, None]
+    along = (corner[:, 1:] - corner[:, :1]).transpose(0, 2, 1) @ inverse
+    return corner[:, 0] - np.einsum("kij,kj->ki", along, at[:, 0]), along
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A plane of an object.
+
+    Attributes
+    ----------
+    normal : (3,) float64
+        Unit.
+    offset : float
+        Along the normal, metres.
+    members : (m,) int
+        Elements in it.
+    """
+
+    normal: np.ndarray
+    offset: float
+    members: np.ndarray
+
+    def near(self, position: np.ndarray, params: PlaneParams = PLANES) -> np.ndarray:
+        """Points ((k, 3)) that lie in it, (k,) bool."""
+        return np.abs(position @ self.normal - self.offset) < params.thickness
+
+
+def planes_of(atlas: Atlas, own: np.ndarray, filled: np.ndarray, params: PlaneParams = PLANES) -> Iterator[Plane]:
+    """Planes of an object's elements `own` ((m,) int), by how much of them is `filled` ((n,) bool), most first."""
+    normal, position = atlas.normal[own].astype(np.float64), atlas.position[own].astype(np.float64)
+    weight = np.where(filled[own], atlas.area[own], 0).astype(np.float64)
+    least, random = LEVELS.many * atlas.texel_edge**2, np.random.default_rng(0)
+
+    def within(direction: np.ndarray, offset: float) -> np.ndarray:
+        return (normal @ direction > np.cos(params.tilt)) & (np.abs(position @ direction - offset) < params.thickness)
+
+    left = np.ones(len(own), bool)
+    for _ in range(params.planes):
+        total = (weight * left).sum()
+        if total < least:
+            return
+        best, most = left, 0.0
+        for k in random.choice(len(own), params.tries, p=weight * left / total):
+            found = within(normal[k], float(position[k] @ normal[k])) & left
+            if weight[found].sum() > most:
+                best, most = found, weight[found].sum()
+        direction = np.average(normal[best], 0, atlas.area[own[best]])
+        direction /= np.linalg.norm(direction)
+        offset = float(np.median(position[best] @ direction))
+        members = within(direction, offset) & left
+        if not members.any() or weight[members].sum() < least:
+            return
+        left &= ~members
+        yield Plane(direction, offset, own[members])
+
+
+@dataclass(frozen=True)
+class Picture:
+    """The cells of a plane's picture.
+
+    Attributes
+    ----------
+    shape : (2,) tuple of int
+    cell : (m,) int
+        Flat index of the cell of each measured element.
+    texel : (k,) int64
+        Flat index of the texels that are wanted, in the atlas's image.
+    wanted : (k,) int
+        The flat index of the cell of each.
+    """
+
+    shape: tuple[int, int]
+    cell: np.ndarray
+    texel: np.ndarray
+    wanted: np.ndarray
+
+    @classmethod
+    def of(cls, atlas: Atlas, mesh: Mesh, known: np.ndarray, wanted: Texels, params: PlaneParams = PLANES) -> Picture:
+        """The picture of a plane's elements `known` ((m,) int), and of what is wanted in it and around."""
+        axes = _axes(atlas, mesh, known, params)
+        cells, at = (np.asarray(one, np.float64) @ axes for one in (atlas.position[known], wanted.position))
+        low, high = cells.min(0), cells.max(0)
+        size, reach = 1 / np.sqrt(np.linalg.norm(np.cross(*axes.T))), high - low
+        inside = ((at >= low - reach) & (at <= high + reach)).all(1) & (wanted.edge < params.stretch * size)
+        every = np.concatenate([cells, at[inside]])
+        # Rounded, not cut off: where texels and cells are the same each texel lies in the middle of its cell.
+        every = np.rint(every - every.min(0)).astype(np.int64)
+        coarser = int(np.ceil(np.sqrt(np.prod(every.max(0) + 1.0) / params.cells)))
+        every //= coarser
+        shape = (int(every[:, 0].max()) + 1, int(every[:, 1].max()) + 1)
+        flat = every[:, 0] * shape[1] + every[:, 1]
+        return cls(shape, flat[: len(cells)], wanted.texel[inside], flat[len(cells) :])
+
+    def paint(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values of the measured elements ((m, c)) as a picture, (h, w, c) float32, and the cells that have one.
+
+        Cells between others, as where charts meet, take the mean of those around.
+        """
+        count = self.shape[0] * self.shape[1]
+        hits = np.bincount(self.cell, minlength=count).reshape(self.shape)
+        known = hits > 0
+        around = ndimage.uniform_filter(known.astype(np.float32), 3, mode="constant")
+        gap = ~known & (around > 0.5)
+        channels = []
+        for value in values.T:
+            mean = np.bincount(self.cell, value, count).reshape(self.shape) / np.maximum(hits, 1)
+            mean[gap] = ndimage.uniform_filter(mean, 3, mode="constant")[gap] / around[gap]
+            channels.append(mean.astype(np.float32))
+        return np.stack(channels, -1), known | gap
+
+    @property
+    def hole(self) -> np.ndarray:
+        """Cells that are wanted, (h, w) bool."""
+        return np.bincount(self.wanted, minlength=self.shape[0] * self.shape[1]).reshape(self.shape) > 0
+
+
+def _axes(atlas: Atlas, mesh: Mesh, known: np.ndarray, params: PlaneParams) -> np.ndarray:
+    """What positions are multiplied by to have the cells' rows and columns, (3, 2) float64.
+
+    The atlas's own texels on the largest triangle: nothing is resampled there.
+    """
+    triangle = np.unique(atlas.triangle[known])
+    largest = triangle[mesh.geometry[1][triangle].argmax()]
+    along = texel_axes(atlas, mesh, np.array([largest]))[1][0]
+    length = np.linalg.norm(along, axis=0)
+    square = length.max() < params.stretch * length.min() and abs(along[:, 0] @ along[:, 1]) < 0.1 * length.prod()
+    if not square or not 1 / params.stretch < length.mean() / atlas.texel_edge < params.stretch:
+        normal = mesh.geometry[0][largest : largest + 1]
+        along = np.stack([one[0] for one in tangent_frame(normal)], 1).astype(np.float64) * atlas.texel_edge
+    return np.linalg.pinv(along).T

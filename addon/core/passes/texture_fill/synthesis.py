@@ -1,0 +1,223 @@
+"""A picture's hole filled by shifted copies of the rest: which shifts there are, and which of them is taken where.
+
+Patches of planks, tiles and weaves resemble others of the same picture at few offsets (He and Sun, "Statistics of Patch
+Offsets for Image Completion", ECCV 2012): the maxima of its autocorrelation. From the hole's border inwards each place
+takes the offset whose copy agrees best with what lies around it. Within one copy all of it agrees, so copies are large.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import fft, ndimage
+
+from .params import TEXTURE, TextureParams
+
+
+def completed(
+    picture: np.ndarray, source: np.ndarray, hole: np.ndarray, scale: float, params: TextureParams = TEXTURE
+) -> tuple[np.ndarray, np.ndarray]:
+    """A picture whose hole shows copies of its source.
+
+    Parameters
+    ----------
+    picture : (h, w, c) float32
+        About 0, without what varies slowly.
+    source, hole : (h, w) bool
+        What may be copied, and where to. The rest is left as it is.
+    scale : float
+        Of `scale_of`, cells.
+
+    Returns
+    -------
+    (h, w, c) float32, (h, w) bool
+        Where there is a copy.
+    """
+    edge = max(int(round(params.window * scale / params.blocks)), 1)
+    offsets = dominant_offsets(picture, source, hole, params.window * scale, params)
+    copies = [(shifted(picture, shift), shifted(source, shift)) for shift in offsets]
+    chosen = _labels(picture, source, hole, copies, edge, params)
+    result, done = picture.copy(), np.zeros(source.shape, bool)
+    label = np.repeat(np.repeat(chosen, edge, 0), edge, 1)[: source.shape[0], : source.shape[1]]
+    for k, (copy, valid) in enumerate(copies):
+        at = hole & valid & (label == k)
+        result[at] = copy[at]
+        done |= at
+    # Single cells whose copy would come from beside the source take the next best offset that has something for them.
+    for copy, valid in copies:
+        at = hole & valid & ~done
+        result[at] = copy[at]
+        done |= at
+    return result, done
+
+
+def autocovariance(picture: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mean product of a picture and itself shifted, over what is known of both.
+
+    Parameters
+    ----------
+    picture : (h, w, c) float32
+        Of mean 0.
+    known : (h, w) bool
+
+    Returns
+    -------
+    covariance : (a, b) float32
+        At shifts of [i, j] cells; those above a / 2 and b / 2 are negative ones.
+    overlap : (a, b) float32
+        Cells that each is the mean over.
+    """
+    shape = tuple(fft.next_fast_len(2 * edge, real=True) for edge in known.shape)
+
+    def with_itself(values: np.ndarray) -> np.ndarray:
+        return fft.irfft2(np.square(np.abs(fft.rfft2(values, shape))), shape)
+
+    overlap = np.maximum(np.rint(with_itself(known.astype(np.float32))), 0)
+    total = np.zeros(shape, np.float32)
+    for c in range(picture.shape[2]):
+        total += with_itself(picture[..., c] * known)
+    return total / np.maximum(overlap, 1) / picture.shape[2], overlap
+
+
+def scale_of(covariance: np.ndarray, overlap: np.ndarray, params: TextureParams = TEXTURE) -> tuple[float, float]:
+    """How far a texture is like itself, and how strong it is.
+
+    Noise, which has nothing in common from cell to cell, counts for neither.
+
+    Returns
+    -------
+    scale : float
+        Cells by which the autocovariance has fallen to `TextureParams.decay`; inf where it does not.
+    contrast : float
+        Standard deviation of what neighbouring cells have in common.
+    """
+    rows, columns = (np.minimum(np.arange(n), n - np.arange(n)) for n in covariance.shape)
+    ring = np.rint(np.hypot(rows[:, None], columns[None])).astype(int).ravel()
+    mean = np.bincount(ring, (covariance * overlap).ravel()) / np.maximum(np.bincount(ring, overlap.ravel()), 1)
+    if mean[1] <= 0:
+        return np.inf, 0.0
+    least = params.decay * mean[1]
+    below = np.flatnonzero(mean[1:] < least)
+    if not len(below):
+        return np.inf, float(np.sqrt(mean[1]))
+    last = int(below[0])
+    return last + float((mean[last] - least) / max(mean[last] - mean[last + 1], 1e-30)), float(np.sqrt(mean[1]))
+
+
+def dominant_offsets(
+    picture: np.ndarray, source: np.ndarray, hole: np.ndarray, apart: float, params: TextureParams = TEXTURE
+) -> list[tuple[int, int]]:
+    """Offsets from the hole to the source by which the picture resembles itself most and that cover most of the hole.
+
+    Parameters
+    ----------
+    apart : float
+        Cells: no shorter offset, and of those nearer to each other the best one.
+    """
+    covariance, overlap = autocovariance(picture, source)
+    shape, reach = covariance.shape, max(int(round(apart)), 1)
+    top = (ndimage.maximum_filter(covariance, 2 * reach + 1, mode="wrap") == covariance) & (overlap > reach * reach)
+    rows, columns = (np.minimum(np.arange(n), n - np.arange(n)) for n in shape)
+    top &= np.hypot(rows[:, None], columns[None]) > reach
+    alike = np.where(top, np.square(np.maximum(covariance / covariance[0, 0], params.unlike)), 0)
+    inside, open_ = fft.rfft2(source.astype(np.float32), shape), hole.astype(np.float32)
+    found: list[tuple[int, int]] = []
+    while len(found) < params.offsets:
+        covered = fft.irfft2(inside * np.conj(fft.rfft2(open_, shape)), shape)
+        i, j = divmod(int((alike * np.maximum(covered, 0)).argmax()), shape[1])
+        if not alike[i, j] or covered[i, j] < 0.5:
+            break
+        alike[i, j] = 0
+        found.append((i - shape[0] * (2 * i > shape[0]), j - shape[1] * (2 * j > shape[1])))
+        open_[shifted(source, found[-1])] *= np.float32(params.again)
+    return found
+
+
+def shifted(values: np.ndarray, shift: tuple[int, int]) -> np.ndarray:
+    """What lies by a shift off each place; 0 where that is outside."""
+    result = np.zeros_like(values)
+    (h, w), (i, j) = values.shape[:2], shift
+    if abs(i) < h and abs(j) < w:
+        to = slice(max(-i, 0), h - max(i, 0)), slice(max(-j, 0), w - max(j, 0))
+        result[to] = values[max(i, 0) : h - max(-i, 0), max(j, 0) : w - max(-j, 0)]
+    return result
+
+
+def block_mean(values: np.ndarray, edge: int) -> np.ndarray:
+    """Means over blocks of edge x edge cells, float32; beyond the border is 0."""
+    h, w = values.shape[:2]
+    padded = np.pad(values, [(0, -h % edge), (0, -w % edge), *[(0, 0)] * (values.ndim - 2)])
+    return padded.reshape(-(-h // edge), edge, -(-w // edge), edge, *values.shape[2:]).mean((1, 3), dtype=np.float32)
+
+
+def _labels(picture, source, hole, copies, edge, params) -> np.ndarray:
+    """Which of the copies each block takes, (h / edge, w / edge) int; -1: none."""
+
+    def blocks(values: np.ndarray, valid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        share = block_mean(valid, edge)
+        return block_mean(values * valid[..., None], edge) / np.maximum(share, 1e-6)[..., None], share > 0.5
+
+    current, settled = blocks(picture, source)
+    told, coarse = settled.copy(), [blocks(*one) for one in copies]
+    todo, everywhere = block_mean(hole, edge) > 0, False
+    chosen = np.full(todo.shape, -1)
+    window, around = 2 * params.blocks + 1, np.ones((3, 3), bool)
+    while True:
+        front = ndimage.binary_dilation(settled, around, params.blocks // 2) & todo
+        if not front.any():
+            if everywhere or not todo.any():
+                return chosen
+            todo, everywhere = ~settled, True  # what is left of the hole has no source beside it
+            continue
+        todo &= ~front
+        place = np.flatnonzero(front)
+        cost, label = np.full(len(place), np.inf), np.full(len(place), -1)
+        for k, (copy, valid) in enumerate(coarse):
+            both = settled & valid
+            off = np.where(both, np.square(current - copy).sum(2), 0)
+            count, total = (
+                ndimage.uniform_filter(one.astype(np.float32), window, mode="constant")[front] for one in (both, off)
+            )
+            compared = valid[front] & (count * window * window > 0.5)
+            mean = np.where(compared, total / np.maximum(count, 1e-6), np.inf)
+            better = mean < cost
+            cost[better], label[better] = mean[better], k
+        for k in np.unique(label[label >= 0]):
+            at = np.unravel_index(place[label == k], chosen.shape)
+            chosen[at] = k
+            fresh = tuple(axis[~told[at]] for axis in at)
+            current[fresh] = coarse[k][0][fresh]
+            settled[at] = True
+
+
+def smooth_mean(picture: np.ndarray, known: np.ndarray, sigma: float) -> np.ndarray:
+    """Mean of what is known within a Gaussian's reach of each place, carried on from farther off where nothing is near.
+
+    Parameters
+    ----------
+    picture : (h, w, c) float32
+    known : (h, w) bool
+    sigma : float
+        Cells.
+
+    Returns
+    -------
+    (h, w, c) float32
+    """
+    edge = max(int(sigma / 4), 1)
+    share, total = block_mean(known, edge), block_mean(picture * known[..., None], edge)
+    result, missing, width = np.zeros_like(total), np.ones_like(share), sigma / edge
+    while True:
+        mass, *sums = (
+            ndimage.gaussian_filter(one, width, mode="constant") for one in (share, *np.moveaxis(total, 2, 0))
+        )
+        last = width > max(share.shape)
+        # Where less than a quarter is known, the mean over twice the width takes the rest.
+        part = missing if last else missing * np.minimum(4 * mass, 1)
+        result += (part / np.maximum(mass, 1e-12))[..., None] * np.stack(sums, -1)
+        missing = missing - part
+        if last:
+            break
+        width *= 2
+    grid = np.meshgrid(*((np.arange(n) + 0.5) / edge - 0.5 for n in known.shape), indexing="ij")
+    channels = [ndimage.map_coordinates(one, grid, order=1, mode="nearest") for one in np.moveaxis(result, 2, 0)]
+    return np.stack(channels, -1)

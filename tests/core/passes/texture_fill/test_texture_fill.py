@@ -1,0 +1,136 @@
+"""Texture carried into what was not measured: patterns go on, and nothing is made up where there is none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from addon.core.passes.texture_fill.synthesis import autocovariance, dominant_offsets, scale_of, smooth_mean
+from addon.core.passes.texture_fill.texture_fill import texture_of
+from tests.core.rooms import box_sides, make_room
+
+FLOOR, TEXEL = 0, 0.02
+
+
+@pytest.fixture(scope="module")
+def room():
+    return make_room(box_sides(), TEXEL)
+
+
+def checker(position: np.ndarray) -> np.ndarray:
+    """Tiles of .3 m, light and dark, (n, 3) float32."""
+    light = np.floor(position[:, :2] / 0.3).astype(int).sum(1) % 2 > 0
+    return np.where(light[:, None], (0.6, 0.55, 0.5), (0.12, 0.1, 0.1)).astype(np.float32)
+
+
+def planks(position: np.ndarray) -> np.ndarray:
+    """Boards .12 m wide along y, each of a tone of its own, with grain along them."""
+    board = np.floor(position[:, 0] / 0.12).astype(int)
+    tone = np.random.default_rng(3).uniform(0.6, 1.4, 64)[board % 64]
+    grain = 1 + 0.2 * np.sin(2 * np.pi * position[:, 0] / 0.04)
+    return ((tone * grain)[:, None] * (0.3, 0.2, 0.12)).astype(np.float32)
+
+
+def hole_in(atlas, low=(1.2, 0.9), high=(2.4, 1.9)) -> np.ndarray:
+    at = atlas.position[:, :2]
+    return (atlas.object_id == FLOOR) & (at > low).all(1) & (at < high).all(1)
+
+
+def filled(room, pattern, hole, noise=0.0, error=0.06):
+    """What is found for a floor with a pattern, and the image over the atlas that shows it; 0 where nothing is."""
+    atlas = room.atlas
+    rho = np.full((len(atlas), 3), 0.5, np.float32)
+    floor = atlas.object_id == FLOOR
+    rho[floor] = pattern(atlas.position[floor])
+    rho *= np.exp(noise * np.random.default_rng(0).normal(size=rho.shape)).astype(np.float32)
+    rho[hole] = np.median(rho[floor & ~hole], 0)
+    found = texture_of(atlas, room.mesh, rho, ~hole, hole, np.full(len(atlas), error, np.float32))
+    image = np.zeros((atlas.size * atlas.size, 3), np.float32)
+    image[found.texel] = found.rho
+    return found, image[atlas.texel[hole]], rho[hole]
+
+
+def test_tiles_go_on_as_they_lie(room):
+    hole = hole_in(room.atlas)
+    found, shown, plain = filled(room, checker, hole)
+    true = checker(room.atlas.position[hole])
+    off = np.abs(shown - true).mean(1)
+    assert np.mean(off < 0.1) > 0.95 and np.mean(np.square(shown - true)) < 0.1 * np.mean(np.square(plain - true))
+    # Nothing but what was missing is touched, its island's border apart.
+    assert hole[room.atlas.padding[found.texel]].all()
+
+
+def test_boards_keep_their_direction_and_contrast(room):
+    hole = hole_in(room.atlas)
+    _, shown, _ = filled(room, planks, hole)
+    at = np.floor((room.atlas.position[hole, :2] - (1.2, 0.9)) / TEXEL).astype(int)
+    picture = np.zeros((*(at.max(0) + 1), 3))
+    picture[tuple(at.T)] = shown
+    across, along = (np.abs(np.diff(picture.mean(2), axis=axis)).mean() for axis in (0, 1))
+    assert along < 0.3 * across
+    true = planks(room.atlas.position[(room.atlas.object_id == FLOOR) & ~hole])
+    assert np.std(shown.mean(1)) == pytest.approx(np.std(true.mean(1)), rel=0.3)
+    assert np.allclose(shown.mean(0), true.mean(0), rtol=0.12)
+
+
+def test_colour_that_varies_slowly_is_not_copied(room):
+    """Light tiles that get darker across the room: the copies take the level of where they are put."""
+
+    def darker(position):
+        return checker(position) * (1.2 - 0.2 * position[:, :1]).astype(np.float32)
+
+    hole = hole_in(room.atlas)
+    _, shown, _ = filled(room, darker, hole)
+    true = darker(room.atlas.position[hole])
+    light = true.mean(1) > 0.25
+    assert np.median(np.abs(shown[light] / true[light] - 1)) < 0.1
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.08])
+def test_nothing_is_made_up_on_an_even_floor(room, noise):
+    """Noise below the error that is told of it is no texture."""
+    found, _, _ = filled(room, lambda at: np.full((len(at), 3), 0.4, np.float32), hole_in(room.atlas), noise, error=0.1)
+    assert len(found.texel) == 0
+
+
+def test_a_measured_corner_is_not_enough(room):
+    at = room.atlas.position[:, :2]
+    found, _, _ = filled(room, checker, (room.atlas.object_id == FLOOR) & (at > 0.7).any(1))
+    assert len(found.texel) == 0
+
+
+def test_a_wall_is_no_source_for_the_floor(room):
+    """One object of two planes: what lies across the edge has another texture."""
+    atlas = room.atlas
+    rho, hole = planks(atlas.position), atlas.object_id == FLOOR
+    found = texture_of(atlas, room.mesh, rho, ~hole, hole, np.full(len(atlas), 0.06, np.float32))
+    assert len(found.texel) == 0
+
+
+def test_offsets_are_the_patterns_periods():
+    rows, columns = np.mgrid[:120, :140]
+    picture = np.where((rows // 10 + columns // 15) % 2 > 0, 1.0, -1.0).astype(np.float32)[..., None]
+    hole = np.zeros(picture.shape[:2], bool)
+    hole[50:80, 50:90] = True
+    covariance, overlap = autocovariance(picture, ~hole)
+    scale, contrast = scale_of(covariance, overlap)
+    assert 2 < scale < 10 and contrast == pytest.approx(1, abs=0.2)
+    offsets = dominant_offsets(picture, ~hole, hole, 2 * scale)
+    exact = [i % 20 == 0 and j % 30 == 0 or i % 20 == 10 and j % 30 == 15 for i, j in offsets]
+    assert len(offsets) > 4 and all(exact[:4])
+
+
+def test_noise_has_no_scale_of_its_own():
+    noise = np.random.default_rng(1).normal(size=(200, 200, 1)).astype(np.float32)
+    _, contrast = scale_of(*autocovariance(noise, np.ones((200, 200), bool)))
+    assert contrast < 0.1
+
+
+def test_the_slow_part_is_carried_on():
+    """A gradient's mean far inside a hole stays between what is known at its ends."""
+    picture = np.linspace(1, 2, 200, dtype=np.float32)[None, :, None] * np.ones((60, 1, 1), np.float32)
+    known = np.ones((60, 200), bool)
+    known[:, 60:140] = False
+    smooth = smooth_mean(picture, known, 8.0)[..., 0]
+    assert np.abs(smooth - picture[..., 0])[known].max() < 0.06
+    assert np.abs(np.diff(smooth[30])).max() < 0.02 and 1.2 < smooth[30, 60:140].min() < smooth[30, 60:140].max() < 1.8
