@@ -6,27 +6,16 @@ saved with the file and needs no registered add-on; the node tree always shows i
 
 import bpy
 
-from ...core.brdf.emitter import LAMP_ALBEDO as UNLIT_GREY
 from ...core.errors import BadInputError
 from ...core.kinds import Limit
 from ...core.naming import in_order, numbered
-from ..data.materials import (
-    BASE_COLOR,
-    EMISSION_STRENGTH,
-    brdf_of,
-    emission,
-    emission_socket,
-    lets_light_through,
-    principled,
-)
+from ..data.materials import EMISSION_STRENGTH, brdf_of, emission, emission_socket, principled
 from .kelvin import HIGHEST, LOWEST, kelvin_of, luminance, rgb_of
 
-_STRENGTH, _COLOUR, _BASE = (f"scan_relight_recovered_{name}" for name in ("strength", "colour", "base"))
+_STRENGTH, _COLOUR = (f"scan_relight_recovered_{name}" for name in ("strength", "colour"))
 _OFF, _FACTOR = "scan_relight_lamp_off", "scan_relight_lamp_factor"
 
 MAX_FACTOR: Limit[float] = 1000.0
-_DARK = ("window", "screen", "monitor", "tv", "television", "display", "laptop")
-"""Classes that are nearly black when off: what is behind them is unlit."""
 
 radiance = emission
 """What a lamp emits now, linear Rec.709 in the frames' unit."""
@@ -147,10 +136,9 @@ def restore(material: bpy.types.Material) -> None:
         return
     inputs, socket = principled(material).inputs, emission_socket(material)
     inputs[EMISSION_STRENGTH].default_value = material[_STRENGTH]
-    inputs[BASE_COLOR].default_value = material[_BASE]
     if socket is not None:
         socket.default_value = (*material[_COLOUR], 1)
-    for name in (_STRENGTH, _COLOUR, _BASE, _OFF, _FACTOR):
+    for name in (_STRENGTH, _COLOUR, _OFF, _FACTOR):
         material.pop(name, None)
 
 
@@ -185,9 +173,7 @@ def state_sockets(material: bpy.types.Material) -> list[bpy.types.NodeSocket]:
     if _STRENGTH not in material or not is_lamp(material):
         return []
     inputs = principled(material).inputs
-    return [
-        one for one in (inputs[EMISSION_STRENGTH], inputs[BASE_COLOR], emission_socket(material)) if one is not None
-    ]
+    return [one for one in (inputs[EMISSION_STRENGTH], emission_socket(material)) if one is not None]
 
 
 def _keep(material):
@@ -196,7 +182,6 @@ def _keep(material):
         return
     inputs, tint = principled(material).inputs, colour(material)
     material[_STRENGTH] = inputs[EMISSION_STRENGTH].default_value
-    material[_BASE] = tuple(inputs[BASE_COLOR].default_value)
     if tint is not None:
         material[_COLOUR] = tint
 
@@ -204,5 +189,3 @@ def _keep(material):
 def _show(material):
     inputs, on = principled(material).inputs, is_on(material)
     inputs[EMISSION_STRENGTH].default_value = material[_STRENGTH] * factor(material) * on
-    grey = 0.02 if numbered(material.name.casefold())[0] in _DARK else UNLIT_GREY
-    inputs[BASE_COLOR].default_value = material[_BASE] if on or lets_light_through(material) else (grey, grey, grey, 1)

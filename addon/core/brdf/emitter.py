@@ -8,16 +8,18 @@ from .model import Brdf, Parameters, Principled
 
 LAMP_ALBEDO = 0.5
 """What a lamp reflects can't be told under its own light. Shades and diffusers are white to grey: with its light off a
-lamp shows this grey. Black, it is a hole in the room (living room, lamps off: 1 % of the pixels, half of the error)."""
+lamp of which nothing else is known (`passes.unlit_lamps`) shows this grey. Black, it is a hole in the room (living
+room, lamps off: 1 % of the pixels, half of the error)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Emitter(Brdf):
-    """Emits its radiance to all sides, over a grey."""
+    """Emits its radiance to all sides, over what it reflects, a guess."""
 
     def principled(self, of: Parameters) -> Principled:
         """Of a description's radiance what the lamp reflects has been taken off."""
-        return Principled(base_color=(LAMP_ALBEDO,) * 3, emission=of.emission or (0.0, 0.0, 0.0))
+        albedo = LAMP_ALBEDO if of.unlit is None else of.unlit
+        return Principled(base_color=(albedo,) * 3, emission=of.emission or (0.0, 0.0, 0.0))
 
 
 EMITTER = Emitter(

@@ -35,8 +35,9 @@ class ObjectMaterial:
     f0 : float, (3,) tuple of float or None
         The lobe's reflectance at normal incidence, 0...1; three numbers, linear Rec.709, of a metal.
     emission : (3,) tuple of float or None
-        Emitter only: the radiance that it gives of itself, linear Rec.709; what it reflects, as a grey of
-        `LAMP_ALBEDO`, comes on top.
+        Emitter only: the radiance that it gives of itself, linear Rec.709; what it reflects comes on top.
+    unlit : float or None
+        Emitter only: its albedo, as it shows with its light off; a guess. None: nothing tells, so `LAMP_ALBEDO`.
     transmission : float or None
         Transparent only: share of a background's radiance that passes the object; of a cut-out, the share of holes.
     surfaces : float or None
@@ -68,6 +69,7 @@ class ObjectMaterial:
     alpha: float | None = None
     f0: F0 | None = None
     emission: tuple[float, float, float] | None = None
+    unlit: float | None = None
     transmission: float | None = None
     surfaces: float | None = None
     target_frame: str | None = None

@@ -104,6 +104,7 @@ PASSES = (
         metal_by_looks="Tells metals of one colour from all of their surface.",
         coat_by_looks="Tells coated things of one colour from all of their surface.",
         class_lobes="Shares lobes among objects of one class.",
+        unlit_lamps="Has windows and screens dark with their light off.",
         specular_removal="Takes the fitted specular part out of every observation, and the median of what is left.",
         glossy_light="Lights the room by what glossy things really reflect.",
         caustics="Follows light from bright triangles over glossy things by photons.",

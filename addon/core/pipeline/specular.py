@@ -23,6 +23,7 @@ from ..passes.specular.params import FIT
 from ..passes.specular.problems import Problems
 from ..passes.specular.separate import specular_in_median, spread_over_object
 from ..passes.specular_removal.removal import SpecularPart, without_specular
+from ..passes.unlit_lamps.unlit import unlit
 from ..progress import Progress, Rounds
 from ..results.overrides import NOTHING, Given, Overrides
 from ..scene.element_groups import ElementGroups
@@ -183,7 +184,9 @@ def fit_specular(
     kept = {} if held is None else {m.object_id: m for m in held.found.materials if m.object_id not in held.only}
     lit_by = {lamp.object_id: lamp for lamp in lamps if lamp.object_id not in given}
     by_id = {
-        i.object_id: kept.get(i.object_id) or told.get(i.object_id) or _describe(i, room, chosen, lit_by, given)
+        i.object_id: kept.get(i.object_id)
+        or told.get(i.object_id)
+        or _describe(i, room, chosen, lit_by, given, seed, without)
         for i in instances
     }
     _same_as(by_id, given, set(kept))
@@ -271,22 +274,32 @@ def _wanted(
 
 
 def _describe(
-    i: Instance, room: Room, chosen: Chosen, lamps: Mapping[int, Lamp], given: Mapping[int, Given]
+    i: Instance,
+    room: Room,
+    chosen: Chosen,
+    lamps: Mapping[int, Lamp],
+    given: Mapping[int, Given],
+    seed: int,
+    without: Collection[str],
 ) -> ObjectMaterial:
     """What is known of one object: a lamp, a flat mirror, or what its model was chosen to be."""
     field, number = room.field, i.object_id
     own, choice = field.atlas.elements_of(number), chosen.choices.get(number)
+
+    def lamp(radiance: np.ndarray, note: str) -> ObjectMaterial:
+        albedo, why = (None, "") if "unlit-lamps" in without else unlit(i, field, seed)
+        return lamp_material(i, radiance, room.irradiance[own], " ".join(filter(None, (note, why))), albedo)
+
     if choice is not None and choice.model.gives_light:
         seen = np.median(field.radiance[own], 0) if len(own) else np.zeros(3)
-        return lamp_material(i, seen, room.irradiance[own], given_note(given[number]))
+        return lamp(seen, given_note(given[number]))
     if choice is not None:
         target, sure = chosen.targets[number], chosen.intervals[number]
         name = room.frame_names[target] if target >= 0 else None
         found = described(i, choice, chosen.problems.get(number), name, sure)
         return as_given(found, given[number], choice, sure) if number in given else found
     if number in lamps:
-        note = lamps[number].note(room.names)
-        return lamp_material(i, lamps[number].radiance, room.irradiance[own], note)
+        return lamp(lamps[number].radiance, lamps[number].note(room.names))
     mirror = next((one for one in field.mirrors if one.object_id == number), None)
     if mirror is not None and number not in given:
         seen = int((field.atlas.object_id[room.samples.element] == number).sum())

@@ -26,10 +26,11 @@ def two_lamps(scene, one_sided):
 
 
 @pytest.mark.parametrize("one_sided", [False, True])
-def test_off_takes_the_light_out_as_if_the_lamp_were_deleted(scene, shoot, look_down, one_sided, monkeypatch):
+def test_off_takes_the_light_out_as_if_the_lamp_were_deleted(scene, shoot, look_down, one_sided):
     _, left, _ = two_lamps(scene, one_sided)
     look_down()
-    monkeypatch.setattr(lamps, "UNLIT_GREY", 0.0)  # an absorber that the world behind it, black, can't be told from
+    # An absorber that the world behind it, black, can't be told from.
+    lamps.principled(left.data.materials[0]).inputs["Base Color"].default_value = (0, 0, 0, 1)
     both = shoot(scene, 8, 8, 64)
     lamps.set_on(left.data.materials[0], False)
     off = shoot(scene, 8, 8, 64)

@@ -20,17 +20,21 @@ from .models import Choice, metal_f0
 from .params import FIT
 
 
-def lamp_material(instance: Instance, radiance: np.ndarray, irradiance: np.ndarray, note: str) -> ObjectMaterial:
-    """The description of a lamp that was seen with `radiance` ((3,)), under the E of its elements, (k, 3)."""
+def lamp_material(
+    instance: Instance, radiance: np.ndarray, irradiance: np.ndarray, note: str, unlit: float | None = None
+) -> ObjectMaterial:
+    """The description of a lamp that was seen with `radiance` ((3,)), under the E of its elements, (k, 3).
+
+    `unlit` is its albedo with its light off; None where nothing tells.
+    """
     here = np.median(irradiance, 0) if len(irradiance) else np.zeros(3)
-    return ObjectMaterial(
-        instance.object_id, instance.class_name, EMITTER, emission=given_off(radiance, here), note=note
-    )
+    emission = given_off(radiance, here, LAMP_ALBEDO if unlit is None else unlit)
+    return ObjectMaterial(instance.object_id, instance.class_name, EMITTER, emission=emission, unlit=unlit, note=note)
 
 
-def given_off(radiance: np.ndarray, irradiance: np.ndarray) -> tuple[float, float, float]:
+def given_off(radiance: np.ndarray, irradiance: np.ndarray, albedo: float) -> tuple[float, float, float]:
     """What a lamp gives of itself of the `radiance` ((3,)) that it was seen with, under E ((3,)); never all of it."""
-    reflected = np.minimum(LAMP_ALBEDO * irradiance / np.pi, LAMP_ALBEDO * radiance)
+    reflected = np.minimum(albedo * irradiance / np.pi, albedo * radiance)
     return rgb(radiance - reflected)
 
 

@@ -1,0 +1,57 @@
+"""Which lamps are dark with their light off: windows, by where they are or by their class, and screens."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from ...light.directions import cosine_hemisphere, sobol
+from ...light.field import LightField
+from ...scene.model import Instance
+from ...scene.tangent_frame import to_world
+from .params import UNLIT, UnlitParams
+
+OUTSIDE = "Behind it there is nothing of the room, so with its light off it is dark, as a window at night: a guess."
+CLASS = "With its light off it is dark, as its class is: a guess."
+
+
+def unlit(
+    instance: Instance, field: LightField, seed: int = 0, params: UnlitParams = UNLIT
+) -> tuple[float | None, str]:
+    """Albedo of a lamp with its light off, and a sentence on why; None where nothing tells."""
+    if looks_outside(instance.object_id, field, seed, params):
+        return params.dark, OUTSIDE
+    words = re.split(r"[^a-z]+", instance.class_name.casefold())
+    return (params.dark, CLASS) if set(words) & set(params.dark_classes) else (None, "")
+
+
+def looks_outside(object_id: int, field: LightField, seed: int = 0, params: UnlitParams = UNLIT) -> bool:
+    """Whether a lamp is an upright pane with the room on one side of it and nothing on the other."""
+    mesh = field.mesh
+    mine = mesh.object_id == object_id
+    normal, area = mesh.geometry[0][mine].astype(np.float64), mesh.geometry[1][mine]
+    own = field.atlas.elements_of(object_id)
+    if not len(own) or not area.sum():
+        return False
+    share, axes = np.linalg.eigh((area[:, None, None] * normal[:, :, None] * normal[:, None]).sum(0) / area.sum())
+    axis = axes[:, 2]
+    if share[2] < params.flat or abs(axis[2]) > np.sin(params.upright):
+        return False
+    along = mesh.vertices[mesh.triangles[mine]].reshape(-1, 3) @ axis
+    random = np.random.default_rng(seed)
+    weight = field.atlas.area[own].astype(np.float64)
+    start = field.atlas.position[random.choice(own, params.rays, p=weight / weight.sum())]
+    local, (low, high) = cosine_hemisphere(sobol(params.rays, seed)), field.atlas.box
+    leaving = []
+    for side, plane in ((axis, along.max()), (-axis, -along.min())):
+        # From beyond the pane's own far face.
+        beyond = start + (plane - start @ side)[:, None] * side
+        turn = np.broadcast_to(side.astype(np.float32), beyond.shape)
+        directions = to_world(local[:, None], turn)[:, 0]
+        hits = field.scene.intersect(field.scene.off_surface(beyond.astype(np.float32), turn), directions)
+        met = beyond + np.where(np.isfinite(hits.distance), hits.distance, 0)[:, None] * directions
+        margin = field.scene.offset
+        inside = ((met > low - margin) & (met < high + margin)).all(1)
+        leaving.append(float(((hits.triangle < 0) | ~inside).mean()))
+    return max(leaving) >= params.leaving > min(leaving)
