@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import importlib.util
 import json
 import struct
 from collections.abc import Callable, Sequence
@@ -14,9 +15,11 @@ import numpy as np
 from addon.core.errors import ScanRelightError
 from addon.core.io.exr import write_exr
 from addon.core.io.layout import AS_FOUND, Reading
+from addon.core.io.pictures import picture_size
 from addon.core.io.pixels import read_pixels
 from addon.core.io.png import write_png
 from addon.core.io.read import describe, read_capture
+from tests.core.io import test_phone_pictures
 from tests.core.io.conftest import CORNERS, HEIGHT, SIDES, WIDTH
 from tests.core.io.hostile import cases, test_coded_spoiled, test_exr_spoiled
 
@@ -64,20 +67,12 @@ def picture(ending: str, write: Callable[[Path], None], reading: Reading) -> Rea
     """A capture whose frame 0 is spoiled; the others are as it was."""
 
     def make(root: Path) -> Path:
-        from PIL import Image
-
         on_disk = cases.CaptureOnDisk(root, 6)
         for i, frame in enumerate(on_disk.transforms["frames"]):
             (root / frame["file_path"]).unlink()
             frame["file_path"] = f"images/{i:03d}.{ending}"
             write(root / frame["file_path"])
-        if ending.endswith("exr"):
-            from addon.core.io.exr import read_header
-
-            width, height = read_header(root / frame["file_path"])
-        else:
-            with Image.open(root / frame["file_path"]) as image:
-                width, height = image.size
+        width, height = picture_size(root / frame["file_path"])
         on_disk.top(w=width, h=height, fl_x=width, fl_y=width, cx=width / 2, cy=height / 2)
         return root / f"images/000.{ending}"
 
@@ -218,6 +213,9 @@ def readers() -> dict[str, Reader]:
         found[f"exr {name}"] = picture(f"{name}.exr", write, Reading())
     for name, write in test_coded_spoiled.KINDS.items():
         found[f"picture {name}"] = picture(name, write, Reading(transfer="srgb"))
+    for name, module in (("heic", "pillow_heif"), ("dng", "rawpy")):
+        if importlib.util.find_spec(module):  # extras
+            found[f"picture {name}"] = picture(name, test_phone_pictures.WRITERS[name], Reading())
     found |= {f"ids {ending}": fipt_ids(ending) for ending in ("exr", "png")}
     found["ptex"] = Reader(ptex, read_ptex)
     found |= {f"result {name}": result(name) for name in ("room.npz", "stages/surface.npz")}

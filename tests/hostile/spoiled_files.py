@@ -95,11 +95,10 @@ class Child:
 
 
 def corpus() -> list[tuple[str, int]]:
-    """What once failed: a reader's name and the seed, a line each."""
+    """What once failed: a reader's name and the seed, a line each; without those whose library is not installed."""
+    known = readers()
     lines = CORPUS.read_text(encoding="utf-8").splitlines() if CORPUS.exists() else []
-    return [
-        (name, int(seed)) for name, _, seed in (line.rpartition(" ") for line in lines) if name[:1] not in ("", "#")
-    ]
+    return [(name, int(seed)) for name, _, seed in (line.rpartition(" ") for line in lines) if name in known]
 
 
 def chosen(seed: int, only: str = "", blender: bool = True) -> Iterator[tuple[str, int]]:

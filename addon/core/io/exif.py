@@ -12,8 +12,10 @@ from pathlib import Path
 
 from ..kinds import Code, Limit
 from .files import read_bytes
+from .heif import heif_exif, is_heif
 
 EXIF: Code[int] = 0x8769
+ORIENTATION: Code[int] = 0x112
 EXPOSURE_TIME: Code[int] = 0x829A
 F_NUMBER: Code[int] = 0x829D
 ISO: Code[int] = 0x8827
@@ -86,8 +88,10 @@ def exposure_tags(data: bytes, pointer: int | None = None, order: str = "", base
 
 
 def exif_exposure(path: Path) -> dict[int, float]:
-    """Exposure time in seconds, f-number and ISO of the JPEG or TIFF `path`, by tag, as far as it tells."""
+    """Exposure time in seconds, f-number and ISO of the JPEG, TIFF, DNG or HEIC `path`, by tag, as far as it tells."""
     data = read_bytes(path, "Picture ", HEAD)
+    if is_heif(data):
+        return exposure_tags(heif_exif(path))
     if not data.startswith(JPEG_MAGIC):
         try:
             return exposure_tags(*_directory(data, path))
@@ -95,6 +99,14 @@ def exif_exposure(path: Path) -> dict[int, float]:
             return {}
     at = data.find(b"Exif\0\0")
     return exposure_tags(data[at + 6 :]) if at >= 0 else {}
+
+
+def exif_orientation(path: Path) -> int:
+    """How the camera was held that took the TIFF or DNG `path`, EXIF's number; 1 where it does not tell."""
+    try:
+        return int(read_tags(*_directory(read_bytes(path, "Picture ", HEAD), path)).get(ORIENTATION, 1))
+    except (struct.error, KeyError, ValueError, OverflowError):
+        return 1
 
 
 def _directory(data: bytes, path: Path) -> tuple[bytes, int, str, int]:

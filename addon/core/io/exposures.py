@@ -19,8 +19,10 @@ from ..errors import BadInputError
 from ..kinds import Limit
 from ..scene.model import Frame
 from . import exif
+from .heif import HEIC
 from .oiio import JPEG, TIFF
 from .pictures import picture_kind
+from .raw import DNG
 
 EXPOSURE, NAME = "exposure", ("name", "file", "file_path", "filename", "frame", "image")
 TIME = (
@@ -136,7 +138,7 @@ def from_settings(
 
 
 def from_exif(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
-    """Use what JPEG and TIFF frames' own EXIF tells, where no exposure is stated and all of them tell.
+    """Use what the own EXIF of JPEG, TIFF, DNG and HEIC frames tells, where no exposure is stated and all of them tell.
 
     Returns
     -------
@@ -147,7 +149,7 @@ def from_exif(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
     settings: list[Settings | None] = []
     for frame in frames:
         try:
-            if picture_kind(frame.path) not in (JPEG, TIFF):
+            if picture_kind(frame.path) not in (JPEG, TIFF, DNG, HEIC):
                 return list(frames), []
             tags = exif.exif_exposure(frame.path)
         except BadInputError:

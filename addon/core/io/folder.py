@@ -144,7 +144,7 @@ def _other(name: str, names: list[str]) -> str:
     blend = next((one for one, ending in zip(names, endings, strict=True) if ending == ".blend"), None)
     if blend:
         return f"Folder '{name}' holds the Blender file '{blend}' and no scan; open that by File, Open."
-    if any(ending in (".exr", ".hdr", ".png", ".jpg", ".jpeg", ".tif", ".tiff") for ending in endings):
+    if any(ending in (".exr", ".hdr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".heic", ".dng") for ending in endings):
         return (
             f"Folder '{name}' holds pictures, but no cameras (such as 'transforms.json' or a COLMAP model); "
             "choose the folder above, or add them."

@@ -8,20 +8,23 @@ import numpy as np
 
 from ..errors import BadInputError
 from . import exr_header, radiance_hdr
+from .exif import exif_orientation
 from .exr import exr_note, read_exr, read_header
 from .files import absence
-from .oiio import CODED, coded_header, coded_orientation, read_coded
+from .heif import HEIC, heif_header, is_heif, read_heif
+from .oiio import CODED, TIFF, coded_header, coded_orientation, read_coded
 from .picture import Picture, turn
 from .radiance_hdr import hdr_size, read_hdr
+from .raw import DNG, is_dng, raw_size, read_raw
 from .transfer import decode
 
 EXR, HDR = "OpenEXR", "Radiance HDR"
-ENDINGS = (".exr", ".hdr", ".pic", ".png", ".jpg", ".jpeg", ".tif", ".tiff")
+ENDINGS = (".exr", ".hdr", ".pic", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".heic", ".heif", ".hif", ".dng")
 """Of files that can be pictures, in the order in which a missing ending is tried."""
 
 
 def picture_kind(path: Path | str) -> str:
-    """One of the kinds above or of `oiio`.
+    """One of the kinds above, of `oiio`, `heif.HEIC` or `raw.DNG`.
 
     Raises
     ------
@@ -42,9 +45,12 @@ def picture_kind(path: Path | str) -> str:
     kinds: dict[str, bytes | tuple[bytes, ...]] = {EXR: exr_header.MAGIC, HDR: radiance_hdr.MAGIC, **CODED}
     for kind, magic in kinds.items():
         if head.startswith(magic):
-            return kind
+            return DNG if kind == TIFF and is_dng(path) else kind
+    if is_heif(head):
+        return HEIC
     raise BadInputError(
-        f"Picture '{path}' is not an OpenEXR, Radiance HDR, PNG, JPEG or TIFF file, or is damaged; write it as OpenEXR."
+        f"Picture '{path}' is not an OpenEXR, Radiance HDR, PNG, JPEG, TIFF, HEIC or DNG file, or is damaged; "
+        "write it as OpenEXR."
     )
 
 
@@ -65,7 +71,10 @@ def picture_size(path: Path, turned: bool = False) -> tuple[int, int]:
     if kind in CODED:
         width, height = coded_header(path)[:2]
         return (height, width) if turned and coded_orientation(path) > 4 else (width, height)
-    return {EXR: read_header, HDR: hdr_size}[kind](path)
+    if kind == HEIC:
+        return heif_header(path)[:2]
+    width, height = {EXR: read_header, HDR: hdr_size, DNG: raw_size}[kind](path)
+    return (height, width) if turned and kind == DNG and exif_orientation(path) > 4 else (width, height)
 
 
 def picture_orientation(path: Path) -> int:
@@ -76,7 +85,8 @@ def picture_orientation(path: Path) -> int:
     BadInputError
         As `picture_size`.
     """
-    return coded_orientation(path) if picture_kind(path) in CODED else 1
+    kind = picture_kind(path)
+    return coded_orientation(path) if kind in CODED else exif_orientation(path) if kind == DNG else 1
 
 
 def picture_bits(path: Path) -> int:
@@ -87,7 +97,11 @@ def picture_bits(path: Path) -> int:
     BadInputError
         As `picture_size`.
     """
-    return coded_header(path).bits if picture_kind(path) in CODED else 0
+    return _coded_bits(path, picture_kind(path))
+
+
+def _coded_bits(path: Path, kind: str) -> int:
+    return heif_header(path).bits if kind == HEIC else coded_header(path).bits if kind in CODED else 0
 
 
 def picture_note(path: Path) -> str:
@@ -115,10 +129,13 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
         return read_exr(path)
     if kind == HDR:
         return read_hdr(path)
-    if not transfer and coded_header(path).bits:
+    if kind == DNG:
+        rgb = read_raw(path).rgb
+        return Picture(turn(rgb, exif_orientation(path)) if turned else rgb, None)
+    if not transfer and _coded_bits(path, kind):
         raise BadInputError(unstated(path))
-    colour, alpha = read_coded(path)
-    if turned:
+    colour, alpha = read_heif(path) if kind == HEIC else read_coded(path)
+    if turned and kind != HEIC:
         orientation = coded_orientation(path)
         colour, alpha = turn(colour, orientation), None if alpha is None else turn(alpha, orientation)
     if colour.shape[2] == 1:

@@ -18,6 +18,11 @@ READERS = {
         "from addon.core.io.exif import exif_exposure\nfrom addon.core.io.oiio import coded_header, read_coded",
         "coded_header, exif_exposure, read_coded",
     ),
+    "phone": (
+        "from functools import partial\nfrom addon.core.io.exif import exif_exposure\n"
+        "from addon.core.io.pictures import picture_orientation, picture_size, read_picture",
+        "picture_size, picture_orientation, exif_exposure, partial(read_picture, transfer='linear')",
+    ),
 }
 """What a kind of picture is read with, the reader of its pixels last."""
 CHILD = """
@@ -78,7 +83,7 @@ def read_spoiled(path: Path, head: int, kind: str) -> None:
     head : int
         Bytes at the front that most blows go to.
     kind : str
-        "exr" or "coded": the readers.
+        "exr", "coded" or "phone": the readers.
     """
     rng = np.random.default_rng(SEED)
     paths = [path, *(path.with_name(f"{i}.{path.name}") for i in range(COUNT))]

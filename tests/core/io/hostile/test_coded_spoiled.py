@@ -1,4 +1,4 @@
-"""PNG, JPEG and TIFF files spoiled in every way."""
+"""PNG, JPEG, TIFF, HEIC and DNG files spoiled in every way."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import pytest
 from addon.core.io.png import write_png
 from tests.core.io.hostile.blows import read_spoiled, tells_memory
 from tests.core.io.hostile.cases import png_content, tiff_content
+from tests.core.io.test_phone_pictures import WRITERS
 
 pillow = pytest.importorskip("PIL.Image")
 PICTURE = np.random.default_rng(5).integers(0, 256, (33, 41, 3), np.uint8)
@@ -32,3 +33,10 @@ KINDS = {
 def test_spoiled(kind, tmp_path):
     KINDS[kind](tmp_path / f"good.{kind}")
     read_spoiled(tmp_path / f"good.{kind}", 400, "coded")
+
+
+@tells_memory
+@pytest.mark.parametrize("kind", WRITERS)
+def test_what_phones_write_spoiled(kind, tmp_path):
+    WRITERS[kind](tmp_path / f"good.{kind}")
+    read_spoiled(tmp_path / f"good.{kind}", 700, "phone")

@@ -1,0 +1,105 @@
+"""HEIC and HEIF as phones write them, through pillow-heif, which is an extra.
+
+A picture is as the file shows it: turned by its `irot`, which readers have to heed, and so not turned by EXIF again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..kinds import Code
+from .oiio import Header, Stored
+from .picture import MAX_PIXELS, too_large
+
+HEIC = "HEIC"
+BOX: Code[bytes] = b"ftyp"
+BRANDS: Code[tuple[bytes, ...]] = (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1")
+"""How such a file begins, behind the four bytes of its first box's size."""
+
+
+def is_heif(head: bytes) -> bool:
+    """Whether a file that begins with `head` is one."""
+    return head[4:8] == BOX and head[8:12] in BRANDS
+
+
+def heif_header(path: Path | str) -> Header:
+    """What the header of `path` says.
+
+    Raises
+    ------
+    BadInputError
+        Damaged, larger than any picture, or there is no pillow-heif.
+    """
+    with _told(path):
+        return _checked(_open(path), Path(path))
+
+
+def heif_exif(path: Path | str) -> bytes:
+    """The EXIF of `path`, a TIFF; empty where it has none. Raises as `heif_header`."""
+    with _told(path):
+        found = _open(path).info.get("exif") or b""
+        return found.removeprefix(b"Exif\0\0")
+
+
+def read_heif(path: Path | str) -> Stored:
+    """Read the pixels of `path`: uint8 codes, or uint16 where they have 10 or 12 bits, scaled to 0...65535.
+
+    Raises
+    ------
+    BadInputError
+        As `heif_header`, and where the pixels are damaged or cut off.
+    """
+    with _told(path):
+        file = _open(path)
+        header = _checked(file, Path(path))
+        pixels = np.asarray(file)
+        if pixels.ndim == 2:
+            pixels = pixels[..., None]
+        if pixels.shape[:2] != (header.height, header.width):
+            raise ValueError("other pixels than its header says")
+        if header.bits == 16:
+            top = (1 << int(file.info["bit_depth"])) - 1
+            pixels = (np.minimum(pixels, top).astype(np.uint32) * 65535 // top).astype(np.uint16)
+        has_alpha = pixels.shape[2] in (2, 4)
+        colour = pixels[..., : 3 if pixels.shape[2] >= 3 else 1]
+        return Stored(colour, pixels[..., -1] if has_alpha else None)
+
+
+def _open(path: Path | str) -> Any:
+    try:
+        import pillow_heif
+    except ImportError as error:
+        raise BadInputError(
+            f"Picture '{path}' is HEIC, which needs pillow-heif; install it (pip: pillow-heif) into this Python, or "
+            "convert the pictures to JPEG."
+        ) from error
+    return pillow_heif.open_heif(str(path), convert_hdr_to_8bit=False, hdr_to_16bit=False)
+
+
+def _checked(file: Any, path: Path) -> Header:
+    """The header, before room for any pixel is made."""
+    width, height = file.size
+    bits = 8 if int(file.info["bit_depth"]) <= 8 else 16
+    stored = width * height * 4 * (bits // 8)
+    if not 0 < width * height <= MAX_PIXELS or too_large(stored, path.stat().st_size):
+        raise BadInputError(
+            f"Picture '{path}' claims {width} x {height} pixels, more than it can hold; write it again."
+        )
+    return Header(width, height, bits)
+
+
+@contextmanager
+def _told(path: Path | str) -> Iterator[None]:
+    """Turn what the library raises into one sentence."""
+    try:
+        yield
+    except BadInputError:
+        raise
+    except (ValueError, EOFError, SyntaxError, RuntimeError, OSError, MemoryError, LookupError, TypeError) as error:
+        raise BadInputError(f"Picture '{path}' is damaged or cut off; write or copy it again.") from error

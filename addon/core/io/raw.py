@@ -1,0 +1,99 @@
+"""DNG, a camera's raw picture, through rawpy (LibRaw), which is an extra: linear light, so no curve is estimated.
+
+Colours are the camera's, made linear Rec.709 under daylight (D65) for all frames alike, not as each was balanced.
+Source: Adobe, Digital Negative Specification 1.7.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..kinds import Code
+from . import exif
+from .files import read_bytes
+from .picture import MAX_PIXELS, Picture, too_large
+
+DNG = "DNG"
+DNG_VERSION: Code[int] = 50706
+"""The tag that tells a DNG from another TIFF."""
+TOP = 65535
+"""LibRaw's greatest value, at which the sensor clips."""
+
+
+def is_dng(path: Path | str) -> bool:
+    """Whether a file that begins as a TIFF is a DNG."""
+    data = read_bytes(Path(path), "Picture ", exif.HEAD)
+    try:
+        order = exif.ORDERS[data[:4]]
+        (at,) = struct.unpack_from(order + "I", data, 4)
+        (count,) = struct.unpack_from(order + "H", data, at)
+        tags = (struct.unpack_from(order + "H", data, at + 2 + 12 * i)[0] for i in range(min(count, exif.MAX_TAGS)))
+        return DNG_VERSION in tags
+    except (KeyError, struct.error):  # of another order, or its directory lies behind the pixels
+        return False
+
+
+def raw_size(path: Path | str) -> tuple[int, int]:
+    """Width and height as stored, in pixels.
+
+    Raises
+    ------
+    BadInputError
+        Damaged, larger than any picture, or there is no rawpy.
+    """
+    with _open(path) as file:
+        return int(file.sizes.width), int(file.sizes.height)
+
+
+def read_raw(path: Path | str) -> Picture:
+    """Read the DNG `path` as stored, not turned: 1 is where the sensor clips.
+
+    Raises
+    ------
+    BadInputError
+        As `raw_size`, and where the pixels are damaged or cut off.
+    """
+    with _open(path) as file:
+        import rawpy
+
+        values = file.postprocess(
+            gamma=(1, 1),
+            no_auto_bright=True,
+            use_camera_wb=False,
+            use_auto_wb=False,
+            output_bps=16,
+            output_color=rawpy.ColorSpace.sRGB,
+            user_flip=0,
+        )
+        if values.shape != (file.sizes.height, file.sizes.width, 3):
+            raise ValueError("other pixels than its header says")
+    return Picture(values.astype(np.float32) / np.float32(TOP), None)
+
+
+@contextmanager
+def _open(path: Path | str) -> Iterator[Any]:
+    """The file; what the library raises becomes one sentence."""
+    try:
+        import rawpy
+    except ImportError as error:
+        raise BadInputError(
+            f"Picture '{path}' is DNG, which needs rawpy; install it (pip: rawpy) into this Python, or develop the "
+            "pictures to linear OpenEXR or 16-bit TIFF."
+        ) from error
+    try:
+        with rawpy.imread(str(path)) as file:
+            width, height = file.sizes.width, file.sizes.height
+            if not 0 < width * height <= MAX_PIXELS or too_large(2 * width * height, Path(path).stat().st_size):
+                raise BadInputError(
+                    f"Picture '{path}' claims {width} x {height} pixels, more than it can hold; write it again."
+                )
+            yield file
+    except (rawpy.LibRawError, RuntimeError, ValueError, OSError, MemoryError) as error:
+        raise BadInputError(f"Picture '{path}' is damaged or cut off; write or copy it again.") from error
