@@ -17,8 +17,8 @@ class PlaneParams:
         Radians between an element's normal and the plane's: what is left of a scan's noise in it, no skirting's slope.
     thickness : float
         Metres to either side of the plane.
-    tries : int
-        Elements whose planes are tried for the largest one.
+    drawn, tries : int
+        Unmeasured elements, by their area, that planes are judged by; and how many of their own planes are tried.
     planes : int
         Of an object, those with most unmeasured surface.
     cells : int
@@ -29,6 +29,7 @@ class PlaneParams:
 
     tilt: float = float(np.radians(15))
     thickness: float = 0.03
+    drawn: int = 1024
     tries: int = 32
     planes: int = 6
     cells: int = 1_000_000

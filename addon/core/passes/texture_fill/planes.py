@@ -118,26 +118,26 @@ def planes_of(atlas: Atlas, own: np.ndarray, filled: np.ndarray, params: PlanePa
     weight = np.where(filled[own], atlas.area[own], 0).astype(np.float64)
     least, random = LEVELS.many * atlas.texel_edge**2, np.random.default_rng(0)
 
-    def within(direction: np.ndarray, offset: float) -> np.ndarray:
-        return (normal @ direction > np.cos(params.tilt)) & (np.abs(position @ direction - offset) < params.thickness)
+    def within(direction: np.ndarray, offset: float, some: np.ndarray) -> np.ndarray:
+        off = np.abs(position[some] @ direction - offset)
+        return (normal[some] @ direction > np.cos(params.tilt)) & (off < params.thickness)
 
     left = np.ones(len(own), bool)
     for _ in range(params.planes):
         total = (weight * left).sum()
         if total < least:
             return
-        best, most = left, 0.0
-        for k in random.choice(len(own), params.tries, p=weight * left / total):
-            found = within(normal[k], float(position[k] @ normal[k])) & left
-            if weight[found].sum() > most:
-                best, most = found, weight[found].sum()
-        direction = np.average(normal[best], 0, atlas.area[own[best]])
+        drawn = random.choice(len(own), params.drawn, p=weight * left / total)
+        tried = [within(normal[k], float(position[k] @ normal[k]), drawn) for k in drawn[: params.tries]]
+        best = drawn[max(tried, key=np.count_nonzero)]
+        direction = normal[best].mean(0)
         direction /= np.linalg.norm(direction)
         offset = float(np.median(position[best] @ direction))
-        members = within(direction, offset) & left
-        if not members.any() or weight[members].sum() < least:
+        members = np.flatnonzero(left)
+        members = members[within(direction, offset, members)]
+        if weight[members].sum() < least:
             return
-        left &= ~members
+        left[members] = False
         yield Plane(direction, offset, own[members])
 
 

@@ -78,29 +78,35 @@ def autocovariance(picture: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, 
     return total / np.maximum(overlap, 1) / picture.shape[2], overlap
 
 
-def scale_of(covariance: np.ndarray, overlap: np.ndarray, params: TextureParams = TEXTURE) -> tuple[float, float]:
-    """How far a texture is like itself, and how strong it is.
+def scale_of(covariance: np.ndarray, overlap: np.ndarray, params: TextureParams = TEXTURE) -> float:
+    """Cells by which the autocovariance has fallen to `TextureParams.decay`; inf where it does not.
 
-    Noise, which has nothing in common from cell to cell, counts for neither.
-
-    Returns
-    -------
-    scale : float
-        Cells by which the autocovariance has fallen to `TextureParams.decay`; inf where it does not.
-    contrast : float
-        Standard deviation of what neighbouring cells have in common.
+    Noise, which has nothing in common from cell to cell, does not count.
     """
     rows, columns = (np.minimum(np.arange(n), n - np.arange(n)) for n in covariance.shape)
     ring = np.rint(np.hypot(rows[:, None], columns[None])).astype(int).ravel()
     mean = np.bincount(ring, (covariance * overlap).ravel()) / np.maximum(np.bincount(ring, overlap.ravel()), 1)
-    if mean[1] <= 0:
-        return np.inf, 0.0
     least = params.decay * mean[1]
     below = np.flatnonzero(mean[1:] < least)
-    if not len(below):
-        return np.inf, float(np.sqrt(mean[1]))
+    if mean[1] <= 0 or not len(below):
+        return np.inf
     last = int(below[0])
-    return last + float((mean[last] - least) / max(mean[last] - mean[last + 1], 1e-30)), float(np.sqrt(mean[1]))
+    return last + float((mean[last] - least) / max(mean[last] - mean[last + 1], 1e-30))
+
+
+def usual_contrast(picture: np.ndarray, known: np.ndarray, edge: float) -> float:
+    """Standard deviation of what neighbouring cells have in common, in the median over squares of some cells' edge.
+
+    A stain, a highlight or a fringe is in few of them, a texture in most; noise is in none.
+    """
+    pairs, products = np.zeros(known.shape, np.float32), np.zeros(known.shape, np.float32)
+    for shift in ((0, 1), (1, 0)):
+        both = known & shifted(known, shift)
+        pairs += both
+        products += np.where(both, (picture * shifted(picture, shift)).mean(2), 0)
+    count, total = (block_mean(one, max(int(edge), 1)) for one in (pairs, products))
+    told = count > 0.5  # a quarter of its pairs
+    return float(np.sqrt(max(np.median(total[told] / count[told]), 0))) if told.any() else 0.0
 
 
 def dominant_offsets(

@@ -14,7 +14,7 @@ from ...scene.model import Mesh
 from ...significance import LEVELS
 from .params import TEXTURE, TextureParams
 from .planes import Picture, planes_of, texels_of
-from .synthesis import autocovariance, completed, scale_of, smooth_mean
+from .synthesis import autocovariance, completed, scale_of, smooth_mean, usual_contrast
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def _textured(level: np.ndarray, error: np.ndarray, known: np.ndarray) -> bool:
 
 
 def _beyond(contrast: float, error: np.ndarray) -> bool:
-    return contrast > LEVELS.likely * float(np.median(error))
+    return contrast > float(np.median(error))
 
 
 def _filled(
@@ -110,11 +110,13 @@ def _filled(
         return NOTHING.texel, NOTHING.rho
     log = np.log(np.maximum(shown, params.floor))
     detail = np.where(source[..., None], log - log[source].mean(0), 0).astype(np.float32)
-    scale, contrast = scale_of(*autocovariance(detail, source))
-    if source.sum() < params.samples * scale**2 or not _beyond(contrast, error):
+    scale = scale_of(*autocovariance(detail, source))
+    if source.sum() < params.samples * scale**2:
         return NOTHING.texel, NOTHING.rho
     smooth = np.maximum(smooth_mean(shown, known, params.smooth * scale), params.floor)
     detail = np.where(known[..., None], log - np.log(smooth), 0).astype(np.float32)
+    if not _beyond(usual_contrast(detail, source, params.smooth * scale), error):
+        return NOTHING.texel, NOTHING.rho
     copy, done = completed(detail, source, picture.hole & ~known, scale)
     got = (done | known).ravel()[picture.wanted]
     value = (np.exp(copy) * smooth).reshape(-1, 3)[picture.wanted[got]]
