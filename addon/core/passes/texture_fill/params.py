@@ -58,6 +58,8 @@ class TextureParams:
         Scales: radius within which a copy is compared with what lies around.
     blocks : int
         That radius in blocks of cells, which take their offset together.
+    before : float
+        Share of such a square that an offset's difference over all of the picture counts for beside it.
     offsets : int
         By which copies are tried.
     unlike : float
@@ -74,6 +76,7 @@ class TextureParams:
     smooth: float = 4.0
     window: float = 2.0
     blocks: int = 4
+    before: float = 0.25
     offsets: int = 48
     unlike: float = 0.02
     again: float = 0.7

@@ -164,6 +164,8 @@ def _labels(picture, source, hole, copies, edge, params) -> np.ndarray:
 
     current, settled = blocks(picture, source)
     told, coarse = settled.copy(), [blocks(*one) for one in copies]
+    # How far a copy is off wherever both are known: what is expected of it before anything around a block is looked at.
+    usual = [_mean_square(current - copy, settled & valid) for copy, valid in coarse]
     todo, everywhere = block_mean(hole, edge) > 0, False
     chosen = np.full(todo.shape, -1)
     window, around = 2 * params.blocks + 1, np.ones((3, 3), bool)
@@ -184,7 +186,7 @@ def _labels(picture, source, hole, copies, edge, params) -> np.ndarray:
                 ndimage.uniform_filter(one.astype(np.float32), window, mode="constant")[front] for one in (both, off)
             )
             compared = valid[front] & (count * window * window > 0.5)
-            mean = np.where(compared, total / np.maximum(count, 1e-6), np.inf)
+            mean = np.where(compared, (total + params.before * usual[k]) / (count + params.before), np.inf)
             better = mean < cost
             cost[better], label[better] = mean[better], k
         for k in np.unique(label[label >= 0]):
@@ -193,6 +195,11 @@ def _labels(picture, source, hole, copies, edge, params) -> np.ndarray:
             fresh = tuple(axis[~told[at]] for axis in at)
             current[fresh] = coarse[k][0][fresh]
             settled[at] = True
+
+
+def _mean_square(off: np.ndarray, where: np.ndarray) -> float:
+    """Mean square of an (h, w, c) difference over some cells, summed over the channels; 0 where there are none."""
+    return float(np.square(off[where]).sum() / max(where.sum(), 1))
 
 
 def smooth_mean(picture: np.ndarray, known: np.ndarray, sigma: float) -> np.ndarray:
