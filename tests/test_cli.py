@@ -8,6 +8,7 @@ import subprocess
 import sys
 from dataclasses import fields, replace
 
+import numpy as np
 import pytest
 
 from addon import cli
@@ -18,6 +19,7 @@ from addon.core.progress import Progress, ProgressEvent
 from addon.core.settings import PAPER, Settings
 from addon.settings_info import setting_infos
 from addon.version import VERSION
+from tests.core.on_disk import ALBEDO, OnDisk
 
 
 def parse(*argv):
@@ -228,3 +230,17 @@ def test_a_wished_stop_ends_the_run():
     progress = Progress(should_stop=lambda: True)
     with pytest.raises(InterruptedRun):
         progress.stage("read")
+
+
+@pytest.mark.slow
+@pytest.mark.once
+def test_a_grey_card_fixes_the_scale_and_later_runs_heed_it(tmp_path):
+    pytest.importorskip("xatlas")
+    disk = OnDisk(tmp_path / "capture")
+    options = "--quiet --no-scene --unwrap xatlas --texel-size 0.2 --shading-rays 64 --emitter-rays 16"
+    run = ["recover", str(disk.root), "--out", str(tmp_path / "result"), *options.split()]
+    for more in (["--grey", "000:20,20=0.7"], []):  # the frame's middle shows object 3
+        assert cli.main([*run, *more]) == 0
+        found = json.loads((tmp_path / "result/report.json").read_text())["figures"]["white_scale"]
+        np.testing.assert_allclose(np.array(found) * 0.7, ALBEDO[3], rtol=0.15)
+    assert json.loads((tmp_path / "result/overrides.json").read_text())["white"]["object"] == 3

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError
-from ..kinds import Code
+from ..kinds import Code, Limit
 from . import exif
 from .files import read_bytes
 from .picture import MAX_PIXELS, Picture, too_large
@@ -23,13 +23,15 @@ from .picture import MAX_PIXELS, Picture, too_large
 DNG = "DNG"
 DNG_VERSION: Code[int] = 50706
 """The tag that tells a DNG from another TIFF."""
-TOP = 65535
+HEAD: Limit[int] = 1 << 16
+"""Bytes in which the first directory has to end; a DNG begins with it, as its specification recommends."""
+TOP: Code[int] = 65535
 """LibRaw's greatest value, at which the sensor clips."""
 
 
 def is_dng(path: Path | str) -> bool:
     """Whether a file that begins as a TIFF is a DNG."""
-    data = read_bytes(Path(path), "Picture ", exif.HEAD)
+    data = read_bytes(Path(path), "Picture ", HEAD)
     try:
         order = exif.ORDERS[data[:4]]
         (at,) = struct.unpack_from(order + "I", data, 4)
