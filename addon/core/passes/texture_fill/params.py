@@ -30,7 +30,7 @@ class PlaneParams:
     tilt: float = float(np.radians(15))
     thickness: float = 0.03
     drawn: int = 1024
-    tries: int = 32
+    tries: int = 16
     planes: int = 6
     cells: int = 1_000_000
     stretch: float = 1.5

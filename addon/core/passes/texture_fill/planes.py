@@ -47,11 +47,15 @@ def texels_of(atlas: Atlas, mesh: Mesh, wanted: np.ndarray) -> Texels:
     shown = np.append(wanted, False)[atlas.padding]  # -1: none
     texel = np.flatnonzero(shown)
     size = atlas.size
-    flat = np.concatenate([atlas.uv.reshape(-1, 2).astype(np.float64) * size, np.zeros((3 * len(atlas.uv), 1))], 1)
+    theirs = np.flatnonzero(np.isin(mesh.object_id, np.unique(atlas.object_id[wanted])))
+    flat = np.concatenate(
+        [atlas.uv[theirs].reshape(-1, 2).astype(np.float64) * size, np.zeros((3 * len(theirs), 1))], 1
+    )
     scene = RayScene(flat, np.arange(len(flat), dtype=np.int32).reshape(-1, 3))
     above = np.stack([texel % size + 0.5, texel // size + 0.5, np.ones(len(texel))], 1).astype(np.float32)
     triangle = np.full(size * size, -1, np.int32)
-    triangle[texel] = scene.intersect(above, np.broadcast_to(np.array([0, 0, -1], np.float32), above.shape)).triangle
+    below = np.broadcast_to(np.array([0, 0, -1], np.float32), above.shape)
+    triangle[texel] = np.append(theirs, -1)[scene.intersect(above, below).triangle]
     # A border's texels, beside a triangle: what is shown between two texels is the mean of both.
     bare = texel[triangle[texel] < 0]
     found = triangle[bare]
@@ -64,10 +68,11 @@ def texels_of(atlas: Atlas, mesh: Mesh, wanted: np.ndarray) -> Texels:
     kept = of >= 0
     kept[kept] = mesh.object_id[of[kept]] == atlas.object_id[element[kept]]
     texel, element, of = texel[kept], element[kept], of[kept]
-    origin, along = texel_axes(atlas, mesh, of)
+    known, which = np.unique(of, return_inverse=True)
+    origin, along = texel_axes(atlas, mesh, known)
+    edge = np.sqrt(np.linalg.norm(np.cross(along[..., 0], along[..., 1]), axis=1))[which]
     at = np.stack([texel % size, texel // size], 1) + 0.5
-    position = origin + np.einsum("kij,kj->ki", along, at)
-    edge = np.sqrt(np.linalg.norm(np.cross(along[..., 0], along[..., 1]), axis=1))
+    position = origin[which] + along[which, :, 0] * at[:, :1] + along[which, :, 1] * at[:, 1:]
     return Texels(texel, element, position, edge)
 
 
