@@ -1,6 +1,7 @@
 """HEIC and HEIF as phones write them, through pillow-heif, which is an extra.
 
 A picture is as the file shows it: turned by its `irot`, which readers have to heed, and so not turned by EXIF again.
+Source: ISO/IEC 23008-12, 6.5.10 (irot).
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError
-from ..kinds import Code
+from ..kinds import Code, Limit
+from .files import read_bytes
 from .oiio import Header, Stored
 from .picture import MAX_PIXELS, too_large
 
@@ -21,6 +23,9 @@ HEIC = "HEIC"
 BOX: Code[bytes] = b"ftyp"
 BRANDS: Code[tuple[bytes, ...]] = (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1")
 """How such a file begins, behind the four bytes of its first box's size."""
+
+HEAD: Limit[int] = 1 << 16
+"""Bytes in which the properties of the picture are: before all pixels."""
 
 
 def is_heif(head: bytes) -> bool:
@@ -45,6 +50,16 @@ def heif_exif(path: Path | str) -> bytes:
     with _told(path):
         found = _open(path).info.get("exif") or b""
         return found.removeprefix(b"Exif\0\0")
+
+
+def heif_orientation(path: Path | str) -> int:
+    """EXIF's number for turning what the file shows back to what the sensor gave, 6 or 8; 1 where sizes can't tell."""
+    data = read_bytes(Path(path), "Picture ", HEAD)
+    at = data.find(b"irot") + 4
+    header = heif_header(path)
+    if at < 4 or at >= len(data) or header.width == header.height:
+        return 1
+    return {1: 6, 3: 8}.get(data[at] & 3, 1)
 
 
 def read_heif(path: Path | str) -> Stored:

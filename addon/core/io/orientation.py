@@ -2,6 +2,7 @@
 
 Most programs that find poses take pictures as stored (COLMAP and nerfstudio do), some turn them first, and no format
 tells. The cameras' sizes do where pictures stand on end. Else gravity may: a picture is upright as its EXIF turns it.
+HEIC, which every reader turns, is the other way round: it is turned back where cameras fit only that.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ def oriented(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
     notes = []
     if turned:
         notes.append(
-            f"{len(turned)} of {len(frames)} pictures were turned as their EXIF says: their cameras fit them so alone."
+            f"{len(turned)} of {len(frames)} pictures were turned as they tell that the camera was held (EXIF): their "
+            "cameras fit them so alone."
         )
     if open_ones and rest is None:
         notes.append(

@@ -11,7 +11,7 @@ from . import exr_header, radiance_hdr
 from .exif import exif_orientation
 from .exr import exr_note, read_exr, read_header
 from .files import absence
-from .heif import HEIC, heif_header, is_heif, read_heif
+from .heif import HEIC, heif_header, heif_orientation, is_heif, read_heif
 from .oiio import CODED, TIFF, coded_header, coded_orientation, read_coded
 from .picture import Picture, turn
 from .radiance_hdr import hdr_size, read_hdr
@@ -68,13 +68,11 @@ def picture_size(path: Path, turned: bool = False) -> tuple[int, int]:
         The file is absent, damaged, or of a kind that isn't supported.
     """
     kind = picture_kind(path)
-    if kind in CODED:
-        width, height = coded_header(path)[:2]
-        return (height, width) if turned and coded_orientation(path) > 4 else (width, height)
-    if kind == HEIC:
-        return heif_header(path)[:2]
-    width, height = {EXR: read_header, HDR: hdr_size, DNG: raw_size}[kind](path)
-    return (height, width) if turned and kind == DNG and exif_orientation(path) > 4 else (width, height)
+    if kind in CODED or kind == HEIC:
+        width, height = (heif_header if kind == HEIC else coded_header)(path)[:2]
+    else:
+        width, height = {EXR: read_header, HDR: hdr_size, DNG: raw_size}[kind](path)
+    return (height, width) if turned and picture_orientation(path) > 4 else (width, height)
 
 
 def picture_orientation(path: Path) -> int:
@@ -86,7 +84,9 @@ def picture_orientation(path: Path) -> int:
         As `picture_size`.
     """
     kind = picture_kind(path)
-    return coded_orientation(path) if kind in CODED else exif_orientation(path) if kind == DNG else 1
+    if kind in CODED:
+        return coded_orientation(path)
+    return {HEIC: heif_orientation, DNG: exif_orientation}.get(kind, lambda _: 1)(path)
 
 
 def picture_bits(path: Path) -> int:
@@ -131,12 +131,12 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
         return read_hdr(path)
     if kind == DNG:
         rgb = read_raw(path).rgb
-        return Picture(turn(rgb, exif_orientation(path)) if turned else rgb, None)
+        return Picture(turn(rgb, picture_orientation(path)) if turned else rgb, None)
     if not transfer and _coded_bits(path, kind):
         raise BadInputError(unstated(path))
     colour, alpha = read_heif(path) if kind == HEIC else read_coded(path)
-    if turned and kind != HEIC:
-        orientation = coded_orientation(path)
+    if turned:
+        orientation = picture_orientation(path)
         colour, alpha = turn(colour, orientation), None if alpha is None else turn(alpha, orientation)
     if colour.shape[2] == 1:
         colour = np.repeat(colour, 3, -1)

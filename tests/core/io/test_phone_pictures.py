@@ -9,6 +9,7 @@ import pytest
 
 from addon.core.errors import BadInputError
 from addon.core.io.exif import EXPOSURE_TIME, exif_exposure
+from addon.core.io.layout import Reading
 from addon.core.io.pictures import picture_bits, picture_kind, picture_orientation, picture_size, read_picture
 from addon.core.io.pixels import read_pixels
 from addon.core.io.read import read_capture
@@ -66,6 +67,21 @@ def test_heic_codes(tmp_path, bits, off):
     assert picture_bits(tmp_path / "a") == (8 if bits == 8 else 16) and picture_orientation(tmp_path / "a") == 1
     np.testing.assert_allclose(read_picture(tmp_path / "a", "linear").rgb, SMOOTH, atol=off)
     assert exif_exposure(tmp_path / "a")[EXPOSURE_TIME] == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("orientation", [6, 8])
+def test_heic_is_as_shown_or_as_the_sensor_gave_it(capture, orientation):
+    """The encoder writes `irot`, and its numbers are the sensor's."""
+    for i in range(4):
+        write_heic(capture.root / f"images/{i:03d}.heic", orientation)
+        capture.frame(i, file_path=f"images/{i:03d}.heic")
+    del capture.transforms["frames"][4:]
+    as_shown = np.rot90(SMOOTH, -1 if orientation == 6 else 1)
+    for (width, height), wanted in ((SIZE[::-1], as_shown), (SIZE, SMOOTH)):
+        capture.top(w=width, h=height, fl_x=60.0, fl_y=60.0, cx=width / 2, cy=height / 2)
+        frame = read_capture(capture.root, Reading(transfer="linear")).frames[0]
+        assert frame.turned == (wanted is SMOOTH)
+        np.testing.assert_allclose(read_pixels(frame).radiance, wanted, atol=0.012)
 
 
 def test_a_white_of_ten_bits_is_the_top(tmp_path):
