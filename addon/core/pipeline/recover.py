@@ -100,8 +100,9 @@ class Recovery(Corrected):
         return texture_of(surface.atlas, surface.mesh, albedo.rho, measured, self._to_texture(), albedo.error)
 
     def _to_texture(self) -> np.ndarray:
-        """Elements whose texels may get texture, (n,) bool."""
-        return self.albedo.origin == FILLED
+        """Elements whose texels may get texture, (n,) bool; not of parts that may hold several materials."""
+        guessed = [one.object_id for one in self.capture.instances if one.guess]
+        return (self.albedo.origin == FILLED) & ~np.isin(self.surface().atlas.object_id, guessed)
 
     def over_atlas(self, name: str, values: np.ndarray) -> np.ndarray:
         """The image `name` of the elements' values ((n, c) float32), with texture where there is any, (s, s, c)."""
