@@ -23,6 +23,8 @@ class PlaneParams:
         Of an object, those with most unmeasured surface.
     cells : int
         Of a plane's picture, at most; it is made coarser where it would have more.
+    least : float
+        Texels that a triangle covers at least. What is smaller shares its texels with others and is not laid out flat.
     stretch : float
         Times that an atlas's axis may be longer than the other, and a texel larger than the picture's cells.
     """
@@ -33,6 +35,7 @@ class PlaneParams:
     tries: int = 16
     planes: int = 6
     cells: int = 1_000_000
+    least: float = 0.05
     stretch: float = 1.5
 
 
@@ -62,6 +65,9 @@ class TextureParams:
         Share of such a square that an offset's difference over all of the picture counts for beside it.
     offsets : int
         By which copies are tried.
+    peaks, asked : int
+        Maxima of the autocorrelation, the highest ones, that these are chosen from; cells of the hole, drawn at random,
+        that are asked which of them cover it.
     unlike : float
         Correlation that an offset counts for where it has less: textures without a pattern have no better ones.
     again : float
@@ -78,6 +84,8 @@ class TextureParams:
     blocks: int = 4
     before: float = 0.25
     offsets: int = 48
+    peaks: int = 2048
+    asked: int = 1024
     unlike: float = 0.02
     again: float = 0.7
 

@@ -42,15 +42,18 @@ class Texels:
         return Texels(self.texel[index], self.element[index], self.position[index], self.edge[index])
 
 
-def texels_of(atlas: Atlas, mesh: Mesh, wanted: np.ndarray) -> Texels:
-    """The texels that show one of some elements ((n,) bool)."""
+def texels_of(atlas: Atlas, mesh: Mesh, wanted: np.ndarray, params: PlaneParams = PLANES) -> Texels:
+    """The texels that show one of some elements ((n,) bool), on triangles of some size."""
     shown = np.append(wanted, False)[atlas.padding]  # -1: none
     texel = np.flatnonzero(shown)
     size = atlas.size
     theirs = np.flatnonzero(np.isin(mesh.object_id, np.unique(atlas.object_id[wanted])))
-    flat = np.concatenate(
-        [atlas.uv[theirs].reshape(-1, 2).astype(np.float64) * size, np.zeros((3 * len(theirs), 1))], 1
-    )
+    corner = atlas.uv[theirs].astype(np.float64) * size
+    large = np.abs(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])) > 2 * params.least
+    theirs, corner = theirs[large], corner[large]
+    if not len(theirs):
+        return Texels(texel[:0], texel[:0], np.zeros((0, 3)), np.zeros(0))
+    flat = np.concatenate([corner.reshape(-1, 2), np.zeros((3 * len(theirs), 1))], 1)
     scene = RayScene(flat, np.arange(len(flat), dtype=np.int32).reshape(-1, 3))
     above = np.stack([texel % size + 0.5, texel // size + 0.5, np.ones(len(texel))], 1).astype(np.float32)
     triangle = np.full(size * size, -1, np.int32)

@@ -124,17 +124,27 @@ def dominant_offsets(
     top = (ndimage.maximum_filter(covariance, 2 * reach + 1, mode="wrap") == covariance) & (overlap > reach * reach)
     rows, columns = (np.minimum(np.arange(n), n - np.arange(n)) for n in shape)
     top &= np.hypot(rows[:, None], columns[None]) > reach
-    alike = np.where(top, np.square(np.maximum(covariance / covariance[0, 0], params.unlike)), 0)
-    inside, open_ = fft.rfft2(source.astype(np.float32), shape), hole.astype(np.float32)
+    peaks = np.flatnonzero(top)
+    alike = np.square(np.maximum(covariance.ravel()[peaks] / covariance[0, 0], params.unlike))
+    best = np.argsort(-alike, kind="stable")[: params.peaks]
+    shift, alike = np.stack(np.divmod(peaks[best], shape[1]), 1), alike[best]
+    shift -= np.where(2 * shift > shape, shape, 0)
+    # Which of them have something for which cells of the hole, some of them for all.
+    cells = np.argwhere(hole)
+    cells = cells[np.random.default_rng(0).permutation(len(cells))[: params.asked]]
+    at = cells + shift[:, None]
+    inside = ((at >= 0) & (at < source.shape)).all(2)
+    covers = inside & source[tuple(np.moveaxis(np.where(inside[..., None], at, 0), 2, 0))]
     found: list[tuple[int, int]] = []
-    while len(found) < params.offsets:
-        covered = fft.irfft2(inside * np.conj(fft.rfft2(open_, shape)), shape)
-        i, j = divmod(int((alike * np.maximum(covered, 0)).argmax()), shape[1])
-        if not alike[i, j] or covered[i, j] < 0.5:
+    open_ = np.ones(len(cells), np.float32)
+    while len(found) < params.offsets and alike.any():
+        score = alike * (covers @ open_)
+        k = int(score.argmax())
+        if not score[k]:
             break
-        alike[i, j] = 0
-        found.append((i - shape[0] * (2 * i > shape[0]), j - shape[1] * (2 * j > shape[1])))
-        open_[shifted(source, found[-1])] *= np.float32(params.again)
+        alike[k] = 0
+        found.append((int(shift[k, 0]), int(shift[k, 1])))
+        open_[covers[k]] *= np.float32(params.again)
     return found
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from ...groups import by_label
+from ...groups import by_label, by_number
 from ...scene.atlas import Atlas
 from ...scene.model import Mesh
 from ...significance import LEVELS
@@ -74,8 +74,9 @@ def texture_of(
     if not objects:
         return NOTHING
     texels = texels_of(atlas, mesh, wanted)
+    shown = by_number(atlas.object_id[texels.element])
     for own in objects:
-        mine = texels.part(np.flatnonzero(atlas.object_id[texels.element] == atlas.object_id[own[0]]))
+        mine = texels.part(shown.get(int(atlas.object_id[own[0]]), np.zeros(0, np.int64)))
         for plane in planes_of(atlas, own, filled):
             known = plane.members[measured[plane.members]]
             there = mine.part(plane.near(mine.position) & (np.isin(mine.element, plane.members)))

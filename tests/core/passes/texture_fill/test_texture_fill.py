@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -110,6 +112,15 @@ def test_a_wall_is_no_source_for_the_floor(room):
     atlas = room.atlas
     rho, hole = planks(atlas.position), atlas.object_id == FLOOR
     found = texture_of(atlas, room.mesh, rho, ~hole, hole, np.full(len(atlas), 0.06, np.float32))
+    assert len(found.texel) == 0
+
+
+def test_triangles_far_smaller_than_texels_are_left_as_they_are(room):
+    """As crumbs of a fine mesh, which share texels: nothing is laid out flat."""
+    hole = hole_in(room.atlas)
+    rho = checker(room.atlas.position)
+    tiny = replace(room.atlas, uv=room.atlas.uv * np.float32(1e-4))
+    found = texture_of(tiny, room.mesh, rho, ~hole, hole, np.full(len(rho), 0.06, np.float32))
     assert len(found.texel) == 0
 
 
