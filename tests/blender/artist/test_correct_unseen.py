@@ -5,6 +5,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from addon.core.passes.albedo.albedo import CLOSED, FILLED, MEASURED, NONE, TEXTURED  # noqa: E402
 from tests.blender.artist.artist_room import bridge  # noqa: E402
 from tests.blender.artist.corrected_room import (  # noqa: E402
     BOARD,
@@ -163,3 +164,11 @@ def test_a_moved_result_is_followed(room, ops, tmp_path):
     (tmp_path / "result").rename(tmp_path / "elsewhere")
     bridge("results.find").repoint(tmp_path / "result", tmp_path / "elsewhere")
     assert bridge("corrections.unseen").coverage(room[BOARD]).shape == (SIZE, SIZE, 3)
+
+
+def test_what_counts_as_measured():
+    """Texture that was copied is none, nor what closes a hole and was filled in."""
+    was_measured = bridge("corrections.unseen").was_measured
+    told = was_measured(np.array([NONE, FILLED, MEASURED, TEXTURED]))
+    assert told.tolist() == [False, False, True, False]
+    assert was_measured(CLOSED + np.array([NONE, FILLED, MEASURED, TEXTURED])).tolist() == told.tolist()
