@@ -11,7 +11,7 @@ from typing import TextIO
 
 from .core.errors import EXIT_INTERRUPTED, MemoryLimitError
 from .core.kinds import Shown, Unit
-from .core.memory import peak_memory
+from .core.memory import BUDGET, SHARE, free_memory, peak_memory, resident_memory
 from .core.progress import ProgressEvent
 
 EVENT_SECONDS: Shown[float] = 0.1
@@ -100,8 +100,9 @@ class MemoryGuard:
 
     Parameters
     ----------
-    limit : float
-        Gigabytes; 0 sets no limit.
+    limit : float, optional
+        Gigabytes; 0 sets no limit. None: what the process has now, and `SHARE` of what the machine has free. The run is
+        told it (`BUDGET`) and works in smaller blocks to keep it.
     end : callable(str), optional
         Ends the process with the sentence where no safe point comes within `GRACE` seconds; left out, the run is only
         stopped at its safe points.
@@ -109,18 +110,23 @@ class MemoryGuard:
 
     PERIOD = 0.2
 
-    def __init__(self, limit: float, end: Callable[[str], None] | None = None):
+    def __init__(self, limit: float | None = None, end: Callable[[str], None] | None = None):
+        free, now = free_memory(), resident_memory()
+        if limit is None:
+            limit = (now + SHARE * free) / GIGABYTE if free is not None and now is not None else 0.0
         self.limit, self.exceeded = limit, False
+        BUDGET.limit = int(limit * GIGABYTE)
+        self._before = peak_memory() or 0
         self._end = end
         self._done = threading.Event()
-        if limit > 0 and peak_memory() is not None:
+        if limit > 0 and now is not None:
             threading.Thread(target=self._watch, name="memory guard", daemon=True).start()
 
     @property
     def sentence(self) -> str:
         """What the user is told."""
         return (
-            f"The run needs more than the memory limit of {self.limit:g} GB and was stopped; the finished stages "
+            f"The run needs more than the memory limit of {self.limit:.3g} GB and was stopped; the finished stages "
             "are kept. Raise the limit, or take a greater texel size, a smaller atlas size or fewer threads."
         )
 
@@ -133,10 +139,12 @@ class MemoryGuard:
     def close(self) -> None:
         """Watch no longer."""
         self._done.set()
+        BUDGET.limit = 0
 
     def _watch(self) -> None:
         while not self._done.wait(self.PERIOD):
-            if peak_memory() > self.limit * GIGABYTE:
+            now, peak = resident_memory() or 0, peak_memory() or 0
+            if max(now, peak if peak > self._before else 0) > self.limit * GIGABYTE:
                 self.exceeded = True
                 if self._end is not None and not self._done.wait(GRACE):
                     self._end(self.sentence)

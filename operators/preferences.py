@@ -37,8 +37,8 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
     )
     memory_limit: bpy.props.FloatProperty(
         name="Memory Limit (GB)",
-        description="Memory that a run may take before it is stopped; 0 sets no limit. A run "
-        "is a process of its own: Blender's own memory does not count",
+        description="Memory that a run keeps to, by working in smaller blocks; it is stopped where that can't be. 0 "
+        "takes 70 % of what the machine has free. A run is a process of its own: Blender's own memory does not count",
         min=0.0,
         soft_max=256.0,
         precision=1,

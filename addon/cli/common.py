@@ -79,8 +79,8 @@ def add_leash(parser: argparse.ArgumentParser) -> None:
     add("--progress", choices=("text", "json"), default="text", help=lines)
     ends = "stop when standard input says 'stop' or ends, so that the run never outlives its starter"
     add("--stop-with-stdin", action="store_true", help=ends)
-    limit = "stop when the run takes more gigabytes (default 0, no limit)"
-    add("--memory-limit", type=float, metavar="GB", default=0.0, help=limit)
+    limit = "gigabytes to keep to, by working in smaller blocks; 0 for no limit (default 70 %% of what is free)"
+    add("--memory-limit", type=float, metavar="GB", help=limit)
 
 
 def add_common(parser: argparse.ArgumentParser, function, quiet: bool = True) -> None:

@@ -1,9 +1,104 @@
-"""Memory of this process: its peak, and giving back what is free."""
+"""Memory of this process: its peak, what it may take, and giving back what is free."""
 
 from __future__ import annotations
 
 import ctypes
+import os
 import sys
+from pathlib import Path
+
+from .errors import MemoryLimitError
+from .kinds import Block
+
+SHARE: Block[float] = 0.7
+"""Of what the machine has free, what a run may take where nobody says."""
+
+
+class Budget:
+    """What this process may take. Work is done in as many pieces at once as fit; what comes out is the same.
+
+    Attributes
+    ----------
+    limit : int
+        Bytes; 0 for no limit.
+    """
+
+    def __init__(self) -> None:
+        self.limit = 0
+
+    def fitting(self, most: int, each: int) -> int:
+        """How many of up to `most` pieces of `each` bytes may be in memory at once; at least one.
+
+        They may take half of what is left: the rest is for what is made of them.
+        """
+        now = resident_memory()
+        if not self.limit or not each or now is None:
+            return most
+        return max(1, min(most, (self.limit - now) // 2 // each))
+
+    def ask(self, need: int, what: str) -> None:
+        """Before long work: raise `MemoryLimitError` where what is left is less than that surely needs, in bytes."""
+        now = resident_memory()
+        if self.limit and now is not None and now + need > self.limit:
+            raise MemoryLimitError(
+                f"{what} need {(now + need) / 1e9:.2g} GB or more, and the memory limit is {self.limit / 1e9:.2g} GB; "
+                "raise it, or take a greater texel size or a smaller atlas size."
+            )
+
+    def is_short(self) -> bool:
+        """Whether less than a quarter is left: what could be found again is then not kept."""
+        now = resident_memory()
+        return bool(self.limit) and now is not None and now > 0.75 * self.limit
+
+
+BUDGET = Budget()
+"""This process's."""
+
+
+def free_memory() -> int | None:
+    """Bytes that this process could have: of the machine, or of the control group that it runs in; None if untold."""
+    if sys.platform == "win32":
+        return _windows_free()
+    told = [_linux_available(), *map(_left_of_group, (_GROUP_V2, _GROUP_V1))]
+    known = [one for one in told if one is not None]
+    if known:
+        return min(known)
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2  # macOS does not tell what is free
+    except (ValueError, OSError, AttributeError):
+        return None
+
+
+_GROUP_V2 = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current")
+_GROUP_V1 = ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes")
+
+
+def _linux_available() -> int | None:
+    try:
+        with open("/proc/meminfo", encoding="ascii", errors="replace") as told:
+            return next((int(line.split()[1]) * 1024 for line in told if line.startswith("MemAvailable:")), None)
+    except OSError:
+        return None
+
+
+def _left_of_group(files: tuple[str, str]) -> int | None:
+    """What is left of a control group's limit; None where it has none."""
+    try:
+        limit, used = (int(Path(file).read_text()) for file in files)
+    except (OSError, ValueError):  # 'max'
+        return None
+    return max(limit - used, 0)
+
+
+def resident_memory() -> int | None:
+    """Resident size now in bytes; the peak where the system tells no more, None where not even that."""
+    if sys.platform == "linux":
+        try:
+            with open("/proc/self/statm", encoding="ascii") as told:
+                return int(told.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+        except (OSError, ValueError, IndexError):
+            pass
+    return peak_memory()
 
 
 def give_back() -> None:
@@ -64,3 +159,22 @@ def _windows_peak() -> int | None:
     except (AttributeError, OSError):
         return None
     return int(counters.peak) if told else None
+
+
+def _windows_free() -> int | None:
+    """ullAvailPhys of GlobalMemoryStatusEx (sysinfoapi.h)."""
+    if sys.platform != "win32":
+        return None
+    from ctypes import wintypes
+
+    sizes = ("total", "free", "total_page", "free_page", "total_virtual", "free_virtual", "extended")
+
+    class Status(ctypes.Structure):
+        _fields_ = [("length", wintypes.DWORD), ("load", wintypes.DWORD), *((name, ctypes.c_uint64) for name in sizes)]
+
+    status = Status(length=ctypes.sizeof(Status))
+    try:
+        told = ctypes.WinDLL("kernel32").GlobalMemoryStatusEx(ctypes.byref(status))
+    except (AttributeError, OSError):
+        return None
+    return int(status.free) if told else None

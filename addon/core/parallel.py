@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 
 from .kinds import Code
+from .memory import BUDGET
 from .progress import Progress, Rounds
 
 ONE_BLAS_THREAD: Code[dict[str, str]] = {"OPENBLAS_NUM_THREADS": "1"}
@@ -26,12 +27,16 @@ def blocks(count: int, size: int) -> list[slice]:
     return [slice(start, min(start + size, count)) for start in range(0, count, size)]
 
 
-def ordered_map(function: Callable, items: Iterable, threads: int, ahead: int = 1) -> Iterator:
+def ordered_map(function: Callable, items: Iterable, threads: int, ahead: int = 1, each: int = 0) -> Iterator:
     """Yield function(item) in the order of the items, with a bounded number of results waiting.
 
-    At most `threads + ahead` results exist at once, so that memory does not grow with the number of items.
+    At most `threads + ahead` results exist at once, so that memory does not grow with the number of items; and no more
+    than fit into the budget if each takes `each` bytes.
     """
     workers = thread_count(threads)
+    fitting = BUDGET.fitting(workers + ahead, each)
+    workers = min(workers, fitting)
+    ahead = fitting - workers
     pending: list = []
     with ThreadPoolExecutor(workers) as pool:
         try:

@@ -236,10 +236,10 @@ class StageOperator(SettingsProps, CaptureOperator):
         return None if self.from_stage == "NONE" else self.from_stage
 
     @staticmethod
-    def memory_limit() -> float:
-        """Gigabytes that a run may take; 0 for no limit."""
+    def memory_limit() -> float | None:
+        """Gigabytes that a run may take; None for most of what is free."""
         ours = preferences.preferences()
-        return ours.memory_limit if ours is not None else 0.0
+        return (ours.memory_limit or None) if ours is not None else None
 
     def begin(self, context):
         """Start the run as a job; the command line's own, so that its result is the same."""

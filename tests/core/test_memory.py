@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.memory import give_back
+from addon.core.errors import MemoryLimitError
+from addon.core.memory import Budget, free_memory, give_back, resident_memory
 
 
 @pytest.mark.skipif(
@@ -22,3 +23,30 @@ def test_what_was_freed_goes_back_to_the_system():
     del held
     give_back()
     assert resident() < full - 1000 * 8000 * 8 // 4096 and last.all()
+
+
+def test_pieces_fit_into_half_of_what_is_left():
+    now = resident_memory()
+    if now is None:
+        pytest.skip("the system does not tell")
+    budget = Budget()
+    assert budget.fitting(8, 1 << 40) == 8  # no limit
+    budget.limit = now + (1 << 30)
+    assert budget.fitting(8, 1) == 8
+    assert 3 <= budget.fitting(8, 1 << 27) <= 4
+    assert budget.fitting(8, 1 << 40) == 1  # one there has to be
+
+
+def test_what_surely_does_not_fit_is_told_before_the_work():
+    budget = Budget()
+    budget.ask(1 << 50, "Its elements")  # no limit
+    budget.limit = 1 << 30
+    with pytest.raises(
+        MemoryLimitError, match=r"^Its elements need 1e\+03 GB or more, and the memory limit is 1\.1 GB; "
+    ):
+        budget.ask(10**12, "Its elements")
+
+
+def test_what_is_free_is_less_than_the_machine_has():
+    free = free_memory()
+    assert free is None or 0 <= free < 1 << 50

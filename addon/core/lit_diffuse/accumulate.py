@@ -17,7 +17,7 @@ from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Frame, Mesh, Pixels
 from ..scene.params import VISIBILITY
 from ..scene.rays import RayScene
-from ..scene.visibility import CLEAN, EDGE, SATURATED, FrameView, Observations, observe, view_frame
+from ..scene.visibility import CLEAN, EDGE, SATURATED, FrameView, Observations, bytes_of_frame, observe, view_frame
 from .medians import Summary, make_estimator
 
 
@@ -100,7 +100,7 @@ def accumulate(
     normal, _ = triangle_geometry(mesh)
     groups = groups or ElementGroups(atlas)
     estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
-    wanted = frame_order(len(frames), seed)
+    wanted, each = frame_order(len(frames), seed), bytes_of_frame(frame.camera for frame in frames)
 
     def look(index: int) -> tuple[int, FrameView, Pixels, Observations]:
         frame = frames[index]
@@ -118,7 +118,7 @@ def accumulate(
     with ExitStack() as stack:
         for estimator in estimators.values():
             stack.callback(estimator.close)
-        for done, (index, view, pixels, seen) in enumerate(ordered_map(look, wanted, threads)):
+        for done, (index, view, pixels, seen) in enumerate(ordered_map(look, wanted, threads, each=each)):
             tiers = seen.tier if edge_tier else np.where(seen.tier == EDGE, CLEAN, seen.tier)
             for tier, estimator in estimators.items():
                 chosen = np.flatnonzero(tiers == tier)

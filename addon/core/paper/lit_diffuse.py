@@ -16,7 +16,7 @@ from ..scene.element_groups import ElementGroups
 from ..scene.elements import triangle_geometry
 from ..scene.model import Frame, Mesh, Pixels
 from ..scene.rays import RayScene
-from ..scene.visibility import FrameView, Observations, observe, view_frame
+from ..scene.visibility import FrameView, Observations, bytes_of_frame, observe, view_frame
 from .p_square import PSquare, Summary
 
 Seen = tuple[int, FrameView, Pixels, Observations]
@@ -58,7 +58,7 @@ def lit_diffuse(
         From `progress`.
     """
     normal, _ = triangle_geometry(mesh)
-    groups = ElementGroups(atlas)
+    groups, each = ElementGroups(atlas), bytes_of_frame(frame.camera for frame in frames)
     median = PSquare(len(atlas))
 
     def look(index: int) -> Seen:
@@ -66,7 +66,7 @@ def lit_diffuse(
         view = view_frame(frames[index].camera, mesh, scene, normal)
         return index, view, pixels, observe(view, pixels, atlas, scene, groups.candidates(view))
 
-    for index, view, pixels, seen in ordered_map(look, range(len(frames)), threads):
+    for index, view, pixels, seen in ordered_map(look, range(len(frames)), threads, each=each):
         median.add(seen.element, seen.radiance)
         if also is not None:
             also(index, view, pixels, seen)

@@ -15,11 +15,12 @@ from ..errors import MissingStageError
 from ..io import readers
 from ..io.fingerprint import fingerprint
 from ..json_values import key
+from ..kinds import Block
 from ..light.environment import Environment
 from ..light.field import LightField
 from ..light.mirrors import in_their_planes
 from ..light.shading import Shading
-from ..memory import give_back, peak_memory
+from ..memory import BUDGET, give_back, peak_memory
 from ..passes.pose_refinement.poses import Poses
 from ..passes.registry import check, followed, left_out_of
 from ..progress import Progress
@@ -34,6 +35,7 @@ from ..scene.samples import Samples
 from ..scene.surface import Surface
 from ..scene.two_sides import laid_apart
 from ..scene.unwrap import Unwrap
+from ..scene.visibility import bytes_of_frame
 from ..settings import ROOM, Settings
 from ..stages import WRITE
 from . import frames, shading, specular, surface
@@ -45,6 +47,8 @@ from .stage import Stage
 
 STAGES = (surface.STAGE, frames.STAGE, shading.STAGE, specular.STAGE)
 """Those that are stored, in their order."""
+ELEMENT_BYTES: Block[int] = 300
+"""At least, that the stages after the surface take for each element: in three rooms 400 to 500, with all besides."""
 Arrays = dict[str, np.ndarray]
 Stored = tuple[Arrays, dict[str, Any]]
 T = TypeVar("T")
@@ -221,7 +225,12 @@ class Stages:
 
     def observed(self) -> Observed:
         """What the frames show."""
-        room = self.surface()
+        room, cameras = self.surface(), [frame.camera for frame in self._near.frames]
+
+        def observe(settings: Settings) -> Observed:
+            needs = ELEMENT_BYTES * len(room.atlas) + bytes_of_frame(cameras)
+            BUDGET.ask(needs, f"The room's {len(room.atlas):,} surface elements and its frames")
+            return frames.observe(room, self._near, self.read, settings, self.store.folder, self.progress)
 
         def from_store(arrays: Arrays, meta: dict[str, Any]) -> Observed:
             self.read.bad, self.read.blind = list(meta.get("bad_frames", ())), list(meta.get("blind_frames", ()))
@@ -229,7 +238,7 @@ class Stages:
 
         return self._stage(
             frames.STAGE,
-            lambda s: frames.observe(room, self._near, self.read, s, self.store.folder, self.progress),
+            observe,
             lambda found: (found.arrays(), {"bad_frames": self.read.bad, "blind_frames": self.read.blind}),
             from_store,
         )

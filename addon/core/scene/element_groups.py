@@ -7,6 +7,7 @@ import zlib
 import numpy as np
 
 from ..kinds import Block, Unit
+from ..memory import BUDGET
 from .atlas import Atlas
 from .model import Camera
 from .params import VISIBILITY
@@ -61,7 +62,13 @@ class ElementGroups:
         return *size, camera.camera_to_world.tobytes(), id(camera.lens)
 
     def remember(self, camera: Camera, valid: np.ndarray, element: np.ndarray) -> None:
-        """Keep which elements ((k,) int32, sorted) a camera sees, of all, in the pixels that were valid."""
+        """Keep which elements ((k,) int32, sorted) a camera sees, of all, in the pixels that were valid.
+
+        Where memory is short nothing is kept: it is found again.
+        """
+        if BUDGET.is_short():
+            self._seen.clear()
+            return
         seen = np.zeros(len(self._group), bool)
         seen[element] = True
         # The lens is held, so that its id is nobody else's.

@@ -23,6 +23,17 @@ def pixel_rays(camera: Camera) -> tuple[np.ndarray, np.ndarray | None]:
     return _pixel_rays(camera.width, camera.height, camera.fx, camera.fy, camera.cx, camera.cy, camera.lens)
 
 
+def rays_of_rows(camera: Camera, rows: slice) -> tuple[np.ndarray, np.ndarray | None]:
+    """`pixel_rays` of some of the rows; a pinhole's large frame is not kept whole for it."""
+    width = camera.width
+    if camera.lens is None and width * camera.height > KEPT_PIXELS:
+        return _pinhole_rays(width, rows, camera.fx, camera.fy, camera.cx, camera.cy), None
+    local, seen = pixel_rays(camera)
+    return local[:, rows.start * width : rows.stop * width], None if seen is None else seen[rows]
+
+
+KEPT_PIXELS: Block[int] = 1 << 22
+"""Of a pinhole's frame up to which its rays are kept: to make them is a tenth of what tracing them takes."""
 KEPT: Block[int] = 4
 """Lenses whose rays are kept: a rig's cameras, or one for each thread; 24 bytes a pixel each."""
 
@@ -31,14 +42,21 @@ KEPT: Block[int] = 4
 def _pixel_rays(
     width: int, height: int, fx: float, fy: float, cx: float, cy: float, lens: Lens | None
 ) -> tuple[np.ndarray, np.ndarray | None]:
+    if lens is None:
+        return _pinhole_rays(width, slice(0, height), fx, fy, cx, cy), None
     x = np.broadcast_to((np.arange(width) + 0.5 - cx) / fx, (height, width))
     y = np.broadcast_to(((cy - np.arange(height) - 0.5) / fy)[:, None], (height, width))
-    if lens is None:
-        local = np.stack([x, y, np.full((height, width), -1.0)]).reshape(3, -1)
-        return local / np.sqrt(local[0] * local[0] + local[1] * local[1] + local[2] * local[2]), None
     rays, seen = lens.unproject(np.stack([x.ravel(), -y.ravel()], -1))
     local = np.stack([rays[:, 0], -rays[:, 1], -rays[:, 2]])
     return local, None if seen.all() else seen.reshape(height, width)
+
+
+def _pinhole_rays(width: int, rows: slice, fx: float, fy: float, cx: float, cy: float) -> np.ndarray:
+    shape = rows.stop - rows.start, width
+    x = np.broadcast_to((np.arange(width) + 0.5 - cx) / fx, shape)
+    y = np.broadcast_to(((cy - np.arange(rows.start, rows.stop) - 0.5) / fy)[:, None], shape)
+    local = np.stack([x, y, np.full(shape, -1.0)]).reshape(3, -1)
+    return local / np.sqrt(local[0] * local[0] + local[1] * local[1] + local[2] * local[2])
 
 
 @functools.lru_cache(maxsize=64)

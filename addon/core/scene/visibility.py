@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinds import Code, Limit, Unit
+from ..kinds import Block, Code, Limit, Unit
+from ..parallel import blocks
 from .atlas import Atlas
 from .model import Camera, Mesh, Pixels
 from .params import VISIBILITY
-from .pixel_rays import pixel_rays
+from .pixel_rays import rays_of_rows
 from .rays import RayScene
 
 EDGE_MARGIN: Unit[float] = 0.5
@@ -25,6 +26,11 @@ the element's object, but a neighbour shows something else, which a filter or a 
 SATURATED: the sensor clipped; a lower bound."""
 NOTHING: Code[int] = -2
 """No object's id, and not that of a ray that escapes."""
+PIXELS_AT_ONCE: Block[int] = 1 << 18
+"""Of a frame that is traced."""
+PIXEL_BYTES: Block[int] = 100
+"""Of a frame while it is looked at, for each pixel: what is read of it (14 and as much while it is decoded), what the
+camera sees (33), its rays where they are kept (24)."""
 FAR: Limit[float] = 1e9
 """Pixels; what a lens throws further out than this overflows nothing."""
 
@@ -83,6 +89,11 @@ class Observations:
     direction: np.ndarray
 
 
+def bytes_of_frame(cameras: Iterable[Camera]) -> int:
+    """What the largest frame takes in memory while it is looked at."""
+    return PIXEL_BYTES * max((camera.width * camera.height for camera in cameras), default=0)
+
+
 def _shifts(height: int, width: int) -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
     """For each of the eight neighbours, the pixels that have one there, and where it lies."""
     for dy in (-1, 0, 1):
@@ -107,22 +118,46 @@ def view_frame(camera: Camera, mesh: Mesh, scene: RayScene, triangle_normal: np.
     triangle_normal : (t, 3) float32
     """
     height, width = camera.height, camera.width
-    local, seen = pixel_rays(camera)
-    rays = np.stack([_dot(local, row) for row in camera.camera_to_world[:3, :3].tolist()]).astype(np.float32)
-    directions = np.ascontiguousarray(rays.T)
-    hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
-    triangle = hits.triangle if seen is None else np.where(seen.ravel(), hits.triangle, -1)
-    hit = triangle >= 0
-    object_id = np.where(hit, mesh.object_id[triangle], -1).reshape(height, width).astype(np.int32)
-    if seen is not None:
-        object_id[~seen] = NOTHING
+    led = np.ones((height, width), bool)  # to by a ray of the lens
+    rays = np.empty((3, height, width), np.float32)
+    triangle, object_id = np.empty((height, width), np.int32), np.empty((height, width), np.int32)
+    u, v, distance = np.empty((3, height, width), np.float32)
+    # By rows: all that is needed for a moment would be three times what is kept of a large frame.
+    step = max(PIXELS_AT_ONCE // width, 1)
+    for rows in blocks(height, step):
+        local, seen = rays_of_rows(camera, rows)
+        own = np.stack([_dot(local, row) for row in camera.camera_to_world[:3, :3].tolist()]).astype(np.float32)
+        directions = np.ascontiguousarray(own.T)
+        hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
+        rays[:, rows] = own.reshape(3, -1, width)
+        met = hits.triangle.reshape(-1, width)
+        if seen is not None:
+            led[rows], met = seen, np.where(seen, met, -1)
+        triangle[rows], object_id[rows] = met, np.where(met >= 0, mesh.object_id[met], -1)
+        u[rows], v[rows] = hits.u.reshape(-1, width), hits.v.reshape(-1, width)
+        distance[rows] = np.where(met >= 0, hits.distance.reshape(-1, width), np.float32(0))
+    object_id[~led] = NOTHING
+    clean = np.ones((height, width), bool)
+    for rows in blocks(height, step):
+        # With the rows beside them, whose pixels are neighbours.
+        wide = slice(max(rows.start - 1, 0), min(rows.stop + 1, height))
+        found = _clean(triangle[wide], object_id[wide], distance[wide], rays[:, wide], triangle_normal)
+        clean[rows] = found[rows.start - wide.start :][: rows.stop - rows.start]
+    clean &= led
+    object_id[~led] = -1
+    return FrameView(camera, rays, triangle, u, v, distance, object_id, clean)
+
+
+def _clean(
+    triangle: np.ndarray, object_id: np.ndarray, distance: np.ndarray, rays: np.ndarray, triangle_normal: np.ndarray
+) -> np.ndarray:
+    """Whether each pixel and the eight around it lie on one surface of one object, (h, w) bool."""
+    height, width = triangle.shape
     # The plane through the hit, seen from the centre: distance along d is offset / (n.d).
-    normal = np.where(hit, triangle_normal.take(triangle, 0).T, -rays)
-    distance = np.where(hit, hits.distance, np.float32(0))
-    offset = (distance * _dot(normal, rays)).reshape(height, width)
-    tolerance = (VISIBILITY.depth_tolerance * np.maximum(distance, 1e-6)).reshape(height, width)
-    distance = distance.reshape(height, width)
-    normal, rays = normal.reshape(3, height, width), rays.reshape(3, height, width)
+    normal = triangle_normal.take(triangle.ravel(), 0).T.reshape(3, height, width)
+    normal = np.where(triangle >= 0, normal, -rays)
+    offset = distance * _dot(normal, rays)
+    tolerance = VISIBILITY.depth_tolerance * np.maximum(distance, 1e-6)
     clean = np.ones((height, width), bool)
     for own, other in _shifts(height, width):
         along = _dot(normal[:, own[0], own[1]], rays[:, other[0], other[1]])
@@ -130,11 +165,7 @@ def view_frame(camera: Camera, mesh: Mesh, scene: RayScene, triangle_normal: np.
         along *= distance[other]
         along -= offset[own]
         clean[own] &= (np.abs(along, out=along) <= tolerance[own]) & (object_id[other] == object_id[own])
-    if seen is not None:
-        clean &= seen
-        object_id[~seen] = -1
-    triangle, u, v = (part.reshape(height, width) for part in (triangle, hits.u, hits.v))
-    return FrameView(camera, rays, triangle, u, v, distance, object_id, clean)
+    return clean
 
 
 def _projected(camera: Camera, away: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

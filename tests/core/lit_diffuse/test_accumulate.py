@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,10 @@ import pytest
 from addon.core.errors import BadInputError, InterruptedRun
 from addon.core.lit_diffuse.accumulate import _choose, accumulate, frame_order
 from addon.core.lit_diffuse.medians import Summary
+from addon.core.memory import BUDGET
 from addon.core.progress import Progress
+from addon.core.scene import visibility
+from addon.core.scene.element_groups import ElementGroups
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.model import Frame
 from addon.core.scene.visibility import CLEAN, EDGE, SATURATED
@@ -163,3 +167,16 @@ def test_a_second_pass_finds_what_a_first_would():
     for bad, only in ((16, None), (0, None), (0, room.atlas.object_id == 6), (8, None)):
         again, fresh = parts(room, bad, only), parts(make_room([*box_sides(), sheet], 0.1), bad, only)
         assert all(np.array_equal(one, other, equal_nan=True) for one, other in zip(again, fresh, strict=True))
+
+
+def test_a_small_memory_changes_nothing(box, monkeypatch):
+    """Frames one by one and in smaller blocks of rows, and what they see found again by each pass."""
+    room, cameras, pictures, _ = box
+    groups = [ElementGroups(room.atlas) for _ in range(2)]
+    first = [run(room, cameras, pictures, groups=groups[0]) for _ in range(2)]
+    monkeypatch.setattr(BUDGET, "limit", 1)
+    monkeypatch.setattr(visibility, "PIXELS_AT_ONCE", 100)
+    again = [run(room, cameras, pictures, groups=groups[1]) for _ in range(2)]
+    for a, b in zip(first, again, strict=True):
+        for one in fields(a):
+            assert np.array_equal(getattr(a, one.name), getattr(b, one.name), equal_nan=True)

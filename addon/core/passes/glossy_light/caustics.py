@@ -159,11 +159,13 @@ def _sent_on(room: LightField, gloss: Gloss, element: np.ndarray, light: _Light,
 
 def _over_cells(atlas: Atlas, halves: np.ndarray) -> np.ndarray:
     """Power over area, and its noise by the photons' halves, (n, 6): means over cells of several shifted grids."""
-    a, b = halves
+    for a, b in zip(*halves, strict=True):  # in place: their sum, and their difference
+        a[:], b[:] = a + b, a - b
     held, area = np.zeros((6, len(atlas)), np.float32), np.zeros(len(atlas), np.float32)
     for k in range(LESS_NOISE.grids):
         group, _ = cells(atlas.position, atlas.normal, k / LESS_NOISE.grids, LESS_NOISE.cell)
-        for row, values in zip(held, (*(a + b), *(a - b)), strict=True):
+        for row, values in zip(held, halves.reshape(6, -1), strict=True):
             row += np.bincount(group, values)[group]
         area += np.bincount(group, atlas.area)[group]
-    return (held / np.maximum(area, np.float32(1e-12))).T
+    held /= np.maximum(area, np.float32(1e-12))
+    return held.T

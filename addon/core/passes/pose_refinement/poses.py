@@ -22,6 +22,7 @@ from ...agreement.params import AGREEMENT, MISALIGNMENT
 from ...parallel import ordered_map
 from ...progress import Progress, Rounds
 from ...scene.model import Camera, Frame, Pixels
+from ...scene.visibility import bytes_of_frame
 from ...significance import LEVELS
 from ...weighted import weighted_median
 from .params import POSES
@@ -243,7 +244,9 @@ def refine_poses(
         return step_of(camera.coarser(step), read(frame).coarser(step), texture)
 
     asked = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, AGREEMENT.count).round().astype(int))]
-    found = [step for step in ordered_map(look, [(frame, frame.camera) for frame in asked], threads) if step]
+    each = bytes_of_frame(frame.camera for frame in frames)
+    first = ordered_map(look, [(frame, frame.camera) for frame in asked], threads, each=each)
+    found = [step for step in first if step]
     shift = float(np.median([step.shift for step in found])) if found else float("nan")
     if not shift >= POSES.least_shift:
         return Poses.as_read(frames, shift)
@@ -252,7 +255,7 @@ def refine_poses(
     moves = np.ones(len(frames), bool)
     for turn in range(POSES.rounds):
         todo = np.flatnonzero(moves)
-        steps = ordered_map(look, [(frames[i], cameras[i]) for i in todo], threads)
+        steps = ordered_map(look, [(frames[i], cameras[i]) for i in todo], threads, each=each)
         for done, (i, step) in enumerate(zip(todo, steps, strict=True), 1):
             if progress is not None:
                 progress.update((turn + done / len(todo)) / POSES.rounds)

@@ -14,6 +14,7 @@ from ...progress import Progress, Rounds
 from ...scene.elements import triangle_geometry
 from ...scene.model import Frame, Mesh, Pixels
 from ...scene.rays import RayScene
+from ...scene.visibility import bytes_of_frame
 from .params import CalibrationParams
 
 
@@ -70,7 +71,8 @@ def observe_codes(
     def of(index: int) -> CodeObservations:
         return _in_frame(index, frames[index], read(frames[index]), scene, places, normals, params)
 
-    for index, observed in enumerate(ordered_map(of, range(len(frames)), threads)):
+    each = bytes_of_frame(frame.camera for frame in frames)
+    for index, observed in enumerate(ordered_map(of, range(len(frames)), threads, each=each)):
         found.append(observed)
         if progress is not None:
             progress.update((index + 1) / len(frames))
