@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import platform
 import subprocess
 import sys
 import venv
@@ -66,7 +67,10 @@ def prepare(tools: bool = False, folder: Path = ROOT / ".venv") -> Path:
         flush=True,
     )
     stamp.unlink(missing_ok=True)
-    venv.create(folder, with_pip=True, clear=not found)
+    settings = folder / "pyvenv.cfg"
+    if not (found and f"version = {platform.python_version()}\n" in settings.read_text()):
+        # Not over one that is good: its Python may be running, and can't be written then.
+        venv.create(folder, with_pip=True, clear=True, symlinks=os.name != "nt")
     pip = [str(python), "-m", "pip", "--disable-pip-version-check", "--quiet"]
     wanted = [option for path in locks for option in ("-r", str(path))]
     run([*pip, "install", "--no-deps", "--only-binary=:all:", "--require-hashes", *wanted])

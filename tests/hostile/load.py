@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -91,6 +92,60 @@ def write(
     return root
 
 
+def obj(root: Path, objects: int) -> Path:
+    """A capture whose mesh is an OBJ file of so many objects."""
+    vertices, quads, _ = boxes(objects)
+    write(root, boxes(1), 4, (64, 48))
+    lines = []
+    for k in range(objects):
+        lines.append(f"o box {k}")
+        lines += [f"v {x:.5f} {y:.5f} {z:.5f}" for x, y, z in vertices[8 * k : 8 * k + 8]]
+        lines += ["f " + " ".join(map(str, quad + 1)) for quad in quads[6 * k : 6 * k + 6]]
+    return _instead_of_ply(root, "mesh.obj", "\n".join(lines))
+
+
+def gltf(root: Path, instances: int) -> Path:
+    """A capture whose mesh is a glTF file that has one box in so many places."""
+    write(root, boxes(1), 4, (64, 48))
+    corners, quads = box(np.zeros(3), np.full(3, SIDE), inside=True)
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype("<u2")
+    buffer = corners.astype("<f4").tobytes() + triangles.tobytes()
+    across = int(np.ceil(np.sqrt(instances)))
+    nodes: list[dict] = [{"mesh": 0, "name": "room"}]
+    for k in range(1, instances):
+        x, y = np.divmod(k, across)
+        nodes.append(
+            {"mesh": 0, "scale": [0.5 / across] * 3, "translation": [x * SIDE / across, y * SIDE / across, 0.1]}
+        )
+    top = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": list(range(instances))}], "nodes": nodes,
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3", "min": [0] * 3, "max": [SIDE] * 3},
+            {"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"},
+        ],
+        "bufferViews": [{"buffer": 0, "byteLength": 96}, {"buffer": 0, "byteOffset": 96, "byteLength": 72}],
+        "buffers": [{"byteLength": len(buffer), "uri": f"data:;base64,{base64.b64encode(buffer).decode()}"}],
+    }  # fmt: skip
+    return _instead_of_ply(root, "mesh.gltf", json.dumps(top))
+
+
+def _instead_of_ply(root: Path, name: str, content: str) -> Path:
+    (root / "mesh.ply").unlink()
+    (root / "info_semantic.json").unlink()
+    (root / name).write_text(content)
+    return root
+
+
+def missing(root: Path, frames: int) -> Path:
+    """A capture that tells of so many frames, and has none."""
+    write(root, boxes(20), 1, (64, 48))
+    told = json.loads((root / "transforms.json").read_text())
+    told["frames"] = [told["frames"][0] | {"file_path": f"images/none{k}.exr"} for k in range(frames)]
+    (root / "transforms.json").write_text(json.dumps(told))
+    return root
+
+
 LOADS: dict[str, Callable[[Path], Path]] = {
     "2,000 frames of 64 x 48": lambda root: write(root, boxes(20), 2000, (64, 48)),
     "5,000 objects, 12 frames of 160 x 120": lambda root: write(root, boxes(5000), 12, (160, 120)),
@@ -98,4 +153,7 @@ LOADS: dict[str, Callable[[Path], Path]] = {
     "4 frames of 8000 x 4000": lambda root: write(root, boxes(20), 4, (8000, 4000)),
     "50 frames of 1 x 1": lambda root: write(root, boxes(20), 50, (1, 1)),
     "2 M triangles, 12 frames of 160 x 120": lambda root: write(root, grid(2_000_000), 12, (160, 120)),
+    "a glTF of 20,000 instances (info)": lambda root: gltf(root, 20_000),
+    "an OBJ of 20,000 objects (info)": lambda root: obj(root, 20_000),
+    "100,000 frames that are missing (info)": lambda root: missing(root, 100_000),
 }

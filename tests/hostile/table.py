@@ -16,7 +16,7 @@ RUN = "import sys; from scan_relight.addon.cli import main; sys.exit(main(sys.ar
 
 
 def measure(place: str, only: str = "") -> None:
-    """Recover each of `LOADS` at the preset draft, and print how it ended as a row of a table."""
+    """Recover each of `LOADS` at the preset draft, or only read it, and print how it ended as a row of a table."""
     print("| capture | ended | processor s | wall s | peak GiB |\n|---|---|---|---|---|")
     for k, (name, make) in enumerate(LOADS.items()):
         if only not in name:
@@ -27,7 +27,9 @@ def measure(place: str, only: str = "") -> None:
         make(root)
         began = time.monotonic()
         words = ["recover", str(root), "--out", str(out), "--preset", "draft", "--quiet"]
-        with subprocess.Popen([sys.executable, "-c", RUN, *words], cwd=ROOT, stderr=subprocess.PIPE, text=True) as run:
+        words = ["info", str(root)] if "(info)" in name else words
+        pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
+        with subprocess.Popen([sys.executable, "-c", RUN, *words], cwd=ROOT, **pipes) as run:
             said = run.stderr.read()
             _, status, used = os.wait4(run.pid, 0)
             run.returncode = os.waitstatus_to_exitcode(status)
