@@ -42,6 +42,8 @@ def uv_scale(mesh: Mesh, uv: np.ndarray) -> float:
 
 def _cover(uv: np.ndarray, size: int, threads: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Covered texels, the triangle over each and the barycentric point, by rays against the unwrapped mesh."""
+    if not len(uv):
+        return np.zeros(0, np.int64), np.zeros(0, np.int32), *np.zeros((2, 0), np.float32)
     flat = np.concatenate([uv.reshape(-1, 2).astype(np.float64) * size, np.zeros((3 * len(uv), 1))], 1)
     plane = RayScene(flat, np.arange(3 * len(uv), dtype=np.int32).reshape(-1, 3))
     triangle = np.full(size * size, -1, np.int32)

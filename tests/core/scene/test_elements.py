@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from addon.core.scene.atlas import Atlas
-from addon.core.scene.elements import ElementLookup, make_atlas, triangle_geometry, uv_scale
+from addon.core.scene.elements import Crumbs, ElementLookup, find_elements, make_atlas, triangle_geometry, uv_scale
 from addon.core.scene.model import Mesh
 from tests.core.rooms import box_sides, make_room, quad
 
@@ -156,3 +156,21 @@ def test_a_sliver_between_texel_centres_gets_elements_at_its_border():
     assert 3 <= len(atlas) <= 10
     assert (atlas.texel // 16 == 4).all()
     assert atlas.area.sum() == pytest.approx(0.015, rel=1e-5)
+
+
+def test_a_mesh_of_crumbs_alone():
+    """A mesh of two million triangles in a small atlas has none that is larger than a texel."""
+    room = make_room(box_sides(), 0.5)
+    count = len(room.mesh.triangles)
+    corner = np.stack([np.arange(count) * 3 + 1, np.ones(count, int)], 1)
+
+    class AllSeen:
+        def seen(self, position, triangle):
+            return np.ones(len(position), bool)
+
+        def coarse(self, position, triangle):
+            return np.zeros(len(position), np.uint64)
+
+    found = find_elements(room.mesh, room.uv, 64, AllSeen(), Crumbs(np.arange(count), np.arange(count), corner))
+    assert sorted(found.triangle) == list(range(count))
+    assert found.area.sum() == pytest.approx(triangle_geometry(room.mesh)[1].sum(), rel=1e-5)
