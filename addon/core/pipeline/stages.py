@@ -144,6 +144,7 @@ class Stages:
         """16 hex digits that are the same where a capture and all that was asked of it are, and else differ."""
         told: tuple[Any, ...] = (self.overrides.as_dict(),) if self.overrides.any else ()
         told += () if self.settings.atlas == ROOM else (self.settings.atlas,)
+        told += () if self.settings.texture_fill else ("no texture fill",)
         told += left_out_of(WRITE, self.settings.without)
         return key("run", self.keys[specular.STAGE.name], *told)[:16]
 
