@@ -5,8 +5,6 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...core.io.picture import turn
-from ...core.io.pictures import picture_orientation
 from ..data.cameras import TURNED, frame_cameras, shows_as_framed, use_camera
 from ..data.images import RADIANCE, image_array
 
@@ -80,7 +78,7 @@ def show_picture(thing: bpy.types.Object, alpha: float = 1.0, front: bool = Fals
         except RuntimeError:
             return f"'{path}' can't be opened as a picture."
         shown = shown or data.background_images.new()
-        shown.image = _turned(image, picture_orientation(path)) if TURNED in thing else image
+        shown.image = _turned(image, path) if TURNED in thing else image
     if shown.image.is_float:
         shown.image.colorspace_settings.name = RADIANCE
     # Without this Blender shows it as stored, not under the exposure and view transform of the scene beside it.
@@ -92,12 +90,15 @@ def show_picture(thing: bpy.types.Object, alpha: float = 1.0, front: bool = Fals
     return ""
 
 
-def _turned(image: bpy.types.Image, orientation: int) -> bpy.types.Image:
+def _turned(image: bpy.types.Image, path: Path) -> bpy.types.Image:
     """A copy of a picture of 8 or 16 bits as its EXIF shows it, which Blender does not heed; packed into the .blend."""
     name = f"{image.name} turned"
     if name in bpy.data.images:
         return bpy.data.images[name]
-    pixels = turn(image_array(image)[::-1], orientation)[::-1]
+    from ...core.io.picture import turn  # not earlier: Blender's start should not wait for the readers of pictures
+    from ...core.io.pictures import picture_orientation
+
+    pixels = turn(image_array(image)[::-1], picture_orientation(path))[::-1]
     copy = bpy.data.images.new(name, pixels.shape[1], pixels.shape[0])
     copy.pixels.foreach_set(np.ascontiguousarray(pixels).ravel())
     copy.update()
