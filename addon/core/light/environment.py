@@ -30,11 +30,14 @@ class Zone:
         Its radiance at a mean of 1, times the weight.
     told : bool
         Frames tell radiance on its side of the horizon.
+    clipped : bool
+        Of what frames saw of it only a lower bound is known.
     """
 
     weight: np.ndarray
     pattern: np.ndarray
     told: bool = False
+    clipped: bool = False
 
 
 def _solid(weight: np.ndarray) -> np.ndarray:
@@ -161,17 +164,27 @@ class Environment:
         summed = [np.bincount(own, (weight * self.radiance[..., k]).ravel(), count + 1)[:count] for k in range(3)]
         return np.stack(summed, 1) / np.maximum(total, 1e-20)[:, None]
 
-    def unseen_zones(self) -> list[Zone]:
-        """The unseen directions above and below the horizon.
+    def unknown_zones(self) -> list[Zone]:
+        """The directions above and below the horizon that frames don't tell; last, what of the rest they clipped.
 
         The weight is `strange`. Within a zone radiance goes with the height as it does where the
-        frames saw it: skies change more with the height than around.
+        frames saw it: skies change more with the height than around. Where frames clipped most of what they saw on a
+        side, that and the unseen are one zone: two unknowns that light a room alike can't be told apart.
         """
         weight, height = self.strange, len(self.observations)
         above = (np.arange(height) >= height / 2)[:, None]
-        zones = [(np.where(side, weight, np.float32(0)), bool((self.told & side).any())) for side in (above, ~above)]
         profile = self._profile()[:, None]
-        return [Zone(zone, _levelled(zone * profile, zone), told) for zone, told in zones if zone.any()]
+        zones, left = [], self.clipped
+        for side in (above, ~above):
+            own, told = np.where(side, weight, np.float32(0)), self.told & side
+            if _solid(self.clipped & side).sum() > _solid(told).sum():
+                own, left = np.where(side & self.clipped, np.float32(1), own), left & ~side
+                zones.append(Zone(own, own, clipped=True))
+            elif own.any():
+                zones.append(Zone(own, _levelled(own * profile, own), bool(told.any())))
+        if left.any():
+            zones.append(Zone(left.astype(np.float32), left.astype(np.float32), clipped=True))
+        return zones
 
     def _profile(self) -> np.ndarray:
         """Median luminance of what frames saw at each height, (h,) float32; of the nearest height that they saw."""
@@ -185,11 +198,6 @@ class Environment:
         profile = ndimage.gaussian_filter1d(profile, np.radians(SKY.profile) / np.pi * height, mode="nearest")
         middle = max(float(np.median(profile[rows])), 1e-12)
         return np.clip(profile / middle, 1 / SKY.steepest, SKY.steepest).astype(np.float32)
-
-    def clipped_zone(self) -> Zone:
-        """The directions of which only a lower bound is known."""
-        weight = self.clipped.astype(np.float32)
-        return Zone(weight, weight)
 
     def zone_mean(self, zone: Zone) -> np.ndarray:
         """Mean radiance over a zone, weighted by solid angle: (3,) float32."""

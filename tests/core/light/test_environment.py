@@ -121,7 +121,7 @@ def half_seen(height: int = 32):
 def test_unseen_sky_goes_with_the_height_as_the_seen():
     truth, environment, elevation = half_seen()
     height = len(truth)
-    zone = environment.unseen_zones()[0]
+    zone = environment.unknown_zones()[0]
     solved = environment.with_zone(zone, environment.zone_mean(zone))
     far = np.s_[height // 2 :, height : height + height // 2]  # the other side of the window, above the horizon
     ratio = solved.radiance[far][..., 0] / truth[far]
@@ -133,7 +133,7 @@ def test_unseen_sky_goes_with_the_height_as_the_seen():
 
 def test_a_zones_mean_is_what_was_solved():
     _, environment, elevation = half_seen()
-    for zone in environment.unseen_zones():
+    for zone in environment.unknown_zones():
         assert zone.pattern.min() >= 0 and (zone.pattern > 0).sum() == (zone.weight > 0).sum()
         solid = np.cos(elevation)[:, None]
         assert (zone.pattern * solid).sum() == pytest.approx((zone.weight * solid).sum(), rel=1e-4)
@@ -145,7 +145,7 @@ def test_a_sky_of_one_height_has_no_profile():
     seen = np.zeros((16, 32), np.int32)
     seen[9] = 1
     environment = Environment(np.ones((16, 32, 3), np.float32), seen)
-    for zone in environment.unseen_zones():
+    for zone in environment.unknown_zones():
         np.testing.assert_allclose(zone.pattern, zone.weight, rtol=1e-5)
 
 

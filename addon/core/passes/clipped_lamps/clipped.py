@@ -15,17 +15,20 @@ from ...light.shading import Shading
 from ...luminance import LUMINANCE
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
-from ...scene.visibility import SATURATED
 from .fringes import FringeParams
 
 
 def clipped_objects(lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()) -> dict[int, float]:
-    """Objects of which most of what was seen is clipped, with the luminance that they have at least; none of `but`."""
+    """Objects of which most frames show most clipped, with the luminance that they have at least; none of `but`.
+
+    Not by the tier: where poses are off, a few pixels of an edge reach far into a lamp that all others show clipped.
+    """
     bounds = {}
-    for object_id in np.setdiff1d(atlas.object_id[lit.tier == SATURATED], list(but)):
+    mostly = lit.seen & (lit.clipped > FringeParams.least_share)
+    for object_id in np.setdiff1d(atlas.object_id[mostly], list(but)):
         own = atlas.elements_of(int(object_id))
         own = own[lit.seen[own]]
-        clipped = own[lit.tier[own] == SATURATED]
+        clipped = own[mostly[own]]
         if atlas.area[clipped].sum() > FringeParams.least_share * atlas.area[own].sum():
             bounds[int(object_id)] = float(np.median(lit.radiance[clipped] @ LUMINANCE))
     return bounds

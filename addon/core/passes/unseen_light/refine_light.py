@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,8 +25,8 @@ class Sky:
         E from each part at radiance 1.
     guess : list of (3,) float64
         Radiance of the seen neighbours; of a clipped part the lower bound.
-    clipped : bool
-        The last part is what was seen, but clipped.
+    clipped : list of bool
+        Of what frames saw of a part only a lower bound is known.
     told : list of bool
         Whether frames tell radiance on a part's side of the horizon.
     radiance : list of (3,) float64
@@ -35,31 +36,33 @@ class Sky:
 
     contribution: list[np.ndarray]
     guess: list[np.ndarray]
-    clipped: bool
-    told: list[bool] = field(default_factory=list)
+    clipped: list[bool]
+    told: list[bool]
     radiance: list[np.ndarray] = field(default_factory=list)
     solved: set[int] = field(default_factory=set)
 
     def __post_init__(self):
         self.radiance = [g.copy() for g in self.guess]
-        self.told = self.told or [False] * len(self.guess)
-
-    def _is_clipped(self, i: int) -> bool:
-        return self.clipped and i == len(self.contribution) - 1
 
     def bounds(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest radiance that is believed, (3,) each."""
         guess = np.maximum(self.guess[i], 1e-12)
-        if self._is_clipped(i):
+        if self.clipped[i]:
             return guess, UNSEEN.brightest * guess
         return guess / (UNSEEN.darker if self.told[i] else LIGHT_FIT.reach), np.full(3, LIGHT_FIT.reach * guess.max())
+
+    def without(self, parts: Collection[int]) -> Sky:
+        """The other parts, at the radiance that they have."""
+        kept = [i for i in range(len(self.contribution)) if i not in parts]
+        lists = (self.contribution, self.radiance, self.clipped, self.told)
+        return Sky(*([one[i] for i in kept] for one in lists))  # type: ignore[arg-type]
 
     def notes(self) -> list[str]:
         """One sentence for each part that was solved."""
         said = []
         for i in sorted(self.solved):
             values, guess = (", ".join(f"{x:.3g}" for x in one[i]) for one in (self.radiance, self.guess))
-            if self._is_clipped(i):
+            if self.clipped[i]:
                 said.append(
                     "Part of the sky is clipped in every frame that sees it; it was solved from the light it "
                     f"throws: radiance {values} (at least {guess})."
@@ -128,11 +131,7 @@ def refined(
     parts = sorted(sky.solved)
     if not free and not parts:
         return lamps
-    others = Sky(
-        [G for i, G in enumerate(sky.contribution) if i not in parts],
-        [r for i, r in enumerate(sky.radiance) if i not in parts],
-        False,
-    )
+    others = sky.without(parts)
 
     def contributions_of() -> np.ndarray:
         """E that each of `free` and `parts` throws at radiance 1, (m, k)."""

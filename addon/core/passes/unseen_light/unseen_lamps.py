@@ -84,7 +84,8 @@ def solve_sky(sample: Sample, lamps, contribution, sky: Sky, base) -> None:
     """Radiance of the sky's unknown parts, channel by channel, one after another."""
     for i, G in enumerate(sky.contribution):
         others = all_light(base, lamps, contribution, sky, without=i)
-        if (G[:, None] * sky.guess[i]).mean() < SKY.least_share * others.mean():
+        likely = sky.bounds(i)[1] if sky.clipped[i] else sky.guess[i]
+        if (G[:, None] * likely).mean() < SKY.least_share * others.mean():
             continue
         found = [sample.best(sample.radiance[:, c], others[:, c], G) for c in range(3)]
         solved = [one[0] for one in found if one is not None]

@@ -143,9 +143,7 @@ def find_light(
     field, found = (field, ()) if "whole-sky" in without else with_whole_sky(field, element, seed)
     environment, atlas = field.environment, field.atlas
     solve_zones = environment.seen and "unseen-sky" not in without
-    zones = environment.unseen_zones() if solve_zones else []
-    if environment.clipped.any() and "unseen-sky" not in without:
-        zones.append(environment.clipped_zone())
+    zones = environment.unknown_zones() if solve_zones else []
     known = environment
     for zone in zones:
         known = known.with_zone(zone, np.zeros(3, np.float32))
@@ -198,8 +196,7 @@ def find_light(
         lit_room = field.with_light(even, environment)
         least = {i: most_reflected(lit_room, own, seed) for i, own in alike.items()}
 
-    clipped_sky = bool(zones) and bool(environment.clipped.any())
-    sky = Sky([G[lit] for G in sky_contributions], guess, clipped_sky, [zone.told for zone in zones])
+    sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.told for z in zones])
     class_of = class_names(instances)
     colours = shared_by_class(colours or {}, unseen_objects, instances)
 

@@ -35,7 +35,7 @@ def sample(noise: float = 0.1, seed: int = 0):
 @pytest.mark.parametrize("bound", [False, True])
 def test_a_lamp_and_the_sky_are_refined_together(bound):
     found, base, (lamp_light, sky_light) = sample()
-    sky = Sky([sky_light], [TRUE[1] * (0.8 if bound else 2)], bound)
+    sky = Sky([sky_light], [TRUE[1] * (0.8 if bound else 2)], [bound], [False])
     sky.solved.add(0)
     start = Lamp(7, np.float32([12, 12, 12]), False, spread=(0.5, 0.4))
     lamps = refined(found, [start], {7: lamp_light}, {7: 0.1}, {}, [], sky, base, {})
@@ -47,7 +47,7 @@ def test_a_lamp_and_the_sky_are_refined_together(bound):
 def test_a_known_colour_is_kept():
     """The lamp's from its edges: only its luminance is solved for, and the sky gets what is left."""
     found, base, (lamp_light, sky_light) = sample()
-    sky = Sky([sky_light], [TRUE[1] * 2], False)
+    sky = Sky([sky_light], [TRUE[1] * 2], [False], [False])
     sky.solved.add(0)
     told = TRUE[0] / (TRUE[0] @ LUMINANCE)
     start = Lamp(7, np.float32(12 * told), False, spread=(0.5, 0.4))
@@ -65,7 +65,7 @@ def test_a_colour_is_shared_by_a_class():
 
 def test_a_lower_bound_holds():
     found, base, (lamp_light, sky_light) = sample()
-    sky = Sky([sky_light], [2 * TRUE[1]], True)
+    sky = Sky([sky_light], [2 * TRUE[1]], [True], [False])
     sky.solved.add(0)
     refined(found, [Lamp(7, np.float32(TRUE[0]), False)], {7: lamp_light}, {7: 0.1}, {}, [], sky, base, {})
     assert (sky.radiance[0] >= 2 * TRUE[1] - 1e-6).all()
@@ -73,7 +73,7 @@ def test_a_lower_bound_holds():
 
 def test_nothing_to_refine():
     found, base, _ = sample()
-    assert refined(found, [], {}, {}, {}, [], Sky([], [], False), base, {}) == []
+    assert refined(found, [], {}, {}, {}, [], Sky([], [], [], []), base, {}) == []
 
 
 def test_flat_spots():

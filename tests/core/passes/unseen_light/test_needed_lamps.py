@@ -22,7 +22,7 @@ def solved(sky: float, lamp: float, wrong_sky: float, wrong_lamp: float, shining
     albedo = np.array([0.2, 0.5, 0.7, 0.4])[np.arange(M) % 4] * np.exp(rng.normal(0, 0.02, M))
     received = 0.5 + sky * FROM_SKY + lamp * FROM_LAMP
     sample = Sample(np.arange(M), np.arange(M) % 4, (albedo * received)[:, None] * np.ones(3), BASE)
-    found = Sky([FROM_SKY], [np.full(3, 2.5)], False)
+    found = Sky([FROM_SKY], [np.full(3, 2.5)], [False], [False])
     found.radiance[0] = np.full(3, wrong_sky)
     lamps = [Lamp(LAMP, np.full(3, wrong_lamp, np.float32), False)]
     return needed(sample, lamps, {LAMP: FROM_LAMP}, found, BASE, dict.fromkeys(shining, np.ones(3)))
