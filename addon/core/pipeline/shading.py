@@ -19,7 +19,7 @@ from ..light.over_surface import Gathering, finest_spacing, irradiance
 from ..light.shading import Shading
 from ..light.sun import Sun, taken_out
 from ..passes.clipped_lamps.clipped import shade_clipped
-from ..passes.clipped_lamps.patches import clipped_patches
+from ..passes.clipped_lamps.patches import clipped_patches, told_of
 from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.missing_light.missing_light import find_missing_light, is_missing
 from ..passes.unseen_light.unseen_light import Light
@@ -263,7 +263,9 @@ def with_missing_light(
     good = (lit_diffuse.tier == CLEAN) & (lit_diffuse.count >= VISIBILITY.enough)
     if not is_missing(field, good, seed):
         return field, light, np.zeros(len(field.atlas), bool)
-    found = find_missing_light(dark, good, patches, seed)
+    told = told_of(patches, field.atlas, lit_diffuse)
+    bright = np.isin(field.atlas.object_id, told)
+    found = find_missing_light(dark, good & ~bright, [one for one in patches if one not in told], seed)
     radiance = evened(dark)
     for one, solved in found.radiance.items():
         own = dark.atlas.object_id == one
@@ -271,7 +273,7 @@ def with_missing_light(
     atlas, shut = dark.atlas, found.shut
     radiance[shut] = found.openings.radiance[found.openings.behind(atlas.position[shut], atlas.normal[shut])[0]]
     # What looked like a lamp for want of light may do so no more.
-    seen = tuple(lamp for lamp in light.lamps if lamp.seen and lamp.object_id in found.brighter)
+    seen = tuple(lamp for lamp in light.lamps if lamp.seen and lamp.object_id in {*found.brighter, *told})
     for lamp in seen:
         own = dark.atlas.object_id == lamp.object_id
         radiance[own & (lit_diffuse.tier != CLEAN)] = lamp.radiance

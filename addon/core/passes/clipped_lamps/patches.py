@@ -1,7 +1,8 @@
-"""Patches that the sensor clipped, of a mesh that tells of no objects.
+"""Patches that the sensor clipped or that are far brighter than the rest, of a mesh that tells of no objects.
 
 In a fused mesh ceiling lamps and windows are of one piece with the rest. What nearly all frames
 that see it show clipped may be such a lamp, and its radiance is solved for. A white wall that few frames clip is none.
+Of what is bright and not clipped the radiance is known.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...luminance import LUMINANCE
 from ...scene.atlas import Atlas
 from ...scene.connected_parts import weld
 from ...scene.elements import ElementLookup
@@ -33,27 +35,32 @@ class PatchParams:
         Of an element's, somewhere in a patch: what frames only clip at times has none.
     most : int
         Patches; the greatest are taken.
+    bright : float
+        Times the median radiance of the surface that an element must send to be of a patch unclipped. Sunlight on a
+        floor is some ten to twenty times as bright as a room, a lamp some hundred times.
     """
 
     least_share: float = 0.5
     core: float = 0.9
     most: int = 24
+    bright: float = 40.0
 
 
 PATCHES = PatchParams()
 
 
 def clipped_patches(mesh: Mesh, atlas: Atlas, lit: LitDiffuse) -> Patches:
-    """Connected triangles that nearly all frames show clipped."""
+    """Connected triangles that nearly all frames show clipped, or that are bright."""
     count = len(mesh.triangles)
     told = np.where(lit.seen, atlas.area, 0)
+    apart = np.maximum(lit.clipped, _bright(atlas, lit))
     of_triangle = np.bincount(atlas.triangle, told, count)
-    share = np.bincount(atlas.triangle, told * lit.clipped, count) / np.maximum(of_triangle, 1e-20)
+    share = np.bincount(atlas.triangle, told * apart, count) / np.maximum(of_triangle, 1e-20)
     # A triangle too small for an element of its own shows one beside it.
     bare = np.flatnonzero(np.bincount(atlas.triangle, minlength=count) == 0).astype(np.int32)
     third = np.full(len(bare), 1 / 3, np.float32)
     beside = ElementLookup(mesh, atlas)(bare, third, third)
-    share[bare] = np.where(lit.seen[beside], lit.clipped[beside], 0)
+    share[bare] = np.where(lit.seen[beside], apart[beside], 0)
     chosen = np.flatnonzero(share > PATCHES.least_share)
     if not len(chosen):
         return Patches.none()
@@ -63,7 +70,7 @@ def clipped_patches(mesh: Mesh, atlas: Atlas, lit: LitDiffuse) -> Patches:
     own = (of_element >= 0) & lit.seen
     parts = int(label.max()) + 1
     elements = np.bincount(of_element[own], minlength=parts)
-    core = np.bincount(of_element[own & (lit.clipped > PATCHES.core)], minlength=parts)
+    core = np.bincount(of_element[own & (apart > PATCHES.core)], minlength=parts)
     area = np.bincount(of_element[own], atlas.area[own], parts)
     enough = np.flatnonzero((elements >= LEVELS.few) & (core > 0))
     kept = enough[np.argsort(-area[enough], kind="stable")][: PATCHES.most]
@@ -72,3 +79,21 @@ def clipped_patches(mesh: Mesh, atlas: Atlas, lit: LitDiffuse) -> Patches:
     number[kept] = first + np.arange(len(kept))
     triangle = np.flatnonzero(np.where(label >= 0, number[label], -1) >= 0)
     return Patches(triangle.astype(np.int32), number[label[triangle]].astype(np.int32))
+
+
+def _bright(atlas: Atlas, lit: LitDiffuse) -> np.ndarray:
+    """Elements that are far brighter than the surface at large, (n,) bool."""
+    seen = np.flatnonzero(lit.seen)
+    luminance = np.zeros(len(atlas))
+    luminance[seen] = lit.radiance[seen] @ LUMINANCE
+    order = seen[np.argsort(luminance[seen])]
+    reached = np.cumsum(atlas.area[order])
+    if not len(order):
+        return np.zeros(len(atlas), bool)
+    return luminance > PATCHES.bright * luminance[order[np.searchsorted(reached, reached[-1] / 2)]]
+
+
+def told_of(patches: list[int], atlas: Atlas, lit: LitDiffuse) -> list[int]:
+    """Those of the patches whose radiance frames tell: most of what they saw of them is not clipped."""
+    own = {one: lit.seen & (atlas.object_id == one) for one in patches}
+    return [one for one, seen in own.items() if np.median(lit.clipped[seen]) <= PATCHES.least_share]

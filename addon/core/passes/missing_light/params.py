@@ -45,6 +45,8 @@ class MissingLightParams:
     above : float
         Weight of what is above `highest`, the greatest albedo of usual paint, in tenths of log albedo.
     highest : float
+    held : float
+        Tenths of log albedo above it from which on the cost grows linearly, no more by the square (Huber).
     sources : float
         Weight of the prior that an opening shows what the room does, and a patch its clipped value: a lamp is an
         exception (Student's t).
@@ -63,7 +65,7 @@ class MissingLightParams:
 
     alarm: float = 0.05
     samples: int = 5000
-    rays: int = 1024
+    rays: int = 2048
     merged: int = 2
     sky: float = float(np.radians(30))
     least_seen: float = 2e-4
@@ -79,6 +81,7 @@ class MissingLightParams:
     grey: float = 0.15
     above: float = 1.0
     highest: float = 0.85
+    held: float = 3.0
     sources: float = 0.1
     unlike: float = 0.5
     tint: float = 0.3

@@ -84,9 +84,11 @@ class _Plausible:
         value += MISSING.colour * float((length - 1).mean())
         pull = MISSING.colour / (MISSING.grey * channels * m) * paint / length
         by_a += pull - pull.mean(1, keepdims=True)
+        # Beside lamps and panes a few elements hold their light: by its square they alone would decide.
         above = np.maximum(a - np.log(MISSING.highest), 0) / 0.1
-        value += MISSING.above * 0.5 * float((above**2).mean())
-        by_a += MISSING.above / (0.1 * channels * m) * above
+        far = np.sqrt(1 + (above / MISSING.held) ** 2)
+        value += MISSING.above * MISSING.held**2 * float((far - 1).mean())
+        by_a += MISSING.above / (0.1 * channels * m) * above / far
         gradient = -(self._G.T @ (by_a / E)) * radiance
         odd = x - self.usual
         level = odd.mean(1, keepdims=True) / MISSING.unlike
