@@ -69,8 +69,10 @@ def free_memory() -> int | None:
         return None
 
 
-_GROUP_V2 = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current")
-_GROUP_V1 = ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes")
+_GROUP_V2 = tuple(Path("/sys/fs/cgroup", name) for name in ("memory.max", "memory.current", "memory.stat"))
+_GROUP_V1 = tuple(
+    Path("/sys/fs/cgroup/memory", name) for name in ("memory.limit_in_bytes", "memory.usage_in_bytes", "memory.stat")
+)
 
 
 def _linux_available() -> int | None:
@@ -81,13 +83,20 @@ def _linux_available() -> int | None:
         return None
 
 
-def _left_of_group(files: tuple[str, str]) -> int | None:
-    """What is left of a control group's limit; None where it has none."""
+def _left_of_group(files: tuple[Path, ...]) -> int | None:
+    """What is left of a control group's limit; None where it has none.
+
+    What it holds of files counts as used there, but is given up for whoever needs it.
+    """
+    limit_file, used_file, stat_file = files
     try:
-        limit, used = (int(Path(file).read_text()) for file in files)
+        limit, used = (int(file.read_text()) for file in (limit_file, used_file))
+        lines = [line.split() for line in stat_file.read_text().splitlines()]
+        held = {name: int(size) for name, size in lines}
     except (OSError, ValueError):  # 'max'
         return None
-    return max(limit - used, 0)
+    of_files = sum(held.get(f"total_{name}", held.get(name, 0)) for name in ("inactive_file", "active_file"))
+    return max(limit - max(used - of_files, 0), 0)
 
 
 def resident_memory() -> int | None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from addon.core import memory
 from addon.core.errors import MemoryLimitError
 from addon.core.memory import Budget, free_memory, give_back, resident_memory
 
@@ -50,3 +51,17 @@ def test_what_surely_does_not_fit_is_told_before_the_work():
 def test_what_is_free_is_less_than_the_machine_has():
     free = free_memory()
     assert free is None or 0 <= free < 1 << 50
+
+
+@pytest.mark.parametrize(("limit", "left"), [("8000", 6000), ("max", None), ("1000", 0)])
+@pytest.mark.parametrize("prefix", ["", "total_"])
+def test_what_a_control_group_holds_of_files_is_free(tmp_path, limit, left, prefix):
+    told = f"anon 2000\n{prefix}inactive_file 3000\n{prefix}active_file 1500\n"
+    files = tuple(tmp_path / name for name in ("limit", "used", "stat"))
+    for file, text in zip(files, (limit, "6500\n", told), strict=True):
+        file.write_text(text)
+    assert memory._left_of_group(files) == left
+
+
+def test_no_control_group_is_no_limit(tmp_path):
+    assert memory._left_of_group(tuple(tmp_path / name for name in ("limit", "used", "stat"))) is None
