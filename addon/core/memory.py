@@ -41,7 +41,7 @@ class Budget:
         now = resident_memory()
         if self.limit and now is not None and now + need > self.limit:
             raise MemoryLimitError(
-                f"{what} need {(now + need) / 1e9:.2g} GB or more, and the memory limit is {self.limit / 1e9:.2g} GB; "
+                f"{what} need {(now + need) / 1e9:.2g} GB or more, over the memory limit of {self.limit / 1e9:.2g} GB; "
                 "raise it, or take a greater texel size or a smaller atlas size."
             )
 

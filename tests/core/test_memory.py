@@ -43,7 +43,7 @@ def test_what_surely_does_not_fit_is_told_before_the_work():
     budget.ask(1 << 50, "Its elements")  # no limit
     budget.limit = 1 << 30
     with pytest.raises(
-        MemoryLimitError, match=r"^Its elements need 1e\+03 GB or more, and the memory limit is 1\.1 GB; "
+        MemoryLimitError, match=r"^Its elements need 1e\+03 GB or more, over the memory limit of 1\.1 GB; "
     ):
         budget.ask(10**12, "Its elements")
 

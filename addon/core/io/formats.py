@@ -5,7 +5,7 @@ FORMATS = {
     "fipt": "train/transforms.json beside scene.obj",
     "fipt-real": "cam.txt and K_list.txt",
     "scannet++": "dslr/colmap and scans/mesh_aligned_0.05.ply",
-    "polycam": "keyframes/corrected_cameras or keyframes/cameras",
+    "polycam": "keyframes with a folder of cameras",
     "record3d": "metadata.json beside rgb or rgbd",
     "traj": "traj.txt and results/frame000000.exr",
     "nerfstudio": "transforms.json",

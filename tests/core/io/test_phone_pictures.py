@@ -18,7 +18,7 @@ from tests.core.io.dng_files import write_dng
 
 SIZE = 64, 48
 SMOOTH = np.stack(
-    np.meshgrid(np.linspace(0.1, 0.7, SIZE[0]), np.linspace(0.2, 0.6, SIZE[1])) + [np.full(SIZE[::-1], 0.4)], -1
+    [*np.meshgrid(np.linspace(0.1, 0.7, SIZE[0]), np.linspace(0.2, 0.6, SIZE[1])), np.full(SIZE[::-1], 0.4)], -1
 )
 
 
