@@ -49,7 +49,7 @@ def texels_of(atlas: Atlas, mesh: Mesh, wanted: np.ndarray, params: PlaneParams 
     size = atlas.size
     theirs = np.flatnonzero(np.isin(mesh.object_id, np.unique(atlas.object_id[wanted])))
     corner = atlas.uv[theirs].astype(np.float64) * size
-    large = np.abs(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])) > 2 * params.least
+    large = np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])) > 2 * params.least
     theirs, corner = theirs[large], corner[large]
     if not len(theirs):
         return Texels(texel[:0], texel[:0], np.zeros((0, 3)), np.zeros(0))
