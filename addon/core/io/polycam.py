@@ -118,4 +118,4 @@ def _alignment(root: Path) -> np.ndarray | None:
     )
 
 
-READER = Reader("polycam", f"{FOLDER}/{CORRECTED[0]} or {FOLDER}/{OWN[0]}", find, read)
+READER = Reader("polycam", f"{FOLDER} with a folder of cameras", find, read)
