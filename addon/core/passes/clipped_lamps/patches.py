@@ -20,6 +20,7 @@ from ...scene.model import Mesh
 from ...scene.patches import Patches
 from ...scene.uv_islands import connected
 from ...significance import LEVELS
+from ...weighted import weighted_median
 
 
 @dataclass(frozen=True)
@@ -83,14 +84,11 @@ def clipped_patches(mesh: Mesh, atlas: Atlas, lit: LitDiffuse) -> Patches:
 
 def _bright(atlas: Atlas, lit: LitDiffuse) -> np.ndarray:
     """Elements that are far brighter than the surface at large, (n,) bool."""
-    seen = np.flatnonzero(lit.seen)
     luminance = np.zeros(len(atlas))
-    luminance[seen] = lit.radiance[seen] @ LUMINANCE
-    order = seen[np.argsort(luminance[seen])]
-    reached = np.cumsum(atlas.area[order])
-    if not len(order):
+    luminance[lit.seen] = lit.radiance[lit.seen] @ LUMINANCE
+    if not lit.seen.any():
         return np.zeros(len(atlas), bool)
-    return luminance > PATCHES.bright * luminance[order[np.searchsorted(reached, reached[-1] / 2)]]
+    return luminance > PATCHES.bright * weighted_median(luminance[lit.seen], atlas.area[lit.seen])
 
 
 def told_of(patches: list[int], atlas: Atlas, lit: LitDiffuse) -> list[int]:
