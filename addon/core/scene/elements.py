@@ -14,7 +14,7 @@ from ..kinds import Block
 from ..parallel import blocks, for_blocks
 from .atlas import Atlas
 from .model import Mesh
-from .rays import RayScene
+from .rays import Hits, RayScene
 
 # Where in a texel it is asked which triangle covers it: the centre first, so that a texel which only touches a
 # triangle still gets an element at its border, and thin triangles are not lost.
@@ -40,22 +40,33 @@ def uv_scale(mesh: Mesh, uv: np.ndarray) -> float:
     return float(np.sqrt(uv_area / max(area.sum(), 1e-30)))
 
 
+class Unwrapped:
+    """Triangles laid flat by their texture coordinates ((t, 3, 2)), for rays down onto texels of an image."""
+
+    def __init__(self, uv: np.ndarray, size: int):
+        self._size = size
+        flat = np.concatenate([uv.reshape(-1, 2).astype(np.float64) * size, np.zeros((3 * len(uv), 1))], 1)
+        self._scene = RayScene(flat, np.arange(3 * len(uv), dtype=np.int32).reshape(-1, 3))
+
+    def at(self, texel: np.ndarray, shift: np.ndarray) -> Hits:
+        """What lies under points of texels ((k,) flat indices), `shift` ((2,) texels) from their middles."""
+        origins = np.empty((len(texel), 3), np.float32)
+        origins[:, 0] = texel % self._size + 0.5 + shift[0]
+        origins[:, 1] = texel // self._size + 0.5 + shift[1]
+        origins[:, 2] = 1.0
+        return self._scene.intersect(origins, np.broadcast_to(np.array([0, 0, -1], np.float32), origins.shape))
+
+
 def _cover(uv: np.ndarray, size: int, threads: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Covered texels, the triangle over each and the barycentric point, by rays against the unwrapped mesh."""
     if not len(uv):
         return np.zeros(0, np.int64), np.zeros(0, np.int32), *np.zeros((2, 0), np.float32)
-    flat = np.concatenate([uv.reshape(-1, 2).astype(np.float64) * size, np.zeros((3 * len(uv), 1))], 1)
-    plane = RayScene(flat, np.arange(3 * len(uv), dtype=np.int32).reshape(-1, 3))
+    plane = Unwrapped(uv, size)
     triangle = np.full(size * size, -1, np.int32)
     u, v = np.zeros(size * size, np.float32), np.zeros(size * size, np.float32)
 
     def ask(texels: np.ndarray, shift: np.ndarray) -> None:
-        origins = np.empty((len(texels), 3), np.float32)
-        origins[:, 0] = texels % size + 0.5 + shift[0]
-        origins[:, 1] = texels // size + 0.5 + shift[1]
-        origins[:, 2] = 1.0
-        down = np.broadcast_to(np.array([0, 0, -1], np.float32), origins.shape)
-        hits = plane.intersect(origins, down)
+        hits = plane.at(texels, shift)
         found = hits.triangle >= 0
         at = texels[found]
         triangle[at], u[at], v[at] = hits.triangle[found], hits.u[found], hits.v[found]

@@ -9,8 +9,8 @@ import numpy as np
 from scipy import ndimage
 
 from ...scene.atlas import Atlas
+from ...scene.elements import Unwrapped
 from ...scene.model import Mesh
-from ...scene.rays import RayScene
 from ...scene.tangent_frame import tangent_frame
 from ...significance import LEVELS
 from .params import PLANES, PlaneParams
@@ -50,15 +50,11 @@ def texels_of(atlas: Atlas, mesh: Mesh, wanted: np.ndarray, params: PlaneParams 
     theirs = np.flatnonzero(np.isin(mesh.object_id, np.unique(atlas.object_id[wanted])))
     corner = atlas.uv[theirs].astype(np.float64) * size
     large = np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])) > 2 * params.least
-    theirs, corner = theirs[large], corner[large]
+    theirs = theirs[large]
     if not len(theirs):
         return Texels(texel[:0], texel[:0], np.zeros((0, 3)), np.zeros(0))
-    flat = np.concatenate([corner.reshape(-1, 2), np.zeros((3 * len(theirs), 1))], 1)
-    scene = RayScene(flat, np.arange(len(flat), dtype=np.int32).reshape(-1, 3))
-    above = np.stack([texel % size + 0.5, texel // size + 0.5, np.ones(len(texel))], 1).astype(np.float32)
     triangle = np.full(size * size, -1, np.int32)
-    below = np.broadcast_to(np.array([0, 0, -1], np.float32), above.shape)
-    triangle[texel] = np.append(theirs, -1)[scene.intersect(above, below).triangle]
+    triangle[texel] = np.append(theirs, -1)[Unwrapped(atlas.uv[theirs], size).at(texel, np.zeros(2)).triangle]
     # A border's texels, beside a triangle: what is shown between two texels is the mean of both.
     bare = texel[triangle[texel] < 0]
     found = triangle[bare]
