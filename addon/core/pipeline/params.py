@@ -21,8 +21,6 @@ class CorrectedParams:
         Less than this of its light no lamp is left.
     doubtful : float
         A white that scales E by more than this, or its inverse, is more likely not that white.
-    unknown_before : float
-        Relative error of an albedo, light aside, of an object whose own is not known as it had none before.
     """
 
     rounds: int = 4
@@ -30,7 +28,6 @@ class CorrectedParams:
     spots: int = 600
     least_light: float = 0.1
     doubtful: float = 1.5
-    unknown_before: float = 0.1
 
 
 CORRECTED = CorrectedParams()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from collections.abc import Callable, Container
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -49,8 +49,8 @@ class Recovery(Corrected):
         coordinates = [self.surface().atlas.uv, *([self.parts.uv] if self.parts else [])]
         return hashlib.sha256(b"".join(np.ascontiguousarray(uv).tobytes() for uv in coordinates)).hexdigest()[:16]
 
-    def write_images(self, wanted: Container[str] | None = None) -> None:
-        """The result folder's images, all or the `wanted` ones by name, materials.json and report.html."""
+    def write_images(self) -> None:
+        """The result folder's images, materials.json and report.html."""
         self.look_closer()
         lit, texture = self.lit_diffuse(), self.texture  # noqa: F841  (made once, before threads ask for it)
         # Each is made when its turn comes: all of them at once were a tenth of a large room's memory.
@@ -63,7 +63,6 @@ class Recovery(Corrected):
             "albedo_error": self.evidence.albedo_error,
             "evidence": self.evidence.shares,
         }
-        images = {name: image for name, image in images.items() if wanted is None or name in wanted}
 
         def write(name: str) -> None:
             self.store.write_exr(f"{name}.exr", self.over_atlas(name, images[name]())[::-1])
@@ -71,12 +70,11 @@ class Recovery(Corrected):
         begun = LOOKED if self._parting else 0.0
         for done, _ in enumerate(ordered_map(write, images, self.settings.threads)):
             self.progress.update(begun + (0.5 - begun) * done / len(images))
-        if wanted is None or "environment" in wanted:
-            self.store.write_exr("environment.exr", self.sky()[::-1])
-            self._write_openings()
+        self.store.write_exr("environment.exr", self.sky()[::-1])
+        self._write_openings()
         if self.settings.atlas == ROOM:
             remove_parts(self)
-        elif "base_color" in images and self._parting is not None:
+        elif self._parting is not None:
             self.parts = write_parts(self, self._parting, self.over_atlas("base_color", images["base_color"]()))
         known: dict[int, dict[str, Any]] = {
             one.object_id: {"evidence": dataclasses.asdict(one)} for one in self.evidence.objects
@@ -97,12 +95,9 @@ class Recovery(Corrected):
             return NOTHING
         surface, albedo = self.surface(), self.albedo
         measured = albedo.origin == MEASURED
-        return texture_of(surface.atlas, surface.mesh, albedo.rho, measured, self._to_texture(), albedo.error)
-
-    def _to_texture(self) -> np.ndarray:
-        """Elements whose texels may get texture, (n,) bool; not of parts that may hold several materials."""
-        guessed = [one.object_id for one in self.capture.instances if one.guess]
-        return (self.albedo.origin == FILLED) & ~np.isin(self.surface().atlas.object_id, guessed)
+        guessed = [one.object_id for one in self.capture.instances if one.guess]  # these may hold several materials
+        to_texture = (albedo.origin == FILLED) & ~np.isin(surface.atlas.object_id, guessed)
+        return texture_of(surface.atlas, surface.mesh, albedo.rho, measured, to_texture, albedo.error)
 
     def over_atlas(self, name: str, values: np.ndarray) -> np.ndarray:
         """The image `name` of the elements' values ((n, c) float32), with texture where there is any, (s, s, c)."""

@@ -1,8 +1,8 @@
 """A few objects of a finished result fitted again, with all else held: seconds instead of a run.
 
-What it needs lies in the result folder: the stages, the room and the images. The capture may be gone. Held are the
-light, the other objects and what glossy things reflect onto the room; a whole run of the specular stage brings
-that up to date.
+What it needs lies in the result folder: the stages and the room. The capture may be gone. Held are the light, the
+fits of the other objects and what glossy things reflect onto the room; a whole run of the specular stage brings that up
+to date. What is made of them is made anew for all of the room.
 """
 
 from __future__ import annotations
@@ -16,23 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from ..brdf.material import ObjectMaterial
 from ..errors import BadInputError, MissingStageError
-from ..evidence.collect import Evidence
-from ..evidence.light import LightEvidence
-from ..evidence.objects import object_evidence
-from ..evidence.params import CALIBRATION
-from ..evidence.texel import TexelEvidence, gloss_error
-from ..io.exr import read_exr
-from ..passes.albedo.albedo import CLOSED, MEASURED, Albedo
-from ..passes.albedo.params import ALBEDO
 from ..progress import Progress
 from ..results.overrides import Given, Overrides, heeded, parse
 from ..results.room_file import DAMAGE, MATERIALS, Room, read_room
 from ..results.store import Store
 from ..scene.model import Mesh
 from ..settings import ROOM, Settings
-from .params import CORRECTED
 from .parts import STAGE as DETAIL
 from .parts import stored_key as detail_key
 from .recover import Recovery
@@ -42,8 +32,6 @@ from .stage import Stage
 from .stages import code
 
 REPORT = "report.json"
-IMAGES = ("albedo", "base_color", "coverage", "albedo_error")
-"""What changes with an object's material."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -157,8 +145,6 @@ class Refit(Recovery):
     def __init__(self, result: Result, store: Store, progress: Progress):
         super().__init__(result.room.capture, store, result.settings, progress, _laid_out, result.overrides)
         self.result = result
-        self._before = {m.object_id: m for m in result.room.materials}
-        self.whole = self.overrides.as_dict().get("white") != result.materials.get("white") or not self._has_images()
         if result.report.get("code", code()) != code():
             raise _again(store.folder, "another version of Scan Relight made it")
         for name in ("surface", "lit_diffuse", "shading"):
@@ -167,9 +153,6 @@ class Refit(Recovery):
         if self.settings.atlas != ROOM and store.stored_key(DETAIL) != detail_key(self):
             raise _again(store.folder, "what its frames show of finer texels was cleared")
         self._specular_before = self._load_specular()
-
-    def _has_images(self) -> bool:
-        return all(self.store.path(f"{name}.exr").is_file() for name in (*IMAGES, "evidence"))
 
     def _first_key(self, stage: Stage) -> str:
         return self.store.stored_key(stage.name) or ""
@@ -212,113 +195,6 @@ class Refit(Recovery):
             self.store.save("specular", self.keys["specular"], *found.to_store(self.overrides))
         self.done["specular"] = found
         self.progress.done()
-
-    # What is written: of what was touched anew, of all else as it was.
-
-    def _image(self, name: str) -> np.ndarray:
-        """Values of the elements in an image of the result, (n, 3) float32."""
-        image = self._image_before(name)
-        return image.reshape(-1, image.shape[-1])[self.surface().atlas.texel]
-
-    def _image_before(self, name: str) -> np.ndarray:
-        """An image of the result, (s, s, 3) float32, row 0 at the bottom."""
-        size = self.surface().atlas.size
-        image = read_exr(self.store.path(f"{name}.exr")).rgb[::-1]
-        if image.shape[:2] != (size, size):
-            raise _again(self.store.folder, f"'{name}.exr' is not the run's")
-        return image.astype(np.float32)
-
-    def _to_texture(self) -> np.ndarray:
-        found = super()._to_texture()
-        return found if self.whole else found & self._own
-
-    def over_atlas(self, name: str, values: np.ndarray) -> np.ndarray:
-        """As `Recovery.over_atlas`; texels of what was not touched stay as they were."""
-        found = super().over_atlas(name, values)
-        if self.whole or name not in IMAGES:
-            return found
-        touched = self.surface().atlas.image(self._own, True)
-        return np.where(touched[..., None], found, self._image_before(name))
-
-    @cached_property
-    def _own(self) -> np.ndarray:
-        return np.isin(self.surface().atlas.object_id, list(self.touched))
-
-    @cached_property
-    def _albedo_before(self) -> Albedo:
-        origin = self._image("coverage")[:, 2].astype(np.int8) % CLOSED
-        return Albedo(self._image("albedo"), origin, np.zeros(len(origin), np.float32))
-
-    @cached_property
-    def albedo(self) -> Albedo:
-        """As `Recovery.albedo`, of the touched objects anew."""
-        if self.whole:
-            return super().albedo
-        before, atlas = self._albedo_before, self.surface().atlas
-        others = {i.object_id for i in self.capture.instances} - self.touched
-        found = self.albedo_of_all_but(self.emitters | others)
-        rho, origin = found.rho.copy(), found.origin
-        measured = before.rho[before.origin == MEASURED]
-        middle = np.median(measured, 0) if len(measured) else np.full(3, 0.5, np.float32)
-        for i in self.touched - self.emitters:
-            own = atlas.elements_of(i)
-            if not (origin[own] == MEASURED).any() and not self.overrides.of(i).base_color:
-                # What is taken over from its class is held; a lamp had nothing.
-                was = before.rho[own]
-                rho[own] = was if was.any() else middle
-        own = self._own
-        origin, error = np.where(own, origin, before.origin), np.where(own, found.error, before.error)
-        return Albedo(np.where(own[:, None], rho, before.rho), origin, error)
-
-    def base_color(self) -> np.ndarray:
-        """As `Recovery.base_color`, of the touched objects anew."""
-        found = super().base_color()
-        return found if self.whole else np.where(self._own[:, None], found, self._image("base_color"))
-
-    @cached_property
-    def _materials(self) -> list[ObjectMaterial]:
-        found = super()._materials
-        return (
-            found
-            if self.whole
-            else [m if m.object_id in self.touched else self._before.get(m.object_id, m) for m in found]
-        )
-
-    @cached_property
-    def evidence(self) -> Evidence:
-        """As `Recovery.evidence`, of the touched objects anew: what gloss and albedo have to do with it."""
-        if self.whole:
-            return super().evidence
-        atlas, lit = self.surface().atlas, self.lit_diffuse()
-        error, (shading, clipped, unseen) = self._image("albedo_error"), self._image("evidence").T
-        before, now = self._albedo_before, self.albedo
-        mine = [m for m in self.materials() if m.object_id in self.touched]
-        was = [self._before[m.object_id] for m in mine]
-        gloss_was, gloss = (
-            gloss_error(atlas, albedo, told, specular, self.irradiance)[:, None]
-            for albedo, told, specular in (
-                (before, was, self._specular_before[0].specular),
-                (now, mine, self.specular().specular),
-            )
-        )
-        relative = np.sqrt(np.maximum(np.square(error) - np.square(gloss_was), 0)) / np.maximum(
-            before.rho, ALBEDO.floor
-        )
-        bare = ~(error > 0).any(1, keepdims=True)
-        relative = np.where(bare, np.hypot(shading, CORRECTED.unknown_before)[:, None], relative)
-        fresh = np.minimum(np.sqrt(np.square(relative * now.rho) + np.square(gloss)), CALIBRATION.nothing_known)
-        known = {m.object_id for m in mine if m.model.gives_light or "base_color" in m.given}
-        fresh = np.where(np.isin(atlas.object_id, list(known))[:, None], 0, fresh)
-        texels = TexelEvidence(shading, np.where(self._own[:, None], fresh, error).astype(np.float32), unseen, clipped)
-        zeros = np.zeros(len(atlas), np.float32)
-        count = int(self.result.report["figures"].get("evidence", {}).get("spots_checked", 0))
-        return Evidence(
-            LightEvidence(zeros, unseen, zeros, {}, count), texels, object_evidence(atlas, lit, now, texels)
-        )
-
-    def write(self) -> None:
-        """Images, materials.json and report.html of the result folder."""
-        self.write_images(None if self.whole else IMAGES)
 
     def report(self) -> dict[str, Any]:
         """The result's report.json with what has changed."""
