@@ -6,7 +6,7 @@ import bpy
 
 from ...addon.bridge.export import export
 from ...addon.core.errors import BadInputError
-from ...addon.core.results.room_file import capture_name
+from ...addon.core.io.folder import capture_name
 from ..base.operator import needs
 from ..base.panel import SidebarPanel
 from .base import SceneOperator, default_folder

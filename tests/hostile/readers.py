@@ -170,6 +170,7 @@ def result(name: str) -> Reader:
     """A file of a result folder."""
 
     def make(root: Path) -> Path:
+        from addon.core.pipeline.stages import code
         from addon.core.results.place import write_capture
         from addon.core.results.room_file import write_room
         from addon.core.results.store import Store
@@ -182,7 +183,7 @@ def result(name: str) -> Reader:
             store.save("surface", "k", STAGE, {"noise": 0.5})
             store.write_json("materials.json", {"run": "0" * 16, "layout": "1" * 16, "objects": [frame]})
             store.write_json("overrides.json", {"objects": {"1": {"model": "specular", "f0": 0.04}}})
-            store.write_json("report.json", {"settings": {}, "stages": {}, "warnings": ["one"]})
+            store.write_json("report.json", {"settings": {}, "stages": {}, "warnings": ["one"], "code": code()})
             store.write_json("openings.json", {"openings": [{"corners": [[[0] * 3] * 4], "radiance": [1, 1, 1]}]})
         write_room(root, Capture(root, mesh, (Instance(0, "wall"), Instance(1, "sofa")), (), format="nerfstudio"))
         write_capture(root, root.parent)
@@ -198,7 +199,7 @@ def result(name: str) -> Reader:
             assert found is None or all(np.array_equal(found[name], STAGE[name]) for name in STAGE)
             store.load_meta("surface", "k"), store.stored_meta("surface"), store.stored_key("surface")
         room_file.run_of(root), room_file.layout_of(root), room_file.objects_of(root), room_file.openings_of(root)
-        room_file.capture_name(root), room_file.root_of(root), place.captures(root)
+        room_file.root_of(root), place.captures(root)
         unfinished.goes_on_with(root), cache.size(root)
         room_file.read_room(root)
         open_result(root, [1])

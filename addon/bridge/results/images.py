@@ -11,7 +11,8 @@ import bpy
 
 from ...core.atomic import replacing
 from ...core.errors import BadInputError, StorageError
-from ...core.results.room_file import capture_name, layout_of
+from ...core.io.folder import capture_name
+from ...core.results.room_file import layout_of
 from ..data.images import DATA, RADIANCE, image_name, load_image, relative_to, result_of, tiles_of
 from ..marks import IMAGE, LAYOUT
 from ..refused import refused

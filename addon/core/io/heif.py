@@ -6,8 +6,6 @@ Source: ISO/IEC 23008-12, 6.5.10 (irot).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +15,7 @@ from ..errors import BadInputError
 from ..kinds import Code, Limit
 from .files import read_bytes
 from .oiio import Header, Stored
-from .picture import MAX_PIXELS, too_large
+from .picture import check_claim, decoding
 
 HEIC = "HEIC"
 BOX: Code[bytes] = b"ftyp"
@@ -41,13 +39,13 @@ def heif_header(path: Path | str) -> Header:
     BadInputError
         Damaged, larger than any picture, or there is no pillow-heif.
     """
-    with _told(path):
+    with decoding(path):
         return _checked(_open(path), Path(path))
 
 
 def heif_exif(path: Path | str) -> bytes:
     """The EXIF of `path`, a TIFF; empty where it has none. Raises as `heif_header`."""
-    with _told(path):
+    with decoding(path):
         found = _open(path).info.get("exif") or b""
         return found.removeprefix(b"Exif\0\0")
 
@@ -70,7 +68,7 @@ def read_heif(path: Path | str) -> Stored:
     BadInputError
         As `heif_header`, and where the pixels are damaged or cut off.
     """
-    with _told(path):
+    with decoding(path):
         file = _open(path)
         header = _checked(file, Path(path))
         pixels = np.asarray(file)
@@ -98,23 +96,7 @@ def _open(path: Path | str) -> Any:
 
 
 def _checked(file: Any, path: Path) -> Header:
-    """The header, before room for any pixel is made."""
     width, height = file.size
     bits = 8 if int(file.info["bit_depth"]) <= 8 else 16
-    stored = width * height * 4 * (bits // 8)
-    if not 0 < width * height <= MAX_PIXELS or too_large(stored, path.stat().st_size):
-        raise BadInputError(
-            f"Picture '{path}' claims {width} x {height} pixels, more than it can hold; write it again."
-        )
+    check_claim(path, width, height, width * height * 4 * (bits // 8))
     return Header(width, height, bits)
-
-
-@contextmanager
-def _told(path: Path | str) -> Iterator[None]:
-    """Turn what the library raises into one sentence."""
-    try:
-        yield
-    except BadInputError:
-        raise
-    except (ValueError, EOFError, SyntaxError, RuntimeError, OSError, MemoryError, LookupError, TypeError) as error:
-        raise BadInputError(f"Picture '{path}' is damaged or cut off; write or copy it again.") from error

@@ -6,6 +6,7 @@ Blender's own builds bring the library. Radiance HDR and EXIF are read by our ow
 from __future__ import annotations
 
 import importlib.util
+import math
 import os
 import sys
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 from ..errors import BadInputError
 from ..kinds import Code, Limit
 from .files import read_bytes
-from .picture import MAX_PIXELS, too_large
+from .picture import check_claim
 
 PNG, JPEG, TIFF = "PNG", "JPEG", "TIFF"
 CODED: dict[str, bytes | tuple[bytes, ...]] = {
@@ -163,24 +164,17 @@ def _checked(file: Any, path: Path) -> Header:
     """The header, before room for any pixel is made."""
     spec = file.spec()
     width, height, depth = spec.width, spec.height, str(spec.format)
-    if not 0 < width * height <= MAX_PIXELS or width * height * spec.nchannels > 4 * MAX_PIXELS:
-        raise BadInputError(f"Picture '{path}' claims {width} x {height} pixels; write it again.")
     bits = spec.get_int_attribute("oiio:BitsPerSample", 8)
     if depth not in DEPTHS or (file.format_name() == "tiff" and bits not in WHOLE_BYTES):
         raise BadInputError(
             f"Picture '{path}' has channels of {bits} bits ({depth}), which isn't supported; write PNG or EXR."
         )
-    size = path.stat().st_size
-    more = too_large(spec.image_bytes(), size)
+    most = math.inf
     if file.format_name() == "png":
         bits, colour = _png_kind(path)
         larger = 4 if colour == PALETTE else 1  # what a pixel of the file becomes when a palette is looked up
-        more |= spec.image_bytes() * min(bits, 8) // 8 > max(LITTLE, larger * MAX_RATIO * size)
-    if more:
-        raise BadInputError(
-            f"Picture '{path}' claims {width} x {height} pixels, more than it can hold; it is "
-            "damaged or cut off, so write or copy it again."
-        )
+        most = max(LITTLE, larger * MAX_RATIO * path.stat().st_size) * 8 / min(bits, 8)
+    check_claim(path, width, height, spec.image_bytes(), most)
     return Header(width, height, DEPTHS[depth])
 
 

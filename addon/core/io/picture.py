@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from ..errors import BadInputError
 from ..kinds import Limit
 
 MAX_PIXELS: Limit[int] = 1 << 26
@@ -23,6 +28,33 @@ LARGE: Limit[tuple[int, int]] = (1 << 28, 400)
 def too_large(stored: int, size: int) -> bool:
     """Whether so many bytes of pixels (`stored`) are out of all proportion to a file of `size` bytes."""
     return stored > max(LARGE[0], LARGE[1] * size)
+
+
+def check_claim(path: Path, width: int, height: int, stored: int, most: float = math.inf) -> None:
+    """Raise `BadInputError` where a picture's header claims too much, before room for any pixel is made.
+
+    Parameters
+    ----------
+    stored : int
+        Bytes that its pixels take.
+    most : float
+        Bytes of pixels that such a file can hold, where its format tells.
+    """
+    if not 0 < width * height <= MAX_PIXELS or stored > most or too_large(stored, path.stat().st_size):
+        raise BadInputError(
+            f"Picture '{path}' claims {width} x {height} pixels, more than it can hold; write or copy it again."
+        )
+
+
+@contextmanager
+def decoding(path: Path | str) -> Iterator[None]:
+    """Turn whatever a library raises at the picture `path` into one sentence, a `BadInputError`."""
+    try:
+        yield
+    except BadInputError:
+        raise
+    except Exception as error:
+        raise BadInputError(f"Picture '{path}' is damaged or cut off; write or copy it again.") from error
 
 
 def too_few_bytes(width: int, height: int, size: int) -> bool:

@@ -18,7 +18,7 @@ from ..errors import BadInputError
 from ..kinds import Code, Limit
 from . import exif
 from .files import read_bytes
-from .picture import MAX_PIXELS, Picture, too_large
+from .picture import Picture, check_claim, decoding
 
 DNG = "DNG"
 DNG_VERSION: Code[int] = 50706
@@ -89,13 +89,7 @@ def _open(path: Path | str) -> Iterator[Any]:
             f"Picture '{path}' is DNG, which needs rawpy; install it (pip: rawpy) into this Python, or develop the "
             "pictures to linear OpenEXR or 16-bit TIFF."
         ) from error
-    try:
-        with rawpy.imread(str(path)) as file:
-            width, height = file.sizes.width, file.sizes.height
-            if not 0 < width * height <= MAX_PIXELS or too_large(2 * width * height, Path(path).stat().st_size):
-                raise BadInputError(
-                    f"Picture '{path}' claims {width} x {height} pixels, more than it can hold; write it again."
-                )
-            yield file
-    except (rawpy.LibRawError, RuntimeError, ValueError, OSError, MemoryError) as error:
-        raise BadInputError(f"Picture '{path}' is damaged or cut off; write or copy it again.") from error
+    with decoding(path), rawpy.imread(str(path)) as file:
+        width, height = file.sizes.width, file.sizes.height
+        check_claim(Path(path), width, height, 2 * width * height)
+        yield file

@@ -59,11 +59,8 @@ class Result:
 
     @property
     def settings(self) -> Settings:
-        """The settings that the result was made with; what is no longer offered is at its default."""
-        told = self.report["settings"]
-        known = {field.name for field in dataclasses.fields(Settings)} & told.keys()
-        offered = {name for name in known if told[name] in Settings.CHOICES.get(name, (told[name],))}
-        return Settings(**{name: told[name] for name in offered})
+        """The settings that the result was made with."""
+        return Settings(**self.report["settings"])
 
     @property
     def given(self) -> dict[int, dict]:
@@ -99,6 +96,8 @@ def open_result(
     overrides = heeded(folder, known, override, heed_kept)
     try:
         report, materials = (json.loads((folder / name).read_text(encoding="utf-8")) for name in (REPORT, MATERIALS))
+        if report.get("code") != code():
+            raise _again(folder, "another version of Scan Relight made it")
         result = Result(room, report, materials, overrides, frozenset(objects))
         result.settings, result.given  # noqa: B018  (what is damaged is told now)
     except FileNotFoundError as error:
@@ -145,8 +144,6 @@ class Refit(Recovery):
     def __init__(self, result: Result, store: Store, progress: Progress):
         super().__init__(result.room.capture, store, result.settings, progress, _laid_out, result.overrides)
         self.result = result
-        if result.report.get("code", code()) != code():
-            raise _again(store.folder, "another version of Scan Relight made it")
         for name in ("surface", "lit_diffuse", "shading"):
             if store.stored_key(name) is None or store.stored_key(name) != self.keys[name]:
                 raise _again(store.folder, "its stages were cleared or are another run's")

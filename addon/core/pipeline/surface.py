@@ -17,7 +17,7 @@ from ..lit_diffuse.from_texture import face_edge
 from ..origin import OWN, of_thing
 from ..passes.mesh_denoising.denoise import without_noise
 from ..scene.closing import as_scanned, settled
-from ..scene.elements import Elements, uv_scale
+from ..scene.elements import Elements
 from ..scene.model import Capture, Mesh
 from ..scene.surface import Surface, build_surface, from_uv
 from ..scene.two_sides import with_backs
@@ -107,8 +107,6 @@ def from_store(arrays: dict[str, np.ndarray], meta: dict[str, Any], captured: Me
     """The inverse of `to_store`."""
     mesh = replace(captured, vertices=arrays["vertices"]) if "vertices" in arrays else captured
     mesh = with_backs(mesh, arrays["backs"])
-    # Stages of versions before this lack some of it: each texel had an element.
-    whole = all(name in arrays for name in Elements._fields)
-    known = Elements(**{name: arrays[name] for name in Elements._fields}) if whole else None
-    texel = float(meta.get("texel_size", 0)) or 1 / (uv_scale(mesh, arrays["uv"]) * int(meta["size"]))
-    return from_uv(mesh, arrays["sign"], arrays["uv"], int(meta["size"]), texel, float(meta["noise"]), known)
+    known = Elements(**{name: arrays[name] for name in Elements._fields})
+    size, texel, noise = int(meta["size"]), float(meta["texel_size"]), float(meta["noise"])
+    return from_uv(mesh, arrays["sign"], arrays["uv"], size, texel, known, noise)

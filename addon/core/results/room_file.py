@@ -216,11 +216,6 @@ def _picture(told: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def capture_name(folder: Path | str) -> str:
-    """Name of the room that a result is of: its capture's folder, or the result's own where that is not told."""
-    return _told(folder, "capture") or Path(folder).name
-
-
 def root_of(folder: Path | str) -> Path | None:
     """Folder of the capture that `ROOM` tells of, and nothing else of it; None where the file is absent or damaged."""
     try:

@@ -161,7 +161,7 @@ def build_surface(
     cells = SeenCells(towards, scene, cameras, texel, threads) if cameras and coarse_unseen else None
     uv, size, edge, crumbs = _laid_out(mesh, unwrap, texel, largest, cells)
     elements = find_elements(towards, turned(uv, _every(mesh, sides.sign)), size, cells, crumbs, threads)
-    return from_uv(mesh, sides.sign, uv, size, edge, known=elements, scene=scene)
+    return from_uv(mesh, sides.sign, uv, size, edge, elements, scene=scene)
 
 
 def _laid_out(
@@ -188,13 +188,13 @@ def from_uv(
     uv: np.ndarray,
     size: int,
     texel_size: float,
+    known: Elements,
     noise: float = 0.0,
-    known: Elements | None = None,
     scene: RayScene | None = None,
 ) -> Surface:
     """The surface for a known layout of a mesh `with_backs`, and the sign of each of its first sides.
 
-    `known` and `scene`, if given, are what was found of the elements before, and the rays against it.
+    `known` is what was found of the elements before; so is `scene`, if given, of the rays against the mesh.
     """
     towards = facing(mesh, sign)
     atlas = make_atlas(towards, turned(uv, _every(mesh, sign)), size, known)

@@ -209,13 +209,6 @@ def test_what_can_not_be_done_is_one_sentence(disk, result, tmp_path):
         open_result(result, [3])
 
 
-def test_a_setting_that_is_no_longer_offered_is_at_its_default(result):
-    report = json.loads((result / "report.json").read_text())
-    report["settings"] |= {"median": "batched", "gone": 3}
-    (result / "report.json").write_text(json.dumps(report))
-    assert open_result(result, (0,)).settings == QUICK
-
-
 def test_stages_of_another_run_are_refused(disk, result):
     with Store(result) as store:  # the shading stage anew with other settings, and stopped there
         Recovery(read_capture(disk.root), store, replace(QUICK, shading_rays=32), Progress(), disk.unwrap).shading()
