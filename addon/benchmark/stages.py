@@ -35,12 +35,7 @@ WHOLE = "pipeline"
 FEW_RAYS: Changes = {"shading_rays": 100, "specular_rays": 100}
 """The smaller of the paper's two settings; its 10,000 rays at each texel would take hours."""
 ALTERNATIVES: dict[str, tuple[tuple[str, Changes], ...]] = {
-    "lit_diffuse": (
-        ("default", {}),
-        ("exact", {"median": "exact"}),
-        ("mean", {"median": "mean"}),
-        (PAPERS, {"median": "p2"}),
-    ),
+    "lit_diffuse": (("default", {}), ("mean", {"median": "mean"}), (PAPERS, {"median": "p2"})),
     "shading": (
         *(("aimed rays", {"shading_rays": n, "emitter_rays": n // 4, "portal_rays": n // 4}) for n in (16, 64, 256)),
         ("default", {}),

@@ -31,9 +31,8 @@ class Settings:
         Put frames right that lie beside what all of them show together. Good poses stay as they are, and so do cameras
         in your own scene.
     median : str
-        'adaptive' (exact for short videos; beyond, exact for a spot's first 20 observations and close from then on),
-        'exact' (all observations go to disk), 'p2' (as in the paper: P-square over all observations, in the order of
-        the video) or 'mean'.
+        'exact' (all observations go to disk meanwhile, 16 bytes each), 'p2' (as in the paper: P-square over all
+        observations, in the order of the video) or 'mean'.
     sharpen : bool
         Put back onto the lit diffuse texture what its blur took from it and the frames still show; one more look at
         every frame.
@@ -74,7 +73,7 @@ class Settings:
     atlas: str = ROOM
     denoise_mesh: bool = True
     refine_poses: bool = True
-    median: str = "adaptive"
+    median: str = "exact"
     sharpen: bool = True
     shading: str = "aimed"
     shading_rays: int = 128
@@ -92,7 +91,7 @@ class Settings:
 
     CHOICES = {
         "atlas": (ROOM, "object", "udim"),
-        "median": ("adaptive", "exact", "p2", "mean"),
+        "median": ("exact", "p2", "mean"),
         "shading": ("aimed", "uniform"),
         "specular": ("frames", "target"),
     }

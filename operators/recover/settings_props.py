@@ -69,8 +69,8 @@ FROM_STAGE = bpy.props.EnumProperty(
         *((name, LABELS[name], f"From '{LABELS[name]}' on") for name in RUN_STAGES),
     ],
 )
-SAVED_AS = {"median": (0, 2, 3, 4)}
-"""Numbers by which saved files know choices, where some have gone: 1 was 'batched'."""
+SAVED_AS = {"median": (2, 3, 4)}
+"""Numbers by which saved files know choices, where some have gone: 0 was 'adaptive', 1 'batched'."""
 PACKAGES = ("scipy", "embreex", "OpenEXR")
 
 

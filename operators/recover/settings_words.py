@@ -48,7 +48,6 @@ WORDS = {
         "Average",
         "How the frames' views of a spot become one colour",
         {
-            "adaptive": ("Automatic", "Exact for short videos, close to it for longer ones"),
             "exact": ("Exact", "The exact median; every view goes to the disk meanwhile"),
             "p2": ("Estimated", "A running estimate of the median, as in the paper"),
             "mean": ("Mean", "The plain mean; lets highlights and passers-by in"),

@@ -56,7 +56,7 @@ def accumulate(
     frames: Sequence[Frame],
     read: Callable[[Frame], Pixels],
     *,
-    median: str = "adaptive",
+    median: str = "exact",
     seed: int = 0,
     threads: int = 0,
     folder: Path | None = None,
@@ -76,9 +76,9 @@ def accumulate(
     read : callable
         Gives a frame's pixels.
     median : str
-        'adaptive', 'exact', 'p2' or 'mean'; see `medians`.
+        'exact', 'p2' or 'mean'; see `medians`.
     folder : Path, optional
-        Where the exact median, and at first the adaptive one, keeps observations meanwhile.
+        Where the exact median keeps observations meanwhile.
     edge_tier : bool
         Observations at depth edges count only where there are too few others.
     only : (n,) bool, optional

@@ -1,9 +1,8 @@
-"""The exact median: every observation is kept on disk."""
+"""The exact median: every observation is kept on disk meanwhile."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,7 @@ class Exact:
     end each bucket is read and sorted by itself.
     """
 
-    BUCKET = 1 << 16
+    BUCKET = 1 << 14
     HELD = 1 << 22
     RECORD = np.dtype([("element", "<u4"), ("value", "<f4", 3)])
 
@@ -40,11 +39,6 @@ class Exact:
         self._held.append((record, np.searchsorted(element, np.arange(self._buckets + 1) * self.BUCKET)))
         if sum(len(held) for held, _ in self._held) >= self.HELD:
             self._flush()
-
-    @property
-    def observations(self) -> int:
-        """How many there are so far."""
-        return sum(len(record) for record, _ in self._held) + int(self._flushed[-1][-1] if self._flushed else 0)
 
     def _flush(self) -> None:
         starts = [self._flushed[-1][-1] if self._flushed else 0]
@@ -71,19 +65,6 @@ class Exact:
         parts += self._held_of(bucket)
         return np.concatenate(parts) if parts else np.zeros(0, self.RECORD)
 
-    def replay(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """All observations anew, in portions as `add` takes them: each element at most once, in the order it had."""
-        for bucket in range(self._buckets):
-            record = self._records(bucket)
-            record = record[np.argsort(record["element"], kind="stable")]
-            element = record["element"]
-            first = np.flatnonzero(np.diff(element, prepend=np.uint32(0xFFFFFFFF)))
-            turn = np.arange(len(element)) - np.repeat(first, np.diff(first, append=len(element)))
-            # Sorted by turn, then element: each turn is one portion.
-            order = np.argsort(turn, kind="stable")
-            for portion in np.split(order, np.cumsum(np.bincount(turn))[:-1]):
-                yield element[portion].astype(np.int32), record["value"][portion]
-
     def _summarise(self, bucket: int) -> tuple[np.ndarray, np.ndarray]:
         """Quartiles ((k, 3, 3) float32: element, channel, quartile) and counts of one bucket."""
         record = self._records(bucket)
@@ -107,7 +88,9 @@ class Exact:
     def result(self) -> Summary:
         lower, median, upper = np.empty((len(QUARTILES), self._count, 3), np.float32)
         count = np.empty(self._count, np.int32)
-        found = ordered_map(self._summarise, range(self._buckets), self._threads)
+        sizes = sum((np.diff(starts) for starts in self._flushed), np.zeros(self._buckets, np.int64))
+        each = 3 * self.RECORD.itemsize * int(sizes.max(initial=0))  # read, put in order, and its values sorted
+        found = ordered_map(self._summarise, range(self._buckets), self._threads, each=each)
         for part, (quartiles, seen) in zip(blocks(self._count, self.BUCKET), found, strict=True):
             lower[part], median[part], upper[part] = quartiles.transpose(2, 0, 1)
             count[part] = seen

@@ -10,21 +10,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..paper.p_square import PSquare, Summary
-from .adaptive import Adaptive
 from .estimator import Estimator
 from .exact import Exact
 from .mean import Mean
 
-__all__ = ["Adaptive", "Estimator", "Exact", "Mean", "PSquare", "Summary", "make_estimator"]
+__all__ = ["Estimator", "Exact", "Mean", "PSquare", "Summary", "make_estimator"]
 
 
 def make_estimator(name: str, count: int, folder: Path | str | None = None, threads: int = 0) -> Estimator:
-    """'adaptive', 'exact', 'p2' (the paper's) or 'mean' for `count` elements.
-
-    `folder` takes what 'exact', and 'adaptive' at first, write to disk.
-    """
+    """'exact', 'p2' (the paper's) or 'mean' for `count` elements; `folder` takes what 'exact' writes to disk."""
     make: dict[str, Callable[[], Estimator]] = {
-        "adaptive": lambda: Adaptive(count, folder, threads),
         "exact": lambda: Exact(count, folder, threads),
         "p2": lambda: PSquare(count),
         "mean": lambda: Mean(count),

@@ -218,7 +218,7 @@ def test_choices_of_older_files_are_what_they_were(choices):
     """A choice that has gone is the default; the others have not moved up."""
     settings = choices.settings
     own = settings.bl_system_properties_get(do_create=True) if bpy.app.version >= (5, 0) else settings
-    for number, name in ((1, "adaptive"), (2, "exact"), (3, "p2"), (4, "mean")):
+    for number, name in ((0, "exact"), (1, "exact"), (2, "exact"), (3, "p2"), (4, "mean")):
         own["median"] = number
         assert settings.value().median == name
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.lit_diffuse.batched import KNOTS, SLOTS, Batched, knot_ranks
-from addon.core.lit_diffuse.medians import Adaptive, Exact, Mean, PSquare, make_estimator
-from addon.core.lit_diffuse.sorting import comparators, sort_planes
+from addon.core.lit_diffuse.medians import Exact, Mean, PSquare, make_estimator
 
 ARTICLE = [0.02, 0.15, 0.74, 3.39, 0.83, 22.37, 10.15, 15.43, 38.62, 15.92,
            34.60, 10.28, 1.47, 0.40, 0.05, 11.39, 0.27, 0.42, 0.09, 11.37]  # fmt: skip
@@ -85,7 +83,7 @@ def test_exact_takes_zeros_of_either_sign():
     assert one_by_one(Exact(1), [-0.0, -0.0, 1.0]).median[0, 0] == 0
 
 
-@pytest.mark.parametrize("name", ["adaptive", "exact", "p2", "mean"])
+@pytest.mark.parametrize("name", ["exact", "p2", "mean"])
 def test_nothing_added_gives_nothing(name):
     result = make_estimator(name, 3).result()
     assert result.count.tolist() == [0, 0, 0] and np.isnan(result.median).all()
@@ -169,15 +167,15 @@ def test_mean_and_deviation():
 
 
 def held_bytes(value) -> int:
-    """Bytes of all arrays that an estimator, or what it has handed over to, holds."""
+    """Bytes of all arrays that an estimator holds."""
     if isinstance(value, np.ndarray):
         return value.nbytes
-    if isinstance(value, (Adaptive, Exact, Batched, PSquare, Mean)):
+    if isinstance(value, (Exact, PSquare, Mean)):
         value = list(vars(value).values())
     return sum(map(held_bytes, value)) if isinstance(value, (list, tuple)) else 0
 
 
-@pytest.mark.parametrize("name", ["adaptive", "exact", "p2", "mean"])
+@pytest.mark.parametrize("name", ["exact", "p2", "mean"])
 def test_memory_does_not_grow_with_the_observations(name, monkeypatch, tmp_path):
     monkeypatch.setattr(Exact, "HELD", 1000)
     estimator, every = make_estimator(name, 100, tmp_path), np.arange(100, dtype=np.int32)
@@ -199,112 +197,3 @@ def test_median_drops_a_minority_that_the_mean_keeps():
         mean.add(every, values)
     assert np.abs(np.log(exact.result().median)).max() < 0.1
     assert np.median(mean.result().median) > 1.5
-
-
-def batched(x: np.ndarray):
-    """Summary of observations (n, elements, 3)."""
-    estimator, every = Batched(x.shape[1], threads=1), np.arange(x.shape[1], dtype=np.int32)
-    for values in x:
-        estimator.add(every, values)
-    return estimator.result()
-
-
-def log_error(found, true) -> float:
-    return float(np.sqrt(np.mean(np.log(found / true) ** 2)))
-
-
-def test_batched_is_the_exact_median_while_observations_fit():
-    """With counts of all kinds side by side; bit by bit what `Exact` gives."""
-    rng = np.random.default_rng(0)
-    counts = np.array([0, 1, 2, 3, 4, 5, SLOTS - 1, SLOTS, SLOTS + 1, 200, 0, *rng.integers(0, SLOTS + 1, 60)])
-    added, _ = ragged(rng, counts)
-    ours, exact = Batched(len(counts)), Exact(len(counts))
-    for element, x in added:
-        ours.add(element, x)
-        exact.add(element, x)
-    found, wanted = ours.result(), exact.result()
-    few = counts <= SLOTS
-    assert found.count.tolist() == counts.tolist()
-    for name in ("lower", "median", "upper"):
-        assert np.array_equal(getattr(found, name)[few], getattr(wanted, name)[few], equal_nan=True), name
-
-
-@pytest.mark.parametrize("share", [0.2, 0.4])
-@pytest.mark.parametrize("n", [30, 100, 1000])
-def test_batched_shuffled_has_a_tenth_of_p_squares_error_as_filmed(n, share):
-    """P-square sees the highlight as a camera that moves past does: in one block."""
-    rng = np.random.default_rng(n)
-    block = int(share * n)
-    start = rng.integers(0, n - block + 1, (1, 100, 1))
-    at = np.arange(n)[:, None, None]
-    bright = (at >= start) & (at < start + block)
-    on_top = bright * rng.exponential(3.25, (n, 100, 1))
-    x = (np.exp(rng.normal(0, 0.03, (n, 100, 3))) * (1 + on_top)).astype(np.float32)
-    p2, every, true = PSquare(100), np.arange(100, dtype=np.int32), np.median(x, 0)
-    for values in x:
-        p2.add(every, values)
-    ours = log_error(batched(x[rng.permutation(n)]).median, true)
-    assert ours <= 0.1 * log_error(p2.result().median, true)
-    assert ours < 0.01
-
-
-def test_batched_takes_ties_zeros_and_six_decades():
-    rng = np.random.default_rng(4)
-    for x in (
-        np.full((300, 4, 3), 0.7),
-        np.zeros((300, 4, 3)),
-        np.full((50, 4, 3), -0.0),
-        rng.choice([0.25, 0.5], (301, 4, 3), p=[0.2, 0.8]),
-    ):
-        x = x.astype(np.float32)
-        assert np.array_equal(batched(x).median, np.median(x, 0))
-    wide = (10 ** rng.uniform(-4, 2, (1000, 50, 3))).astype(np.float32)
-    assert log_error(batched(wide).median, np.median(wide, 0)) < 0.1  # 13.8 from end to end
-
-
-@pytest.mark.parametrize("bucket", [1 << 16, 7])
-def test_adaptive_is_exact_at_first_and_batched_from_then_on(bucket, tmp_path, monkeypatch):
-    """In the end it is as if all observations had gone to the summary from the start, in their order."""
-    monkeypatch.setattr(Exact, "BUCKET", bucket)
-    monkeypatch.setattr(Exact, "HELD", 100)
-    rng = np.random.default_rng(1)
-    for counts, twin in ((rng.integers(0, 20, 40), Exact), (rng.integers(0, 150, 40), Batched)):
-        adaptive, other = Adaptive(40, tmp_path), twin(40)
-        for element, x in ragged(rng, counts)[0]:
-            adaptive.add(element, x)
-            other.add(element, x)
-        found, wanted = adaptive.result(), other.result()
-        adaptive.close()
-        for name in ("lower", "median", "upper", "count"):
-            assert np.array_equal(getattr(found, name), getattr(wanted, name), equal_nan=True), name
-        assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("order", ["ascending", "descending"])
-def test_batched_survives_five_thousand_in_order(order):
-    """The worst there is; a default run does not meet it, as its frames are shuffled."""
-    x = np.sort(np.exp(np.random.default_rng(5).normal(0, 0.03, (5000, 4, 3))).astype(np.float32), 0)
-    result = batched(x if order == "ascending" else x[::-1])
-    assert result.count.tolist() == [5000] * 4
-    assert log_error(result.median, np.median(x, 0)) < 0.03
-    assert np.isfinite(result.lower).all() and (result.lower <= result.median).all()
-    assert (result.median <= result.upper).all()
-
-
-@pytest.mark.parametrize("count", [SLOTS, SLOTS + 1, 28, 100, 2001, 100_000])
-def test_knots_stand_in_order_and_reach_both_ends(count):
-    ranks = knot_ranks(count)
-    assert len(ranks) == KNOTS and ranks[0] == 0 and ranks[-1] == count - 1
-    assert (np.diff(ranks) >= 0).all() and np.allclose(ranks + ranks[::-1], count - 1)
-    assert {0.25 * (count - 1), 0.75 * (count - 1)} <= set(ranks)
-
-
-def test_sorting_by_planes():
-    rng = np.random.default_rng(0)
-    for k in range(1, 34):
-        x = rng.integers(0, 9, (k, 200)).astype(np.float32)
-        x[rng.random(x.shape) < 0.1] = np.inf
-        wanted = np.sort(x, 0)
-        sort_planes(x)
-        assert np.array_equal(x, wanted)
-    assert len(comparators(16)) == 63  # Batcher's count

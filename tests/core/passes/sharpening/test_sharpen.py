@@ -55,7 +55,7 @@ def inner(wall, lit):
     return np.flatnonzero(at & (lit.count >= 5))
 
 
-@pytest.mark.parametrize("median", ["adaptive", "p2"])
+@pytest.mark.parametrize("median", ["exact", "p2"])
 def test_lines_get_their_darkness_back(wall, median):
     cameras = views()
     lit, after = both(wall, cameras, [photo(camera) for camera in cameras], median=median)

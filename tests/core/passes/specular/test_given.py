@@ -52,7 +52,7 @@ class Seen:
         self.irradiance = self.box.irradiance.astype(np.float32)
         cameras = [look_at((0.5 + 0.3 * i, 1, 1.5), (2, 1.5, 0), 16, 12, 80) for i in range(10)]
         grey = pixels_of(np.ones((12, 16, 3)))
-        self.pictures = Pictures(frames_of(cameras), lambda frame: grey, "adaptive", Path())
+        self.pictures = Pictures(frames_of(cameras), lambda frame: grey, "exact", Path())
 
     def fit(self, given):
         return fit_given(given, self.maker, FLOOR, self.irradiance, RAYS)[0]
