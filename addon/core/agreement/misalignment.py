@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 from ..scene.model import Camera
 from ..scene.rays import RayScene
@@ -35,13 +36,7 @@ def predicted(index: int, views: Sequence[SmallView], cameras: Sequence[Camera],
 
 def bilinear(image: np.ndarray, at: np.ndarray) -> np.ndarray:
     """`image` ((h, w)) between its pixels, at (n, 2) x and y counted from the first pixel's centre; NaN outside."""
-    x0, y0 = np.floor(at).astype(int).T
-    good = (x0 >= 0) & (y0 >= 0) & (x0 < image.shape[1] - 1) & (y0 < image.shape[0] - 1)
-    x0, y0 = np.where(good, x0, 0), np.where(good, y0, 0)
-    a, b = at[:, 0] - x0, at[:, 1] - y0
-    value = ((1 - a) * (1 - b) * image[y0, x0] + a * (1 - b) * image[y0, x0 + 1]
-             + (1 - a) * b * image[y0 + 1, x0] + a * b * image[y0 + 1, x0 + 1])  # fmt: skip
-    return np.where(good, value, np.nan)
+    return map_coordinates(image, at.T[::-1], order=1, cval=np.nan)
 
 
 def shift(image: np.ndarray, reference: np.ndarray) -> np.ndarray | None:

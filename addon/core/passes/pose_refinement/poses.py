@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import gaussian_filter, minimum_filter
+from scipy.spatial.transform import Rotation
 
 from ...agreement.params import AGREEMENT, MISALIGNMENT
 from ...parallel import ordered_map
@@ -135,12 +136,9 @@ class Step:
 
 def moved(camera: Camera, way: np.ndarray) -> Camera:
     """The camera turned by a rotation vector and moved ((6,): radians, metres) in its own axes."""
-    angle = float(np.linalg.norm(way[:3]))
-    x, y, z = way[:3] / max(angle, 1e-30)
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     pose = camera.camera_to_world.copy()
     pose[:3, 3] += pose[:3, :3] @ way[3:]
-    pose[:3, :3] = pose[:3, :3] @ (np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K)
+    pose[:3, :3] = pose[:3, :3] @ Rotation.from_rotvec(way[:3]).as_matrix()
     return replace(camera, camera_to_world=pose)
 
 
@@ -163,12 +161,9 @@ def step_of(camera: Camera, pixels: Pixels, texture: Texture) -> Step | None:
     floor = texture.floor
     picture = np.log(np.maximum(pixels.radiance, 0) + floor).mean(-1).astype(np.float64)
     good = minimum_filter(pixels.valid & ~pixels.saturated, 2 * round(2 * POSES.blur) + 1)
-    good[: POSES.border], good[-POSES.border :], good[:, : POSES.border], good[:, -POSES.border :] = (
-        False,
-        False,
-        False,
-        False,
-    )
+    inner = np.zeros_like(good)
+    inner[POSES.border : -POSES.border, POSES.border : -POSES.border] = True
+    good &= inner
     dx, dy = (gaussian_filter(picture, POSES.blur, order=order) for order in ((0, 1), (1, 0)))
     steep = np.where(good, np.hypot(dx, dy), 0)
     count = min(POSES.pixels, steep.size - 1)

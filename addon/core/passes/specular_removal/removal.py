@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
 from ...brdf.material import ObjectMaterial
 from ...brdf.model import Microfacets
@@ -105,20 +106,10 @@ class SpecularPart:
             box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
             own = own[box]
             planes = np.concatenate([part[box] * own[..., None], own[..., None]], -1).transpose(2, 0, 1)
-            total = self._spread(self._spread(planes, 1), 2)
+            width, reach = self._params.width, self._params.reach
+            total = gaussian_filter(planes, width, axes=(1, 2), mode="constant", radius=reach)
             result[box][own] = (total[:3, own] / total[3, own]).T
         return result
-
-    def _spread(self, planes: np.ndarray, axis: int) -> np.ndarray:
-        """Sum of neighbours along one axis by the Gaussian's weights; nothing lies beyond the ends."""
-        total, size = planes.copy(), planes.shape[axis]
-        for step in range(1, min(self._params.reach, size - 1) + 1):
-            weight = np.float32(np.exp(-(step**2) / (2 * self._params.width**2)))
-            first, last = ([slice(None)] * planes.ndim for _ in range(2))
-            first[axis], last[axis] = slice(0, size - step), slice(step, size)
-            total[tuple(first)] += weight * planes[tuple(last)]
-            total[tuple(last)] += weight * planes[tuple(first)]
-        return total
 
 
 def without_specular(

@@ -13,7 +13,7 @@ from ...scene.elements import Unwrapped
 from ...scene.model import Mesh
 from ...scene.tangent_frame import tangent_frame
 from ...significance import LEVELS
-from .params import PLANES, PlaneParams
+from .params import PLANES
 
 
 @dataclass(frozen=True)
@@ -42,14 +42,14 @@ class Texels:
         return Texels(self.texel[index], self.element[index], self.position[index], self.edge[index])
 
 
-def texels_of(atlas: Atlas, mesh: Mesh, wanted: np.ndarray, params: PlaneParams = PLANES) -> Texels:
+def texels_of(atlas: Atlas, mesh: Mesh, wanted: np.ndarray) -> Texels:
     """The texels that show one of some elements ((n,) bool), on triangles of some size."""
     shown = np.append(wanted, False)[atlas.padding]  # -1: none
     texel = np.flatnonzero(shown)
     size = atlas.size
     theirs = np.flatnonzero(np.isin(mesh.object_id, np.unique(atlas.object_id[wanted])))
     corner = atlas.uv[theirs].astype(np.float64) * size
-    large = np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])) > 2 * params.least
+    large = np.abs(np.linalg.det(corner[:, 1:] - corner[:, :1])) > 2 * PLANES.least
     theirs = theirs[large]
     if not len(theirs):
         return Texels(texel[:0], texel[:0], np.zeros((0, 3)), np.zeros(0))
@@ -111,12 +111,12 @@ class Plane:
     offset: float
     members: np.ndarray
 
-    def near(self, position: np.ndarray, params: PlaneParams = PLANES) -> np.ndarray:
+    def near(self, position: np.ndarray) -> np.ndarray:
         """Points ((k, 3)) that lie in it, (k,) bool."""
-        return np.abs(position @ self.normal - self.offset) < params.thickness
+        return np.abs(position @ self.normal - self.offset) < PLANES.thickness
 
 
-def planes_of(atlas: Atlas, own: np.ndarray, filled: np.ndarray, params: PlaneParams = PLANES) -> Iterator[Plane]:
+def planes_of(atlas: Atlas, own: np.ndarray, filled: np.ndarray) -> Iterator[Plane]:
     """Planes of an object's elements `own` ((m,) int), by how much of them is `filled` ((n,) bool), most first."""
     normal, position = atlas.normal[own].astype(np.float64), atlas.position[own].astype(np.float64)
     weight = np.where(filled[own], atlas.area[own], 0).astype(np.float64)
@@ -124,15 +124,15 @@ def planes_of(atlas: Atlas, own: np.ndarray, filled: np.ndarray, params: PlanePa
 
     def within(direction: np.ndarray, offset: float, some: np.ndarray) -> np.ndarray:
         off = np.abs(position[some] @ direction - offset)
-        return (normal[some] @ direction > np.cos(params.tilt)) & (off < params.thickness)
+        return (normal[some] @ direction > np.cos(PLANES.tilt)) & (off < PLANES.thickness)
 
     left = np.ones(len(own), bool)
-    for _ in range(params.planes):
+    for _ in range(PLANES.planes):
         total = (weight * left).sum()
         if total < least:
             return
-        drawn = random.choice(len(own), params.drawn, p=weight * left / total)
-        tried = [within(normal[k], float(position[k] @ normal[k]), drawn) for k in drawn[: params.tries]]
+        drawn = random.choice(len(own), PLANES.drawn, p=weight * left / total)
+        tried = [within(normal[k], float(position[k] @ normal[k]), drawn) for k in drawn[: PLANES.tries]]
         best = drawn[max(tried, key=np.count_nonzero)]
         direction = normal[best].mean(0)
         direction /= np.linalg.norm(direction)
@@ -166,17 +166,17 @@ class Picture:
     wanted: np.ndarray
 
     @classmethod
-    def of(cls, atlas: Atlas, mesh: Mesh, known: np.ndarray, wanted: Texels, params: PlaneParams = PLANES) -> Picture:
+    def of(cls, atlas: Atlas, mesh: Mesh, known: np.ndarray, wanted: Texels) -> Picture:
         """The picture of a plane's elements `known` ((m,) int), and of what is wanted in it and around."""
-        axes = _axes(atlas, mesh, known, params)
+        axes = _axes(atlas, mesh, known)
         cells, at = (np.asarray(one, np.float64) @ axes for one in (atlas.position[known], wanted.position))
         low, high = cells.min(0), cells.max(0)
         size, reach = 1 / np.sqrt(np.linalg.norm(np.cross(*axes.T))), high - low
-        inside = ((at >= low - reach) & (at <= high + reach)).all(1) & (wanted.edge < params.stretch * size)
+        inside = ((at >= low - reach) & (at <= high + reach)).all(1) & (wanted.edge < PLANES.stretch * size)
         every = np.concatenate([cells, at[inside]])
         # Rounded, not cut off: where texels and cells are the same each texel lies in the middle of its cell.
         every = np.rint(every - every.min(0)).astype(np.int64)
-        coarser = int(np.ceil(np.sqrt(np.prod(every.max(0) + 1.0) / params.cells)))
+        coarser = int(np.ceil(np.sqrt(np.prod(every.max(0) + 1.0) / PLANES.cells)))
         every //= coarser
         shape = (int(every[:, 0].max()) + 1, int(every[:, 1].max()) + 1)
         flat = every[:, 0] * shape[1] + every[:, 1]
@@ -205,7 +205,7 @@ class Picture:
         return np.bincount(self.wanted, minlength=self.shape[0] * self.shape[1]).reshape(self.shape) > 0
 
 
-def _axes(atlas: Atlas, mesh: Mesh, known: np.ndarray, params: PlaneParams) -> np.ndarray:
+def _axes(atlas: Atlas, mesh: Mesh, known: np.ndarray) -> np.ndarray:
     """What positions are multiplied by to have the cells' rows and columns, (3, 2) float64.
 
     The atlas's own texels on the largest triangle: nothing is resampled there.
@@ -214,8 +214,8 @@ def _axes(atlas: Atlas, mesh: Mesh, known: np.ndarray, params: PlaneParams) -> n
     largest = triangle[mesh.geometry[1][triangle].argmax()]
     along = texel_axes(atlas, mesh, np.array([largest]))[1][0]
     length = np.linalg.norm(along, axis=0)
-    square = length.max() < params.stretch * length.min() and abs(along[:, 0] @ along[:, 1]) < 0.1 * length.prod()
-    if not square or not 1 / params.stretch < length.mean() / atlas.texel_edge < params.stretch:
+    square = length.max() < PLANES.stretch * length.min() and abs(along[:, 0] @ along[:, 1]) < 0.1 * length.prod()
+    if not square or not 1 / PLANES.stretch < length.mean() / atlas.texel_edge < PLANES.stretch:
         normal = mesh.geometry[0][largest : largest + 1]
         along = np.stack([one[0] for one in tangent_frame(normal)], 1).astype(np.float64) * atlas.texel_edge
     return np.linalg.pinv(along).T

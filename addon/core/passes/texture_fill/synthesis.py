@@ -10,12 +10,10 @@ from __future__ import annotations
 import numpy as np
 from scipy import fft, ndimage
 
-from .params import TEXTURE, TextureParams
+from .params import TEXTURE
 
 
-def completed(
-    picture: np.ndarray, source: np.ndarray, hole: np.ndarray, scale: float, params: TextureParams = TEXTURE
-) -> tuple[np.ndarray, np.ndarray]:
+def completed(picture: np.ndarray, source: np.ndarray, hole: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray]:
     """A picture whose hole shows copies of its source.
 
     Parameters
@@ -32,10 +30,10 @@ def completed(
     (h, w, c) float32, (h, w) bool
         Where there is a copy.
     """
-    edge = max(int(round(params.window * scale / params.blocks)), 1)
-    offsets = dominant_offsets(picture, source, hole, params.window * scale, params)
+    edge = max(int(round(TEXTURE.window * scale / TEXTURE.blocks)), 1)
+    offsets = dominant_offsets(picture, source, hole, TEXTURE.window * scale)
     copies = [(shifted(picture, shift), shifted(source, shift)) for shift in offsets]
-    chosen = _labels(picture, source, hole, copies, edge, params)
+    chosen = _labels(picture, source, hole, copies, edge)
     result, done = picture.copy(), np.zeros(source.shape, bool)
     label = np.repeat(np.repeat(chosen, edge, 0), edge, 1)[: source.shape[0], : source.shape[1]]
     for k, (copy, valid) in enumerate(copies):
@@ -78,7 +76,7 @@ def autocovariance(picture: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, 
     return total / np.maximum(overlap, 1) / picture.shape[2], overlap
 
 
-def scale_of(covariance: np.ndarray, overlap: np.ndarray, params: TextureParams = TEXTURE) -> float:
+def scale_of(covariance: np.ndarray, overlap: np.ndarray) -> float:
     """Cells by which the autocovariance has fallen to `TextureParams.decay`; inf where it does not.
 
     Noise, which has nothing in common from cell to cell, does not count.
@@ -86,7 +84,7 @@ def scale_of(covariance: np.ndarray, overlap: np.ndarray, params: TextureParams 
     rows, columns = (np.minimum(np.arange(n), n - np.arange(n)) for n in covariance.shape)
     ring = np.rint(np.hypot(rows[:, None], columns[None])).astype(int).ravel()
     mean = np.bincount(ring, (covariance * overlap).ravel()) / np.maximum(np.bincount(ring, overlap.ravel()), 1)
-    least = params.decay * mean[1]
+    least = TEXTURE.decay * mean[1]
     below = np.flatnonzero(mean[1:] < least)
     if mean[1] <= 0 or not len(below):
         return np.inf
@@ -109,9 +107,7 @@ def usual_contrast(picture: np.ndarray, known: np.ndarray, edge: float) -> float
     return float(np.sqrt(max(np.median(total[told] / count[told]), 0))) if told.any() else 0.0
 
 
-def dominant_offsets(
-    picture: np.ndarray, source: np.ndarray, hole: np.ndarray, apart: float, params: TextureParams = TEXTURE
-) -> list[tuple[int, int]]:
+def dominant_offsets(picture: np.ndarray, source: np.ndarray, hole: np.ndarray, apart: float) -> list[tuple[int, int]]:
     """Offsets from the hole to the source by which the picture resembles itself most and that cover most of the hole.
 
     Parameters
@@ -125,26 +121,26 @@ def dominant_offsets(
     rows, columns = (np.minimum(np.arange(n), n - np.arange(n)) for n in shape)
     top &= np.hypot(rows[:, None], columns[None]) > reach
     peaks = np.flatnonzero(top)
-    alike = np.square(np.maximum(covariance.ravel()[peaks] / covariance[0, 0], params.unlike))
-    best = np.argsort(-alike, kind="stable")[: params.peaks]
+    alike = np.square(np.maximum(covariance.ravel()[peaks] / covariance[0, 0], TEXTURE.unlike))
+    best = np.argsort(-alike, kind="stable")[: TEXTURE.peaks]
     shift, alike = np.stack(np.divmod(peaks[best], shape[1]), 1), alike[best]
     shift -= np.where(2 * shift > shape, shape, 0)
     # Which of them have something for which cells of the hole, some of them for all.
     cells = np.argwhere(hole)
-    cells = cells[np.random.default_rng(0).permutation(len(cells))[: params.asked]]
+    cells = cells[np.random.default_rng(0).permutation(len(cells))[: TEXTURE.asked]]
     at = cells + shift[:, None]
     inside = ((at >= 0) & (at < source.shape)).all(2)
     covers = inside & source[tuple(np.moveaxis(np.where(inside[..., None], at, 0), 2, 0))]
     found: list[tuple[int, int]] = []
     open_ = np.ones(len(cells), np.float32)
-    while len(found) < params.offsets and alike.any():
+    while len(found) < TEXTURE.offsets and alike.any():
         score = alike * (covers @ open_)
         k = int(score.argmax())
         if not score[k]:
             break
         alike[k] = 0
         found.append((int(shift[k, 0]), int(shift[k, 1])))
-        open_[covers[k]] *= np.float32(params.again)
+        open_[covers[k]] *= np.float32(TEXTURE.again)
     return found
 
 
@@ -165,7 +161,7 @@ def block_mean(values: np.ndarray, edge: int) -> np.ndarray:
     return padded.reshape(-(-h // edge), edge, -(-w // edge), edge, *values.shape[2:]).mean((1, 3), dtype=np.float32)
 
 
-def _labels(picture, source, hole, copies, edge, params) -> np.ndarray:
+def _labels(picture, source, hole, copies, edge) -> np.ndarray:
     """Which of the copies each block takes, (h / edge, w / edge) int; -1: none."""
 
     def blocks(values: np.ndarray, valid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -178,9 +174,9 @@ def _labels(picture, source, hole, copies, edge, params) -> np.ndarray:
     usual = [_mean_square(current - copy, settled & valid) for copy, valid in coarse]
     todo, everywhere = block_mean(hole, edge) > 0, False
     chosen = np.full(todo.shape, -1)
-    window, around = 2 * params.blocks + 1, np.ones((3, 3), bool)
+    window, around = 2 * TEXTURE.blocks + 1, np.ones((3, 3), bool)
     while True:
-        front = ndimage.binary_dilation(settled, around, params.blocks // 2) & todo
+        front = ndimage.binary_dilation(settled, around, TEXTURE.blocks // 2) & todo
         if not front.any():
             if everywhere or not todo.any():
                 return chosen
@@ -196,7 +192,7 @@ def _labels(picture, source, hole, copies, edge, params) -> np.ndarray:
                 ndimage.uniform_filter(one.astype(np.float32), window, mode="constant")[front] for one in (both, off)
             )
             compared = valid[front] & (count * window * window > 0.5)
-            mean = np.where(compared, (total + params.before * usual[k]) / (count + params.before), np.inf)
+            mean = np.where(compared, (total + TEXTURE.before * usual[k]) / (count + TEXTURE.before), np.inf)
             better = mean < cost
             cost[better], label[better] = mean[better], k
         for k in np.unique(label[label >= 0]):

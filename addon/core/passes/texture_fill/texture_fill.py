@@ -12,7 +12,7 @@ from ...groups import by_label, by_number
 from ...scene.atlas import Atlas
 from ...scene.model import Mesh
 from ...significance import LEVELS
-from .params import TEXTURE, TextureParams
+from .params import TEXTURE
 from .planes import Picture, planes_of, texels_of
 from .synthesis import autocovariance, completed, scale_of, smooth_mean, usual_contrast
 
@@ -31,23 +31,12 @@ class Texture:
     texel: np.ndarray
     rho: np.ndarray
 
-    def onto(self, image: np.ndarray, values: np.ndarray | float) -> np.ndarray:
-        """An image over the atlas, (s, s, ...), with `values` ((k, ...)) at these texels; it is changed."""
-        image.reshape(image.shape[0] ** 2, *image.shape[2:])[self.texel] = values
-        return image
-
 
 NOTHING = Texture(np.zeros(0, np.int64), np.zeros((0, 3), np.float32))
 
 
 def texture_of(
-    atlas: Atlas,
-    mesh: Mesh,
-    rho: np.ndarray,
-    measured: np.ndarray,
-    filled: np.ndarray,
-    error: np.ndarray,
-    params: TextureParams = TEXTURE,
+    atlas: Atlas, mesh: Mesh, rho: np.ndarray, measured: np.ndarray, filled: np.ndarray, error: np.ndarray
 ) -> Texture:
     """Texture for the texels of the elements that are filled in.
 
@@ -64,7 +53,7 @@ def texture_of(
     Texture
         Of planes whose measured part has detail beyond its error, and enough of it.
     """
-    level, told = np.log(np.maximum(rho.mean(1), params.floor)), []
+    level, told = np.log(np.maximum(rho.mean(1), TEXTURE.floor)), []
     objects = [
         own for own in by_label(atlas.object_id) if filled[own].any() and _textured(level, error, own[measured[own]])
     ]
@@ -82,7 +71,7 @@ def texture_of(
             there = mine.part(plane.near(mine.position) & (np.isin(mine.element, plane.members)))
             if _textured(level, error, known) and len(there.texel) >= LEVELS.many:
                 picture = Picture.of(atlas, mesh, known, there)
-                told.append(_filled(picture, rho[known], error[known], params))
+                told.append(_filled(picture, rho[known], error[known]))
     if not told:
         return NOTHING
     texel, value = (np.concatenate(parts) for parts in zip(*told, strict=True))
@@ -98,25 +87,23 @@ def _beyond(contrast: float, error: np.ndarray) -> bool:
     return contrast > float(np.median(error))
 
 
-def _filled(
-    picture: Picture, rho: np.ndarray, error: np.ndarray, params: TextureParams
-) -> tuple[np.ndarray, np.ndarray]:
+def _filled(picture: Picture, rho: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Texels of one plane and their albedo; none where there is too little to go by."""
     shown, known = picture.paint(rho)
     # As where neighbourhoods are told: what was seen well, the better half at least; and no albedo that was cut off.
-    sure = (error <= max(params.sure, float(np.median(error)))) & (rho.max(1) < 1)
-    around = ndimage.uniform_filter(picture.paint(sure[:, None])[0][..., 0], params.mostly, mode="constant")
+    sure = (error <= max(TEXTURE.sure, float(np.median(error)))) & (rho.max(1) < 1)
+    around = ndimage.uniform_filter(picture.paint(sure[:, None])[0][..., 0], TEXTURE.mostly, mode="constant")
     source = known & (around > 0.5)
     if source.sum() < LEVELS.many:
         return NOTHING.texel, NOTHING.rho
-    log = np.log(np.maximum(shown, params.floor))
+    log = np.log(np.maximum(shown, TEXTURE.floor))
     detail = np.where(source[..., None], log - log[source].mean(0), 0).astype(np.float32)
     scale = scale_of(*autocovariance(detail, source))
-    if source.sum() < params.samples * scale**2:
+    if source.sum() < TEXTURE.samples * scale**2:
         return NOTHING.texel, NOTHING.rho
-    smooth = np.maximum(smooth_mean(shown, known, params.smooth * scale), params.floor)
+    smooth = np.maximum(smooth_mean(shown, known, TEXTURE.smooth * scale), TEXTURE.floor)
     detail = np.where(known[..., None], log - np.log(smooth), 0).astype(np.float32)
-    if not _beyond(usual_contrast(detail, source, params.smooth * scale), error):
+    if not _beyond(usual_contrast(detail, source, TEXTURE.smooth * scale), error):
         return NOTHING.texel, NOTHING.rho
     copy, done = completed(detail, source, picture.hole & ~known, scale)
     got = (done | known).ravel()[picture.wanted]

@@ -10,23 +10,21 @@ from ...light.directions import cosine_hemisphere, sobol
 from ...light.field import LightField
 from ...scene.model import Instance
 from ...scene.tangent_frame import to_world
-from .params import UNLIT, UnlitParams
+from .params import UNLIT
 
 OUTSIDE = "Behind it there is nothing of the room, so with its light off it is dark, as a window at night: a guess."
 CLASS = "With its light off it is dark, as its class is: a guess."
 
 
-def unlit(
-    instance: Instance, field: LightField, seed: int = 0, params: UnlitParams = UNLIT
-) -> tuple[float | None, str]:
+def unlit(instance: Instance, field: LightField, seed: int = 0) -> tuple[float | None, str]:
     """Albedo of a lamp with its light off, and a sentence on why; None where nothing tells."""
-    if looks_outside(instance.object_id, field, seed, params):
-        return params.dark, OUTSIDE
+    if looks_outside(instance.object_id, field, seed):
+        return UNLIT.dark, OUTSIDE
     words = re.split(r"[^a-z]+", instance.class_name.casefold())
-    return (params.dark, CLASS) if set(words) & set(params.dark_classes) else (None, "")
+    return (UNLIT.dark, CLASS) if set(words) & set(UNLIT.dark_classes) else (None, "")
 
 
-def looks_outside(object_id: int, field: LightField, seed: int = 0, params: UnlitParams = UNLIT) -> bool:
+def looks_outside(object_id: int, field: LightField, seed: int = 0) -> bool:
     """Whether a lamp is an upright pane with the room on one side of it and nothing on the other."""
     mesh = field.mesh
     mine = mesh.object_id == object_id
@@ -36,13 +34,13 @@ def looks_outside(object_id: int, field: LightField, seed: int = 0, params: Unli
         return False
     share, axes = np.linalg.eigh((area[:, None, None] * normal[:, :, None] * normal[:, None]).sum(0) / area.sum())
     axis = axes[:, 2]
-    if share[2] < params.flat or abs(axis[2]) > np.sin(params.upright):
+    if share[2] < UNLIT.flat or abs(axis[2]) > np.sin(UNLIT.upright):
         return False
     along = mesh.vertices[mesh.triangles[mine]].reshape(-1, 3) @ axis
     random = np.random.default_rng(seed)
     weight = field.atlas.area[own].astype(np.float64)
-    start = field.atlas.position[random.choice(own, params.rays, p=weight / weight.sum())]
-    local, (low, high) = cosine_hemisphere(sobol(params.rays, seed)), field.atlas.box
+    start = field.atlas.position[random.choice(own, UNLIT.rays, p=weight / weight.sum())]
+    local, (low, high) = cosine_hemisphere(sobol(UNLIT.rays, seed)), field.atlas.box
     leaving = []
     for side, plane in ((axis, along.max()), (-axis, -along.min())):
         # From beyond the pane's own far face.
@@ -54,4 +52,4 @@ def looks_outside(object_id: int, field: LightField, seed: int = 0, params: Unli
         margin = field.scene.offset
         inside = ((met > low - margin) & (met < high + margin)).all(1)
         leaving.append(float(((hits.triangle < 0) | ~inside).mean()))
-    return max(leaving) >= params.leaving > min(leaving)
+    return max(leaving) >= UNLIT.leaving > min(leaving)
