@@ -11,7 +11,7 @@ import numpy as np
 from ..core.kinds import Workload
 from ..core.light.emitters import bright_triangles
 from ..core.light.lobes import GRID, reflected_light
-from ..core.photo import MIDDLE_GREY
+from ..core.photo import MIDDLE_GREY, srgb
 from ..core.pipeline.recover import Recovery
 
 PIXELS: Workload[int] = 1500
@@ -42,7 +42,7 @@ def rerender_psnr(recovery: Recovery, seen: list[dict], seed: int = 0) -> float:
         own = view == number
         usable = one["inside"] & ~np.isin(one["id"], left_out) & np.isfinite(one["image"]).all(1)
         level = MIDDLE_GREY / max(float(np.median(one["image"][usable].mean(1))), 1e-12)
-        error = _display(shown[own] * level) - _display(true[own])
+        error = srgb(shown[own] * level) - srgb(true[own])
         result.append(-10 * np.log10(max(float(np.mean(error**2)), 1e-12)))
     return float(np.mean(result))
 
@@ -66,9 +66,3 @@ def _shown(recovery: Recovery, materials: dict, element: np.ndarray, direction: 
         lobe = np.float32(m.f0) * light.A[:, 0] + light.B[:, 0]
         shown[own] = shown[own] + lobe if m.model.has_diffuse else lobe
     return shown
-
-
-def _display(radiance: np.ndarray) -> np.ndarray:
-    """sRGB, 0...1."""
-    x = np.clip(radiance, 0, 1)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)

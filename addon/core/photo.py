@@ -10,11 +10,15 @@ MIDDLE_GREY: Unit[float] = 0.18
 """What a grey card reflects, and what an exposure puts a picture's median at."""
 
 
+def srgb(linear: np.ndarray) -> np.ndarray:
+    """Linear Rec.709 in 0...1 as sRGB in 0...1."""
+    x = np.clip(np.nan_to_num(linear), 0, 1)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
+
+
 def encoded(linear: np.ndarray) -> np.ndarray:
     """Linear Rec.709 in 0...1 as sRGB bytes."""
-    x = np.clip(np.nan_to_num(linear), 0, 1)
-    curve = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(np.maximum(x, 1e-9), 1 / 2.4) - 0.055)
-    return (255 * curve + 0.5).astype(np.uint8)
+    return (255 * srgb(linear) + 0.5).astype(np.uint8)
 
 
 def photo(radiance: np.ndarray, middle: float) -> np.ndarray:

@@ -314,14 +314,10 @@ def from_store(a: dict[str, np.ndarray], meta: dict[str, Any]) -> Shading:
         a["irradiance"], a["escaped"], a["relative_error"], a["radiance"], lamps,
         Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
         None if meta["sun"] is None else _sun(**meta["sun"]),
-        _openings(a) if "openings_low" in a else None,
+        Openings(a["openings_low"], a["openings_size"], a["openings_radiance"], float(a["openings_share"]))
+        if "openings_low" in a else None,
         Patches(*(a[f"patches_{one.name}"] for one in fields(Patches))),
     )  # fmt: skip
-
-
-def _openings(a: dict[str, np.ndarray]) -> Openings:
-    stored = {one.name: a[f"openings_{one.name}"] for one in fields(Openings) if f"openings_{one.name}" in a}
-    return Openings(stored["low"], stored["size"], stored["radiance"], float(stored.get("share", 0)))
 
 
 def _sun(direction: list[float], irradiance: list[float], **more: Any) -> Sun:

@@ -146,15 +146,3 @@ class UnfoldParams:
 
 
 UNFOLD = UnfoldParams()
-
-
-@dataclass(frozen=True)
-class CracksParams:
-    """Of `cracks`.
-
-    Attributes
-    ----------
-    """
-
-
-CRACKS = CracksParams()
