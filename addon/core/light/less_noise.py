@@ -7,11 +7,17 @@ edge of a shadow it is light and stays. Cells on several shifted grids are avera
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from ..kinds import Block
 from ..parallel import ordered_map
 from ..significance import LEVELS
 from .params import LESS_NOISE
+
+AT_ONCE: Block[int] = 1 << 17
+"""Elements, or few cells' more."""
 
 
 def less_noise(
@@ -46,26 +52,37 @@ def less_noise(
         Root mean square over the cells around.
     """
 
-    def on_grid(k: int) -> tuple[np.ndarray, np.ndarray]:
-        """Light with less noise by one of the grids, (m, 3), and the mean square of the noise around, (m,)."""
-        group, count = cells(position, normal, k / LESS_NOISE.grids, size)
-        fitted = _planes(position, light, group, count, size)
-        rest = (light - fitted).mean(1)
-        n2, v = (np.bincount(group, x.astype(np.float64) ** 2, len(count)) / count for x in (noise, rest))
-        keep = np.where(count >= LEVELS.few, np.maximum(v - n2, 0) / np.maximum(v, 1e-30), 1)
-        return fitted + keep[group, None].astype(np.float32) * (light - fitted), n2[group]
-
     result, around = np.zeros_like(light), np.zeros(len(light))
-    for less, n2 in ordered_map(on_grid, range(LESS_NOISE.grids), threads):
-        result += less
-        around += n2
+
+    def lessen(portion: tuple[np.ndarray, np.ndarray]) -> None:
+        """Add what is left of the light in some cells, and the mean square of their noise."""
+        own, group = portion
+        light_here, count = light[own], np.bincount(group)
+        fitted = _planes(position[own], light_here, group, count, size)
+        rest = (light_here - fitted).mean(1)
+        n2, v = (np.bincount(group, x.astype(np.float64) ** 2) / count for x in (noise[own], rest))
+        keep = np.where(count >= LEVELS.few, np.maximum(v - n2, 0) / np.maximum(v, 1e-30), 1)
+        result[own] += fitted + keep[group, None].astype(np.float32) * (light_here - fitted)
+        around[own] += n2[group]
+
+    for k in range(LESS_NOISE.grids):
+        for _ in ordered_map(lessen, cells(position, normal, k / LESS_NOISE.grids, size), threads):
+            pass
     return (result / np.float32(LESS_NOISE.grids)), np.sqrt(around / LESS_NOISE.grids).astype(np.float32)
 
 
 def cells(
     position: np.ndarray, normal: np.ndarray, shift: float, size: float = LESS_NOISE.cell
-) -> tuple[np.ndarray, np.ndarray]:
-    """Cell of each element, by place and by the way that it faces, (m,) int; and the elements in each."""
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Elements by cells, which go by place and by the way that they face, some whole cells at once.
+
+    Yields
+    ------
+    own : (k,) int
+        Elements, in each cell rising.
+    group : (k,) int
+        The cell of each, from 0 on.
+    """
     key = np.zeros(len(position), np.int64)
 
     def tell_apart(part: np.ndarray) -> None:
@@ -78,8 +95,12 @@ def cells(
         tell_apart(np.floor(along / size + shift))
     for facing in normal.T:
         tell_apart(np.round(facing * LESS_NOISE.turned / 2) + LESS_NOISE.turned)
-    _, group, count = np.unique(key, return_inverse=True, return_counts=True)
-    return group.ravel(), count
+    order = np.argsort(key, kind="stable")
+    new = np.diff(key[order], prepend=-1) != 0
+    starts = np.append(np.flatnonzero(new), len(key))
+    cuts = np.unique(starts[np.searchsorted(starts, range(0, len(key) + AT_ONCE, AT_ONCE)).clip(max=len(starts) - 1)])
+    for first, last in zip(cuts, cuts[1:]):
+        yield order[first:last], np.cumsum(new[first:last]) - 1
 
 
 def _planes(position: np.ndarray, light: np.ndarray, group: np.ndarray, count: np.ndarray, size: float) -> np.ndarray:
@@ -98,7 +119,7 @@ def _planes(position: np.ndarray, light: np.ndarray, group: np.ndarray, count: n
     # Across a wall there is no slope to find.
     slope = _solved(second + 1e-4 * np.eye(3), both)
     fitted = np.empty_like(light)
-    for c in range(3):  # (m, 3, 3) slopes at once would be most of a large room's memory
+    for c in range(3):
         fitted[:, c] = mean(light[:, c])[group] + sum(x[i] * slope[group, i, c] for i in range(3))
     return fitted
 

@@ -163,9 +163,9 @@ def _over_cells(atlas: Atlas, halves: np.ndarray) -> np.ndarray:
         a[:], b[:] = a + b, a - b
     held, area = np.zeros((6, len(atlas)), np.float32), np.zeros(len(atlas), np.float32)
     for k in range(LESS_NOISE.grids):
-        group, _ = cells(atlas.position, atlas.normal, k / LESS_NOISE.grids, LESS_NOISE.cell)
-        for row, values in zip(held, halves.reshape(6, -1), strict=True):
-            row += np.bincount(group, values)[group]
-        area += np.bincount(group, atlas.area)[group]
+        for own, group in cells(atlas.position, atlas.normal, k / LESS_NOISE.grids):
+            for row, values in zip(held, halves.reshape(6, -1), strict=True):
+                row[own] += np.bincount(group, values[own])[group]
+            area[own] += np.bincount(group, atlas.area[own])[group]
     held /= np.maximum(area, np.float32(1e-12))
     return held.T

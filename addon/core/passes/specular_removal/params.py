@@ -13,8 +13,10 @@ class RemovalParams:
     ----------
     fewer, least : int
         So many times fewer rays a pixel than an observation has in the fit, and at least so many.
+    pixels : int
+        Of a frame that are traced, about; of a larger one, one in each square cell.
     reach, width : int, float
-        Pixels whose rays are shared, and the standard deviation of their weights, in pixels.
+        Pixels, or cells, whose rays are shared, and the standard deviation of their weights.
     most : float
         Times what is left that the specular part may be.
     dark : float
@@ -23,6 +25,7 @@ class RemovalParams:
 
     fewer: int = 32
     least: int = 8
+    pixels: int = 1 << 17
     reach: int = 2
     width: float = 1.0
     most: float = 3.0

@@ -4,9 +4,10 @@ Once lobes are known the model I = I_d + I_nd gives every observation its diffus
 most views hold a highlight, too: a floor that mirrors a window from wherever one stands. Differences of medians, spread
 between samples, left such windows white there, and what lies beside them burnt.
 
-I_nd is predicted over whole pictures, by few rays in each pixel; pixels nearby on the same object share theirs. Where
-it is more than what is left, the pixel is taken for a bound, as a clipped one is: it counts where there is no other,
-and what rests on such pixels alone is not measured.
+I_nd is predicted over whole pictures, by few rays in each pixel; pixels nearby on the same object share theirs. Of a
+large picture one pixel in each cell is traced: no lobe has finer detail for being seen by more pixels. Where I_nd is
+more than what is left, the pixel is taken for a bound, as a clipped one is: it counts where there is no other, and what
+rests on such pixels alone is not measured.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, map_coordinates
 
 from ...brdf.material import ObjectMaterial
 from ...brdf.model import Microfacets
@@ -85,31 +86,57 @@ class SpecularPart:
         field = self._field
         element = field.elements(Hits(*(x.ravel() for x in (view.triangle, view.u, view.v, view.distance))))
         shown = np.where(element >= 0, field.atlas.object_id[element], NO_OBJECT)
-        rays, part = view.rays.reshape(3, -1), np.zeros((len(element), 3), np.float32)
+        rays, result = view.rays.reshape(3, -1), np.zeros((len(element), 3), np.float32)
+        step = int(np.ceil(np.sqrt(len(element) / self._params.pixels)))
         for object_id in self._lobes.keys() & set(np.unique(shown).tolist()):
             # Each object has rays of its own, so that its part is the same whichever others are asked for.
             (alpha, f0, microfacets), at = self._lobes[object_id], np.flatnonzero(shown == object_id)
+            place = np.stack(np.divmod(at, view.triangle.shape[1]))
+            traced, cell = one_of_each_cell(place, step)
             light = reflected_light(
-                field, self._bright, element[at], -rays[:, at].T, rays=self._rays, grid=np.array([alpha], np.float32),
-                proposals=(alpha,), microfacets=microfacets, threads=1, seed=self._seed + seed + object_id,
+                field, self._bright, element[at[traced]], -rays[:, at[traced]].T, rays=self._rays,
+                grid=np.array([alpha], np.float32), proposals=(alpha,), microfacets=microfacets, threads=1,
+                seed=self._seed + seed + object_id,
             )  # fmt: skip
-            part[at] = f0 * light.A[:, 0] + light.B[:, 0]
-        shape = view.triangle.shape
-        return self._shared(part.reshape(*shape, 3), shown.reshape(shape))
+            result[at] = self._shared(f0 * light.A[:, 0] + light.B[:, 0], cell, (place + 0.5) / step - 0.5)
+        return result.reshape(*view.triangle.shape, 3)
 
-    def _shared(self, part: np.ndarray, owner: np.ndarray) -> np.ndarray:
-        """The mean of pixels nearby that show the same object."""
-        result = np.zeros_like(part)
-        for object_id in self._lobes.keys() & set(np.unique(owner).tolist()):
-            own = owner == object_id
-            rows, columns = (np.flatnonzero(own.any(axis)) for axis in (1, 0))
-            box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-            own = own[box]
-            planes = np.concatenate([part[box] * own[..., None], own[..., None]], -1).transpose(2, 0, 1)
-            width, reach = self._params.width, self._params.reach
-            total = gaussian_filter(planes, width, axes=(1, 2), mode="constant", radius=reach)
-            result[box][own] = (total[:3, own] / total[3, own]).T
-        return result
+    def _shared(self, part: np.ndarray, cell: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """The mean of an object's cells nearby, of one ray's place each, at places ((2, k), in cells): (k, 3) float32.
+
+        Parameters
+        ----------
+        part : (m, 3) float32
+        cell : (2, m) int
+            Row and column.
+        """
+        low = cell.min(1)
+        planes = np.zeros((4, *(cell.max(1) + 1 - low)), np.float32)
+        row, column = cell - low[:, None]
+        planes[:3, row, column], planes[3, row, column] = part.T, 1
+        width, reach = self._params.width, self._params.reach
+        total = gaussian_filter(planes, width, axes=(1, 2), mode="constant", radius=reach)
+        at = place - low[:, None]
+        shares = np.stack([map_coordinates(plane, at, np.float32, order=1, mode="nearest") for plane in total])
+        return (shares[:3] / shares[3]).T
+
+
+def one_of_each_cell(place: np.ndarray, step: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of pixels ((2, k) int: row and column) the one nearest to the middle of each cell of `step` pixels' edge.
+
+    Returns
+    -------
+    index : (m,) int
+    cell : (2, m) int
+        Row and column of each cell that holds any, row by row.
+    """
+    cell, within = np.divmod(place, step)
+    off = np.square(np.indices((step, step)) - (step - 1) / 2).sum(0).ravel()
+    rank = np.argsort(np.argsort(off, kind="stable"))
+    number = cell[0] * (cell[1].max(initial=0) + 1) + cell[1]
+    order = np.argsort(number * step**2 + rank[within[0] * step + within[1]], kind="stable")
+    first = order[np.flatnonzero(np.diff(number[order], prepend=-1))]
+    return first, cell[:, first]
 
 
 def without_specular(

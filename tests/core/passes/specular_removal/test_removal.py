@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from addon.core.brdf.dielectric import DIELECTRIC
 from addon.core.brdf.material import ObjectMaterial
 from addon.core.errors import InterruptedRun
-from addon.core.passes.specular_removal.removal import SpecularPart, without_specular
+from addon.core.light.lobes import reflected_light
+from addon.core.passes.specular_removal.params import REMOVAL
+from addon.core.passes.specular_removal.removal import SpecularPart, one_of_each_cell, without_specular
 from addon.core.progress import Progress
 from tests.core.glossy_box import Box
 from tests.core.lit_diffuse.test_accumulate import frames_of, run
@@ -99,6 +103,42 @@ def test_a_black_floor_is_not_hidden():
     assert not found.hidden.any()
     left = np.abs((floor.lit.radiance - found.specular - floor.truth)[own]).mean()
     assert left < 0.5 * np.abs((floor.lit.radiance - floor.truth)[own]).mean()
+
+
+def test_large_pictures_lose_a_mirror_image_by_no_more_rays(floor, monkeypatch):
+    """A picture of three times the edge, of which as many pixels are traced, shows the same highlight."""
+    from addon.core.passes.specular_removal import removal
+    from addon.core.scene.elements import triangle_geometry
+    from addon.core.scene.visibility import view_frame
+
+    room, small = floor.box.room, floor.cameras[0]
+    large = replace(small, width=84, height=63, fx=3 * small.fx, fy=3 * small.fy, cx=3 * small.cx, cy=3 * small.cy)
+    material = ObjectMaterial(FLOOR, "floor", DIELECTRIC, alpha=ALPHA, f0=F0)
+    traced = []
+
+    def counted(field, bright, element, *more, **how):
+        traced.append(len(element))
+        return reflected_light(field, bright, element, *more, **how)
+
+    monkeypatch.setattr(removal, "reflected_light", counted)
+    params = replace(REMOVAL, pixels=28 * 21)
+    part = SpecularPart(floor.box.field, [material], rays=4096, params=params)
+    normal = triangle_geometry(room.mesh)[0]
+    shown = [part(view_frame(camera, room.mesh, room.scene, normal), 0) for camera in (small, large)]
+    assert traced[1] < 1.1 * traced[0]
+    means = shown[1].reshape(21, 3, 28, 3, 3).mean((1, 3))
+    assert np.abs(means - shown[0]).mean() < 0.1 * shown[0].mean()
+
+
+@pytest.mark.parametrize("step", [1, 3])
+def test_each_cell_has_one_pixel_the_middle_one_if_it_may(step):
+    rng = np.random.default_rng(0)
+    place = np.stack(np.nonzero(rng.random((20, 31)) < 0.6))
+    index, cell = one_of_each_cell(place, step)
+    assert (place[:, index] // step == cell).all()
+    assert np.array_equal(cell, np.unique(place // step, axis=1))
+    middle = {tuple(one) for one in (place[:, ((place % step) == step // 2).all(0)] // step).T}
+    assert middle <= {tuple(c) for c, p in zip(cell.T, place[:, index].T) if (p % step == step // 2).all()}
 
 
 def test_it_can_be_stopped(floor):
