@@ -88,7 +88,6 @@ def irradiance(
         Relative error of E by interpolation, by the rays' noise and at the edges of the sun's light.
     """
     atlas = field.atlas
-    position, normal = atlas.position[element], atlas.normal[element]
     bright = bright_triangles(field)
     lamp_rays = emitter_rays if len(bright) else 0
     portals = find_portals(field, seed) if portal_rays else None
@@ -101,9 +100,11 @@ def irradiance(
         steps["count"] += 1
 
         def run(part: slice) -> None:
-            at = index[part]
+            at = element[index[part]]
             here = seed + 7919 * steps["count"] + part.start
-            found = gather(field, bright, position[at], normal[at], rays, lamp_rays, here, portals, portal_rays)
+            found = gather(
+                field, bright, atlas.position[at], atlas.normal[at], rays, lamp_rays, here, portals, portal_rays
+            )
             value[part, :3], radius[part], value[part, 3] = found
 
         for_blocks(run, len(index), max(ELEMENTS_AT_ONCE * 64 // rays, 64), threads, gathering)
@@ -120,7 +121,7 @@ def irradiance(
         if not interpolate:
             points += len(index)
             return np.concatenate([gathered(index)[0], np.zeros((len(index), 1), np.float32)], 1)
-        at = position[index], normal[index]
+        at = atlas.position[element[index]], atlas.normal[element[index]]
         value, chosen, contrast = interpolated(*at, lambda i: gathered(index[i]), finest, threads)
         points += len(chosen)
         return np.concatenate([value, contrast[:, None]], 1)
@@ -130,9 +131,9 @@ def irradiance(
         found = np.empty((len(index), 4), np.float32)
 
         def run(part: slice) -> None:
-            at = index[part]
+            at = element[index[part]]
             found[part, :3], found[part, 3] = direct(
-                field, bright, position[at], normal[at], rays, lamp_rays, seed + 1 + part.start
+                field, bright, atlas.position[at], atlas.normal[at], rays, lamp_rays, seed + 1 + part.start
             )
 
         for_blocks(run, len(index), ELEMENTS_AT_ONCE, threads, aiming)
@@ -144,21 +145,22 @@ def irradiance(
         found, edge = np.empty((len(index), 4), np.float32), atlas.texel_edge
 
         def run(part: slice) -> None:
-            at = index[part]
-            found[part] = sunlight(field.scene, sun, position[at], normal[at], edge, seed + 2 + part.start)
+            at = element[index[part]]
+            found[part] = sunlight(field.scene, sun, atlas.position[at], atlas.normal[at], edge, seed + 2 + part.start)
 
         for_blocks(run, len(index), ELEMENTS_AT_ONCE, threads)
         return found
 
     value = blocks.evaluate(around, step, np.inf)
-    total, escaped, contrast = value[:, :3].copy(), value[:, 3].copy(), value[:, 4]
-    unsure = contrast * total.mean(1)
+    total, escaped = value[:, :3].copy(), value[:, 3].copy()
+    unsure = value[:, 4] * total.mean(1)
+    del value
     if lamp_rays:
         lamps = blocks.evaluate(aim, step, GATHER.smooth, total.mean(1))
         total += lamps[:, :3]
         unsure = np.hypot(unsure, lamps[:, 3])
     if smooth:
-        total, unsure = less_noise(position, normal, total, unsure, threads=threads)
+        total, unsure = less_noise(atlas.position[element], atlas.normal[element], total, unsure, threads=threads)
     if field.sun is not None:
         shone = blocks.evaluate(functools.partial(shine, field.sun), step, GATHER.smooth, total.mean(1))
         total += shone[:, :3]

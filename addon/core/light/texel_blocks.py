@@ -35,8 +35,7 @@ class TexelBlocks:
     def __init__(self, atlas: Atlas, element: np.ndarray, threads: int = 0):
         self._size, self._threads = atlas.size, threads
         self._row, self._column = np.divmod(atlas.texel[element].astype(np.int32), np.int32(atlas.size))
-        self._position, self._normal = atlas.position[element], atlas.normal[element]
-        self._edge = atlas.texel_edge
+        self._atlas, self._element = atlas, element
         self._at = np.full(atlas.size * atlas.size, -1, np.int32)
         self._at[atlas.texel[element]] = np.arange(len(element), dtype=np.int32)
 
@@ -53,14 +52,15 @@ class TexelBlocks:
         v = ((row - low)[whole] / np.float32(step)).astype(np.float32)
         u = ((column - left)[whole] / np.float32(step)).astype(np.float32)
         weight = np.stack([(1 - v) * (1 - u), (1 - v) * u, v * (1 - u), v * u], 1)
-        alike = np.einsum("kcj,kj->kc", self._normal[corner], self._normal[index]).min(1) >= BENT
+        normal, position, element = self._atlas.normal, self._atlas.position, self._element
+        alike = np.einsum("kcj,kj->kc", normal[element[corner]], normal[element[index]]).min(1) >= BENT
         index, corner, weight = index[alike], corner[alike], weight[alike]
-        place = self._position[corner]
+        place = position[element[corner]]
         across = place[:, 3] - place[:, 0]
         edge = np.sqrt(np.einsum("kj,kj->k", across, across) / 2)
-        off = np.einsum("kc,kcj->kj", weight, place) - self._position[index]
+        off = np.einsum("kc,kcj->kj", weight, place) - position[element[index]]
         right = (np.einsum("kj,kj->k", off, off) <= (GATHER.off_place * edge) ** 2) & (
-            edge <= GATHER.stretch * step * self._edge
+            edge <= GATHER.stretch * step * self._atlas.texel_edge
         )
         return index[right], corner[right], weight[right]
 

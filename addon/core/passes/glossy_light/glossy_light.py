@@ -133,7 +133,6 @@ def glossy_light(
     if not excess.any or not len(element):
         return np.zeros((len(element), 3), np.float32)
     atlas = excess.atlas
-    position, normal = atlas.position[element], atlas.normal[element]
     bright = bright_triangles(excess)  # none
     # How far places may differ is judged beside the room's light: the excess itself is next to nothing in most of them.
     level = np.float32(np.median(irradiance))
@@ -145,10 +144,12 @@ def glossy_light(
         steps["count"] += 1
 
         def run(part: slice) -> None:
-            at = index[part]
+            at = element[index[part]]
             here = seed + 7919 * steps["count"] + part.start
             (a, near, _), (b, also_near, _) = (
-                gather(excess, bright, position[at], normal[at], GLOSSY.rays // 2, 0, here + (1 << 20) * half)
+                gather(
+                    excess, bright, atlas.position[at], atlas.normal[at], GLOSSY.rays // 2, 0, here + (1 << 20) * half
+                )
                 for half in range(2)
             )
             value[part] = np.concatenate([level + (a + b) / 2, (a - b) / 2], 1)
@@ -160,7 +161,8 @@ def glossy_light(
 
     def around(index: np.ndarray) -> np.ndarray:
         finest = finest_spacing(atlas, GLOSSY.finest_share)
-        return interpolated(position[index], normal[index], lambda i: gathered(index[i]), finest, threads)[0]
+        at = element[index]
+        return interpolated(atlas.position[at], atlas.normal[at], lambda i: gathered(index[i]), finest, threads)[0]
 
     found = TexelBlocks(atlas, element, threads).evaluate(around, block_step(atlas), np.inf)
     if "caustics" not in without:
@@ -168,5 +170,5 @@ def glossy_light(
     # Spread like the light itself, the halves' difference has the noise that is left in it.
     found, noise = found[:, :3] - level, found[:, 3:].mean(1)
     if "glossy-smoothing" not in without:
-        found, _ = less_noise(position, normal, found, noise, GLOSSY.smooth, threads)
+        found, _ = less_noise(atlas.position[element], atlas.normal[element], found, noise, GLOSSY.smooth, threads)
     return np.maximum(found, -GLOSSY.most_taken * irradiance).astype(np.float32)
