@@ -151,7 +151,7 @@ def write_exr(path: Path | str, array: np.ndarray, half: bool = False) -> None:
         OpenEXR.File(header, planes).write(stream)
     except RuntimeError as error:
         raise StorageError(f"'{path}' can't be written ({error}); try again with less in memory.") from error
-    write_bytes(path, stream.getvalue())
+    write_bytes(path, stream.getbuffer())
 
 
 def _supported(path: Path) -> tuple[ExrLayer, str]:

@@ -26,27 +26,27 @@ def frame_order(count: int, seed: int) -> np.ndarray:
     return np.random.default_rng(seed).permutation(count)
 
 
-def _choose(tiers: dict[int, Summary]) -> LitDiffuse:
+def _choose(summary: Callable[[int], Summary]) -> LitDiffuse:
     """For each element the best tier that has enough, else the best that has any."""
-    clean, edge, saturated = tiers[CLEAN], tiers[EDGE], tiers[SATURATED]
-    tier = np.select(
-        [
-            clean.count >= VISIBILITY.enough,
-            (edge.count > 0) & (edge.count >= clean.count),
-            clean.count > 0,
-            saturated.count > 0,
-        ],
-        [CLEAN, EDGE, CLEAN, SATURATED],
-        -1,
-    ).astype(np.int8)
-    parts = {name: getattr(clean, name).copy() for name in ("median", "lower", "upper", "count")}
-    for other in (EDGE, SATURATED):
-        chosen = tier == other
-        for name, values in parts.items():
-            values[chosen] = getattr(tiers[other], name)[chosen]
-    clipped = saturated.count / np.maximum(clean.count + edge.count + saturated.count, 1)
-    median, lower, upper, count = parts.values()
-    return LitDiffuse(median, lower, upper, count, tier, clipped.astype(np.float32))
+    # One after the other, into the first: all summaries at once were the most memory that a large room's frames took.
+    best = summary(CLEAN)
+    clean = best.count.copy()
+    tier = np.where(clean > 0, np.int8(CLEAN), np.int8(-1))
+
+    def take(kind: int) -> np.ndarray:
+        """Put what is to be taken of another tier into `best`; gives that tier's counts."""
+        other = summary(kind)
+        beaten = (clean < VISIBILITY.enough) & (other.count >= clean) if kind == EDGE else tier < 0
+        chosen = beaten & (other.count > 0)
+        tier[chosen] = kind
+        for name in ("median", "lower", "upper", "count"):
+            getattr(best, name)[chosen] = getattr(other, name)[chosen]
+        return other.count
+
+    edge, saturated = take(EDGE), take(SATURATED)
+    clipped = saturated / np.maximum(clean + edge + saturated, 1)
+    median, lower, upper = map(np.ascontiguousarray, (best.median, best.lower, best.upper))
+    return LitDiffuse(median, lower, upper, best.count, tier, clipped.astype(np.float32))
 
 
 def accumulate(
@@ -127,4 +127,4 @@ def accumulate(
                 also(index, view, pixels, seen)
             if progress is not None:
                 progress.update(0.9 * (done + 1) / len(wanted))
-        return _choose({tier: estimator.result() for tier, estimator in estimators.items()})
+        return _choose(lambda tier: estimators[tier].result())

@@ -223,6 +223,7 @@ def all_passes(
         )  # fmt: skip
         rounds.next()
         poses = refine_poses(frames, read, Texture(room, lit.seen), threads=settings.threads, progress=rounds)
+        del room
         found = replace(found, poses=poses)
         if poses.moved.any():
             rounds.next()

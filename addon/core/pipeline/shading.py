@@ -176,13 +176,15 @@ def shade(
     solved = np.zeros(len(atlas), bool)
     if patches is not None and "missing-light" not in without:
         field, light, solved = with_missing_light(dark, field, light, lit_diffuse, patches, seed)
+    del dark
 
     # Where there is no L_d to divide, the rough E does.
     emitters = {lamp.object_id for lamp in light.lamps}
     told = lit_diffuse.seen | solved | np.isin(atlas.object_id, list(emitters))
-    E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
     if not told.all() and "unseen-surfaces" not in without:
         field, E, escaped = with_unseen_surfaces(field, told, lit_diffuse, instances, emitters, **how)
+    else:
+        E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
     lit, unsure = np.flatnonzero(told), np.zeros(len(atlas), np.float32)
     E[lit], escaped[lit], points, unsure[lit] = irradiance(
         field, lit, rays=rays,

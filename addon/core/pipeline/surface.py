@@ -93,9 +93,7 @@ def make_surface(capture: Capture, unwrap: Unwrap, settings: Settings) -> Surfac
 
 def to_store(found: Surface, captured: Mesh, laid_out: str = "") -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """What is stored of a surface: arrays, and what JSON holds. Of the captured mesh it holds what is different."""
-    first = found.mesh.triangles[: len(captured.triangles)]
-    sign = np.where((first == captured.triangles).all(1), 1, -1).astype(np.int8)
-    arrays = {"uv": found.uv, "sign": sign, "backs": found.backs}
+    arrays = {"uv": found.uv, "sign": found.sign, "backs": found.backs}
     if found.noise:
         arrays["vertices"] = found.mesh.vertices[: len(captured.vertices)]
     arrays |= {name: getattr(found.atlas, name) for name in Elements._fields}

@@ -33,9 +33,8 @@ class Surface:
         these see both sides of (`Mesh.backs`).
     atlas : Atlas
     scene : RayScene
-    uv : (t, 3, 2) float32
-        The atlas coordinates in the corner order of the capture's own mesh; then those of the second sides, turned
-        alike.
+    sign : (s,) number
+        Of each of the capture's triangles: negative where its winding was turned.
     texel_size : float
         Edge of a surface element in metres.
     noise : float
@@ -45,14 +44,20 @@ class Surface:
     mesh: Mesh
     atlas: Atlas
     scene: RayScene
-    uv: np.ndarray
+    sign: np.ndarray
     texel_size: float
     noise: float = 0.0
 
     @property
+    def uv(self) -> np.ndarray:
+        """Atlas coordinates in the corner order of the capture's own mesh; then those of the second sides, turned
+        alike: (t, 3, 2) float32."""
+        return turned(self.atlas.uv, _every(self.mesh, self.sign))
+
+    @property
     def first_uv(self) -> np.ndarray:
         """`uv` of the capture's own triangles. Where a mesh must stay as it is, its sheets show the side seen more."""
-        return self.uv[: len(self.uv) - len(self.backs)]
+        return self.uv[: len(self.sign)]
 
     @cached_property
     def lookup(self) -> ElementLookup:
@@ -201,4 +206,4 @@ def from_uv(
     scene = scene or RayScene(towards.vertices, towards.triangles, towards.backs)
     low, high = atlas.box
     scene.fit(float(np.linalg.norm(high - low)))
-    return Surface(towards, atlas, scene, uv, texel_size, noise)
+    return Surface(towards, atlas, scene, sign.astype(np.int8), texel_size, noise)

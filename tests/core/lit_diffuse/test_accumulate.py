@@ -95,11 +95,12 @@ def summary(count, value) -> Summary:
 
 def test_the_best_kind_of_observations_is_taken():
     """Elements: enough clean; two clean, more at edges; two clean, one at an edge; edge; saturated; nothing."""
-    result = _choose({
+    kinds = {
         CLEAN: summary([3, 2, 2, 0, 0, 0], 1),
         EDGE: summary([9, 4, 1, 1, 0, 0], 2),
         SATURATED: summary([9, 9, 9, 9, 2, 0], 3),
-    })  # fmt: skip
+    }
+    result = _choose(kinds.__getitem__)
     assert result.tier.tolist() == [CLEAN, EDGE, CLEAN, EDGE, SATURATED, -1]
     assert result.count.tolist() == [3, 4, 2, 1, 2, 0]
     assert np.array_equal(result.radiance[:, 0], [1, 2, 1, 2, 3, np.nan], equal_nan=True)

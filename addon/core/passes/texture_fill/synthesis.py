@@ -7,6 +7,8 @@ takes the offset whose copy agrees best with what lies around it. Within one cop
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy import fft, ndimage
 
@@ -32,16 +34,20 @@ def completed(picture: np.ndarray, source: np.ndarray, hole: np.ndarray, scale: 
     """
     edge = max(int(round(TEXTURE.window * scale / TEXTURE.blocks)), 1)
     offsets = dominant_offsets(picture, source, hole, TEXTURE.window * scale)
-    copies = [(shifted(picture, shift), shifted(source, shift)) for shift in offsets]
-    chosen = _labels(picture, source, hole, copies, edge)
+
+    def copies() -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Each offset's copy, and where it shows the source; one at a time, as all are dozens of pictures."""
+        return ((shifted(picture, shift), shifted(source, shift)) for shift in offsets)
+
+    chosen = _labels(picture, source, hole, copies(), edge)
     result, done = picture.copy(), np.zeros(source.shape, bool)
     label = np.repeat(np.repeat(chosen, edge, 0), edge, 1)[: source.shape[0], : source.shape[1]]
-    for k, (copy, valid) in enumerate(copies):
+    for k, (copy, valid) in enumerate(copies()):
         at = hole & valid & (label == k)
         result[at] = copy[at]
         done |= at
     # Single cells whose copy would come from beside the source take the next best offset that has something for them.
-    for copy, valid in copies:
+    for copy, valid in copies():
         at = hole & valid & ~done
         result[at] = copy[at]
         done |= at
