@@ -226,7 +226,7 @@ def finer_detail(run: Corrected, closer: Closer) -> np.ndarray:
     good = (lit.tier == CLEAN) & (lit.count >= VISIBILITY.enough) & (run.albedo.origin == MEASURED)
     known = np.concatenate([np.where(good[:, None], lit.radiance, 0), good[:, None]], 1).astype(np.float32)
     room = closer.sheet.image(surface.atlas.image(known), _owner(run)).reshape(-1, 4)[atlas.texel]
-    floor = np.float32(max(LEVELS.dark * run.median_radiance(), 1e-30))
+    floor = np.float32(max(LEVELS.dark * run.median_radiance, 1e-30))
     level = room[:, :3] / np.maximum(room[:, 3:], 1e-6)
     ratio = np.clip((closer.radiance + floor) / (level + floor), 1 / SHARPENING.most, SHARPENING.most)
     ratio[(room[:, 3] < PARTS.half) | ~np.isfinite(ratio).all(1)] = 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from ..atomic import write_bytes
 from ..evidence.page import make_page
+from ..memory import give_back
 from ..parallel import ordered_map
 from ..passes.albedo.albedo import CLOSED, FILLED, MEASURED, TEXTURED
 from ..passes.texture_fill.texture_fill import NOTHING, Texture, texture_of
@@ -21,6 +23,7 @@ from .corrected import Corrected
 from .parts import LOOKED, Parting, Parts, look_closer, remove_parts, write_parts
 from .report import make_report
 from .stages import code
+from .surface import STAGE as SURFACE
 
 
 class Recovery(Corrected):
@@ -39,6 +42,17 @@ class Recovery(Corrected):
         """All that writing asks of the frames. It may fail and be stopped: done before what was written is touched."""
         if self.settings.atlas != ROOM and self._parting is None:
             self._parting = look_closer(self)
+
+    def let_go(self) -> None:
+        """Hold surface, materials and median radiance alone, which a scene is made of; no more may be asked for then.
+
+        Blender takes as much for the room's mesh as all the stages' values.
+        """
+        self._materials, self.median_radiance  # noqa: B018  (made now: they are kept)
+        for name in ("field", "irradiance", "albedo", "evidence", "texture"):
+            self.__dict__.pop(name, None)
+        self.done = {SURFACE.name: replace(self.surface())}  # without what it has cached
+        give_back()
 
     @property
     def layout_key(self) -> str:
@@ -115,7 +129,7 @@ class Recovery(Corrected):
     def _coverage(self) -> np.ndarray:
         """Count of observations, their relative spread, and where the albedo comes from, (n, 3) float32."""
         lit = self.lit_diffuse()
-        dark = max(1e-6 * self.median_radiance(), 1e-30)
+        dark = max(1e-6 * self.median_radiance, 1e-30)
         spread = (lit.upper - lit.lower).mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
         parts = (lit.count, np.nan_to_num(spread), self.albedo.origin + CLOSED * self.closing)
         return np.stack([part.astype(np.float32) for part in parts], -1)

@@ -179,7 +179,7 @@ class Run:
                 getattr(self.recovery, stage)()
                 if stage == until:
                     break
-            report = self._report(())
+            report = self._report(self.recovery.report())
             if until != WRITE and self._block is None:
                 store.write_json("report.json", report)
             return report
@@ -201,16 +201,21 @@ class Run:
             # materials were measured on: their colours fit its normals.
             posed = replace(recovery.capture, frames=recovery.room_poses().of(self.capture.frames))
             write_room(store.folder, posed, recovery.surface().first_uv)
-            warnings = () if scene is None else scene(recovery, replace(posed, mesh=recovery.written_mesh()))
+            report = recovery.report()
+            warnings: tuple[str, ...] = ()
+            if scene is not None:
+                posed = replace(posed, mesh=recovery.written_mesh())
+                recovery.let_go()
+                warnings = scene(recovery, posed)
             self._progress.done()
             figures = {"seconds": round(time.monotonic() - writing, 2), "stored": False}
-            report = self._report(warnings, {WRITE: figures | {"peak_memory_bytes": peak_memory()}})
+            report["stages"] |= {WRITE: figures | {"peak_memory_bytes": peak_memory()}}
+            report = self._report(report, warnings)
             store.write_json("report.json", report)
             return report
 
-    def _report(self, warnings: tuple[str, ...], stages: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        report = self.recovery.report()
-        report["stages"] |= stages or {}
+    def _report(self, report: dict[str, Any], warnings: tuple[str, ...] = ()) -> dict[str, Any]:
+        """The recovery's report with what only the run knows."""
         report["warnings"] += (*self._told, *warnings)
         report["versions"] = self._versions | package_versions()
         report["peak_memory_bytes"] = peak_memory()

@@ -335,6 +335,7 @@ class Stages:
             progress=self.progress,
         )  # fmt: skip
 
+    @cached_property
     def median_radiance(self) -> float:
         """Median of L_d over all that was seen: what a picture's exposure is set by."""
         lit = self.lit_diffuse()
