@@ -16,7 +16,7 @@ from typing import BinaryIO
 
 from ..errors import BadInputError
 from ..kinds import Code, Limit
-from .files import absence
+from .files import check_picture
 from .picture import MAX_PIXELS, too_large
 
 MAGIC = b"\x76\x2f\x31\x01"
@@ -101,8 +101,7 @@ def parse_headers(path: Path) -> tuple[ExrHeader, ...]:
     """
     path = Path(path)
     try:
-        if what := absence(path):
-            raise BadInputError(f"Picture '{path}' {what}; check the capture's paths.")
+        check_picture(path)
         size = path.stat().st_size
         with open(path, "rb") as file:
             for limit in HEADER_BYTES:

@@ -25,6 +25,12 @@ def absence(path: Path) -> str:
     return "" if path.is_file() else "is not a file" if path.exists() else "does not exist"
 
 
+def check_picture(path: Path) -> None:
+    """Raise `BadInputError` where no picture can be read at `path`."""
+    if what := absence(path):
+        raise BadInputError(f"Picture '{path}' {what}; check the capture's paths.")
+
+
 @contextmanager
 def readable(what: str, remedy: str = "check the file and its rights") -> Iterator[None]:
     """Turn what the system refuses as `what` is read into one sentence, a `BadInputError`."""

@@ -21,7 +21,7 @@ from ..scene.model import Frame
 from ..scene.pose import check_pose
 from . import instances
 from .conventions import AS_READ
-from .files import inside, read_json
+from .files import check_picture, inside, read_json
 from .layout import Layout, RawMesh, Reader, Reading, usable
 from .meshes import MESH, find_mesh, read_mesh
 from .nerfstudio_camera import Entry, check_model, lens_notes, read_camera
@@ -159,6 +159,7 @@ def _frame(root: Path, entry: Entry, reading: Reading) -> Frame:
     """One frame; raises `BadInputError` where it can't be used."""
     name, mask = entry.name, entry.own.get("mask_path")
     path = ended(inside(root, entry.own.get("file_path"), name, reading.outside), name)
+    check_picture(path)  # first: of a hundred thousand frames the rest takes many seconds
     pose = check_pose(entry.own.get("transform_matrix"), name)
     exposure, saturation = entry.positive("exposure", 1.0), entry.positive("saturation", math.inf)
     camera = read_camera(entry, path, pose)

@@ -10,7 +10,7 @@ from ..errors import BadInputError
 from . import exr_header, radiance_hdr
 from .exif import exif_orientation
 from .exr import exr_note, read_exr, read_header
-from .files import absence
+from .files import check_picture
 from .heif import HEIC, heif_header, heif_orientation, is_heif, read_heif
 from .oiio import CODED, TIFF, coded_header, coded_orientation, read_coded
 from .picture import Picture, turn
@@ -33,8 +33,7 @@ def picture_kind(path: Path | str) -> str:
     """
     path = Path(path)
     try:
-        if what := absence(path):
-            raise BadInputError(f"Picture '{path}' {what}; check the capture's paths.")
+        check_picture(path)
         with open(path, "rb") as file:
             head = file.read(16)
     except (OSError, ValueError) as error:
