@@ -77,6 +77,7 @@ class Recovery(Corrected):
             "albedo_error": self.evidence.albedo_error,
             "evidence": self.evidence.shares,
         }
+        give_back()
 
         def write(name: str) -> None:
             self.store.write_exr(f"{name}.exr", self.over_atlas(name, images[name]())[::-1])
