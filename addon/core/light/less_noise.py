@@ -86,9 +86,11 @@ def cells(
     key = np.zeros(len(position), np.int64)
 
     def tell_apart(part: np.ndarray) -> None:
+        nonlocal key
         part = part.astype(np.int64)
         part -= part.min(initial=0)
-        key[:] = key * (int(part.max(initial=0)) + 1) + part
+        key *= int(part.max(initial=0)) + 1
+        key += part
 
     # One axis after the other: all six at once were the most memory that a large room took.
     for along in position.T:
@@ -96,7 +98,8 @@ def cells(
     for facing in normal.T:
         tell_apart(np.round(facing * LESS_NOISE.turned / 2) + LESS_NOISE.turned)
     order = np.argsort(key, kind="stable")
-    new = np.diff(key[order], prepend=-1) != 0
+    key = key[order]
+    new = np.append([True], key[1:] != key[:-1])[: len(key)]
     starts = np.append(np.flatnonzero(new), len(key))
     cuts = np.unique(starts[np.searchsorted(starts, range(0, len(key) + AT_ONCE, AT_ONCE)).clip(max=len(starts) - 1)])
     for first, last in zip(cuts, cuts[1:]):

@@ -18,6 +18,7 @@ from ..light.environment import Environment, EnvironmentAccumulator
 from ..light.field import LightField
 from ..lit_diffuse.accumulate import accumulate
 from ..lit_diffuse.from_texture import lit_from_tiles
+from ..memory import give_back
 from ..passes.clipped_lamps.fringes import FringeCollector, Fringes
 from ..passes.pose_refinement.poses import Poses, Texture, refine_poses
 from ..passes.radiometric_calibration.calibrate import Calibration, calibrate
@@ -224,6 +225,7 @@ def all_passes(
         rounds.next()
         poses = refine_poses(frames, read, Texture(room, lit.seen), threads=settings.threads, progress=rounds)
         del room
+        give_back()
         found = replace(found, poses=poses)
         if poses.moved.any():
             rounds.next()

@@ -18,6 +18,7 @@ from ..light.openings import Openings
 from ..light.over_surface import Gathering, finest_spacing, irradiance
 from ..light.shading import Shading
 from ..light.sun import Sun, taken_out
+from ..memory import give_back
 from ..passes.clipped_lamps.clipped import shade_clipped
 from ..passes.clipped_lamps.patches import clipped_patches, told_of
 from ..passes.mirrors.flat_mirrors import find_mirrors
@@ -183,6 +184,7 @@ def shade(
     told = lit_diffuse.seen | solved | np.isin(atlas.object_id, list(emitters))
     if not told.all() and "unseen-surfaces" not in without:
         field, E, escaped = with_unseen_surfaces(field, told, lit_diffuse, instances, emitters, **how)
+        give_back()
     else:
         E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
     lit, unsure = np.flatnonzero(told), np.zeros(len(atlas), np.float32)

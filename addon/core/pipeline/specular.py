@@ -205,6 +205,7 @@ def fit_specular(
         _without_backgrounds(specular, apart, room, maker, threads)
         if pictures is not None:
             hidden |= _remove(specular, apart, room, pictures, rays, threads, seed, progress)
+    give_back()
     if refine > 1 and held is None:
         seen = np.flatnonzero(lit_diffuse.seen)
         sent = Excess(field, materials, specular, seed)

@@ -160,6 +160,7 @@ def find_elements(
     for part in blocks(len(texel), 1 << 18):
         a, b, c = (mesh.vertices[mesh.triangles[triangle[part], i]].astype(np.float64) for i in range(3))
         position[part] = a + u[part, None] * (b - a) + v[part, None] * (c - a)
+    del u, v
     # Each triangle's surface is shared out between its texels; what no texel covers is left out.
     count = np.bincount(triangle, minlength=len(mesh.triangles))
     area = triangle_geometry(mesh)[1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,19 @@ def test_a_shadows_edge_stays():
     beside = np.abs(position[:, 0] - 0.43) < LESS_NOISE.cell / 2
     assert error(found[beside], clean[beside]) < 0.06  # no more than the noise itself
     assert error(found[~beside], clean[~beside]) < 0.03
+
+
+def test_memory_beside_the_result_is_a_portions():
+    """A room of many cells: what is held at once for each element is less than the double planes of a grid would be."""
+    rng = np.random.default_rng(0)
+    position = rng.random((500_000, 3), np.float32) * 5
+    position[:, 2] = 0
+    light, normal = np.ones_like(position), np.broadcast_to(np.float32([0, 0, 1]), position.shape)
+    tracemalloc.start()
+    less_noise(position, normal, light, light[:, 0], threads=2)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 120 * len(position)
 
 
 def test_without_noise_nothing_changes():
