@@ -11,8 +11,8 @@ from tests.hostile.load import boxes, write
 bpy = pytest.importorskip("bpy")
 
 KINDS = ("scenes", "collections", "objects", "meshes", "materials", "worlds", "cameras", "images", "actions")
-BLENDERS_OWN = {"session_uid", "identifier", "filepath", "filepath_raw"}
-"""What Blender counts or draws by chance, and where the result lies."""
+LEFT_OUT = {"session_uid", "identifier", "filepath", "filepath_raw", "use_nodes"}
+"""What Blender counts or draws by chance, where the result lies, and what Blender 6 won't have."""
 
 
 def plain(value):
@@ -22,7 +22,7 @@ def plain(value):
 def values(thing) -> dict:
     """All that is no reference to other things, by name."""
     kinds = {one.identifier: one.type for one in thing.bl_rna.properties}
-    names = [name for name, kind in kinds.items() if kind not in ("POINTER", "COLLECTION") and name not in BLENDERS_OWN]
+    names = [name for name, kind in kinds.items() if kind not in ("POINTER", "COLLECTION") and name not in LEFT_OUT]
     return {name: plain(getattr(thing, name)) for name in names}
 
 
