@@ -81,7 +81,7 @@ def read_heif(path: Path | str) -> Stored:
             pixels = (np.minimum(pixels, top).astype(np.uint32) * 65535 // top).astype(np.uint16)
         has_alpha = pixels.shape[2] in (2, 4)
         colour = pixels[..., : 3 if pixels.shape[2] >= 3 else 1]
-        return Stored(colour, pixels[..., -1] if has_alpha else None)
+        return Stored(colour, pixels[..., -1] if has_alpha else None, file.info.get("icc_profile") or b"")
 
 
 def _open(path: Path | str) -> Any:

@@ -66,10 +66,13 @@ class Stored(NamedTuple):
         uint8 or uint16 codes, or float32. A palette is looked up; 1, 2 and 4 bits are scaled to 0...255.
     alpha : (h, w) of the same type, or None
         PNG's one transparent colour (tRNS) counts as alpha 0.
+    profile : bytes
+        ICC's; empty where it has none.
     """
 
     colour: np.ndarray
     alpha: np.ndarray | None
+    profile: bytes = b""
 
 
 def coded_header(path: Path | str) -> Header:
@@ -122,7 +125,10 @@ def read_coded(path: Path | str) -> Stored:
     if file.format_name() == "png" and _png_kind(path)[1] == PALETTE:
         _check_palette(colour, path)
     alpha = spec.alpha_channel
-    return Stored(colour, pixels[..., alpha] if 0 <= alpha < count else None)
+    profile = spec.getattribute("ICCProfile")
+    return Stored(
+        colour, pixels[..., alpha] if 0 <= alpha < count else None, b"" if profile is None else bytes(profile)
+    )
 
 
 def _library(path: Path) -> Any:

@@ -84,9 +84,12 @@ class Picture(NamedTuple):
     Attributes
     ----------
     rgb : (h, w, 3) float32
-        Linear Rec.709; NaN where the display window is larger than the data.
+        Linear; NaN where the display window is larger than the data.
     alpha : (h, w) float32 or None
+    to_rec709 : (3, 3) float32 or None
+        What the pixels of codes are still to be multiplied by once they are linear; None: they are Rec.709.
     """
 
     rgb: np.ndarray
     alpha: np.ndarray | None
+    to_rec709: np.ndarray | None = None

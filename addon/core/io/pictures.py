@@ -12,6 +12,7 @@ from .exif import exif_orientation
 from .exr import exr_note, read_exr, read_header
 from .files import check_picture
 from .heif import HEIC, heif_header, heif_orientation, is_heif, read_heif
+from .icc import to_rec709
 from .oiio import CODED, TIFF, coded_header, coded_orientation, read_coded
 from .picture import Picture, turn
 from .radiance_hdr import hdr_size, read_hdr
@@ -109,7 +110,7 @@ def picture_note(path: Path) -> str:
 
 
 def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Picture:
-    """A frame's numbers, linear Rec.709; 1 is the greatest code of a picture of 8 or 16 bits.
+    """A frame's numbers, linear (see `Picture.to_rec709`); 1 is the greatest code of a picture of 8 or 16 bits.
 
     Parameters
     ----------
@@ -133,7 +134,7 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
         return Picture(turn(rgb, picture_orientation(path)) if turned else rgb, None)
     if not transfer and _coded_bits(path, kind):
         raise BadInputError(unstated(path))
-    colour, alpha = read_heif(path) if kind == HEIC else read_coded(path)
+    colour, alpha, profile = read_heif(path) if kind == HEIC else read_coded(path)
     if turned:
         orientation = picture_orientation(path)
         colour, alpha = turn(colour, orientation), None if alpha is None else turn(alpha, orientation)
@@ -142,7 +143,7 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
     if colour.dtype.kind == "f":
         return Picture(np.ascontiguousarray(colour, np.float32), alpha)
     scale = np.float32(np.iinfo(colour.dtype).max)
-    return Picture(decode(colour, transfer), None if alpha is None else alpha / scale)
+    return Picture(decode(colour, transfer), None if alpha is None else alpha / scale, to_rec709(profile))
 
 
 def unstated(path: Path | str) -> str:

@@ -13,7 +13,7 @@ from ..scene.radiometry import srgb_to_linear
 from .brackets import Exposed, merge
 from .exr import HALF_MAX
 from .pictures import read_mask, read_picture
-from .transfer import LINEAR
+from .transfer import CODES, LINEAR
 
 NOISE = 1e-4
 """Negative values down to this come from filtering and count as 0."""
@@ -56,13 +56,13 @@ def read_pixels(frame: Frame) -> Pixels:
 
 def as_codes(frame: Frame) -> Frame:
     """A frame with the curve `AUTO` whose codes, 0...1, `read_pixels` gives as they are."""
-    return replace(frame, transfer=LINEAR, exposure=1.0, radiometry=None)
+    return replace(frame, transfer=CODES, exposure=1.0, radiometry=None)
 
 
 def _exposed(frame: Frame, shot: Shot, seen: np.ndarray) -> Exposed:
     """One exposure of `frame`; `seen` ((h, w) bool) is False where no exposure says anything."""
     auto = frame.transfer == AUTO
-    rgb, alpha = read_picture(shot.path, LINEAR if auto else frame.transfer, frame.turned)
+    rgb, alpha, to_rec709 = read_picture(shot.path, LINEAR if auto else frame.transfer, frame.turned)
     if rgb.shape[:2] != seen.shape:
         raise BadInputError(f"Frame '{frame.name}': '{shot.path}' changed its size during the run; start again.")
     # A half float overflows to inf: the pixel was bright, but it gives no value at all, not even a bound. Writers that
@@ -76,6 +76,8 @@ def _exposed(frame: Frame, shot: Shot, seen: np.ndarray) -> Exposed:
         rgb = frame.radiometry.radiance(rgb, _r2(frame.camera))
     elif auto:
         rgb, saturation = srgb_to_linear(rgb).astype(np.float32), float(srgb_to_linear(np.array(saturation)))
+    if to_rec709 is not None and frame.transfer != CODES:
+        rgb = rgb @ to_rec709.T
     return Exposed(np.maximum(rgb, 0), usable, clipped & seen, shot.exposure, saturation)
 
 

@@ -12,11 +12,13 @@ import functools
 import numpy as np
 
 from ..errors import BadInputError
-from ..kinds import Limit
+from ..kinds import Code, Limit
 from ..scene.model import AUTO
 from ..scene.radiometry import srgb_to_linear
 
 SRGB, LINEAR = "srgb", "linear"
+CODES: Code[str] = "codes"
+"""In place of a curve where the stored codes are asked for: not even their primaries are converted."""
 GAMMAS: Limit[tuple[float, float]] = (0.1, 10.0)
 """Bounds of a gamma that anyone can mean."""
 TOP = {8: 253.5 / 255, 16: 1 - 2.0**-12}
@@ -33,7 +35,7 @@ def check_transfer(text: str) -> None:
 def to_linear(values: np.ndarray, transfer: str) -> np.ndarray:
     """Undo the curve `transfer` of `values` in 0...1; float64, of the same shape."""
     values = np.asarray(values, np.float64)
-    if transfer == LINEAR:
+    if transfer in (LINEAR, CODES):
         return values
     if transfer == SRGB:
         return srgb_to_linear(values)

@@ -32,7 +32,7 @@ def write_with_library(path, planes, **header):
 def test_what_is_written_is_read(tmp_path, shape, half):
     array = PICTURE.ravel()[: np.prod(shape)].reshape(shape)
     write_exr(tmp_path / "a.exr", array, half)
-    rgb, alpha = read_exr(tmp_path / "a.exr")
+    rgb, alpha, *_ = read_exr(tmp_path / "a.exr")
     wanted = np.repeat(array[..., None], 3, -1) if array.ndim == 2 else array
     assert rgb.dtype == np.float32
     np.testing.assert_allclose(rgb, wanted[..., :3], rtol=5e-4 if half else 0, atol=1e-7 if half else 0)
@@ -85,7 +85,7 @@ def test_the_display_window_is_the_picture(tmp_path):
     path = tmp_path / "a.exr"
     write_exr(path, PICTURE)
     patched(path, b"displayWindow", struct.pack("<4i", 10, -5, 99, 29))  # data is 0...69 x 0...39
-    rgb, alpha = read_exr(path)
+    rgb, alpha, *_ = read_exr(path)
     assert rgb.shape == (35, 90, 3) and read_header(path) == (90, 35)
     np.testing.assert_array_equal(rgb[5:, :60], PICTURE[:30, 10:, :3])
     np.testing.assert_array_equal(alpha[5:, :60], PICTURE[:30, 10:, 3])

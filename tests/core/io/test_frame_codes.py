@@ -89,7 +89,7 @@ def test_gray_and_alpha(tmp_path):
     pillow = pytest.importorskip("PIL.Image")
     gray = np.stack([CODES[..., 0], np.full((HEIGHT, WIDTH), 128, np.uint8)], -1)
     pillow.fromarray(gray, "LA").save(tmp_path / "a.png")
-    rgb, alpha = read_picture(tmp_path / "a.png", "linear")
+    rgb, alpha, *_ = read_picture(tmp_path / "a.png", "linear")
     np.testing.assert_allclose(rgb, np.repeat(CODES[..., :1], 3, -1) / 255, atol=1e-6)
     np.testing.assert_allclose(alpha, 128 / 255)
     assert picture_bits(tmp_path / "a.png") == 8
