@@ -28,6 +28,7 @@ from ...light.field import LightField
 from ...light.lamps import Lamp, find_seen, lamp_models, mixed_lamps, of_shining_class
 from ...light.light_fit import Sample, kinds_of, on_flat
 from ...light.params import LIGHT_FIT
+from ...luminance import LUMINANCE
 from ...scene.model import Instance, class_names
 from ...significance import LEVELS
 from .params import UNSEEN
@@ -198,7 +199,8 @@ def find_light(
 
     sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.told for z in zones])
     class_of = class_names(instances)
-    colours = shared_by_class(colours or {}, unseen_objects, instances)
+    known_colours = shared_by_class(colours or {}, unseen_objects, instances)
+    colours = {i: np.mean([known_colours[one] for one in own], 0) for i, own in alike.items() if i in known_colours}
 
     for _ in range(UNSEEN.sweeps if zones else 1):
         lamps = solve_lamps(sample, contribution, least, class_of, model, kin, seen, sky, received[lit], colours)
@@ -210,7 +212,11 @@ def find_light(
     sample = replace(sample, kind=kind, cap=LIGHT_FIT.clipped_cap if clipped else LIGHT_FIT.cap)
     if "joint-light" not in without:
         lamps = refined(sample, lamps, contribution, least, model, seen, sky, received[lit], colours)
-    lamps = [replace(lamp, object_id=one) for lamp in lamps for one in alike[lamp.object_id]]
+    lamps = [
+        replace(lamp, object_id=one, radiance=of_colour(lamp, known_colours.get(one)))
+        for lamp in lamps
+        for one in alike[lamp.object_id]
+    ]
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))
     # With all light known, what looked like a lamp for want of it does so no more.
@@ -221,6 +227,13 @@ def find_light(
     kept = Contributions(sunless, sky_contributions, sample.element, contribution, least)
     notes = found + tuple(sky.notes())
     return Light(tuple(sure) + tuple(lamps), environment, notes, element, everything, kept, mixed)
+
+
+def of_colour(lamp: Lamp, known: np.ndarray | None) -> np.ndarray:
+    """A lamp's radiance ((3,) float32), in the colour of its own edges where the lamp has one of edges."""
+    if known is None or not lamp.from_edges:
+        return lamp.radiance
+    return (lamp.radiance @ LUMINANCE * known).astype(np.float32)
 
 
 def lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
