@@ -159,7 +159,7 @@ def test_a_stage_is_measured_under_its_alternatives(stage, disk, tmp_path, monke
     assert [name for name, record in records.items() if record["baseline"]] == [stages.PAPERS]
     errors = {name: record[stages.ERRORS[stage]] for name, record in records.items()}
     assert all(0 <= error < 1 for error in errors.values()), errors
-    assert stage != "lit_diffuse" or errors["exact"] == 0 < errors[stages.PAPERS]
+    assert stage != "lit_diffuse" or errors["default"] == 0 < errors[stages.PAPERS]
     assert [path.name for path in tmp_path.iterdir()] == ["capture"]
 
 
