@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from ..scene.model import Camera, Mesh
+from ..scene.model import Camera
 from ..scene.rays import RayScene
 from ..significance import LEVELS
 from .params import AGREEMENT
@@ -23,12 +23,14 @@ class Shown(NamedTuple):
     edge: np.ndarray
 
 
-def shown(camera: Camera, mesh: Mesh, normal: np.ndarray, scene: RayScene) -> Shown:
+def shown(camera: Camera, normal: np.ndarray, scene: RayScene, bends: bool = True) -> Shown:
     """Trace a view and find the mesh's edges: steps in depth, bends, borders of objects.
 
     Parameters
     ----------
     normal : (t, 3) float32
+    bends : bool
+        Not so in a mesh that was fused from depth: most of its bends are noise.
     """
     directions = camera.directions(camera.pixel_centres())
     hits = scene.intersect(np.broadcast_to(np.float32(camera.centre), directions.shape), directions)
@@ -45,7 +47,7 @@ def shown(camera: Camera, mesh: Mesh, normal: np.ndarray, scene: RayScene) -> Sh
             step = far > (1 + AGREEMENT.jump) * near
         # a triangle's normal has no side: scans are wound as it happens
         bent = np.abs((facing[own] * facing[other]).sum(-1)) < AGREEMENT.bend
-        edge[own] |= (both & bent) | step | (hit[own] != hit[other])
+        edge[own] |= (both & bent & bends) | step | (hit[own] != hit[other])
     return Shown(triangle, distance, edge)
 
 

@@ -125,12 +125,14 @@ class _Scene:
 
     def colour(self, convention: Convention, every: int = 1) -> Fit:
         views = self.views[::every]
-        found = consistency(views, convention.cameras([view.camera for view in views]), self.rays)
+        told = not any(frame.uncalibrated for frame in self.capture.frames)
+        found = consistency(views, convention.cameras([view.camera for view in views]), self.rays, told)
         return Fit(convention, found.score, float("nan"), found.hit)
 
     def shown(self, convention: Convention) -> list[Shown]:
         cameras = convention.cameras([view.camera for view in self.views])
-        return [shown(camera, self.capture.mesh, self.normal, self.rays) for camera in cameras]
+        bends = not all(one.guess for one in self.capture.instances)
+        return [shown(camera, self.normal, self.rays, bends) for camera in cameras]
 
     def whole(self, fit: Fit) -> Fit:
         return replace(fit, edge=edge_score(self.views, self.shown(fit.convention)))

@@ -42,7 +42,7 @@ def overlay(capture: Capture, read: Callable[[Frame], Pixels], conventions: Sequ
         images = []
         for convention in conventions:
             image = plain.copy()
-            image[shown(convention.cameras([camera])[0], capture.mesh, normal, rays).edge] = LINE
+            image[shown(convention.cameras([camera])[0], normal, rays).edge] = LINE
             images.append(image)
         rows.append(_beside(images, 1))
     return _beside(rows, 0)

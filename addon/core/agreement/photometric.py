@@ -32,13 +32,17 @@ class Consistency(NamedTuple):
     pairs: int
 
 
-def consistency(views: Sequence[SmallView], cameras: Sequence[Camera], scene: RayScene, seed: int = 0) -> Consistency:
+def consistency(
+    views: Sequence[SmallView], cameras: Sequence[Camera], scene: RayScene, exposed: bool = True, seed: int = 0
+) -> Consistency:
     """Compare views of the same spots.
 
     Parameters
     ----------
     cameras : sequence of Camera
         The views' cameras, in the pose to be tried.
+    exposed : bool
+        Whether exposures and white balance are told; if not, each two views may differ by a factor in each channel.
     """
     rng = np.random.default_rng(seed)
     near, far, hits, rays = [], [], 0, 0
@@ -64,6 +68,8 @@ def consistency(views: Sequence[SmallView], cameras: Sequence[Camera], scene: Ra
             known = np.isfinite(theirs).all(1)
             inside, theirs = inside[known], theirs[known]
             if len(inside) > 1:
+                if not exposed:
+                    theirs = theirs + np.median(own[inside] - theirs, 0)
                 near.append(np.abs(own[inside] - theirs).mean(1))
                 far.append(np.abs(own[inside] - theirs[rng.permutation(len(inside))]).mean(1))
     pairs = sum(map(len, near))

@@ -8,12 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from addon.core.agreement.edges import shown
 from addon.core.agreement.look import look
 from addon.core.agreement.overlay import LINE, overlay
 from addon.core.agreement.params import AGREEMENT
 from addon.core.errors import BadInputError
 from addon.core.io.conventions import Convention, matrix, parse
-from addon.core.scene.model import Capture, Instance, Pixels
+from addon.core.scene.elements import triangle_geometry
+from addon.core.scene.model import AUTO, Capture, Instance, Pixels
+from addon.core.scene.rays import RayScene
 from tests.core.synthetic import synthetic_capture
 
 MENDS = ["opencv", "world-to-camera", "camera:+x-y-z,world:+x+z-y", "scale:100"]
@@ -67,6 +70,38 @@ def test_right_poses_are_left_alone(room):
     assert found.fits and not found.searched and found.best is None and found.as_read.quality > AGREEMENT.agree + 0.02
     assert found.up == "+z" and len(found.sentences()) == 1 and "fit the mesh" in found.sentence()
     assert np.median(found.misaligned) < 0.15
+
+
+def test_frames_whose_exposure_nobody_told_fit_too(room):
+    """Automatic exposure and white balance differ from frame to frame as much as what two spots show."""
+    capture, read = room
+    rng = np.random.default_rng(3)
+    gain = {frame.name: np.exp2(rng.normal(0, 1.5) + rng.normal(0, 0.3, 3)) for frame in capture.frames}
+
+    def exposed(frame):
+        pixels = read(frame)
+        return replace(pixels, radiance=np.float32(pixels.radiance * gain[frame.name]))
+
+    untold = replace(capture, frames=tuple(replace(frame, transfer=AUTO) for frame in capture.frames))
+    assert not look(capture, exposed, search=False).fits
+    assert look(untold, exposed, search=False).fits
+    wrong = spoilt(untold, parse("camera:+x-y-z,world:+x+z-y"))
+    assert not look(wrong, exposed, search=False).fits
+
+
+def test_bends_of_a_fused_mesh_are_no_edges(room):
+    """Noise of depth turns most of its triangles; what steps in depth is an edge still."""
+    capture, _ = room
+    noise = 0.01 * np.sin(100 * capture.mesh.vertices.sum(1))[:, None]  # alike where vertices meet
+    rough = replace(capture.mesh, vertices=np.float32(capture.mesh.vertices + noise))
+    camera = capture.frames[0].camera
+
+    def edges(mesh, bends):
+        return shown(camera, triangle_geometry(mesh)[0], RayScene(mesh.vertices, mesh.triangles), bends).edge
+
+    assert edges(rough, True).mean() > 1.3 * edges(capture.mesh, True).mean()
+    steps = edges(capture.mesh, False)
+    assert steps.any() and edges(rough, False).mean() < 1.1 * steps.mean()
 
 
 @pytest.mark.slow
