@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..light.environment import Environment
-from ..light.few_elements import evened
+from ..light.few_elements import barely_seen, evened
 from ..light.field import LightField
 from ..light.lamps import Lamp
 from ..light.mirrors import Mirror, known_mirror
@@ -232,7 +232,10 @@ def with_all_light(
         `turned_by_noise`.
     """
     atlas, seen, tier = field.atlas, lit_diffuse.seen, lit_diffuse.tier
-    good = seen & (((tier == CLEAN) & (lit_diffuse.count >= VISIBILITY.enough)) | (tier == SATURATED))
+    clean = seen & (tier == CLEAN)
+    good = clean & (lit_diffuse.count >= VISIBILITY.enough) | seen & (tier == SATURATED)
+    # One clean look at a lamp shows what it sends.
+    good |= clean & barely_seen(field, good)
     real = atlas.area > 0
     unseen = np.setdiff1d(atlas.object_id[real], atlas.object_id[real & seen]).tolist()
     unseen = [] if "unseen-lamps" in without else unseen

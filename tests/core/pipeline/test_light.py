@@ -100,6 +100,18 @@ def test_a_lamp_smaller_than_a_pixel_is_solved_for_with_its_like(strips):
     assert found[7].radiance @ LUMINANCE == pytest.approx(np.float32([20, 18, 16]) @ LUMINANCE, rel=0.2)
 
 
+def test_a_lamp_that_one_frame_shows_unmixed_is_as_bright_as_it_shows(strips):
+    """Elsewhere its pixels are mixed with the dark beside it."""
+    room, L = strips
+    lit = measured(room, L, {8}, texture=0.1)
+    own = np.flatnonzero(room.atlas.object_id == 7)
+    lit.count[own] = 1
+    lit.radiance[own[1:]] *= 0.5
+    lit.tier[own[1:]] = EDGE
+    found = {lamp.object_id: lamp for lamp in run(room, lit).lamps}
+    assert found[7].seen and np.allclose(found[7].radiance, lit.radiance[own[0]])
+
+
 @pytest.mark.slow
 def test_an_unseen_lamp_is_found_among_many_unseen_things():
     """A corner of the floor is in 100 pieces that no frame sees, each a thing of its own; so is the only lamp."""
