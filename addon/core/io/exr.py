@@ -151,7 +151,8 @@ def write_exr(path: Path | str, array: np.ndarray, half: bool = False) -> None:
         OpenEXR.File(header, planes).write(stream)
     except RuntimeError as error:
         raise StorageError(f"'{path}' can't be written ({error}); try again with less in memory.") from error
-    write_bytes(path, stream.getbuffer())
+    with stream.getbuffer() as content:  # let go of, or the stream can't be closed
+        write_bytes(path, content)
 
 
 def _supported(path: Path) -> tuple[ExrLayer, str]:
