@@ -34,6 +34,8 @@ class Lamp:
     twin : int or None
         The seen lamp whose radiance it takes, as `solved`, the luminance that was solved for, is near that lamp's.
     solved : float or None
+    mixed : bool
+        Frames show it, but no pixel without what is beside it.
     """
 
     object_id: int
@@ -44,12 +46,14 @@ class Lamp:
     from_edges: bool = False
     twin: int | None = None
     solved: float | None = None
+    mixed: bool = False
 
     def note(self, names: Mapping[int, str]) -> str:
         """How the radiance was found, where that needs saying; `names` are those of all objects."""
         if self.seen:
             return "Clipped in every frame; its radiance is a lower bound." if self.clipped else ""
-        told = "Clipped in every frame" if self.clipped else "No frame sees it"
+        unseen = "Frames show it only mixed with what is beside it" if self.mixed else "No frame sees it"
+        told = "Clipped in every frame" if self.clipped else unseen
         told += "; solved from the light it throws"
         if self.spread is not None:
             before, after = self.spread
@@ -105,14 +109,19 @@ def of_shining_class(lamps: Collection[Lamp], clean: np.ndarray, instances: tupl
     return found
 
 
-def mixed_lamps(lamps: Collection[Lamp], clean: np.ndarray, instances: tuple[Instance, ...]) -> list[int]:
-    """Seen lamps of a class that shines whose radiance no pixel shows unmixed (`of_shining_class`).
+def mixed_lamps(lamps: Collection[Lamp], clean: np.ndarray) -> list[int]:
+    """Seen lamps whose radiance no pixel shows unmixed.
 
-    Their pixels hold what is beside the lamp as well, so their radiance is to be solved for, too.
+    Their pixels hold what is beside them as well. So a lamp's radiance is to be solved for, too, and what only stands
+    beside one is none.
+
+    Parameters
+    ----------
+    clean : (m,) int
+        As in `of_shining_class`.
     """
-    shown = np.unique(clean)
-    kin = of_shining_class(lamps, shown, instances).keys() - set(shown.tolist())
-    return [lamp.object_id for lamp in lamps if lamp.seen and lamp.object_id in kin]
+    shown = set(np.unique(clean).tolist())
+    return [lamp.object_id for lamp in lamps if lamp.seen and lamp.object_id not in shown]
 
 
 def lamp_models(atlas: Atlas, instances: tuple[Instance, ...]) -> dict[int, int]:

@@ -97,7 +97,30 @@ def test_a_lamp_smaller_than_a_pixel_is_solved_for_with_its_like(strips):
     found = {lamp.object_id: lamp for lamp in run(room, lit).lamps}
     assert set(found) == {6, 7, 8} and found[6].seen and not found[7].seen
     assert np.array_equal(found[7].radiance, found[8].radiance)
+    assert found[7].note({}).startswith("Frames show it only mixed") and found[8].note({}).startswith(
+        "No frame sees it"
+    )
     assert found[7].radiance @ LUMINANCE == pytest.approx(np.float32([20, 18, 16]) @ LUMINANCE, rel=0.2)
+
+
+def test_what_stands_beside_a_lamp_is_none(strips):
+    """A strip that only reflects shows the lamp's light in each of its pixels, but throws none."""
+    room, _ = strips
+    room = replace(room, instances=tuple(replace(one, class_name="") for one in room.instances))
+    lit = measured(room, radiosity(room, ALBEDO | {7: ALBEDO[0], 8: ALBEDO[0]}, {6: (10, 9, 8)}), set(), texture=0.1)
+    mixed = room.atlas.object_id == 7
+    lit.radiance[mixed] = (5, 4.5, 4)
+    lit.tier[mixed], lit.count[mixed] = EDGE, 1
+    assert {lamp.object_id for lamp in run(room, lit).lamps} == {6}
+
+
+def test_a_lamp_whose_pixels_are_hardly_mixed_is_as_bright_as_they_are(strips):
+    room, L = strips
+    lit = measured(room, L, {8}, texture=0.1)
+    mixed = room.atlas.object_id == 7
+    lit.tier[mixed], lit.count[mixed] = EDGE, 1
+    found = {lamp.object_id: lamp for lamp in run(room, lit).lamps}
+    assert found[7].seen and np.allclose(found[7].radiance, np.median(lit.radiance[mixed], 0))
 
 
 def test_a_lamp_that_one_frame_shows_unmixed_is_as_bright_as_it_shows(strips):

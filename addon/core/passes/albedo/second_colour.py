@@ -68,7 +68,8 @@ def shrunk_to_second_colour(
     """
     ground, width, near = np.exp(around.middle), around.width, around.near
     other = np.empty(near.shape, bool)
-    uncut, least = reference.max(1) < most, (LEVELS.likely * reference_error) ** 2
+    # An error may be as large as a float holds: such a reference tells no colour.
+    uncut, least = reference.max(1) < most, np.square(LEVELS.likely * reference_error, dtype=np.float64)
 
     def far(part: slice) -> None:
         beside = near[part]

@@ -164,7 +164,7 @@ def find_light(
     filled = received + sum(G[:, None] * s for G, s in zip(sky_contributions, guess, strict=True))
     seen = find_seen(atlas.object_id[element], field.radiance[element], filled)
     if before is None and "unseen-lamps" not in without:
-        mixed = tuple(mixed_lamps(seen, atlas.object_id[good], instances))
+        mixed = tuple(mixed_lamps(seen, atlas.object_id[good]))
         if mixed:
             told = Light((), shown.environment, (), element, filled, mixed=mixed)
             return find_light(shown, good, unseen_objects, instances, seed, tilted, colours, told, without)
@@ -213,10 +213,11 @@ def find_light(
     if "joint-light" not in without:
         lamps = refined(sample, lamps, contribution, least, model, seen, sky, received[lit], colours)
     lamps = [
-        replace(lamp, object_id=one, radiance=of_colour(lamp, known_colours.get(one)))
+        replace(lamp, object_id=one, radiance=of_colour(lamp, known_colours.get(one)), mixed=one in mixed)
         for lamp in lamps
         for one in alike[lamp.object_id]
     ]
+    lamps = [as_shown(lamp, shown) if lamp.mixed else lamp for lamp in lamps]
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))
     # With all light known, what looked like a lamp for want of it does so no more.
@@ -234,6 +235,13 @@ def of_colour(lamp: Lamp, known: np.ndarray | None) -> np.ndarray:
     if known is None or not lamp.from_edges:
         return lamp.radiance
     return (lamp.radiance @ LUMINANCE * known).astype(np.float32)
+
+
+def as_shown(lamp: Lamp, field: LightField) -> Lamp:
+    """A lamp that pixels show mixed, as bright as they do if it was solved to be about that: they were hardly mixed."""
+    radiance = np.median(field.radiance[field.atlas.elements_of(lamp.object_id)], 0)
+    ratio = float(lamp.radiance @ LUMINANCE) / max(float(radiance @ LUMINANCE), 1e-12)
+    return Lamp(lamp.object_id, radiance, True) if abs(ratio - 1) < LIGHT_FIT.alike else lamp
 
 
 def lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
