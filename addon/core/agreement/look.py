@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -123,10 +124,14 @@ class _Scene:
     rays: RayScene
     normal: np.ndarray
 
+    @cached_property
+    def exposed(self) -> bool:
+        """Whether all frames' exposures are told."""
+        return not any(frame.uncalibrated for frame in self.capture.frames)
+
     def colour(self, convention: Convention, every: int = 1) -> Fit:
         views = self.views[::every]
-        told = not any(frame.uncalibrated for frame in self.capture.frames)
-        found = consistency(views, convention.cameras([view.camera for view in views]), self.rays, told)
+        found = consistency(views, convention.cameras([view.camera for view in views]), self.rays, self.exposed)
         return Fit(convention, found.score, float("nan"), found.hit)
 
     def shown(self, convention: Convention) -> list[Shown]:

@@ -11,24 +11,26 @@ import struct
 import numpy as np
 
 from ..kinds import Code, Limit
+from .primaries import xyz_to_rec709
 
 HEADER: Code[int] = 128
-REC709_D50 = np.array([[0.43607, 0.38515, 0.14307], [0.22249, 0.71687, 0.06061], [0.01392, 0.09708, 0.71410]])
-"""Linear Rec.709 to CIE XYZ under D50, which profiles refer to; the columns of sRGB's own profile (IEC 61966-2-1)."""
 SAME: Limit[float] = 5e-3
 """Difference of coefficients up to which a profile is taken for sRGB's: their writers round."""
-MAX_GAIN: Limit[float] = 10.0
+FARTHEST: Limit[float] = 10.0
 """No primaries of cameras or displays are farther from Rec.709's."""
 
 
-def to_rec709(profile: bytes) -> np.ndarray | None:
+def profile_to_rec709(profile: bytes) -> np.ndarray | None:
     """(3, 3) float32 from linear RGB of `profile` to Rec.709; None where they are the same or it doesn't tell."""
     try:
         columns = np.stack([_column(profile, name) for name in (b"rXYZ", b"gXYZ", b"bXYZ")], 1)
     except (ValueError, struct.error):
         return None
-    matrix = np.linalg.solve(REC709_D50, columns)
-    if np.abs(matrix).max() > MAX_GAIN or np.allclose(matrix, np.eye(3), atol=SAME):
+    if np.linalg.matrix_rank(columns) < 3:  # they span no colours
+        return None
+    with np.errstate(all="ignore"):
+        matrix = xyz_to_rec709(columns)
+    if not np.abs(matrix).max() <= FARTHEST or np.allclose(matrix, np.eye(3), atol=SAME):
         return None
     return matrix.astype(np.float32)
 

@@ -12,7 +12,7 @@ from .exif import exif_orientation
 from .exr import exr_note, read_exr, read_header
 from .files import check_picture
 from .heif import HEIC, heif_header, heif_orientation, is_heif, read_heif
-from .icc import to_rec709
+from .icc import profile_to_rec709
 from .oiio import CODED, TIFF, coded_header, coded_orientation, read_coded
 from .picture import Picture, turn
 from .radiance_hdr import hdr_size, read_hdr
@@ -143,7 +143,7 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
     if colour.dtype.kind == "f":
         return Picture(np.ascontiguousarray(colour, np.float32), alpha)
     scale = np.float32(np.iinfo(colour.dtype).max)
-    return Picture(decode(colour, transfer), None if alpha is None else alpha / scale, to_rec709(profile))
+    return Picture(decode(colour, transfer), None if alpha is None else alpha / scale, profile_to_rec709(profile))
 
 
 def unstated(path: Path | str) -> str:

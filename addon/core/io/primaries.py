@@ -30,6 +30,13 @@ def rgb_to_xyz(chromaticities: tuple[float, ...]) -> np.ndarray:
     return xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])
 
 
+def xyz_to_rec709(own: np.ndarray) -> np.ndarray:
+    """(3, 3) matrix to linear Rec.709 from RGB that `own` ((3, 3)) takes to CIE XYZ; white becomes white (Bradford)."""
+    wanted = rgb_to_xyz(REC709)
+    gain = (BRADFORD @ wanted.sum(1)) / (BRADFORD @ own.sum(1))
+    return np.linalg.solve(wanted, np.linalg.solve(BRADFORD, gain[:, None] * BRADFORD) @ own)
+
+
 def to_rec709(rgb: np.ndarray, chromaticities: tuple[float, ...], name: object) -> np.ndarray:
     """Convert linear `rgb` ((h, w, 3) float32) from `chromaticities`; white becomes white (Bradford).
 
@@ -42,12 +49,9 @@ def to_rec709(rgb: np.ndarray, chromaticities: tuple[float, ...], name: object) 
         return rgb
     try:
         with np.errstate(all="raise"):
-            own, wanted = rgb_to_xyz(chromaticities), rgb_to_xyz(REC709)
-            adapted = own
-            if not np.allclose(chromaticities[:6], CIE_XYZ, atol=1e-3):
-                gain = (BRADFORD @ wanted.sum(1)) / (BRADFORD @ own.sum(1))
-                adapted = np.linalg.solve(BRADFORD, gain[:, None] * BRADFORD) @ own
-            matrix = np.linalg.solve(wanted, adapted)
+            own = rgb_to_xyz(chromaticities)
+            is_xyz = np.allclose(chromaticities[:6], CIE_XYZ, atol=1e-3)
+            matrix = np.linalg.solve(rgb_to_xyz(REC709), own) if is_xyz else xyz_to_rec709(own)
     except (ArithmeticError, np.linalg.LinAlgError):
         matrix = np.full((3, 3), np.nan)
     if not np.all(np.abs(matrix) < MAX_GAIN):

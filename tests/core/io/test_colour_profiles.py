@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.io.icc import to_rec709
+from addon.core.io.icc import profile_to_rec709
 from addon.core.io.oiio import _library, read_coded
 from addon.core.io.pictures import read_picture
 from addon.core.io.pixels import as_codes, read_pixels
@@ -99,4 +99,4 @@ def test_srgb_s_own_profile_changes_no_number(tmp_path):
 )  # fmt: skip
 def test_a_profile_that_tells_no_primaries_is_none(profile):
     """Grey ones, tables for printers, and damaged ones: the picture is read as if it had none."""
-    assert to_rec709(profile) is None
+    assert profile_to_rec709(profile) is None
