@@ -109,7 +109,7 @@ def of_shining_class(lamps: Collection[Lamp], clean: np.ndarray, instances: tupl
     return found
 
 
-def mixed_lamps(lamps: Collection[Lamp], clean: np.ndarray) -> tuple[Lamp, ...]:
+def mixed_lamps(lamps: Collection[Lamp], clean: np.ndarray) -> list[int]:
     """Seen lamps whose radiance no pixel shows unmixed.
 
     Their pixels hold what is beside them as well. So a lamp's radiance is to be solved for, too, and what only stands
@@ -121,7 +121,7 @@ def mixed_lamps(lamps: Collection[Lamp], clean: np.ndarray) -> tuple[Lamp, ...]:
         As in `of_shining_class`.
     """
     shown = set(np.unique(clean).tolist())
-    return tuple(lamp for lamp in lamps if lamp.seen and lamp.object_id not in shown)
+    return [lamp.object_id for lamp in lamps if lamp.seen and lamp.object_id not in shown]
 
 
 def lamp_models(atlas: Atlas, instances: tuple[Instance, ...]) -> dict[int, int]:

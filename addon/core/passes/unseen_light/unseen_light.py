@@ -78,8 +78,8 @@ class Light:
     received : (m, 3) float64
         E there by all of this light.
     contribution : Contributions, optional
-    mixed : tuple of Lamp
-        As frames show them, but mixed with what is beside them (`mixed_lamps`): solved for as if unseen.
+    mixed : tuple of int
+        Lamps that frames show, but mixed with what is beside them (`mixed_lamps`): solved for as if unseen.
     """
 
     lamps: tuple[Lamp, ...]
@@ -88,11 +88,11 @@ class Light:
     element: np.ndarray
     received: np.ndarray
     contribution: Contributions | None = None
-    mixed: tuple[Lamp, ...] = ()
+    mixed: tuple[int, ...] = ()
 
     def without_mixed(self, field: LightField) -> LightField:
         """The field with lamps dark that frames show only mixed."""
-        own = np.isin(field.atlas.object_id, [lamp.object_id for lamp in self.mixed])[:, None]
+        own = np.isin(field.atlas.object_id, self.mixed)[:, None]
         return field.with_light(np.where(own, np.float32(0), field.radiance)) if self.mixed else field
 
 
@@ -129,7 +129,7 @@ def find_light(
     """
     shown, mixed = field, before.mixed if before is not None else ()
     if before is not None:
-        field, unseen_objects = before.without_mixed(field), [*unseen_objects, *(lamp.object_id for lamp in mixed)]
+        field, unseen_objects = before.without_mixed(field), [*unseen_objects, *mixed]
     flat = on_flat(field.atlas)
     if tilted is not None:
         flat &= tilted < np.arccos(LIGHT_FIT.flat)
@@ -164,7 +164,7 @@ def find_light(
     filled = received + sum(G[:, None] * s for G, s in zip(sky_contributions, guess, strict=True))
     seen = find_seen(atlas.object_id[element], field.radiance[element], filled)
     if before is None and "unseen-lamps" not in without:
-        mixed = mixed_lamps(seen, atlas.object_id[good])
+        mixed = tuple(mixed_lamps(seen, atlas.object_id[good]))
         if mixed:
             told = Light((), shown.environment, (), element, filled, mixed=mixed)
             return find_light(shown, good, unseen_objects, instances, seed, tilted, colours, told, without)
@@ -212,13 +212,12 @@ def find_light(
     sample = replace(sample, kind=kind, cap=LIGHT_FIT.clipped_cap if clipped else LIGHT_FIT.cap)
     if "joint-light" not in without:
         lamps = refined(sample, lamps, contribution, least, model, seen, sky, received[lit], colours)
-    as_shown = {lamp.object_id: lamp for lamp in mixed}
     lamps = [
-        replace(lamp, object_id=one, radiance=of_colour(lamp, known_colours.get(one)), mixed=one in as_shown)
+        replace(lamp, object_id=one, radiance=of_colour(lamp, known_colours.get(one)), mixed=one in mixed)
         for lamp in lamps
         for one in alike[lamp.object_id]
     ]
-    lamps = [hardly_mixed(lamp, as_shown[lamp.object_id]) if lamp.mixed else lamp for lamp in lamps]
+    lamps = [as_shown(lamp, shown) if lamp.mixed else lamp for lamp in lamps]
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))
     # With all light known, what looked like a lamp for want of it does so no more.
@@ -238,10 +237,11 @@ def of_colour(lamp: Lamp, known: np.ndarray | None) -> np.ndarray:
     return (lamp.radiance @ LUMINANCE * known).astype(np.float32)
 
 
-def hardly_mixed(solved: Lamp, shown: Lamp) -> Lamp:
-    """A lamp as its pixels show it if it was solved to be about that bright; else as solved."""
-    ratio = float(solved.radiance @ LUMINANCE) / float(shown.radiance @ LUMINANCE)
-    return shown if abs(ratio - 1) < LIGHT_FIT.alike else solved
+def as_shown(lamp: Lamp, field: LightField) -> Lamp:
+    """A lamp that pixels show mixed, as bright as they do if it was solved to be about that: they were hardly mixed."""
+    radiance = np.median(field.radiance[field.atlas.elements_of(lamp.object_id)], 0)
+    ratio = float(lamp.radiance @ LUMINANCE) / max(float(radiance @ LUMINANCE), 1e-12)
+    return Lamp(lamp.object_id, radiance, True) if abs(ratio - 1) < LIGHT_FIT.alike else lamp
 
 
 def lit_by(field: LightField, lamps: list[Lamp]) -> np.ndarray:
