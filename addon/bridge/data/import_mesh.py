@@ -17,6 +17,7 @@ from ...core.io.self_contained import copy_gltf, copy_obj
 from ..refused import reason_of
 from .added import Made
 from .arrays import layer_of, triangles_of, vertices_of
+from .shown import shown
 
 NUMBERED = re.compile(r"^(.*?)(?:\.(\d{3,}))?$", re.DOTALL)
 """Blender's ending of a name that was taken already."""
@@ -53,12 +54,7 @@ def import_mesh(path: Path) -> RawMesh:
 
 def _import(path: Path, folder: Path, scene: bpy.types.Scene) -> list[Placed]:
     """Run Blender's importer on a copy of `path`, naming nothing else; how each 'part N' of it is called and lies."""
-    with bpy.context.temp_override(
-        scene=scene,
-        view_layer=scene.view_layers[0],
-        collection=scene.collection,
-        layer_collection=scene.view_layers[0].layer_collection,
-    ):
+    with shown(scene):
         try:
             if path.suffix.lower() == ".obj":
                 copy, named, placed = copy_obj(path, folder)

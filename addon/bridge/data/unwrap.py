@@ -15,6 +15,7 @@ from ...core.scene.unwrap import of_parts
 from ...core.scene.uv_islands import areas, connected, corner_ids, cut_sparse
 from ...core.scene.uv_overlap import layers, overlapping_pairs
 from .arrays import layer_of, make_mesh, set_layer
+from .shown import shown
 
 _PROJECTION_ANGLE = 1.15
 _LAYER = "ScanRelight"
@@ -203,16 +204,12 @@ def _laid_out(points, vertex, start, uv, operator, **settings):
         layer = scene.view_layers[0]
         layer.objects.active = thing
         thing.select_set(True, view_layer=layer)
-        chosen = {"object": thing, "active_object": thing, "selected_objects": [thing]}
-        context = {"scene": scene, "view_layer": layer, **chosen}
-        with bpy.context.temp_override(**context):
+        with shown(scene):
             bpy.ops.object.mode_set(mode="EDIT")
-        try:
-            with bpy.context.temp_override(edit_object=thing, **context):
+            try:
                 bpy.ops.mesh.select_all(action="SELECT")
                 operator(**settings)
-        finally:
-            with bpy.context.temp_override(**context):
+            finally:
                 bpy.ops.object.mode_set(mode="OBJECT")
         return np.nan_to_num(layer_of(data, _LAYER), nan=0.0, posinf=0.0, neginf=0.0)
     finally:

@@ -1,5 +1,8 @@
 """The atlas's layout: nothing overlaps, nothing of the user's changes."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -95,6 +98,41 @@ def test_degenerate_triangles_are_tolerated(scene):
 def test_tiny_meshes(scene, faces):
     uv = unwrap(room([[0, 0, 0], [1, 0, 0], [0, 1, 0]], np.reshape(faces, (-1, 3))), SIZE)
     assert np.isfinite(uv).all() and len(uv) == len(faces)
+
+
+CROWD = """
+import sys, threading
+import bpy
+from addon.bridge.data.shown import shown
+
+end = threading.Event()
+
+def read():
+    while not end.is_set():
+        open(sys.argv[1], "rb").close()  # lets go of the interpreter's lock and takes it again
+
+threads = [threading.Thread(target=read) for _ in range(2)]
+for one in threads:
+    one.start()
+with shown(bpy.data.scenes.new("Other")):
+    for _ in range(60000):
+        bpy.ops.object.select_all(action="SELECT")
+end.set()
+"""
+
+
+@pytest.mark.slow
+def test_operators_bear_threads_that_run_python_meanwhile(root):
+    """With an overridden context Blender looked it up in a dict of Python's without the interpreter's lock: a crash."""
+    assert subprocess.run([sys.executable, "-c", CROWD, __file__], cwd=root, timeout=300).returncode == 0
+
+
+def test_the_users_view_layer_stays(scene):
+    scene.view_layers.new("Mine")
+    window = bpy.context.window_manager.windows[0]
+    window.view_layer = scene.view_layers["Mine"]
+    unwrap(rectangles(3), SIZE)
+    assert window.scene == scene and window.view_layer.name == "Mine"
 
 
 def test_the_users_scene_selection_and_mode_stay(scene):
