@@ -5,18 +5,22 @@ One pass, a second where the first tells that poses are off, and one more that m
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import BadInputError
+from ..agreement.views import sees
+from ..errors import BadInputError, StorageError
 from ..io.pixels import as_codes, read_pixels
 from ..io.read import MAX_BAD_SHARE
+from ..kinds import Block
 from ..light.environment import Environment, EnvironmentAccumulator
 from ..light.field import LightField
 from ..lit_diffuse.accumulate import accumulate
+from ..lit_diffuse.exact import Exact
 from ..lit_diffuse.from_texture import lit_from_tiles
 from ..memory import give_back
 from ..passes.clipped_lamps.fringes import FringeCollector, Fringes
@@ -35,6 +39,9 @@ from .stage import Stage
 from .surface import STAGE as SURFACE
 
 STAGE = Stage("lit_diffuse", Path(__file__), (SURFACE,), ("refine_poses", "median", "sharpen", "seed"))
+
+ASKED: Block[tuple[int, int]] = (32, 4096)
+"""Frames, and elements, of which it is found how many of these those see, before all are read."""
 
 
 @dataclass(frozen=True)
@@ -117,6 +124,20 @@ class FrameReader:
                 ) from error
             shape = (frame.camera.height, frame.camera.width)
             return Pixels(np.zeros((*shape, 3), np.float32), np.zeros(shape, bool), np.zeros(shape, bool))
+
+
+def ask_for_disk(surface: Surface, frames: Sequence[Frame], folder: Path) -> None:
+    """Raise `StorageError` where what `Exact` keeps of the frames, as some of them tell, does not fit on the disk."""
+    some, points = frames[:: -(-len(frames) // ASKED[0])], surface.atlas.position[:: -(-len(surface.atlas) // ASKED[1])]
+    seen = sum(len(sees(frame.camera, points, surface.scene)[0]) for frame in some)
+    observations = seen / (len(some) * len(points)) * len(frames) * len(surface.atlas)
+    need, free = int(observations) * Exact.RECORD.itemsize, shutil.disk_usage(folder).free
+    if observations > Exact.HELD and need > free:
+        raise StorageError(
+            f"The exact median keeps about {need / 1e9:.2g} GB of observations in '{folder}' meanwhile, where "
+            f"{free / 1e9:.2g} GB are free; free some space, choose another result folder, or take a greater texel "
+            "size or --median p2."
+        )
 
 
 def observe(

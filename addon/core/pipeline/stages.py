@@ -231,6 +231,8 @@ class Stages:
         def observe(settings: Settings) -> Observed:
             needs = ELEMENT_BYTES * len(room.atlas) + bytes_of_frame(cameras)
             BUDGET.ask(needs, f"The room's {len(room.atlas):,} surface elements and its frames")
+            if cameras and settings.median == "exact":
+                frames.ask_for_disk(room, self._near.frames, self.store.folder)
             return frames.observe(room, self._near, self.read, settings, self.store.folder, self.progress)
 
         def from_store(arrays: Arrays, meta: dict[str, Any]) -> Observed:

@@ -8,6 +8,7 @@ import shutil
 from dataclasses import replace
 from functools import wraps
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,11 +16,13 @@ import pytest
 from addon.core.brdf.dielectric import DIELECTRIC
 from addon.core.brdf.emitter import EMITTER
 from addon.core.brdf.lambertian import LAMBERTIAN
-from addon.core.errors import BadInputError, InterruptedRun
+from addon.core.errors import BadInputError, InterruptedRun, StorageError
 from addon.core.io.exr import read_exr, write_exr
 from addon.core.io.read import read_capture
+from addon.core.lit_diffuse.exact import Exact
 from addon.core.paper.recover import recover
 from addon.core.passes.albedo.albedo import MEASURED, NONE
+from addon.core.pipeline import frames
 from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
 from addon.core.results.store import Store
@@ -267,3 +270,27 @@ def test_far_from_the_origin(tmp_path, distance):
     disk = OnDisk(tmp_path / "capture", shift=(distance, -distance, 0))
     run = disk.run(tmp_path / "result")
     check(run)
+
+
+def test_disk_for_observations_is_asked_for_before_frames_are_read(disk, tmp_path, monkeypatch):
+    kept, add = [], Exact.add
+
+    def count(self, element, values):
+        kept.append(values.nbytes + element.nbytes)
+        add(self, element, values)
+
+    def with_free(size, folder):
+        monkeypatch.setattr(frames, "shutil", SimpleNamespace(disk_usage=lambda at: SimpleNamespace(free=size)))
+        settings = replace(CHEAP, sharpen=False, refine_poses=False)
+        with Store(tmp_path / folder) as store:
+            Recovery(read_capture(disk.root), store, settings, Progress(), disk.unwrap).observed()
+
+    monkeypatch.setattr(Exact, "HELD", 0)
+    monkeypatch.setattr(Exact, "add", count)
+    with_free(1 << 60, "plenty")
+    need = sum(kept)
+    kept.clear()
+    with pytest.raises(StorageError, match="GB are free"):
+        with_free(0.7 * need, "short")
+    assert not kept
+    with_free(1.4 * need, "enough")

@@ -92,16 +92,17 @@ class SpecularPart:
             # Each object has rays of its own, so that its part is the same whichever others are asked for.
             (alpha, f0, microfacets), at = self._lobes[object_id], np.flatnonzero(shown == object_id)
             place = np.stack(np.divmod(at, view.triangle.shape[1]))
-            traced, cell = one_of_each_cell(place, step)
+            traced, cell = one_of_each_cell(place, step) if step > 1 else (slice(None), place)
             light = reflected_light(
                 field, self._bright, element[at[traced]], -rays[:, at[traced]].T, rays=self._rays,
                 grid=np.array([alpha], np.float32), proposals=(alpha,), microfacets=microfacets, threads=1,
                 seed=self._seed + seed + object_id,
             )  # fmt: skip
-            result[at] = self._shared(f0 * light.A[:, 0] + light.B[:, 0], cell, (place + 0.5) / step - 0.5)
+            part = f0 * light.A[:, 0] + light.B[:, 0]
+            result[at] = self._shared(part, cell, None if step == 1 else (place + 0.5) / step - 0.5)
         return result.reshape(*view.triangle.shape, 3)
 
-    def _shared(self, part: np.ndarray, cell: np.ndarray, place: np.ndarray) -> np.ndarray:
+    def _shared(self, part: np.ndarray, cell: np.ndarray, place: np.ndarray | None) -> np.ndarray:
         """The mean of an object's cells nearby, of one ray's place each, at places ((2, k), in cells): (k, 3) float32.
 
         Parameters
@@ -109,6 +110,8 @@ class SpecularPart:
         part : (m, 3) float32
         cell : (2, m) int
             Row and column.
+        place : (2, k) float, optional
+            The cells' own where not given.
         """
         low = cell.min(1)
         planes = np.zeros((4, *(cell.max(1) + 1 - low)), np.float32)
@@ -116,8 +119,11 @@ class SpecularPart:
         planes[:3, row, column], planes[3, row, column] = part.T, 1
         width, reach = self._params.width, self._params.reach
         total = gaussian_filter(planes, width, axes=(1, 2), mode="constant", radius=reach)
-        at = place - low[:, None]
-        shares = np.stack([map_coordinates(plane, at, np.float32, order=1, mode="nearest") for plane in total])
+        if place is None:
+            shares = total[:, row, column]
+        else:
+            at = place - low[:, None]
+            shares = np.stack([map_coordinates(plane, at, np.float32, order=1, mode="nearest") for plane in total])
         return (shares[:3] / shares[3]).T
 
 
