@@ -5,7 +5,6 @@ COLMAP's world has no up and, unless it was given measures, no metres; it is tak
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
@@ -16,9 +15,9 @@ from ..kinds import Limit
 from ..scene.lenses_colmap import Intrinsics, intrinsics
 from ..scene.model import Camera, Frame
 from ..scene.pose import MAX_DISTANCE, check_pose, rotation_of
-from . import instances
 from .colmap_model import ColmapImage, ColmapModel, is_pose, model_files, read_model
 from .files import inside
+from .formats import FORMATS
 from .layout import Layout, RawMesh, Reader, Reading, usable
 from .meshes import IMPORTED, MESH, find_mesh, read_mesh
 
@@ -28,7 +27,7 @@ PICTURES = "images"
 MASKS = "masks"
 HDR = (".exr", ".hdr")
 """Tried before a picture's own ending: COLMAP is often run on tone-mapped copies."""
-MESHES = ("dense/meshed-poisson.ply", "dense/meshed-delaunay.ply", "dense/0/meshed-poisson.ply",
+MESHES = (MESH, "dense/meshed-poisson.ply", "dense/meshed-delaunay.ply", "dense/0/meshed-poisson.ply",
           "dense/0/meshed-delaunay.ply", "meshed-poisson.ply", "meshed-delaunay.ply")  # fmt: skip
 POINTS = ("fused.ply", "dense/fused.ply", "dense/0/fused.ply", "sparse.ply", "points3D.ply")
 """Clouds of points, which are no mesh."""
@@ -60,7 +59,6 @@ def read(root: Path, reading: Reading) -> Layout:
         )
     model = read_model(folder)
     mesh = _mesh(root, reading)
-    names = instances.names_in(root)
     frames, problems, notes = frames_of(model, root, _pictures(root, folder), reading)
     others = [path.name for path in sorted(folder.parent.iterdir())
               if path != folder and folder.name == "0" and model_files(path)]  # fmt: skip
@@ -69,7 +67,7 @@ def read(root: Path, reading: Reading) -> Layout:
             f"COLMAP left {len(others) + 1} models that don't hang together; '{folder}' was read, not "
             f"{', '.join(others[:3])}."
         )
-    return Layout(frames, mesh, names, instances.FILE, problems, [*notes, UP])
+    return Layout(frames, mesh, problems=problems, notes=[*notes, UP])
 
 
 def frames_of(
@@ -154,18 +152,13 @@ def _frame(
     camera = Camera(
         width, height, values.fx, values.fy, values.cx, values.cy, camera_to_world(image, name), values.lens
     )
-    path = next((hdr for hdr in (named.with_suffix(ending) for ending in HDR) if hdr.is_file()), named)
-    # COLMAP's own convention: the picture's whole name, and .png after it.
-    masks = folder.parent / MASKS / named.relative_to(folder) if named.is_relative_to(folder) else named
-    mask = next(
-        (
-            p
-            for p in (masks.with_name(masks.name + ".png"), masks.with_suffix(".png"))
-            if p != path and p.is_file() and MASKS in p.parts
-        ),
-        None,
-    )
-    return Frame(name, path, camera, mask)
+    path = next((hdr for hdr in map(named.with_suffix, HDR) if hdr.is_file()), named)
+    masks = []
+    if named.is_relative_to(folder):
+        usual = folder.parent / MASKS / named.relative_to(folder)
+        # COLMAP's own convention: the picture's whole name, and .png after it.
+        masks = [usual.with_name(f"{usual.name}.png"), usual.with_suffix(".png")]
+    return Frame(name, path, camera, next(filter(Path.is_file, masks), None))
 
 
 def _notes(model: ColmapModel, frames: list[Frame]) -> list[str]:
@@ -188,24 +181,14 @@ def _pictures(root: Path, model: Path) -> Path:
 
 
 def _mesh(root: Path, reading: Reading) -> RawMesh:
-    if reading.mesh is not None or (root / MESH).exists():
-        return read_mesh(find_mesh(root, reading), reading)
-    for place in MESHES:
-        if (root / place).is_file():
-            return read_mesh(root / place, reading)
-    clouds = [place for place in POINTS if (root / place).is_file()]
-    if clouds and not any(_meshes(root)):
+    cloud = next((place for place in POINTS if (root / place).is_file()), None)
+    others = (p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED) and p.name not in POINTS)
+    if reading.mesh is None and cloud and not any((root / place).exists() for place in MESHES) and not any(others):
         raise BadInputError(
-            f"Capture '{root}' has no mesh, only the points of '{clouds[0]}'; mesh them (colmap "
-            f"poisson_mesher) to '{MESHES[0]}' or name a mesh with --mesh."
+            f"Capture '{root}' has no mesh, only the points of '{cloud}'; mesh them (colmap "
+            f"poisson_mesher) to '{MESHES[1]}' or name a mesh with --mesh."
         )
-    return read_mesh(find_mesh(root, reading), reading)
+    return read_mesh(find_mesh(root, reading, MESHES), reading)
 
 
-def _meshes(root: Path) -> Iterator[Path]:
-    return (p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED) and p.name not in POINTS)
-
-
-READER = Reader(
-    "colmap", "cameras and images of a COLMAP model (.bin or .txt)", lambda root: find_model(root) is not None, read
-)
+READER = Reader("colmap", FORMATS["colmap"], lambda root: find_model(root) is not None, read)

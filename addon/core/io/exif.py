@@ -24,7 +24,8 @@ JPEG_MAGIC = b"\xff\xd8\xff"
 HEAD: Limit[int] = 1 << 20
 """Bytes in which a JPEG's EXIF has to end; with a thumbnail it has some 64 thousand."""
 MAX_TAGS: Limit[int] = 4096
-TYPES = {3: ("H", 2), 4: ("I", 4), 5: ("II", 8), 11: ("f", 4), 12: ("d", 8)}  # short, long, rational, float, double
+TYPES = {1: ("B", 1), 3: ("H", 2), 4: ("I", 4), 5: ("II", 8), 11: ("f", 4), 12: ("d", 8)}
+"""Byte, short, long, rational, float and double: how `struct` reads them, and their bytes."""
 
 
 def read_tags(data: bytes, pointer: int | None = None, order: str = "", base: int = 0) -> dict[int, float]:

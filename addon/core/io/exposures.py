@@ -24,18 +24,10 @@ from .oiio import JPEG, TIFF
 from .pictures import picture_kind
 from .raw import DNG
 
-EXPOSURE, NAME = "exposure", ("name", "file", "file_path", "filename", "frame", "image")
-TIME = (
-    "exposure_time",
-    "exposuretime",
-    "shutter",
-    "shutter_speed",
-    "shutter_time",
-    "exposure_duration",
-    "exposureduration",
-)
-F_NUMBER = ("f_number", "fnumber", "aperture", "f_stop")
-ISO = ("iso", "iso_speed", "isospeedratings", "photographicsensitivity")
+EXPOSURE, NAME = "exposure", ("name", "file", "filepath", "filename", "frame", "image")
+TIME = ("exposuretime", "shutter", "shutterspeed", "shuttertime", "exposureduration")
+F_NUMBER, ISO = ("fnumber", "aperture", "fstop"), ("iso", "isospeed", "isospeedratings", "photographicsensitivity")
+"""Keys and columns, in small letters and without underscores."""
 WIDEST: Limit[float] = 1e9
 """Ratio of two exposures that no camera has."""
 EQUAL = 1.01
@@ -57,12 +49,16 @@ def settings_of(entry: dict[str, Any], name: str) -> Settings | None:
     BadInputError
         One of them is no number above 0.
     """
-    low = {key.lower(): value for key, value in entry.items() if isinstance(key, str)}
+    told = {_plain(key): key for key, value in entry.items() if isinstance(key, str) and value not in (None, "")}
     found = []
     for keys in (TIME, F_NUMBER, ISO):
-        key = next((key for key in keys if low.get(key) not in (None, "")), None)
-        found.append(None if key is None else parse_number(low[key], key, name))
+        key = next((told[key] for key in keys if key in told), None)
+        found.append(None if key is None else parse_number(entry[key], key, name))
     return Settings(*found) if any(value is not None for value in found) else None
+
+
+def _plain(key: str) -> str:
+    return key.strip().lower().replace("_", "")
 
 
 def parse_number(value: Any, key: str, name: str) -> float:
@@ -220,16 +216,16 @@ def from_csv(frames: Sequence[Frame], path: Path) -> tuple[list[Frame], list[str
 
 
 def _table(path: Path) -> dict[str, dict[str, str]]:
-    """The lines of the CSV by name, columns in lower case."""
+    """The lines of the CSV by name, columns as `TIME` has them."""
+    if not path.is_file():
+        raise BadInputError(f"Table of exposures '{path}' is not there or no file; check --exposures.")
     try:
-        if not path.is_file():
-            raise BadInputError(f"Table of exposures '{path}' is not there or no file; check --exposures.")
         with open(path, encoding="utf-8-sig", newline="") as file:
             rows = [row for row in csv.reader(file) if any(cell.strip() for cell in row)]
     except (OSError, ValueError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error
         raise BadInputError(f"Table of exposures '{path}' can't be read ({reason}); save it as UTF-8 CSV.") from error
-    columns = [cell.strip().lower() for cell in rows[0]] if rows else []
+    columns = list(map(_plain, rows[0])) if rows else []
     key = next((name for name in NAME if name in columns), None)
     if key is None or not any(name in columns for name in (EXPOSURE, *TIME, *F_NUMBER, *ISO)):
         raise BadInputError(

@@ -16,7 +16,7 @@ from typing import BinaryIO
 
 from ..errors import BadInputError
 from ..kinds import Code, Limit
-from .files import check_picture
+from .files import check_picture, readable
 from .picture import MAX_PIXELS, too_large
 
 MAGIC = b"\x76\x2f\x31\x01"
@@ -102,8 +102,8 @@ def parse_headers(path: Path) -> tuple[ExrHeader, ...]:
     path = Path(path)
     try:
         check_picture(path)
-        size = path.stat().st_size
-        with open(path, "rb") as file:
+        with readable(f"Picture '{path}'"), open(path, "rb") as file:
+            size = path.stat().st_size
             for limit in HEADER_BYTES:
                 file.seek(0)
                 head = file.read(limit)
@@ -120,9 +120,6 @@ def parse_headers(path: Path) -> tuple[ExrHeader, ...]:
         return headers
     except _Damaged as error:
         raise BadInputError(f"Picture '{path}' {error}; write or copy it again.") from error
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise BadInputError(f"Picture '{path}' can't be read ({reason}); check the file and its rights.") from error
 
 
 def _parse(head: bytes, size: int) -> tuple[tuple[ExrHeader, ...], int, list[_Chunks]]:

@@ -46,28 +46,28 @@ def read_bytes(path: Path, what: str = "", most: int = -1) -> bytes:
         return file.read(most)
 
 
-def read_text(path: Path) -> str:
-    """A table of poses or cameras; raises `BadInputError` where it is absent, no text, or larger than any such."""
-    with readable(f"'{path}'"):
+def _content(path: Path) -> str:
+    """The text of `path`; a ValueError where it is none, a `BadInputError` where it can't be read or is too large."""
+    with readable(f"'{path}'", "check the capture"):
         if what := absence(path):
             raise BadInputError(f"'{path}' {what}; check the capture.")
         if path.stat().st_size > MAX_TEXT:
-            raise BadInputError(f"'{path}' is too large for a table of poses or cameras; export it again.")
-        try:
-            return path.read_text(encoding="utf-8")
-        except ValueError as error:
-            raise BadInputError(f"'{path}' is no text; export it again.") from error
+            raise BadInputError(f"'{path}' is too large for a table of a capture; export it again.")
+        return path.read_text(encoding="utf-8-sig")
+
+
+def read_text(path: Path) -> str:
+    """A table of poses or cameras; raises `BadInputError` where it is absent, no text, or larger than any such."""
+    try:
+        return _content(path)
+    except ValueError as error:
+        raise BadInputError(f"'{path}' is no text; export it again.") from error
 
 
 def read_json(path: Path) -> dict[str, Any]:
     """The object in the file `path`; raises `BadInputError` where it is absent, not JSON, or no object."""
     try:
-        with readable(f"'{path}'", "check the capture"):
-            if what := absence(path):
-                raise BadInputError(f"'{path}' {what}; check the capture.")
-            if path.stat().st_size > MAX_TEXT:
-                raise BadInputError(f"'{path}' is too large for a table of a capture; export it again.")
-            value = json.loads(path.read_text(encoding="utf-8-sig"))
+        value = json.loads(_content(path))
     except (ValueError, RecursionError) as error:
         raise BadInputError(f"'{path}' is not valid JSON ({error}); export it again.") from error
     if not isinstance(value, dict):

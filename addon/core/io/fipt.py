@@ -21,7 +21,8 @@ from ..json_values import is_number
 from ..scene.model import Camera, Frame
 from ..scene.pose import check_pose
 from .files import read_json, read_text
-from .layout import Layout, Reader, Reading, usable
+from .formats import FORMATS
+from .layout import Layout, Reader, Reading, holding, usable
 from .meshes import read_mesh
 from .pictures import picture_size
 
@@ -130,15 +131,5 @@ def _triples(path: Path) -> np.ndarray:
     return values.reshape(count, 3, 3)
 
 
-SYNTHETIC = Reader(
-    "fipt",
-    f"{SPLIT}/{POSES} beside {MESH}",
-    lambda root: (root / SPLIT / POSES).is_file() and (root / MESH).is_file(),
-    read_synthetic,
-)
-REAL = Reader(
-    "fipt-real",
-    f"{CAMERAS} and {INTRINSICS}",
-    lambda root: (root / CAMERAS).is_file() and (root / INTRINSICS).is_file(),
-    read_real,
-)
+SYNTHETIC = Reader("fipt", FORMATS["fipt"], holding(f"{SPLIT}/{POSES}", MESH), read_synthetic)
+REAL = Reader("fipt-real", FORMATS["fipt-real"], holding(CAMERAS, INTRINSICS), read_real)

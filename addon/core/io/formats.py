@@ -1,4 +1,4 @@
-"""Names of the formats and the files by which each is known: what Blender needs of them as it starts."""
+"""Names of the formats and the files by which a user knows each: what Blender needs of them as it starts."""
 
 FORMATS = {
     "replica": "textures/parameters.json beside mesh.ply",

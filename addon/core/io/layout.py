@@ -91,9 +91,9 @@ class Layout:
     mesh : RawMesh
         In the frames' coordinates.
     names : dict of int to str, or None
-        Class name of each object by what the mesh's faces carry; None where the capture has none.
+        Class name of each object by what the mesh's faces carry; None takes those of `info_semantic.json`, if any.
     names_file : str
-        Where `names` come from, for messages.
+        Where `names` come from, for messages; '' for that file.
     problems : list of str
         One sentence for each frame that can't be used.
     notes : list of str
@@ -128,6 +128,11 @@ def usable(makers: Iterable[Callable[[], Frame]]) -> tuple[list[Frame], list[str
         except BadInputError as error:
             problems.append(str(error))
     return frames, problems
+
+
+def holding(*names: str) -> Callable[[Path], bool]:
+    """A `Reader.find`: whether a folder has all of these files, or folders."""
+    return lambda root: all((root / name).exists() for name in names)
 
 
 class Reader(NamedTuple):

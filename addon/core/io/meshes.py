@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import BadInputError
@@ -34,8 +35,8 @@ def read_mesh(path: Path, reading: Reading) -> RawMesh:
     return RawMesh(ply.vertices, ply.triangles, ply.object_id, ply.uv, name=path.name)
 
 
-def find_mesh(root: Path, reading: Reading, name: str = MESH, remedy: str = "") -> Path:
-    """The mesh that the user named, else the file `name`, else the only mesh file of the folder.
+def find_mesh(root: Path, reading: Reading, names: Sequence[str] = (MESH,), remedy: str = "") -> Path:
+    """The mesh that the user named, else the first file of `names`, else the only mesh file of the folder.
 
     Parameters
     ----------
@@ -49,9 +50,9 @@ def find_mesh(root: Path, reading: Reading, name: str = MESH, remedy: str = "") 
     """
     if reading.mesh is not None:
         return reading.mesh
-    usual = root / name
-    if usual.exists():
-        return usual
+    for usual in (root / name for name in names):
+        if usual.exists():
+            return usual
     found = sorted(p for p in root.iterdir() if p.suffix.lower() in (".ply", *IMPORTED) and p.is_file())
     if len(found) == 1:
         return found[0]
@@ -61,4 +62,6 @@ def find_mesh(root: Path, reading: Reading, name: str = MESH, remedy: str = "") 
         )
     if remedy:
         raise BadInputError(f"Capture '{root}' has no mesh; {remedy}")
-    raise BadInputError(f"Mesh '{usual}' does not exist; a capture needs its mesh there, or named with --mesh.")
+    raise BadInputError(
+        f"Mesh '{root / names[0]}' does not exist; a capture needs its mesh there, or named with --mesh."
+    )

@@ -19,9 +19,9 @@ from ..json_values import is_number
 from ..kinds import Code
 from ..scene.model import Frame
 from ..scene.pose import check_pose
-from . import instances
 from .conventions import AS_READ
 from .files import check_picture, inside, read_json
+from .formats import FORMATS
 from .layout import Layout, RawMesh, Reader, Reading, usable
 from .meshes import MESH, find_mesh, read_mesh
 from .nerfstudio_camera import Entry, check_model, lens_notes, read_camera
@@ -57,55 +57,50 @@ def read(root: Path, reading: Reading) -> Layout:
     paths = find(root) or [root / FILE]
     top = read_json(paths[0])
     mesh = read_mesh(_mesh_path(root, top, reading), reading)
-    names = instances.names_in(root)
     frames, problems, notes = read_frames(root, reading)
     mesh, more = _in_frames_world(mesh, root, top, frames, reading)
-    return Layout(frames, mesh, names, instances.FILE, problems, notes + more)
+    return Layout(frames, mesh, problems=problems, notes=notes + more)
 
 
 def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], list[str]]:
     """All frames that the capture `root` lists, sentences on those that can't be used, and on what may mean else."""
-    listed: list[tuple[dict[str, Any], Any, Path]] = []
+    listed: list[Entry] = []
+    problems: list[str] = []
     notes: list[str] = []
     for path in find(root) or [root / FILE]:
         top = read_json(path)
-        entries = top.get("frames")
-        if not isinstance(entries, list) or not entries:
+        told = top.get("frames")
+        if not isinstance(told, list) or not told:
             raise BadInputError(f"'{path}' lists no frames; export the capture again.")
+        problems += [
+            f"Frame '#{i}' is no JSON object in '{path}'." for i, one in enumerate(told) if not isinstance(one, dict)
+        ]
+        entries = [Entry(top, one, _name(one, i)) for i, one in enumerate(told) if isinstance(one, dict)]
         entries, said = _without_test(top, entries)
-        listed += [(top, entry, path) for entry in entries]
-        notes += said + _unexposed(top, entries) + _orientation(top)
-        notes += lens_notes([Entry(top, entry, "") for entry in entries if isinstance(entry, dict)])
+        for entry in entries:
+            check_model(entry, path)
+        listed += entries
+        notes += said + _unexposed(top, entries) + _orientation(top) + lens_notes(entries)
     if (root / TEST_SPLIT).is_file() and not (root / FILE).is_file():
         notes.append(f"The frames of '{TEST_SPLIT}' were left out; put those to be used into '{FILE}'.")
-    names = [_name(entry, i) for i, (_, entry, _) in enumerate(listed)]
-    if len(set(names)) < len(names):  # left/0001 and right/0001: tell them apart by their folders
-        names = [
-            str(entry.get("file_path", i)) if isinstance(entry, dict) else str(i)
-            for i, (_, entry, _) in enumerate(listed)
-        ]
-    told: dict[Path, Entry] = {}
+    names = {entry.name for entry in listed}
+    if len(names) < len(listed):  # left/0001 and right/0001: tell them apart by their folders
+        listed = [replace(entry, name=str(entry.own.get("file_path", i))) for i, entry in enumerate(listed)]
+    used: dict[Path, Entry] = {}
 
     def frame(entry: Entry) -> Frame:
         made = _frame(root, entry, reading)
-        if made.path in told:
+        if made.path in used:
             raise BadInputError(f"Frame '{entry.name}' is listed twice; keep the entry with the right pose.")
-        told[made.path] = entry
+        used[made.path] = entry
         return made
 
-    makers, problems = [], []
-    for name, (top, own, path) in zip(names, listed):
-        if isinstance(own, dict):
-            makers.append(partial(frame, entry := Entry(top, own, name)))
-            check_model(entry, path)
-        else:
-            problems.append(f"Frame '{name}' is no JSON object in '{path}'.")
-    frames, more = usable(makers)
-    frames, said = with_settings(frames, list(told.values()))
+    frames, more = usable(partial(frame, entry) for entry in listed)
+    frames, said = with_settings(frames, list(used.values()))
     return frames, problems + more, list(dict.fromkeys(notes + said))
 
 
-def _without_test(top: dict[str, Any], entries: list[Any]) -> tuple[list[Any], list[str]]:
+def _without_test(top: dict[str, Any], entries: list[Entry]) -> tuple[list[Entry], list[str]]:
     """The entries without those that are for testing alone (`test_filenames`), and a sentence on them."""
 
     def split(key: str) -> set[str]:
@@ -113,8 +108,7 @@ def _without_test(top: dict[str, Any], entries: list[Any]) -> tuple[list[Any], l
         return {_plain(v) for v in value if isinstance(v, str)} if isinstance(value, list) else set()
 
     test = split("test_filenames") - split("train_filenames")
-    kept = [e for e in entries if not (isinstance(e, dict) and isinstance(e.get("file_path"), str)
-                                       and _plain(e["file_path"]) in test)]  # fmt: skip
+    kept = [entry for entry in entries if _plain(str(entry.own.get("file_path"))) not in test]
     if not kept or len(kept) == len(entries):
         return entries, []
     return kept, [
@@ -127,15 +121,14 @@ def _plain(path: str) -> str:
     return PurePosixPath(path.replace("\\", "/")).as_posix()
 
 
-def _unexposed(top: dict[str, Any], entries: list[Any]) -> list[str]:
+def _unexposed(top: dict[str, Any], entries: list[Entry]) -> list[str]:
     """A sentence where some frames state an exposure and others don't."""
-    stated = [isinstance(entry, dict) and entry.get("exposure") is not None for entry in entries]
+    stated = [entry.own.get("exposure") is not None for entry in entries]
     if not any(stated) or all(stated) or top.get("exposure") is not None:
         return []
-    index = stated.index(False)
     return [
         f"{stated.count(False)} of {len(stated)} frames state no exposure (the first: "
-        f"'{_name(entries[index], index)}'); it was taken as 1; give each frame its own."
+        f"'{entries[stated.index(False)].name}'); it was taken as 1; give each frame its own."
     ]
 
 
@@ -150,8 +143,8 @@ def _orientation(top: dict[str, Any]) -> list[str]:
     ]
 
 
-def _name(entry: Any, index: int) -> str:
-    path = entry.get("file_path") if isinstance(entry, dict) else None
+def _name(entry: dict[str, Any], index: int) -> str:
+    path = entry.get("file_path")
     return (isinstance(path, str) and PurePosixPath(path.replace("\\", "/")).stem) or f"#{index}"
 
 
@@ -250,4 +243,4 @@ def _mesh_path(root: Path, top: dict[str, Any], reading: Reading) -> Path:
     return path
 
 
-READER = Reader("nerfstudio", FILE, lambda root: bool(find(root)), read)
+READER = Reader("nerfstudio", FORMATS["nerfstudio"], lambda root: bool(find(root)), read)

@@ -10,7 +10,7 @@ from ..errors import BadInputError
 from . import exr_header, radiance_hdr
 from .exif import exif_orientation
 from .exr import exr_note, read_exr, read_header
-from .files import check_picture
+from .files import check_picture, read_bytes
 from .heif import HEIC, heif_header, heif_orientation, is_heif, read_heif
 from .icc import profile_to_rec709
 from .oiio import CODED, TIFF, coded_header, coded_orientation, read_coded
@@ -33,13 +33,8 @@ def picture_kind(path: Path | str) -> str:
         The file is absent, empty, or of a kind that isn't known.
     """
     path = Path(path)
-    try:
-        check_picture(path)
-        with open(path, "rb") as file:
-            head = file.read(16)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise BadInputError(f"Picture '{path}' can't be read ({reason}); check the file and its rights.") from error
+    check_picture(path)
+    head = read_bytes(path, "Picture ", 16)
     if not head:
         raise BadInputError(f"Picture '{path}' is empty; write or copy it again.")
     kinds: dict[str, bytes | tuple[bytes, ...]] = {EXR: exr_header.MAGIC, HDR: radiance_hdr.MAGIC, **CODED}

@@ -18,10 +18,10 @@ from ..errors import BadInputError
 from ..json_values import is_number
 from ..scene.model import Frame
 from ..scene.pose import check_pose
-from . import instances
 from .arkit import TO_Z_UP, read_y_up
 from .camera_check import pinhole
 from .files import read_json
+from .formats import FORMATS
 from .layout import Layout, Reader, Reading, usable
 from .meshes import find_mesh
 from .pictures import ENDINGS
@@ -53,7 +53,7 @@ def read(root: Path, reading: Reading) -> Layout:
     BadInputError
         There are no cameras or there is no mesh, or the mesh or its alignment can't be read.
     """
-    path = find_mesh(root, reading, MESH, EXPORT)
+    path = find_mesh(root, reading, (MESH,), EXPORT)
     corrected = all((root / FOLDER / name).is_dir() for name in CORRECTED)
     cameras, pictures = (root / FOLDER / name for name in (CORRECTED if corrected else OWN))
     listed = sorted(cameras.glob("*.json"))
@@ -90,7 +90,7 @@ def read(root: Path, reading: Reading) -> Layout:
             f"first: '{blurred[0]}') and were passed over."
         )
     mesh = read_y_up(path, reading, _alignment(root))
-    return Layout(frames, mesh, instances.names_in(root), instances.FILE, problems, notes)
+    return Layout(frames, mesh, problems=problems, notes=notes)
 
 
 def _alignment(root: Path) -> np.ndarray | None:
@@ -118,4 +118,4 @@ def _alignment(root: Path) -> np.ndarray | None:
     )
 
 
-READER = Reader("polycam", f"{FOLDER} with a folder of cameras", find, read)
+READER = Reader("polycam", FORMATS["polycam"], find, read)

@@ -6,7 +6,6 @@ Source: Adobe, Digital Negative Specification 1.7.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,14 +30,9 @@ TOP: Code[int] = 65535
 
 def is_dng(path: Path | str) -> bool:
     """Whether a file that begins as a TIFF is a DNG."""
-    data = read_bytes(Path(path), "Picture ", HEAD)
     try:
-        order = exif.ORDERS[data[:4]]
-        (at,) = struct.unpack_from(order + "I", data, 4)
-        (count,) = struct.unpack_from(order + "H", data, at)
-        tags = (struct.unpack_from(order + "H", data, at + 2 + 12 * i)[0] for i in range(min(count, exif.MAX_TAGS)))
-        return DNG_VERSION in tags
-    except (KeyError, struct.error):  # of another order, or its directory lies behind the pixels
+        return DNG_VERSION in exif.read_tags(read_bytes(Path(path), "Picture ", HEAD))
+    except ValueError:  # of another order, or its directory lies behind the pixels
         return False
 
 

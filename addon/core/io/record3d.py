@@ -17,11 +17,11 @@ from ..errors import BadInputError
 from ..json_values import is_number
 from ..scene.model import Camera, Frame
 from ..scene.pose import check_pose, rotation_of
-from . import instances
 from .arkit import TO_Z_UP, read_y_up
 from .files import read_json
+from .formats import FORMATS
 from .layout import Layout, Reader, Reading, usable
-from .meshes import MESH, find_mesh
+from .meshes import find_mesh
 from .pictures import ENDINGS
 
 METADATA, FOLDERS, ARCHIVE = ("metadata.json", "metadata"), ("rgb", "rgbd"), ".r3d"
@@ -77,8 +77,8 @@ def read(root: Path, reading: Reading) -> Layout:
     notes = [UP]
     if len(chosen) < len(pictures):
         notes.append(f"{len(chosen)} of {len(pictures)} frames were taken, evenly: others show nearly the same.")
-    mesh = read_y_up(find_mesh(root, reading, MESH, EXPORT), reading)
-    return Layout(frames, mesh, instances.names_in(root), instances.FILE, problems, notes)
+    mesh = read_y_up(find_mesh(root, reading, remedy=EXPORT), reading)
+    return Layout(frames, mesh, problems=problems, notes=notes)
 
 
 def _parts(root: Path) -> tuple[Path, Path] | None:
@@ -111,4 +111,4 @@ def _camera(told: dict[str, Any], index: int, pose: np.ndarray, path: Path) -> C
     return Camera(int(width), int(height), fx, fy, cx, cy, pose)
 
 
-READER = Reader("record3d", f"{METADATA[0]} beside {FOLDERS[0]} or {FOLDERS[1]}", find, read)
+READER = Reader("record3d", FORMATS["record3d"], find, read)

@@ -20,8 +20,9 @@ from ..kinds import Code, Limit
 from ..scene.model import KnownMirror, LitTiles
 from . import nerfstudio, traj
 from .files import read_json
+from .formats import FORMATS
 from .instances import FILE, read_instances
-from .layout import Layout, RawMesh, Reader, Reading
+from .layout import Layout, RawMesh, Reader, Reading, holding
 from .ply import PlyMesh, read_ply
 from .ptex import read_sorted_faces, split_faces
 from .replica_glass import FILE as GLASS
@@ -158,9 +159,4 @@ def _object_id(path: Path, ply: PlyMesh) -> tuple[np.ndarray, float]:
     return np.where(far, -1, other.object_id[nearest]), float(far.mean())
 
 
-READER = Reader(
-    "replica",
-    f"{PARAMETERS} beside {MESH}",
-    lambda root: (root / PARAMETERS).is_file() and (root / MESH).is_file(),
-    read,
-)
+READER = Reader("replica", FORMATS["replica"], holding(PARAMETERS, MESH), read)

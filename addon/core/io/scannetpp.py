@@ -20,6 +20,7 @@ from . import colmap
 from .camera_check import pinhole
 from .colmap_model import model_files, read_model
 from .files import read_json
+from .formats import FORMATS
 from .instances import MAX_ID
 from .layout import Layout, RawMesh, Reader, Reading
 from .meshes import read_mesh
@@ -154,11 +155,8 @@ def _tests(top: dict[str, Any]) -> set[str]:
 
 def _bad(top: dict[str, Any]) -> set[str]:
     listed = top.get("frames")
-    return (
-        {Path(str(one.get("file_path"))).stem for one in listed if isinstance(one, dict) and one.get("is_bad")}
-        if isinstance(listed, list)
-        else set()
-    )
+    frames = [one for one in listed if isinstance(one, dict)] if isinstance(listed, list) else []
+    return {Path(str(one.get("file_path"))).stem for one in frames if one.get("is_bad")}
 
 
 def _masked(frame: Frame, folder: Path, masks: Path) -> Frame:
@@ -168,5 +166,5 @@ def _masked(frame: Frame, folder: Path, masks: Path) -> Frame:
 
 
 READER = Reader(
-    "scannet++", f"{MODEL} and {MESH}", lambda root: (root / MESH).is_file() and bool(model_files(root / MODEL)), read
+    "scannet++", FORMATS["scannet++"], lambda root: (root / MESH).is_file() and bool(model_files(root / MODEL)), read
 )

@@ -17,10 +17,10 @@ import numpy as np
 from ..errors import BadInputError
 from ..scene.model import Camera, Frame
 from ..scene.pose import check_pose
-from . import instances
 from .camera_check import pinhole
 from .files import read_json, read_text
-from .layout import Layout, RawMesh, Reader, Reading, usable
+from .formats import FORMATS
+from .layout import Layout, RawMesh, Reader, Reading, holding, usable
 from .meshes import IMPORTED, find_mesh, read_mesh
 from .pictures import ENDINGS
 
@@ -39,8 +39,7 @@ def read(root: Path, reading: Reading) -> Layout:
         The poses, the camera, the mesh or the list of objects can't be read, or there are no pictures.
     """
     frames, problems, notes = read_frames(root)
-    names = instances.names_in(root)
-    return Layout(frames, _mesh(root, reading), names, instances.FILE, problems, notes)
+    return Layout(frames, _mesh(root, reading), problems=problems, notes=notes)
 
 
 def read_frames(root: Path) -> tuple[list[Frame], list[str], list[str]]:
@@ -119,9 +118,4 @@ def _mesh(root: Path, reading: Reading) -> RawMesh:
     return read_mesh(find_mesh(root, reading), reading)
 
 
-READER = Reader(
-    "traj",
-    f"{POSES} and {FOLDER}/frame000000.exr",
-    lambda root: (root / POSES).is_file() and (root / FOLDER).is_dir(),
-    read,
-)
+READER = Reader("traj", FORMATS["traj"], holding(POSES, FOLDER), read)
