@@ -21,7 +21,7 @@ class SettingInfo:
         bool, int, float or str.
     default : bool, int, float or str
     help : str
-        One or two sentences, without the closing full stop.
+        One sentence or several, without the closing full stop; the first is a tooltip.
     choices : tuple of str
         Empty where any value goes.
     """

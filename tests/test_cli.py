@@ -127,7 +127,7 @@ def test_errors_become_one_sentence_and_an_exit_code(error, code, monkeypatch, c
     def fail(arguments, stream):
         raise error
 
-    monkeypatch.setattr(cli, "recover_command", fail)
+    monkeypatch.setattr(cli.recover, "recover_command", fail)
     assert cli.main(["recover", "capture", "--out", str(tmp_path)]) == code
     out, err = capsys.readouterr()
     assert err.startswith("scan-relight: ") and err.count("\n") == 1 and "Traceback" not in err
@@ -139,7 +139,7 @@ def test_debug_shows_the_traceback(monkeypatch, capsys, tmp_path):
     def fail(arguments, stream):
         raise ValueError("deep inside")
 
-    monkeypatch.setattr(cli, "recover_command", fail)
+    monkeypatch.setattr(cli.recover, "recover_command", fail)
     assert cli.main(["recover", "capture", "--out", str(tmp_path), "--debug"]) == 1
     assert "Traceback" in capsys.readouterr().err
 

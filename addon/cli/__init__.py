@@ -19,14 +19,14 @@ from ..core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, ScanRe
 from ..core.parallel import ONE_BLAS_THREAD
 from ..temporary import use_own_folder
 from ..version import VERSION
-from .ablation import ablation_command, add_ablation, joined
-from .benchmark import add_benchmark, benchmark_command
-from .common import add_common, add_leash, add_settings, complain
-from .demo import add_demo, demo_command
-from .info import add_info, info_command
-from .recover import add_recover, recover_command
-from .refit import add_refit, refit_command
-from .relight import add_relight, relight_command
+from .ablation import add_ablation, joined
+from .benchmark import add_benchmark
+from .common import complain
+from .demo import add_demo
+from .info import add_info
+from .recover import add_recover
+from .refit import add_refit
+from .relight import add_relight
 
 COMMAND = "scan_relight"
 EXIT_CODES = """\
@@ -78,7 +78,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that says what is wrong in one sentence instead of a page of usage."""
+    """A parser that tells the exit codes, and what is wrong in one sentence instead of a page of usage."""
+
+    def __init__(self, *args, **told):
+        super().__init__(*args, epilog=EXIT_CODES, **told)
 
     def error(self, message: str):
         """End with exit code 2."""
@@ -89,34 +92,16 @@ def make_parser() -> argparse.ArgumentParser:
     """The parser for every command."""
     parser = Parser(
         prog="scan-relight",
-        epilog=EXIT_CODES,
         description="Recover albedo, roughness and lamps from a scanned room and write a Blender scene to relight.",
     )
     parser.add_argument("--version", action="version", version=f"scan-relight {VERSION}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-
-    recover = add_recover(commands, EXIT_CODES)
-    add_settings(recover)
-    add_leash(recover)
-    add_common(recover, recover_command)
-
-    add_common(add_info(commands, EXIT_CODES), info_command, quiet=False)
-
-    for add, function in ((add_refit, refit_command), (add_relight, relight_command)):
-        command = add(commands, EXIT_CODES)
-        add_leash(command)
-        add_common(command, function)
-
-    demo = add_demo(commands, EXIT_CODES)
-    add_settings(demo)
-    add_common(demo, demo_command)
-
-    add_common(add_benchmark(commands, EXIT_CODES), benchmark_command)
-    add_common(add_ablation(commands, EXIT_CODES), ablation_command)
+    for add in (add_recover, add_info, add_refit, add_relight, add_demo, add_benchmark, add_ablation):
+        add(commands)
     if importlib.util.find_spec("..farm", __package__):  # the extension's zip has none
         from ..farm.commands import add_farm
 
-        add_farm(commands, EXIT_CODES)
+        add_farm(commands)
     return parser
 
 

@@ -10,6 +10,7 @@ from typing import TextIO
 
 from ..core.errors import EXIT_OK, BadInputError
 from ..core.settings import PRESETS
+from .common import add_common
 
 NAMES = ("benchmark", "ablation")
 """How it is called."""
@@ -23,12 +24,11 @@ def joined(argv: Sequence[str] | None) -> list[str]:
     return [COMMAND, *argv[2:]] if tuple(argv[:2]) == NAMES else argv
 
 
-def add_ablation(commands, epilog: str) -> argparse.ArgumentParser:
-    """The parser of the command."""
+def add_ablation(commands) -> None:
+    """Add the command to the program's `commands`."""
     parser = commands.add_parser(
         COMMAND,
         prog=f"scan-relight {' '.join(NAMES)}",
-        epilog=epilog,
         description="Recover rooms with truth, whole and without each pass, one at a time, and tell what each pass "
         "gains and costs. What OUT/ablation.jsonl holds already is not done again.",
     )
@@ -48,7 +48,7 @@ def add_ablation(commands, epilog: str) -> argparse.ArgumentParser:
         type=Path,
         help="run nothing, and write the table of all OUT/ablation*.jsonl as Markdown, with a plot beside it",
     )
-    return parser
+    add_common(parser, ablation_command)
 
 
 def ablation_command(arguments: argparse.Namespace, stream: TextIO) -> int:

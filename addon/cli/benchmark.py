@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import TextIO
 
 from ..core.errors import EXIT_OK, BadInputError
-from .common import console_run, needed_packages
+from .common import add_common, console_run, needed_packages
 
 
-def add_benchmark(commands, epilog: str) -> argparse.ArgumentParser:
-    """Add the parser of `benchmark` to the program's `commands`."""
+def add_benchmark(commands) -> None:
+    """Add the command to the program's `commands`."""
     parser = commands.add_parser(
         "benchmark",
         help="measure every stage's error and cost against the paper's",
-        epilog=epilog,
         description="Run each stage over its alternatives, the paper's setting among them, and write a table (CSV and "
         "Markdown) and a plot for each. Errors are the same from run to run; seconds are the machine's.",
     )
@@ -26,7 +25,7 @@ def add_benchmark(commands, epilog: str) -> argparse.ArgumentParser:
     parser.add_argument("--large", action="store_true", help="the real size; takes much longer")
     parser.add_argument("--seed", type=int, metavar="INT", default=0, help="of every random choice (default 0)")
     parser.add_argument("--threads", type=int, metavar="INT", default=0, help="0 takes all cores (default 0)")
-    return parser
+    add_common(parser, benchmark_command)
 
 
 def benchmark_command(arguments: argparse.Namespace, stream: TextIO) -> int:

@@ -72,7 +72,7 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
     return replace(PRESETS[arguments.preset], **{name: value for name, value in given.items() if value is not None})
 
 
-def add_leash(parser: argparse.ArgumentParser) -> None:
+def _add_leash(parser: argparse.ArgumentParser) -> None:
     """Options for programs that start a run and follow it."""
     add = parser.add_argument_group("for programs that start a run").add_argument
     lines = "json: one line of JSON for each event instead of text (default text)"
@@ -83,8 +83,10 @@ def add_leash(parser: argparse.ArgumentParser) -> None:
     add("--memory-limit", type=float, metavar="GB", help=limit)
 
 
-def add_common(parser: argparse.ArgumentParser, function, quiet: bool = True) -> None:
-    """Options of every command, and what runs it; `quiet`: one of them is to print nothing."""
+def add_common(parser: argparse.ArgumentParser, function, quiet: bool = True, leash: bool = False) -> None:
+    """Options of every command, and what runs it; `quiet`: one of them is to print nothing; `leash`: see `Leash`."""
+    if leash:
+        _add_leash(parser)
     if quiet:
         parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
     parser.add_argument("--debug", action="store_true", help="also print Blender's messages and tracebacks of errors")

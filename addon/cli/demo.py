@@ -7,23 +7,23 @@ from pathlib import Path
 from typing import TextIO
 
 from ..core.errors import EXIT_OK
-from .common import console_run, need, settings_from
+from .common import add_common, add_settings, console_run, need, settings_from
 
 DEMO_SIZES = ("tiny", "small", "large")
 
 
-def add_demo(commands, epilog: str) -> argparse.ArgumentParser:
-    """Add the parser of `demo` to the program's `commands`; its settings come after."""
+def add_demo(commands) -> None:
+    """Add the command to the program's `commands`."""
     parser = commands.add_parser(
         "demo",
         help="render a small room, recover it, compare, relight",
-        epilog=epilog,
         description="Render a small furnished room whose materials are known, recover it, print recovered against "
         "true values, and leave scene.blend and before_after.png in RESULT.",
     )
     parser.add_argument("--out", metavar="RESULT", type=Path, required=True, help="folder to write, made if missing")
     parser.add_argument("--size", choices=DEMO_SIZES, default="small", help="number and size of frames (default small)")
-    return parser
+    add_settings(parser)
+    add_common(parser, demo_command)
 
 
 def demo_command(arguments: argparse.Namespace, stream: TextIO) -> int:

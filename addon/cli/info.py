@@ -9,16 +9,15 @@ from typing import TextIO
 
 from ..core.errors import EXIT_OK
 from ..leash import Leash
-from .common import add_reading, needed_packages, reading_from
+from .common import add_common, add_reading, needed_packages, reading_from
 
 
-def add_info(commands, epilog: str) -> argparse.ArgumentParser:
-    """Add the parser of `info` to the program's `commands`."""
+def add_info(commands) -> None:
+    """Add the command to the program's `commands`."""
     parser = commands.add_parser(
         "info",
         help="say what a capture holds, and what is wrong with it",
         description="Read and check a capture without recovering anything.",
-        epilog=epilog,
     )
     parser.add_argument("capture", metavar="CAPTURE", type=Path, help="folder of the capture")
     parser.add_argument("--json", action="store_true", help="machine-readable")
@@ -29,7 +28,7 @@ def add_info(commands, epilog: str) -> argparse.ArgumentParser:
         "--overlay", metavar="PNG", type=Path, help="write frames with the mesh's edges drawn over them"
     )
     add_reading(parser)
-    return parser
+    add_common(parser, info_command, quiet=False)
 
 
 def info_command(arguments: argparse.Namespace, stream: TextIO) -> int:

@@ -12,19 +12,28 @@ from typing import Any, TextIO
 from ..console import duration
 from ..core.errors import EXIT_OK, BadInputError
 from ..core.stages import RUN_STAGES, WRITE
-from .common import add_reading, console_run, need, needed_packages, reading_from, settings_from, tell_end
+from .common import (
+    add_common,
+    add_reading,
+    add_settings,
+    console_run,
+    need,
+    needed_packages,
+    reading_from,
+    settings_from,
+    tell_end,
+)
 from .refit import add_override
 
 UNWRAPS = ("blender", "xatlas", "own")
 """As `api.UNWRAPS`, which takes numpy."""
 
 
-def add_recover(commands, epilog: str) -> argparse.ArgumentParser:
-    """Add the parser of `recover` to the program's `commands`; its settings come after."""
+def add_recover(commands) -> None:
+    """Add the command to the program's `commands`."""
     parser = commands.add_parser(
         "recover",
         help="recover a capture into a relightable scene",
-        epilog=epilog,
         description="Recover a capture and write scene.blend, its images and a report. A stopped or repeated run goes "
         "on from the finished stages in RESULT.",
     )
@@ -38,7 +47,8 @@ def add_recover(commands, epilog: str) -> argparse.ArgumentParser:
     anew = "do this stage and all later ones anew, though they are stored"
     add("--from-stage", metavar="STAGE", choices=RUN_STAGES, help=anew)
     add_home(parser)
-    return parser
+    add_settings(parser)
+    add_common(parser, recover_command, leash=True)
 
 
 def add_home(parser: argparse.ArgumentParser) -> None:

@@ -8,7 +8,7 @@ from typing import TextIO
 
 from ..console import duration
 from ..core.errors import EXIT_OK
-from .common import console_run, need, tell_end
+from .common import add_common, console_run, need, tell_end
 
 
 def add_override(parser: argparse.ArgumentParser) -> None:
@@ -18,12 +18,11 @@ def add_override(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--no-overrides", action="store_true", help="don't heed what RESULT/overrides.json keeps")
 
 
-def add_refit(commands, epilog: str) -> argparse.ArgumentParser:
-    """Add the parser of `refit` to the program's `commands`."""
+def add_refit(commands) -> None:
+    """Add the command to the program's `commands`."""
     parser = commands.add_parser(
         "refit",
         help="fit a few objects of a result again, in seconds",
-        epilog=epilog,
         description="Fit objects of RESULT again with all else held, heeding what is given of them, and write the "
         "result anew. The capture is not needed; RESULT has to hold its stages.",
     )
@@ -33,7 +32,7 @@ def add_refit(commands, epilog: str) -> argparse.ArgumentParser:
     scene = "also write scene.blend anew (default yes)"
     parser.add_argument("--scene", action=argparse.BooleanOptionalAction, default=True, help=scene)
     add_override(parser)
-    return parser
+    add_common(parser, refit_command, leash=True)
 
 
 def refit_command(arguments: argparse.Namespace, stream: TextIO) -> int:

@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import TextIO
 
 from ..core.errors import EXIT_OK, BadInputError
-from .common import console_run, need, tell_end
+from .common import add_common, console_run, need, tell_end
 
 
-def add_relight(commands, epilog: str) -> argparse.ArgumentParser:
-    """Add the parser of `relight` to the program's `commands`."""
+def add_relight(commands) -> None:
+    """Add the command to the program's `commands`."""
     parser = commands.add_parser(
         "relight",
         help="render a result's scene under another light",
-        epilog=epilog,
         description="Render RESULT/scene.blend with its lamps changed and new lights added. The scene is not changed. "
         "New lights take a strength: a factor on the room's own light, 1 if none is given, or radiant "
         "watts or lumens, as in 20W or 800lm.",
@@ -48,7 +47,7 @@ def add_relight(commands, epilog: str) -> argparse.ArgumentParser:
     device = "what Cycles renders on; KIND is optix, cuda, hip, metal or oneapi (default the processor)"
     add("--device", metavar="cpu|gpu|KIND", help=device)
     add("--scene", metavar="NAME", help="where the file holds several (default its active one)")
-    return parser
+    add_common(parser, relight_command, leash=True)
 
 
 def positive(text: str) -> float:

@@ -13,56 +13,60 @@ ROOM = "room"
 class Settings:
     """Settings of `recover`; `PRESETS` holds the ones that have names.
 
+    What an attribute says below is the command line's help; its first sentence is the tooltip in Blender.
+
     Attributes
     ----------
     texel_size : float
-        Edge of a surface element in metres; 0 chooses it from the frames' footprint.
+        Edge of a texel in metres; 0 takes what the frames resolve.
     detail : float
-        Texels along one pixel of the frames' footprint, where texel_size is 0.
+        Texels along one pixel of the frames, where the texel size is 0; more is finer and slower.
     atlas_size : int
-        Upper bound on the atlas's edge in pixels.
+        The longest edge that a texture may have, in pixels.
     atlas : str
-        'room' (one image for the room), or for close work 'object' (one for each object, as fine as the frames resolve
-        it) or 'udim' (the same as tiles of at most atlas_size); the room's images are written all the same.
+        How many images the colours of the room are in. 'room' (one for the room), or for close work 'object' (one for
+        each object, as fine as the frames resolve it) or 'udim' (the same as tiles of at most atlas_size); the room's
+        images are written all the same.
     denoise_mesh : bool
-        Take a scanned mesh's noise out of it, edges kept, for all that is computed and for the scene that is written. A
-        mesh without noise, and objects in your own scene, stay as they are.
+        Take the noise out of a scanned mesh and keep its edges; a mesh without noise and your own objects stay as they
+        are.
     refine_poses : bool
-        Put frames right that lie beside what all of them show together. Good poses stay as they are, and so do cameras
-        in your own scene.
+        Move frames that lie beside what all of them show together; good ones, and the cameras of your own scene, stay
+        as they are.
     median : str
-        'exact' (all observations go to disk meanwhile, 16 bytes each), 'p2' (as in the paper: P-square over all
-        observations, in the order of the video) or 'mean'.
+        How the frames' views of a spot become one colour. 'exact' (all observations go to disk meanwhile, 16 bytes
+        each), 'p2' (as in the paper: P-square over all observations, in the order of the video) or 'mean'.
     sharpen : bool
-        Put back onto the lit diffuse texture what its blur took from it and the frames still show; one more look at
-        every frame.
+        Give the texture back the detail that averaging has blurred; reads the frames once more.
     shading : str
-        'aimed' (cosine rays, and rays aimed at bright triangles) or 'uniform' (as in the paper: uniform rays at each
-        surface element, no other light than what frames saw, albedo as the quotient has it).
+        Where rays go that look for light. 'aimed' (cosine rays, and rays aimed at bright triangles) or 'uniform' (as in
+        the paper: uniform rays at each surface element, no other light than what frames saw, albedo as the quotient has
+        it).
     shading_rays : int
-        Gather rays for each shading point.
+        Rays that look for light, from each spot; more is calmer and slower.
     emitter_rays : int
-        Rays aimed at bright triangles for each surface element that is not interpolated ('aimed' only).
+        Rays to bright surfaces from each texel, where rays go to the lamps too. That is with 'aimed' only.
     portal_rays : int
-        Rays aimed at the openings to the outside for each shading point ('aimed' only).
+        Rays to windows and doors from each spot, where rays go to the lamps too. That is with 'aimed' only.
     interpolate : bool
-        Gather where the indirect light changes and interpolate between; False gathers at each element.
+        Look for indirect light where it changes and fill in between; without it every texel is looked from, which takes
+        long.
     mirrors : bool
-        Find flat mirrors and follow light over them; False takes what they show for L_d.
+        Find flat mirrors and follow light over them; without it a mirror counts as a painted picture.
     specular : str
-        'frames' (several frames at once, and a choice of model) or 'target' (as in the paper: a lobe for each object,
-        from one target frame).
+        What roughness and specular are fitted to. 'frames' (several frames at once, and a choice of model) or 'target'
+        (as in the paper: a lobe for each object, from one target frame).
     specular_rays : int
-        Rays for each observation in the specular fit.
+        Rays for each view in the fit of the highlights; more is calmer and slower.
     refine : int
-        Rounds after the fit: 1 takes the fitted specular out of the lit diffuse texture; 2 also lights the room with
-        what glossy things really reflect; 0 leaves both.
+        0 stops after the first fit; 1 takes the highlights out of the texture; 2 lights the room with what glossy
+        things reflect, too.
     threads : int
-        0 takes all cores.
+        Processor threads that the run takes; 0 takes all.
     seed : int
-        Of every pseudo-random choice.
+        Another number gives other noise; the same one gives the same result again.
     texture_fill : bool
-        Give what no frame saw, or too poorly, the texture of the measured part of its plane, where that has any.
+        Give what no frame saw the texture of its plane's measured part; without it such a part has one even colour.
     without : tuple of str
         Passes that are left out, by name (`passes.registry`); what each gains: docs/ablation.md.
     """

@@ -10,7 +10,6 @@ from typing import TextIO
 
 from ..cli.common import (
     add_common,
-    add_leash,
     add_reading,
     add_settings,
     complain,
@@ -29,12 +28,11 @@ from .plan import PROGRAM, Room, plan_text, rooms_from
 ENGINES = ("slurm", "flamenco", "openjd")
 
 
-def add_farm(commands, epilog: str) -> None:
+def add_farm(commands) -> None:
     """Add the parsers of the farm's commands to the program's `commands`."""
     unit = commands.add_parser(
         "stage",
         help="do one stage of a recovery, or a block of one, as farms do",
-        epilog=epilog,
         description="Do one stage of a recovery from what is finished in RESULT. May be done twice, by several at "
         "once, killed and done again: what it stores is whole, and the same as in a run on one machine.",
     )
@@ -46,13 +44,11 @@ def add_farm(commands, epilog: str) -> None:
     add_reading(unit)
     add_home(unit)
     add_settings(unit)
-    add_leash(unit)
-    add_common(unit, stage_command)
+    add_common(unit, stage_command, leash=True)
 
     plan = commands.add_parser(
         "plan",
         help="print the units of work of a recovery, and which waits for which, as JSON",
-        epilog=epilog,
         description="Print the units of work of each room as JSON, each with its command.",
     )
     _add_rooms(plan)
@@ -61,7 +57,6 @@ def add_farm(commands, epilog: str) -> None:
     submit = commands.add_parser(
         "submit",
         help="hand rooms to a farm",
-        epilog=epilog,
         description="Hand the recovery of rooms to a farm. A room that can't be handed over stops no other.",
     )
     submit.add_argument("--engine", choices=ENGINES, required=True, help="openjd writes a template alone")
@@ -79,7 +74,6 @@ def add_farm(commands, epilog: str) -> None:
     status = commands.add_parser(
         "status",
         help="tell how far rooms are",
-        epilog=epilog,
         description="Tell each room's stage, share and error. The exit code is 1 where a room has failed.",
     )
     status.add_argument("results", metavar="RESULT", type=Path, nargs="+", help="result folders")
