@@ -102,12 +102,17 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
             self.say(layout, "Shown as given; Refit fits the rest of it to that.", "INFO")
 
 
-class SCAN_RELIGHT_PT_correct_scale(SidebarPanel, bpy.types.Panel):
-    """A known white."""
+class CorrectPart(SidebarPanel):
+    """Below it, and folded away at first."""
 
     bl_parent_id = "SCAN_RELIGHT_PT_correct"
-    bl_label = "Known White"
     bl_options = {"DEFAULT_CLOSED"}
+
+
+class SCAN_RELIGHT_PT_correct_scale(CorrectPart, bpy.types.Panel):
+    """A known white."""
+
+    bl_label = "Known White"
 
     def draw(self, context):
         layout, choices, thing = self.layout, context.scene.scan_relight_correct, the_object(context)
@@ -128,12 +133,10 @@ class SCAN_RELIGHT_PT_correct_scale(SidebarPanel, bpy.types.Panel):
             row.operator("scan_relight.white_back", text="", icon="LOOP_BACK")
 
 
-class SCAN_RELIGHT_PT_correct_unseen(SidebarPanel, bpy.types.Panel):
+class SCAN_RELIGHT_PT_correct_unseen(CorrectPart, bpy.types.Panel):
     """What no frame saw."""
 
-    bl_parent_id = "SCAN_RELIGHT_PT_correct"
     bl_label = "Unseen Spots"
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
         layout, thing = self.layout, the_object(context)
@@ -147,12 +150,10 @@ class SCAN_RELIGHT_PT_correct_unseen(SidebarPanel, bpy.types.Panel):
             row.operator("scan_relight.restore_painted", text="", icon="LOOP_BACK")
 
 
-class SCAN_RELIGHT_PT_correct_smooth(SidebarPanel, bpy.types.Panel):
+class SCAN_RELIGHT_PT_correct_smooth(CorrectPart, bpy.types.Panel):
     """Smooth shading."""
 
-    bl_parent_id = "SCAN_RELIGHT_PT_correct"
     bl_label = "Smooth Shading"
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
         layout, angle = self.layout, context.scene.scan_relight_correct.smooth_angle

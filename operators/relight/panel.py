@@ -50,6 +50,8 @@ class SCAN_RELIGHT_UL_lamps(NamedRows, bpy.types.UIList):
 class RelightPanel(SidebarPanel):
     """A part that needs a scanned room."""
 
+    bl_parent_id = "SCAN_RELIGHT_PT_relight"
+
     @classmethod
     def poll(cls, context):
         return super().poll(context) and has_room(context.scene)
@@ -104,7 +106,6 @@ class SCAN_RELIGHT_PT_outside(RelightPanel, bpy.types.Panel):
     """The world."""
 
     bl_label = "Outside"
-    bl_parent_id = "SCAN_RELIGHT_PT_relight"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
@@ -125,7 +126,6 @@ class SCAN_RELIGHT_PT_new_lights(RelightPanel, bpy.types.Panel):
     """Presets."""
 
     bl_label = "New Lights"
-    bl_parent_id = "SCAN_RELIGHT_PT_relight"
 
     def draw(self, context):
         studio = context.scene.scan_relight_studio
@@ -160,7 +160,6 @@ class SCAN_RELIGHT_PT_exposure(RelightPanel, bpy.types.Panel):
     """How bright it is shown, and by EEVEE."""
 
     bl_label = "Exposure and Preview"
-    bl_parent_id = "SCAN_RELIGHT_PT_relight"
 
     def draw(self, context):
         layout, scene = fields(self.layout), context.scene
@@ -210,7 +209,6 @@ class SCAN_RELIGHT_PT_virtual(RelightPanel, bpy.types.Panel):
     """Things that were not scanned."""
 
     bl_label = "Objects"
-    bl_parent_id = "SCAN_RELIGHT_PT_relight"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
@@ -229,7 +227,6 @@ class SCAN_RELIGHT_PT_before_after(RelightPanel, bpy.types.Panel):
     """The preview."""
 
     bl_label = "Before and After"
-    bl_parent_id = "SCAN_RELIGHT_PT_relight"
 
     def draw(self, context):
         studio = context.scene.scan_relight_studio

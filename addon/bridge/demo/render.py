@@ -1,8 +1,6 @@
 """Renders the demo's room with Cycles into a capture folder, exactly as a scanner's would look."""
 
 import json
-import os
-import shutil
 from pathlib import Path
 
 import bpy
@@ -10,7 +8,6 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.brdf.compensation import ior_of
-from ...core.errors import BadInputError, StorageError
 from ...core.io.exr import read_header
 from ...core.kinds import Workload
 from ...core.progress import Progress
@@ -19,7 +16,7 @@ from ..data.arrays import set_layer
 from ..data.images import array_image
 from ..data.materials import BASE_COLOR, plain_material, principled, texture
 from ..data.nodes import add_node, feed, fresh_tree
-from ..refused import reason_of
+from ..refused import whole_folder
 from ..relight.pictures import can_denoise
 from .room import FIELD_OF_VIEW, Paint, Thing, frame_path, room, tour, write_all_but_frames
 
@@ -50,24 +47,13 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
     folder, progress = Path(folder), progress or Progress()
     if is_rendered(folder, size):
         return folder
-    part = folder.with_name(folder.name + ".part")
-    try:
-        shutil.rmtree(part, ignore_errors=True)
-        things = room()
-        frames, width, height, samples = SIZES[size]
-        poses = tour(frames)
+    things = room()
+    frames, width, height, samples = SIZES[size]
+    poses = tour(frames)
+    with whole_folder(folder, f"The demo's capture can't be written to '{folder}'") as part:
         write_all_but_frames(part, things, poses, (width, height))
         render_frames(part, things, poses, (width, height), samples, progress)
         (part / "truth" / "demo.json").write_text(json.dumps(stamp_of(size)))
-        shutil.rmtree(folder, ignore_errors=True)
-        os.replace(part, folder)
-    except (OSError, RuntimeError, BadInputError) as error:  # Blender's failures to write are RuntimeErrors, or silent
-        reason = reason_of(error)
-        raise StorageError(
-            f"The demo's capture can't be written to '{folder}' ({reason}); free some space or choose another folder."
-        ) from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
     return folder
 
 

@@ -8,17 +8,14 @@ The locus of black bodies is that of Kim et al. (US patent 7024034, 2006), 1667.
 import numpy as np
 
 from ...core.errors import BadInputError
+from ...core.io.primaries import REC709, rgb_to_xyz
 from ...core.kinds import Limit
+from ...core.luminance import LUMINANCE
 
 LOWEST: Limit[float] = 1700.0
 HIGHEST: Limit[float] = 20000.0
 """Kelvin that can be asked for: a match, the blue sky."""
-LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
-_TO_RGB = np.array(
-    ((3.2404542, -1.5371385, -0.4985314), (-0.9692660, 1.8760108, 0.0415560), (0.0556434, -0.2040259, 1.0572252))
-)
-"""From CIE XYZ to linear Rec.709 (IEC 61966-2-1)."""
-_TO_XYZ = np.linalg.inv(_TO_RGB)
+_TO_XYZ = rgb_to_xyz(REC709)
 
 
 def rgb_of(kelvin: float) -> tuple[float, float, float]:
@@ -36,7 +33,7 @@ def rgb_of(kelvin: float) -> tuple[float, float, float]:
         y = ((-0.9549476 * x - 1.37418593) * x + 2.09137015) * x - 0.16748867
     else:
         y = ((3.0817580 * x - 5.87338670) * x + 3.75112997) * x - 0.37001483
-    rgb = np.maximum(_TO_RGB @ (x / y, 1.0, (1 - x - y) / y), 0.0)
+    rgb = np.maximum(np.linalg.solve(_TO_XYZ, (x / y, 1.0, (1 - x - y) / y)), 0.0)
     return tuple(float(c) for c in rgb / (rgb @ LUMINANCE))
 
 

@@ -12,9 +12,9 @@ from mathutils import Vector
 
 from ...core.errors import BadInputError
 from ...core.kinds import Limit
+from ...core.luminance import LUMINANCE
 from ..data.images import RADIANCE, image_array
 from ..data.nodes import add_node, feed, find_node, make_world
-from .kelvin import LUMINANCE
 from .room import bounds, leaves, room_light, sphere
 
 RECOVERED = "scan_relight_recovered_world"

@@ -24,7 +24,7 @@ from ...core.kinds import Shown
 from ...core.scene.lenses_told import told_lens
 from ...core.scene.model import Mesh
 from ..data.unwrap import Polygons
-from ..refused import refused
+from ..refused import whole_folder
 from . import cameras as scene_cameras
 from .mesh import Part, SceneMesh, gather, joined
 
@@ -125,7 +125,8 @@ def capture_scene(
     if not views:
         raise BadInputError(f"None of the pictures can be used: {told}")
     metre = scene.unit_settings.scale_length if scene.unit_settings.system != "NONE" else 1.0
-    _write_whole(folder, lambda part: _write(part, mesh, parts, views, metre))
+    with whole_folder(folder, f"The scene can't be captured into '{folder}'") as part:
+        _write(part, mesh, parts, views, metre)
     return (
         (f"{len(problems)} of {len(problems) + len(views)} pictures are left out: {told}",) if problems else ()
     ) + _doubts(parts)
@@ -155,20 +156,6 @@ def few(names: list[str]) -> str:
         if len(names) > MAX_TOLD
         else f"Object{'s' if len(names) > 1 else ''} {shown}"
     )
-
-
-def _write_whole(folder: Path, write) -> None:
-    """Let `write` fill a folder beside `folder` and put it in its place."""
-    part = folder.with_name(folder.name + ".part")
-    try:
-        with refused(f"The scene can't be captured into '{folder}'", "free some space or choose another folder"):
-            shutil.rmtree(part, ignore_errors=True)
-            part.mkdir(parents=True)
-            write(part)
-            shutil.rmtree(folder, ignore_errors=True)
-            os.replace(part, folder)
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def _write(folder: Path, mesh: SceneMesh, parts: list[Part], views: list[scene_cameras.View], metre: float) -> None:

@@ -16,8 +16,6 @@ from .pictures import small_median
 
 CAPTURED = "scan_relight_captured_exposure"
 """Custom property of a scene: its exposure before ours, in stops."""
-ASKED = "scan_relight_asked_exposure"
-"""Custom property of a scene: the exposure that its light asked for when it was last measured, in stops."""
 _MOST: Limit[float] = 32.0
 
 
@@ -28,18 +26,21 @@ def measure(scene: bpy.types.Scene) -> float:
     median = small_median(scene)
     if not median > 0:
         raise BadInputError("No light reaches what the camera looks at; switch a lamp on or add a light.")
-    asked = min(max(math.log2(MIDDLE_GREY / median), -_MOST), _MOST)
-    scene[ASKED] = asked
-    return asked
+    return min(max(math.log2(MIDDLE_GREY / median), -_MOST), _MOST)
 
 
 def expose(scene: bpy.types.Scene) -> float:
     """Set the scene's exposure to what its light asks for; returns it in stops. Raises as `measure`."""
     asked = measure(scene)
+    _set(scene, asked)
+    return asked
+
+
+def _set(scene: bpy.types.Scene, stops: float) -> None:
+    """Set the exposure, that before kept for `restore`."""
     if CAPTURED not in scene:
         scene[CAPTURED] = scene.view_settings.exposure
-    scene.view_settings.exposure = asked
-    return asked
+    scene.view_settings.exposure = min(max(stops, -_MOST), _MOST)
 
 
 def restore(scene: bpy.types.Scene) -> None:
@@ -47,8 +48,6 @@ def restore(scene: bpy.types.Scene) -> None:
     if CAPTURED in scene:
         scene.view_settings.exposure = scene[CAPTURED]
         del scene[CAPTURED]
-    if ASKED in scene:
-        del scene[ASKED]
 
 
 def captured_exposure(scene: bpy.types.Scene) -> float:
@@ -61,12 +60,7 @@ def follow(scene: bpy.types.Scene) -> None:
     stops = estimate.estimate(scene)
     if stops is None or stops == estimate.NO_LIGHT:
         return
-    captured = captured_exposure(scene)
-    if CAPTURED not in scene:
-        scene[CAPTURED] = scene.view_settings.exposure
-    scene.view_settings.exposure = min(max(captured - stops, -_MOST), _MOST)
-    if ASKED in scene:
-        del scene[ASKED]  # of another light
+    _set(scene, captured_exposure(scene) - stops)
 
 
 def darkness(scene: bpy.types.Scene) -> str:

@@ -14,9 +14,9 @@ import numpy as np
 
 from ...core.atomic import replacing
 from ...core.errors import BadInputError, InterruptedRun
+from ...core.luminance import LUMINANCE
 from ...core.progress import Progress
 from ..data.images import image_array
-from ..light.kelvin import LUMINANCE
 from ..refused import refused
 
 FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32"), ".jpg": ("JPEG", "8"), ".jpeg": ("JPEG", "8")}

@@ -10,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from .gltf_nodes import TO_Z_UP
 from .layout import RawMesh, Reading
 from .meshes import read_mesh
 
-TO_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-"""From +Y up to +Z up, as glTF is turned."""
 TURNED = (".gltf", ".glb")
 """Meshes that come turned to +Z up from their reader."""
 

@@ -141,18 +141,6 @@ def _lead(frame: Frame, others: Sequence[Frame]) -> Frame:
 
 def _key(frame: Frame) -> tuple:
     """Equal for frames that saw the same through the same lens."""
-    camera = frame.camera
-    pose = tuple(np.round(camera.camera_to_world[:3] / SAME_POSE).ravel().tolist())
-    return (
-        camera.width,
-        camera.height,
-        camera.fx,
-        camera.fy,
-        camera.cx,
-        camera.cy,
-        repr(camera.lens),
-        pose,
-        frame.mask_path,
-        frame.id_path,
-        frame.transfer,
-    )
+    pose = tuple(np.round(frame.camera.camera_to_world[:3] / SAME_POSE).ravel().tolist())
+    camera = repr(replace(frame.camera, camera_to_world=np.eye(4)))
+    return camera, pose, frame.mask_path, frame.id_path, frame.transfer

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import BadInputError
 from ..json_values import numbers
 from ..kinds import Limit
-from ..scene.model import Camera
+from ..scene.model import Camera, Frame
 
 FOCAL: Limit[tuple[float, float]] = (1e-3, 1e6)
 """Bounds of a focal length over the frame's longer side; a panorama has 0.16."""
@@ -68,6 +68,16 @@ def check_camera(camera: Camera, name: str) -> None:
     for value in _numbers(camera.lens):
         if not abs(value) <= STRONGEST:
             raise BadInputError(f"Frame '{name}' has a lens with the coefficient {value:.4g}; check its distortion.")
+
+
+def check_size(frame: Frame, path: Path, size: tuple[int, int]) -> None:
+    """Raise `BadInputError` where a picture's width and height are not those of the frame's camera."""
+    wanted = frame.camera.width, frame.camera.height
+    if size != wanted:
+        raise BadInputError(
+            f"Frame '{frame.name}': '{path}' has {size[0]} x {size[1]} pixels, but its camera has "
+            f"{wanted[0]} x {wanted[1]}; give them one size."
+        )
 
 
 def _numbers(lens: object) -> Iterator[float]:

@@ -15,7 +15,7 @@ import numpy as np
 from ..errors import BadInputError
 
 TO_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
-"""glTF has +Y up."""
+"""From +Y up, as glTF and ARKit have it, to +Z up."""
 
 
 class Placed(NamedTuple):

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..scene.model import Frame
+from .camera_check import check_size
 from .exr import read_numbers
 from .exr_header import parse_headers
 from .oiio import PNG, read_coded
@@ -19,19 +20,13 @@ EXACT = {2: 1 << 11, 4: 1 << 24, 8: 1 << 53}
 """Up to here floats of so many bytes hold every whole number."""
 
 
-def check_size(frame: Frame) -> None:
+def check_ids(frame: Frame) -> None:
     """Compare the header of a frame's picture of ids with its camera; raises `BadInputError`."""
     if frame.id_path is None:
         return
-    path, camera, kind = frame.id_path, frame.camera, picture_kind(frame.id_path)
-    if kind not in (EXR, PNG):  # told when it is read
-        return
-    width, height = parse_headers(path)[0].size if kind == EXR else picture_size(path)  # of any channel
-    if (width, height) != (camera.width, camera.height):
-        raise BadInputError(
-            f"Frame '{frame.name}': '{path}' has {width} x {height} pixels, but its camera has "
-            f"{camera.width} x {camera.height}; give them one size."
-        )
+    path, kind = frame.id_path, picture_kind(frame.id_path)
+    if kind in (EXR, PNG):  # else told when it is read
+        check_size(frame, path, parse_headers(path)[0].size if kind == EXR else picture_size(path))  # of any channel
 
 
 def read_ids(frame: Frame) -> np.ndarray:

@@ -18,10 +18,11 @@ from ..errors import BadInputError
 from ..json_values import is_number
 from ..scene.model import Frame
 from ..scene.pose import check_pose
-from .arkit import TO_Z_UP, read_y_up
+from .arkit import read_y_up
 from .camera_check import pinhole
 from .files import read_json
 from .formats import FORMATS
+from .gltf_nodes import TO_Z_UP
 from .layout import Layout, Reader, Reading, usable
 from .meshes import find_mesh
 from .pictures import ENDINGS

@@ -17,13 +17,13 @@ from ..scene.shape_parts import parts_of
 from ..scene.vote import vote
 from . import instances
 from .brackets import fold, group_brackets, unfold
-from .camera_check import check_camera
+from .camera_check import check_camera, check_size
 from .clipping import find_clipping
 from .conventions import parse, upright
 from .exposures import from_csv, from_exif
 from .files import EscapesError, absence, check_links
 from .frame_codes import with_curves
-from .id_pictures import check_size, read_ids
+from .id_pictures import check_ids, read_ids
 from .layout import AS_FOUND, Layout, RawMesh, Reading
 from .mesh_repair import repair
 from .orientation import oriented
@@ -135,7 +135,7 @@ def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str
 
 
 def _ids(frame: Frame) -> np.ndarray:
-    check_size(frame)
+    check_ids(frame)
     return read_ids(frame)
 
 
@@ -196,7 +196,6 @@ def _refuse_too_many(root: Path, layout: Layout, problems: list[str]) -> tuple[i
 def _check_frame(frame: Frame) -> None:
     """Look at a frame's camera and at the headers of its pictures; raises `BadInputError`."""
     check_camera(frame.camera, frame.name)
-    wanted = frame.camera.width, frame.camera.height
     shots = [shot.path for shot in frame.shots]
     for path in filter(None, (*shots, frame.mask_path)):
         width, height = picture_size(path, frame.turned and path in shots)
@@ -206,11 +205,7 @@ def _check_frame(frame: Frame) -> None:
                 f"Frame '{frame.name}': '{path}' claims {width} x {height} pixels in {size} bytes, fewer than any "
                 "camera's picture takes; give the picture as it was taken or rendered."
             )
-        if (width, height) != wanted:
-            raise BadInputError(
-                f"Frame '{frame.name}': '{path}' has {width} x {height} pixels, but its camera has "
-                f"{wanted[0]} x {wanted[1]}; give them one size."
-            )
+        check_size(frame, path, (width, height))
 
 
 def describe(capture: Capture) -> dict[str, Any]:
@@ -219,14 +214,8 @@ def describe(capture: Capture) -> dict[str, Any]:
     corners = capture.mesh.vertices[capture.mesh.triangles]
     low, high = corners.min((0, 1)), corners.max((0, 1))
     area = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
-    sizes: dict[str, int] = {}
-    lenses: dict[str, int] = {}
-    for camera in (frame.camera for frame in capture.frames):
-        for counted, key in (
-            (sizes, f"{camera.width}x{camera.height}"),
-            (lenses, "PINHOLE" if camera.lens is None else camera.lens.name),
-        ):
-            counted[key] = counted.get(key, 0) + 1
+    cameras = [frame.camera for frame in capture.frames]
+    exposures = sorted(frame.exposure for frame in unfold(capture.frames))
     return {
         "capture": str(capture.root),
         "format": capture.format,
@@ -236,9 +225,9 @@ def describe(capture: Capture) -> dict[str, Any]:
         "bounds_m": [low.tolist(), high.tolist()],
         "extent_m": (high - low).tolist(),
         "frames": len(capture.frames),
-        "resolutions": sizes,
-        "lenses": lenses,
-        "exposures": _exposures(capture),
+        "resolutions": dict(Counter(f"{camera.width}x{camera.height}" for camera in cameras)),
+        "lenses": dict(Counter("PINHOLE" if camera.lens is None else camera.lens.name for camera in cameras)),
+        "exposures": [exposures[0], exposures[-1]] if exposures else [],
         "bracketed_frames": sum(bool(frame.brackets) for frame in capture.frames),
         "curve_of_codes": next((frame.transfer for frame in capture.frames if frame.transfer), ""),
         "masks": sum(frame.mask_path is not None for frame in capture.frames),
@@ -248,9 +237,3 @@ def describe(capture: Capture) -> dict[str, Any]:
         ],
         "warnings": list(capture.warnings),
     }
-
-
-def _exposures(capture: Capture) -> list[float]:
-    """The least and the greatest exposure of any picture."""
-    values = [frame.exposure for frame in unfold(capture.frames)]
-    return [min(values), max(values)] if values else []

@@ -7,6 +7,8 @@ glTF: registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, sections 3.6 (buffers) 
 
 from __future__ import annotations
 
+import base64
+import binascii
 import json
 import re
 import shutil
@@ -192,9 +194,6 @@ def _copy_part(path: Path, target: Path, begin: int, length: int) -> None:
 
 
 def _decode(path: Path, uri: str, target: Path) -> None:
-    import base64
-    import binascii
-
     try:
         target.write_bytes(base64.b64decode(uri.partition(",")[2], validate=True))
     except (binascii.Error, ValueError) as error:
