@@ -297,11 +297,11 @@ class EnvironmentAccumulator:
         cells = _bin(directions, self._height)
         radiance, clipped = pixels.radiance[outside], pixels.saturated[outside]
         np.maximum.at(self._bound, cells[clipped], radiance[clipped])
-        self._bounds += np.bincount(cells[clipped], minlength=len(self._count))
-        cells, radiance = cells[~clipped], radiance[~clipped]
-        for channel in range(3):
-            self._sum[:, channel] += np.bincount(cells, radiance[:, channel], len(self._count))
-        self._count += np.bincount(cells, minlength=len(self._count))
+        np.add.at(self._bounds, cells[clipped], 1)
+        # Of the frame's cells alone: sums over the whole map took four times as long.
+        met, index = np.unique(cells[~clipped], return_inverse=True)
+        self._sum[met] += np.stack([np.bincount(index, plane, len(met)) for plane in radiance[~clipped].T], -1)
+        self._count[met] += np.bincount(index, minlength=len(met))
 
     def result(self) -> Environment:
         """The map, unseen directions filled in from their neighbours; of clipped ones the greatest lower bound.
