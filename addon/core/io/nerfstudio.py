@@ -185,7 +185,7 @@ def applied(root: Path, top: dict[str, Any]) -> np.ndarray | None:
             result[:3] = rows[:3]
         if not is_number(scale) or not scale > 0 or not np.isfinite(result).all():
             raise ValueError
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise BadInputError(
             f"'{FILE}' in '{root}' has an applied_transform that is no 3 x 4 matrix, or an "
             "applied_scale that is no number above 0; mend or remove them."

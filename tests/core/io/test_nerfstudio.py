@@ -263,6 +263,7 @@ def test_files_from_before_applied_transform(capture):
         {"applied_scale": 0},
         {"applied_scale": "2"},
         {"applied_transform": [[1, 0, 0, math.nan], [0, 1, 0, 0], [0, 0, 1, 0]]},
+        {"applied_transform": [[10**400, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]},
     ],
 )
 def test_worlds_that_are_none(capture, values):
