@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.kinds import Workload
 from ..core.light.emitters import bright_triangles
-from ..core.light.lobes import GRID, reflected_light
+from ..core.light.lobes import highlight
 from ..core.photo import MIDDLE_GREY, srgb
 from ..core.pipeline.recover import Recovery
 
@@ -58,11 +58,9 @@ def _shown(recovery: Recovery, materials: dict, element: np.ndarray, direction: 
         if not m.model.has_lobe:
             continue
         own = np.flatnonzero(object_id == i)
-        alpha = max(float(m.alpha), float(GRID[0]))
-        light = reflected_light(
-            field, bright, element[own], direction[own], rays=RAYS, grid=np.float32([alpha]), proposals=(alpha,),
-            microfacets=m.model.microfacets, threads=recovery.settings.threads, seed=seed,
+        lobe = highlight(
+            field, bright, element[own], direction[own], m.alpha, m.f0, m.model.microfacets, rays=RAYS,
+            threads=recovery.settings.threads, seed=seed,
         )  # fmt: skip
-        lobe = np.float32(m.f0) * light.A[:, 0] + light.B[:, 0]
         shown[own] = shown[own] + lobe if m.model.has_diffuse else lobe
     return shown

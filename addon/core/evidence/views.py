@@ -9,7 +9,7 @@ import numpy as np
 from ..io.pixels import read_pixels
 from ..kinds import Shown
 from ..light.emitters import bright_triangles
-from ..light.lobes import GRID, reflected_light
+from ..light.lobes import highlight
 from .findings import Findings
 from .params import CALIBRATION
 
@@ -110,11 +110,9 @@ def _add_lobes(found: Findings, predicted: np.ndarray, element: np.ndarray, dire
         at = np.flatnonzero(owner == m.object_id)
         if m.model.microfacets is None or m.alpha is None or m.f0 is None or m.object_id in mirrors or not len(at):
             continue
-        alpha = max(float(m.alpha), float(GRID[0]))
-        light = reflected_light(
-            room, bright, element[at], -directions[at], rays=CALIBRATION.lobe_rays, grid=np.array([alpha], np.float32),
-            proposals=(alpha,), microfacets=m.model.microfacets, threads=found.threads, seed=found.seed,
-        )  # fmt: skip
         if not m.model.has_diffuse:
             predicted[at] = 0
-        predicted[at] += np.asarray(m.f0, np.float32) * light.A[:, 0] + light.B[:, 0]
+        predicted[at] += highlight(
+            room, bright, element[at], -directions[at], m.alpha, m.f0, m.model.microfacets,
+            rays=CALIBRATION.lobe_rays, threads=found.threads, seed=found.seed,
+        )  # fmt: skip

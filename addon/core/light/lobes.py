@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..brdf import ggx
 from ..brdf.fresnel import rise
@@ -145,6 +146,35 @@ def reflected_light(
     for_blocks(run, m, max(RAYS_AT_ONCE // max(rays, 1), 1), threads, progress)
     mean, noise = both.mean(1), (both[:, 0] - both[:, 1]) / 2
     return LobeLight(mean[..., :3], mean[..., 3:], noise[..., :3], noise[..., 3:], np.asarray(grid, np.float32))
+
+
+def highlight(
+    room: LightField,
+    bright: BrightTriangles,
+    element: np.ndarray,
+    direction: np.ndarray,
+    alpha: float,
+    f0: ArrayLike,
+    microfacets: Microfacets,
+    *,
+    rays: int,
+    threads: int = 1,
+    seed: int = 0,
+) -> np.ndarray:
+    """Radiance of lobes of one width, (m, 3) float32; parameters are those of `reflected_light`.
+
+    Parameters
+    ----------
+    alpha : float
+        Narrower ones are taken for the narrowest of `GRID`.
+    f0 : float, (3,) or (m, 3) float32
+    """
+    width = max(alpha, float(GRID[0]))
+    light = reflected_light(
+        room, bright, element, direction, rays=rays, grid=np.array([width], np.float32), proposals=(width,),
+        microfacets=microfacets, threads=threads, seed=seed,
+    )  # fmt: skip
+    return np.asarray(f0, np.float32) * light.A[:, 0] + light.B[:, 0]
 
 
 def _arriving(room, bright, origin, w, axes, aims) -> tuple[np.ndarray, np.ndarray]:

@@ -21,7 +21,7 @@ from ...light.field import LightField
 from ...light.interpolate import interpolated
 from ...light.irradiance import gather
 from ...light.less_noise import less_noise
-from ...light.lobes import GRID, reflected_light
+from ...light.lobes import GRID, highlight
 from ...light.over_surface import block_step, finest_spacing
 from ...light.texel_blocks import TexelBlocks
 from ...parallel import for_blocks
@@ -97,13 +97,11 @@ class Excess(LightField):
         for alike, microfacets, alpha in self._gloss.alike(element[met]):
             at = met[alike]
             own = element[at]
-            light = reflected_light(
-                self._room, self._bright, own, -directions[at], rays=GLOSSY.lobe_rays,
-                grid=np.array([alpha], np.float32), proposals=(alpha,), microfacets=microfacets, threads=1,
-                seed=self._seed + int(at[0]) + len(at),
+            shown = highlight(
+                self._room, self._bright, own, -directions[at], alpha, self._f0[own], microfacets,
+                rays=GLOSSY.lobe_rays, seed=self._seed + int(at[0]) + len(at),
             )  # fmt: skip
-            taken = np.where(self._aimed[own, None], 0, self._inside[own])
-            result[at] = self._f0[own] * light.A[:, 0] + light.B[:, 0] - taken
+            result[at] = shown - np.where(self._aimed[own, None], 0, self._inside[own])
         return result
 
 
