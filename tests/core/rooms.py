@@ -14,6 +14,7 @@ from addon.core.passes.albedo.albedo import albedo_of
 from addon.core.scene.elements import ElementLookup, make_atlas, triangle_geometry
 from addon.core.scene.model import Camera, Instance, Mesh, Pixels
 from addon.core.scene.rays import RayScene
+from addon.core.scene.surface import Surface
 
 GAP = 3
 """Texels between two islands."""
@@ -83,6 +84,10 @@ class Room:
     @cached_property
     def atlas(self):
         return make_atlas(self.mesh, self.uv, self.size)
+
+    @cached_property
+    def surface(self) -> Surface:
+        return Surface(self.mesh, self.atlas, self.scene, np.ones(len(self.mesh.triangles)), self.atlas.texel_edge)
 
     @cached_property
     def lookup(self) -> ElementLookup:

@@ -27,13 +27,11 @@ from ..passes.unseen_light.unseen_light import Light
 from ..progress import Progress
 from ..scene.atlas import Atlas
 from ..scene.creases import crease_error
-from ..scene.elements import ElementLookup
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.mesh_noise import tilt
 from ..scene.model import Capture, Instance, Mesh
 from ..scene.params import VISIBILITY
 from ..scene.patches import Patches
-from ..scene.rays import RayScene
 from ..scene.surface import Surface
 from ..scene.two_sides import fronts
 from ..scene.visibility import CLEAN, SATURATED
@@ -78,12 +76,9 @@ def find_shading(
 
     def shaded(lit: LitDiffuse) -> Shading:
         return shade(
-            surface.mesh, capture.instances, surface.atlas, surface.scene, lit, observed.environment,
-            rays=s.shading_rays, emitter_rays=s.emitter_rays, portal_rays=s.portal_rays,
-            interpolate=s.interpolate, threads=s.threads, seed=s.seed, progress=progress,
-            find_mirrors=mirrors if s.mirrors else None, noise=surface.noise,
-            colours=observed.fringes.colours(), patches=patches.objects if guessed else None, without=s.without,
-            lookup=surface.lookup,
+            surface, capture.instances, lit, observed.environment, s, progress=progress,
+            find_mirrors=mirrors if s.mirrors else None, colours=observed.fringes.colours(),
+            patches=patches.objects if guessed else None,
         )  # fmt: skip
 
     if "clipped-lamps" in s.without:
@@ -115,26 +110,16 @@ def unseen_dark(lit_diffuse: LitDiffuse) -> np.ndarray:
 
 
 def shade(
-    mesh: Mesh,
+    surface: Surface,
     instances: tuple[Instance, ...],
-    atlas: Atlas,
-    scene: RayScene,
     lit_diffuse: LitDiffuse,
     environment: Environment,
+    settings: Settings,
     *,
-    rays: int = 128,
-    emitter_rays: int = 32,
-    portal_rays: int = 32,
-    interpolate: bool = True,
-    threads: int = 0,
-    seed: int = 0,
     progress: Progress | None = None,
     find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None = None,
-    noise: float = 0.0,
     colours: dict[int, np.ndarray] | None = None,
     patches: list[int] | None = None,
-    without: Collection[str] = (),
-    lookup: ElementLookup | None = None,
 ) -> Shading:
     """Lamps and irradiance by aimed rays, interpolated.
 
@@ -143,37 +128,33 @@ def shade(
     find_mirrors : callable, optional
         Tells the flat mirrors, as light is followed over them: with None for the lamps before those are known, and
         again with them.
-    noise : float
-        Metres, what was taken out of the mesh's vertices.
     colours : dict of (3,) float, optional
         Colour of light of objects that were clipped (`fringes`).
     patches : list of int, optional
         Objects that were set apart as they were clipped; None where the capture tells of its objects.
-    without : collection of str
-        Passes left out.
-    lookup : ElementLookup, optional
-        Of this mesh and atlas, if there is one already.
 
     Raises
     ------
     InterruptedRun
         From `progress`.
     """
+    mesh, atlas, without, seed = surface.mesh, surface.atlas, settings.without, settings.seed
     how: Gathering = {
         "finest": finest_spacing(atlas),
         "smooth": "lamp-noise" not in without,
-        "threads": threads,
+        "threads": settings.threads,
         "seed": seed,
     }
     find_mirrors = None if "mirrors" in without else find_mirrors
     colours = None if "fringe-colours" in without else colours
-    tilted = turned_by_noise(mesh, atlas, 0.0 if "tilt-error" in without else noise)
+    tilted = turned_by_noise(mesh, atlas, 0.0 if "tilt-error" in without else surface.noise)
 
     environment, sun = (environment, None) if "seen-sun" in without else taken_out(environment)
     # What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.
-    field = LightField(mesh, atlas, scene, unseen_dark(lit_diffuse), environment, lookup=lookup).with_sun(sun)
-    dark = field
-    field, light = with_all_light(field, lit_diffuse, instances, find_mirrors, seed, tilted, colours, without)
+    dark = LightField(
+        mesh, atlas, surface.scene, unseen_dark(lit_diffuse), environment, lookup=surface.lookup
+    ).with_sun(sun)
+    field, light = with_all_light(dark, lit_diffuse, instances, find_mirrors, seed, tilted, colours, without)
     solved = np.zeros(len(atlas), bool)
     if patches is not None and "missing-light" not in without:
         field, light, solved = with_missing_light(dark, field, light, lit_diffuse, patches, seed)
@@ -189,10 +170,10 @@ def shade(
         E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
     lit, unsure = np.flatnonzero(told), np.zeros(len(atlas), np.float32)
     E[lit], escaped[lit], points, unsure[lit] = irradiance(
-        field, lit, rays=rays,
-        emitter_rays=0 if "emitter-rays" in without else emitter_rays,
-        portal_rays=0 if "portal-rays" in without else portal_rays,
-        interpolate=interpolate and "interpolation" not in without, progress=progress, **how,
+        field, lit, rays=settings.shading_rays,
+        emitter_rays=0 if "emitter-rays" in without else settings.emitter_rays,
+        portal_rays=0 if "portal-rays" in without else settings.portal_rays,
+        interpolate=settings.interpolate and "interpolation" not in without, progress=progress, **how,
     )  # fmt: skip
     # A noisy mesh faces elsewhere than the surface did.
     unsure = np.hypot(unsure, tilted)

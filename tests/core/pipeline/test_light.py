@@ -15,6 +15,7 @@ from addon.core.luminance import LUMINANCE
 from addon.core.pipeline.shading import shade
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.visibility import EDGE
+from addon.core.settings import Settings
 from tests.core.rooms import DARK, Quad, albedo_in, around, box_sides, cut, lit_box, make_room, quad, radiosity, split
 
 ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}
@@ -34,9 +35,9 @@ def measured(room, radiance, hidden=(), noise=0.03, texture=0.0, seed=0) -> LitD
     return LitDiffuse(L, L, L, count, tier, np.zeros(len(L), np.float32))
 
 
-def run(room, lit, **options):
-    how = {"rays": 64, "emitter_rays": 16, "threads": 2} | options
-    return shade(room.mesh, room.instances, room.atlas, room.scene, lit, DARK, **how)
+def run(room, lit, rays=64, **options):
+    settings = Settings(shading_rays=rays, emitter_rays=16, threads=2)
+    return shade(room.surface, room.instances, lit, DARK, settings, **options)
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,7 @@ from addon.core.passes.albedo.albedo import MEASURED, NONE
 from addon.core.pipeline import shading as module
 from addon.core.pipeline.shading import shade
 from addon.core.scene.model import Frame
+from addon.core.settings import Settings
 from tests.core.rooms import DARK, albedo_in, all_round, lit_box, make_room, picture, radiosity
 
 ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}
@@ -41,8 +42,8 @@ def test_lit_diffuse_is_what_the_frames_show(lit):
 
 
 HOW = {
-    "aimed": {"rays": 128, "emitter_rays": 16},
-    "aimed everywhere": {"rays": 64, "emitter_rays": 16, "interpolate": False},
+    "aimed": Settings(shading_rays=128, emitter_rays=16, threads=2),
+    "aimed everywhere": Settings(shading_rays=64, emitter_rays=16, interpolate=False, threads=2),
 }
 
 
@@ -50,7 +51,7 @@ HOW = {
 @pytest.mark.parametrize("how", HOW)
 def test_albedo_comes_back(lit, how):
     room, _, found = lit
-    result = shade(room.mesh, room.instances, room.atlas, room.scene, found, DARK, threads=2, **HOW[how])
+    result = shade(room.surface, room.instances, found, DARK, HOW[how])
     assert [lamp.object_id for lamp in result.lamps] == [6]
     assert np.allclose(result.lamps[0].radiance, LAMP, rtol=0.01)
     albedo = albedo_in(room, found, result)
@@ -69,7 +70,7 @@ def test_albedo_comes_back(lit, how):
 def test_irradiance_agrees_with_radiosity(lit):
     """E = pi L / rho of the truth, element by element; each texel is a point."""
     room, truth, found = lit
-    result = shade(room.mesh, room.instances, room.atlas, room.scene, found, DARK, rays=256, emitter_rays=32, threads=2)
+    result = shade(room.surface, room.instances, found, DARK, Settings(shading_rays=256, threads=2))
     walls = np.isin(room.atlas.object_id, [0, 2, 3, 4, 5])
     E = np.pi * truth[walls] / room.by_object(ALBEDO, default=1)[walls]
     off = result.irradiance[walls] / E - 1
@@ -82,9 +83,8 @@ def test_exposure_does_not_matter(lit):
     room, _, found = lit
     brighter = {name: getattr(found, name) * 1000 for name in ("radiance", "lower", "upper")}
     bright = replace(found, **brighter)
-    one, other = (
-        shade(room.mesh, room.instances, room.atlas, room.scene, ld, DARK, rays=32, threads=2) for ld in (found, bright)
-    )
+    how = Settings(shading_rays=32, threads=2)
+    one, other = (shade(room.surface, room.instances, ld, DARK, how) for ld in (found, bright))
     dim, glaring = albedo_in(room, found, one).rho, albedo_in(room, bright, other).rho
     assert np.allclose(dim, glaring, rtol=1e-3, atol=1e-5)
     assert np.allclose(one.irradiance * 1000, other.irradiance, rtol=1e-3)
@@ -103,7 +103,7 @@ def test_what_was_not_seen_is_filled_in(lit, monkeypatch):
     radiance = np.where(gone[:, None], np.float32(np.nan), found.radiance)
     count = np.where(gone, 0, found.count).astype(np.int32)
     part = replace(found, radiance=radiance, lower=radiance, upper=radiance, count=count)
-    result = shade(room.mesh, room.instances, room.atlas, room.scene, part, DARK, rays=128, threads=2)
+    result = shade(room.surface, room.instances, part, DARK, Settings(threads=2))
     off = result.radiance[gone] / truth[gone] - 1  # guessed without the light that it sends itself: too dark
     assert np.median(np.abs(off)) < 0.12
     rho = albedo_in(room, part, result).rho

@@ -10,6 +10,7 @@ from addon.core.light.sun import RADIUS, Sun, put_in, sunlight, taken_out
 from addon.core.luminance import LUMINANCE
 from addon.core.pipeline.shading import shade
 from addon.core.scene.lit_diffuse import LitDiffuse
+from addon.core.settings import Settings
 from tests.core import sunny
 from tests.core.rooms import albedo_in, make_room, quad
 
@@ -34,8 +35,8 @@ def sky_map(seen=None) -> Environment:
 
 def run(room, radiance, environment=None, **more):
     environment = environment or sky_map()
-    return shade(room.mesh, room.instances, room.atlas, room.scene, measured(room, radiance, **more), environment,
-                 rays=64, emitter_rays=16, portal_rays=32, threads=2)  # fmt: skip
+    settings = Settings(shading_rays=64, emitter_rays=16, threads=2)
+    return shade(room.surface, room.instances, measured(room, radiance, **more), environment, settings)
 
 
 @pytest.fixture(scope="module")
