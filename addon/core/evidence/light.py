@@ -41,8 +41,6 @@ class LightEvidence:
         Share of E that comes from what no frame saw: surfaces whose light was estimated, lamps and sky solved for.
     unsure : (n,) float32
         Relative error of E that follows from that.
-    bias : dict of int to float
-        By object_id: median of log(E checked / E) over its seen spots.
     spots : int
         Places at which E was checked.
     """
@@ -50,7 +48,6 @@ class LightEvidence:
     noise: np.ndarray
     unseen: np.ndarray
     unsure: np.ndarray
-    bias: dict[int, float]
     spots: int
 
 
@@ -134,7 +131,7 @@ def light_evidence(
     kept = np.log(np.maximum(shading.irradiance[chosen].mean(1), 1e-20))
     again = [again_at(field, chosen, **RAYS, seed=seed + 100_003 * (k + 1))[0].mean(1) for k in range(2)]
     a, b = (np.clip(np.log(np.maximum(E, 1e-20)) - kept, -CALIBRATION.worst, CALIBRATION.worst) for E in again)
-    noise, bias = _by_group(2 * atlas.object_id[chosen] + lit.seen[chosen], a, b)
+    noise = _by_group(2 * atlas.object_id[chosen] + lit.seen[chosen], a, b)
 
     hidden = unsure_light(field, shading, lit, relative_error)
     shares = np.zeros((len(chosen), 3), np.float32)
@@ -145,13 +142,12 @@ def light_evidence(
         noise=noise[nearest].astype(np.float32),
         unseen=shares[nearest, 0].astype(np.float32),
         unsure=np.hypot(shares[:, 1], shares[:, 2])[nearest].astype(np.float32),
-        bias=bias,
         spots=len(chosen),
     )
 
 
-def _by_group(group: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, dict[int, float]]:
-    """Standard error of log E at each spot, (k,), the same all over a group, and each seen object's offset.
+def _by_group(group: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Standard error of log E at each spot, (k,), the same all over a group.
 
     Robust, as a contact shadow that fell between the shading points must not speak for a whole wall: from the share
     of 68 % that lies within one standard deviation, for the checks' deviations and for the checks' own noise.
@@ -163,7 +159,7 @@ def _by_group(group: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarr
     a, b : (k,) float
         log(E checked / E) of both checks.
     """
-    result, offset = np.empty(len(group)), {}
+    result = np.empty(len(group))
     of_kind = {kind: _variance(a[group % 2 == kind], b[group % 2 == kind]) for kind in (0, 1)}
     for one, own in by_number(group).items():
         count = len(own)
@@ -171,9 +167,7 @@ def _by_group(group: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarr
         result[own] = np.sqrt(
             (count * _variance(a[own], b[own]) + CALIBRATION.prior_spots * whole) / (count + CALIBRATION.prior_spots)
         )
-        if one % 2:
-            offset[one // 2] = float(np.median((a[own] + b[own]) / 2))
-    return result, offset
+    return result
 
 
 def _variance(a: np.ndarray, b: np.ndarray) -> float:

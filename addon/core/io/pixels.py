@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import BadInputError
+from ..photo import srgb_to_linear
 from ..scene.model import AUTO, Camera, Frame, Pixels, Shot
 from ..scene.pixel_rays import pixel_rays
-from ..scene.radiometry import srgb_to_linear
 from .brackets import Exposed, merge
 from .exr import HALF_MAX
 from .pictures import read_mask, read_picture

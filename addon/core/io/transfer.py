@@ -13,8 +13,8 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..kinds import Code, Limit
+from ..photo import srgb_to_linear
 from ..scene.model import AUTO
-from ..scene.radiometry import srgb_to_linear
 
 SRGB, LINEAR = "srgb", "linear"
 CODES: Code[str] = "codes"

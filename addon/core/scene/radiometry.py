@@ -10,12 +10,6 @@ CODES = np.arange(256) / 255
 """The codes of 8 bits."""
 
 
-def srgb_to_linear(codes: np.ndarray) -> np.ndarray:
-    """Linear light, float64, of codes in 0...1 of any shape (IEC 61966-2-1)."""
-    codes = np.asarray(codes, np.float64)
-    return np.where(codes <= 0.04045, codes / 12.92, ((codes + 0.055) / 1.055) ** 2.4)
-
-
 @dataclass(frozen=True)
 class Radiometry:
     """Of one frame: code = response^-1(radiance * gain * vignetting), channel by channel.

@@ -44,7 +44,7 @@ def grey(room, rho=0.5, error=0.05, filled=None) -> Albedo:
 
 def sure_light(room, noise=0.0, unsure=0.0) -> LightEvidence:
     n = len(room.atlas)
-    return LightEvidence(*(np.full(n, x, np.float32) for x in (noise, 0.0, unsure)), {}, n)
+    return LightEvidence(*(np.full(n, x, np.float32) for x in (noise, 0.0, unsure)), n)
 
 
 def evidence(room, lit, albedo, light, models=None):

@@ -20,9 +20,10 @@ import numpy as np
 from scipy import sparse
 from scipy.interpolate import BSpline
 
+from ...photo import srgb_to_linear
 from ...progress import Progress, Rounds
 from ...scene.model import Frame, Mesh, Pixels
-from ...scene.radiometry import CODES, Radiometry, srgb_to_linear
+from ...scene.radiometry import CODES, Radiometry
 from ...scene.rays import RayScene
 from .observations import CodeObservations, observe_codes
 from .params import CALIBRATION, CalibrationParams
