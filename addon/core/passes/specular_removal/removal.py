@@ -25,7 +25,7 @@ from ...brdf.model import Microfacets
 from ...kinds import Code
 from ...light.emitters import bright_triangles
 from ...light.field import LightField
-from ...light.lobes import GRID, reflected_light
+from ...light.lobes import highlight
 from ...lit_diffuse.accumulate import accumulate
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Frame, Pixels
@@ -78,8 +78,7 @@ class SpecularPart:
         for m in materials:
             if m.alpha is None or m.f0 is None or m.model.microfacets is None:
                 raise ValueError(f"{m.name} has no lobe")
-            lobe = max(float(m.alpha), float(GRID[0])), float(np.mean(m.f0)), m.model.microfacets
-            self._lobes[m.object_id] = lobe
+            self._lobes[m.object_id] = float(m.alpha), float(np.mean(m.f0)), m.model.microfacets
 
     def __call__(self, view: FrameView, seed: int) -> np.ndarray:
         """I_nd as a frame sees it, (height, width, 3) float32; 0 where there is no lobe."""
@@ -90,15 +89,13 @@ class SpecularPart:
         step = int(np.ceil(np.sqrt(len(element) / self._params.pixels)))
         for object_id in self._lobes.keys() & set(np.unique(shown).tolist()):
             # Each object has rays of its own, so that its part is the same whichever others are asked for.
-            (alpha, f0, microfacets), at = self._lobes[object_id], np.flatnonzero(shown == object_id)
+            at = np.flatnonzero(shown == object_id)
             place = np.stack(np.divmod(at, view.triangle.shape[1]))
             traced, cell = one_of_each_cell(place, step) if step > 1 else (slice(None), place)
-            light = reflected_light(
-                field, self._bright, element[at[traced]], -rays[:, at[traced]].T, rays=self._rays,
-                grid=np.array([alpha], np.float32), proposals=(alpha,), microfacets=microfacets, threads=1,
-                seed=self._seed + seed + object_id,
+            part = highlight(
+                field, self._bright, element[at[traced]], -rays[:, at[traced]].T, *self._lobes[object_id],
+                rays=self._rays, seed=self._seed + seed + object_id,
             )  # fmt: skip
-            part = f0 * light.A[:, 0] + light.B[:, 0]
             result[at] = self._shared(part, cell, None if step == 1 else (place + 0.5) / step - 0.5)
         return result.reshape(*view.triangle.shape, 3)
 

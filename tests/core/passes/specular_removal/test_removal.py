@@ -10,7 +10,7 @@ import pytest
 from addon.core.brdf.dielectric import DIELECTRIC
 from addon.core.brdf.material import ObjectMaterial
 from addon.core.errors import InterruptedRun
-from addon.core.light.lobes import reflected_light
+from addon.core.light.lobes import highlight
 from addon.core.passes.specular_removal.params import REMOVAL
 from addon.core.passes.specular_removal.removal import SpecularPart, one_of_each_cell, without_specular
 from addon.core.progress import Progress
@@ -118,9 +118,9 @@ def test_large_pictures_lose_a_mirror_image_by_no_more_rays(floor, monkeypatch):
 
     def counted(field, bright, element, *more, **how):
         traced.append(len(element))
-        return reflected_light(field, bright, element, *more, **how)
+        return highlight(field, bright, element, *more, **how)
 
-    monkeypatch.setattr(removal, "reflected_light", counted)
+    monkeypatch.setattr(removal, "highlight", counted)
     params = replace(REMOVAL, pixels=28 * 21)
     part = SpecularPart(floor.box.field, [material], rays=4096, params=params)
     normal = triangle_geometry(room.mesh)[0]
