@@ -20,11 +20,11 @@ Line = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Figure:
-    """One figure: its name in the lines, its column, and what makes it comparable.
+    """One figure: its name in the lines, in verdicts, its column, and what makes it comparable.
 
     Attributes
     ----------
-    name, column : str
+    name, short, column : str
     sign : int
         1 where more is better, -1 where less is.
     scale : float
@@ -32,6 +32,7 @@ class Figure:
     """
 
     name: str
+    short: str
     column: str
     sign: int = 1
     scale: float = 1.0
@@ -40,21 +41,14 @@ class Figure:
 
 OLDER = "benchmark/ablation_older.md"
 """Beside the page, if there is any: what was measured of older sources."""
-ALBEDO = Figure("albedo", "albedo, dB")
+ALBEDO = Figure("albedo", "albedo", "albedo, dB")
 FIGURES = (
     ALBEDO,
-    Figure("rerender", "re-render, dB"),
-    Figure("roughness_by_pixel", "roughness by pixel, 1/1000", -1, 1000.0, 1),
-    Figure("roughness_by_object", "by object, 1/1000", -1, 1000.0, 1),
-    Figure("right", "right models", 1, 1.0, 1),
+    Figure("rerender", "re-render", "re-render, dB"),
+    Figure("roughness_by_pixel", "roughness by pixel", "roughness by pixel, 1/1000", -1, 1000.0, 1),
+    Figure("roughness_by_object", "by object", "by object, 1/1000", -1, 1000.0, 1),
+    Figure("right", "models", "right models", 1, 1.0, 1),
 )
-SHORT = {
-    "albedo": "albedo",
-    "rerender": "re-render",
-    "roughness_by_pixel": "roughness by pixel",
-    "roughness_by_object": "by object",
-    "right": "models",
-}
 
 
 @dataclass(frozen=True)
@@ -206,7 +200,12 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None, older: bool = False
         lines += ["## Not measured", "", ", ".join(one.name for one in missing) + ".", ""]
         if older:
             lines += [f"Figures of older sources: [{OLDER}]({OLDER}).", ""]
-    lines += ["## What they do", "", *_table(["pass", "first stage", "does"], [_does(one) for one in acting]), ""]
+    lines += [
+        "## What they do",
+        "",
+        *_table(["pass", "first stage", "does"], [[one.name, one.stage, one.does] for one in acting]),
+        "",
+    ]
     return "\n".join(lines)
 
 
@@ -258,17 +257,13 @@ def _summary(name: str, runs: Mapping[tuple, Line]) -> list[str]:
 
 def _verdict(name: str, runs: Mapping[tuple, Line]) -> str:
     """The figures in which a pass gains or costs more than twice the standard error, whichever room is left out."""
-    gains = {figure.name: gain_of(figure, name, runs) for figure in FIGURES}
+    gains = {figure.short: gain_of(figure, name, runs) for figure in FIGURES}
     known = {key: gain for key, gain in gains.items() if gain is not None and gain.error is not None}
     if not known:
         return "one run: open"
     better = [key for key, gain in known.items() if min(_ends(gain)) >= 0 and gain.mean > 2 * gain.error + 1e-9]
     worse = [key for key, gain in known.items() if max(_ends(gain)) <= 0 and gain.mean < -2 * gain.error - 1e-9]
-    words = [
-        f"{verb} {', '.join(SHORT[key] for key in some)}"
-        for verb, some in (("gains", better), ("costs", worse))
-        if some
-    ]
+    words = [f"{verb} {', '.join(some)}" for verb, some in (("gains", better), ("costs", worse)) if some]
     return "; ".join(words) or "open"
 
 
@@ -285,10 +280,6 @@ def _by_room(one: Pass, rooms: Sequence[tuple[str, str]], runs: Mapping[tuple, L
 def _whole(room: tuple[str, str], runs: Mapping[tuple, Line]) -> str:
     found = [line["figures"]["albedo"] for (r, _, name), line in runs.items() if r == room and name == WHOLE]
     return f"{np.mean(found):.2f}" if found else ""
-
-
-def _does(one: Pass) -> list[str]:
-    return [one.name, one.stage, one.does]
 
 
 def _signed(value: float, digits: int = 2, error: float | None = None) -> str:

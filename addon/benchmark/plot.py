@@ -25,31 +25,31 @@ def write_plot(table: Table, path: Path | str) -> None:
 
     An error of zero has no place on a logarithmic axis: it stands at the bottom of its panel with a hollow mark.
     """
-    curves, records = table.curves, table.records()
-    cases = list(dict.fromkeys(record[curves.case] for record in records))
-    names = list(dict.fromkeys(record[curves.alternative] for record in records))
+    records, (case_column, name_column) = table.records(), table.columns[:2]
+    cases = list(dict.fromkeys(record[case_column] for record in records))
+    names = list(dict.fromkeys(record[name_column] for record in records))
     across = min(ACROSS, max(len(cases), 1))
     down = -(-len(cases) // across)
     figure = Figure(figsize=(PANEL * across, PANEL * down + 0.3 * len(names) ** 0.5 + 0.6), layout="constrained")
     panels = figure.subplots(max(down, 1), across, squeeze=False).ravel()
     handles = {}
     for panel, case in zip(panels, cases):
-        here = [record for record in records if record[curves.case] == case and _is_drawn(record, curves)]
-        errors = [record[curves.error] for record in here if record[curves.error] > 0]
+        here = [record for record in records if record[case_column] == case and _is_drawn(record, table)]
+        errors = [record[table.error] for record in here if record[table.error] > 0]
         bottom = min(errors, default=1.0) / 4
-        panel.set(xscale="log", yscale="log", title=str(case), xlabel=curves.cost, ylabel=curves.error)
+        panel.set(xscale="log", yscale="log", title=str(case), xlabel=table.cost, ylabel=table.error)
         panel.grid(alpha=0.3)
         for name in names:
-            rows = [record for record in here if record[curves.alternative] == name]
+            rows = [record for record in here if record[name_column] == name]
             if not rows:
                 continue
             paper = any(record.get(BASELINE) for record in rows)
-            x = [record[curves.cost] for record in rows]
-            y = [record[curves.error] or bottom for record in rows]
+            x = [record[table.cost] for record in rows]
+            y = [record[table.error] or bottom for record in rows]
             colour = COLOURS[names.index(name) % len(COLOURS)]
             label = f"{name} (paper)" if paper and "paper" not in str(name) else str(name)
             (line,) = panel.plot(x, y, "--" if paper else "-", color=colour, label=label)
-            exact = [record[curves.error] == 0 for record in rows]
+            exact = [record[table.error] == 0 for record in rows]
             for a, b, hollow in zip(x, y, exact):
                 panel.plot(a, b, "s" if paper else "o", color=colour, markerfacecolor="none" if hollow else colour)
             handles.setdefault(name, line)
@@ -79,7 +79,7 @@ def write_points(points: Sequence[tuple[str, float, float, float]], x: str, y: s
         figure.savefig(temporary, format="png", dpi=110, metadata={"Software": None})
 
 
-def _is_drawn(record: dict, curves) -> bool:
+def _is_drawn(record: dict, table: Table) -> bool:
     """Whether a row has a place in the plot: a positive cost, and an error that was measured."""
-    cost, error = record[curves.cost], record[curves.error]
+    cost, error = record[table.cost], record[table.error]
     return cost is not None and error is not None and cost > 0 and math.isfinite(cost) and math.isfinite(error)

@@ -10,10 +10,9 @@ import re
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
 from ..core.atomic import write_bytes
@@ -67,11 +66,11 @@ def check_stages(stages: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in STAGES if name in stages or not stages)
 
 
-def load(stage: str) -> Callable[[Options], Iterable[Table]]:
-    """The function of a stage; imported when it is wanted, as it takes what the command's help needs not."""
+def measure(stage: str, options: Options) -> Table:
+    """The table of a stage, which takes what the command's help needs not."""
     from . import stages
 
-    return partial(stages.run, stage)
+    return stages.run(stage, options)
 
 
 @contextmanager
@@ -90,7 +89,7 @@ def room_and_scratch(options: Options) -> Iterator[tuple[Path, Path]]:
         yield folder, Path(scratch)
 
 
-def run_benchmark(stages: Sequence[str], options: Options) -> dict[str, list[Table] | str]:
+def run_benchmark(stages: Sequence[str], options: Options) -> dict[str, Table | str]:
     """Run stages and write their tables, plots and `index.md` into `options.out`.
 
     What is finished is written at once: an interrupted run keeps it.
@@ -102,8 +101,8 @@ def run_benchmark(stages: Sequence[str], options: Options) -> dict[str, list[Tab
 
     Returns
     -------
-    dict of str to (list of Table or str)
-        For each stage its tables, or the sentence why it was skipped.
+    dict of str to (Table or str)
+        For each stage its table, or the sentence why it was skipped.
 
     Raises
     ------
@@ -121,16 +120,14 @@ def run_benchmark(stages: Sequence[str], options: Options) -> dict[str, list[Tab
         reason = error.strerror or error
         raise BadInputError(f"Folder '{options.out}' can't be made ({reason}); choose another.") from error
     plots = plots_are_possible()
-    results: dict[str, list[Table] | str] = {}
+    results: dict[str, Table | str] = {}
     seconds: dict[str, float] = {}
     for stage in stages:
         started = time.monotonic()
         options.progress.stage(stage)
         try:
-            results[stage] = []
-            for table in load(stage)(options):
-                results[stage].append(table)
-                _write(table, options.out, plots)
+            results[stage] = table = measure(stage, options)
+            _write(table, options.out, plots)
         except SkippedStage as reason:
             results[stage] = str(reason)
         options.progress.done()
@@ -148,13 +145,13 @@ def _write(table: Table, folder: Path, plots: bool) -> None:
     """A table's files."""
     table.write_csv(folder / f"{table.stage}.csv")
     table.write_markdown(folder / f"{table.stage}.md")
-    if plots and table.curves is not None:
+    if plots:
         from .plot import write_plot
 
         write_plot(table, folder / f"{table.stage}.png")
 
 
-def _index(results: dict[str, list[Table] | str], seconds: dict[str, float], options: Options, plots: bool) -> str:
+def _index(results: dict[str, Table | str], seconds: dict[str, float], options: Options, plots: bool) -> str:
     """index.md: the machine, the settings, all tables."""
     lines = ["# Benchmark", "", *(f"- {name}: {text}" for name, text in describe_machine().items()), ""]
     lines += [
@@ -166,15 +163,14 @@ def _index(results: dict[str, list[Table] | str], seconds: dict[str, float], opt
     ]
     if not plots:
         lines += [NO_PLOTS, ""]
-    for stage, tables in results.items():
+    for stage, table in results.items():
         lines += [f"# {stage.capitalize()}", "", f"{seconds[stage]:.0f} s", ""]
-        if isinstance(tables, str):
-            lines += [f"Skipped: {tables}", ""]
+        if isinstance(table, str):
+            lines += [f"Skipped: {table}", ""]
             continue
-        for table in tables:
-            lines += [table.markdown()]
-            if plots and table.curves is not None:
-                lines += [f"![{table.title}]({table.stage}.png)", ""]
+        lines += [table.markdown()]
+        if plots:
+            lines += [f"![{table.title}]({stage}.png)", ""]
     return "\n".join(lines).rstrip() + "\n"
 
 

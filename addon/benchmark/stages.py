@@ -25,7 +25,7 @@ from ..core.results.store import Store
 from ..core.settings import PRESETS, Settings
 from ..core.stages import STAGES
 from .run import Options, SkippedStage, room_and_scratch
-from .table import BASELINE, Curves, Table
+from .table import BASELINE, Table
 from .truth_materials import UNTOLD, found_kind, found_roughness, true_kind, true_roughness
 from .truth_views import psnr, views
 
@@ -84,7 +84,7 @@ def once(function: Callable[[], Any]) -> Timing:
     return Timing(time.perf_counter() - started, time.process_time() - cpu_started, value)
 
 
-def run(stage: str, options: Options) -> Iterator[Table]:
+def run(stage: str, options: Options) -> Table:
     """The table of a stage of `ALTERNATIVES`."""
     columns = ("capture", "alternative", BASELINE, "settings", ERRORS[stage], "seconds", "CPU seconds")
     notes = ("Error of elements that frames saw, against the finest settings.",)
@@ -94,7 +94,7 @@ def run(stage: str, options: Options) -> Iterator[Table]:
     with room_and_scratch(options) as (folder, scratch):
         title = f"{stage.replace('_', ' ').capitalize()}: its alternatives"
         rows = list(_rows(stage, folder, scratch, options))
-        yield Table(stage, title, columns, rows, notes, Curves("capture", "alternative", "CPU seconds", ERRORS[stage]))
+    return Table(stage, title, columns, rows, "CPU seconds", ERRORS[stage], notes)
 
 
 def _rows(stage: str, folder: Path, scratch: Path, options: Options) -> Iterator[tuple]:

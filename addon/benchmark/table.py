@@ -18,48 +18,33 @@ Cell = str | bool | int | float | None
 
 
 @dataclass(frozen=True)
-class Curves:
-    """Which columns of a table make its plot: error over cost, a panel a case, a line an alternative.
-
-    Attributes
-    ----------
-    case, alternative, cost, error : str
-        Names of columns. Rows of one case and alternative are joined to a line in the table's order.
-    """
-
-    case: str
-    alternative: str
-    cost: str
-    error: str
-
-
-@dataclass(frozen=True)
 class Table:
     """One table of a stage.
 
     Attributes
     ----------
     stage : str
-        Also the files' name: the stage's own, or with what it shows behind a hyphen ('shading-rooms').
+        Also the files' name.
     title : str
         One line, without a full stop.
     columns : tuple of str
-        Names, with the unit where there is one ('seconds', 'bytes an element'). `BASELINE` among them marks the
-        paper's rows.
+        Names, with the unit where there is one ('seconds', 'bytes an element'). The first two are the case and the
+        alternative, of which the plot has a panel and a line each; `BASELINE` marks the paper's rows.
     rows : list of tuple
         One cell a column: str, bool, int, float or None (not measured).
+    cost, error : str
+        The columns that the plot has for x and y; rows of one case and alternative are joined in the table's order.
     notes : tuple of str
         Sentences below the table: what the columns mean, and what was found.
-    curves : Curves or None
-        None: no plot.
     """
 
     stage: str
     title: str
     columns: tuple[str, ...]
     rows: list[tuple[Cell, ...]]
+    cost: str
+    error: str
     notes: tuple[str, ...] = ()
-    curves: Curves | None = None
 
     def __post_init__(self):
         for row in self.rows:

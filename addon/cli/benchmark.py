@@ -44,11 +44,8 @@ def benchmark_command(arguments: argparse.Namespace, stream: TextIO) -> int:
             )
             results = run_benchmark(stages, options)
     if not arguments.quiet:
-        for stage, tables in results.items():
-            if isinstance(tables, str):
-                print(f"Skipped {stage}: {tables}", file=stream)
-            else:
-                print(*(table.markdown() for table in tables), sep="\n", file=stream)
+        for stage, table in results.items():
+            print(f"Skipped {stage}: {table}" if isinstance(table, str) else table.markdown(), file=stream)
         if not plots_are_possible():
             print(NO_PLOTS, file=stream)
         print(f"Tables and plots: {arguments.out / 'index.md'}", file=stream)

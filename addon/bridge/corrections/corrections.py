@@ -15,6 +15,7 @@ from ...core.atomic import write_bytes
 from ...core.brdf.dielectric import DIELECTRIC
 from ...core.brdf.registry import shown
 from ...core.errors import BadInputError
+from ...core.kinds import Shown
 from ...core.results.overrides import LOBE, OVERRIDES, Given, Overrides, White, kept_overrides, merge, parse
 from ...core.results.place import write_capture
 from ..marks import CAPTURE, FOUND, GIVEN, OBJECT_ID, RESULT, SMOOTH, WHITE
@@ -23,7 +24,7 @@ from ..scene.as_made import is_corrected, our_own
 from . import material, unseen
 from .unseen import room_of
 
-ROUGHNESS = 0.3
+ROUGHNESS: Shown[float] = 0.3
 """What is shown until a refit, where nothing better is known."""
 
 _written: dict[Path, set[int | str]] = {}

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...core.kinds import Code, Unit
+from ...core.kinds import Code, Shown, Unit
 from ...core.scene.lens import Lens
 from ...core.scene.lenses import Cropped, Equirectangular
 from ...core.scene.lenses_told import lens_of, told_lens
@@ -29,7 +29,7 @@ FRAME_INDEX = "frame_index"
 _SENSOR: Unit[float] = 36.0
 _WIDE = np.radians(80)
 """A lens that sees further than this from its axis is no perspective."""
-_TOLD = 0.5
+_TOLD: Shown[float] = 0.5
 """Pixels off from which on a lens is told of."""
 _GRID = 33
 

@@ -17,7 +17,8 @@ from ..marks import OBJECT_ID
 
 ROOM_LIGHT = "scan_relight_room_light"
 """Custom property of the scene: median irradiance of the scanned room, in the frames' unit."""
-_ALBEDO = 0.4
+ALBEDO = 0.5
+"""Of a usual room's surfaces, on average."""
 VIEW, CURSOR, OBJECT = "VIEW", "CURSOR", "OBJECT"
 
 
@@ -137,7 +138,7 @@ def room_light(scene: bpy.types.Scene) -> float:
     kept = scene.get(ROOM_LIGHT)
     if kept:
         return float(kept)
-    found = _median_shading() or math.pi * MIDDLE_GREY / 2**scene.view_settings.exposure / _ALBEDO
+    found = _median_shading() or math.pi * MIDDLE_GREY / 2**scene.view_settings.exposure / ALBEDO
     scene[ROOM_LIGHT] = found
     return found
 

@@ -16,7 +16,7 @@ from mathutils import Matrix, Quaternion, Vector
 from ..light.room import bounds, cast, leaves, picture_ray, view_direction
 from .subject import Subject
 
-_CLEAR = 0.05
+CLEAR = 0.05
 """Metres that a light keeps off what is behind it."""
 _OFF_CEILING = 0.45
 """Metres below the room's top: a lamp closer to a ceiling burns its edge into it."""
@@ -67,7 +67,7 @@ def window_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
     for side in (sign * side for side in range(30, 151, 15) for sign in (1, -1)):
         direction = _towards(-view_direction(scene), side, 0)
         hit, wall = cast(scene, middle, direction), _exit(middle, direction, low, high)
-        distance = (min(hit.distance, wall) if hit else wall) - _CLEAR
+        distance = (min(hit.distance, wall) if hit else wall) - CLEAR
         if distance < 0.6 * wall:
             continue  # before a cupboard: the light has to stand near the room's edge
         place, inward = middle + direction * distance, -direction
@@ -82,7 +82,7 @@ def window_place(scene: bpy.types.Scene, subject: Subject) -> Placement:
     sizes = []
     for axis, wanted in ((inward.cross(_UP), 1.2), (_UP, min(1.3, 0.55 * storey))):
         free = min(_way(scene, place, axis * sign, wanted / 2) for sign in (1, -1))
-        sizes.append(max(2 * (free - (_CLEAR if free < wanted / 2 else 0.0)), 0.3))
+        sizes.append(max(2 * (free - (CLEAR if free < wanted / 2 else 0.0)), 0.3))
     return Placement(place, _facing(inward), *sizes)
 
 
@@ -173,7 +173,7 @@ def _way(scene, place: Vector, direction: Vector, wanted: float) -> float:
 def _room_around(scene, place: Vector, wanted: float) -> float:
     """Metres to the nearest surface, at most `wanted`; 0 outside the room."""
     low, high = bounds(scene)
-    if any(not low[k] + _CLEAR <= place[k] <= high[k] - _CLEAR for k in range(3)):
+    if any(not low[k] + CLEAR <= place[k] <= high[k] - CLEAR for k in range(3)):
         return 0.0
     return min(_way(scene, place, direction, wanted) for direction in _AROUND)
 
@@ -196,7 +196,7 @@ def _free(scene, target: Vector, direction: Vector, wanted: float) -> float:
     """How far from the target a light may stand: `wanted`, but inside the room and clear of what is in the way."""
     start, wall = target + direction * 0.02, _exit(target, direction, *bounds(scene))
     limit = _way(scene, start, direction, wall)
-    return max(min(wanted, 0.9 * limit, limit - _CLEAR), 0.1)
+    return max(min(wanted, 0.9 * limit, limit - CLEAR), 0.1)
 
 
 def _exit(place: Vector, direction: Vector, low: Vector, high: Vector) -> float:

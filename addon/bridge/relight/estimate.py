@@ -19,12 +19,11 @@ from ..data.arrays import triangles_of, vertices_of
 from ..light import lamps as relight_lamps
 from ..light import outside
 from ..light.kelvin import luminance
-from ..light.room import bounds, cast, leaves, picture_ray, sphere
+from ..light.room import ALBEDO, bounds, cast, leaves, picture_ray, sphere
 from ..light.units import LUMENS_PER_WATT, efficacy
 
 _GRID, _AROUND, _ON_LAMP = 9, 64, 6
 """Rays: a side of the picture; all over the room, from the camera and from its middle; from each place to a lamp."""
-_ALBEDO = 0.5
 _ALMOST = 0.02
 NO_LIGHT = -math.inf
 Source = Callable[[Vector], Iterator[tuple[Vector, float, float]]]
@@ -90,7 +89,7 @@ def looking(scene: bpy.types.Scene) -> Iterator[None]:
                 found.append(_arriving(scene, source, place, normal))
                 yield
             around = _all_over(scene, key, known.areas, found[known.seen :])
-            reaches[key] = np.array(found[: known.seen] or [0.0]) + around * _ALBEDO / (1 - _ALBEDO)
+            reaches[key] = np.array(found[: known.seen] or [0.0]) + around * ALBEDO / (1 - ALBEDO)
     known.reaches = reaches
     _known[scene.name] = known
 

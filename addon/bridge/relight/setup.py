@@ -16,11 +16,11 @@ from ...core.errors import BadInputError
 from ..light import lamps as relight_lamps
 from ..light import outside as relight_outside
 from ..light.room import bounds, cast, room_light, view_direction
+from .aim import CLEAR
 from .lights import KIND, PRESETS, added_lights, put_light, remove_lights
 
 _NUMBERS = ("angle", "spread", "spot_size", "spot_blend", "temperature")
 _LENGTHS = ("size", "size_y", "shadow_soft_size")
-_CLEAR = 0.15
 
 
 def setup_of(scene: bpy.types.Scene) -> str:
@@ -138,10 +138,10 @@ def _within(scene, eye: Vector, place: Vector) -> Vector:
     way = place - eye
     if way.length < 1e-6:
         return place
-    hit = cast(scene, eye, way, way.length + _CLEAR)
+    hit = cast(scene, eye, way, way.length + CLEAR)
     low, high = bounds(scene)
-    reached = eye + way.normalized() * max(hit.distance - _CLEAR, 0.0) if hit else place
-    return Vector(min(max(reached[k], low[k] + _CLEAR), high[k] - _CLEAR) for k in range(3))
+    reached = eye + way.normalized() * max(hit.distance - CLEAR, 0.0) if hit else place
+    return Vector(min(max(reached[k], low[k] + CLEAR), high[k] - CLEAR) for k in range(3))
 
 
 def _class(lamp) -> str:

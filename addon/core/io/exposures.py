@@ -30,7 +30,6 @@ F_NUMBER, ISO = ("fnumber", "aperture", "fstop"), ("iso", "isospeed", "isospeedr
 """Keys and columns, in small letters and without underscores."""
 WIDEST: Limit[float] = 1e9
 """Ratio of two exposures that no camera has."""
-EQUAL = 1.01
 
 
 class Settings(NamedTuple):
@@ -155,7 +154,7 @@ def from_exif(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
             return list(frames), []
         settings.append(Settings(*(tags.get(tag) for tag in (exif.EXPOSURE_TIME, exif.F_NUMBER, exif.ISO))))
     known = [value for value in relative(settings) if value is not None]
-    if not known or max(known) <= EQUAL * min(known):
+    if not known or max(known) == min(known):
         return list(frames), []
     return from_settings(frames, settings, "the pictures' EXIF")
 

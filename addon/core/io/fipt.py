@@ -18,6 +18,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..json_values import is_number
+from ..kinds import Limit
 from ..scene.model import Camera, Frame
 from ..scene.pose import check_pose
 from .files import read_json, read_text
@@ -30,7 +31,7 @@ MESH, SPLIT = "scene.obj", "train"
 POSES, CAMERAS, INTRINSICS = "transforms.json", "cam.txt", "K_list.txt"
 TO_OPENGL = np.diag([-1.0, 1.0, -1.0, 1.0])
 """From x left, y up, z forward to x right, y up, z backward."""
-MAX_LEAN = 0.1
+MAX_LEAN: Limit[float] = 0.1
 """Cosine between the direction of view and `up` from which on they are no camera's; the authors allow 0.002."""
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Limit
 from ..scene.model import Frame
 from .camera_check import check_size
 from .exr import read_numbers
@@ -14,7 +15,7 @@ from .exr_header import parse_headers
 from .oiio import PNG, read_coded
 from .pictures import EXR, picture_kind, picture_size
 
-OFF = 0.02
+OFF: Limit[float] = 0.02
 """An id in a float channel is this near to a whole number; further off, pictures were blended or are no ids."""
 EXACT = {2: 1 << 11, 4: 1 << 24, 8: 1 << 53}
 """Up to here floats of so many bytes hold every whole number."""

@@ -14,7 +14,7 @@ MAX_COORDINATE: Limit[float] = 1e6
 """Metres; beyond, single precision (rays, atlas) can't hold a room."""
 THIN: Unit[float] = 1e-12
 """A triangle whose height is below this share of its longest edge has no area."""
-USUAL_EXTENT = (0.1, 1000.0)
+USUAL_EXTENT: Limit[tuple[float, float]] = (0.1, 1000.0)
 """Metres; a room outside of this was likely exported in another unit."""
 
 

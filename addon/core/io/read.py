@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadInputError, one_line
-from ..kinds import Shown
+from ..kinds import Limit, Shown
 from ..scene.closing import Closing, close_holes
 from ..scene.model import Capture, Frame, Mesh, Pixels
 from ..scene.shape_parts import parts_of
@@ -32,7 +32,7 @@ from .pictures import picture_note, picture_size, read_picture
 from .pixels import read_pixels
 from .readers import reader_for
 
-MAX_BAD_SHARE = 0.2
+MAX_BAD_SHARE: Limit[float] = 0.2
 """More bad frames than this share, and the capture is taken as broken instead of the frames as bad."""
 LISTED: Shown[int] = 3
 """How many problems are told in full."""
