@@ -6,7 +6,7 @@ artist's as ever. ESC over a 3D view stops it.
 
 import threading
 import time
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 
 import bpy
 
@@ -20,7 +20,8 @@ from ..translations import told
 FOLLOWED = {"progress": "json", "stop_with_stdin": True}
 """Options of a command that an operator follows."""
 PERIOD: Shown[float] = 0.1
-"""Seconds between two looks at the job."""
+HURRY: Shown[float] = 0.01
+"""Seconds between two looks at the job, and between two slices of what it brings."""
 REDRAW: Shown[float] = 0.5
 """Seconds between two pictures of the progress bar, unless the stage changes: drawing is the window's time."""
 SLICE: Shown[float] = 0.04
@@ -51,14 +52,17 @@ def redraw(context) -> None:
                 region.tag_redraw()
 
 
+def under_mouse(event, parts) -> Iterator:
+    """Those of areas or regions that the mouse is in."""
+    for one in parts:
+        if 0 <= event.mouse_x - one.x < one.width and 0 <= event.mouse_y - one.y < one.height:
+            yield one
+
+
 def over_3d_view(context, event) -> bool:
     """Whether the mouse is in a 3D view."""
-    return context.window is not None and any(
-        area.type == "VIEW_3D"
-        and area.x <= event.mouse_x < area.x + area.width
-        and area.y <= event.mouse_y < area.y + area.height
-        for area in context.window.screen.areas
-    )
+    there = context.window.screen.areas if context.window is not None else ()
+    return any(area.type == "VIEW_3D" for area in under_mouse(event, there))
 
 
 class JobOperator:
@@ -150,7 +154,8 @@ class JobOperator:
             )
         job.facts["phase"], job.facts["changed"] = "change", 0.0
         self._slices = self.change(scene, self._ready)
-        self._hurry(context, True)
+        context.window_manager.event_timer_remove(self._timer)
+        self._timer = context.window_manager.event_timer_add(HURRY, window=context.window)
         return None
 
     def _load(self) -> None:
@@ -191,11 +196,6 @@ class JobOperator:
         self.job.facts["phase"], self.job.facts["failed"] = "end", sentence
         self.report({"ERROR"}, sentence)
         return self._leave(context, {"FINISHED"} if half else {"CANCELLED"})
-
-    def _hurry(self, context, fast: bool) -> None:
-        manager = context.window_manager
-        manager.event_timer_remove(self._timer)
-        self._timer = manager.event_timer_add(0.01 if fast else PERIOD, window=context.window)
 
     def _tell(self, context) -> None:
         job = self.job

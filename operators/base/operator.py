@@ -7,7 +7,7 @@ from bpy_extras import view3d_utils
 
 from ...addon.console import unexpected
 from ...addon.core.errors import ScanRelightError
-from .job_operator import active
+from .job_operator import active, under_mouse
 
 REPORTED = "Error: "
 """How Blender begins an operator's error where it raises it as an exception."""
@@ -117,11 +117,8 @@ FOLDERS = bpy.props.BoolProperty(
 def mouse_ray(context, event):
     """Origin and direction of the ray under the mouse; None outside the 3D views."""
     for area in context.screen.areas:
-        region = next((one for one in area.regions if one.type == "WINDOW"), None)
-        if area.type != "VIEW_3D" or region is None:
-            continue
-        at = event.mouse_x - region.x, event.mouse_y - region.y
-        if 0 <= at[0] < region.width and 0 <= at[1] < region.height:
-            view = region, area.spaces.active.region_3d, at
+        main = [one for one in area.regions if one.type == "WINDOW" and area.type == "VIEW_3D"][:1]
+        for region in under_mouse(event, main):
+            view = region, area.spaces.active.region_3d, (event.mouse_x - region.x, event.mouse_y - region.y)
             return view3d_utils.region_2d_to_origin_3d(*view), view3d_utils.region_2d_to_vector_3d(*view)
     return None

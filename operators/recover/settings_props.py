@@ -217,8 +217,7 @@ class StageOperator(SettingsProps, CaptureOperator):
         from ...addon.core.pipeline.run import progress_of_run  # not earlier: Blender's start should not wait for it
 
         settings = self.settings()
-        guard = MemoryGuard(self.memory_limit())
-        with contextlib.closing(guard):
+        with contextlib.closing(MemoryGuard(self.memory_limit())) as guard:
             report = run(
                 self.folder("capture_folder"),
                 self.folder("result_folder"),
@@ -271,16 +270,8 @@ class SceneStageOperator(StageOperator):
     def work(self, context):
         """Run, then bring the room, so that a failed run leaves the file alone."""
         scene = context.scene
-        warnings = self.run(
-            context,
-            self.until,
-            scene=scene,
-            import_first=self.import_first,
-            target=self.target,
-            images=self.images,
-            copies=self.copies,
-            into=self.into,
-        )
+        how = {name: getattr(self, name) for name in ("import_first", "target", "images", "copies", "into")}
+        warnings = self.run(context, self.until, scene=scene, **how)
         if self.into == "OWN":
             room.show_own(scene, self.folder("capture_folder"))
         return warnings
