@@ -136,7 +136,7 @@ class _Scene:
 
     def shown(self, convention: Convention) -> list[Shown]:
         cameras = convention.cameras([view.camera for view in self.views])
-        bends = not all(one.guess for one in self.capture.instances)
+        bends = not self.capture.mesh.whole
         return [shown(camera, self.normal, self.rays, bends) for camera in cameras]
 
     def whole(self, fit: Fit) -> Fit:

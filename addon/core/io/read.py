@@ -130,7 +130,7 @@ def _objects(layout: Layout, frames: list[Frame]) -> tuple[Mesh, tuple, list[str
         objects = tuple(replace(one, guess=True) for one in objects)
     closed = np.arange(count, len(raw.triangles), dtype=np.int32)
     lit = None if frames else raw.lit
-    mesh = Mesh(raw.vertices, raw.triangles, ids, raw.uv, lit, closed=closed if len(closed) else None)
+    mesh = Mesh(raw.vertices, raw.triangles, ids, raw.uv, lit, closed=closed if len(closed) else None, whole=not told)
     return mesh, objects, warnings + more
 
 

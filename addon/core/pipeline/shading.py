@@ -69,7 +69,7 @@ def find_shading(
             surface.mesh, surface.atlas, surface.scene, lit, observed.environment,
             rays=s.shading_rays, threads=s.threads, seed=s.seed, progress=progress,
         )  # fmt: skip
-    patches, guessed = Patches.none(), all(one.guess for one in capture.instances)
+    patches, guessed = Patches.none(), capture.mesh.whole
     if guessed and not {"clipped-patches", "missing-light"} & set(s.without):
         patches = clipped_patches(surface.mesh, surface.atlas, lit)
         surface, capture = patches.surface(surface), patches.capture(capture)

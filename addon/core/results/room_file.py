@@ -168,8 +168,9 @@ def read_capture_file(folder: Path | str) -> tuple[Capture, np.ndarray]:
         )
         pictures = told.get("pictures") or [{}] * len(frames)
         frames = tuple(replace(frame, **_picture(one)) for frame, one in zip(frames, pictures, strict=True))
-        mesh = Mesh(arrays["vertices"], arrays["triangles"], arrays["object_id"], arrays.get("uv"))
         instances = tuple(Instance(int(number), name, *guess) for number, name, *guess in told["instances"])
+        whole = all(one.guess for one in instances)
+        mesh = Mesh(arrays["vertices"], arrays["triangles"], arrays["object_id"], arrays.get("uv"), whole=whole)
         return Capture(Path(told["root"]), mesh, instances, frames, format=told["format"]), arrays["atlas_uv"]
     except DAMAGE as error:
         raise _damaged(folder, error) from error

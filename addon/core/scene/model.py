@@ -327,6 +327,8 @@ class Mesh:
         sheets that frames see from both sides (`surface.two_sides`).
     closed : (c,) int32 or None
         Triangles that the capture lacks, by which its holes were closed (`closing`).
+    whole : bool
+        Nobody told its objects: they are parts by shape alone, and where two of them border one surface may go on.
     """
 
     vertices: np.ndarray
@@ -336,6 +338,7 @@ class Mesh:
     lit: LitTiles | None = None
     backs: np.ndarray | None = None
     closed: np.ndarray | None = None
+    whole: bool = False
 
     @cached_property
     def geometry(self) -> tuple[np.ndarray, np.ndarray]:

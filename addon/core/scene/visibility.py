@@ -55,6 +55,8 @@ class FrameView:
     clean : (height, width) bool
         All nine pixels of the neighbourhood show one continuous surface (or all escape). No pixel is clean that has
         none of a lens's rays, or such a neighbour.
+    whole : bool
+        As the mesh's: its objects' borders are none of surfaces.
     """
 
     camera: Camera
@@ -65,6 +67,7 @@ class FrameView:
     distance: np.ndarray
     object_id: np.ndarray
     clean: np.ndarray
+    whole: bool = False
 
 
 @dataclass(frozen=True)
@@ -137,15 +140,16 @@ def view_frame(camera: Camera, mesh: Mesh, scene: RayScene, triangle_normal: np.
         u[rows], v[rows] = hits.u.reshape(-1, width), hits.v.reshape(-1, width)
         distance[rows] = np.where(met >= 0, hits.distance.reshape(-1, width), np.float32(0))
     object_id[~led] = NOTHING
+    surface_id = np.minimum(object_id, 0) if mesh.whole else object_id
     clean = np.ones((height, width), bool)
     for rows in blocks(height, step):
         # With the rows beside them, whose pixels are neighbours.
         wide = slice(max(rows.start - 1, 0), min(rows.stop + 1, height))
-        found = _clean(triangle[wide], object_id[wide], distance[wide], rays[:, wide], triangle_normal)
+        found = _clean(triangle[wide], surface_id[wide], distance[wide], rays[:, wide], triangle_normal)
         clean[rows] = found[rows.start - wide.start :][: rows.stop - rows.start]
     clean &= led
     object_id[~led] = -1
-    return FrameView(camera, rays, triangle, u, v, distance, object_id, clean)
+    return FrameView(camera, rays, triangle, u, v, distance, object_id, clean, mesh.whole)
 
 
 def _clean(
@@ -250,7 +254,10 @@ def observe(
     x, y = x.take(at), y.take(at)
     pixel = y.astype(np.int32) * camera.width + x.astype(np.int32)
     shown = np.where(pixels.valid, view.object_id, NOTHING).ravel()
-    keep = np.flatnonzero(shown.take(pixel) == atlas.object_id.take(index.take(at)))
+    same = shown.take(pixel) == atlas.object_id.take(index.take(at))
+    if view.whole:
+        same |= view.clean.ravel().take(pixel) & (shown.take(pixel) >= 0)
+    keep = np.flatnonzero(same)
     at = at.take(keep)
     away = np.stack([plane.take(at) for plane in away])
     distance = np.sqrt(_dot(away, away))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -129,6 +131,20 @@ def test_an_edge_within_one_object_counts(board):
     several, _ = sees(board, CAMERA)
     one, _ = sees(room, CAMERA)
     assert np.array_equal(one.clean, several.clean) and not one.clean.all()
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_parts_by_shape_alone_border_within_a_surface(board, whole):
+    """Two halves of a wall, and a board before it: where nobody told objects only the board has edges."""
+    halves = make_room([quad((3, 2, -2), (0, -2, 0), (0, 0, 4), 0), quad((3, 0, -2), (0, -2, 0), (0, 0, 4), 2)], 0.1)
+    room = replace(halves, mesh=replace(halves.mesh, whole=whole))
+    _, seen = sees(room, CAMERA)
+    beside = np.abs(room.atlas.position[seen.element, 1]) < 0.1
+    assert len(np.unique(seen.element)) == len(seen.element) and beside.any()
+    assert (seen.tier[beside] == CLEAN).all() == whole
+    before = replace(board, mesh=replace(board.mesh, whole=whole))
+    told, same = sees(board, CAMERA)[1], sees(before, CAMERA)[1]
+    assert np.array_equal(told.element, same.element) and np.array_equal(told.tier, same.tier)
 
 
 def test_a_slanted_plane_has_no_edges():
