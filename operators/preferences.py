@@ -10,6 +10,7 @@ from ..addon.bridge.results import home
 from ..addon.core.kinds import Shown
 from . import keymaps
 from .base.job_operator import areas
+from .base.operator import folder_property
 from .base.panel import fields
 
 PACKAGE = home.PACKAGE
@@ -20,17 +21,13 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
 
     bl_idname = PACKAGE
 
-    results_folder: bpy.props.StringProperty(
-        name="Results Folder",
-        description="Where results go whose folder is not chosen and whose .blend was never "
-        "saved; empty takes 'Scan Relight' among your documents. A saved .blend has its results beside it",
-        subtype="DIR_PATH",
+    results_folder: folder_property(
+        "Results Folder",
+        "Where results go whose folder is not chosen and whose .blend was never saved; empty takes 'Scan "
+        "Relight' among your documents. A saved .blend has its results beside it",
     )
-    cache_folder: bpy.props.StringProperty(
-        name="Cache Folder",
-        description="The results folder as earlier versions called it; heeded where none is set",
-        subtype="DIR_PATH",
-        options={"HIDDEN"},
+    cache_folder: folder_property(
+        "Cache Folder", "The results folder as earlier versions called it; heeded where none is set", "HIDDEN"
     )
     threads: bpy.props.IntProperty(
         name="Threads", description="Processor threads that a run may take; 0 takes all", min=0, soft_max=64

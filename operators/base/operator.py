@@ -1,6 +1,7 @@
 """What all operators share: when they can run, errors that become one sentence, files and places that are picked."""
 
 from collections.abc import Callable
+from functools import partial
 
 import bpy
 from bpy_extras import view3d_utils
@@ -108,6 +109,12 @@ class Choosing:
         return {"RUNNING_MODAL"}
 
 
+def _path(subtype: str, name: str, description: str, *options: str, **more):
+    return bpy.props.StringProperty(name=name, description=description, subtype=subtype, options=set(options), **more)
+
+
+folder_property, file_property = partial(_path, "DIR_PATH"), partial(_path, "FILE_PATH")
+"""Properties that hold a path: label, tooltip, options, and what else `StringProperty` takes."""
 FOLDERS = bpy.props.BoolProperty(
     name="Folders", description="Only folders are shown", default=True, options={"HIDDEN", "SKIP_SAVE"}
 )

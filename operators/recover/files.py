@@ -7,11 +7,20 @@ import bpy
 
 from ...addon.core.errors import BadInputError
 from ...addon.core.io import folder as folders
-from ..base.operator import FOLDERS, AtOnce, Choosing, OneSentence, free_scene, has_scene, no_run
+from ..base.operator import (
+    FOLDERS,
+    AtOnce,
+    Choosing,
+    OneSentence,
+    file_property,
+    folder_property,
+    free_scene,
+    has_scene,
+    no_run,
+)
 from ..base.panel import SidebarPanel, fields
-from ..translations import OWN
 from . import room
-from .settings_props import preset_items
+from .settings_props import preset_property
 
 NEXT = (
     ("CHOOSE", "Choose Only", "Choose it in the sidebar; the panel shows what is in it"),
@@ -63,15 +72,8 @@ def given_path(operator) -> Path:
 class FileOperator(OneSentence):
     """Takes a path to a scan or to a result; errors become one sentence."""
 
-    filepath: bpy.props.StringProperty(
-        name="File or Folder",
-        description="Folder of a scan or of a result, or a file in one",
-        subtype="FILE_PATH",
-        options={"SKIP_SAVE"},
-    )
-    directory: bpy.props.StringProperty(
-        name="Folder", description="Folder that the files lie in", subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"}
-    )
+    filepath: file_property("File or Folder", "Folder of a scan or of a result, or a file in one", "SKIP_SAVE")
+    directory: folder_property("Folder", "Folder that the files lie in", "HIDDEN", "SKIP_SAVE")
     files: bpy.props.CollectionProperty(
         name="Files",
         description="Names of files in the folder",
@@ -79,13 +81,7 @@ class FileOperator(OneSentence):
         options={"HIDDEN", "SKIP_SAVE"},
     )
     then: bpy.props.EnumProperty(name="Then", description="What is done with a scan", items=NEXT)
-    preset: bpy.props.EnumProperty(
-        name="Preset",
-        description="What all settings of a recovery start from",
-        items=preset_items(),
-        translation_context=OWN,
-        default="normal",
-    )
+    preset: preset_property("What all settings of a recovery start from")
 
     def execute(self, context):
         return self.attempt(lambda: self.open(context))
@@ -176,7 +172,7 @@ class SCAN_RELIGHT_OT_use_folder(bpy.types.Operator):
     bl_label = "Use This Folder"
     bl_options = {"UNDO", "INTERNAL"}
 
-    folder: bpy.props.StringProperty(name="Folder", description="Folder of a scan", subtype="DIR_PATH")
+    folder: folder_property("Folder", "Folder of a scan")
 
     def execute(self, context):
         context.scene.scan_relight.capture_folder = self.folder
@@ -190,12 +186,8 @@ class SCAN_RELIGHT_OT_open_result(Choosing, AtOnce, bpy.types.Operator):
     bl_label = "Open Scan Relight Result"
     given = "folder"
 
-    folder: bpy.props.StringProperty(
-        name="Folder", description="Result folder of a finished run", subtype="DIR_PATH", options={"SKIP_SAVE"}
-    )
-    directory: bpy.props.StringProperty(
-        name="Folder", description="What the file browser chooses", subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"}
-    )
+    folder: folder_property("Folder", "Result folder of a finished run", "SKIP_SAVE")
+    directory: folder_property("Folder", "What the file browser chooses", "HIDDEN", "SKIP_SAVE")
     filter_folder: FOLDERS
 
     def work(self, context):

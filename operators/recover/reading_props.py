@@ -6,6 +6,7 @@ import bpy
 
 from ...addon.core.io.formats import FORMATS
 from ...addon.core.io.layout import Reading
+from ..base.operator import file_property
 from ..translations import OWN
 
 FOUND = "FOUND"
@@ -26,11 +27,8 @@ class ReadingProps:
     reading_format: bpy.props.EnumProperty(
         name="Format", description="Layout of the capture's folder", items=FORMAT_ITEMS, default=FOUND
     )
-    reading_mesh: bpy.props.StringProperty(
-        name="Mesh",
-        description="The mesh, where it is not the one that the format names",
-        subtype="FILE_PATH",
-        translation_context=OWN,
+    reading_mesh: file_property(
+        "Mesh", "The mesh, where it is not the one that the format names", translation_context=OWN
     )
     reading_outside: bpy.props.BoolProperty(
         name="Files Outside", description="Let the capture's files name others outside of its folder"
@@ -38,11 +36,7 @@ class ReadingProps:
     reading_transfer: bpy.props.EnumProperty(
         name="Picture Curve", description="Curve of pictures of 8 and 16 bits", items=CURVES
     )
-    reading_exposures: bpy.props.StringProperty(
-        name="Exposures",
-        description="CSV file with the exposure of each frame: lines of name, exposure",
-        subtype="FILE_PATH",
-    )
+    reading_exposures: file_property("Exposures", "CSV file with the exposure of each frame: lines of name, exposure")
     reading_convention: bpy.props.StringProperty(
         name="Poses", description="Name of a correction of all poses, as the check of the capture proposes it"
     )

@@ -8,10 +8,10 @@ import bpy
 from ...addon.core.errors import StorageError
 from ...addon.core.settings import PRESETS, Settings
 from ...addon.settings_info import setting_infos
-from ..translations import OWN
+from ..base.operator import folder_property
 from . import findings
 from .reading_props import ReadingProps
-from .settings_props import COPIES, IMAGES, SettingsProps, preset_items, setting_value
+from .settings_props import COPIES, IMAGES, SettingsProps, preset_property, setting_value
 
 
 def preset_chosen(choices, context) -> None:
@@ -59,29 +59,18 @@ class ScanRelightReading(ReadingProps, bpy.types.PropertyGroup):
 class ScanRelightScene(bpy.types.PropertyGroup):
     """`Scene.scan_relight`."""
 
-    capture_folder: bpy.props.StringProperty(
-        name="Capture",
-        description="Folder of the scan: its mesh, its frames and their cameras",
-        subtype="DIR_PATH",
-        update=capture_chosen,
+    capture_folder: folder_property(
+        "Capture", "Folder of the scan: its mesh, its frames and their cameras", update=capture_chosen
     )
     reading: bpy.props.PointerProperty(
         name="How It Is Read", description="How the capture is to be read", type=ScanRelightReading
     )
-    result_folder: bpy.props.StringProperty(
-        name="Result",
-        description="Folder for the recovered scene and the finished stages; empty takes one beside "
-        "the saved .blend, or in the preferences' results folder",
-        subtype="DIR_PATH",
+    result_folder: folder_property(
+        "Result",
+        "Folder for the recovered scene and the finished stages; empty takes one beside the saved .blend, "
+        "or in the preferences' results folder",
     )
-    preset: bpy.props.EnumProperty(
-        name="Preset",
-        description="What all settings start from",
-        items=preset_items(),
-        default="normal",
-        translation_context=OWN,
-        update=preset_chosen,
-    )
+    preset: preset_property("What all settings start from", update=preset_chosen)
     settings: bpy.props.PointerProperty(
         name="Settings", description="All settings of a recovery", type=ScanRelightSettings
     )

@@ -16,7 +16,7 @@ from ...addon.leash import MemoryGuard
 from ...addon.settings_info import SettingInfo, setting_infos
 from .. import preferences
 from ..base.job_operator import FOLLOWED, JobOperator
-from ..base.operator import OneSentence, free_scene, needs
+from ..base.operator import OneSentence, folder_property, free_scene, needs
 from ..base.panel import fields
 from ..translations import OWN
 from . import reading_props, room
@@ -118,9 +118,11 @@ def startable(operator):
     return free_scene(packages(operator))
 
 
-def preset_items() -> list[tuple[str, str, str]]:
-    """Items of an enumeration of the presets."""
-    return [(name, name.capitalize(), PRESET_TEXTS.get(name, "")) for name in PRESETS]
+def preset_property(description: str, **more):
+    """A property that holds the name of a preset."""
+    items = [(name, name.capitalize(), PRESET_TEXTS.get(name, "")) for name in PRESETS]
+    told = {"name": "Preset", "description": description, "default": "normal", "translation_context": OWN}
+    return bpy.props.EnumProperty(items=items, **told, **more)
 
 
 @startable
@@ -128,12 +130,7 @@ class CaptureOperator(ReadingProps, OneSentence, JobOperator):
     """Works on a capture: a job of its own that `modal` follows; in the background `execute` does it itself."""
 
     bl_options = {"UNDO", "PRESET"}
-    capture_folder: bpy.props.StringProperty(
-        name="Capture",
-        description="Folder with transforms.json, mesh.ply and the frames",
-        subtype="DIR_PATH",
-        options={"SKIP_PRESET"},
-    )
+    capture_folder: folder_property("Capture", "Folder with transforms.json, mesh.ply and the frames", "SKIP_PRESET")
     ask: bpy.props.BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"}, description="Ask for the folders first")
 
     def invoke(self, context, event):
@@ -172,19 +169,8 @@ class StageOperator(SettingsProps, CaptureOperator):
     """An operator that runs stages of the method: also a result folder and the settings."""
 
     bl_options = set()  # the scene stays as it is: no undo step
-    result_folder: bpy.props.StringProperty(
-        name="Result",
-        description="Folder for the recovered scene and the finished stages",
-        subtype="DIR_PATH",
-        options={"SKIP_PRESET"},
-    )
-    preset: bpy.props.EnumProperty(
-        name="Preset",
-        description="What the settings that are not given start from",
-        items=preset_items(),
-        translation_context=OWN,
-        default="normal",
-    )
+    result_folder: folder_property("Result", "Folder for the recovered scene and the finished stages", "SKIP_PRESET")
+    preset: preset_property("What the settings that are not given start from")
     from_stage: FROM_STAGE
     paper: bpy.props.BoolProperty(
         name="As in the Paper", description="The published method; the other settings are not looked at", default=False

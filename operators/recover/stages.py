@@ -11,7 +11,7 @@ from ...addon.bridge.job.command import command
 from ...addon.bridge.results import home
 from ...addon.core.errors import ScanRelightError
 from .. import preferences
-from ..base.operator import AtOnce, OneSentence, has_capture, has_scene, needs
+from ..base.operator import AtOnce, OneSentence, folder_property, has_capture, has_scene, needs
 from ..base.panel import fields
 from . import findings, reading_props, room
 from .settings_props import (
@@ -197,11 +197,10 @@ class SCAN_RELIGHT_OT_capture_from_scene(AtOnce, bpy.types.Operator):
 
     bl_label = "Capture From Scene"
 
-    result_folder: bpy.props.StringProperty(
-        name="Result",
-        description="The capture goes into a folder within this one; empty takes the panel's, or a "
-        "folder of its own among the results",
-        subtype="DIR_PATH",
+    result_folder: folder_property(
+        "Result",
+        "The capture goes into a folder within this one; empty takes the panel's, or a folder of its own "
+        "among the results",
     )
     cameras: bpy.props.EnumProperty(
         name="Frames",

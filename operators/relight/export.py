@@ -7,7 +7,7 @@ import bpy
 from ...addon.bridge.export import export
 from ...addon.core.errors import BadInputError
 from ...addon.core.io.folder import capture_name
-from ..base.operator import needs
+from ..base.operator import file_property, needs
 from ..base.panel import SidebarPanel
 from .base import SceneOperator, default_folder
 
@@ -31,9 +31,7 @@ class SCAN_RELIGHT_OT_export(SceneOperator, bpy.types.Operator):
     bl_label = "Export Room"
     bl_options = {"REGISTER", "PRESET"}
 
-    filepath: bpy.props.StringProperty(
-        name="File", description="What to write", subtype="FILE_PATH", options={"SKIP_SAVE"}
-    )
+    filepath: file_property("File", "What to write", "SKIP_SAVE")
     filter_glob: bpy.props.StringProperty(default="*.glb;*.gltf;*.usd*", options={"HIDDEN"})
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
     format: bpy.props.EnumProperty(name="Format", description="Of a file whose name has no ending", items=FORMATS)

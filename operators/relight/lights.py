@@ -11,7 +11,7 @@ from bl_operators.presets import AddPresetBase
 from ...addon.bridge.light import lamps, outside
 from ...addon.bridge.relight import exposure, lights, probe, setup
 from ...addon.core.errors import BadInputError, ScanRelightError
-from ..base.operator import Choosing, has_scene, needs
+from ..base.operator import Choosing, file_property, has_scene, needs
 from ..results.look import make_active
 from .base import RelightOperator, follow, has_room
 from .props import AIM, KELVIN, UNIT
@@ -163,9 +163,7 @@ class SCAN_RELIGHT_OT_use_hdri(Choosing, RelightOperator, bpy.types.Operator):
     bl_label = "Picture Around the Room"
     given = "filepath"
 
-    filepath: bpy.props.StringProperty(
-        name="Picture", description="EXR or HDR file", subtype="FILE_PATH", options={"SKIP_SAVE"}
-    )
+    filepath: file_property("Picture", "EXR or HDR file", "SKIP_SAVE")
     filter_glob: bpy.props.StringProperty(default="*.exr;*.hdr;*.png;*.jpg", options={"HIDDEN"})
 
     def work(self, context):

@@ -17,7 +17,7 @@ from ...addon.bridge.relight import virtual_object as virtual
 from ...addon.bridge.render_device import told_device
 from ...addon.core.errors import BadInputError, ScanRelightError
 from ..base.job_operator import FOLLOWED, JobOperator, areas
-from ..base.operator import TURNING, mouse_ray, needs, no_run
+from ..base.operator import TURNING, file_property, mouse_ray, needs, no_run
 from ..results.look import make_active
 from ..translations import OWN
 from .base import RelightOperator, SceneOperator
@@ -182,11 +182,8 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
     bl_label = "Before and After"
     bl_options = {"UNDO"}
 
-    filepath: bpy.props.StringProperty(
-        name="File",
-        description="Picture to write; by default before_after.png in the room's result folder",
-        subtype="FILE_PATH",
-        options={"SKIP_SAVE"},
+    filepath: file_property(
+        "File", "Picture to write; by default before_after.png in the room's result folder", "SKIP_SAVE"
     )
     engine: ENGINE
     samples: SAMPLES

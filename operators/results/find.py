@@ -7,7 +7,7 @@ import bpy
 from ...addon.bridge.results import find, home, images
 from ...addon.core.errors import BadInputError, ScanRelightError
 from .. import preferences
-from ..base.operator import FOLDERS, AtOnce, Choosing, NothingDone, needs, no_run
+from ..base.operator import FOLDERS, AtOnce, Choosing, NothingDone, folder_property, needs, no_run
 from ..base.panel import SidebarPanel
 from . import told
 
@@ -20,18 +20,10 @@ class SCAN_RELIGHT_OT_find_result(Choosing, AtOnce, bpy.types.Operator):
 
     bl_label = "Find It"
 
-    missing: bpy.props.StringProperty(
-        name="Missing",
-        description="The result folder that is gone; empty takes the first that is",
-        subtype="DIR_PATH",
-        options={"HIDDEN", "SKIP_SAVE"},
+    missing: folder_property(
+        "Missing", "The result folder that is gone; empty takes the first that is", "HIDDEN", "SKIP_SAVE"
     )
-    directory: bpy.props.StringProperty(
-        name="Folder",
-        description="Where it lies now; the folder above or below will do",
-        subtype="DIR_PATH",
-        options={"SKIP_SAVE"},
-    )
+    directory: folder_property("Folder", "Where it lies now; the folder above or below will do", "SKIP_SAVE")
     filter_folder: FOLDERS
 
     def work(self, context):
