@@ -95,8 +95,6 @@ def export(
 
 def chosen(scene: bpy.types.Scene, scope: str) -> list[bpy.types.Object]:
     """The meshes that a scope means; none that is hidden from renders."""
-    if scope not in (ROOM, SELECTED, ALL):
-        raise BadInputError(f"There is no scope '{scope}'; choose one of {ROOM}, {SELECTED}, {ALL}.")
     meshes = [thing for thing in scene.objects if thing.type == "MESH" and not thing.hide_render]
     if scope == SELECTED:
         return [thing for thing in meshes if thing.select_get()]

@@ -18,10 +18,9 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...core.errors import BadInputError
 from ..data.added import own_collection, remove_own
 from ..light.room import room_light
-from ..light.units import ROOM, UNITS, set_strength
+from ..light.units import ROOM, set_strength
 from .aim import Placement, softbox_place, spot_place, sun_place, window_place
 from .subject import Subject, side_of, subject_of
 
@@ -71,12 +70,8 @@ def add_light(
     Raises
     ------
     BadInputError
-        No such preset or unit, no room in the scene, or no object to aim at.
+        No room in the scene, or no object to aim at.
     """
-    if preset not in PRESETS:
-        raise BadInputError(f"There is no light '{preset}'; choose one of {', '.join(PRESETS)}.")
-    if unit not in UNITS:
-        raise BadInputError(f"There is no unit '{unit}'; choose one of {', '.join(UNITS)}.")
     subject = subject_of(scene, aim, thing)
     place = _PLACES[preset](scene, subject)
     irradiance = room_light(scene) * _STRONGER[preset] * (strength if unit == ROOM else 1.0)

@@ -54,10 +54,8 @@ def add_virtual(
     Raises
     ------
     BadInputError
-        No room, no surface to stand on, or no such shape.
+        No room, or no surface to stand on.
     """
-    if shape not in SHAPES:
-        raise BadInputError(f"There is no shape '{shape}'; choose one of {', '.join(SHAPES)}.")
     at = at or place_in_view(scene)
     mesh = bpy.data.meshes.new(NAMES[shape])
     build = bmesh.new()

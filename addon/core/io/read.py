@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,10 @@ from .camera_check import check_camera, check_size
 from .clipping import find_clipping
 from .conventions import parse, upright
 from .exposures import from_csv, from_exif
-from .files import EscapesError, absence, check_links
+from .files import absence, check_links
 from .frame_codes import with_curves
 from .id_pictures import check_ids, read_ids
-from .layout import AS_FOUND, Layout, RawMesh, Reading
+from .layout import AS_FOUND, Layout, RawMesh, Reading, usable
 from .mesh_repair import repair
 from .orientation import oriented
 from .picture import too_few_bytes
@@ -157,20 +158,15 @@ def _with(mesh: RawMesh, added: Closing) -> RawMesh:
 
 def _usable(root: Path, layout: Layout, outside: bool) -> tuple[list[Frame], list[str]]:
     """The frames whose pictures are there and fit their cameras, and sentences on the others."""
-    problems = list(layout.problems)
-    good = []
-    for frame in layout.frames:
-        try:
-            if not outside:
-                check_links(root, frame)
-            _check_frame(frame)
-        except EscapesError:
-            raise
-        except BadInputError as error:
-            problems.append(str(error))
-        else:
-            good.append(frame)
-    warnings = list(layout.notes)
+
+    def checked(frame: Frame) -> Frame:
+        if not outside:
+            check_links(root, frame)
+        _check_frame(frame)
+        return frame
+
+    good, more = usable(partial(checked, frame) for frame in layout.frames)
+    problems, warnings = [*layout.problems, *more], list(layout.notes)
     if problems:
         total, few = _refuse_too_many(root, layout, problems)
         warnings.append(f"{len(problems)} of {total} frames are left out: {few}")
