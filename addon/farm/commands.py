@@ -23,7 +23,7 @@ from ..console import duration
 from ..core.errors import EXIT_OK, BadInputError, ScanRelightError
 from ..core.stages import RUN_STAGES, WRITE
 from ..settings_info import setting_infos
-from .plan import PROGRAM, Room, plan_text, rooms_from
+from .plan import PROGRAM, Room, rooms_from
 
 ENGINES = ("slurm", "flamenco", "openjd")
 
@@ -145,34 +145,33 @@ def stage_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     return EXIT_OK
 
 
-def _rooms(arguments: argparse.Namespace) -> tuple[list[Room], tuple[str, ...]]:
-    """The rooms, and the stages that are divided."""
+def _rooms(arguments: argparse.Namespace) -> list[Room]:
     settings = settings_from(arguments)
     if arguments.unwrap and arguments.scene:
         raise BadInputError("Option --unwrap goes with --no-scene: the scene is laid out by Blender.")
-    rooms = rooms_from(
-        arguments.rooms, arguments.list, arguments.out, arguments.blocks, arguments.program, options_of(arguments)
-    )
-    return rooms, divided_under(settings)
+    with needed_packages():
+        from ..core.pipeline.stages import STAGES
+    divided = tuple(one.name for one in STAGES if one.divided_by and one.name not in settings.published)
+    asked = arguments.rooms, arguments.list, arguments.out, arguments.blocks, arguments.program
+    return rooms_from(*asked, options_of(arguments), divided)
 
 
 def plan_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`plan CAPTURE --blocks N`."""
-    rooms, divided = _rooms(arguments)
-    print(json.dumps({"rooms": [room.as_dict(divided) for room in rooms]}, indent=1, ensure_ascii=False), file=stream)
+    rooms = [room.as_dict() for room in _rooms(arguments)]
+    print(json.dumps({"rooms": rooms}, indent=1, ensure_ascii=False), file=stream)
     return EXIT_OK
 
 
 def submit_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`submit --engine ENGINE CAPTURE...`; the exit code is that of the last room that could not be handed over."""
-    rooms, divided = _rooms(arguments)
     code = EXIT_OK
-    for room in rooms:
+    for room in _rooms(arguments):
         try:
             if not room.capture.is_dir():
                 raise BadInputError(f"Capture '{room.capture}' is no folder; check the path.")
-            room.write("plan.json", plan_text(room, divided))
-            line = _hand_over(arguments, room, divided)
+            room.write("plan.json", room.as_dict())
+            line = _hand_over(arguments, room)
         except ScanRelightError as error:
             code = complain(f"Room '{room.name}' was not handed over: {error}", error.exit_code)
             continue
@@ -181,20 +180,20 @@ def submit_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     return code
 
 
-def _hand_over(arguments: argparse.Namespace, room: Room, divided: tuple[str, ...]) -> str:
+def _hand_over(arguments: argparse.Namespace, room: Room) -> str:
     """Give a room to the engine; what to tell of it."""
     if arguments.engine == "slurm":
         from . import slurm
 
         limits = slurm.Limits(arguments.partition, arguments.time, arguments.mem, arguments.cpus)
-        return f"jobs {', '.join(slurm.submit(room, divided, limits))}"
+        return f"jobs {', '.join(slurm.submit(room, limits))}"
     if arguments.engine == "flamenco":
         from . import flamenco
 
-        return f"job {flamenco.submit(room, divided, arguments.manager, arguments.priority)}"
+        return f"job {flamenco.submit(room, arguments.manager, arguments.priority)}"
     from . import openjd
 
-    return str(openjd.write(room, divided))
+    return str(openjd.write(room))
 
 
 def status_command(arguments: argparse.Namespace, stream: TextIO) -> int:
@@ -211,10 +210,3 @@ def status_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     else:
         print(table(rooms), file=stream)
     return int(any(room.state == FAILED for room in rooms))
-
-
-def divided_under(settings) -> tuple[str, ...]:
-    """The stages that are divided under some settings."""
-    with needed_packages():
-        from ..core.pipeline.stages import STAGES
-    return tuple(one.name for one in STAGES if one.divided_by and one.name not in settings.published)

@@ -84,10 +84,10 @@ def _message(content: bytes) -> str:
         return "no reason given"
 
 
-def job_of(room: Room, divided: tuple[str, ...], etag: str = "", priority: int = 50) -> dict[str, Any]:
+def job_of(room: Room, etag: str = "", priority: int = 50) -> dict[str, Any]:
     """The room as a `SubmittedJob`."""
     settings: dict[str, Any] = {"capture": str(room.capture), "result": str(room.result)}
-    settings["blocks"] = room.blocks if divided else 1
+    settings["blocks"] = room.blocks if room.divided else 1
     options = []
     for option in room.options:
         name, _, value = option.removeprefix("--").partition("=")
@@ -103,9 +103,9 @@ def job_of(room: Room, divided: tuple[str, ...], etag: str = "", priority: int =
     return job | ({"type_etag": etag} if etag else {})
 
 
-def submit(room: Room, divided: tuple[str, ...], address: str = "", priority: int = 50) -> str:
+def submit(room: Room, address: str = "", priority: int = 50) -> str:
     """Hand a room to the manager at an address; returns the job's number. Raises `BadInputError`."""
     manager = Manager(address or MANAGER)
     known = manager.job_type()
     etag = str(known.get("etag", "")) if isinstance(known, dict) else ""
-    return manager.submit(job_of(room, divided, etag, priority))
+    return manager.submit(job_of(room, etag, priority))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +11,11 @@ from .plan import Room
 TEMPLATE, PARAMETERS = "openjd.json", "openjd-parameters.json"
 
 
-def template(room: Room, divided: tuple[str, ...]) -> dict[str, Any]:
+def template(room: Room) -> dict[str, Any]:
     """The room as a template of the specification 2023-09; a step for each stage, its blocks as tasks of a step."""
     steps: list[dict[str, Any]] = []
     names: dict[str, str] = {}
-    for task in room.tasks(divided):
+    for task in room.tasks():
         name = names[task.name] = f"{task.stage} blocks" if task.block else task.stage
         if steps and steps[-1]["name"] == name:
             continue
@@ -51,13 +50,12 @@ def template(room: Room, divided: tuple[str, ...]) -> dict[str, Any]:
     }
 
 
-def write(room: Room, divided: tuple[str, ...]) -> Path:
+def write(room: Room) -> Path:
     """Write the room's template, and the values of its parameters beside it, into its farm folder.
 
     Raises
     ------
     StorageError
     """
-    given = {"Capture": str(room.capture), "Result": str(room.result), "Blocks": room.blocks}
-    room.write(PARAMETERS, json.dumps(given, indent=1, ensure_ascii=False) + "\n")
-    return room.write(TEMPLATE, json.dumps(template(room, divided), indent=1, ensure_ascii=False) + "\n")
+    room.write(PARAMETERS, {"Capture": str(room.capture), "Result": str(room.result), "Blocks": room.blocks})
+    return room.write(TEMPLATE, template(room))

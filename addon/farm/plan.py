@@ -52,6 +52,8 @@ class Room:
         What runs a command of ours on a worker.
     options : tuple of str
         The options of each unit: settings, how the capture is read.
+    divided : tuple of str
+        The stages that are, by blocks.
     """
 
     capture: Path
@@ -59,6 +61,7 @@ class Room:
     blocks: int = 1
     program: tuple[str, ...] = (PROGRAM,)
     options: tuple[str, ...] = ()
+    divided: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -70,12 +73,12 @@ class Room:
         """Where the plan, locks, marks and logs are."""
         return self.result / FOLDER
 
-    def tasks(self, divided: tuple[str, ...]) -> tuple[Task, ...]:
-        """The units of work, each after those it waits for; the stages that are `divided` by blocks."""
+    def tasks(self) -> tuple[Task, ...]:
+        """The units of work, each after those it waits for."""
         tasks: list[Task] = []
         before: tuple[str, ...] = ()
         for stage in RUN_STAGES:
-            if stage in divided and self.blocks > 1:
+            if stage in self.divided and self.blocks > 1:
                 parts = [
                     Task(unit_name(stage, (i, self.blocks)), stage, (i, self.blocks), before)
                     for i in range(1, self.blocks + 1)
@@ -88,11 +91,11 @@ class Room:
 
     def command(self, stage: str, block: str = "") -> list[str]:
         """The command line of a unit of work; `block` as "I/N", or what an engine puts there."""
-        divided = ["--block", block] if block else []
-        unit = ["stage", str(self.capture), "--out", str(self.result), "--stage", stage, *divided]
+        part = ["--block", block] if block else []
+        unit = ["stage", str(self.capture), "--out", str(self.result), "--stage", stage, *part]
         return [*self.program, *unit, *self.options]
 
-    def as_dict(self, divided: tuple[str, ...]) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """The graph, for JSON."""
         tasks = [
             {
@@ -102,16 +105,17 @@ class Room:
                 "after": list(one.after),
                 "command": self.command(one.stage, "{}/{}".format(*one.block) if one.block else ""),
             }
-            for one in self.tasks(divided)
+            for one in self.tasks()
         ]
         told = {"room": self.name, "capture": str(self.capture), "result": str(self.result), "blocks": self.blocks}
         return told | {"program": list(self.program), "options": list(self.options), "tasks": tasks}
 
-    def write(self, name: str, content: str) -> Path:
-        """Write a file of the room's farm folder, whole or not at all. Raises `StorageError`."""
+    def write(self, name: str, content: str | dict[str, Any]) -> Path:
+        """Write a file of the room's farm folder, a text or JSON, whole or not at all. Raises `StorageError`."""
         make_folder(self.farm)
         path = self.farm / name
-        write_bytes(path, content.encode())
+        text = content if isinstance(content, str) else json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+        write_bytes(path, text.encode())
         return path
 
 
@@ -133,7 +137,13 @@ def make_folder(folder: Path) -> None:
 
 
 def rooms_from(
-    captures: list[Path], listed: Path | None, results: Path, blocks: int, program: str, options: list[str]
+    captures: list[Path],
+    listed: Path | None,
+    results: Path,
+    blocks: int,
+    program: str,
+    options: list[str],
+    divided: tuple[str, ...],
 ) -> list[Room]:
     """The rooms that a command names.
 
@@ -148,6 +158,7 @@ def rooms_from(
     program : str
         As a shell would split it.
     options : list of str
+    divided : tuple of str
 
     Raises
     ------
@@ -169,7 +180,8 @@ def rooms_from(
     if not wanted:
         raise BadInputError("No room is named; give the folders of captures, or --list FILE.")
     command = tuple(shlex.split(program)) or (PROGRAM,)
-    rooms = [Room(capture.absolute(), result.absolute(), blocks, command, tuple(options)) for capture, result in wanted]
+    how = blocks, command, tuple(options), divided
+    rooms = [Room(capture.absolute(), result.absolute(), *how) for capture, result in wanted]
     taken: dict[Path, Path] = {}
     for room in rooms:
         if room.result.resolve() == room.capture.resolve():
@@ -180,8 +192,3 @@ def rooms_from(
                 "give --list FILE with a result folder behind each, parted by a tab."
             )
     return list(dict.fromkeys(rooms))
-
-
-def plan_text(room: Room, divided: tuple[str, ...]) -> str:
-    """The graph as a file has it."""
-    return json.dumps(room.as_dict(divided), indent=1, ensure_ascii=False) + "\n"

@@ -21,7 +21,7 @@ class Limits:
     cpus: int = 0
 
 
-def submit(room: Room, divided: tuple[str, ...], limits: Limits = Limits()) -> list[str]:
+def submit(room: Room, limits: Limits = Limits()) -> list[str]:
     """Submit a room as a chain of jobs; returns their numbers.
 
     Their scripts and logs lie in the room's farm folder. A room is a chain of its own: where one of its jobs fails, its
@@ -35,7 +35,7 @@ def submit(room: Room, divided: tuple[str, ...], limits: Limits = Limits()) -> l
     """
     numbers: dict[str, str] = {}
     try:
-        for task in room.tasks(divided):
+        for task in room.tasks():
             first = _first(task)
             if first is not None and first in numbers:
                 numbers[task.name] = numbers[first]

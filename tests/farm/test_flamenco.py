@@ -46,7 +46,7 @@ def compiled(job: dict) -> dict:
 
 
 def room(**how) -> Room:
-    return Room(Path("/shared/rooms/kitchen"), Path("/shared/results/my kitchen"), **how)
+    return Room(Path("/shared/rooms/kitchen"), Path("/shared/results/my kitchen"), divided=DIVIDED, **how)
 
 
 def test_the_job_type_is_one():
@@ -61,9 +61,9 @@ def test_the_job_type_is_one():
 def test_a_job_becomes_the_plans_units_with_their_commands(blocks):
     options = ("--preset=draft", "--no-scene", "--convention=odd words", "--mesh=/shared/other mesh.ply")
     one = room(blocks=blocks, program=("{python}", "-m", "scan relight"), options=options)
-    job = job_of(one, DIVIDED)
+    job = job_of(one)
     tasks = compiled(job)["tasks"]
-    plan = one.tasks(DIVIDED)
+    plan = one.tasks()
     assert [(task["name"], tuple(task["after"])) for task in tasks] == [(task.name, task.after) for task in plan]
     parser = cli.make_parser()
     for task, unit in zip(tasks, plan, strict=True):

@@ -136,6 +136,6 @@ def test_a_plan_that_is_damaged_is_told(tmp_path, capsys):
 
 
 def test_blocks_come_before_what_joins_them():
-    tasks = {one.name: one for one in Room(*map(commands.Path, ("/c", "/r")), blocks=3).tasks(("specular",))}
+    tasks = {one.name: one for one in Room(*map(commands.Path, ("/c", "/r")), blocks=3, divided=("specular",)).tasks()}
     assert tasks["specular"].after == ("specular-1-of-3", "specular-2-of-3", "specular-3-of-3")
     assert tasks["specular-2-of-3"].after == ("shading",) and tasks["write"].after == ("specular",)

@@ -159,8 +159,8 @@ def test_the_script_holds_names_of_all_kinds(tmp_path):
     program = tmp_path / "odd $HOME 'x'"
     program.write_text('#!/bin/sh\nfor word in "$@"; do printf "%s\\n" "$word"; done\n')
     program.chmod(0o755)
-    room = Room(Path("/c a"), Path("/r `x`"), 3, (str(program),), ("--convention=$(x);\\",))
-    for task in room.tasks(("specular",)):
+    room = Room(Path("/c a"), Path("/r `x`"), 3, (str(program),), ("--convention=$(x);\\",), ("specular",))
+    for task in room.tasks():
         script = tmp_path / "script.sh"
         script.write_text(slurm.script_of(room, task, slurm.Limits(memory="4G")))
         told = subprocess.run(

@@ -77,19 +77,16 @@ def export(
         for thing in scene.objects
         if not thing.hide_render and (lights and thing.type == "LIGHT" or cameras and thing == scene.camera)
     ]
-    folder = Path(tempfile.mkdtemp(prefix="scan_relight_"))
-    try:
-        made = folder / "made"
+    with tempfile.TemporaryDirectory(prefix="scan_relight_", ignore_cleanup_errors=True) as folder:
+        made = Path(folder, "made")
         made.mkdir()
         # Blender's USD exporter can be told no folder for its textures, but it can leave them where they are.
-        textures = made / textures_of(path) if ending in _BESIDE else folder / "textures"
+        textures = made / textures_of(path) if ending in _BESIDE else Path(folder, "textures")
         with copies(scene, things, extra, textures, FORMATS[ending] != "USD") as collection:
             with refused(f"'{path}' can't be exported", "choose another format, or fewer objects"):
                 _write(made / path.name, ending, collection)
         with refused(f"'{path}' can't be written", "free some space or choose another folder"):
             put(made, path)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
     return remarks(ending, things, extra, scene)
 
 

@@ -5,7 +5,6 @@ In background mode the pictures are rendered here. Beside a window the command l
 """
 
 import os
-import shutil
 import tempfile
 import time
 from pathlib import Path
@@ -35,9 +34,11 @@ def render_pair(scene: bpy.types.Scene, out: Path, progress: Progress | None = N
     progress = progress or Progress()
     with refused(f"'{out}' can't be written", "choose another folder"):
         out.parent.mkdir(parents=True, exist_ok=True)
-        folder = Path(tempfile.mkdtemp(prefix=f"{TEMPORARY}{os.getpid()}-", dir=out.parent))
-    try:
-        before, after = folder / f"before{ending}", folder / f"after{ending}"
+        scratch = tempfile.TemporaryDirectory(
+            prefix=f"{TEMPORARY}{os.getpid()}-", dir=out.parent, ignore_cleanup_errors=True
+        )
+    with scratch as folder:
+        before, after = Path(folder, f"before{ending}"), Path(folder, f"after{ending}")
         progress.stage("before")
         with captured_light(scene):
             expected = seconds_expected(scene)
@@ -51,8 +52,6 @@ def render_pair(scene: bpy.types.Scene, out: Path, progress: Progress | None = N
             shoot(scene, after)
         progress.done()
         beside(before, after, out)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 def picture_folder(scene: bpy.types.Scene, chosen: str = "") -> tuple[Path, bool]:
