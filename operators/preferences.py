@@ -79,6 +79,12 @@ def result_folder(chosen: str, capture_folder: str, scene: bpy.types.Scene | Non
     return home.result_folder(Path(bpy.path.abspath(capture_folder)).absolute(), results_folder(), scene)
 
 
+def chosen_result(scene: bpy.types.Scene) -> Path | None:
+    """The result folder of the capture that a scene's panel has chosen; None where it has none."""
+    choices = scene.scan_relight
+    return result_folder(choices.result_folder, choices.capture_folder, scene) if choices.capture_folder else None
+
+
 SIZE_SECONDS: Shown[float] = 30.0
 """How old the size may be that the preferences show."""
 _size: dict = {"folder": None, "time": 0.0, "text": "", "thread": None}

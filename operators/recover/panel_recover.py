@@ -62,8 +62,7 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
         fields(layout, choices.settings, "detail", "shading_rays")
         layout.prop(choices, "result_folder")
         if not choices.result_folder and choices.capture_folder:
-            folder = preferences.result_folder("", choices.capture_folder, context.scene)
-            self.say(layout, f"Goes into '{home.shown(folder)}'.", "FILE_FOLDER")
+            self.say(layout, f"Goes into '{home.shown(preferences.chosen_result(context.scene))}'.", "FILE_FOLDER")
         layout.prop(choices, "images")
         if choices.images == images.FOLDER and not bpy.data.filepath:
             self.say(layout, images.NEVER_SAVED, "ERROR")
@@ -78,11 +77,8 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
     def start(self, context) -> None:
         """The button; where a run was stopped, it goes on, and there is another to start anew."""
         choices = context.scene.scan_relight
-        stage = (
-            goes_on_with(preferences.result_folder(choices.result_folder, choices.capture_folder, context.scene))
-            if choices.capture_folder
-            else ""
-        )
+        folder = preferences.chosen_result(context.scene)
+        stage = goes_on_with(folder) if folder is not None else ""
         row = self.layout.row()
         row.scale_y = 1.4
         row.enabled = findings.wrong_folder(choices) is None

@@ -172,9 +172,7 @@ class SCAN_RELIGHT_OT_run(OneSentence, bpy.types.Operator):
         found |= {name: getattr(choices.reading, name) for name in reading_props.NAMES}
         if self.target == "import_capture":
             return found
-        found["result_folder"] = str(
-            preferences.result_folder(choices.result_folder, choices.capture_folder, choices.id_data)
-        )
+        found["result_folder"] = str(preferences.chosen_result(choices.id_data))
         found |= {"preset": choices.preset, "from_stage": self.from_stage}
         found |= {name: getattr(choices, name) for name in ("images", "copies")}
         wanted = {*choices.settings.changed(choices.preset), "threads", "seed"}

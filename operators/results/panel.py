@@ -155,12 +155,7 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
 
     def bring_in(self, layout, scene, folder: Path | None) -> None:
         """The button that renews objects of an earlier run from a folder: the panel's own capture's, or by itself."""
-        choices = scene.scan_relight
-        chosen = (
-            preferences.result_folder(choices.result_folder, choices.capture_folder, scene)
-            if choices.capture_folder
-            else None
-        )
+        chosen = preferences.chosen_result(scene)
         if chosen is not None and folder in (None, chosen):
             layout.operator("scan_relight.run", text="Bring In", icon="IMPORT").target = "write"
         elif folder is not None:

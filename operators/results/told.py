@@ -26,10 +26,9 @@ def folder_of(scene: bpy.types.Scene) -> Path | None:
     choices = scene.scan_relight
     if choices.result_folder:
         return Path(bpy.path.abspath(choices.result_folder))
-    if choices.capture_folder:
-        folder = preferences.result_folder("", choices.capture_folder, scene)
-        if (folder / MATERIALS).is_file():
-            return folder
+    folder = preferences.chosen_result(scene)
+    if folder is not None and (folder / MATERIALS).is_file():
+        return folder
     return look.result_of(scene)
 
 

@@ -109,9 +109,7 @@ def restore(things: Iterable[bpy.types.Object], discard: bool = False) -> int:
 
 
 def reapply(thing: bpy.types.Object) -> list[str]:
-    """Bring back what the artist did to an object whose mesh or material a run has just made anew.
-
-    Its corrected values, its painted image, its smooth shading. For whoever updates a room, at the end of each object.
+    """Show what was painted on an object again whose mesh or material a run has just made anew.
 
     Returns
     -------
