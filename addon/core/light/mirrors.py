@@ -15,8 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..scene.elements import triangle_geometry
 from ..scene.model import KnownMirror, Mesh
-from ..scene.params import CREASES
-from ..scene.weld import ring_of, same_place
+from ..scene.weld import one_place, ring_of, same_place
 
 SAME = np.cos(np.radians(5.0))
 """Triangles turned less than this against a mirror's plane are put into it: a scan's are off by a degree or two, bevels
@@ -91,7 +90,7 @@ def in_their_planes(mesh: Mesh, mirrors: tuple[Mirror, ...]) -> np.ndarray:
         if not len(face):
             continue
         own, corner = np.unique(mesh.triangles[face], return_inverse=True)
-        first, place = same_place(vertices[own], CREASES.weld)
+        first, place = same_place(vertices[own], one_place(vertices))
         corner = place[corner.reshape(-1, 3)]
         # Each connected part of it at the mean height of its area.
         _, part = connected_components(ring_of(corner, len(first)), directed=False)

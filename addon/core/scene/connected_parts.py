@@ -8,13 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .params import SURFACE
-from .weld import same_place
-
-
-def weld(vertices: np.ndarray) -> np.ndarray:
-    """A number for each place that vertices ((v, 3), finite) lie at, (v,) int64."""
-    low, high = vertices.min(0), vertices.max(0)
-    return same_place(vertices - low, max(SURFACE.weld * float(np.linalg.norm(high - low)), 1e-12))[1]
+from .weld import weld
 
 
 def connected_parts(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from .elements import triangle_geometry
 from .model import Mesh
 from .params import CREASES
 from .two_sides import fronts, other_way
-from .weld import welded
+from .weld import one_place, welded
 
 
 def edge_angles(mesh: Mesh, wanted: np.ndarray | None = None) -> np.ndarray:
@@ -24,7 +24,7 @@ def edge_angles(mesh: Mesh, wanted: np.ndarray | None = None) -> np.ndarray:
         either = None if wanted is None else np.bincount(sheet, wanted, len(single.triangles)) > 0
         angle = edge_angles(single, either)
         return np.concatenate([angle, other_way(angle[mesh.backs])])
-    points, faces, _ = welded(mesh, CREASES.weld)
+    points, faces, _ = welded(mesh, one_place(mesh.vertices))
     if wanted is not None:
         # Who shares an edge has two of its points: the others tell nothing, and may be most of a million.
         used = np.zeros(len(points), bool)

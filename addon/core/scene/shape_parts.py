@@ -16,11 +16,12 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from .connected_parts import connected_parts, to_nearest, weld
+from .connected_parts import connected_parts, to_nearest
 from .elements import triangle_geometry
 from .model import Mesh
 from .params import PARTS
 from .sphere import fibonacci
+from .weld import weld
 
 
 @dataclass(frozen=True)
@@ -265,7 +266,7 @@ def parts_of(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
     """
     part, names, planes = Parts(connected_parts(vertices, triangles), {})
     area = triangle_geometry(Mesh(vertices, triangles, part))[1]
-    if area[part == 0].sum() > PARTS.hangs_together * area.sum():
+    if 2 * area[part == 0].sum() > area.sum():
         used, corner = np.unique(triangles.ravel(), return_inverse=True)
         place = weld(vertices[used])[corner.ravel()]
         point = np.empty((int(place.max()) + 1, 3))

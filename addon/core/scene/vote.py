@@ -11,10 +11,10 @@ from scipy.spatial import cKDTree
 
 from ..errors import BadInputError
 from ..kinds import Block
-from .connected_parts import weld
 from .model import Frame
 from .params import SIDES
 from .rays import RayScene
+from .weld import weld
 
 PACK: Block[int] = 8
 """Frames whose votes are summed at once; bounds the memory."""

@@ -6,6 +6,7 @@ import numpy as np
 from scipy import sparse
 
 from .model import Mesh
+from .params import SURFACE
 
 
 def same_place(vertices: np.ndarray, tolerance: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -35,6 +36,16 @@ def same_place(vertices: np.ndarray, tolerance: float = 0.0) -> tuple[np.ndarray
     place = np.empty(len(order), np.int64)
     place[order] = np.cumsum(new) - 1
     return order[new], place
+
+
+def one_place(vertices: np.ndarray) -> float:
+    """Metres within which vertices ((v, 3), finite) are one: at seams they are listed twice."""
+    return max(SURFACE.weld * float(np.linalg.norm(np.ptp(vertices, axis=0))), 1e-12)
+
+
+def weld(vertices: np.ndarray) -> np.ndarray:
+    """A number for each place that vertices ((v, 3), finite) lie at, (v,) int64."""
+    return same_place(vertices - vertices.min(0), one_place(vertices))[1]
 
 
 def welded(mesh: Mesh, tolerance: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -15,11 +15,8 @@ Where points are crowded, closer together than a third of the noise, none of the
 nothing: there x0 is what the crowd makes of them (`unfold`), and x stays near it.
 
 It is solved by Gauss-Newton steps with weights from the last one's angles, while `scale` goes down (graduated
-non-convexity, Blake and Zisserman 1987): first all is smoothed alike, then what stays sharp is let go. An angle that
-the points don't tell well is no flatter for that: its weight goes by theta^2 and its variance (the expectation step for
-a Lorentzian as a mixture of normal distributions, Tipping and Lawrence 2005), which draws from the linear system tell.
-Last, what lies in flat parts is put into their planes (`planes`), which angles alone can't tell, and cracks that the
-noise opened are closed (`cracks`).
+non-convexity, Blake and Zisserman 1987): first all is smoothed alike, then what stays sharp is let go.
+Last, what lies in flat parts is put into their planes (`planes`), which angles alone can't tell.
 """
 
 from __future__ import annotations
@@ -34,9 +31,8 @@ from scipy.sparse.csgraph import connected_components
 from ...scene.mesh_noise import noise_of
 from ...scene.model import Mesh
 from ...scene.params import NOISE
-from ...scene.weld import point_normals, ring_of, welded
+from ...scene.weld import one_place, point_normals, ring_of, welded
 from ...significance import LEVELS
-from .cracks import closed
 from .params import DENOISE
 from .planes import onto_sheets
 from .unfold import solved, unfolded
@@ -116,30 +112,17 @@ def dihedral(
 
 
 def _linear(
-    points: np.ndarray, normal: np.ndarray, hinges: Hinges, held: np.ndarray, variance: np.ndarray, noise: float,
-    scale: float,
+    points: np.ndarray, normal: np.ndarray, hinges: Hinges, held: np.ndarray, noise: float, scale: float
 ) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix, sparse.csr_matrix]:  # fmt: skip
     """Angles, their weights, their change by each point's way along its normal, and the normal equations' matrix."""
     count = len(points)
     theta, gradient = dihedral(points, hinges, noise)
-    weight = 1 / (scale**2 + theta**2 + variance)
+    weight = 1 / (scale**2 + theta**2)
     ends = (hinges.a, hinges.b, hinges.c, hinges.d)
     values = np.concatenate([(by * normal[at]).sum(1) for by, at in zip(gradient, ends)])
     rows = np.tile(np.arange(len(theta)), 4)
     change = sparse.csr_matrix((values, (rows, np.concatenate(ends))), (len(theta), count))
     return theta, weight, change, (sparse.diags(held) + change.T @ sparse.diags(weight) @ change).tocsr()
-
-
-def _variance(
-    held: np.ndarray, weight: np.ndarray, change: sparse.csr_matrix, system: sparse.csr_matrix, rng: np.random.Generator
-) -> np.ndarray:
-    """What the angles' posterior variance is, (e,), by draws from it: the system's solution for noise as it expects."""
-    total = np.zeros(len(weight))
-    for _ in range(DENOISE.draws):
-        by_points = np.sqrt(held) * rng.standard_normal(len(held))
-        by_angles = change.T @ (np.sqrt(weight) * rng.standard_normal(len(weight)))
-        total += (change @ solved(system, by_points + by_angles, tolerance=DENOISE.roughly)) ** 2
-    return total / max(DENOISE.draws, 1)
 
 
 def _within(points: np.ndarray, measured: np.ndarray, farthest: float) -> np.ndarray:
@@ -180,7 +163,7 @@ def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndar
     """
     if not noise > 0:
         return mesh.vertices
-    measured, faces, place = welded(mesh, DENOISE.weld * noise)
+    measured, faces, place = welded(mesh, one_place(mesh.vertices))
     # Welding makes triangles that are smaller than its grid into edges.
     real = (faces != np.roll(faces, 1, 1)).all(1)
     real[real] = _large(measured, faces[real], DENOISE.too_small * noise)
@@ -193,19 +176,14 @@ def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndar
         points, crowded = unfolded(measured, faces, noise)
     points = _within(points, measured, LEVELS.sigmas * noise)
     told, held = measured + crowded[:, None] * (points - measured), (1 + DENOISE.held * crowded) / noise**2
-    variance, rng = np.zeros(len(hinges.a)), np.random.default_rng(0)
     for scale in SCALES:
         normal = point_normals(points, faces)
-        theta, weight, change, system = _linear(points, normal, hinges, held, variance, noise, scale)
+        theta, weight, change, system = _linear(points, normal, hinges, held, noise, scale)
         gone = ((points - told) * normal).sum(1)
         step = solved(system, -gone * held - change.T @ (weight * theta))
         # The angles are linear over small steps only.
         points = points + np.clip(step, -noise, noise)[:, None] * normal
         points = _within(points, measured, LEVELS.sigmas * noise)
-        if scale != SCALES[-1] and "angle-variance" not in without:
-            variance = _variance(held, weight, change, system, rng)
     if "sheets" not in without:
         points = onto_sheets(measured, points, faces, noise)
-    if "cracks" not in without:
-        points = closed(points, faces, noise)
     return mesh.vertices + (points - measured)[place]

@@ -7,30 +7,19 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class DenoiseParams:
-    """Of `denoise` (`mesh-denoising`, `angle-variance` in the ablation).
+    """Of `denoise` (`mesh-denoising` in the ablation).
 
     Attributes
     ----------
-    draws : int
-        From each step's posterior. Without (0) the living room's objects are 2.13 mm and 7.3 degrees off under 2.9 mm
-        of independent noise, with 3 2.06 mm and 7.1, with 6 2.06 mm and 7.0; half smooth 4.08 mm and 9.2, with 6 4.01
-        and 9.0.
-    roughly : float
-        Of their linear solves: as good as 1e-3, in a third of the time.
     too_small : float
         Times the noise: parts whose box has a shorter diagonal have no shape left to find, and stay as they are. (A
         finely scanned one of 7 times is found to a third of the noise.)
-    weld : float
-        Times the noise: points nearer than this are one.
     held : float
         Times more that a point in a crowd is held where the crowd has put it (`unfold`): angles there are mostly noise,
         and took a bottle cap's normals from 9 degrees back to 30.
     """
 
-    draws: int = 6
-    roughly: float = 3e-2
     too_small: float = 4.0
-    weld: float = 0.01
     held: float = 100.0
 
 
@@ -50,9 +39,8 @@ class PlanesParams:
     high : float
         Times the noise.
     turn : float
-        Radians by which a large triangle may face another way than its plane, besides what noise tilts it by.
-    most_turn : float
-        Radians, however low the triangle: front and sides of a thin plate are 1.6 apart.
+        Radians by which a large triangle may face another way than its plane, besides what noise tilts it by; and
+        within which two sheets have no line in common.
     known : float
         Radians, standard error of the way that a plane faces. Known less well, it is no better than what is there:
         denoised triangles of a few times the noise are off by 0.05 to 0.2.
@@ -68,44 +56,22 @@ class PlanesParams:
         Radians, root mean square, by which a bend turns the normals of what is called flat: where the bend is sure, and
         where it may be noise (together with what the noise makes it by chance). Strips of a cylinder of 6 cm have 0.1
         to 0.2 and too few points to be sure; chamfers of 1.5 cm taken into a sofa's front 0.06.
-    most_bent : float
-        The same of a bent sheet.
-    ends : float
-        Share of a bent sheet's outline at creases or borders. Sconces: 0.97 to 1.0. Parts of cushions: 0.2 to 0.9.
-    crease : float
-        Radians.
     determined : float
         Points tell a quadratic term by at least this much of what they would if spread at random.
     stiff : float
         How much firmer a sheet holds its points than the denoised places do, as a ratio of standard deviations.
-    share : float
-        Of the area around a point: a sheet with less of it does not hold it.
-    parallel : float
-        Cosine of the angle from which on two sheets have no line in common: one of 14 degrees, or front and back.
-    again : int
-        Triangles after which a region may be known again.
-    smooth : int
-        Rounds of adding up neighbours by which seeds are ordered.
     """
 
     reach: float = 4.5
     high: float = 10.0
     turn: float = 0.15
-    most_turn: float = 0.8
     known: float = 0.05
     fill: float = 0.3
     spread: float = 1.6
     bent: float = 24.0
     gentle: float = 0.015
-    most_bent: float = 0.2
-    ends: float = 0.9
-    crease: float = 0.6
     determined: float = 0.3
     stiff: float = 50.0
-    share: float = 0.2
-    parallel: float = 0.97
-    again: int = 50
-    smooth: int = 3
 
 
 PLANES = PlanesParams()
@@ -126,10 +92,10 @@ class UnfoldParams:
     crowd, near : int, float
         A point is in a crowd with so many within that many times the noise, itself among them. A frame's thin profile
         has fewer: it would shrink to a line.
-    fine, finest : float
-        Times that the noise exceeds the length of edges, from where on a crowd counts, and where it does fully. The
-        living room's bottle cap and skirting under 5 mm of independent noise: normals off by 31 and 2 degrees in the
-        median, by 99 and 73 for a tenth of the surface, without the second plate; by 10 and 2, 33 and 34 with it.
+    fine : float
+        Times that the noise exceeds the length of edges, from where on a crowd counts; one more and it does fully.
+        The living room's bottle cap and skirting under 5 mm of independent noise: normals off by 31 and 2 degrees in
+        the median, by 99 and 73 for a tenth of the surface, without the second plate; by 10 and 2, 33 and 34 with it.
     tolerance, most_steps : float, int
         Of each linear solve, by conjugate gradients.
     """
@@ -140,7 +106,6 @@ class UnfoldParams:
     crowd: int = 8
     near: float = 2.5
     fine: float = 3.0
-    finest: float = 4.0
     tolerance: float = 1e-3
     most_steps: int = 200
 

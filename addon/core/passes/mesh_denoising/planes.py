@@ -6,9 +6,7 @@ as small as the noise they leave normals that wander. A plane through all the po
 Regions grow from triangle to triangle (region growing, Besl and Jain 1988): by the angle to the region's plane, and by
 the points' distance against the prediction interval of the plane fitted so far. What grew is flat if the data say so:
 its points tell well which way it faces, they lie about as far off as the noise takes them, and a bend (quadratic terms)
-explains them no better than chance would. Spheres, cushions and cylinders fail the last and stay as they are. A region
-that ends at creases all around and whose bend explains its points entirely is a sheet too, gently bent: the metal of a
-sconce.
+explains them no better than chance would. Spheres, cushions and cylinders fail the last and stay as they are.
 """
 
 from __future__ import annotations
@@ -18,40 +16,25 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from ...groups import by_label
 from ...significance import LEVELS
 from .params import PLANES
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A flat or gently bent region: height z = c . (1, x, y, x^2, x y, y^2) over a plane.
+    """A flat region.
 
     Attributes
     ----------
-    mean : (3,) float
-        Where x = y = z = 0.
-    axes : (3, 3) float
-        Of z, y and x, in rows.
-    c : (6,) float
-        Per metre and per square metre, as fits; all 0 where flat.
+    mean, normal : (3,) float
+        Of its plane.
     faces : (f,) int
         Its triangles.
     """
 
     mean: np.ndarray
-    axes: np.ndarray
-    c: np.ndarray
+    normal: np.ndarray
     faces: np.ndarray
-
-    def tangent(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Unit normals (p, 3) over or under the points, and how far they are from the planes there (p,)."""
-        z, y, x = ((points - self.mean) @ self.axes.T).T
-        c = self.c
-        way = np.stack([np.ones_like(x), -(c[2] + c[4] * x + 2 * c[5] * y), -(c[1] + 2 * c[3] * x + c[4] * y)], 1)
-        length = np.linalg.norm(way, axis=1)
-        gap = (z - (c[0] + c[1] * x + c[2] * y + c[3] * x * x + c[4] * x * y + c[5] * y * y)) / length
-        return way / length[:, None] @ self.axes, gap
 
 
 class Moments:
@@ -110,31 +93,21 @@ class Grower:
         self.normal, self.area = normal / np.maximum(double, 1e-30)[:, None], double / 2
         self.length = np.linalg.norm(np.roll(corners, -1, 1) - corners, axis=2)
         tilt = noise * self.length.max(1) / np.maximum(double, 1e-30)  # noise / height
-        self.least = np.cos(np.minimum(PLANES.turn + tilt, PLANES.most_turn))
+        # However low a triangle: front and sides of a thin plate are pi / 2 apart.
+        self.least = np.cos(np.minimum(PLANES.turn + tilt, np.pi / 4))
         self.reach = noise * np.where(tilt < 1 / PLANES.high, PLANES.reach, LEVELS.sigmas)
         self.free, self.tried = np.ones(len(faces), bool), np.zeros(len(faces), bool)
         self._seen, self._met, self._run = np.zeros(len(faces), np.int64), np.zeros(len(points), np.int64), 0
 
     def seeds(self) -> np.ndarray:
-        """Triangles with a neighbour that faces their way, those first that have most area facing one way around."""
-        inner = (self.across >= 0).ravel()
-        row = np.repeat(np.arange(len(self.faces)), 3)[inner]
-        near = sparse.csr_matrix((self.alike.ravel()[inner].astype(float), (row, self.across.ravel()[inner])),
-                                 (len(self.faces),) * 2) + sparse.eye(len(self.faces))  # fmt: skip
-        way = self.normal * self.area[:, None]
-        for _ in range(PLANES.smooth):
-            way = near @ way
+        """Triangles with a neighbour that faces their way, the largest first."""
         alike = (self.normal[:, None] * self.normal[self.across]).sum(2) * self.alike > self.least[self.across]
         able = np.flatnonzero((alike & (self.across >= 0)).any(1))
-        return able[np.argsort(-np.linalg.norm(way[able], axis=1), kind="stable")]
+        return able[np.argsort(-self.area[able], kind="stable")]
 
     def grow(self, seed: int) -> np.ndarray:
-        """The triangles around `seed` that may lie in one plane with it; those of other sheets are not free.
-
-        It ends early where nearly all was tried before: that region comes out again.
-        """
+        """The triangles around `seed` that may lie in one plane with it; those of other sheets are not free."""
         self._run += 1
-        size, again = 0, 0
         self._seen[seed] = self._run
         side, count = self.normal[seed], 0
         moments = Moments(self.points[self.faces[seed, 0]])
@@ -142,9 +115,6 @@ class Grower:
         region = []
         while len(front):
             region.append(front)
-            size, again = size + len(front), again + np.count_nonzero(self.tried[front])
-            if size > PLANES.again and again > 0.8 * size:
-                break
             new = np.unique(self.faces[front])
             new = new[self._met[new] != self._run]
             self._met[new] = self._run
@@ -166,23 +136,18 @@ class Grower:
         self.tried[region] = True
         return region
 
-    def outline(self, region: np.ndarray) -> tuple[float, float]:
-        """Length of a region's outline in metres, and what share of it is at creases or the mesh's borders."""
+    def outline(self, region: np.ndarray) -> float:
+        """Length of a region's outline in metres."""
         inside = np.zeros(len(self.faces), bool)
         inside[region] = True
         across = self.across[region]
-        outer = (across < 0) | ~inside[across]
-        along = (self.normal[region][:, None] * self.normal[across]).sum(2) * self.alike[region]
-        sharp = outer & ((across < 0) | (along < np.cos(PLANES.crease)))
-        length = float(self.length[region][outer].sum())
-        return length, float(self.length[region][sharp].sum()) / max(length, 1e-30)
+        return float(self.length[region][(across < 0) | ~inside[across]].sum())
 
 
-def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: tuple[float, float],
-             noise: float) -> Sheet | None:  # fmt: skip
+def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: float, noise: float) -> Sheet | None:
     """The sheet that measured points ((p, 3)) of a region lie in; None if it is not sure that they lie in one.
 
-    `area` and `outline` are the region's, in square metres and as `Grower.outline` has it.
+    `area` and `outline` are the region's, in square metres and metres.
     """
     n = len(points)
     moments = Moments(points.mean(0))
@@ -192,7 +157,7 @@ def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: tuple
     if n < 4 or noise > PLANES.known * np.sqrt(scatter[1]):
         return None
     # A rectangle's sides are sqrt(12) times its standard deviations; a strip's width is twice its area by its outline.
-    if area < PLANES.fill * 12 * spread.prod() and noise * outline[0] > PLANES.known * 4 * area:
+    if area < PLANES.fill * 12 * spread.prod() and noise * outline > PLANES.known * 4 * area:
         return None
     z, y, x = ((points - mean) @ axes.T).T
     x, y = x / spread[1], y / spread[0]
@@ -215,24 +180,16 @@ def sheet_of(points: np.ndarray, region: np.ndarray, area: float, outline: tuple
 
     chance = noise * np.sqrt(sum(slope(one) ** 2 for one in terms / s[told, None]))
     explained = (part**2).sum() / noise**2
-    left, freedom = (z**2).sum() / noise**2 - explained, n - 3 - told.sum()
-
-    def likely(total: float, freedom: int) -> bool:
-        """Whether chi squared is within three standard deviations."""
-        return total < freedom + 3 * np.sqrt(2 * max(freedom, 1))
-
-    bent = explained > PLANES.bent * max(1, left / max(freedom, 1))
-    if likely((left + explained) / PLANES.spread**2, n - 3) and (
-        slope(c) < PLANES.gentle if bent else np.hypot(slope(c), chance) < LEVELS.sigmas * PLANES.gentle
-    ):
-        return Sheet(mean, axes, np.zeros(6), region)
-    if bent and likely(left, freedom) and slope(c) < PLANES.most_bent and outline[1] > PLANES.ends:
-        return Sheet(mean, axes, c, region)
-    return None
+    total, freedom = (z**2).sum() / noise**2, n - 3 - told.sum()
+    bent = explained > PLANES.bent * max(1, (total - explained) / max(freedom, 1))
+    gentle = slope(c) < PLANES.gentle if bent else np.hypot(slope(c), chance) < LEVELS.sigmas * PLANES.gentle
+    # Chi squared within three of its standard deviations.
+    likely = total / PLANES.spread**2 < n - 3 + LEVELS.sigmas * np.sqrt(2 * (n - 3))
+    return Sheet(mean, axes[0], region) if likely and gentle else None
 
 
 def sheets_of(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noise: float) -> tuple[list[Sheet], Grower]:
-    """The flat and gently bent parts of a mesh.
+    """The flat parts of a mesh.
 
     Parameters
     ----------
@@ -274,23 +231,20 @@ def onto_sheets(measured: np.ndarray, smooth: np.ndarray, faces: np.ndarray, noi
     around.sum_duplicates()
     first = np.asarray(around.argmax(1)).ravel()
     largest = around.max(1).toarray().ravel()
-    whole = np.bincount(faces.ravel(), np.repeat(grower.area, 3), len(measured))
     pair = around.tocoo()
-    keep = pair.data >= PLANES.share * whole[pair.row]
-    point, sheet = pair.row[keep], pair.col[keep]
-    normal, gap = np.empty((len(point), 3)), np.empty(len(point))
-    for part in by_label(sheet):
-        normal[part], gap[part] = sheets[sheet[part[0]]].tangent(smooth[point[part]])
+    point, sheet = pair.row, pair.col
+    normal = np.stack([one.normal for one in sheets])[sheet]
+    gap = ((smooth[point] - np.stack([one.mean for one in sheets])[sheet]) * normal).sum(1)
     facing = np.empty((len(measured), 3))
     main = sheet == first[point]
     facing[point[main]] = normal[main]
-    crossing = main | (np.abs((normal * facing[point]).sum(1)) < PLANES.parallel)
+    crossing = main | (np.abs((normal * facing[point]).sum(1)) < np.cos(PLANES.turn))
     for some in (main, crossing):  # last what all of a point's sheets ask for, where it may go there
         p, n, g = point[some], PLANES.stiff * normal[some], PLANES.stiff * gap[some]
         right = np.stack([np.bincount(p, -g * n[:, k], len(measured)) for k in range(3)], 1)
         system = np.stack([np.bincount(p, n[:, i] * n[:, j], len(measured)) for i in range(3) for j in range(3)], 1)
         way = np.linalg.solve(system.reshape(-1, 3, 3) + np.eye(3), right[..., None])[..., 0]
         there = smooth + way
-        fits = (largest >= PLANES.share * whole) & (np.linalg.norm(there - measured, axis=1) <= PLANES.reach * noise)
+        fits = (largest > 0) & (np.linalg.norm(there - measured, axis=1) <= PLANES.reach * noise)
         moved[fits] = there[fits]
     return moved

@@ -39,7 +39,7 @@ def unfolded(points: np.ndarray, faces: np.ndarray, noise: float) -> tuple[np.nd
     by_length, by_shortest = (_mean(near, 1 / np.maximum(length, noise) ** power) for power in (1, 2))
     stiff = np.minimum(2 * noise / _true(_usual_length(ring, near, length), noise), UNFOLD.stiffest) ** 4
     fine = noise / _true(_shortest_length(near, length, by_shortest), noise)
-    crowded = _in_crowds(points, noise) * np.clip((fine - UNFOLD.fine) / (UNFOLD.finest - UNFOLD.fine), 0, 1)
+    crowded = _in_crowds(points, noise) * np.clip(fine - UNFOLD.fine, 0, 1)
     system = sparse.eye(len(points))
     # Points of no triangle, as of parts too small to have a shape, have nothing to be drawn to.
     meant = sparse.diags(np.diff(ring.indptr) > 0, dtype=float)
@@ -50,12 +50,10 @@ def unfolded(points: np.ndarray, faces: np.ndarray, noise: float) -> tuple[np.nd
     return np.stack([solved(system, points[:, axis], points[:, axis]) for axis in range(3)], 1), crowded
 
 
-def solved(
-    system: sparse.csr_matrix, right: np.ndarray, guess: np.ndarray | None = None, tolerance: float = UNFOLD.tolerance
-) -> np.ndarray:
+def solved(system: sparse.csr_matrix, right: np.ndarray, guess: np.ndarray | None = None) -> np.ndarray:
     """The solution of a symmetric positive definite system, by conjugate gradients."""
     scaled = sparse.diags(1 / system.diagonal())
-    return cg(system, right, guess, rtol=tolerance, maxiter=UNFOLD.most_steps, M=scaled)[0]
+    return cg(system, right, guess, rtol=UNFOLD.tolerance, maxiter=UNFOLD.most_steps, M=scaled)[0]
 
 
 def _mean(near: sparse.coo_matrix, weight: np.ndarray) -> sparse.csr_matrix:

@@ -163,16 +163,3 @@ def test_a_clean_mesh_is_left_to_the_last_bit():
     found, noise = without_noise(noisy(cube()))
     assert noise == pytest.approx(NOISE, rel=0.25)
     assert noise_of(found) < 0.25 * NOISE
-
-
-def test_angles_that_points_do_not_tell_are_no_flatter_for_that():
-    """A leg 6 cm across of strips of 2 by 1.5 cm, under 3 mm of noise."""
-    leg = tube(0.03, 0.5, 12, 25)
-    scans = [noisy(leg, 0.003, seed) for seed in range(4)]
-
-    def left(without=()) -> float:
-        return rms(np.array([denoised(scan, 0.003, without) - leg.vertices for scan in scans]))
-
-    by_draws = left()
-    assert by_draws < 0.65 * rms(np.array([scan.vertices - leg.vertices for scan in scans]))
-    assert by_draws < 0.92 * left(without=("angle-variance",))

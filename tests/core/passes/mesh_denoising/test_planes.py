@@ -1,4 +1,4 @@
-"""Flat and gently bent parts of a noisy mesh are found; what is round stays round, and thin plates keep two sides."""
+"""Flat parts of a noisy mesh are found; what is round stays round, and thin plates keep two sides."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import pytest
 from addon.core.passes.mesh_denoising import denoise
 from addon.core.passes.mesh_denoising.planes import neighbours_of, sheet_of, sheets_of
 from addon.core.scene.model import Mesh
-from addon.core.scene.weld import welded
-from tests.core.passes.mesh_denoising.test_denoise import NOISE, cube, noisy, rms, sheet, smoothed, sphere, tilted, tube
+from addon.core.scene.weld import one_place, welded
+from tests.core.passes.mesh_denoising.test_denoise import NOISE, cube, noisy, rms, smoothed, sphere, tilted, tube
 from tests.core.rooms import make_room, quad, split
 
 
@@ -39,7 +39,7 @@ def by_angles_alone(mesh: Mesh, noise: float = NOISE) -> Mesh:
 
 
 def found_in(mesh: Mesh, noise: float = NOISE):
-    points, faces, _ = welded(mesh, denoise.DENOISE.weld * noise)
+    points, faces, _ = welded(mesh, one_place(mesh.vertices))
     return sheets_of(points, points, faces, noise)[0]
 
 
@@ -125,14 +125,6 @@ def test_small_triangles_do_not_lead_around_an_edge():
     assert rms(found.vertices - true.vertices) < 0.4 * rms(off.vertices - true.vertices)
 
 
-def test_gently_bent_metal_is_one_smooth_sheet():
-    """1 cm of bend over 28 cm, ending at its borders: sure to be bent, and known better as a whole than by angles."""
-    true = sheet(np.linspace(-0.14, 0.14, 20), np.linspace(0, 0.36, 25), lambda x, y: 0.5 * x**2)
-    off = noisy(true)
-    now, before = tilted(smoothed(off), true), tilted(by_angles_alone(off), true)
-    assert np.quantile(now, 0.9) < 2 and np.quantile(now, 0.9) < 0.7 * np.quantile(before, 0.9)
-
-
 def test_a_moulding_around_a_room_is_no_plane():
     """A ring of 2 cm, inclined by 11 degrees, lies in a plane within the noise, which says nothing of how it faces."""
     x = np.linspace(0, 2 * np.pi, 5)[:-1] + np.pi / 4
@@ -148,14 +140,10 @@ def test_a_moulding_around_a_room_is_no_plane():
 def test_a_bend_is_weighed_against_the_noise():
     rng = np.random.default_rng(5)
     xy = rng.uniform(-0.3, 0.3, (200, 2))
-    outline = (2.4, 0.0)  # smooth on all sides
     flat = np.c_[xy, NOISE * rng.normal(size=200)]
-    found = sheet_of(flat, np.arange(1), 0.36, outline, NOISE)
-    assert found is not None and not found.c.any() and abs(found.axes[0, 2]) > 0.9999
+    found = sheet_of(flat, np.arange(1), 0.36, 2.4, NOISE)
+    assert found is not None and abs(found.normal[2]) > 0.9999
     bowl = flat + np.c_[np.zeros((200, 2)), 0.2 * (xy**2).sum(1)]
-    assert sheet_of(bowl, np.arange(1), 0.36, outline, NOISE) is None
-    bent = sheet_of(bowl, np.arange(1), 0.36, (2.4, 1.0), NOISE)
-    normal, gap = bent.tangent(np.array([[0.2, 0.0, 0.2 * 0.04]]))
-    assert normal[0] * np.sign(normal[0, 2]) == pytest.approx([-0.08, 0, 1], abs=0.02) and abs(gap[0]) < 0.002
+    assert sheet_of(bowl, np.arange(1), 0.36, 2.4, NOISE) is None
     few = flat[:4] * [0.1, 0.1, 1]  # 6 cm of four points say nothing
-    assert sheet_of(few, np.arange(1), 0.0036, (0.24, 1.0), NOISE) is None
+    assert sheet_of(few, np.arange(1), 0.0036, 0.24, NOISE) is None
