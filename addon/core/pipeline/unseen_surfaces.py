@@ -10,7 +10,6 @@ from ..light.field import LightField
 from ..light.over_surface import RayCounts, irradiance
 from ..light.params import GATHER
 from ..passes.albedo.albedo import fill, quotient
-from ..passes.albedo.params import UNSEEN_PRIOR
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance, class_names
 
@@ -51,14 +50,12 @@ def with_unseen_surfaces(
         Share of the rays that left the mesh, where not `told`.
     """
     atlas, lit, dark = field.atlas, np.flatnonzero(told), np.flatnonzero(~told)
-    rough = partial(
-        irradiance, **ROUGH, interpolate=True, smooth=smooth, threads=threads, seed=seed
-    )  # fmt: skip
+    rough = partial(irradiance, **ROUGH, interpolate=True, smooth=smooth, threads=threads, seed=seed)
     E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
     E[lit] = rough(field, lit, finest=GATHER.unseen_coarser * finest)[0]
     E[dark], escaped[dark], _, _ = rough(field, dark, finest=GATHER.unseen_coarser * finest)
     rho, valid = quotient(lit_diffuse.radiance, E)
-    guess = fill(atlas, rho, valid, class_names(instances), emitters, params=UNSEEN_PRIOR).rho
+    guess = fill(atlas, rho, valid, class_names(instances), emitters).rho
     radiance = field.radiance.copy()
     radiance[dark] = guess[dark] * E[dark] / np.float32(np.pi)
     return field.with_light(radiance), E, escaped

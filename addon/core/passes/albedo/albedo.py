@@ -13,7 +13,7 @@ from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Instance, class_names
 from .neighbourhood import relative_error, shrink
-from .params import ALBEDO, MAX_ALBEDO, PRIOR, PriorParams
+from .params import ALBEDO, MAX_ALBEDO
 
 MEASURED: Code[int] = 2
 FILLED: Code[int] = 1
@@ -116,7 +116,6 @@ def fill(
     emitters: set[int],
     error: np.ndarray | None = None,
     without: Collection[str] = (),
-    params: PriorParams = PRIOR,
 ) -> Albedo:
     """Clamp, fill in what was not measured, and shrink what was measured badly, from the same object.
 
@@ -127,7 +126,6 @@ def fill(
     error : (n,) float32, optional
         Relative standard error of each quotient (`neighbourhood.relative_error`); without it all count as equally good.
         Where it is inf, the quotient counts as not measured.
-    params : PriorParams
     """
     if error is not None:
         valid = valid & np.isfinite(error)
@@ -147,9 +145,7 @@ def fill(
         if not valid[own].any():
             bare.setdefault(class_of.get(object_id, ""), []).append(own)
             continue
-        result[own], left[own] = shrink(
-            atlas, own, result[own], error[own], most=MAX_ALBEDO, without=without, params=params
-        )
+        result[own], left[own] = shrink(atlas, own, result[own], error[own], without)
         by_class.setdefault(class_of.get(object_id, ""), []).append(np.median(result[own][valid[own]], 0))
     known = [middle for alike in by_class.values() for middle in alike]
     for name, groups in bare.items():

@@ -10,9 +10,8 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-from scipy import special
 from scipy.spatial import cKDTree
-from scipy.special import ndtri
+from scipy.special import ndtr
 
 from ...groups import by_label
 from ...kinds import Block
@@ -21,15 +20,13 @@ from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.visibility import CLEAN, SATURATED
 from ...significance import LEVELS
-from .params import ALBEDO, PRIOR, PriorParams
+from .params import ALBEDO, PRIOR
 from .second_colour import Neighbourhood, shrunk_to_second_colour
 
 BLOCK: Block[int] = 1 << 11
 
 
-def relative_error(
-    lit: LitDiffuse, object_id: np.ndarray, of_object: bool = True, params: PriorParams = PRIOR
-) -> np.ndarray:
+def relative_error(lit: LitDiffuse, object_id: np.ndarray, of_object: bool = True) -> np.ndarray:
     """Relative standard error of each element's L_d, from its observations: (n,) float32.
 
     inf where there are none, or none but clipped ones: a lower bound may be off by any factor.
@@ -41,73 +38,68 @@ def relative_error(
         Of each element: one seen once or twice is as unsure as others of its object.
     of_object : bool
         If not, all that was seen once or twice is equally unsure.
-    params : PriorParams
     """
     middle = np.maximum(np.nan_to_num(lit.radiance).mean(1), 1e-12)
     spread = (np.nan_to_num(lit.upper) - np.nan_to_num(lit.lower)).mean(1) / 1.35 / middle
     n = np.maximum(lit.count, 1)
     # The median of n values of standard deviation s has the error 1.25 s / sqrt(n); few values hide their spread.
-    few: float | np.ndarray = params.single
+    few: float | np.ndarray = PRIOR.single
     if of_object:
-        few = _single(spread, lit.seen & (lit.count >= 3) & (lit.tier == CLEAN), object_id, params)
-    error = np.hypot(1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, few)) / np.sqrt(n), params.least_error)
-    error = np.where(lit.tier == CLEAN, error, error + params.edge_error)
+        few = _single(spread, lit.seen & (lit.count >= 3) & (lit.tier == CLEAN), object_id)
+    error = np.hypot(1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, few)) / np.sqrt(n), PRIOR.least_error)
+    error = np.where(lit.tier == CLEAN, error, error + PRIOR.edge_error)
     return np.where(lit.seen & (lit.tier != SATURATED), error, np.inf).astype(np.float32)
 
 
-def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray, params: PriorParams) -> np.ndarray:
+def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray) -> np.ndarray:
     """Relative error of a single observation of each element's object, (n,), from the elements seen `often`."""
-    few = np.full(int(object_id.max()) + 1, params.single)
+    few = np.full(int(object_id.max()) + 1, PRIOR.single)
     ids, known = object_id[often], spread[often]
     for own in by_label(ids):
         if len(own) >= LEVELS.enough:
-            few[ids[own[0]]] = np.clip(
-                params.single_factor * np.quantile(known[own], special.ndtr(1.0)), params.least_single, params.single
-            )
+            usual = PRIOR.single_factor * np.quantile(known[own], ndtr(1.0))
+            few[ids[own[0]]] = np.clip(usual, PRIOR.least_single, PRIOR.single)
     return few[object_id]
 
 
-def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, params: PriorParams) -> Neighbourhood:
+def _around(position: np.ndarray, references: np.ndarray, log_rho: np.ndarray) -> Neighbourhood:
     """The nearest references of m places."""
     # At most an eighth of the object: a small object's ends are not each other's neighbourhood.
-    k = min(params.neighbours, max(len(references) // 8, 3), len(references))
+    k = min(PRIOR.neighbours, max(len(references) // 8, 3), len(references))
     near = cKDTree(references).query(position, k=k, workers=-1)[1].reshape(len(position), k)
     middle = np.empty((len(position), 3), np.float32)
     width = np.empty(len(position), np.float32)
     channels = np.ascontiguousarray(log_rho.T)
-    normal = np.float32(ndtri((1 + params.width_quantile) / 2))  # that quantile of |deviation|, in standard deviations
 
     def gather(part: slice) -> None:
         around = channels[:, near[part]]
-        middle[part] = _quantile(np.sort(around), 0.5).T
-        off = np.sort(np.abs(around - middle[part].T[..., None]).mean(0))
-        width[part] = _quantile(off, params.width_quantile) / normal
+        middle[part] = _median(around).T
+        width[part] = 1.4826 * _median(np.abs(around - middle[part].T[..., None]).mean(0))
 
     for_blocks(gather, len(position), BLOCK, 0)
     return Neighbourhood(middle, np.maximum(width, np.float32(0.02)), near)
 
 
-def _quantile(ordered: np.ndarray, share: float) -> np.ndarray:
-    """As np.quantile along the last axis, of values in order: NumPy sorts 128 of them seven times as fast as it parts
-    them (AVX-512)."""
-    low, rest = divmod(share * (ordered.shape[-1] - 1), 1)
-    return (1 - rest) * ordered[..., int(low)] + rest * ordered[..., min(int(low) + 1, ordered.shape[-1] - 1)]
+def _median(values: np.ndarray) -> np.ndarray:
+    """As np.median along the last axis: NumPy sorts 128 values seven times as fast as it parts them (AVX-512)."""
+    count = values.shape[-1]
+    return np.sort(values)[..., [(count - 1) // 2, count // 2]].mean(-1)
 
 
 def _prior(
-    position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, without: Collection[str], params: PriorParams
+    position: np.ndarray, references: np.ndarray, log_rho: np.ndarray, without: Collection[str]
 ) -> Neighbourhood:
     """As `_around`, from as far around each place as it stays the same.
 
     `references` are in random order: half of them reach twice as far (in area) with as many neighbours.
     """
-    found = _around(position, references, log_rho, params)
+    found = _around(position, references, log_rho)
     if "wide-prior" in without:
         return found
-    first, allowed = found.middle.copy(), params.alike * found.width
+    first, allowed = found.middle.copy(), PRIOR.alike * found.width
     todo, count = np.arange(len(position)), len(references) // 2
-    while count >= 8 * params.neighbours and len(todo):
-        wider = _around(position[todo], references[:count], log_rho[:count], params)
+    while count >= 8 * PRIOR.neighbours and len(todo):
+        wider = _around(position[todo], references[:count], log_rho[:count])
         alike = np.abs(wider.middle - first[todo]).mean(1) <= allowed[todo]
         todo = todo[alike]
         for kept, new in zip(found, wider, strict=True):
@@ -117,14 +109,7 @@ def _prior(
 
 
 def shrink(
-    atlas: Atlas,
-    own: np.ndarray,
-    rho: np.ndarray,
-    error: np.ndarray,
-    seed: int = 0,
-    most: float = np.inf,
-    without: Collection[str] = (),
-    params: PriorParams = PRIOR,
+    atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, without: Collection[str] = ()
 ) -> tuple[np.ndarray, np.ndarray]:
     """Albedo of one object's elements, each shrunk towards its neighbourhood as far as it is uncertain.
 
@@ -136,11 +121,8 @@ def shrink(
         Clamped quotient; anything where `error` is inf.
     error : (m,) float32
         Relative standard error; 0: stays as it is; inf: not measured. At least one is finite.
-    most : float
-        Albedo that `rho` was clamped to.
     without : collection of str
         Passes left out.
-    params : PriorParams
 
     Returns
     -------
@@ -151,11 +133,12 @@ def shrink(
     position = atlas.position[own]
     known = np.flatnonzero(np.isfinite(error))
     # The better half at least: the few that are surer may be all of one kind, the frame of a painting.
-    sure = known[error[known] <= max(params.sure, float(np.median(error[known])))]
-    if len(sure) < params.neighbours:
+    sure = known[error[known] <= max(PRIOR.sure, float(np.median(error[known])))]
+    if len(sure) < PRIOR.neighbours:
         sure = known
-    sure = np.random.default_rng(seed).permutation(sure)[: params.references]
-    cell = params.cell * float(np.sqrt(np.median(atlas.area[own])))
+    # A thinned set reaches further around.
+    sure = np.random.default_rng(0).permutation(sure)[: LEVELS.sample]
+    cell = PRIOR.cell * float(np.sqrt(np.median(atlas.area[own])))
     place = np.floor((position - position.min(0)) / max(cell, 1e-9)).astype(np.int64)
     extent = place.max(0) + 1
     _, index, count = np.unique(
@@ -167,7 +150,7 @@ def shrink(
     asked, index = np.unique(index[todo], return_inverse=True)
     rho = np.maximum(rho, ALBEDO.floor)
     reference, reference_error = rho[sure], error[sure]
-    around = _prior(centre[asked], position[sure], np.log(reference), without, params)
+    around = _prior(centre[asked], position[sure], np.log(reference), without)
     shrunk, left = rho.astype(np.float32), error.astype(np.float32)
     rho, error = rho[todo], error[todo]
     measured = np.isfinite(error)
@@ -188,6 +171,6 @@ def shrink(
     result = trust * log_rho + (1 - trust) * middle
     if not {"second-colour", "albedo-prior"} & set(without):
         near = around, index[measured], reference, reference_error
-        result[measured] = shrunk_to_second_colour(result[measured], rho[measured], error[measured, 0], *near, most)
+        result[measured] = shrunk_to_second_colour(result[measured], rho[measured], error[measured, 0], *near)
     shrunk[todo] = np.exp(result)
     return shrunk, left

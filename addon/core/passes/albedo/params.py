@@ -21,10 +21,6 @@ class PriorParams:
         bathrooms and the living room .2, hall and office .0.
     alike : float
         Widths of the prior, by which the median of a wider neighbourhood may differ to stand for it (`wide-prior`).
-    width_quantile : float
-        Of the neighbours' deviations, from which the prior's width is taken as if they were normal.
-    references : int
-        Well-measured elements of an object that neighbours are sought among: a thinned set reaches further around.
     cell : float
         Texels, edge of the cells that share one prior.
     least_error : float
@@ -43,8 +39,6 @@ class PriorParams:
 
     neighbours: int = 128
     alike: float = 0.7
-    width_quantile: float = 0.5
-    references: int = 4096
     cell: float = 6.0
     least_error: float = 0.06
     sure: float = 0.15
@@ -77,10 +71,6 @@ class SecondColourParams:
 
 
 PRIOR = PriorParams()
-UNSEEN_PRIOR = PriorParams(width_quantile=0.7)
-"""For what no frame saw, while its light is sought: outliers of a texture count, so that the median comes from farther
-around. Albedo of a kitchen 24.07 to 24.18 dB (its draft 24.02 to 24.01, 23.94 to 23.91), a living room 32.64 to 32.66;
-the object's median alone, 23.82 (its draft 23.93, 23.89)."""
 SECOND_COLOUR = SecondColourParams()
 
 

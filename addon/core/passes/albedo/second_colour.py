@@ -15,7 +15,7 @@ import numpy as np
 from ...kinds import Block
 from ...parallel import for_blocks
 from ...significance import LEVELS
-from .params import SECOND_COLOUR, SecondColourParams
+from .params import MAX_ALBEDO, SECOND_COLOUR
 
 BLOCK: Block[int] = 1 << 11
 
@@ -36,8 +36,6 @@ def shrunk_to_second_colour(
     cell: np.ndarray,
     reference: np.ndarray,
     reference_error: np.ndarray,
-    most: float,
-    params: SecondColourParams = SECOND_COLOUR,
 ) -> np.ndarray:
     """Log albedo of measured elements, shrunk to the other colours around them as far as those are likelier.
 
@@ -58,9 +56,6 @@ def shrunk_to_second_colour(
         Each element's cell.
     reference, reference_error : (r, 3) and (r,)
         Albedo above 0, and relative standard error.
-    most : float
-        Albedo that a reference was cut off at: there E is wrong, and no colour is told.
-    params : SecondColourParams
 
     Returns
     -------
@@ -68,8 +63,8 @@ def shrunk_to_second_colour(
     """
     ground, width, near = np.exp(around.middle), around.width, around.near
     other = np.empty(near.shape, bool)
-    # An error may be as large as a float holds: such a reference tells no colour.
-    uncut, least = reference.max(1) < most, np.square(LEVELS.likely * reference_error, dtype=np.float64)
+    # Where a reference was cut off E is wrong; an error may be as large as a float holds. Such tell no colour.
+    uncut, least = reference.max(1) < MAX_ALBEDO, np.square(LEVELS.likely * reference_error, dtype=np.float64)
 
     def far(part: slice) -> None:
         beside = near[part]
@@ -78,7 +73,7 @@ def shrunk_to_second_colour(
 
     for_blocks(far, len(near), BLOCK, 0)
     share = other.mean(1)
-    real = np.clip(1 - params.by_chance / np.maximum(share, 1e-9), 0, 1)
+    real = np.clip(1 - SECOND_COLOUR.by_chance / np.maximum(share, 1e-9), 0, 1)
     result = shrunk.copy()
     todo = np.flatnonzero(real[cell] > 0)
 
@@ -86,14 +81,16 @@ def shrunk_to_second_colour(
         own = todo[part]
         at = cell[own]
         beside, value = reference[near[at]], rho[own]
-        local = (params.local * error[own]) ** 2
+        local = (SECOND_COLOUR.local * error[own]) ** 2
         of_ground = (1 - real[at] * share[at]) * _normal(_apart(value, ground[at]), local + width[at] ** 2)
         away = _apart(value[:, None], beside)
-        of_other = (real[at] / near.shape[1])[:, None] * other[at] * _normal(away, (local + params.apart**2)[:, None])
-        of_ground += params.unexplained
+        of_other = (
+            (real[at] / near.shape[1])[:, None] * other[at] * _normal(away, (local + SECOND_COLOUR.apart**2)[:, None])
+        )
+        of_ground += SECOND_COLOUR.unexplained
         total = of_ground + of_other.sum(1)
         drawn = (of_other[:, :, None] * np.log(beside)).sum(1)
-        trust = (params.apart**2 / (params.apart**2 + local))[:, None]
+        trust = (SECOND_COLOUR.apart**2 / (SECOND_COLOUR.apart**2 + local))[:, None]
         as_other = trust * of_other.sum(1)[:, None] * np.log(value) + (1 - trust) * drawn
         result[own] = (of_ground[:, None] * shrunk[own] + as_other) / total[:, None]
 
