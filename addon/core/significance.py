@@ -25,6 +25,8 @@ class SignificanceParams:
         Elements or observations that give a spread: its standard error is then 13 % of it.
     many : int
         Pixels, vertices or pairs of observations that say something where all of them are looked at together.
+    sample : int
+        Elements, or places of a mesh, that stand for all of a room's, or of a large object's.
     views : int
         Views of an element that tell what changes with the view.
     gain : float
@@ -41,6 +43,7 @@ class SignificanceParams:
     few: int = 12
     enough: int = 30
     many: int = 100
+    sample: int = 4096
     views: int = 4
     gain: float = 0.1
     dark: float = 0.02

@@ -21,6 +21,7 @@ from ..luminance import LUMINANCE
 from ..scene.atlas import Atlas
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.visibility import SATURATED
+from ..significance import LEVELS
 from .params import CALIBRATION
 
 RAYS: RayCounts = {"rays": 128, "emitter_rays": 32, "portal_rays": 32}
@@ -126,7 +127,7 @@ def light_evidence(
         Relative error of each element's albedo, the light aside.
     """
     atlas = field.atlas
-    chosen, nearest = spots(atlas, lit.seen, CALIBRATION.spots, seed)
+    chosen, nearest = spots(atlas, lit.seen, LEVELS.sample, seed)
     again_at = partial(irradiance, interpolate=False, finest=1.0, threads=threads)
     kept = np.log(np.maximum(shading.irradiance[chosen].mean(1), 1e-20))
     again = [again_at(field, chosen, **RAYS, seed=seed + 100_003 * (k + 1))[0].mean(1) for k in range(2)]

@@ -52,8 +52,6 @@ class CalibrationParams:
     of_object : float
         Error of an object's mean albedo, relative to the root mean square of its texels' errors: most of those is
         common to all of an object. 88 % of the objects' means are held in the small rooms, 99 % in the furnished ones.
-    spots : int
-        Elements at which light is gathered again.
     worst : float
         Where next to no light comes, the logarithm may be off by anything.
     prior_spots : int
@@ -79,7 +77,6 @@ class CalibrationParams:
     left: float = 0.008
     nothing_known: float = 0.4
     of_object: float = 0.6
-    spots: int = 4000
     worst: float = 1.0
     prior_spots: int = 10
     around: int = 5

@@ -139,7 +139,7 @@ def lamp_models(atlas: Atlas, instances: tuple[Instance, ...]) -> dict[int, int]
         told = one.class_name and one.object_id < len(area)
         own = area[one.object_id] if told else 0.0
         known = firsts.setdefault(one.class_name, [])
-        like = [i for i in known if abs(own - area[i]) <= LIGHT_FIT.same_size * area[i]] if own else []
+        like = [i for i in known if abs(own - area[i]) <= LIGHT_FIT.same * area[i]] if own else []
         model[one.object_id] = like[0] if like else one.object_id
         if own and not like:
             known.append(one.object_id)

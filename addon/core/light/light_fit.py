@@ -61,7 +61,7 @@ def kinds_of(object_id: np.ndarray, log_albedo: np.ndarray, class_of: dict[int, 
     -------
     (m,) int64
         The same for elements of objects whose albedo is within `alike` of their class's median, and its colour within
-        `same_colour`; else the object's own.
+        `same`; else the object's own.
     """
     ids, group = np.unique(object_id, return_inverse=True)
     median = np.stack([np.median(log_albedo[own], 0) for own in by_label(group)])
@@ -73,7 +73,7 @@ def kinds_of(object_id: np.ndarray, log_albedo: np.ndarray, class_of: dict[int, 
         own = np.flatnonzero(names == name)
         off = median[own] - np.median(median[own], 0)
         alike = np.abs(off.mean(1)) < LIGHT_FIT.alike
-        alike &= (np.abs(off - off.mean(1, keepdims=True)) < LIGHT_FIT.same_colour).all(1)
+        alike &= (np.abs(off - off.mean(1, keepdims=True)) < LIGHT_FIT.same).all(1)
         if alike.sum() > 1:
             kind[own[alike]] = kind[own[alike][0]]
     return kind[group]

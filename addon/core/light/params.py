@@ -27,9 +27,6 @@ class GatherParams:
         Gathered points, at most, that an element is interpolated from.
     turn : float
         Weight of the normals' difference, in Ward's error.
-    coarsest : float
-        First spacing, as a share of the elements' extent (root of the bounding box's largest face). Starting coarser
-        saves little and misses what is small: from 0.15 the living room's mean error was 0.094, from 0.01 it is 0.08.
     off_place : float
         How far a texel may lie from where its block's corners put it, as a share of the block's edge.
     stretch : float
@@ -41,10 +38,8 @@ class GatherParams:
         Finely meshed lamps have many: 24 of 512 triangles each, cut off at 4096, had an error of 0.74 instead of 0.06.
     cells : int
         Cells along either axis of each of the box's six sides.
-    pilot_points, pilot_rays : int
-        Points, and rays of each, that find the openings.
-    least_escaped : int
-        Of the pilot's rays; fewer lit ones are no opening worth aiming at.
+    pilot_rays : int
+        Of each of `LEVELS.sample` points, which find the openings.
     both_halves : float
         Two halves of well-spread rays are better together than two that know nothing of each other (living room: the
         halves' difference is 1.35 times the scatter over seeds).
@@ -65,15 +60,12 @@ class GatherParams:
     contrast: float = 0.15
     neighbours: int = 8
     turn: float = 1.5
-    coarsest: float = 0.01
     off_place: float = 0.15
     stretch: float = 3.0
     bright: float = 8.0
     max_triangles: int = 1 << 16
     cells: int = 24
-    pilot_points: int = 4096
     pilot_rays: int = 64
-    least_escaped: int = 16
     both_halves: float = 0.75
     mirror_fewer: int = 4
     proposals: tuple[float, ...] = (0.015, 0.06, 0.2, 0.6)
@@ -130,11 +122,12 @@ class LightFitParams:
         Least length of a cell's mean normal (8 degrees). E of a bumpy spot is uncertain, and more so that from a small
         light: as an error of the regressor it draws the light's radiance down. The same two lamps, mesh off by 5 mm,
         under a cap of 1: 10 and 15 with all elements, 21 and 22 with those on flat spots.
-    alike, same_colour : float
-        Log albedo, of all channels together and apart, by which objects of one class may differ to be of one kind.
-        Lamps that are off by a tenth part objects under them from others under the sky by up to .1.
-    same_size : float
-        Relative difference of area up to which two objects of a class can be the same lamp: a scan's noise and holes.
+    alike : float
+        Log albedo by which objects of one class may differ to be of one kind. Lamps that are off by a tenth part
+        objects under them from others under the sky by up to .1.
+    same : float
+        The same of each channel beside the others; and relative difference of area up to which two objects of a class
+        can be the same lamp: a scan's noise and holes.
     reach : float
         The refined radiance stays within this factor of where it started.
     lamp_elements : int
@@ -152,8 +145,7 @@ class LightFitParams:
     flat_cell: float = 0.08
     flat: float = 0.99
     alike: float = 0.25
-    same_colour: float = 0.1
-    same_size: float = 0.1
+    same: float = 0.1
     reach: float = 3.0
     lamp_elements: int = 500
     rays: int = 256

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..luminance import LUMINANCE
 from ..scene.tangent_frame import to_world
+from ..significance import LEVELS
 from .directions import cosine_hemisphere, shifted, sobol
 from .field import LightField
 from .openings import CELLS, exits, within
@@ -102,12 +103,10 @@ def find_portals(field: LightField, seed: int = 0) -> Portals | None:
     atlas = field.atlas
     rng = np.random.default_rng(seed)
     weight = np.cumsum(atlas.weight.astype(np.float64))
-    start = np.searchsorted(
-        weight, (np.arange(GATHER.pilot_points) + rng.random(GATHER.pilot_points)) / GATHER.pilot_points * weight[-1]
-    )
+    start = np.searchsorted(weight, (np.arange(LEVELS.sample) + rng.random(LEVELS.sample)) / LEVELS.sample * weight[-1])
     start = np.minimum(start, len(atlas) - 1)
     normal = atlas.normal[start]
-    local = cosine_hemisphere(shifted(sobol(GATHER.pilot_rays, seed), GATHER.pilot_points, rng))
+    local = cosine_hemisphere(shifted(sobol(GATHER.pilot_rays, seed), LEVELS.sample, rng))
     directions = to_world(local, normal).reshape(-1, 3)
     origins = np.repeat(field.scene.off_surface(atlas.position[start], normal), GATHER.pilot_rays, 0)
     out = np.flatnonzero(field.scene.intersect(origins, directions).triangle < 0)
@@ -116,7 +115,7 @@ def find_portals(field: LightField, seed: int = 0) -> Portals | None:
     low, size = field.outer_box
     inside = within(low, size, origins[out])
     out, light = out[inside], light[inside]
-    if len(out) < GATHER.least_escaped:
+    if len(out) < LEVELS.few:
         return None
     cell, _, _ = exits(low, size, origins[out], directions[out])
     chance = np.bincount(cell, light.astype(np.float64), CELLS)

@@ -196,7 +196,7 @@ def white_scale(run: Corrected) -> WhiteScale | None:
 def _direct_share(run: Corrected) -> np.ndarray:
     """Share of E, (3,), that comes from lamps, sky and sun, over what was seen of the room."""
     field, seen = run.field, run.lit_diffuse().seen
-    chosen, _ = spots(field.atlas, seen, CORRECTED.spots, run.settings.seed)
+    chosen, _ = spots(field.atlas, seen, LEVELS.sample, run.settings.seed)
     chosen = chosen[seen[chosen]]
     lamps = np.isin(field.atlas.object_id, [lamp.object_id for lamp in run.shading().lamps])
     direct = field.with_light(np.where(lamps[:, None], field.radiance, np.float32(0)))

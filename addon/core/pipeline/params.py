@@ -15,8 +15,6 @@ class CorrectedParams:
         Albedo is clamped at 1 and shrunk towards its neighbours, so its mean follows E but roughly.
     around : float
         Edges of an element around a spot of known albedo within which its elements lie: three by three of them.
-    spots : int
-        Elements that such a white is looked at by.
     least_light : float
         Less than this of its light no lamp is left.
     doubtful : float
@@ -25,7 +23,6 @@ class CorrectedParams:
 
     rounds: int = 4
     around: float = 1.5
-    spots: int = 600
     least_light: float = 0.1
     doubtful: float = 1.5
 
@@ -45,14 +42,11 @@ class PartsParams:
         Finer by less than this is not worth another look at the frames.
     most_texels : int
         Of all parts together: one and a half times an atlas of 4096. Memory, a few gigabytes for this, ends there.
-    half : float
-        Of what lies around a spot on the room's atlas, this share has to be measured for detail to be told there.
     """
 
     finest: float = 4.0
     worth: float = 1.2
     most_texels: int = 25_000_000
-    half: float = 0.5
 
 
 PARTS = PartsParams()

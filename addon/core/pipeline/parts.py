@@ -229,7 +229,8 @@ def finer_detail(run: Corrected, closer: Closer) -> np.ndarray:
     floor = np.float32(max(LEVELS.dark * run.median_radiance, 1e-30))
     level = room[:, :3] / np.maximum(room[:, 3:], 1e-6)
     ratio = np.clip((closer.radiance + floor) / (level + floor), 1 / SHARPENING.most, SHARPENING.most)
-    ratio[(room[:, 3] < PARTS.half) | ~np.isfinite(ratio).all(1)] = 1
+    # No detail where less than half of what lies around a spot on the room's atlas was measured.
+    ratio[(room[:, 3] < 0.5) | ~np.isfinite(ratio).all(1)] = 1
     return atlas.image(ratio, 1.0)
 
 

@@ -250,7 +250,7 @@ def _shut(
     if groups:
         group = np.concatenate(labels)
         normal, area = triangle_geometry(mesh)
-        some = np.random.default_rng(0).choice(len(triangles), CLOSING.samples, p=area / area.sum())
+        some = np.random.default_rng(0).choice(len(triangles), LEVELS.sample, p=area / area.sum())
         shown = colours(frames, read, sight, scene, vertices[triangles[some]].mean(1), normal[some], gap)
         closed &= (group < 0) | ~_outside(sight, group, groups, shown, gap)[group]
     told = zip(sheets, np.split(closed, ends), np.split(sight.out > 0, ends), strict=True)
@@ -274,7 +274,7 @@ def _outside(sight: Sight, group: np.ndarray, count: int, shown: Shown, gap: flo
     for one in range(count):
         own = np.flatnonzero(of == one)
         told = own[~shown.clipped[own] & np.isfinite(value[own]).all(1)]
-        if len(told) < max((1 - CLOSING.clipped) * len(own), 1) or not np.median(value[told].mean(1)) <= shown.bright:
+        if len(told) < max(len(own) / 2, 1) or not np.median(value[told].mean(1)) <= shown.bright:
             continue
         if np.median(sight.out[group == one]) <= shown.views:
             outside[one] = False

@@ -153,8 +153,8 @@ def lay_out(
     first = np.unique(island, return_index=True)[1]
     owner = object_id[first].astype(np.int64)
     low, high = (edge.astype(np.float64) * size for edge in boxes(uv, island))
-    corner = np.floor(low) - SURFACE.page_margin
-    extent = np.ceil(high) + SURFACE.page_margin - corner
+    corner = np.floor(low) - SURFACE.margin // 2
+    extent = np.ceil(high) + SURFACE.margin // 2 - corner
     numbers = np.unique(owner).tolist()
     scale = {number: float(scale.get(number, 1.0)) for number in numbers}
     blocks, place, box = {}, np.zeros((len(first), 2)), np.zeros((len(first), 2))

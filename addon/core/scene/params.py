@@ -36,13 +36,12 @@ class SampleParams:
 
     Attributes
     ----------
-    of_object, in_all : int
-        Elements whose observations are kept, of one object and together.
+    in_all : int
+        Elements whose observations are kept; of one object `LEVELS.sample`.
     frames : int
         With more frames, each observation is kept with the chance that this many frames would leave of it.
     """
 
-    of_object: int = 4000
     in_all: int = 150_000
     frames: int = 200
 
@@ -93,8 +92,6 @@ class CreaseParams:
 
     Attributes
     ----------
-    weld : float
-        Metres within which two vertices are one.
     reach : float
         Texels from the edge up to which it is felt, less and less.
     knee : float
@@ -106,7 +103,6 @@ class CreaseParams:
         0.07 to 0.12 on flat parts.
     """
 
-    weld: float = 1e-5
     reach: float = 1.5
     knee: float = 0.1
     thin: float = 1e-3
@@ -152,8 +148,6 @@ class SurfaceParams:
         Share of the atlas that islands usually cover; only the unwrapping's margin depends on it.
     step : int
         Edges of atlases and pages are multiples of it.
-    page_margin : int
-        Texels of the room's atlas around each island that show it too, for what lies between texels.
     page_shapes : tuple of float
         Widths that are tried for a block of islands, of the edge of the square that would hold their area.
     turned : float
@@ -168,7 +162,7 @@ class SurfaceParams:
     overlap_texels : float
         Triangles may penetrate each other by this much; far less than what moves a texel's centre, more than rounding.
     margin : int
-        Texels between two charts.
+        Texels between two charts: half of them on either side show the chart, too, for what lies between texels.
     full, hopeless : float
         Islands that fill less of their rectangle are cut in two, or all apart where a cut gains nothing.
     rounds : int
@@ -177,7 +171,6 @@ class SurfaceParams:
 
     expected_fill: float = 0.55
     step: int = 64
-    page_margin: int = 1
     page_shapes: tuple[float, ...] = (1.0, 1.1, 1.25, 1.5)
     turned: float = 0.2
     weld: float = 1e-6
@@ -202,8 +195,6 @@ class PartsParams:
 
     Attributes
     ----------
-    hangs_together : float
-        With more of its surface in one connected part, a mesh is taken apart.
     rounds, crease : int, float
         Of the bilateral filter of normals, and its standard deviation in radians.
     directions : int
@@ -226,7 +217,6 @@ class PartsParams:
         Share of the surface in front of a floor, a ceiling, a wall.
     """
 
-    hangs_together: float = 0.5
     rounds: int = 8
     crease: float = float(np.radians(20))
     directions: int = 1000
@@ -299,12 +289,8 @@ class ClosingParams:
 
     Attributes
     ----------
-    samples : int
-        Places of the mesh that tell frames' gains, and how bright the room is.
     block : int
         Edge in cells of the squares that close what no frame saw, a power of 2: a third of a metre in a room.
-    clipped : float
-        Share of clipped observations from which on a hole shows the outside.
     nearly_all : float
         Of the mesh: the share that is darker than the outside, and that more frames see than what was not fused.
     speck : int
@@ -313,9 +299,7 @@ class ClosingParams:
         Cells that a face lies at least under the scan's denoised border, as the two cover each other: 1 mm in a room.
     """
 
-    samples: int = 4000
     block: int = 8
-    clipped: float = 0.5
     nearly_all: float = 0.95
     speck: int = 4
     under: float = 0.025

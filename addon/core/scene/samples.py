@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..significance import LEVELS
 from .atlas import Atlas
 from .params import SAMPLES
 from .visibility import CLEAN, SATURATED, Observations
@@ -43,14 +44,14 @@ class Samples:
 
 
 def choose_elements(atlas: Atlas, seed: int) -> np.ndarray:
-    """Elements to keep observations of: up to `of_object` for each object, at random, sorted."""
+    """Elements to keep observations of: up to `LEVELS.sample` for each object, at random, sorted."""
     rng = np.random.default_rng(seed)
     key = rng.random(len(atlas))
     order = np.lexsort((key, atlas.object_id))
     objects = atlas.object_id[order]
     start = np.concatenate([[0], np.flatnonzero(np.diff(objects)) + 1])
     rank = np.arange(len(order)) - np.repeat(start, np.diff(np.concatenate([start, [len(order)]])))
-    limit = SAMPLES.of_object
+    limit = LEVELS.sample
     while limit > 16 and np.minimum(np.diff(np.concatenate([start, [len(order)]])), limit).sum() > SAMPLES.in_all:
         limit //= 2
     return np.sort(order[rank < limit])

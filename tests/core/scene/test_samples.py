@@ -22,10 +22,10 @@ def atlas():
 
 
 def test_chosen_elements_are_few_sorted_and_the_same_again(atlas, monkeypatch):
-    monkeypatch.setattr(module, "SAMPLES", replace(SAMPLES, of_object=300))
+    monkeypatch.setattr(module, "SAMPLES", replace(SAMPLES, in_all=1536))
     chosen = choose_elements(atlas, 0)
     assert (np.diff(chosen) > 0).all() and np.array_equal(chosen, choose_elements(atlas, 0))
-    assert np.array_equal(np.bincount(atlas.object_id[chosen]), [300] * 6)
+    assert np.array_equal(np.bincount(atlas.object_id[chosen]), [256] * 6)
     assert not np.array_equal(chosen, choose_elements(atlas, 1))
     floor = chosen[atlas.object_id[chosen] == 0]
     assert np.allclose(atlas.position[floor].mean(0), (2, 1.5, 0), atol=0.25)  # spread out

@@ -15,7 +15,6 @@ from ...light.shading import Shading
 from ...luminance import LUMINANCE
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
-from .fringes import FringeParams
 
 
 def clipped_objects(lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()) -> dict[int, float]:
@@ -24,12 +23,12 @@ def clipped_objects(lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()) ->
     Not by the tier: where poses are off, a few pixels of an edge reach far into a lamp that all others show clipped.
     """
     bounds = {}
-    mostly = lit.seen & (lit.clipped > FringeParams.least_share)
+    mostly = lit.seen & (lit.clipped > 0.5)
     for object_id in np.setdiff1d(atlas.object_id[mostly], list(but)):
         own = atlas.elements_of(int(object_id))
         own = own[lit.seen[own]]
         clipped = own[mostly[own]]
-        if atlas.area[clipped].sum() > FringeParams.least_share * atlas.area[own].sum():
+        if 2 * atlas.area[clipped].sum() > atlas.area[own].sum():
             bounds[int(object_id)] = float(np.median(lit.radiance[clipped] @ LUMINANCE))
     return bounds
 

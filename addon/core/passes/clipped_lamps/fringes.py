@@ -15,6 +15,7 @@ from scipy import ndimage
 from ...luminance import LUMINANCE
 from ...scene.model import Pixels
 from ...scene.visibility import FrameView
+from ...significance import LEVELS
 
 AROUND = np.ones((3, 3), bool)
 
@@ -29,20 +30,16 @@ class FringeParams:
         Of the level at which the sensor clipped: fainter, a fringe says more of its surroundings than of the lamp.
     least_pixels : int
         Smaller clipped spots may be glints.
-    least_share : float
-        Of a clipped spot that must show one object; of an object's seen area that makes it a clipped one.
-    enough : int
-        Fringe pixels from which on their median is a colour.
-    near, far : int
-        Pixels from a clipped spot at which its surroundings begin and end.
+    near : int
+        Pixels from a clipped spot at which its surroundings begin; they end twice as far off.
     """
 
     least_excess: float = 0.25
     least_pixels: int = 4
-    least_share: float = 0.5
-    enough: int = 20
     near: int = 2
-    far: int = 4
+
+
+FRINGES = FringeParams()
 
 
 @dataclass(frozen=True)
@@ -72,8 +69,7 @@ class Fringes:
 class FringeCollector:
     """Collects fringes frame by frame; give `add` to `accumulate(also=...)`."""
 
-    def __init__(self, params: FringeParams = FringeParams()):
-        self._params = params
+    def __init__(self) -> None:
         self._excess: dict[int, list[np.ndarray]] = {}
 
     def add(self, view: FrameView, pixels: Pixels) -> None:
@@ -83,13 +79,13 @@ class FringeCollector:
             return
         spots, _ = ndimage.label(clipped, AROUND)
         usable = pixels.valid & ~clipped
-        far_from_any = ~ndimage.binary_dilation(clipped, AROUND, self._params.near)
+        far_from_any = ~ndimage.binary_dilation(clipped, AROUND, FRINGES.near)
         for index, box in enumerate(ndimage.find_objects(spots), 1):
             ids = view.object_id[box][spots[box] == index]
             owner = np.bincount(ids[ids >= 0], minlength=1)
-            if len(ids) < self._params.least_pixels or owner.max() <= self._params.least_share * len(ids):
+            if len(ids) < FRINGES.least_pixels or 2 * owner.max() <= len(ids):
                 continue
-            around = tuple(slice(max(side.start - self._params.far, 0), side.stop + self._params.far) for side in box)
+            around = tuple(slice(max(side.start - 2 * FRINGES.near, 0), side.stop + 2 * FRINGES.near) for side in box)
             excess = self._of_spot(
                 spots[around] == index, clipped[around] & (spots[around] != index), usable[around],
                 far_from_any[around] & usable[around], pixels.radiance[around],
@@ -100,7 +96,7 @@ class FringeCollector:
     def result(self) -> Fringes:
         """Colours of the objects with enough fringe pixels: the median of each channel's share in the luminance."""
         found = {i: np.concatenate(parts) for i, parts in sorted(self._excess.items())}
-        found = {i: excess for i, excess in found.items() if len(excess) >= self._params.enough}
+        found = {i: excess for i, excess in found.items() if len(excess) >= LEVELS.enough}
         if not found:
             return Fringes.none()
         colour = np.array([np.median(excess / (excess @ LUMINANCE)[:, None], 0) for excess in found.values()])
@@ -112,11 +108,11 @@ class FringeCollector:
     ) -> np.ndarray:
         """What the pixels next to a clipped spot have above its surroundings, (p, 3) float64, where that is much."""
         fringe = ndimage.binary_dilation(spot, AROUND) & usable & ~ndimage.binary_dilation(others, AROUND)
-        behind = behind & ndimage.binary_dilation(spot, AROUND, self._params.far)
+        behind = behind & ndimage.binary_dilation(spot, AROUND, 2 * FRINGES.near)
         if not fringe.any() or not behind.any():
             return np.zeros((0, 3))
         excess = radiance[fringe].astype(np.float64) - np.median(radiance[behind], 0)
         # Clipped to inf, pixels have no value: the brightest of the fringe is all that is known of the sensor.
         bound = (radiance[spot] @ LUMINANCE)[radiance[spot].any(1)]
         level = float(bound.min()) if len(bound) else float((radiance[fringe] @ LUMINANCE).max())
-        return excess[(excess.min(1) >= 0) & (excess @ LUMINANCE >= self._params.least_excess * level)]
+        return excess[(excess.min(1) >= 0) & (excess @ LUMINANCE >= FRINGES.least_excess * level)]

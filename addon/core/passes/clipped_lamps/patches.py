@@ -13,12 +13,12 @@ import numpy as np
 
 from ...luminance import LUMINANCE
 from ...scene.atlas import Atlas
-from ...scene.connected_parts import weld
 from ...scene.elements import ElementLookup
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Mesh
 from ...scene.patches import Patches
 from ...scene.uv_islands import connected
+from ...scene.weld import weld
 from ...significance import LEVELS
 from ...weighted import weighted_median
 
@@ -29,9 +29,6 @@ class PatchParams:
 
     Attributes
     ----------
-    least_share : float
-        Of the observations of a triangle that must be clipped. At a patch's edge poses that are off mix in what lies
-        beside it: of a ceiling lamp's 0.27 square metres 0.285 have .3, 0.279 .5 and 0.261 .7, and none of the wall.
     core : float
         Of an element's, somewhere in a patch: what frames only clip at times has none.
     most : int
@@ -41,7 +38,6 @@ class PatchParams:
         floor is some ten to twenty times as bright as a room, a lamp some hundred times.
     """
 
-    least_share: float = 0.5
     core: float = 0.9
     most: int = 24
     bright: float = 40.0
@@ -62,7 +58,9 @@ def clipped_patches(mesh: Mesh, atlas: Atlas, lit: LitDiffuse) -> Patches:
     third = np.full(len(bare), 1 / 3, np.float32)
     beside = ElementLookup(mesh, atlas)(bare, third, third)
     share[bare] = np.where(lit.seen[beside], apart[beside], 0)
-    chosen = np.flatnonzero(share > PATCHES.least_share)
+    # At a patch's edge poses that are off mix in what lies beside it: of a ceiling lamp's 0.27 square metres 0.285
+    # have more than .3, 0.279 more than .5 and 0.261 more than .7, and none of the wall.
+    chosen = np.flatnonzero(share > 0.5)
     if not len(chosen):
         return Patches.none()
     label = np.full(count, -1)
@@ -94,4 +92,4 @@ def _bright(atlas: Atlas, lit: LitDiffuse) -> np.ndarray:
 def told_of(patches: list[int], atlas: Atlas, lit: LitDiffuse) -> list[int]:
     """Those of the patches whose radiance frames tell: most of what they saw of them is not clipped."""
     own = {one: lit.seen & (atlas.object_id == one) for one in patches}
-    return [one for one, seen in own.items() if np.median(lit.clipped[seen]) <= PATCHES.least_share]
+    return [one for one, seen in own.items() if np.median(lit.clipped[seen]) <= 0.5]

@@ -31,7 +31,7 @@ from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Frame, Pixels
 from ...scene.rays import Hits
 from ...scene.visibility import SATURATED, FrameView
-from .params import REMOVAL, RemovalParams
+from .params import REMOVAL
 
 NO_OBJECT: Code[int] = -1
 
@@ -64,16 +64,9 @@ class SpecularPart:
         Of each observation in the fit.
     """
 
-    def __init__(
-        self,
-        field: LightField,
-        materials: Sequence[ObjectMaterial],
-        rays: int,
-        seed: int = 0,
-        params: RemovalParams = REMOVAL,
-    ):
-        self._field, self._bright, self._params, self._seed = field, bright_triangles(field), params, seed
-        self._rays = max(rays // params.fewer, params.least)
+    def __init__(self, field: LightField, materials: Sequence[ObjectMaterial], rays: int, seed: int = 0):
+        self._field, self._bright, self._seed = field, bright_triangles(field), seed
+        self._rays = max(rays // REMOVAL.fewer, REMOVAL.least)
         self._lobes: dict[int, tuple[float, float, Microfacets]] = {}
         for m in materials:
             if m.alpha is None or m.f0 is None or m.model.microfacets is None:
@@ -84,12 +77,12 @@ class SpecularPart:
         """I_nd as a frame sees it, (height, width, 3) float32; 0 where there is no lobe."""
         field = self._field
         element = field.elements(Hits(*(x.ravel() for x in (view.triangle, view.u, view.v, view.distance))))
-        shown = np.where(element >= 0, field.atlas.object_id[element], NO_OBJECT)
+        owner = np.where(element >= 0, field.atlas.object_id[element], NO_OBJECT)
         rays, result = view.rays.reshape(3, -1), np.zeros((len(element), 3), np.float32)
-        step = int(np.ceil(np.sqrt(len(element) / self._params.pixels)))
-        for object_id in self._lobes.keys() & set(np.unique(shown).tolist()):
+        step = int(np.ceil(np.sqrt(len(element) / REMOVAL.pixels)))
+        for object_id in self._lobes.keys() & set(np.unique(owner).tolist()):
             # Each object has rays of its own, so that its part is the same whichever others are asked for.
-            at = np.flatnonzero(shown == object_id)
+            at = np.flatnonzero(owner == object_id)
             place = np.stack(np.divmod(at, view.triangle.shape[1]))
             traced, cell = one_of_each_cell(place, step) if step > 1 else (slice(None), place)
             part = highlight(
@@ -114,8 +107,8 @@ class SpecularPart:
         planes = np.zeros((4, *(cell.max(1) + 1 - low)), np.float32)
         row, column = cell - low[:, None]
         planes[:3, row, column], planes[3, row, column] = part.T, 1
-        width, reach = self._params.width, self._params.reach
-        total = gaussian_filter(planes, width, axes=(1, 2), mode="constant", radius=reach)
+        reach = REMOVAL.reach
+        total = gaussian_filter(planes, reach / 2, axes=(1, 2), mode="constant", radius=reach)
         if place is None:
             shares = total[:, row, column]
         else:
@@ -149,7 +142,6 @@ def without_specular(
     own: np.ndarray,
     frames: Sequence[Frame],
     read: Callable[[Frame], Pixels],
-    params: RemovalParams = REMOVAL,
     **how: Any,
 ) -> Removed:
     """Take the specular part out of every frame, and the median of what is left.
@@ -179,7 +171,7 @@ def without_specular(
     def rest(frame: Frame, view: FrameView, pixels: Pixels) -> Pixels:
         specular = part(view, zlib.crc32(frame.name.encode()) & 0xFFFFFF)
         left = pixels.radiance - specular
-        hidden = specular.sum(-1) > params.most * left.sum(-1)
+        hidden = specular.sum(-1) > REMOVAL.most * left.sum(-1)
         return replace(pixels, radiance=left, saturated=pixels.saturated | hidden)
 
     found = accumulate(field.mesh, field.atlas, field.scene, frames, read, only=own, change=rest, **how)
@@ -189,4 +181,4 @@ def without_specular(
     hidden, object_id = told & (found.tier == SATURATED), field.atlas.object_id
     objects = int(object_id.max()) + 1
     share = np.bincount(object_id, hidden, objects) / np.maximum(np.bincount(object_id, told, objects), 1)
-    return Removed(specular, hidden & (share[object_id] <= params.dark))
+    return Removed(specular, hidden & (share[object_id] <= 0.5))

@@ -22,18 +22,12 @@ class UnlitParams:
         a tenth as thick as wide has .8.
     upright : float
         Radians from the horizontal, at most, of a pane's normal. Flat lamps in ceilings are mostly luminous panels.
-    leaving : float
-        Share of the rays behind a pane that leave the room. A kitchen's window has .88; its strips, and ceiling lamps,
-        bulbs, spots and panels of six more rooms 0 to .04.
-    rays : int
     """
 
     dark: float = 0.02
     dark_classes: tuple[str, ...] = ("window", "pane", "screen", "monitor", "tv", "television", "display", "laptop")
     flat: float = 0.8
     upright: float = float(np.radians(30))
-    leaving: float = 0.5
-    rays: int = 256
 
 
 UNLIT = UnlitParams()

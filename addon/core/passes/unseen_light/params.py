@@ -11,15 +11,12 @@ class UnseenParams:
 
     Attributes
     ----------
-    samples : int
-        Elements that the test looks at, spread evenly over the objects. Noise in E or G draws the solved radiance to 0:
-        few elements with many rays each find more of it than many with few (a sky of 1.7: 16,000 with 64 rays give
-        1.4).
     clipped : int
-        Times as many where lamps are clipped, as then all albedos hang on the solution; no object counts for more than
-        it does among `samples`. Lamps over the truth in perturbed living rooms, two seeds each: 0.99 +- 0.06 with 4,000
-        elements (seven scans), 1.01 +- 0.035 with 16,000 (six), 1.07 +- 0.02 where large objects count for more
-        (three).
+        Times as many elements as `LEVELS.sample` where lamps are clipped, as then all albedos hang on the solution; no
+        object counts for more than it does among those. Noise in E or G draws the solved radiance to 0: few elements
+        with many rays each find more of it than many with few (a sky of 1.7: 16,000 with 64 rays give 1.4). Lamps over
+        the truth in perturbed living rooms, two seeds each: 0.99 +- 0.06 with 4,000 elements (seven scans), 1.01 +-
+        0.035 with 16,000 (six), 1.07 +- 0.02 where large objects count for more (three).
     candidates : int
         Unseen objects, those alike counted once, that are tried as lamps: those that would reach the sample most. Of
         thousands of things under a table none lights the room, and each takes a fifth of a second.
@@ -36,7 +33,6 @@ class UnseenParams:
         The same for a part of the sky that is clipped.
     """
 
-    samples: int = 4000
     clipped: int = 4
     candidates: int = 64
     lamp_gain: float = 0.03

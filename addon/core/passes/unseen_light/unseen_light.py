@@ -137,7 +137,7 @@ def find_light(
     usable = steady(field, good, flat) | barely_seen(field, good)
     # What a mirror shows is no albedo.
     usable &= ~np.isin(field.atlas.object_id, [mirror.object_id for mirror in field.mirrors])
-    element = pick(field, usable, seed, UNSEEN.clipped * UNSEEN.samples if clipped else UNSEEN.samples)
+    element = pick(field, usable, seed, LEVELS.sample * (UNSEEN.clipped if clipped else 1))
     if not len(element):
         return Light((), field.environment, (), element, np.zeros((0, 3)), mixed=mixed)
     old = before.contribution if before is not None and field.environment.seen else None
@@ -175,7 +175,7 @@ def find_light(
         return Light(tuple(seen), environment, found, element, filled, mixed=mixed)
     sent = field.radiance[element[lit]].astype(np.float64)
     # About half of the elements are on flat spots, of large objects as of small ones.
-    most = UNSEEN.samples / len(np.unique(atlas.object_id[element])) / 2 if clipped else np.inf
+    most = LEVELS.sample / len(np.unique(atlas.object_id[element])) / 2 if clipped else np.inf
     sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit], most)
     # The same lamp hung several times is one unknown.
     model, kin = lamp_models(atlas, instances), of_shining_class(seen, atlas.object_id[good], instances)

@@ -121,8 +121,8 @@ def test_large_pictures_lose_a_mirror_image_by_no_more_rays(floor, monkeypatch):
         return highlight(field, bright, element, *more, **how)
 
     monkeypatch.setattr(removal, "highlight", counted)
-    params = replace(REMOVAL, pixels=28 * 21)
-    part = SpecularPart(floor.box.field, [material], rays=4096, params=params)
+    monkeypatch.setattr(removal, "REMOVAL", replace(REMOVAL, pixels=28 * 21))
+    part = SpecularPart(floor.box.field, [material], rays=4096)
     normal = triangle_geometry(room.mesh)[0]
     shown = [part(view_frame(camera, room.mesh, room.scene, normal), 0) for camera in (small, large)]
     assert traced[1] < 1.1 * traced[0]
