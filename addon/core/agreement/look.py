@@ -168,7 +168,7 @@ def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True)
         return Agreement(plain, None, moved, False, _up(scene.views, Convention()))
     if _flat(scene.views):
         return Agreement(replace(plain, colour=np.nan), None, np.zeros(0), False, _up(scene.views, Convention()))
-    if not search or len(scene.views) < AGREEMENT.least_views:
+    if not search or len(scene.views) < 2:
         return Agreement(plain, None, np.zeros(0), False, _up(scene.views, Convention()))
     best = _search(scene)
     if best is not None and best.quality < max(AGREEMENT.agree, plain.quality + AGREEMENT.better):

@@ -28,7 +28,7 @@ def predicted(index: int, views: Sequence[SmallView], cameras: Sequence[Camera],
     for row, j in enumerate(nearest):
         inside, pixels = sees(cameras[j], points, scene, margin=1)
         said[row, inside] = bilinear(views[j].log.mean(-1), pixels - 0.5)
-    enough = np.isfinite(said).sum(0) >= AGREEMENT.least_views
+    enough = np.isfinite(said).sum(0) >= 2
     image = np.full(camera.height * camera.width, np.nan, np.float32)
     image[at[enough]] = np.nanmedian(said[:, enough], 0)
     return image.reshape(camera.height, camera.width)

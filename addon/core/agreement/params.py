@@ -26,8 +26,6 @@ class AgreementParams:
         Qualities that differ by less are the same; the simpler convention is taken.
     upright : float
         Mean cosine from which on an axis is taken as the one that points up.
-    least_views : int
-        Of one spot, that can be compared.
     count : int
         Frames that are looked at, spread evenly.
     width : int
@@ -47,7 +45,6 @@ class AgreementParams:
     plausible: float = 5.0
     tie: float = 0.01
     upright: float = 0.7
-    least_views: int = 2
     count: int = 16
     width: int = 160
     grid: int = 20

@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from ..scene.model import Pixels
 from ..scene.visibility import FrameView
-from .params import SKY
+from .params import LIGHT_FIT, SKY
 
 NEAR = np.radians(8)
 """Angle over which what was seen of the sky says something of its surroundings."""
@@ -197,7 +197,7 @@ class Environment:
         profile = np.interp(np.arange(height), rows, level)
         profile = ndimage.gaussian_filter1d(profile, np.radians(SKY.profile) / np.pi * height, mode="nearest")
         middle = max(float(np.median(profile[rows])), 1e-12)
-        return np.clip(profile / middle, 1 / SKY.steepest, SKY.steepest).astype(np.float32)
+        return np.clip(profile / middle, 1 / LIGHT_FIT.reach, LIGHT_FIT.reach).astype(np.float32)
 
     def zone_mean(self, zone: Zone) -> np.ndarray:
         """Mean radiance over a zone, weighted by solid angle: (3,) float32."""

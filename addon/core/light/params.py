@@ -129,7 +129,7 @@ class LightFitParams:
         The same of each channel beside the others; and relative difference of area up to which two objects of a class
         can be the same lamp: a scan's noise and holes.
     reach : float
-        The refined radiance stays within this factor of where it started.
+        The refined radiance stays within this factor of where it started, and a sky's within it of its middle.
     lamp_elements : int
         Of an unseen object, at which what it could reflect is looked at.
     rays, emitter_rays : int
@@ -164,8 +164,8 @@ class SkyParams:
     ----------
     max_height : int
         Rows of a map.
-    profile, steepest : float
-        Degrees over which the sky's change with the height is smoothed, and how far it may go either way.
+    profile : float
+        Degrees over which the sky's change with the height is smoothed.
     shadow_rays : int
         Of each element, over the sun's disc.
     above : float
@@ -176,7 +176,6 @@ class SkyParams:
 
     max_height: int = 512
     profile: float = 3.0
-    steepest: float = 3.0
     shadow_rays: int = 16
     above: float = 30.0
     least_share: float = 0.02

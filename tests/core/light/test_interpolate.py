@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from addon.core.light import interpolate
 from addon.core.light.interpolate import interpolated
 from addon.core.light.params import GATHER
 from tests.core.rooms import box_sides, make_room, quad
 
 FINEST = 0.1
+
+
+@pytest.fixture(autouse=True)
+def several_levels(monkeypatch):
+    """In a room of few elements the first spacing would lie below the finest: start coarser, to have levels at all."""
+    monkeypatch.setattr(interpolate, "GATHER", replace(GATHER, finest_share=0.075))
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +42,7 @@ def run(atlas, function, radius=1.5, finest=FINEST):
 def test_a_constant_stays(atlas):
     value, points = run(atlas, lambda p, n: np.tile(np.float32([1, 2, 3, 0.5]), (len(p), 1)))
     assert np.allclose(value, [1, 2, 3, 0.5], rtol=1e-5) and value.shape == (len(atlas), 4)
-    assert len(points) < len(atlas) / 10
+    assert len(points) < len(atlas) / 20
     assert len(np.unique(points)) == len(points)
 
 
@@ -79,7 +88,7 @@ def test_a_shadow_edge_gets_more_points(atlas):
 def test_close_walls_ask_for_more_points(atlas):
     _, few = run(atlas, lambda p, n: np.ones((len(p), 3), np.float32), radius=4)
     _, many = run(atlas, lambda p, n: np.ones((len(p), 3), np.float32), radius=0.4)
-    assert 3 * len(few) < len(many)
+    assert 4 * len(few) < len(many)
 
 
 def test_light_refines_where_walls_are_far(atlas):
@@ -120,8 +129,9 @@ def test_coarse_points_do_not_outweigh_fine_ones(atlas):
     assert np.percentile(off[beside], 95) < 0.05 and np.percentile(off[along], 75) < 0.01
 
 
-def test_small_things_are_not_stepped_over():
+def test_small_things_are_not_stepped_over(monkeypatch):
     """A patch of light of 3 % of the room's size, walls far off: found, as the first points lie 1 % apart."""
+    monkeypatch.setattr(interpolate, "GATHER", GATHER)
     atlas = make_room([quad((0, 0, 0), (4, 0, 0), (0, 4, 0), 0)], 0.02).atlas
     lit = (np.abs(atlas.position[:, :2] - (1.234, 2.345)) < 0.06).all(1)
     value, points = run(atlas, lambda p, n: spot_of(p), radius=10, finest=0.02)

@@ -47,7 +47,7 @@ def relative_error(lit: LitDiffuse, object_id: np.ndarray, of_object: bool = Tru
     if of_object:
         few = _single(spread, lit.seen & (lit.count >= 3) & (lit.tier == CLEAN), object_id)
     error = np.hypot(1.25 * np.where(lit.count >= 3, spread, np.maximum(spread, few)) / np.sqrt(n), PRIOR.least_error)
-    error = np.where(lit.tier == CLEAN, error, error + PRIOR.edge_error)
+    error = np.where(lit.tier == CLEAN, error, error + PRIOR.single)
     return np.where(lit.seen & (lit.tier != SATURATED), error, np.inf).astype(np.float32)
 
 
@@ -58,7 +58,7 @@ def _single(spread: np.ndarray, often: np.ndarray, object_id: np.ndarray) -> np.
     for own in by_label(ids):
         if len(own) >= LEVELS.enough:
             usual = PRIOR.single_factor * np.quantile(known[own], ndtr(1.0))
-            few[ids[own[0]]] = np.clip(usual, PRIOR.least_single, PRIOR.single)
+            few[ids[own[0]]] = min(usual, PRIOR.single)
     return few[object_id]
 
 

@@ -27,14 +27,13 @@ class PriorParams:
         Relative standard error that even the best measured element has: irradiance, texels against pixels.
     sure : float
         Relative standard error below which an element may speak for its neighbourhood.
-    single, least_single : float
-        Bounds of the relative standard error of a single observation, whose spread can't be known.
+    single : float
+        Relative standard error of a single observation, whose spread can't be known, at most; and what is added to that
+        of observations at depth edges, where another surface is mixed in.
     single_factor : float
         It is taken for so many times this quantile (one standard deviation of a normal distribution) of the spreads
         that its object's other elements have (`object-spread`). Single observations are made where little is seen, so
         for more than theirs.
-    edge_error : float
-        Added to the relative standard error of observations at depth edges, where another surface is mixed in.
     """
 
     neighbours: int = 128
@@ -43,9 +42,7 @@ class PriorParams:
     least_error: float = 0.06
     sure: float = 0.15
     single: float = 0.35
-    least_single: float = 0.1
     single_factor: float = 2.0
-    edge_error: float = 0.3
 
 
 @dataclass(frozen=True)

@@ -166,7 +166,8 @@ def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndar
     measured, faces, place = welded(mesh, one_place(mesh.vertices))
     # Welding makes triangles that are smaller than its grid into edges.
     real = (faces != np.roll(faces, 1, 1)).all(1)
-    real[real] = _large(measured, faces[real], DENOISE.too_small * noise)
+    # Parts no larger than outliers have no shape left to find, and stay as they are.
+    real[real] = _large(measured, faces[real], LEVELS.sigmas * noise)
     faces = faces[real]
     if not len(faces):
         return mesh.vertices

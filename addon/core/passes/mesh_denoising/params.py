@@ -11,15 +11,11 @@ class DenoiseParams:
 
     Attributes
     ----------
-    too_small : float
-        Times the noise: parts whose box has a shorter diagonal have no shape left to find, and stay as they are. (A
-        finely scanned one of 7 times is found to a third of the noise.)
     held : float
         Times more that a point in a crowd is held where the crowd has put it (`unfold`): angles there are mostly noise,
         and took a bottle cap's normals from 9 degrees back to 30.
     """
 
-    too_small: float = 4.0
     held: float = 100.0
 
 
@@ -33,11 +29,8 @@ class PlanesParams:
     Attributes
     ----------
     reach : float
-        Times the noise (and the plane's own uncertainty), how far denoised points may lie off, of low triangles and of
-        high ones: a scan's smooth error shows over large triangles, and a moulding's steps have low ones. Half smooth,
-        half from vertex to vertex has 1.4 times what `noise_of` sees; no point goes farther than `reach`.
-    high : float
-        Times the noise.
+        Times the noise (and the plane's own uncertainty), how far denoised points may lie off, as a scan's smooth error
+        shows: half smooth, half from vertex to vertex it has 1.4 times what `noise_of` sees. No point goes farther.
     turn : float
         Radians by which a large triangle may face another way than its plane, besides what noise tilts it by; and
         within which two sheets have no line in common.
@@ -63,7 +56,6 @@ class PlanesParams:
     """
 
     reach: float = 4.5
-    high: float = 10.0
     turn: float = 0.15
     known: float = 0.05
     fill: float = 0.3
@@ -83,12 +75,8 @@ class UnfoldParams:
 
     Attributes
     ----------
-    stiffest : float
-        Of the first plate, as the noise over half an edge's length.
-    shortest, around : float, int
-        Times the noise, edges are taken for no shorter; and rings of neighbours that their lengths are taken over. A
-        bottle cap of 4 cm with edges of 2 mm under 4 to 5 mm of noise: normals off by 16 (half of it smooth) and 32
-        degrees in the median, 23 and 60 by the lengths as measured.
+    shortest : float
+        Times the noise, edges are taken for no shorter.
     crowd, near : int, float
         A point is in a crowd with so many within that many times the noise, itself among them. A frame's thin profile
         has fewer: it would shrink to a line.
@@ -100,9 +88,7 @@ class UnfoldParams:
         Of each linear solve, by conjugate gradients.
     """
 
-    stiffest: float = 4.0
     shortest: float = 0.25
-    around: int = 3
     crowd: int = 8
     near: float = 2.5
     fine: float = 3.0

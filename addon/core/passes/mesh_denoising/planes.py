@@ -95,7 +95,6 @@ class Grower:
         tilt = noise * self.length.max(1) / np.maximum(double, 1e-30)  # noise / height
         # However low a triangle: front and sides of a thin plate are pi / 2 apart.
         self.least = np.cos(np.minimum(PLANES.turn + tilt, np.pi / 4))
-        self.reach = noise * np.where(tilt < 1 / PLANES.high, PLANES.reach, LEVELS.sigmas)
         self.free, self.tried = np.ones(len(faces), bool), np.zeros(len(faces), bool)
         self._seen, self._met, self._run = np.zeros(len(faces), np.int64), np.zeros(len(points), np.int64), 0
 
@@ -129,7 +128,7 @@ class Grower:
             near, first = np.unique(near[fit], return_index=True)
             arm = (self.points[self.faces[near]] - mean) @ axes.T
             variance = 1 + 1 / count + arm[..., 1] ** 2 / scatter[1] + arm[..., 2] ** 2 / scatter[2]
-            fits = (arm[..., 0] ** 2 < self.reach[near, None] ** 2 * variance).all(1)
+            fits = (arm[..., 0] ** 2 < (PLANES.reach * self.noise) ** 2 * variance).all(1)
             front, sign = near[fits], turn[fit][first][fits]
             self._seen[front] = self._run
         region = np.concatenate(region)

@@ -37,7 +37,7 @@ def unfolded(points: np.ndarray, faces: np.ndarray, noise: float) -> tuple[np.nd
     near = ring.tocoo()
     length = np.linalg.norm(points[near.row] - points[near.col], axis=1)
     by_length, by_shortest = (_mean(near, 1 / np.maximum(length, noise) ** power) for power in (1, 2))
-    stiff = np.minimum(2 * noise / _true(_usual_length(ring, near, length), noise), UNFOLD.stiffest) ** 4
+    stiff = (2 * noise / _true(_usual_length(near, length), noise)) ** 4
     fine = noise / _true(_shortest_length(near, length, by_shortest), noise)
     crowded = _in_crowds(points, noise) * np.clip(fine - UNFOLD.fine, 0, 1)
     system = sparse.eye(len(points))
@@ -62,13 +62,10 @@ def _mean(near: sparse.coo_matrix, weight: np.ndarray) -> sparse.csr_matrix:
     return sparse.csr_matrix((weight / np.maximum(total, 1e-300)[near.row], (near.row, near.col)), near.shape)
 
 
-def _usual_length(ring: sparse.csr_matrix, near: sparse.coo_matrix, length: np.ndarray) -> np.ndarray:
-    """Root mean square of the edges around each point, (p,)."""
-    degree = np.maximum(np.diff(ring.indptr), 1)
-    squared = np.bincount(near.row, length**2, len(degree)) / degree
-    for _ in range(UNFOLD.around):
-        squared = (squared + ring @ squared) / (1 + degree)
-    return np.sqrt(squared)
+def _usual_length(near: sparse.coo_matrix, length: np.ndarray) -> np.ndarray:
+    """Root mean square of the edges at each point, (p,)."""
+    degree = np.bincount(near.row, minlength=near.shape[0])
+    return np.sqrt(np.bincount(near.row, length**2, len(degree)) / np.maximum(degree, 1))
 
 
 def _shortest_length(near: sparse.coo_matrix, length: np.ndarray, mean: sparse.csr_matrix) -> np.ndarray:

@@ -27,9 +27,6 @@ class MirrorsParams:
     tilt, tilts, fitted : float, int
         Radians by which the plane is turned first to fit what is mirrored, how often, and observations for it: a scan's
         planes are off.
-    most_off : float
-        Most that one observation counts for, in log radiance: beside an edge a ray of a slightly other way meets
-        something else altogether.
     """
 
     flat_share: float = 0.8
@@ -41,7 +38,6 @@ class MirrorsParams:
     tilt: float = 0.01
     tilts: int = 40
     fitted: int = 6000
-    most_off: float = 0.5
 
 
 MIRRORS = MirrorsParams()

@@ -24,8 +24,6 @@ class SunParams:
         Elements, at most, that these are drawn from.
     near, dense : float, int
         Metres around what stands out; elements from there, and from elsewhere on the same objects, for the refinement.
-    explained : float
-        Share of the elements short of light within the patch that must not be so with the sun.
     colour : float
         A channel's irradiance differs from the luminance by this factor at most: a low sun's is 1.4 and 0.65. What is
         brighter in a channel is no sun: a kitchen's table under copper shades had 1.67 in red.
@@ -44,7 +42,6 @@ class SunParams:
     pool: int = 60_000
     near: float = 0.3
     dense: int = 2000
-    explained: float = 0.5
     colour: float = 1.6
     over: float = 1.2
     stands_out: float = 1.0

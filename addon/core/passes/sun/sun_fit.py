@@ -188,7 +188,7 @@ def find_sun(
     if (
         found.cost > (1 - LEVELS.gain) * edges.differ()
         or after > (1 - LEVELS.gain) * before
-        or left.sum() > (1 - SUN.explained) * short.sum()
+        or 2 * left.sum() > short.sum()
         or not _of_a_sun(spots, contribution)
     ):
         return None

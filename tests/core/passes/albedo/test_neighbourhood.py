@@ -212,14 +212,14 @@ def test_a_single_observation_is_as_unsure_as_the_object_s_others(spread):
     """Within bounds; what is known of one object says nothing of another."""
     lit = observed(1.0, [spread] * 40 + [0.0, 0.0], [20] * 40 + [1, 1], CLEAN)
     own, other = relative_error(lit, np.int32([7] * 41 + [2]))[-2:]
-    expected = np.clip(PRIOR.single_factor * spread, PRIOR.least_single, PRIOR.single)
+    expected = min(PRIOR.single_factor * spread, PRIOR.single)
     assert own == pytest.approx(np.hypot(1.25 * expected, PRIOR.least_error), rel=0.01)
     assert other == pytest.approx(np.hypot(1.25 * PRIOR.single, PRIOR.least_error))
 
 
 def test_edges_and_saturation_are_in_doubt():
     clean, edge, saturated = of_one(observed(1.0, 0.1, 20, [CLEAN, EDGE, SATURATED]))
-    assert edge == pytest.approx(clean + PRIOR.edge_error) and saturated > edge > PRIOR.sure > clean
+    assert edge == pytest.approx(clean + PRIOR.single) and saturated > edge > PRIOR.sure > clean
 
 
 def test_what_nobody_saw_is_no_measurement():
