@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from addon.core.passes.unseen_light import unseen_light
-from addon.core.passes.unseen_light.params import UNSEEN
+from addon.core.significance import LEVELS
 from tests.hard_cases.figures import FIGURES, Figure
 from tests.hard_cases.rooms import Captured
 
@@ -26,7 +26,7 @@ def pytest_collection_modifyitems(items):
 @pytest.fixture(autouse=True)
 def few_samples(monkeypatch):
     """The search for lamps looks at fewer elements than it would in a real room."""
-    monkeypatch.setattr(unseen_light, "UNSEEN", replace(UNSEEN, samples=800))
+    monkeypatch.setattr(unseen_light, "LEVELS", replace(LEVELS, sample=800))
 
 
 @pytest.fixture
