@@ -198,19 +198,23 @@ class LightField:
             radiance[lamp[behind]] = 0
         return radiance
 
-    def _mirrored(self, hits: Hits, directions: np.ndarray, dark: np.ndarray | None) -> np.ndarray:
-        """What a mirror that was hit shows; a second mirror shows its L_d."""
+    def onward(self, hits: Hits, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Origins and directions of rays that go on from mirrors that they hit, and these mirrors' F0, (n, 3) each."""
         a, b, c = (self.mesh.vertices.take(corner, 0) for corner in self.mesh.triangles.take(hits.triangle, 0).T)
         u, v = hits.u[:, None], hits.v[:, None]
         turn = ((1 - u - v) * a + u * b + v * c).astype(np.float32)
         normal = self.normal.take(hits.triangle, 0)
         along = np.einsum("ij,ij->i", directions, normal)[:, None]
-        onward = directions - 2 * along * normal
+        f0 = np.stack([mirror.f0 for mirror in self.mirrors]).astype(np.float32)
         origins = self.scene.off_surface(turn, -np.sign(along) * normal)
+        return origins, directions - 2 * along * normal, f0.take(self.mirror_of.take(hits.triangle), 0)
+
+    def _mirrored(self, hits: Hits, directions: np.ndarray, dark: np.ndarray | None) -> np.ndarray:
+        """What a mirror that was hit shows; a second mirror shows its L_d."""
+        origins, onward, f0 = self.onward(hits, directions)
         further = self.scene.intersect(origins, onward)
         element = self.elements(further)
         radiance = self._sent(further, element, onward, origins)
         if dark is not None:
             radiance[(dark[further.triangle] > 0) & (element >= 0)] = 0
-        f0 = np.stack([mirror.f0 for mirror in self.mirrors]).astype(np.float32)
-        return radiance * f0.take(self.mirror_of.take(hits.triangle), 0)
+        return radiance * f0

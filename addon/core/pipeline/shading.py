@@ -22,6 +22,7 @@ from ..memory import give_back
 from ..passes.clipped_lamps.clipped import shade_clipped
 from ..passes.clipped_lamps.patches import clipped_patches, told_of
 from ..passes.mirrors.flat_mirrors import find_mirrors
+from ..passes.mirrors.mirror_patches import mirror_patches
 from ..passes.missing_light.missing_light import find_missing_light, is_missing
 from ..passes.unseen_light.unseen_light import Light
 from ..progress import Progress
@@ -72,27 +73,38 @@ def find_shading(
     patches, guessed = Patches.none(), capture.mesh.whole
     if guessed and not {"clipped-patches", "missing-light"} & set(s.without):
         patches = clipped_patches(surface.mesh, surface.atlas, lit)
-        surface, capture = patches.surface(surface), patches.capture(capture)
+        surface = patches.surface(surface)
+    if guessed and s.mirrors and "mirrors" not in s.without:
+        seen = LightField(
+            surface.mesh, surface.atlas, surface.scene, unseen_dark(lit), observed.environment, lookup=surface.lookup
+        )
+        patches = Patches.together([patches, mirror_patches(seen, observed.samples)])
+        surface = patches.surface(surface)
+    capture = patches.capture(capture)
 
     def shaded(lit: LitDiffuse) -> Shading:
         return shade(
             surface, capture.instances, lit, observed.environment, s, progress=progress,
             find_mirrors=mirrors if s.mirrors else None, colours=observed.fringes.colours(),
-            patches=patches.objects if guessed else None,
+            patches=patches.lamps if guessed else None,
         )  # fmt: skip
 
     if "clipped-lamps" in s.without:
         found = shaded(lit)
     else:
-        found = shade_clipped(shaded, lit, surface.atlas, patches.objects)
-    return with_lamps_of(found, patches)
+        found = shade_clipped(shaded, lit, surface.atlas, patches.lamps)
+    return with_patches_of(found, patches)
 
 
-def with_lamps_of(found: Shading, patches: Patches) -> Shading:
-    """Light that was found with `patches` set apart: those that are no lamps are parts of their objects again."""
-    lamps, number = patches.kept(set(patches.objects) & found.emitters)
-    told = [replace(one, object_id=number.get(one.object_id, one.object_id)) for one in found.lamps]
-    return replace(found, lamps=tuple(told), patches=lamps)
+def with_patches_of(found: Shading, patches: Patches) -> Shading:
+    """Light that was found with `patches` set apart: those that are no lamps or mirrors are of their objects again."""
+    mirrors = {one.object_id for one in found.mirrors}
+    kept, number = patches.kept(set(patches.objects) & (found.emitters | mirrors))
+
+    def told(found: Any) -> tuple:
+        return tuple(replace(one, object_id=number.get(one.object_id, one.object_id)) for one in found)
+
+    return replace(found, lamps=told(found.lamps), mirrors=told(found.mirrors), patches=kept)
 
 
 def lit_room(surface: Surface, shading: Shading) -> LightField:
@@ -252,8 +264,9 @@ def with_missing_light(
     if not is_missing(field, good, seed):
         return field, light, np.zeros(len(field.atlas), bool)
     told = told_of(patches, field.atlas, lit_diffuse)
-    bright = np.isin(field.atlas.object_id, told)
-    found = find_missing_light(dark, good & ~bright, [one for one in patches if one not in told], seed)
+    bright = np.isin(field.atlas.object_id, [*told, *(one.object_id for one in field.mirrors)])
+    lit_over = dark.with_mirrors(field.mirrors)
+    found = find_missing_light(lit_over, good & ~bright, [one for one in patches if one not in told], seed)
     radiance = evened(dark)
     for one, solved in found.radiance.items():
         own = dark.atlas.object_id == one

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
 from .model import Capture, Instance, Mesh
 from .surface import Surface
 
-CLASS_NAME = "lamp"
-"""Of their instances."""
+LAMP, MIRROR = "lamp", "mirror"
+"""Classes of their instances."""
+
+
+def _nothing() -> np.ndarray:
+    return np.zeros(0, np.int32)
 
 
 @dataclass(frozen=True)
@@ -23,10 +27,13 @@ class Patches:
     triangle : (p,) int32
     object_id : (p,) int32
         The object that each is of now.
+    mirrors : (m,) int32
+        Those of the new objects that may be mirrors; the others may be lamps.
     """
 
     triangle: np.ndarray
     object_id: np.ndarray
+    mirrors: np.ndarray = field(default_factory=_nothing)
 
     def __len__(self) -> int:
         return len(self.triangle)
@@ -34,19 +41,30 @@ class Patches:
     @staticmethod
     def none() -> Patches:
         """Where nothing is."""
-        return Patches(np.zeros(0, np.int32), np.zeros(0, np.int32))
+        return Patches(_nothing(), _nothing())
+
+    @staticmethod
+    def together(parts: Sequence[Patches]) -> Patches:
+        """Several that share no triangle and no object."""
+        return Patches(*(np.concatenate([getattr(one, each.name) for one in parts]) for each in fields(Patches)))
 
     @property
     def objects(self) -> list[int]:
         """The new objects."""
         return [int(i) for i in np.unique(self.object_id)]
 
+    @property
+    def lamps(self) -> list[int]:
+        """Those of them that may be lamps."""
+        return [i for i in self.objects if i not in self.mirrors]
+
     def kept(self, objects: Iterable[int]) -> tuple[Patches, dict[int, int]]:
         """Those of some objects alone, numbered without gaps; and the new number of each."""
         numbers = dict(zip(sorted(objects), self.objects, strict=False))
         kept = np.isin(self.object_id, list(numbers))
         new = np.array([numbers[int(i)] for i in self.object_id[kept]], np.int32)
-        return Patches(self.triangle[kept], new), numbers
+        mirrors = np.array([numbers[int(i)] for i in self.mirrors if i in numbers], np.int32)
+        return Patches(self.triangle[kept], new, mirrors), numbers
 
     def mesh(self, mesh: Mesh) -> Mesh:
         """A mesh with them set apart; it may lack the second sides (`Mesh.backs`)."""
@@ -68,7 +86,8 @@ class Patches:
     def capture(self, capture: Capture) -> Capture:
         """A capture with them set apart; as it is where they are already."""
         known = {one.object_id for one in capture.instances}
-        new = tuple(Instance(i, CLASS_NAME, guess=True) for i in self.objects if i not in known)
+        classes = dict.fromkeys(self.objects, LAMP) | dict.fromkeys(self.mirrors.tolist(), MIRROR)
+        new = tuple(Instance(i, name, guess=True) for i, name in classes.items() if i not in known)
         if not new:
             return capture
         mesh = self.mesh(capture.mesh)

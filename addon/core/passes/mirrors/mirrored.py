@@ -57,6 +57,14 @@ class Views:
         known = np.flatnonzero(shown.mean(1) > DARK)
         return None if len(known) < LEVELS.many else (known, shown[known])
 
+    def known(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """As `_known`, with the logarithm of what was seen and of what a mirror would show, (k,) each."""
+        found = self._known(normals)
+        if found is None:
+            return None
+        known, shown = found
+        return known, *(np.log(np.maximum(x.mean(1), DARK)) for x in (self.radiance[known], shown))
+
     def off(self, normal: np.ndarray) -> float:
         """Mean absolute deviation of log radiance from a mirror that faces one way ((3,)); inf where too little is
         known.

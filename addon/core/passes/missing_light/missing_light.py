@@ -178,13 +178,19 @@ def _through_cells(
         normal = field.atlas.normal[element[block]]
         directions = turned(patterns, normal, np.random.default_rng([seed, block.start]))[0].reshape(-1, 3)
         origins = np.repeat(field.scene.off_surface(field.atlas.position[element[block]], normal), MISSING.rays, 0)
-        hits = field.scene.intersect(origins, directions)
-        closed = shut[field.elements(hits)] & (hits.triangle >= 0)
-        out = np.flatnonzero((hits.triangle < 0) | closed)
-        place, way = out // MISSING.rays, directions[out]
-        share = np.where(closed[out], 1, sky.at(unfamiliar, way)) * (np.pi / MISSING.rays)
+        hits, each = field.scene.intersect(origins, directions), np.full(len(origins), np.pi / MISSING.rays)
+        met, closed = hits.triangle, shut[field.elements(hits)]
+        if field.mirrors and len(seen := np.flatnonzero((met >= 0) & (field.mirror_of.take(met) >= 0))):
+            origins[seen], directions[seen], f0 = field.onward(hits.part(seen), directions[seen])
+            further = field.scene.intersect(origins[seen], directions[seen])
+            met[seen], closed[seen] = further.triangle, shut[field.elements(further)]
+            each[seen] *= f0.mean(1)
+        closed &= met >= 0
+        out = np.flatnonzero((met < 0) | closed)
+        place, way, each = out // MISSING.rays, directions[out], each[out]
+        share = np.where(closed[out], 1, sky.at(unfamiliar, way)) * each
         np.add.at(through[block], (place, unknown[exits(low, size, origins[out], way)[0]]), share)
-        rest, own = np.pi / MISSING.rays - share, sky.at(part, way)
+        rest, own = each - share, sky.at(part, way)
         clipped = own >= 0
         np.add.at(by_part[block], (place[clipped], own[clipped]), rest[clipped])
         np.add.at(shown[block], place[~clipped], rest[~clipped, None] * sky(way[~clipped]))

@@ -11,9 +11,12 @@ from scipy.spatial import cKDTree
 
 from addon.core.light.environment import Environment
 from addon.core.light.few_elements import irradiance_at
+from addon.core.light.mirrors import Mirror
+from addon.core.light.openings import CELLS, Openings
 from addon.core.passes.clipped_lamps.clipped import clipped_objects
 from addon.core.passes.clipped_lamps.patches import clipped_patches, told_of
-from addon.core.passes.missing_light.missing_light import find_missing_light, is_missing
+from addon.core.passes.missing_light.missing_light import _through_cells, find_missing_light, is_missing
+from addon.core.passes.missing_light.params import MISSING
 from addon.core.passes.missing_light.solve import Unknown, solve
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.visibility import CLEAN, EDGE
@@ -223,3 +226,24 @@ def test_where_nothing_is_unknown_nothing_is_solved_for():
     pairs = np.arange(40).reshape(-1, 2)
     found, spread = solve(np.ones((40, 3)), np.full((40, 3), 4.0), none, pairs)
     assert found.shape == (0, 3) and spread == (0, 0)
+
+
+def test_light_by_a_hole_that_a_mirror_shows_counts():
+    """The ceiling sees the hole in it over a mirror on the floor alone."""
+    sides = box_sides()
+    room = make_room([sides[0], *around(sides[1], *AT), *sides[2:]], texel=0.2)
+    atlas = room.atlas
+    field = room.field(np.zeros((len(atlas), 3), np.float32)).with_light(
+        np.full((len(atlas), 3), 0.01, np.float32) * (atlas.object_id != 0)[:, None], Environment.dark()
+    )
+    mirror = Mirror(0, np.zeros(3, np.float32), np.float32([0, 0, 1]), np.full(3, 0.9, np.float32))
+    ceiling = np.flatnonzero(atlas.object_id == 1)
+    low, size = field.outer_box
+    bright = field.with_openings(Openings(low, size, np.ones((CELLS, 3), np.float32), 1.0))
+    for one, seen in ((bright.with_mirrors((mirror,)), True), (bright, False)):
+        through = _through_cells(
+            one, one.environment.clipped_parts(MISSING.sky), np.zeros(len(atlas), bool), ceiling, 0
+        )[1].sum(1)
+        dark = one.with_light(np.zeros_like(one.radiance))
+        assert through.mean() == pytest.approx(irradiance_at(dark, ceiling, 0)[:, 0].mean(), rel=0.1)
+        assert (through.mean() > 0.01) == seen

@@ -1,0 +1,89 @@
+"""A mirror that is of one part with its wall is set apart, from frames summed up without the code under test."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from addon.core.passes.mirrors.flat_mirrors import find_mirrors
+from addon.core.passes.mirrors.mirror_patches import mirror_patches
+from addon.core.scene.model import Capture
+from addon.core.scene.patches import Patches
+from addon.core.scene.samples import Samples
+from tests.core.glossy_box import SIZE, Box
+from tests.core.rooms import around, cut, lit_box, make_room
+
+LOW, HIGH, ABOVE = np.array([1.0, 0.6]), np.array([3.0, 2.4]), 0.02
+"""Of the mirror on the floor, metres."""
+
+
+def with_mirror(above: float) -> Box:
+    """A floor with a board of the same object on it, or in it."""
+    box = Box()
+    floor, *others = lit_box(tuple(SIZE))
+    u, v = ((float(LOW[i] / SIZE[i]), float(HIGH[i] / SIZE[i])) for i in (0, 1))
+    board = cut(floor, u, v)
+    board = replace(board, corner=board.corner + [0, 0, above])
+    box.room = make_room([*around(floor, u, v), board, *others], 0.1)
+    return box
+
+
+@pytest.fixture(scope="module")
+def box():
+    return with_mirror(ABOVE)
+
+
+def frames(box, f0, diffuse=0.3, noise=0.05):
+    """The floor's samples: diffuse, with a mirror in its middle; and which are the mirror's."""
+    element, direction, frame = box.views(900, 10)
+    origin = box.room.atlas.position[element].astype(float) + [0, 0, 1e-6]
+    inside = ((origin[:, :2] > LOW) & (origin[:, :2] < HIGH)).all(1)
+    shown = box.arriving(origin, np.array([-1, -1, 1]) * direction)
+    seen = np.where(inside[:, None], f0 * shown, diffuse)
+    seen = seen * np.exp(np.random.default_rng(0).normal(0, noise, seen.shape))
+    return Samples(
+        element.astype(np.int32), frame.astype(np.int32), np.float32(seen), direction, np.zeros(len(element), bool)
+    )
+
+
+def test_a_mirror_on_a_floor(box):
+    samples = frames(box, 0.85)
+    patches = mirror_patches(box.field, samples)
+    assert len(patches.mirrors) == 1 and patches.objects == patches.mirrors.tolist() and not patches.lamps
+    mesh = box.room.mesh
+    raised = (mesh.object_id == 0) & (mesh.vertices[mesh.triangles][:, :, 2] > ABOVE / 2).all(1)
+    assert np.array_equal(patches.triangle, np.flatnonzero(raised))
+
+    capture = patches.capture(Capture(None, mesh, box.room.instances, ()))
+    assert [one.class_name for one in capture.instances if one.object_id in patches.mirrors] == ["mirror"]
+    set_apart = replace(box.room, mesh=capture.mesh)
+    field = set_apart.field(box.field.radiance)
+    (mirror,) = find_mirrors(field, (), samples, capture.instances)
+    assert mirror.object_id == patches.mirrors[0]
+    np.testing.assert_allclose(mirror.f0, 0.85, rtol=0.1)
+
+
+@pytest.mark.parametrize(("f0", "diffuse"), [(0.0, 0.3), (0.06, 0.05)])  # no mirror at all; a black pane
+def test_what_is_no_mirror(box, f0, diffuse):
+    assert not len(mirror_patches(box.field, frames(box, f0, diffuse)))
+
+
+def test_a_polished_floor_that_mirrors_in_one_place():
+    box = with_mirror(0.0)
+    assert not len(mirror_patches(box.field, frames(box, 0.85)))
+
+
+def test_too_little_to_tell(box):
+    samples = frames(box, 0.85)
+    assert not len(mirror_patches(box.field, replace(samples, saturated=np.ones(len(samples.element), bool))))
+
+
+def test_patches_together_and_kept():
+    lamps = Patches(np.array([3, 4], np.int32), np.array([7, 7], np.int32))
+    mirrors = Patches(np.array([1, 9], np.int32), np.array([8, 9], np.int32), np.array([8, 9], np.int32))
+    both = Patches.together([lamps, mirrors])
+    assert both.objects == [7, 8, 9] and both.lamps == [7]
+    kept, number = both.kept({9})
+    assert number == {9: 7} and kept.mirrors.tolist() == [7] and kept.triangle.tolist() == [9]
