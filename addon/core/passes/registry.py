@@ -113,6 +113,7 @@ PASSES = (
         albedo_prior="Shrinks uncertain albedo towards its neighbourhood's.",
         second_colour="Shrinks it to a second colour of the neighbourhood where that is likelier.",
         wide_prior="Widens the neighbourhood for as long as it stays alike.",
+        class_albedo="Shrinks the albedo of objects of one class towards one another's.",
         object_spread="Takes the spread of single observations from others of the object.",
         texture_fill="Gives what is filled in the texture of its plane's measured part.",
         compensation="Raises Base Color for the light that the Principled coat keeps from the diffuse part.",

@@ -12,6 +12,7 @@ from addon.core.light.emitters import bright_triangles
 from addon.core.light.lamps import Lamp, find_seen
 from addon.core.light.mirrors import Mirror
 from addon.core.luminance import LUMINANCE
+from addon.core.passes.unseen_light.unseen_light import bright_all_over
 from addon.core.pipeline.shading import shade
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.visibility import EDGE
@@ -233,6 +234,23 @@ def test_bright_surfaces_under_bright_light_are_no_lamps():
     lamps = find_seen(ids, radiance, np.pi * radiance / needed)
     assert [lamp.object_id for lamp in lamps] == [4]
     assert lamps[0].seen and lamps[0].radiance.tolist() == [1, 1, 1]
+
+
+def test_a_metal_that_shows_a_highlight_to_some_is_no_lamp():
+    """The few elements that were seen unmixed are as bright as a lamp's; most of the object is not."""
+    things = [quad((1, 1, 2), (0, 0.5, 0), (0.5, 0, 0), 1), quad((3, 1, 2), (0, 0.5, 0), (0.5, 0, 0), 2)]
+    room = make_room([quad((0, 0, 0), (4, 0, 0), (0, 3, 0), 0), *things], 0.1)
+    radiance = room.by_object({0: 0.1, 1: 50.0, 2: 50.0})
+    metal, lamp = room.atlas.elements_of(2), room.atlas.elements_of(1)
+    radiance[metal[4:]] = 0.05
+    element = np.concatenate([room.atlas.elements_of(0), lamp[:4], metal[:4]])
+    E = np.full((len(element), 3), 0.5)
+    found = bright_all_over(room.field(radiance), element, E)
+    assert [one.object_id for one in found] == [1] and found[0].radiance.tolist() == [50, 50, 50]
+    radiance[lamp[4:]] = 0  # no frame saw these
+    assert [
+        one.object_id for one in bright_all_over(room.field(radiance), element, np.full((len(element), 3), 0.5))
+    ] == [1]
 
 
 def test_a_finely_meshed_lamp_is_aimed_at_as_a_whole():

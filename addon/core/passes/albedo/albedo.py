@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Instance, class_names
 from .neighbourhood import relative_error, shrink
+from .of_class import shrunk_to_class
 from .params import ALBEDO, MAX_ALBEDO
 
 MEASURED: Code[int] = 2
@@ -88,7 +89,7 @@ def albedo_of(
     specular: np.ndarray | float = 0.0,
     without: Collection[str] = (),
 ) -> Albedo:
-    """Albedo = pi L_d / E, clamped, filled in and shrunk (`fill`).
+    """Albedo = pi L_d / E, clamped, filled in and shrunk (`fill`), to others of its class as well (`of_class`).
 
     Parameters
     ----------
@@ -105,7 +106,12 @@ def albedo_of(
     """
     rho, valid = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
     error = np.hypot(relative_error(lit_diffuse, atlas.object_id, "object-spread" not in without), unsure)
-    return fill(atlas, rho, valid & lit_diffuse.seen, class_names(instances), emitters, error, without)
+    found = fill(atlas, rho, valid & lit_diffuse.seen, class_names(instances), emitters, error, without)
+    if "class-albedo" in without:
+        return found
+    told = class_names(one for one in instances if not one.guess)
+    level = shrunk_to_class(atlas, found.rho, found.origin == MEASURED, told)
+    return replace(found, rho=np.minimum(level, MAX_ALBEDO))
 
 
 def fill(

@@ -67,8 +67,27 @@ class SecondColourParams:
     unexplained: float = 1e-4
 
 
+@dataclass(frozen=True)
+class ClassPriorParams:
+    """Of `of_class` (`class-albedo` in the ablation).
+
+    Attributes
+    ----------
+    of_place, place : float
+        Relative standard error that E has in common over so many square metres: ten rooms have .03 to .08, as their
+        large objects' albedo varies between places.
+    most : float
+        That of an object however small.
+    """
+
+    of_place: float = 0.05
+    place: float = 0.5
+    most: float = 0.2
+
+
 PRIOR = PriorParams()
 SECOND_COLOUR = SecondColourParams()
+CLASS_PRIOR = ClassPriorParams()
 
 
 @dataclass(frozen=True)

@@ -162,7 +162,7 @@ def find_light(
         received = received + from_sun(field, element)
     guess = [environment.zone_mean(zone).astype(np.float64) for zone in zones]
     filled = received + sum(G[:, None] * s for G, s in zip(sky_contributions, guess, strict=True))
-    seen = find_seen(atlas.object_id[element], field.radiance[element], filled)
+    seen = bright_all_over(field, element, filled)
     if before is None and "unseen-lamps" not in without:
         mixed = tuple(mixed_lamps(seen, atlas.object_id[good]))
         if mixed:
@@ -224,10 +224,25 @@ def find_light(
     everything = irradiance_at(
         field.with_light(lit_by(field, lamps), environment, [lamp.object_id for lamp in lamps]), element, seed
     )
-    sure = find_seen(atlas.object_id[element], field.radiance[element], everything)
+    sure = bright_all_over(field, element, everything)
     kept = Contributions(sunless, sky_contributions, sample.element, contribution, least)
     notes = found + tuple(sky.notes())
     return Light(tuple(sure) + tuple(lamps), environment, notes, element, everything, kept, mixed)
+
+
+def bright_all_over(field: LightField, element: np.ndarray, irradiance: np.ndarray) -> list[Lamp]:
+    """`find_seen` by a few elements, (m,) int, and E there, (m, 3), less what all that frames show of it says is none.
+
+    The pixels that show a small metal unmixed may be those of a highlight.
+    """
+    atlas, found = field.atlas, []
+    for lamp in find_seen(atlas.object_id[element], field.radiance[element], irradiance):
+        own = atlas.elements_of(lamp.object_id)
+        own = own[field.radiance[own].any(1)]
+        E = np.median(irradiance[atlas.object_id[element] == lamp.object_id], 0)
+        if find_seen(atlas.object_id[own], field.radiance[own], np.broadcast_to(E, (len(own), 3))):
+            found.append(lamp)
+    return found
 
 
 def of_colour(lamp: Lamp, known: np.ndarray | None) -> np.ndarray:

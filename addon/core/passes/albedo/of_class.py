@@ -1,0 +1,55 @@
+"""Albedo of objects of one class: its level, which E's error puts off place by place, shrunk towards the class's.
+
+Doors, panels, chairs of one class mostly are of one paint. A random-effects model of log albedo tells how far: how much
+the members differ beyond their own errors is estimated (DerSimonian and Laird 1986), and each is shrunk by that
+(empirical Bayes). Where they are of several paints, they stay as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...scene.atlas import Atlas
+from .params import ALBEDO, CLASS_PRIOR
+
+
+def shrunk_to_class(atlas: Atlas, rho: np.ndarray, measured: np.ndarray, class_of: Mapping[int, str]) -> np.ndarray:
+    """Albedo with all of each object's times what its level is shrunk by, (n, 3) float32.
+
+    Parameters
+    ----------
+    rho : (n, 3) float32
+    measured : (n,) bool
+        Elements that the level is taken from.
+    class_of : mapping of int to str
+        Of the objects that somebody told apart; others stay as they are.
+    """
+    result = rho.copy()
+    members: dict[str, list[np.ndarray]] = {}
+    for object_id, name in class_of.items():
+        own = atlas.elements_of(object_id)
+        if measured[own].any():
+            members.setdefault(name, []).append(own)
+    for alike in members.values():
+        if len(alike) > 1:
+            for own, factor in zip(alike, _factors(atlas, rho, [own[measured[own]] for own in alike]), strict=True):
+                result[own] *= factor
+    return result
+
+
+def _factors(atlas: Atlas, rho: np.ndarray, measured: Sequence[np.ndarray]) -> np.ndarray:
+    """What the albedo of a class's k members is to be multiplied by, (k,) float32."""
+    colour = np.log(np.maximum([np.median(rho[own], 0) for own in measured], ALBEDO.floor))
+    area = np.array([atlas.area[own].sum() for own in measured])
+    # E errs by the place: a large member lies in several.
+    variance = np.minimum(CLASS_PRIOR.of_place**2 * CLASS_PRIOR.place / area, CLASS_PRIOR.most**2)
+    weight = 1 / variance
+    # Paints that differ in one channel differ.
+    off = np.square(colour - np.average(colour, 0, weight)).max(1)
+    excess = (weight * off).sum() - (len(colour) - 1)
+    between = max(excess / (weight.sum() - np.square(weight).sum() / weight.sum()), 0.0)
+    level = colour.mean(1)
+    middle = np.average(level, weights=1 / (variance + between))
+    return np.exp(variance / (between + variance) * (middle - level)).astype(np.float32)
