@@ -27,6 +27,7 @@ from ...light.texel_blocks import TexelBlocks
 from ...parallel import for_blocks
 from ...progress import Progress, Rounds
 from ...scene.rays import Hits
+from ...significance import LEVELS
 from .caustics import Gloss, caustics
 from .params import GLOSSY
 
@@ -168,5 +169,10 @@ def glossy_light(
     # Spread like the light itself, the halves' difference has the noise that is left in it.
     found, noise = found[:, :3] - level, found[:, 3:].mean(1)
     if "glossy-smoothing" not in without:
-        found, _ = less_noise(atlas.position[element], atlas.normal[element], found, noise, GLOSSY.smooth, threads)
+        # As shares of E: what is lost in the noise of bright places is much beside them in the dark.
+        whole = np.maximum(irradiance, LEVELS.dark * level)
+        part, _ = less_noise(
+            atlas.position[element], atlas.normal[element], found / whole, noise / whole.mean(1), GLOSSY.smooth, threads
+        )
+        found = part * whole
     return np.maximum(found, -GLOSSY.most_taken * irradiance).astype(np.float32)

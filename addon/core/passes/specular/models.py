@@ -227,7 +227,9 @@ def adopt_from_class(
                 note = f"Not identifiable by itself; takes over the lobe of object {source} of its class."
                 result[i] = replace(model, gain=0.0, sigmas=0.0, note=note, scores=choice.scores)
             elif choice.model is model.model and len(found) > 1 and i in problems:
-                result[i] = replace(choice, fit=_of_class(choice.lobe, model.lobe, model.model, problems[i]))
+                # By looks alone it has no lobe of its own, where views of others tell one.
+                own = None if choice.looks is not None and model.looks is None else problems[i]
+                result[i] = replace(choice, fit=_of_class(choice.lobe, model.lobe, model.model, own))
     return result
 
 
