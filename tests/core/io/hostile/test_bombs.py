@@ -14,7 +14,7 @@ import OpenEXR
 import pytest
 
 from addon.core.errors import BadInputError
-from addon.core.io.id_pictures import check_size
+from addon.core.io.id_pictures import check_ids
 from addon.core.io.layout import Reading
 from addon.core.io.oiio import read_coded
 from addon.core.io.read import read_capture
@@ -65,7 +65,7 @@ READ = """
 import sys
 from pathlib import Path
 from addon.core.errors import BadInputError
-from addon.core.io.id_pictures import check_size
+from addon.core.io.id_pictures import check_ids
 from addon.core.io.layout import Reading
 from addon.core.io.pixels import read_pixels
 from addon.core.io.read import read_capture
@@ -108,7 +108,7 @@ def test_a_picture_of_ids_that_is_larger_than_its_frame(tmp_path):
     exr(tmp_path / "ids.exr", 2048)
     frame = Frame("one", tmp_path / "a.exr", Camera(8, 6, 4, 4, 4, 3, np.eye(4)), id_path=tmp_path / "ids.exr")
     with pytest.raises(BadInputError, match="2048 x 2048.*give them one size"):
-        check_size(frame)
+        check_ids(frame)
 
 
 def test_a_jpeg_of_many_scans(tmp_path):
