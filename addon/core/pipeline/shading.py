@@ -78,8 +78,8 @@ def find_shading(
         seen = LightField(
             surface.mesh, surface.atlas, surface.scene, unseen_dark(lit), observed.environment, lookup=surface.lookup
         )
-        patches = Patches.together([patches, mirror_patches(seen, observed.samples)])
-        surface = patches.surface(surface)
+        glass = mirror_patches(seen, observed.samples)
+        patches, surface = Patches.together([patches, glass]), glass.surface(surface)
     capture = patches.capture(capture)
 
     def shaded(lit: LitDiffuse) -> Shading:

@@ -62,7 +62,7 @@ def _mirrored(views: Views, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     known = views.known(normal)
     if known is None:
         return np.zeros(0, int), np.zeros(0, bool)
-    index, seen, shown = known
+    index, _, seen, shown = known
     element, group, count = np.unique(views.element[index], return_inverse=True, return_counts=True)
     position = views.field.atlas.position[element]
     near = cKDTree(position).query(position, k=min(LEVELS.enough, len(element)))[1].reshape(len(element), -1)

@@ -50,30 +50,25 @@ class Views:
         """Some of them."""
         return Views(self.field, *(getattr(self, k)[index] for k in ("element", "origin", "direction", "radiance")))
 
-    def _known(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """Which observations ((k,) int) a mirror that faces `normals` shows something known in, and what ((k, 3))."""
+    def known(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+        """Which observations ((k,) int) a mirror that faces `normals` shows something known in, what ((k, 3)), and the
+        logarithm of what was seen and of what it shows, (k,) each."""
         along = 2 * np.einsum("ij,ij->i", self.direction, np.broadcast_to(normals, self.direction.shape))[:, None]
         shown = self.field.along(self.origin, (along * normals - self.direction).astype(np.float32))[0]
         known = np.flatnonzero(shown.mean(1) > DARK)
-        return None if len(known) < LEVELS.many else (known, shown[known])
-
-    def known(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """As `_known`, with the logarithm of what was seen and of what a mirror would show, (k,) each."""
-        found = self._known(normals)
-        if found is None:
+        if len(known) < LEVELS.many:
             return None
-        known, shown = found
-        return known, *(np.log(np.maximum(x.mean(1), DARK)) for x in (self.radiance[known], shown))
+        seen, shown = self.radiance[known], shown[known]
+        return known, shown, *(np.log(np.maximum(x.mean(1), DARK)) for x in (seen, shown))
 
     def off(self, normal: np.ndarray) -> float:
         """Mean absolute deviation of log radiance from a mirror that faces one way ((3,)); inf where too little is
         known.
         """
-        found = self._known(normal)
+        found = self.known(normal)
         if found is None:
             return np.inf
-        known, shown = found
-        ratio = np.log(np.maximum(self.radiance[known].mean(1), DARK)) - np.log(shown.mean(1))
+        ratio = found[2] - found[3]
         # Beside an edge a ray of a slightly other way meets something else altogether.
         return float(np.minimum(np.abs(ratio - np.median(ratio)), LIGHT_FIT.cap).mean())
 
@@ -88,17 +83,16 @@ class Views:
             Correlation of what was seen with the mirrored room, within the elements.
         f0 : (3,) float
         """
-        found = self._known(normals)
+        found = self.known(normals)
         if found is None:
             return np.inf, 0.0, 0.0, np.zeros(3)
-        known, shown = found
-        seen = self.radiance[known]
-        a, b = (np.log(np.maximum(x.mean(1), DARK)) for x in (seen, shown))
+        known, shown, a, b = found
         _, group, count = np.unique(self.element[known], return_inverse=True, return_counts=True)
         own_a, own_b = (x - (np.bincount(group, x) / count)[group] for x in (a, b))
         together = float(np.mean(own_a * own_b) / max(own_a.std() * own_b.std(), 1e-12))
         off = float(np.median(np.abs(a - b - np.median(a - b))))
-        return off, float(np.median(np.abs(own_a))), together, np.median(seen / np.maximum(shown, DARK), 0)
+        f0 = np.median(self.radiance[known] / np.maximum(shown, DARK), 0)
+        return off, float(np.median(np.abs(own_a))), together, f0
 
 
 def sides_of(normal: np.ndarray) -> np.ndarray:
