@@ -1,7 +1,5 @@
 """Scan Relight as a Python library, with Blender or without (docs/api.md); the package gives these names as its own."""
 
-from __future__ import annotations
-
 import importlib.util
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What ties a run to whoever started it: events as lines of JSON, the wish to stop, and a limit on memory."""
 
-from __future__ import annotations
-
 import json
 import os
 import threading

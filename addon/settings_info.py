@@ -1,7 +1,5 @@
 """What there is to say about each setting, read off the `Settings` dataclass: the one source for every interface."""
 
-from __future__ import annotations
-
 import inspect
 import re
 import typing

@@ -5,8 +5,6 @@ as long as it lives, in which whoever asks for temporary files puts them. Only f
 lock is free are taken away.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import os

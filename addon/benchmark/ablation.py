@@ -5,8 +5,6 @@ are taken from the whole run's store; where that stage comes out the same withou
 of JSON for each run goes to `LINES`: what is there is not done again, and files of several machines can be joined.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import shutil

@@ -1,7 +1,5 @@
 """docs/ablation.md: what each pass gains and costs, from the ablation's lines of JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

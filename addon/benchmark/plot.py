@@ -1,7 +1,5 @@
 """A table's curves as a picture. The only module that imports matplotlib, which is there for development only."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@ It is no render: light goes no further than the recovered light field. But what 
 view shows, in a second.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.kinds import Workload

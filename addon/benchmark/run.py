@@ -1,7 +1,5 @@
 """The benchmark's stages, what they are told, and the files they leave."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import importlib.util
 import os

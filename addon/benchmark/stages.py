@@ -4,8 +4,6 @@ Alternatives are settings, so what is measured is what a user gets; the paper's 
 from the same stage under the settings of `FINEST`; of the specular stage and of all together, from the capture's truth.
 """
 
-from __future__ import annotations
-
 import gc
 import json
 import time

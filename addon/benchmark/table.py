@@ -1,7 +1,5 @@
 """A benchmark's table: what was run, how wrong it was, what it cost. As CSV in full precision, as Markdown rounded."""
 
-from __future__ import annotations
-
 import csv
 import io
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Materials as found against a capture's truth: roughness and model, object by object. Never read by the pipeline."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Truth seen through a capture's held-out cameras, against what surface elements hold. Never read by the pipeline."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

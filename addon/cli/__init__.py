@@ -4,8 +4,6 @@ As `scan-relight` in a Python environment with Blender's bpy, and as `blender --
 extension is installed. Nothing of Blender or the method is imported before it is needed, so that `--help` is quick.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import importlib.util

@@ -1,7 +1,5 @@
 """`scan-relight benchmark ablation`: what each pass gains, from the command line."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The command `benchmark`: every stage's error and cost over its alternatives."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import TextIO

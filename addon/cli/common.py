@@ -1,7 +1,5 @@
 """What the commands have in common: options that several take, and how their runs are followed."""
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import importlib

@@ -1,7 +1,5 @@
 """The command `demo`: a small room rendered, recovered, compared with its truth, relit."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import TextIO

@@ -1,7 +1,5 @@
 """The command `info`: what a capture holds, and what is wrong with it."""
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path

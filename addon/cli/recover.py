@@ -1,7 +1,5 @@
 """The command `recover`: its options, how a capture is read, with a scene or without."""
 
-from __future__ import annotations
-
 import argparse
 import re
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What the command line knows of corrections: the options for them, and the command `refit`."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import TextIO

@@ -1,7 +1,5 @@
 """The command `relight` of the command line: its options, and from them to what the bridge does."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import TextIO

@@ -1,7 +1,5 @@
 """Files that are there whole or not at all: written under a temporary name beside the target, then moved over it."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import secrets

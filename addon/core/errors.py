@@ -1,7 +1,5 @@
 """Typed errors. The text of each is the one sentence that a user reads: which file, what is wrong, what to do."""
 
-from __future__ import annotations
-
 from .kinds import Code, Shown
 
 EXIT_OK: Code[int] = 0

@@ -1,7 +1,5 @@
 """Elements grouped by what they belong to."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,7 +1,5 @@
 """Values in what JSON knows, and a digest of them."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json

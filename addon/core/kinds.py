@@ -5,8 +5,6 @@ plain constant: `scripts/count_constants.py` counts both. These kinds are named 
 counted apart.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, TypeVar
 
 T = TypeVar("T")

@@ -1,7 +1,5 @@
 """How bright linear Rec.709 looks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

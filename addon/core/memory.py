@@ -1,7 +1,5 @@
 """Memory of this process: its peak, what it may take, and giving back what is free."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

@@ -1,7 +1,5 @@
 """The one name that an object of the room has everywhere: Blender, lists, warnings, the report, exports."""
 
-from __future__ import annotations
-
 from .kinds import Code
 
 LONGEST: Code[int] = 48

@@ -1,7 +1,5 @@
 """Which package a thing comes from, and in which version: what other packages bring is heeded by it."""
 
-from __future__ import annotations
-
 import hashlib
 import sys
 from functools import cache, partial

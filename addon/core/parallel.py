@@ -1,7 +1,5 @@
 """Work cut into blocks and shared between threads. NumPy's loops and embree both release the GIL."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait

@@ -1,7 +1,5 @@
 """Radiance and reflectance as pictures that a screen shows."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .kinds import Unit

@@ -1,7 +1,5 @@
 """Progress of a run: stage, share done, time left; and the one place where a run may be stopped."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

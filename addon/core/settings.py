@@ -1,7 +1,5 @@
 """Every setting of a run, in one frozen value. The command line, the operators and the panel all fill this in."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 
 from .errors import BadInputError

@@ -1,7 +1,5 @@
 """What counts as beyond chance, and how few are too few to tell, wherever that is asked."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,8 +1,6 @@
 """The stages of a run: names, order, and what they are called in front of artists. Every interface needs them at its
 start, so nothing is imported here."""
 
-from __future__ import annotations
-
 READ = "read"
 """Comes before all stages: the capture is read."""
 STAGES = ("surface", "lit_diffuse", "shading", "specular")

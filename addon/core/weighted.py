@@ -1,7 +1,5 @@
 """The weighted median."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -1,7 +1,5 @@
 """The farm's commands: `stage` is a unit of work; `plan`, `submit` and `status` are about rooms of them."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import re

@@ -1,7 +1,5 @@
 """Flamenco 3: a room as a job of the type `scan_relight.js`, handed to the manager over its HTTP interface."""
 
-from __future__ import annotations
-
 import json
 import platform
 import urllib.error

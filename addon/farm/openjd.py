@@ -1,7 +1,5 @@
 """Open Job Description: a room as a job template, which Deadline Cloud and others run; `openjd run` does it here."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

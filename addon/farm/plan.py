@@ -1,7 +1,5 @@
 """The graph of a room's units of work: what every engine is given in its own language."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Slurm: each unit of work is a job, blocks are a job array, and `afterok` makes the chain of a room."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import subprocess

@@ -1,7 +1,5 @@
 """How far rooms are, read off the marks and locks in their result folders; no capture is read, no clock is asked."""
 
-from __future__ import annotations
-
 import html
 import json
 import os

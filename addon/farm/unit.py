@@ -1,7 +1,5 @@
 """One unit of work under its lock, and the mark that it leaves for `status`."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import time

@@ -1,7 +1,5 @@
 """Do the mesh's edges lie on the pictures' edges, and if not, how many pixels beside them?"""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Do the frames agree with the mesh as the poses are read, and if not, read how would they?"""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """By how many pixels a frame lies beside what the other frames show of the same spots (Lucas and Kanade 1981)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A picture of the mesh's edges drawn over frames: what a person checks poses with."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How it is told whether frames and mesh fit."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """Do views agree on the colour of the spots that they share? Only with the right poses do they."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

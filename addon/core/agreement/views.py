@@ -1,7 +1,5 @@
 """A few frames at a small size, with what the mesh shows in each of their pixels."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ The method adds a diffuse and a specular lobe. Principled layers them: its diffu
 layer reflects, E(psi, phi). Base Color must be the albedo / (1 - E) for the diffuse part to come out as fitted.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A diffuse part under a dielectric's microfacet lobe: the paper's model (sec. 3.3)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A lamp: gives light of itself; what it reflects is unknown."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from .model import Brdf, Parameters, Principled

@@ -4,8 +4,6 @@ Schlick's approximation falls short in between: at 60 degrees, where floors mirr
 reflects .089 and not .070. A fit makes up for that by F0 = .058, which is then too much straight on.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..kinds import Unit

@@ -3,8 +3,6 @@
 phi is GGX's alpha (Blender's Roughness is its square root). All arguments are cosines, arrays of one shape.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..kinds import Unit

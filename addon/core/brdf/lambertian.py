@@ -1,7 +1,5 @@
 """Diffuse albedo alone."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from .model import Brdf

@@ -1,7 +1,5 @@
 """What was recovered of each object: the description that stands between the core and Blender."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from typing import Any

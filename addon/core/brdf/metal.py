@@ -1,7 +1,5 @@
 """A metal: the lobe alone, coloured."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -10,8 +10,6 @@ The specular part of a model is linear in F0, s being how Fresnel's term rises w
 so the light transport needs G D alone, of many widths at once (`Microfacets`), and the fit is linear least squares.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol

@@ -6,8 +6,6 @@ Another package's is made known by `register`, or found by its entry point:
     beckmann = "my_package.beckmann:BECKMANN"
 """
 
-from __future__ import annotations
-
 import warnings
 from functools import cache
 from importlib.metadata import entry_points

@@ -1,7 +1,5 @@
 """What shows what lies behind it: glass, or cut out by a mask that the mesh does not have. Set apart, not modelled."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

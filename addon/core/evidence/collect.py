@@ -1,7 +1,5 @@
 """All evidence of a finished recovery."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Colours of the page: quantities as heat, models."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..kinds import Shown

@@ -1,7 +1,5 @@
 """What a recovery found: all that evidence and page are made of."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -4,8 +4,6 @@ The same light is gathered twice with other rays, E_a and E_b. How far they diff
 how much further they differ from E is the error of E, be it its rays' or its interpolation's.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import partial
 

@@ -1,7 +1,5 @@
 """What is known of each object as a whole: how much of it was seen, and its mean albedo with an interval."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The page that tells a person in a minute what was recovered and how far to trust it: one HTML file, no script."""
 
-from __future__ import annotations
-
 from html import escape
 from typing import Any
 

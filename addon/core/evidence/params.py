@@ -7,8 +7,6 @@ rooms and in that over the furnished ones, and score well there (`docs/evidence.
 worth). The living room's figures were seen, not aimed at.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

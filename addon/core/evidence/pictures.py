@@ -1,7 +1,5 @@
 """The page's pictures of one frame: seen, predicted, recovered, and how sure it is."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Standard errors of every texel's shading and albedo."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

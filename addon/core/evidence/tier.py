@@ -1,7 +1,5 @@
 """What a capture's frames tell of radiance: the first thing to know of how far to trust a result."""
 
-from __future__ import annotations
-
 from ..scene.model import AUTO, Capture, Frame
 
 TIERS = {

@@ -1,7 +1,5 @@
 """Frames worth looking at, and what the recovery predicts for them, pixel by pixel."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -11,8 +11,6 @@ and makes whatever phi has the noisier A look worse. A and B come from two indep
 noise's part of every product is known (`LobeLight.A_noise`), and is taken out of <A, A>, <A, B> and the cost.
 """
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """How a lobe is fitted."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """What is found of an object that shows what lies behind it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -3,8 +3,6 @@
 Source: Apple, ARConfiguration.WorldAlignment.gravity and ARCamera.transform.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -6,8 +6,6 @@ weighting schemes for combination of multiple exposures", BMVC 2006; their Poiss
 clip, where a value is a mixture of clipped ones, so that no seam shows where an exposure drops out.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

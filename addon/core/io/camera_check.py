@@ -1,7 +1,5 @@
 """Whether a camera's numbers can be those of one: a slip of the decimal point would overflow far from its cause."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterator, Sequence

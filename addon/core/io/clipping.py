@@ -6,8 +6,6 @@ others are not, with all kinds of values. The number is looked for in what is st
 exposures differ, in stored / exposure (an HDR picture that was clipped and then scaled).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -3,8 +3,6 @@
 COLMAP's world has no up and, unless it was given measures, no metres; it is taken as it is.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

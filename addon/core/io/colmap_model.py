@@ -4,8 +4,6 @@ Formats: COLMAP's documentation (doc/format.rst) and src/colmap/scene/reconstruc
 points are not looked at.
 """
 
-from __future__ import annotations
-
 import math
 import mmap
 import struct

@@ -9,8 +9,6 @@ scale:0.001          the positions are in another unit than the mesh
 up:+y                mesh and poses alike have that axis upwards: both are turned so that +Z is
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

@@ -4,8 +4,6 @@ OpenImageIO 3.0 leaves out the ISO of TIFF's EXIF, and frames of unlike ISO woul
 Source: TIFF 6.0, section 2; CIPA DC-008 (Exif 2.32), 4.6.5.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from pathlib import Path

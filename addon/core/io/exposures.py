@@ -4,8 +4,6 @@ A camera's settings give the relative exposure H = t S / N^2 (exposure time in s
 ratios are known, so that of the capture's median frame becomes 1.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """OpenEXR in and out, in linear Rec.709: the only module that imports the library."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

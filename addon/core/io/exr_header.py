@@ -6,8 +6,6 @@ that contradicts itself never reaches the library.
 Layout: openexr.com/en/latest/OpenEXRFileLayout.html
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from dataclasses import dataclass

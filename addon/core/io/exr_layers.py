@@ -7,8 +7,6 @@ with their names.
 Source: openexr.com, "Technical Introduction" (layers, luminance and chroma), "Multi-View OpenEXR".
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Files of a capture: read with care, and within its folder, unless the user allows more."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """A hash that changes with a capture, by which stored stages are known again."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import os

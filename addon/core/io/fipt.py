@@ -6,8 +6,6 @@ the list, `train/segmentation/000.exr` ...; its camera has x left, y up and look
 `segmentation`. `val` is kept out, as are the folders that hold the truth (DiffCol, Roughness, albedo, Emit, IndexMA).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import partial

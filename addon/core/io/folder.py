@@ -1,7 +1,5 @@
 """What a folder or file that an artist has chosen is: a capture, a finished result, or the way to one of them."""
 
-from __future__ import annotations
-
 import json
 import os
 from dataclasses import dataclass

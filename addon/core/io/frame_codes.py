@@ -1,7 +1,5 @@
 """Frames that are pictures of 8 or 16 bits: which curve their codes have, and where they clip."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ mesh is imported once, and its instances are made of where its nodes lie.
 glTF 2.0, sections 3.5.2 (hierarchy) and 3.5.3 (transformations).
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ A picture is as the file shows it: turned by its `irot`, which readers have to h
 Source: ISO/IEC 23008-12, 6.5.10 (irot).
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

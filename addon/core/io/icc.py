@@ -4,8 +4,6 @@ Only the primaries are taken: the curve is what `--transfer` says, or is estimat
 Source: ICC.1:2022, 7.2 (header), 7.3 (tag table), 9.2 (redMatrixColumnTag and its like), 10.31 (XYZType).
 """
 
-from __future__ import annotations
-
 import struct
 
 import numpy as np

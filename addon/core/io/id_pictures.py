@@ -1,7 +1,5 @@
 """Pictures whose pixels are object ids."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

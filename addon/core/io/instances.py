@@ -1,7 +1,5 @@
 """Which object each triangle belongs to: names from `info_semantic.json`, and what to do where they don't agree."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

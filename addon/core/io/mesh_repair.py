@@ -1,7 +1,5 @@
 """Take out of a mesh what no later stage can use: triangles without area, vertices that are not finite."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A mesh from a file of any kind: PLY here, others through whatever the caller brings (Blender's importers)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

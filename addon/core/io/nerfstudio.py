@@ -4,8 +4,6 @@ A frame that can't be used becomes a problem in a list, so that one bad frame do
 the whole file is raised.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import partial

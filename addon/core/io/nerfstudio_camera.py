@@ -4,8 +4,6 @@ Source: nerfstudio 1.1's data/dataparsers/nerfstudio_dataparser.py and cameras/c
 or, for all frames, at the top of the file.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

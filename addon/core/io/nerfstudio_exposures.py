@@ -1,7 +1,5 @@
 """What `transforms.json` tells of exposures: our own keys, and those that cameras' settings go by."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

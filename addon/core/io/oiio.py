@@ -3,8 +3,6 @@
 Blender's own builds bring the library. Radiance HDR and EXIF are read by our own code: docs/development.md says why.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import os

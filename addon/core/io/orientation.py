@@ -5,8 +5,6 @@ tells. The cameras' sizes do where pictures stand on end. Else gravity may: a pi
 HEIC, which every reader turns, is the other way round: it is turned back where cameras fit only that.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

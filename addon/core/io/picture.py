@@ -1,7 +1,5 @@
 """A picture in memory, of whatever kind its file was."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager

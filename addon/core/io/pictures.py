@@ -1,7 +1,5 @@
 """Pictures of every kind that a frame or mask may be stored in. The kind is told by the content, not by the name."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

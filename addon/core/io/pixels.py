@@ -1,7 +1,5 @@
 """What a frame measured: its pictures read, exposure divided out, brackets merged, pixels that say nothing marked."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

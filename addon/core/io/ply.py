@@ -4,8 +4,6 @@ A body is bytes: those of the file where it is binary, those of all its numbers 
 kinds are read alike. Nothing is allocated before the counts that the header claims were compared with the file's size.
 """
 
-from __future__ import annotations
-
 import struct
 import warnings
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The header of a PLY file: which elements follow, how many, and what each record holds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

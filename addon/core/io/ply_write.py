@@ -1,7 +1,5 @@
 """Binary PLY meshes with an object on each face, as `ply.read_ply` reads them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Writes PNGs with zlib alone: what the page, textures and previews need depends on no library."""
 
-from __future__ import annotations
-
 import base64
 import struct
 import zlib

@@ -5,8 +5,6 @@ Depth and its confidence are not looked at.
 Source: Polycam's polyform, README.md (format); nerfstudio's process_data/polycam_utils.py and its defaults.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from pathlib import Path

@@ -4,8 +4,6 @@ Source: SMPTE RP 177 (primaries and white to XYZ); K. M. Lam's linear Bradford t
 Annex E gives it. Luminance and chroma as OpenEXR stores them: openexr.com, "Technical Introduction"; `ImfRgbaYca`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..errors import BadInputError

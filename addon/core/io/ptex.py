@@ -7,8 +7,6 @@ the sort of libstdc++ (bits/stl_algo.h) is done again step by step.
 Replica SDK, `PTexMesh::SplitMesh`; the file: Habitat, `PTexMeshData.cpp`.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -3,8 +3,6 @@
 Layout and formulas: G. Ward, "Real Pixels", Graphics Gems II, 1991; Radiance's `filefmts.pdf` and `color.h`.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

@@ -4,8 +4,6 @@ Colours are the camera's, made linear Rec.709 under daylight (D65) for all frame
 Source: Adobe, Digital Negative Specification 1.7.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """From a folder to a checked `Capture`: what all formats have in common."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """The formats that are known, the more telling before the more general; which of them a folder has."""
 
-from __future__ import annotations
-
 import functools
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path

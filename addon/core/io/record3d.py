@@ -4,8 +4,6 @@ Depth and its confidence are not looked at.
 Source: marek-simonik/record3d, issues 27, 33, 36, 64, 83, 93; nerfstudio's process_data/record3d_utils.py.
 """
 
-from __future__ import annotations
-
 import re
 from functools import partial
 from pathlib import Path

@@ -6,8 +6,6 @@ mirrors. Where the folder also holds frames (`transforms.json`, or `traj.txt` wi
 stored light is not. The viewer's exposure and gamma are display and are not applied.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

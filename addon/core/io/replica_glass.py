@@ -1,7 +1,5 @@
 """Replica's `glass.sur`: the planes of glass and mirrors, and which object of the mesh each of them is."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -6,8 +6,6 @@ the pinhole camera of `dslr/nerfstudio/transforms_undistorted.json`. Its own pic
 given, or EXR put beside or in place of them. The views that `dslr/train_test_lists.json` calls 'test' are kept out.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ is wanted, so the copy has no materials and pictures at all, and its buffers lie
 glTF: registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, sections 3.6 (buffers) and 4.4 (the binary container).
 """
 
-from __future__ import annotations
-
 import base64
 import binascii
 import json

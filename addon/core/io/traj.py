@@ -5,8 +5,6 @@ Each line is the 4 x 4 matrix from camera to world, row by row, of a camera with
 are not looked at. (Sucar et al., iMAP, ICCV 2021; Zhu et al., NICE-SLAM, CVPR 2022.)
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from functools import partial

@@ -5,8 +5,6 @@ contrast) is not in the file and can't be undone: such pictures give wrong light
 Source: IEC 61966-2-1 (sRGB).
 """
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cosine-distributed directions over the hemisphere, and well-spread points to make them of."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.stats import qmc
 

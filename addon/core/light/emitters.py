@@ -1,7 +1,5 @@
 """Bright triangles: where a share of the rays is aimed. Lamps, and anything else that shines like one."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The elements at which light that no frame looked at is solved for, and E there by many rays each."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..groups import by_label, by_number

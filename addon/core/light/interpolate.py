@@ -5,8 +5,6 @@ surrounds it. The error made at (x, n) is bounded by e_i = |x - x_i| / R_i + sqr
 coarse to fine: every element whose bound is above `allowed` asks for a new one nearby, half as far apart as before.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ noise nor its 1/r^2 is left to the other. The weights depend on the geometry alo
 different places, which lets the smooth part be gathered at few points and interpolated.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..kinds import Block

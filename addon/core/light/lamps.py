@@ -1,7 +1,5 @@
 """Lamps that the frames see: objects that give more light than they could reflect."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 

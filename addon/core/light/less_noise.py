@@ -5,8 +5,6 @@ kept of an element's rest is max(v - n^2, 0) / v (Lee 1980): where light is smoo
 edge of a shadow it is light and stays. Cells on several shifted grids are averaged, so that none shows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

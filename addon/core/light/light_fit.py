@@ -5,8 +5,6 @@ radiance 1. What is minimised is the mean deviation of log albedo from its objec
 end from the median of all objects of its paint as well (`kinds_of`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Irradiance from bright triangles by way of flat mirrors: what a lamp throws on a wall over the glass opposite."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..kinds import Block

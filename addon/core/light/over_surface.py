@@ -1,7 +1,5 @@
 """E over the surface: which estimator is asked at which elements, and what is interpolated between."""
 
-from __future__ import annotations
-
 import functools
 from typing import TypedDict
 

@@ -1,7 +1,5 @@
 """How light is gathered and solved for; what each part gains: docs/ablation.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -4,8 +4,6 @@ A window fills a small part of the hemisphere; cosine-distributed rays find it b
 crossed the bounding box tells where the openings are, without any knowledge of what a window is.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is found of a room's light: lamps, sky, sun, mirrors, and the irradiance E of every element."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

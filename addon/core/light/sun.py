@@ -5,8 +5,6 @@ its part of E comes from shadow rays at every place (`sunlight`), and it goes ba
 (`put_in`). One that no frame saw is solved for (`sun_fit`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -5,8 +5,6 @@ normal, so neither a chart's border nor a fold of the surface is interpolated ac
 points, a texel costs a few array look-ups: fine texels cost little more than coarse ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Accumulation: all frames into the lit diffuse texture L_d."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What accumulation needs of an estimator of typical values."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

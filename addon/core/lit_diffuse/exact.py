@@ -1,7 +1,5 @@
 """The exact median: every observation is kept on disk meanwhile."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

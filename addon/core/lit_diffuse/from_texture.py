@@ -1,7 +1,5 @@
 """L_d from light that the capture stores on its mesh, where there are no frames to take the median of."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..errors import BadInputError

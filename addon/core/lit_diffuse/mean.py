@@ -1,7 +1,5 @@
 """The mean: what keeps highlights in, for comparison."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..paper.p_square import Summary

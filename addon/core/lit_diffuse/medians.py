@@ -4,8 +4,6 @@ All share one interface (`estimator.Estimator`): `add(element, values)` with eac
 `result()`. Measured against one another: `scan-relight benchmark lit_diffuse`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

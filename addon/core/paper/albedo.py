@@ -1,7 +1,5 @@
 """Diffuse albedo rho = pi L_d / S (Haefner et al. 2021, sec. 3.2; the paper's sums leave out pi and 2 pi / N)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

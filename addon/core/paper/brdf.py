@@ -5,8 +5,6 @@ arguments are cosines, of one shape or shapes that broadcast. phi is the width o
 psi is the reflectance at normal incidence, F0.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 

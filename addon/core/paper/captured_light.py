@@ -3,8 +3,6 @@
 So no lamp need be known, and one ray stands for all bounces: what the frames saw of a surface holds them already.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 from typing import Protocol

@@ -5,8 +5,6 @@
 For each phi of a grid psi follows in closed form; the phi of the least sum is taken.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

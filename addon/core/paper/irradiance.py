@@ -5,8 +5,6 @@
 The paper leaves 2 pi / N out, and pi out of the albedo; with them S is the irradiance E in radiance * steradian.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..kinds import Block

@@ -5,8 +5,6 @@ what a surface sends diffusely. The frames come in the order of the video, and n
 one, P-square (`p_square`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from ..parallel import ordered_map

@@ -1,7 +1,5 @@
 """P-square, the running median (Haefner et al. 2021, sec. 3.1; Jain and Chlamtac, CACM 1985)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 The five steps one after the other; the pipeline calls the same functions one by one and keeps what each gives.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@
 by the same uniform rays as the shading, which serve every phi at once.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..parallel import for_blocks

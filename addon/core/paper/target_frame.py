@@ -4,8 +4,6 @@ Assumption A1: a specular highlight of direct light is likely in it. Assumption 
 saturated.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..luminance import LUMINANCE

@@ -7,8 +7,6 @@ stage's own. They are made known by `register`, or found by their entry points:
     grey-floor = "my_package.grey_floor:PASS"
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Which model and which lobe each object gets: by its views, by what is behind it, by its looks, by its class."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -5,8 +5,6 @@ channel, and the albedo of the whole room with it. The light that the scene is r
 what other surfaces send is measured and stays, so all of the difference is laid on lamps, sky and sun (`of_light`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 

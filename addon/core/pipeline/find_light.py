@@ -1,7 +1,5 @@
 """All light that no frame tells of by itself: lamps and sky, then a sun, then lamps and sky under that sun."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 import numpy as np

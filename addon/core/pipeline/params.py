@@ -1,7 +1,5 @@
 """What is made of the stages' results."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -5,8 +5,6 @@ An object that they resolve finer gets finer texels: the frames are looked at on
 base colour is multiplied by what this differs from the room's own lit diffuse texture.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Collection

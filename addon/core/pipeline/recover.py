@@ -1,7 +1,5 @@
 """A whole recovery: the stages, what is made of them, and what is written into the result folder."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 from collections.abc import Callable

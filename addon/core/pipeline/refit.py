@@ -5,8 +5,6 @@ fits of the other objects and what glossy things reflect onto the room; a whole 
 to date. What is made of them is made anew for all of the room.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from collections.abc import Collection

@@ -1,7 +1,5 @@
 """What report.json holds: how the run went, what it found, and what to be wary of, one sentence each."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

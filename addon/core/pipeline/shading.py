@@ -1,7 +1,5 @@
 """The shading stage: from the lit diffuse texture to lamps, irradiance and albedo."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from dataclasses import asdict, fields, replace
 from pathlib import Path

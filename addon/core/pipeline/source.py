@@ -1,7 +1,5 @@
 """A digest of the source code that a stage is made of, so that what other code has stored is known for old."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import re

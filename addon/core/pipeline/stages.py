@@ -1,7 +1,5 @@
 """The stages in their order: each is computed when it is first asked for, or taken from the result folder."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The surface stage: surface elements over the mesh, whose noise is taken out first."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """What no frame saw reflects like the rest of its object, under the light that reaches it: a rough first pass."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

@@ -5,8 +5,6 @@ that the zip format has anyway, so that it costs nothing. It tells accidents, an
 it; it is no signature.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """Result folders: how much they take, and clearing what can be made again: the finished stages, and nothing else."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """What has a known albedo, as the command line says it: a part of the room, or a pixel of a frame."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -4,8 +4,6 @@ It saves work, no more: what is stored is whole and the same whoever does it, so
 was frozen for longer than `patience`, lose time and nothing else.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -3,8 +3,6 @@
 A result is the artist's work. It lies where her documents lie, never in a folder that someone else clears.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

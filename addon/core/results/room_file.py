@@ -3,8 +3,6 @@
 Reading it asks for neither the capture's pictures nor the stages, and takes a blink.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import dataclass, replace

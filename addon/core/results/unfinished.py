@@ -1,7 +1,5 @@
 """Where a run goes on that was stopped: told from the files alone, before anything is read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from ..io.folder import REPORT

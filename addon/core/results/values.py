@@ -3,8 +3,6 @@
 For what one worker hands to another. Nothing of it is code: only classes that the reader names are made.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The texel atlas: one image over the whole room, and the surface elements that its texels stand for."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -7,8 +7,6 @@ brighter than the room, or something that nearly all frames would have fused, un
 same places rather than in the same directions (photo-consistency: Seitz and Dyer 1999).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Objects for a mesh that tells of none: its connected parts."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components

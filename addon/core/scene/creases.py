@@ -1,7 +1,5 @@
 """Near a crease an element's irradiance is uncertain: texel, pixels and facets mix the light of both sides."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Groups of neighbouring elements: which of them a frame can't see is found for the whole group at once."""
 
-from __future__ import annotations
-
 import zlib
 
 import numpy as np

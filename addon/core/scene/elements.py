@@ -1,7 +1,5 @@
 """Surface elements: the atlas's texels with their place on the surface."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import NamedTuple, Protocol
 

@@ -1,7 +1,5 @@
 """What a lens does between a ray and the image plane: the interface of all camera models."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Protocol
 
 import numpy as np

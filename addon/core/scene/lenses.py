@@ -1,7 +1,5 @@
 """Lenses whose inverse has a closed form. Polynomial ones are in `lenses_polynomial.py`."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Source: COLMAP's doc/cameras.rst and src/colmap/sensor/models.h (4.x), which also fix the parameters' order.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Sequence

@@ -3,8 +3,6 @@
 Their inverses are found by Newton's method, in the disc on which the model is one to one.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Lenses as JSON holds them: the class's name and the values of its fields."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from typing import Any

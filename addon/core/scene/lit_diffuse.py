@@ -1,7 +1,5 @@
 """The lit diffuse texture L_d: what the frames show of every element, and how much it rests on."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How noisy a scanned mesh is, and by how much its triangles are tilted for it."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import sparse
 

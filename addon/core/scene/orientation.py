@@ -1,7 +1,5 @@
 """Which side of a triangle is the front: the one that the frames see. A scan's winding can't be relied on."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """A camera that shows the room, where the capture has none."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..kinds import Shown

@@ -1,7 +1,5 @@
 """What the geometry is told: what counts as seen, as a side, as a crease, as noise."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The rays of all of a frame's pixels, kept for the frames that share a lens."""
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

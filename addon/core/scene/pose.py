@@ -1,7 +1,5 @@
 """Whether a camera's pose is one: finite, rigid, not mirrored; rotations of quaternions."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

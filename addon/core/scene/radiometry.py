@@ -1,7 +1,5 @@
 """How the codes that a camera stored tell radiance: its response, a frame's exposure and white balance, vignetting."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ Light that no frame saw still counts, but texels there show nothing that was mea
 cell of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -6,8 +6,6 @@ its shape does: large planes first (floor, ceiling, walls, table tops), then wha
 92 % of the surface lay in a part whose majority was that object.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 

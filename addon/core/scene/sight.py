@@ -1,7 +1,5 @@
 """What frames see where a mesh could be closed: nothing, something behind, or what no mesh holds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

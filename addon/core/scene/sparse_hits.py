@@ -1,7 +1,5 @@
 """What some of a frame's pixels meet: enough to tell which surface the frames look at, and how closely."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .model import Camera

@@ -4,8 +4,6 @@ What is smaller than its coarse cell (`seen_cells`) shares the cell's block of t
 between their centres. Larger triangles lie apart, each with a texel as wide as half a cell. No two triangles overlap.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Directions spread evenly over the sphere."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

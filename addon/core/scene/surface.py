@@ -1,7 +1,5 @@
 """The surface stage: normals towards the cameras, the atlas's resolution, the surface elements."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Frames about normals: local directions, in which the normal is +Z, and the world's."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -6,8 +6,6 @@ are traced against the first alone and credited to the side that they come from 
 between the two has to be larger than some other distance. Renderers need one: `laid_apart`.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Atlases without Blender: by the mesh's own texture coordinates, or by xatlas where it is installed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import TypeVar
 

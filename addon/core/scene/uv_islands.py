@@ -1,7 +1,5 @@
 """Islands of a texture layout: which triangles hang together, and cutting those that waste the square."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components

@@ -4,8 +4,6 @@ A projection folds where a surface does: two sheets of one island come to lie on
 for two places. Pure numpy; texture space only.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..kinds import Block

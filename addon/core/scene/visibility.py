@@ -1,7 +1,5 @@
 """Which surface elements a frame sees, and how well: projection, occlusion, edges."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 

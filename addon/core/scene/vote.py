@@ -1,7 +1,5 @@
 """Objects from pictures of object ids: every triangle gets what most of the pixels that see it say."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A mesh's vertices joined where they lie in one place, and what that tells of its neighbourhoods."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import sparse
 

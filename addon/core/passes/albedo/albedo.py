@@ -1,7 +1,5 @@
 """Albedo = pi L_d / E, and what stands in where nothing was seen."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 

@@ -5,8 +5,6 @@ edge, seen once) is shrunk towards them; where they differ, as in a texture, it 
 log albedo, with the spread of the neighbours as the prior's width; a second colour among them: `second_colour`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 import numpy as np

@@ -5,8 +5,6 @@ the members differ beyond their own errors is estimated (DerSimonian and Laird 1
 (empirical Bayes). Where they are of several paints, they stay as they are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

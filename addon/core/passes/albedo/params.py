@@ -1,7 +1,5 @@
 """What the albedo's prior is told; what each part gains: docs/ablation.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ...kinds import Unit

@@ -6,8 +6,6 @@ is a value that an element may have too. The prior is then a mixture of the neig
 narrow ones at these neighbours (an empirical prior, Robbins 1956); the albedo is its mean once the element is measured.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

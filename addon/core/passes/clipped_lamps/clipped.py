@@ -4,8 +4,6 @@ A clipped lamp lights the room with more than its pixels show. So it is solved f
 lamp that no frame looked at is (`unseen_light`); where that fails, the bound is used and said to be one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from dataclasses import replace
 

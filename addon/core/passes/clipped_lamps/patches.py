@@ -5,8 +5,6 @@ that see it show clipped may be such a lamp, and its radiance is solved for. A w
 Of what is bright and not clipped the radiance is known.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -7,8 +7,6 @@ at bright triangles is followed from there (`caustics`); the rest is gathered: a
 towards where the ray came from. The rest of E stays as it was.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 import numpy as np

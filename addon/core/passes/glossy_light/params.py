@@ -1,7 +1,5 @@
 """What the light of glossy things is followed with; what each part gains: docs/ablation.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

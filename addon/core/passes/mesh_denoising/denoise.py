@@ -19,8 +19,6 @@ non-convexity, Blake and Zisserman 1987): first all is smoothed alike, then what
 Last, what lies in flat parts is put into their planes (`planes`), which angles alone can't tell.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """What a scan's noise is taken out with; what each part gains: docs/ablation.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -9,8 +9,6 @@ its points tell well which way it faces, they lie about as far off as the noise 
 explains them no better than chance would. Spheres, cushions and cylinders fail the last and stay as they are.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

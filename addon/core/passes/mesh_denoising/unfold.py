@@ -6,8 +6,6 @@ the strips of a moulding, a millimetre wide and metres long, or a small thing sc
 together tell what each by itself does not, and `denoise` has nothing to add.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import cg

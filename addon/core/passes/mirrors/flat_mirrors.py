@@ -10,8 +10,6 @@ field has there is one number, F0. Anything else shows its own light:
 | 25 other flat objects, six rooms | .33 to 1.4 | .002 to .10 | at most .40 |
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.optimize import minimize
 

@@ -6,8 +6,6 @@ piece's elements that do: two mirrors of two rooms .69 and .98; polished worktop
 one place, at most .11.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import cKDTree
 

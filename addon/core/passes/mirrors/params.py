@@ -1,7 +1,5 @@
 """What it takes to believe in a flat mirror; what it gains: docs/ablation.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -5,8 +5,6 @@ frame, the other hangs in a part of the ceiling that no frame saw: the light tha
 Nothing is done unless albedos above 1 tell that light is missing.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is believed of light that a scan without objects lacks; what it gains: docs/ablation.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

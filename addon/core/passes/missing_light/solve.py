@@ -5,8 +5,6 @@ robust against edges of paint (Land and McCann's Retinex in three dimensions), t
 not above what paint reflects. All radiances are solved for together, in log, by L-BFGS.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

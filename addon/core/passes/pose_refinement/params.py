@@ -1,7 +1,5 @@
 """When and how poses are refined; what it gains: docs/ablation.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

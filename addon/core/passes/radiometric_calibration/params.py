@@ -1,7 +1,5 @@
 """What radiometric calibration looks at, and what it takes for granted."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """What it takes to believe that something is transparent or cut out; what it gains: docs/ablation.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -10,8 +10,6 @@ with one tau for the object (glass), or 0 or 1 for each element (cut out). D is 
 of the object's own colour decides nothing. Half of each element's views choose, the other half judge.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How the projection's blur is taken out; what it gains: docs/ablation.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

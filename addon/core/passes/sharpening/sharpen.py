@@ -8,8 +8,6 @@ median over the frames leaves highlights out, as that of L_d does.
 One round. A second and a third changed bathroom, kitchen and living room by -.2 to +.2 dB.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any

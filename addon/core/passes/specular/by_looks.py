@@ -4,8 +4,6 @@ Taps, legs and rings, soap and black tubes: too small, thin or seldom seen for a
 `one_colour` compares what could explain all of such an object; here is what it takes to believe it.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

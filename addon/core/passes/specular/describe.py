@@ -1,7 +1,5 @@
 """What was found of an object, or given, as its description: `ObjectMaterial`."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ What is given decides the model, too, where that itself is not: a roughness or F
 dielectric has makes it a metal. Nothing is chosen, nothing is taken over from the class.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -5,8 +5,6 @@ a badly posed frame, is left out together. The jackknife knows nothing of what a
 light, of the model): that is the systematic part below.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which model an object needs: Lambertian, a dielectric lobe over diffuse, or metal; none richer than the data show."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np

@@ -10,8 +10,6 @@ A coat of no colour of its own over a saturated one shows in the dark channels, 
 by channel (`compare_coat`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

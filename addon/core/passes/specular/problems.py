@@ -1,7 +1,5 @@
 """The observations of one object made into a fit's problem: elements, views, and the light that they reflect."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 import numpy as np

@@ -4,8 +4,6 @@ The elements that were not looked at take over the difference to L_d from their 
 texture does not.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial import cKDTree
 

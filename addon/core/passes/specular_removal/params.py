@@ -1,7 +1,5 @@
 """What the removal of specular parts is told."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

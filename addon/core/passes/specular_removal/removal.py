@@ -10,8 +10,6 @@ more than what is left, the pixel is taken for a bound, as a clipped one is: it 
 rests on such pixels alone is not measured.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """What it takes to believe in a sun that no frame sees; what it gains: docs/ablation.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

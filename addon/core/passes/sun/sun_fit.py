@@ -6,8 +6,6 @@ least within the objects (`light_fit`), as for any light that no frame saw. Text
 but no direction puts its patch right over them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Elements near a patch of light, and how well a sun explains them: by the objects' albedo, and along the edges."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How texture is carried into what no frame saw."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ Offsets for Image Completion", ECCV 2012): the maxima of its autocorrelation. Fr
 takes the offset whose copy agrees best with what lies around it. Within one copy all of it agrees, so copies are large.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,8 +1,6 @@
 """What no frame saw gets the texture of its plane's measured part; its colour, where texture is averaged out, is what
 lies around it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

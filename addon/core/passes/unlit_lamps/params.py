@@ -1,7 +1,5 @@
 """By what it is told that a lamp is dark with its light off."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

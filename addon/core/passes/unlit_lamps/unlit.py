@@ -1,7 +1,5 @@
 """Which lamps are dark with their light off: windows, by where they are or by their class, and screens."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What it takes to believe in light that no frame sees; what each part gains: docs/ablation.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """Lamps that nobody saw shine, found one by one from what they throw, and the sky beside them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...light.lamps import Lamp, twin

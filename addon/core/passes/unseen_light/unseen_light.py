@@ -5,8 +5,6 @@ an object, light a lot: the radiance under which albedo varies least is the one 
 by one, then all that was solved is refined together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """A sky of which no frame saw anything, solved for as one radiance from what it throws into the room."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...light.environment import Environment

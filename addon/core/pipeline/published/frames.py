@@ -1,7 +1,5 @@
 """The lit diffuse texture, and how much of it was clipped."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

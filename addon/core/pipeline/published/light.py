@@ -1,7 +1,5 @@
 """Irradiance and albedo, and which objects are lamps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The lobe of each object, from its target frame."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
