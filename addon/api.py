@@ -14,7 +14,7 @@ from .core.errors import BadInputError, InterruptedRun, ScanRelightError
 from .core.io.layout import AS_FOUND, Layout, RawMesh, Reader, Reading
 from .core.io.read import read_capture
 from .core.io.readers import register_reader
-from .core.pipeline.run import Run, SceneWriter, check_run, progress_of_run
+from .core.pipeline.run import WHOLE, Asked, Run, SceneWriter, progress_of_run
 from .core.progress import Progress, ProgressEvent
 from .core.scene.model import Camera, Capture, Frame, Mesh
 from .core.scene.unwrap import Unwrap, by_xatlas, own_coordinates
@@ -205,35 +205,22 @@ def recover(
     ScanRelightError
         One sentence on what is wrong; `BadInputError` where it is with what was given.
     """
-    check_run(capture.root if isinstance(capture, Capture) else Path(capture), Path(folder))
+    asked = Asked(reading=reading, override=overrides, white=white)
     told = progress_of_run(progress, should_stop)
-    run, lay_out = _read(capture, Path(folder), settings or Settings(), told, unwrap, reading, overrides, white=white)
+    run, lay_out = _read(capture, Path(folder), settings or Settings(), told, asked, unwrap)
     with run:
         run.stages(lay_out)
     return Recovered(run)
 
 
 def run_without_scene(
-    capture: Path,
-    folder: Path,
-    settings: Settings,
-    progress: Progress,
-    until: str = WRITE,
-    reading: Reading = AS_FOUND,
-    from_stage: str | None = None,
-    override: Path | None = None,
-    heed_kept: bool = True,
-    unwrap: Unwrap | str = "",
-    alone: bool = False,
-    white: str = "",
-    block: tuple[int, int] | None = None,
+    capture: Path, folder: Path, settings: Settings, progress: Progress, asked: Asked = WHOLE, unwrap: str = ""
 ) -> dict[str, Any]:
-    """Recover a capture up to a stage, and write all but scene.blend; as `bridge.job.run.run`, without Blender."""
-    check_run(capture, folder, until, from_stage, block)
-    run, lay_out = _read(capture, folder, settings, progress, unwrap, reading, override, heed_kept, white, block)
+    """Recover a capture as far as is asked, and write all but scene.blend; as `bridge.job.run.run`, without Blender."""
+    run, lay_out = _read(capture, folder, settings, progress, asked, unwrap)
     with run:
-        report = run.stages(lay_out, until, from_stage, alone)
-        return run.write() if until == WRITE else report
+        report = run.stages(lay_out)
+        return run.write() if asked.until == WRITE else report
 
 
 def _read(
@@ -241,20 +228,14 @@ def _read(
     folder: Path,
     settings: Settings,
     progress: Progress,
+    asked: Asked,
     unwrap: Unwrap | str,
-    reading: Reading,
-    override: Path | None,
-    heed_kept: bool = True,
-    white: str = "",
-    block: tuple[int, int] | None = None,
 ) -> tuple[Run, Unwrap]:
     """The run over a capture, which is read now unless it was, and what lays out its atlas."""
+    asked.check(capture.root if isinstance(capture, Capture) else Path(capture), folder)
     started = time.monotonic()
     lay_out = unwrapper(unwrap) if isinstance(unwrap, str) else unwrap
     progress.stage(READ)
     if not isinstance(capture, Capture):
-        capture = read_capture(capture, reading)
-    versions = {"scan_relight": VERSION}
-    return Run(
-        capture, folder, settings, progress, reading, override, heed_kept, versions, started, white, block
-    ), lay_out
+        capture = read_capture(capture, asked.reading)
+    return Run(capture, folder, settings, progress, asked, {"scan_relight": VERSION}, started), lay_out

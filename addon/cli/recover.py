@@ -70,33 +70,38 @@ def _grey(text: str) -> str:
     return text
 
 
-def run_from(arguments: argparse.Namespace) -> Callable[..., dict[str, Any]]:
-    """The run that was asked for, but for its stages: called with capture, result, settings and progress."""
+def run_from(arguments: argparse.Namespace, **stages) -> Callable[..., dict[str, Any]]:
+    """The run that was asked for: called with capture, result, settings and progress.
+
+    Parameters
+    ----------
+    stages
+        Fields of `Asked`.
+    """
     if arguments.unwrap and arguments.scene:
         raise BadInputError("Option --unwrap goes with --no-scene: the scene is laid out by Blender.")
-    how: dict[str, Any] = {
-        "reading": reading_from(arguments),
-        "override": arguments.override,
-        "heed_kept": not arguments.no_overrides,
-        "white": arguments.white,
-    }
+    reading = reading_from(arguments)
     with needed_packages():
+        from ..core.pipeline.run import Asked
+
+        told = {"override": arguments.override, "heed_kept": not arguments.no_overrides, "white": arguments.white}
+        asked = Asked(reading=reading, **told, **stages)
+        asked.check(arguments.capture, arguments.out)
         if arguments.scene:
-            return partial(need("job.run").run, **how)
+            return partial(need("job.run").run, asked=asked)
         from ..api import run_without_scene
 
-        return partial(run_without_scene, unwrap=arguments.unwrap, **how)
+        return partial(run_without_scene, asked=asked, unwrap=arguments.unwrap)
 
 
 def recover_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`recover CAPTURE --out RESULT`."""
     settings = settings_from(arguments)
-    run = run_from(arguments)
+    run = run_from(arguments, until=arguments.until, from_stage=arguments.from_stage)
     with needed_packages():
         from ..core.pipeline.run import progress_of_run
-    stages = {"until": arguments.until, "from_stage": arguments.from_stage}
     with console_run(arguments, stream) as console:
-        report = run(arguments.capture, arguments.out, settings, progress_of_run(**console), **stages)
+        report = run(arguments.capture, arguments.out, settings, progress_of_run(**console))
     made = "stages" if arguments.until != WRITE else "scene.blend" if arguments.scene else "materials.json"
     line = f"Done in {duration(report['seconds'])}: {arguments.out / made}"
     told = {"seconds": report["seconds"], "result": str(arguments.out.absolute()), "until": arguments.until}

@@ -119,23 +119,13 @@ def options_of(arguments: argparse.Namespace) -> list[str]:
 def stage_command(arguments: argparse.Namespace, stream: TextIO) -> int:
     """`stage CAPTURE --out RESULT --stage NAME [--block I/N]`."""
     settings = settings_from(arguments)
-    run = run_from(arguments)
+    run = run_from(arguments, until=arguments.stage, alone=True, block=arguments.block)
     with needed_packages():
-        from ..core.pipeline.run import check_run, progress_of_run
+        from ..core.pipeline.run import progress_of_run
         from .unit import unit
-    check_run(arguments.capture, arguments.out, arguments.stage, block=arguments.block)
     with console_run(arguments, stream) as console:
         with unit(arguments.out, arguments.stage, arguments.block, console["should_stop"]):
-            progress = progress_of_run(**console)
-            report = run(
-                arguments.capture,
-                arguments.out,
-                settings,
-                progress,
-                until=arguments.stage,
-                alone=True,
-                block=arguments.block,
-            )
+            report = run(arguments.capture, arguments.out, settings, progress_of_run(**console))
     line = f"Done in {duration(report['seconds'])}: stage '{arguments.stage}' of {arguments.out}"
     told = {"seconds": report["seconds"], "result": str(arguments.out.absolute()), "until": arguments.stage}
     warnings = report.get("warnings", ()) if arguments.stage == WRITE else ()

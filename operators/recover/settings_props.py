@@ -200,21 +200,12 @@ class StageOperator(SettingsProps, CaptureOperator):
     def run(self, context, until: str, **where) -> list[str]:
         """Run the stages up to `until` here; returns the report's warnings. `where` goes to `bridge.job.run.run`."""
         from ...addon.bridge.job.run import run
-        from ...addon.core.pipeline.run import progress_of_run  # not earlier: Blender's start should not wait for it
+        from ...addon.core.pipeline.run import Asked, progress_of_run  # not earlier: Blender's start should not wait
 
-        settings = self.settings()
+        settings, asked = self.settings(), Asked(until, self.first_stage(), reading=reading_props.reading(self))
+        folders = self.folder("capture_folder"), self.folder("result_folder")
         with contextlib.closing(MemoryGuard(self.memory_limit())) as guard:
-            report = run(
-                self.folder("capture_folder"),
-                self.folder("result_folder"),
-                settings,
-                progress_of_run(should_stop=guard),
-                until,
-                reading=reading_props.reading(self),
-                from_stage=self.first_stage(),
-                **where,
-            )
-        return report["warnings"]
+            return run(*folders, settings, progress_of_run(should_stop=guard), asked, **where)["warnings"]
 
     def first_stage(self) -> str | None:
         """The stage that is done anew with all later ones; None goes on from what is stored."""

@@ -171,18 +171,18 @@ def test_what_is_chosen_arrives(ops, name, until, paper, package, tmp_path, monk
     module = importlib.import_module("scan_relight.addon.bridge.job.run")
     settings = importlib.import_module("scan_relight.addon.core.settings")
 
-    def remember(capture, result, chosen, progress, until, **where):
-        asked.append((capture, result, chosen, until, where))
+    def remember(capture, result, chosen, progress, what, **where):
+        asked.append((capture, result, chosen, what, where))
         return {"warnings": ["This was odd."]}
 
     monkeypatch.setattr(module, "run", remember)
     monkeypatch.chdir(tmp_path)
     done = getattr(ops, name)(capture_folder="a", result_folder="b", paper=paper, seed=5, median="mean")
     assert done == {"FINISHED"}
-    [(capture, result, chosen, stage, where)] = asked
-    assert (capture, result, stage) == ("a", "b", until)
+    [(capture, result, chosen, what, where)] = asked
+    assert (capture, result, what.until) == ("a", "b", until)
     assert chosen == (replace(settings.PAPER, seed=5) if paper else settings.Settings(seed=5, median="mean"))
-    assert where.pop("from_stage") is None and where.pop("reading").format == ""
+    assert what.from_stage is None and what.reading.format == ""
     onto = {"scene": bpy.context.scene, "target": "AUTO", "images": "RESULT", "copies": False, "into": "OWN"}
     assert where == {"write": onto | {"import_first": False}, "recover": onto | {"import_first": True}}.get(name, {})
 

@@ -10,11 +10,10 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import BadInputError
-from ...core.io.layout import AS_FOUND, Reading
 from ...core.io.read import read_capture
 from ...core.pipeline.recover import Recovery
 from ...core.pipeline.refit import REPORT, Refit, open_result
-from ...core.pipeline.run import Run, check_run, package_versions, told_in_a_sentence
+from ...core.pipeline.run import WHOLE, Asked, Run, package_versions, told_in_a_sentence
 from ...core.progress import Progress
 from ...core.results.overrides import OVERRIDES
 from ...core.results.store import Store
@@ -42,53 +41,30 @@ def run(
     out_folder: Path | str,
     settings: Settings,
     progress: Progress,
-    until: str = WRITE,
+    asked: Asked = WHOLE,
     scene: bpy.types.Scene | None = None,
     import_first: bool = True,
-    reading: Reading = AS_FOUND,
-    from_stage: str | None = None,
     target: str = AUTO,
     images: str = result_images.RESULT,
     copies: bool = False,
-    override: Path | None = None,
-    heed_kept: bool = True,
     into: str = "OWN",
-    alone: bool = False,
-    white: str = "",
-    block: tuple[int, int] | None = None,
 ) -> dict:
-    """Recover a capture up to a stage; stages that the result folder holds already are not done again.
+    """Recover a capture as far as is asked; stages that the result folder holds already are not done again.
 
     Parameters
     ----------
     out_folder : path
         Made where absent.
-    until : str
-        One of `stages.RUN_STAGES`; `WRITE` for all of them, the images and scene.blend.
     scene : bpy.types.Scene, optional
-        With `WRITE`: also bring the room into the file that this scene is of, and leave all else that is open as it
+        Of a whole run: also bring the room into the file that this scene is of, and leave all else that is open as it
         is. Without one, scene.blend is made from an empty file.
     import_first : bool
         Bring the room where it is not there; False updates one that is.
-    reading : Reading
-        How the capture is to be read.
-    from_stage : str, optional
-        Do this stage and all later ones anew, though the result folder holds them.
     target, images, copies
         With `scene`: what the materials go onto, see `own_scene.write_back.is_own`, and where their images go, see
         `results.images`. No room comes where they go onto the artist's own objects.
-    override : Path, optional
-        File of what the artist gives (`core.results.overrides`), merged into what the result folder keeps.
-    heed_kept : bool
-        False leaves out, for this run, what the result folder keeps.
     into : str
         `OWN`: the room has a scene of its own; `SCENE`: it comes into `scene`.
-    alone : bool
-        Do `until` and none that comes before it; see `Run.stages`.
-    white : str
-        What has a known albedo: a part, 'ceiling' or 'wall=0.7', or a frame's pixel, '0012:320,200=0.18'.
-    block : tuple of int, optional
-        Do a part of it alone; see `Run`.
 
     Returns
     -------
@@ -101,7 +77,7 @@ def run(
         One sentence for the user.
     """
     capture_folder, out_folder = Path(capture_folder), Path(out_folder)
-    check_run(capture_folder, out_folder, until, from_stage, block)
+    asked.check(capture_folder, out_folder)
     if os.sep == "/" and "\\" in str(out_folder.absolute()):
         raise BadInputError(
             f"Result folder '{out_folder.absolute()}' has a backslash in its path, which Blender takes for a slash; "
@@ -111,15 +87,13 @@ def run(
         result_images.check(images)
     started = time.monotonic()
     progress.stage(READ)
-    capture = read_capture(capture_folder, reading)
+    capture = read_capture(capture_folder, asked.reading)
     own = is_own(capture.root, target)
     if scene is not None and own:
         check_own(capture.root)  # what is absent is told now, not after the work
     elif scene is not None and not import_first:
         imported(capture.root)
-    whole_run = Run(
-        capture, out_folder, settings, progress, reading, override, heed_kept, versions(), started, white, block
-    )
+    whole_run = Run(capture, out_folder, settings, progress, asked, versions(), started)
 
     def write(recovery: Recovery, facing: Capture) -> tuple[str, ...]:
         warnings = write_recovered(recovery, facing, fresh=scene is None)
@@ -134,8 +108,8 @@ def run(
 
     with whole_run:
         lay_out = partial(unwrap, polygons=polygons_of(capture.root, capture.mesh))
-        report = whole_run.stages(lay_out, until, from_stage, alone)
-        return whole_run.write(write) if until == WRITE else report
+        report = whole_run.stages(lay_out)
+        return whole_run.write(write) if asked.until == WRITE else report
 
 
 def refit(
@@ -146,7 +120,7 @@ def refit(
     heed_kept: bool = True,
     scene: bool = True,
 ) -> dict:
-    """Fit objects of a result again with all else held; `progress`, `override`, `heed_kept` and errors as in `run`.
+    """Fit objects of a result again with all else held; `progress` and errors as in `run`, the rest as in `Asked`.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ import platform
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -46,21 +46,53 @@ def progress_of_run(
     return Progress(listener, should_stop, WEIGHTS)
 
 
-def check_run(
-    capture_folder: Path,
-    out_folder: Path,
-    until: str = WRITE,
-    from_stage: str | None = None,
-    block: tuple[int, int] | None = None,
-) -> None:
-    """Raise `BadInputError` for a stage that is not, or not divided, and a result folder that is the capture's."""
-    for stage in (until, from_stage):
-        if stage is not None and stage not in RUN_STAGES:
-            raise BadInputError(f"There is no stage '{stage}'; choose one of {', '.join(RUN_STAGES)}.")
-    if block is not None and until not in [one.name for one in DECLARED if one.divided_by]:
-        raise BadInputError(f"Stage '{until}' can't be divided into blocks; leave --block out.")
-    if out_folder.resolve() == capture_folder.resolve():
-        raise BadInputError(f"Result folder '{out_folder}' is the capture itself; choose another.")
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of a run besides its settings.
+
+    Attributes
+    ----------
+    until : str
+        The last stage to do, one of `stages.RUN_STAGES`; `WRITE` for all of them and what is written.
+    from_stage : str or None
+        Do this stage and all later ones anew, though the result folder holds them.
+    alone : bool
+        Do `until` and none that comes before it.
+    block : tuple of int, or None
+        I and N: of the last stage, this part alone; the result folder is shared with those who do the others.
+    reading : Reading
+        How the capture is to be read, or was.
+    override : Path or None
+        File of what the artist gives (`results.overrides`), merged into what the result folder keeps.
+    heed_kept : bool
+        False leaves out, for this run, what the result folder keeps.
+    white : str
+        What has a known albedo: a part, 'ceiling' or 'wall=0.7', or a frame's pixel, '0012:320,200=0.18'; '' for none.
+        Kept as what is in `override` is.
+    """
+
+    until: str = WRITE
+    from_stage: str | None = None
+    alone: bool = False
+    block: tuple[int, int] | None = None
+    reading: Reading = AS_FOUND
+    override: Path | None = None
+    heed_kept: bool = True
+    white: str = ""
+
+    def check(self, capture_folder: Path, out_folder: Path) -> None:
+        """Raise `BadInputError` for a stage that is not, or not divided, and a result folder that is the capture's."""
+        for stage in (self.until, self.from_stage):
+            if stage is not None and stage not in RUN_STAGES:
+                raise BadInputError(f"There is no stage '{stage}'; choose one of {', '.join(RUN_STAGES)}.")
+        if self.block is not None and self.until not in [one.name for one in DECLARED if one.divided_by]:
+            raise BadInputError(f"Stage '{self.until}' can't be divided into blocks; leave --block out.")
+        if out_folder.resolve() == capture_folder.resolve():
+            raise BadInputError(f"Result folder '{out_folder}' is the capture itself; choose another.")
+
+
+WHOLE = Asked()
+"""A whole run."""
 
 
 class Run:
@@ -76,20 +108,11 @@ class Run:
     settings : Settings
     progress : Progress
         In the stage `READ`.
-    reading : Reading
-        How the capture was read.
-    override : Path, optional
-        File of what the artist gives (`results.overrides`), merged into what the result folder keeps.
-    heed_kept : bool
-        False leaves out, for this run, what the result folder keeps.
+    asked : Asked
     versions : mapping of str to str
         What the report names besides Python and its packages.
-    started : float, optional
-        When it began, by `time.monotonic`; now, unless given.
-    white : str
-        What has a known albedo (`results.known_white.white_of`), kept as what is in `override` is; '' for none.
-    block : tuple of int, optional
-        I and N: of the last stage, this part alone; the result folder is shared with those who do the others.
+    started : float
+        When it began, by `time.monotonic`.
 
     Attributes
     ----------
@@ -110,77 +133,61 @@ class Run:
         out_folder: Path,
         settings: Settings,
         progress: Progress,
-        reading: Reading = AS_FOUND,
-        override: Path | None = None,
-        heed_kept: bool = True,
-        versions: Mapping[str, str] | None = None,
-        started: float | None = None,
-        white: str = "",
-        block: tuple[int, int] | None = None,
+        asked: Asked,
+        versions: Mapping[str, str],
+        started: float,
     ):
-        self._started = time.monotonic() if started is None else started
-        self.capture, self.folder = capture, out_folder
-        self._settings, self._progress, self._versions = settings, progress, dict(versions or {})
-        self._block = block
-        self._keep = (override is not None or bool(white)) and heed_kept
+        self.capture, self.folder, self._asked, self._started = capture, out_folder, asked, started
+        self._settings, self._progress, self._versions = settings, progress, dict(versions)
         known = {one.object_id for one in capture.instances} | objects_of(out_folder)
-        self._given = heeded(out_folder, known, override, heed_kept)
-        if white:
-            self._given = merge(self._given, Overrides(white=white_of(white, capture)))
-        self._told = _look(capture, reading) if capture.frames else []
-        if not heed_kept and (out_folder / OVERRIDES).is_file():
+        self._given = heeded(out_folder, known, asked.override, asked.heed_kept)
+        if asked.white:
+            self._given = merge(self._given, Overrides(white=white_of(asked.white, capture)))
+        self._told = _look(capture, asked.reading) if capture.frames else []
+        if not asked.heed_kept and (out_folder / OVERRIDES).is_file():
             self._told = [LEFT_OUT, *self._told]
 
     def __enter__(self) -> Run:
-        self._store = Store(self.folder, shared=self._block is not None)
+        self._store = Store(self.folder, shared=self._asked.block is not None)
         return self
 
     def __exit__(self, *exception: object) -> None:
         self._store.close()
 
-    def stages(
-        self, unwrap: Unwrap, until: str = WRITE, from_stage: str | None = None, alone: bool = False
-    ) -> dict[str, Any]:
-        """Do the stages up to `until`, and all from `from_stage` on anew; returns the report of a run that ends there.
+    def stages(self, unwrap: Unwrap) -> dict[str, Any]:
+        """Do the stages that are asked for, over an atlas by `unwrap`; returns the report of a run that ends there.
 
-        What was written before stays untouched where `until` is `WRITE`: `write` is to follow.
-
-        Parameters
-        ----------
-        unwrap : callable(Mesh, int) -> (t, 3, 2) float32
-        until, from_stage : str
-        alone : bool
-            Do `until` and none that comes before it.
+        What was written before stays untouched where all are: `write` is to follow.
 
         Raises
         ------
         MissingStageError
-            With `alone`: one that comes before is not stored.
+            One is to be done alone, and what comes before is not stored.
         """
-        store = self._store
+        store, asked = self._store, self._asked
         with told_in_a_sentence(self.folder):
-            if self._block is None:
+            if asked.block is None:
                 write_capture(store.folder, self.capture.root)
-                if from_stage in STAGES:
-                    store.drop(STAGES[STAGES.index(from_stage) :])
-                if self._keep:
+                if asked.from_stage in STAGES:
+                    store.drop(STAGES[STAGES.index(asked.from_stage) :])
+                if asked.heed_kept and (asked.override is not None or asked.white):
                     store.write_json(OVERRIDES, self._given.as_dict())
             self._progress.done()
             self.recovery = Recovery(self.capture, store, self._settings, self._progress, unwrap, self._given)
             for stage in STAGES:
-                if alone and stage != until and store.stored_key(stage) != self.recovery.keys[stage]:
+                if asked.alone and stage != asked.until and store.stored_key(stage) != self.recovery.keys[stage]:
                     raise MissingStageError(
                         f"Result folder '{self.folder}' holds no stage '{stage}' of this capture, these settings and "
                         "this version; do it first."
                     )
-                if stage == until and self._block is not None:
-                    getattr(self.recovery, f"{stage}_block")(self._block)
+                if stage == asked.until and asked.block is not None:
+                    getattr(self.recovery, f"{stage}_block")(asked.block)
                     break
                 getattr(self.recovery, stage)()
-                if stage == until:
+                if stage == asked.until:
                     break
             report = self._report(self.recovery.report())
-            if until != WRITE and self._block is None:
+            if asked.until != WRITE and asked.block is None:
                 store.write_json("report.json", report)
             return report
 
