@@ -1,6 +1,7 @@
 """Which model and which lobe each object gets: by its views, by what is behind it, by its looks, by its class."""
 
-from collections.abc import Collection, Mapping, Sequence
+import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,6 +12,7 @@ from ..fit.lobe_fit import LobeFit
 from ..fit.problem import Problem
 from ..fit.transmission import SeeThrough
 from ..light.field import LightField
+from ..light.lamps import Lamp
 from ..light.lobes import LobeLight
 from ..paper.target_frame import frame_scores, target_frame
 from ..parallel import ordered_map
@@ -27,12 +29,13 @@ from ..results.overrides import Given
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Instance, class_names
 from ..scene.samples import Samples
+from ..settings import Settings
 from ..significance import LEVELS
 
 
 @dataclass(frozen=True)
 class Room:
-    """What the models are chosen by, for n elements.
+    """What the models are chosen by and how, for n elements.
 
     Attributes
     ----------
@@ -43,8 +46,16 @@ class Room:
         E of each element, from L_d.
     samples : Samples
     frame_names : list of str
+    lamps : tuple of Lamp
+        As the shading stage found them.
     noise : float
         What was taken out of the mesh, in metres.
+    given : dict of int to Given
+        What the artist gives of objects, by object_id.
+    settings : Settings
+        The stage's.
+    progress : Progress or None
+        Ends the work by `InterruptedRun`.
     """
 
     instances: tuple[Instance, ...]
@@ -53,7 +64,11 @@ class Room:
     irradiance: np.ndarray
     samples: Samples
     frame_names: list[str]
-    noise: float
+    lamps: tuple[Lamp, ...] = ()
+    noise: float = 0.0
+    given: Mapping[int, Given] = dataclasses.field(default_factory=dict)
+    settings: Settings = Settings()
+    progress: Progress | None = None
 
     @cached_property
     def names(self) -> dict[int, str]:
@@ -104,44 +119,35 @@ LOOKED = {one.__name__: one for one in (Looked, Choice, Problem, LobeLight, Lobe
 
 
 def look_at(
-    room: Room,
-    maker: Problems,
-    wanted: Sequence[int],
-    given: Mapping[int, Given],
-    rays: int,
-    threads: int,
-    without: Collection[str],
-    progress: Progress | None,
-    looked: Mapping[int, Looked] | None = None,
+    room: Room, maker: Problems, wanted: Sequence[int], known: Mapping[int, Looked] | None = None
 ) -> dict[int, Looked]:
     """What the frames say of each of the `wanted` objects, by object_id; none depends on which others are wanted.
 
     Parameters
     ----------
-    looked : mapping of int to Looked, optional
-        What is known already.
+    known : mapping of int to Looked, optional
+        What was found of them before.
     """
-    guesses, known = {one.object_id for one in room.instances if one.guess}, looked or {}
+    guesses, known, given = {one.object_id for one in room.instances if one.guess}, known or {}, room.given
 
     def look(object_id: int) -> Looked:
         if object_id in known:
             return known[object_id]
         if object_id in given:
+            rays = room.settings.specular_rays
             return Looked(*fit_given(given[object_id], maker, object_id, room.irradiance, rays), -1)
-        return Looked(*_look(room, maker, object_id, rays, without, object_id in guesses))
+        return Looked(*_look(room, maker, object_id, object_id in guesses))
 
     found: dict[int, Looked] = {}
-    for object_id, one in zip(wanted, ordered_map(look, wanted, threads, ahead=len(wanted)), strict=True):
+    for object_id, one in zip(wanted, ordered_map(look, wanted, room.settings.threads, ahead=len(wanted)), strict=True):
         found[object_id] = one
-        if progress is not None:
-            progress.update(0.7 * len(found) / len(wanted))
+        if room.progress is not None:
+            room.progress.update(0.7 * len(found) / len(wanted))
     return found
 
 
-def choose_models(
-    room: Room, found: Mapping[int, Looked], given: Collection[int], threads: int, without: Collection[str]
-) -> Chosen:
-    """Choose a model for each object, by what its frames and its class say; of those that are `given`, by that alone.
+def choose_models(room: Room, found: Mapping[int, Looked]) -> Chosen:
+    """Choose a model for each object, by what its frames and its class say; of those that are given, by that alone.
 
     Parameters
     ----------
@@ -151,37 +157,35 @@ def choose_models(
     choices = {i: one.choice for i, one in found.items()}
     problems = {i: one.problem for i, one in found.items() if one.problem is not None}
     targets = {i: one.target for i, one in found.items()}
-    if "class-lobes" not in without:
+    if "class-lobes" not in room.settings.without:
         reflecting = {i: choice for i, choice in choices.items() if not choice.model.gives_light}
         adopted = adopt_from_class(reflecting, problems, class_names(room.instances))
-        choices |= {i: choice for i, choice in adopted.items() if i not in given}
-    intervals = ordered_map(lambda i: gloss_interval(choices[i], problems.get(i)), found, threads)
+        choices |= {i: choice for i, choice in adopted.items() if i not in room.given}
+    intervals = ordered_map(lambda i: gloss_interval(choices[i], problems.get(i)), found, room.settings.threads)
     return Chosen(choices, problems, targets, dict(zip(found, intervals, strict=True)))
 
 
-def _look(
-    room: Room, maker: Problems, object_id: int, rays: int, without: Collection[str], guess: bool
-) -> tuple[Choice, Problem | None, int]:
+def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Choice, Problem | None, int]:
     """What an object's own frames say: its model, the observations behind that, its target frame.
 
     A `guess` may hold several things: it is called neither metal nor transparent, as that would take the texture of
     all of them, and it is not judged by one colour.
     """
     field, samples = room.field, room.samples
-    choice, problem, index = _by_frames(maker, object_id, rays, not guess)
+    choice, problem, index = _by_frames(maker, object_id, room.settings.specular_rays, not guess)
     element, direction = samples.element[index], samples.direction[index]
     scores = frame_scores(
         field, field.atlas.position[element], field.atlas.normal[element], direction, samples.frame[index],
         len(room.frame_names),
     )  # fmt: skip
-    if problem is not None and choice.fit is not None and "see-through" not in without and not guess:
+    if problem is not None and choice.fit is not None and "see-through" not in room.settings.without and not guess:
         behind = look_behind(field, room.lit_diffuse.seen, element, direction, object_id, room.noise)
         lobe = choice.fit if choice.model.has_lobe else None
         shown = judge(problem, behind, lobe, max(1.4826 * choice.fit.residual, 1e-4))
         if shown is not None:
             choice = set_apart(choice, shown, is_sure(shown))
     if choice.model.has_albedo and not guess:
-        choice, problem = _by_looks(maker, object_id, choice, problem, room.irradiance, rays, without)
+        choice, problem = _by_looks(room, maker, object_id, choice, problem)
     return choice, problem, target_frame(scores)
 
 
@@ -197,15 +201,10 @@ def _by_frames(
 
 
 def _by_looks(
-    maker: Problems,
-    object_id: int,
-    choice: Choice,
-    problem: Problem | None,
-    irradiance: np.ndarray,
-    rays: int,
-    without: Collection[str],
+    room: Room, maker: Problems, object_id: int, choice: Choice, problem: Problem | None
 ) -> tuple[Choice, Problem | None]:
     """Ask whether an object looks like a metal or coated all over; choice and observations stay as they were if not."""
+    irradiance, without = room.irradiance, room.settings.without
     if problem is not None and len(np.unique(problem.element)) >= LEVELS.few:
         first = compare(problem, irradiance)
         if first is None:
@@ -217,7 +216,7 @@ def _by_looks(
     index = maker.pick(object_id, FIT.elements, LEVELS.views, least=1, seed=1)
     if not len(index):
         return choice, problem
-    whole = maker.problem(index, rays)
+    whole = maker.problem(index, room.settings.specular_rays)
     looks = compare(whole, irradiance)
     if looks is None:
         return choice, problem

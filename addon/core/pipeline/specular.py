@@ -12,7 +12,6 @@ import numpy as np
 from ..brdf.lambertian import LAMBERTIAN
 from ..brdf.material import ObjectMaterial, from_json
 from ..light.field import LightField
-from ..light.lamps import Lamp
 from ..memory import give_back
 from ..parallel import ordered_map
 from ..passes.glossy_light.glossy_light import Excess, glossy_light
@@ -24,10 +23,9 @@ from ..passes.specular.problems import Problems
 from ..passes.specular.separate import specular_in_median, spread_over_object
 from ..passes.specular_removal.removal import SpecularPart, without_specular
 from ..passes.unlit_lamps.unlit import unlit
-from ..progress import Progress, Rounds
+from ..progress import Rounds
 from ..results.overrides import NOTHING, Given, Overrides
 from ..scene.element_groups import ElementGroups
-from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Frame, Instance, Pixels, class_names
 from ..scene.samples import Samples
 from .choose_models import Chosen, Looked, Room, choose_models, look_at
@@ -102,8 +100,6 @@ class Pictures:
         All of the capture's, in the poses that they were found to have.
     read : callable
         Gives a frame's pixels.
-    median : str
-        As `accumulate` takes it.
     folder : Path
         Where the exact median keeps observations meanwhile.
     groups : ElementGroups, optional
@@ -112,82 +108,49 @@ class Pictures:
 
     frames: Sequence[Frame]
     read: Callable[[Frame], Pixels]
-    median: str
     folder: Path
     groups: ElementGroups | None = None
 
 
 def fit_specular(
-    instances: tuple[Instance, ...],
-    field: LightField,
-    lit_diffuse: LitDiffuse,
-    irradiance: np.ndarray,
-    lamps: tuple[Lamp, ...],
-    samples: Samples,
-    frame_names: list[str],
-    *,
-    pictures: Pictures | None = None,
-    rays: int = 256,
-    refine: int = 2,
-    threads: int = 0,
-    seed: int = 0,
-    noise: float = 0.0,
-    given: Mapping[int, Given] | None = None,
-    held: Held | None = None,
-    without: Collection[str] = (),
-    as_published: bool = False,
-    looked: Mapping[int, Looked] | None = None,
-    progress: Progress | None = None,
+    room: Room, pictures: Pictures | None = None, held: Held | None = None, looked: Mapping[int, Looked] | None = None
 ) -> Specular:
     """Fit every object to many of its views, choose its model, and find the specular part of L_d.
 
+    With the setting `specular` as published, objects of which nothing is given get the lobe of their target frame.
+
     Parameters
     ----------
-    irradiance : (n, 3) float32
-        E of each element, from L_d.
     pictures : Pictures, optional
         What lobes are taken out of; without, they stay in L_d.
-    refine : int
-        0 leaves L_d as the median gave it; 1 takes the lobes out of it; 2 also corrects E for what they really reflect.
-    noise : float
-        What was taken out of the mesh, in metres.
-    given : dict of int to Given
-        What the artist gives of objects, by object_id.
     held : Held, optional
         Fit a few objects only.
-    without : collection of str
-        Passes left out.
-    as_published : bool
-        Objects of which nothing is given get the lobe of their target frame instead (`fit_targets`).
     looked : mapping of int to Looked, optional
         What `look_at_block` found of objects.
 
     Raises
     ------
     InterruptedRun
-        From `progress`.
+        From the room's progress.
     """
-    given = given or {}
+    instances, field, given, how, progress = room.instances, room.field, room.given, room.settings, room.progress
+    rays, threads, seed, without, refine = how.specular_rays, how.threads, how.seed, how.without, how.refine
     refine = 0 if "specular-removal" in without else min(refine, 1) if "glossy-light" in without else refine
-    room = Room(instances, field, lit_diffuse, irradiance, samples, frame_names, noise)
-    maker, wanted = _asked(room, lamps, given, held, seed, without)
+    maker, wanted = _asked(room, held)
     told: dict[int, ObjectMaterial] = {}
-    if as_published:
+    if "specular" in how.published:
         others = [i for i in instances if i.object_id in wanted and i.object_id not in given]
         told = fit_targets(
-            others, field, lit_diffuse, samples, frame_names, rays=rays, threads=threads, seed=seed, progress=progress
-        )
+            others, field, room.lit_diffuse, room.samples, room.frame_names, rays=rays, threads=threads, seed=seed,
+            progress=progress,
+        )  # fmt: skip
         wanted = [i for i in wanted if i not in told]
-    found = look_at(room, maker, wanted, given, rays, threads, without, progress, looked)
-    chosen = choose_models(room, found, given, threads, without)
+    found = look_at(room, maker, wanted, looked)
+    chosen = choose_models(room, found)
 
     kept = {} if held is None else {m.object_id: m for m in held.found.materials if m.object_id not in held.only}
-    lit_by = {lamp.object_id: lamp for lamp in lamps if lamp.object_id not in given}
     by_id = {
-        i.object_id: kept.get(i.object_id)
-        or told.get(i.object_id)
-        or _describe(i, room, chosen, lit_by, given, seed, without)
-        for i in instances
+        i.object_id: kept.get(i.object_id) or told.get(i.object_id) or _describe(i, room, chosen) for i in instances
     }
     _same_as(by_id, given, set(kept))
     materials = tuple(by_id.values())
@@ -202,32 +165,21 @@ def fit_specular(
         hidden = held.found.hidden & ~np.isin(field.atlas.object_id, list(held.only))
     if refine:
         apart = [m for m in materials if m.object_id not in kept]
-        _without_backgrounds(specular, apart, room, maker, threads)
+        _without_backgrounds(specular, apart, room, maker)
         if pictures is not None:
-            hidden |= _remove(specular, apart, room, pictures, rays, threads, seed, progress)
+            hidden |= _remove(specular, apart, room, pictures)
     give_back()
     if refine > 1 and held is None:
-        seen = np.flatnonzero(lit_diffuse.seen)
+        seen = np.flatnonzero(room.lit_diffuse.seen)
         sent = Excess(field, materials, specular, seed)
         excess[seen] = glossy_light(
-            sent, seen, irradiance[seen], threads=threads, seed=seed, progress=progress, share=(0.85, 1.0),
+            sent, seen, room.irradiance[seen], threads=threads, seed=seed, progress=progress, share=(0.85, 1.0),
             without=without,
         )  # fmt: skip
     return Specular(materials, specular, excess, hidden)
 
 
-def look_at_block(
-    room: Room,
-    lamps: tuple[Lamp, ...],
-    block: tuple[int, int],
-    *,
-    rays: int,
-    threads: int,
-    seed: int,
-    given: Mapping[int, Given],
-    without: Collection[str],
-    progress: Progress,
-) -> dict[int, Looked]:
+def look_at_block(room: Room, block: tuple[int, int]) -> dict[int, Looked]:
     """What `fit_specular` has to find of every N-th object, from the I-th of those on that it fits.
 
     Parameters
@@ -238,25 +190,18 @@ def look_at_block(
     Raises
     ------
     InterruptedRun
-        From `progress`.
+        From the room's progress.
     """
-    maker, wanted = _asked(room, lamps, given, None, seed, without)
-    return look_at(room, maker, wanted[block[0] - 1 :: block[1]], given, rays, threads, without, progress)
+    maker, wanted = _asked(room, None)
+    return look_at(room, maker, wanted[block[0] - 1 :: block[1]])
 
 
-def _asked(
-    room: Room,
-    lamps: tuple[Lamp, ...],
-    given: Mapping[int, Given],
-    held: Held | None,
-    seed: int,
-    without: Collection[str],
-) -> tuple[Problems, list[int]]:
+def _asked(room: Room, held: Held | None) -> tuple[Problems, list[int]]:
     """What makes objects' problems, and the objects that a model is to be chosen for."""
-    found_before = {lamp.object_id for lamp in lamps} | {mirror.object_id for mirror in room.field.mirrors}
+    found_before = {lamp.object_id for lamp in room.lamps} | {mirror.object_id for mirror in room.field.mirrors}
     # Objects are shared between the threads, not the rays of one: so the fits run side by side, too.
-    maker = Problems(room.field, room.samples, threads=1, seed=seed, without=without)
-    return maker, _wanted(room.instances, found_before, given, held)
+    maker = Problems(room.field, room.samples, threads=1, seed=room.settings.seed, without=room.settings.without)
+    return maker, _wanted(room.instances, found_before, room.given, held)
 
 
 def _wanted(
@@ -274,21 +219,13 @@ def _wanted(
     return [i for i in wanted if i in held.only or i not in given and class_of[i] in alike]
 
 
-def _describe(
-    i: Instance,
-    room: Room,
-    chosen: Chosen,
-    lamps: Mapping[int, Lamp],
-    given: Mapping[int, Given],
-    seed: int,
-    without: Collection[str],
-) -> ObjectMaterial:
+def _describe(i: Instance, room: Room, chosen: Chosen) -> ObjectMaterial:
     """What is known of one object: a lamp, a flat mirror, or what its model was chosen to be."""
-    field, number = room.field, i.object_id
+    field, given, number = room.field, room.given, i.object_id
     own, choice = field.atlas.elements_of(number), chosen.choices.get(number)
 
     def lamp(radiance: np.ndarray, note: str) -> ObjectMaterial:
-        albedo, why = (None, "") if "unlit-lamps" in without else unlit(i, field, seed)
+        albedo, why = (None, "") if "unlit-lamps" in room.settings.without else unlit(i, field, room.settings.seed)
         return lamp_material(i, radiance, room.irradiance[own], " ".join(filter(None, (note, why))), albedo)
 
     if choice is not None and choice.model.gives_light:
@@ -299,8 +236,9 @@ def _describe(
         name = room.frame_names[target] if target >= 0 else None
         found = described(i, choice, chosen.problems.get(number), name, sure)
         return as_given(found, given[number], choice, sure) if number in given else found
-    if number in lamps:
-        return lamp(lamps[number].radiance, lamps[number].note(room.names))
+    solved = None if number in given else next((one for one in room.lamps if one.object_id == number), None)
+    if solved is not None:
+        return lamp(solved.radiance, solved.note(room.names))
     mirror = next((one for one in field.mirrors if one.object_id == number), None)
     if mirror is not None and number not in given:
         seen = int((field.atlas.object_id[room.samples.element] == number).sum())
@@ -317,41 +255,30 @@ def _same_as(by_id: dict[int, ObjectMaterial], given: Mapping[int, Given], kept:
             by_id[i] = same_material(by_id[source], by_id[i])
 
 
-def _remove(
-    specular: np.ndarray,
-    materials: list[ObjectMaterial],
-    room: Room,
-    pictures: Pictures,
-    rays: int,
-    threads: int,
-    seed: int,
-    progress: Progress | None,
-) -> np.ndarray:
+def _remove(specular: np.ndarray, materials: list[ObjectMaterial], room: Room, pictures: Pictures) -> np.ndarray:
     """Put the specular part of glossy things' L_d into `specular`, (n, 3); where it hides the rest, (n,) bool."""
-    glossy, field, samples = [m for m in materials if m.model.layered], room.field, room.samples
+    glossy, field, samples, how = [m for m in materials if m.model.layered], room.field, room.samples, room.settings
     own = np.isin(field.atlas.object_id, [m.object_id for m in glossy])
     looking = np.unique(samples.frame[own[samples.element]])
     if not len(looking):
         return np.zeros(len(own), bool)
     found = without_specular(
-        SpecularPart(field, glossy, rays, seed), field, room.lit_diffuse, own,
-        [pictures.frames[i] for i in looking], pictures.read, median=pictures.median, seed=seed, threads=threads,
-        folder=pictures.folder, groups=pictures.groups, progress=Rounds(progress, 0.7, 1.0),
+        SpecularPart(field, glossy, how.specular_rays, how.seed), field, room.lit_diffuse, own,
+        [pictures.frames[i] for i in looking], pictures.read, median=how.median, seed=how.seed, threads=how.threads,
+        folder=pictures.folder, groups=pictures.groups, progress=Rounds(room.progress, 0.7, 1.0),
     )  # fmt: skip
     specular[own] = found.specular[own]
     return found.hidden
 
 
-def _without_backgrounds(
-    specular: np.ndarray, materials: list[ObjectMaterial], room: Room, maker: Problems, threads: int
-) -> None:
+def _without_backgrounds(specular: np.ndarray, materials: list[ObjectMaterial], room: Room, maker: Problems) -> None:
     """Put what came from behind glass into `specular`, (n, 3)."""
     glass = [m for m in materials if m.surfaces is not None]
 
     def separate(material: ObjectMaterial) -> tuple[np.ndarray, np.ndarray]:
         return _without_background(material, room.field, room.lit_diffuse.seen, maker, room.samples)
 
-    for own, part in ordered_map(separate, glass, threads):
+    for own, part in ordered_map(separate, glass, room.settings.threads):
         specular[own] = part
 
 

@@ -292,19 +292,12 @@ class Stages:
     def specular_block(self, block: tuple[int, int]) -> None:
         """Store what is found of some of the objects, which `specular` begins with: the I-th of N parts, I from 1."""
         name, key = f"{specular.STAGE.name}-{block[0]}-of-{block[1]}", self.keys[specular.STAGE.name]
-        settings, light = specular.STAGE.settings(self.settings), self.shading()
+        settings = specular.STAGE.settings(self.settings)
+        self.shading()
         if self.store.stored_key(name) == key:
             return
         self.progress.stage(specular.STAGE.name)
-        names = [frame.name for frame in self.capture.frames]
-        room = Room(
-            self.capture.instances, self.field, self.lit_diffuse(), light.irradiance, self.samples(), names,
-            self.surface().noise,
-        )  # fmt: skip
-        found = look_at_block(
-            room, light.lamps, block, rays=settings.specular_rays, threads=settings.threads, seed=settings.seed,
-            given=self.overrides.lobes(), without=settings.without, progress=self.progress,
-        )  # fmt: skip
+        found = look_at_block(self._room(settings), block)
         arrays: Arrays = {}
         self.store.save(name, key, arrays, {"looked": packed(found, arrays)})
         self.progress.done()
@@ -318,22 +311,18 @@ class Stages:
                 found |= unpacked(self.store.stored_meta(name)["looked"], arrays, LOOKED)
         return found
 
-    @property
-    def _pictures(self) -> Pictures:
-        return Pictures(self.frames, self.read, self.settings.median, self.store.folder, self.surface().groups)
+    def _room(self, settings: Settings) -> Room:
+        light, names = self.shading(), [frame.name for frame in self.capture.frames]
+        return Room(
+            self.capture.instances, self.field, self.lit_diffuse(), light.irradiance, self.samples(), names,
+            light.lamps, self.surface().noise, self.overrides.lobes(), settings, self.progress,
+        )  # fmt: skip
 
     def fitted(self, settings: Settings, held: Held | None = None) -> Specular:
         """The specular stage as it is computed, of all objects or with some `held`."""
-        s, light, lit, samples = settings, self.shading(), self.lit_diffuse(), self.samples()
-        names = [frame.name for frame in self.capture.frames]
-        return fit_specular(
-            self.capture.instances, self.field, lit, light.irradiance, light.lamps, samples, names,
-            pictures=self._pictures if names else None,
-            rays=s.specular_rays, refine=s.refine, threads=s.threads, seed=s.seed,
-            noise=self.surface().noise, given=self.overrides.lobes(), held=held, without=s.without,
-            as_published="specular" in s.published, looked=None if held else self._looked(),
-            progress=self.progress,
-        )  # fmt: skip
+        room = self._room(settings)
+        pictures = Pictures(self.frames, self.read, self.store.folder, self.surface().groups)
+        return fit_specular(room, pictures if room.frame_names else None, held, None if held else self._looked())
 
     @cached_property
     def median_radiance(self) -> float:

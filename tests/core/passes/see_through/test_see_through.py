@@ -10,10 +10,12 @@ import pytest
 from addon.core.brdf.transparent import TRANSPARENT
 from addon.core.passes.see_through.see_through import look_behind
 from addon.core.pipeline import choose_models
+from addon.core.pipeline.choose_models import Room as Views
 from addon.core.pipeline.specular import fit_specular
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.samples import Samples
 from addon.core.scene.visibility import CLEAN
+from addon.core.settings import Settings
 from tests.core.rooms import box_sides, make_room, quad
 
 SIZE = np.array([4.0, 3.0, 2.5])
@@ -66,10 +68,9 @@ class Room:
         count[np.setdiff1d(np.flatnonzero(self.room.atlas.object_id == PANE), own)] = 0
         seen = LitDiffuse(lit, lit, lit, count, np.full(n, CLEAN, np.int8), np.zeros(n, np.float32))
         card = tuple(i for i in self.room.instances if i.object_id == PANE)
-        found = fit_specular(
-            card, self.room.field(lit), seen, np.ones((n, 3), np.float32), (), samples,
-            [f"{k}" for k in range(len(EYES))], rays=64, threads=2, noise=mesh_noise,
-        )  # fmt: skip
+        names, settings = [f"{k}" for k in range(len(EYES))], Settings(specular_rays=64, threads=2)
+        found = fit_specular(Views(card, self.room.field(lit), seen, np.ones((n, 3), np.float32), samples, names,
+                                   noise=mesh_noise, settings=settings))  # fmt: skip
         return found.materials[0], found.specular[own], lit[own]
 
 

@@ -14,11 +14,13 @@ from addon.core.brdf.metal import METAL
 from addon.core.light.lamps import Lamp
 from addon.core.passes.specular.given import fit_given
 from addon.core.passes.specular.problems import Problems
+from addon.core.pipeline.choose_models import Room
 from addon.core.pipeline.specular import Held, Pictures, fit_specular
 from addon.core.results.overrides import Given
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.samples import Samples
 from addon.core.scene.visibility import CLEAN
+from addon.core.settings import Settings
 from tests.core.fit.test_fit import paint, steps
 from tests.core.glossy_box import GLOW, Box
 from tests.core.lit_diffuse.test_accumulate import frames_of
@@ -52,28 +54,19 @@ class Seen:
         self.irradiance = self.box.irradiance.astype(np.float32)
         cameras = [look_at((0.5 + 0.3 * i, 1, 1.5), (2, 1.5, 0), 16, 12, 80) for i in range(10)]
         grey = pixels_of(np.ones((12, 16, 3)))
-        self.pictures = Pictures(frames_of(cameras), lambda frame: grey, "exact", Path())
+        self.pictures = Pictures(frames_of(cameras), lambda frame: grey, Path())
 
     def fit(self, given):
         return fit_given(given, self.maker, FLOOR, self.irradiance, RAYS)[0]
 
     def all(self, given=None, held=None):
         lamp = Lamp(LAMP, np.float32(GLOW), True)
-        return fit_specular(
-            self.box.room.instances,
-            self.field,
-            self.lit,
-            self.irradiance,
-            (lamp,),
-            self.samples,
-            [f"{i:03d}" for i in range(10)],
-            pictures=self.pictures,
-            rays=64,
-            refine=1,
-            threads=2,
-            given=given,
-            held=held,
-        )
+        names = [f"{i:03d}" for i in range(10)]
+        room = Room(
+            self.box.room.instances, self.field, self.lit, self.irradiance, self.samples, names, (lamp,),
+            given=given or {}, settings=Settings(specular_rays=64, refine=1, threads=2),
+        )  # fmt: skip
+        return fit_specular(room, self.pictures, held)
 
 
 @pytest.fixture(scope="module")
