@@ -9,6 +9,7 @@ import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -140,122 +141,115 @@ def ask_for_disk(surface: Surface, frames: Sequence[Frame], folder: Path) -> Non
         )
 
 
-def observe(
-    surface: Surface,
-    capture: Capture,
-    read: Callable[[Frame], Pixels],
-    settings: Settings,
-    folder: Path,
-    progress: Progress,
-) -> Observed:
-    """What the frames of a capture show, or the light stored on its mesh; parameters and errors are `one_pass`'s."""
-    if capture.frames:
-        return all_passes(surface, capture.frames, read, settings, folder, progress)
-    mesh = replace(capture.mesh, vertices=surface.mesh.vertices)
-    lit = lit_from_tiles(mesh, surface.atlas, progress)
-    return Observed(lit, Environment.dark(), Samples.none(), Fringes.none(), Poses.as_read(()), Calibration.none(0))
+@dataclass(frozen=True)
+class Passes:
+    """The passes over the frames of a room, as the settings ask for them.
 
-
-def lit_diffuse(
-    surface: Surface,
-    frames: Sequence[Frame],
-    read: Callable[[Frame], Pixels],
-    settings: Settings,
-    folder: Path,
-    progress: Progress | Rounds,
-    also: Callable[[int, FrameView, Pixels, Observations], None] | None = None,
-) -> LitDiffuse:
-    """L_d as the settings ask for it; parameters are those of `one_pass` and of `accumulate`."""
-    where, threads = (surface.mesh, surface.atlas, surface.scene, frames, read), settings.threads
-    if "lit_diffuse" in settings.published:
-        return running_lit_diffuse(*where, threads=threads, also=also, progress=progress)
-    return accumulate(
-        *where, median=settings.median, edge_tier="edge-tier" not in settings.without, seed=settings.seed,
-        threads=threads, folder=folder, also=also, groups=surface.groups, progress=progress,
-    )  # fmt: skip
-
-
-def one_pass(
-    surface: Surface,
-    frames: Sequence[Frame],
-    poses: Poses,
-    read: Callable[[Frame], Pixels],
-    settings: Settings,
-    folder: Path,
-    progress: Progress | Rounds,
-) -> Observed:
-    """Read every frame once.
-
-    Parameters
+    Attributes
     ----------
-    poses : Poses
-        Where the frames are taken to be.
+    surface : Surface
+    read : callable
+        Gives a frame's pixels.
+    settings : Settings
     folder : Path
         Where the exact median keeps observations meanwhile.
-
-    Raises
-    ------
-    BadInputError
-        From `read`, or as no frame shows any of the mesh.
-    InterruptedRun
-        From `progress`.
     """
-    frames = poses.of(frames)
-    sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
-    kept = SampleCollector(surface.atlas, len(frames), settings.seed)
-    fringes = FringeCollector()
 
-    def also(index, view, pixels, seen):
-        sky.add(view, pixels)
-        kept.add(index, seen)
-        fringes.add(view, pixels)
+    surface: Surface
+    read: Callable[[Frame], Pixels]
+    settings: Settings
+    folder: Path
 
-    lit = lit_diffuse(surface, frames, read, settings, folder, progress, also)
-    if not lit.seen.any():
-        raise BadInputError(
-            "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; check the frames."
-        )
-    return Observed(lit, sky.result(), kept.result(), fringes.result(), poses, Calibration.none(len(frames)))
-
-
-def all_passes(
-    surface: Surface,
-    frames: Sequence[Frame],
-    read: Callable[[Frame], Pixels],
-    settings: Settings,
-    folder: Path,
-    progress: Progress,
-) -> Observed:
-    """What `one_pass` finds with the poses as read, or put right. Parameters and errors are its."""
-    rounds = Rounds(progress, 0, 1)
-    calibration = Calibration.none(len(frames))
-    if "radiometric-calibration" not in settings.without and any(frame.uncalibrated for frame in frames):
-        calibration = calibrate(
-            surface.mesh, surface.scene, frames, lambda frame: read(as_codes(frame)), threads=settings.threads,
-            seed=settings.seed, progress=rounds,
+    def lit_diffuse(
+        self,
+        frames: Sequence[Frame],
+        progress: Progress | Rounds,
+        also: Callable[[int, FrameView, Pixels, Observations], None] | None = None,
+    ) -> LitDiffuse:
+        """L_d as the settings ask for it; `also` and errors as of `accumulate`."""
+        surface, s = self.surface, self.settings
+        where = surface.mesh, surface.atlas, surface.scene, frames, self.read
+        if "lit_diffuse" in s.published:
+            return running_lit_diffuse(*where, threads=s.threads, also=also, progress=progress)
+        return accumulate(
+            *where, median=s.median, edge_tier="edge-tier" not in s.without, seed=s.seed, threads=s.threads,
+            folder=self.folder, also=also, groups=surface.groups, progress=progress,
         )  # fmt: skip
-        frames = calibration.of(frames)
-        rounds.next()
-    found = one_pass(surface, frames, Poses.as_read(frames), read, settings, folder, rounds)
-    if settings.refine_poses and "pose-refinement" not in settings.without:
-        lit = found.lit_diffuse
-        room = LightField(
-            surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), found.environment,
-            lookup=surface.lookup,
+
+    def sharpened(
+        self, lit: LitDiffuse, frames: Sequence[Frame], progress: Progress | Rounds, **how: Any
+    ) -> LitDiffuse:
+        """L_d with its detail given back; `how` and errors as of `sharpen.sharpened`."""
+        s = self.settings
+        return sharpened(
+            lit, self.surface, frames, self.read, median=s.median, seed=s.seed, threads=s.threads, folder=self.folder,
+            progress=progress, **how,
         )  # fmt: skip
-        rounds.next()
-        poses = refine_poses(frames, read, Texture(room, lit.seen), threads=settings.threads, progress=rounds)
-        del room
-        give_back()
-        found = replace(found, poses=poses)
-        if poses.moved.any():
+
+    def once(self, frames: Sequence[Frame], poses: Poses, progress: Progress | Rounds) -> Observed:
+        """Read every frame once, from where `poses` has it.
+
+        Raises
+        ------
+        BadInputError
+            From `read`, or as no frame shows any of the mesh.
+        InterruptedRun
+            From `progress`.
+        """
+        frames = poses.of(frames)
+        sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
+        kept = SampleCollector(self.surface.atlas, len(frames), self.settings.seed)
+        fringes = FringeCollector()
+
+        def also(index, view, pixels, seen):
+            sky.add(view, pixels)
+            kept.add(index, seen)
+            fringes.add(view, pixels)
+
+        lit = self.lit_diffuse(frames, progress, also)
+        if not lit.seen.any():
+            raise BadInputError(
+                "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; check the frames."
+            )
+        return Observed(lit, sky.result(), kept.result(), fringes.result(), poses, Calibration.none(len(frames)))
+
+    def all(self, frames: Sequence[Frame], progress: Progress) -> Observed:
+        """What `once` finds with the poses as read, or put right; errors as its."""
+        surface, settings, rounds = self.surface, self.settings, Rounds(progress, 0, 1)
+        calibration = Calibration.none(len(frames))
+        if "radiometric-calibration" not in settings.without and any(frame.uncalibrated for frame in frames):
+            calibration = calibrate(
+                surface.mesh, surface.scene, frames, lambda frame: self.read(as_codes(frame)),
+                threads=settings.threads, seed=settings.seed, progress=rounds,
+            )  # fmt: skip
+            frames = calibration.of(frames)
             rounds.next()
-            found = one_pass(surface, frames, poses, read, settings, folder, rounds)
-    if settings.sharpen and "sharpening" not in settings.without:
-        rounds.next()
-        lit = sharpened(
-            found.lit_diffuse, surface, found.poses.of(frames), read, median=settings.median, seed=settings.seed,
-            threads=settings.threads, folder=folder, groups=surface.groups, progress=rounds,
-        )  # fmt: skip
-        found = replace(found, lit_diffuse=lit)
-    return replace(found, calibration=calibration)
+        found = self.once(frames, Poses.as_read(frames), rounds)
+        if settings.refine_poses and "pose-refinement" not in settings.without:
+            lit = found.lit_diffuse
+            room = LightField(
+                surface.mesh, surface.atlas, surface.scene, np.nan_to_num(lit.radiance), found.environment,
+                lookup=surface.lookup,
+            )  # fmt: skip
+            rounds.next()
+            poses = refine_poses(frames, self.read, Texture(room, lit.seen), threads=settings.threads, progress=rounds)
+            del room
+            give_back()
+            found = replace(found, poses=poses)
+            if poses.moved.any():
+                rounds.next()
+                found = self.once(frames, poses, rounds)
+        if settings.sharpen and "sharpening" not in settings.without:
+            rounds.next()
+            lit = self.sharpened(found.lit_diffuse, found.poses.of(frames), rounds, groups=surface.groups)
+            found = replace(found, lit_diffuse=lit)
+        return replace(found, calibration=calibration)
+
+
+def observe(passes: Passes, capture: Capture, progress: Progress) -> Observed:
+    """What the frames of a capture show, or the light stored on its mesh; errors as of `Passes.once`."""
+    if capture.frames:
+        return passes.all(capture.frames, progress)
+    mesh = replace(capture.mesh, vertices=passes.surface.mesh.vertices)
+    lit = lit_from_tiles(mesh, passes.surface.atlas, progress)
+    return Observed(lit, Environment.dark(), Samples.none(), Fringes.none(), Poses.as_read(()), Calibration.none(0))

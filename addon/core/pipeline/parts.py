@@ -17,7 +17,6 @@ from ..kinds import Shown
 from ..parallel import ordered_map
 from ..passes.albedo.albedo import MEASURED
 from ..passes.sharpening.params import SHARPENING
-from ..passes.sharpening.sharpen import sharpened
 from ..progress import Rounds
 from ..scene.atlas import Atlas
 from ..scene.elements import ElementLookup, make_atlas
@@ -30,7 +29,7 @@ from ..scene.surface import Surface
 from ..scene.visibility import CLEAN
 from ..significance import LEVELS
 from .corrected import Corrected
-from .frames import lit_diffuse
+from .frames import Passes
 from .params import PARTS
 
 LOOKED: Shown[float] = 0.3
@@ -173,11 +172,10 @@ def _looked(run: Corrected, part: Mesh, atlas: Atlas, chosen: np.ndarray) -> Lit
         return element
 
     rounds = Rounds(run.progress, 0, LOOKED)
-    how = {"median": s.median, "seed": s.seed, "threads": s.threads, "folder": run.store.folder, "progress": rounds}
-    finer = replace(surface, atlas=atlas)
-    found = lit_diffuse(finer, run.frames, run.read, s, run.store.folder, rounds)
+    passes = Passes(replace(surface, atlas=atlas), run.read, s, run.store.folder)
+    found = passes.lit_diffuse(run.frames, rounds)
     rounds.next()
-    return sharpened(found, finer, run.frames, run.read, lookup, **how) if s.sharpen and found.seen.any() else found
+    return passes.sharpened(found, run.frames, rounds, lookup=lookup) if s.sharpen and found.seen.any() else found
 
 
 def write_parts(run: Corrected, parting: Parting, base_color: np.ndarray) -> Parts:

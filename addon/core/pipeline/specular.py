@@ -133,17 +133,14 @@ def fit_specular(
     InterruptedRun
         From the room's progress.
     """
-    instances, field, given, how, progress = room.instances, room.field, room.given, room.settings, room.progress
-    rays, threads, seed, without, refine = how.specular_rays, how.threads, how.seed, how.without, how.refine
+    instances, field, given, how = room.instances, room.field, room.given, room.settings
+    without, refine = how.without, how.refine
     refine = 0 if "specular-removal" in without else min(refine, 1) if "glossy-light" in without else refine
     maker, wanted = _asked(room, held)
     told: dict[int, ObjectMaterial] = {}
     if "specular" in how.published:
         others = [i for i in instances if i.object_id in wanted and i.object_id not in given]
-        told = fit_targets(
-            others, field, room.lit_diffuse, room.samples, room.frame_names, rays=rays, threads=threads, seed=seed,
-            progress=progress,
-        )  # fmt: skip
+        told = fit_targets(others, room)
         wanted = [i for i in wanted if i not in told]
     found = look_at(room, maker, wanted, looked)
     chosen = choose_models(room, found)
@@ -171,10 +168,10 @@ def fit_specular(
     give_back()
     if refine > 1 and held is None:
         seen = np.flatnonzero(room.lit_diffuse.seen)
-        sent = Excess(field, materials, specular, seed)
+        sent = Excess(field, materials, specular, how.seed)
         excess[seen] = glossy_light(
-            sent, seen, room.irradiance[seen], threads=threads, seed=seed, progress=progress, share=(0.85, 1.0),
-            without=without,
+            sent, seen, room.irradiance[seen], threads=how.threads, seed=how.seed, progress=room.progress,
+            share=(0.85, 1.0), without=without,
         )  # fmt: skip
     return Specular(materials, specular, excess, hidden)
 

@@ -231,7 +231,8 @@ class Stages:
             BUDGET.ask(needs, f"The room's {len(room.atlas):,} surface elements and its frames")
             if cameras and settings.median == "exact":
                 frames.ask_for_disk(room, self._near.frames, self.store.folder)
-            return frames.observe(room, self._near, self.read, settings, self.store.folder, self.progress)
+            passes = frames.Passes(room, self.read, settings, self.store.folder)
+            return frames.observe(passes, self._near, self.progress)
 
         def from_store(arrays: Arrays, meta: dict[str, Any]) -> Observed:
             self.read.bad, self.read.blind = list(meta.get("bad_frames", ())), list(meta.get("blind_frames", ()))

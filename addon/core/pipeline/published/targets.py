@@ -9,58 +9,41 @@ from ...brdf.dielectric import DIELECTRIC
 from ...brdf.lambertian import LAMBERTIAN
 from ...brdf.material import ObjectMaterial
 from ...fit.lobe_fit import LobeFit
-from ...light.field import LightField
 from ...paper.recover import fit_object, usable
 from ...passes.specular.describe import described
 from ...passes.specular.intervals import gloss_interval
 from ...passes.specular.models import Choice
-from ...progress import Progress
-from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Instance
-from ...scene.samples import Samples
+from ..choose_models import Room
 
 
-def fit_targets(
-    instances: Sequence[Instance],
-    field: LightField,
-    lit: LitDiffuse,
-    samples: Samples,
-    frame_names: Sequence[str],
-    *,
-    rays: int,
-    threads: int,
-    seed: int,
-    progress: Progress | None = None,
-) -> dict[int, ObjectMaterial]:
-    """A lobe for each object, from its target frame; diffuse where no frame can be one."""
+def fit_targets(instances: Sequence[Instance], room: Room) -> dict[int, ObjectMaterial]:
+    """A lobe for each of these objects, from its target frame; diffuse where no frame can be one."""
+    field, known, samples, how = room.field, room.lit_diffuse.radiance, room.samples, room.settings
+    names = room.frame_names
 
     def look(instance: Instance) -> ObjectMaterial:
         index = usable(samples, field.atlas.object_id, instance.object_id)
-        known = lit.radiance
         found = fit_object(
-            field, field.atlas, known, samples, index, len(frame_names), rays, threads=threads, seed=seed
+            field, field.atlas, known, samples, index, len(names), how.specular_rays, threads=how.threads, seed=how.seed
         )
         if found is None:
             note = "No frame shows enough of it."
             return ObjectMaterial(instance.object_id, instance.class_name, LAMBERTIAN, note=note)
         diffuse = known[samples.element[found.index]]
         level = np.maximum(diffuse.mean(1), 1e-12)
-        left, whole = (
-            float(np.median(np.sqrt(np.square(x).mean(1)) / level))
-            for x in (found.lobe.residual, samples.radiance[found.index] - diffuse)
-        )
+        residuals = found.lobe.residual, samples.radiance[found.index] - diffuse
+        left, whole = (float(np.median(np.sqrt(np.square(x).mean(1)) / level)) for x in residuals)
         psi = np.full(3, found.lobe.psi)
-        cost, flat_cost = (
-            float(np.square(x).mean()) for x in (found.lobe.residual, samples.radiance[found.index] - diffuse)
-        )
+        cost, flat_cost = (float(np.square(x).mean()) for x in residuals)
         choice = Choice(DIELECTRIC, LobeFit(found.lobe.phi, psi, 0.0, 0.0, cost, flat_cost, left, whole))
-        name = frame_names[found.frame]
+        name = names[found.frame]
         material = described(instance, choice, None, name, gloss_interval(choice, None))
         return replace(material, observations=len(found.index))
 
     materials = {}
     for instance in instances:
         materials[instance.object_id] = look(instance)
-        if progress is not None:
-            progress.update(0.7 * len(materials) / len(instances))
+        if room.progress is not None:
+            room.progress.update(0.7 * len(materials) / len(instances))
     return materials
