@@ -14,7 +14,6 @@ class SettingInfo:
 
     Attributes
     ----------
-    name : str
     kind : type
         bool, int, float or str.
     default : bool, int, float or str

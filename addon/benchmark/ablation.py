@@ -47,11 +47,8 @@ class Ablation:
         Captures with truth beside them.
     out : Path
         Folder for the lines and the stages.
-    seeds : sequence of int
     passes : sequence of str
         Empty for all. Names joined by '+' are taken out together.
-    preset : str
-    threads : int
     limit : float
         Seconds after which no further run is begun; 0 for none.
     unwrap : callable, optional

@@ -22,11 +22,8 @@ class Figure:
 
     Attributes
     ----------
-    name, short, column : str
     sign : int
         1 where more is better, -1 where less is.
-    scale : float
-    digits : int
     """
 
     name: str
@@ -57,7 +54,6 @@ class Gain:
     ----------
     by_room : dict of str to float
         Mean over the seeds.
-    mean : float
     error : float or None
         Standard error of the mean by the seeds alone; where no room in which the pass acts has two seeds, by the rooms,
         whose deviation holds that of the seeds. None for one room and seed.

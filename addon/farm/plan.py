@@ -23,7 +23,6 @@ class Task:
     ----------
     name : str
         Unique in its room: the stage's, with "-I-of-N" for a block.
-    stage : str
     block : tuple of int or None
         I and N, I from 1; None: the whole stage, or what joins its blocks.
     after : tuple of str

@@ -105,11 +105,6 @@ def let_light_through(material: bpy.types.Material) -> None:
     feed(find_node(material, "OUTPUT_MATERIAL").inputs[0], both.outputs[0])
 
 
-def lets_light_through(material: bpy.types.Material) -> bool:
-    """Whether a material is as `let_light_through` makes it."""
-    return find_node(material, "BSDF_TRANSPARENT") is not None
-
-
 def principled(material: bpy.types.Material | None) -> bpy.types.ShaderNode | None:
     """A material's Principled node; None where it has none."""
     return find_node(material, "BSDF_PRINCIPLED")

@@ -29,7 +29,6 @@ class Light:
         'on', 'off', or NAME=FACTOR and NAME=off, separated by commas; a name stands for one lamp or a class of them.
     world : str or None
         'on', 'off', or degrees by which the outside is turned, anticlockwise from above.
-    world_strength : float or None
     hdri : Path or None
         Picture to put around the room.
     added : dict of str to (float, str)

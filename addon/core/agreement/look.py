@@ -23,7 +23,6 @@ class Fit:
 
     Attributes
     ----------
-    convention : Convention
     colour : float
         Probability that two views of one spot are more alike than of two spots (0.5 by chance); NaN unknown.
     edge : float
@@ -50,7 +49,6 @@ class Agreement:
 
     Attributes
     ----------
-    as_read : Fit
     best : Fit or None
         A convention that fits clearly better, where one was looked for and found.
     misaligned : (k,) float

@@ -22,7 +22,6 @@ class Consistency(NamedTuple):
         where too few spots are shared.
     hit : float
         Share of the views' rays that meet the mesh.
-    pairs : int
     """
 
     score: float

@@ -17,7 +17,6 @@ class SmallView:
 
     Attributes
     ----------
-    name : str
     camera : Camera
         Of the small picture.
     log : (height, width, 3) float32

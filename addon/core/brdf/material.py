@@ -24,8 +24,6 @@ class ObjectMaterial:
 
     Attributes
     ----------
-    object_id : int
-    class_name : str
     model : Brdf
         By its name in JSON.
     alpha : float or None

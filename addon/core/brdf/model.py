@@ -119,8 +119,6 @@ class Principled:
         Linear Rec.709; None: the image over the atlas, mid-grey where there is none.
     roughness : float or None
         Square root of GGX's alpha; None leaves Blender's own, where no lobe shows it.
-    metallic : float
-    ior : float
     specular_level : float
         "Specular IOR Level": 0.5 is what `ior` says, 0 no lobe at all.
     alpha : float

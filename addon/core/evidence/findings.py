@@ -23,21 +23,14 @@ class Findings:
     ----------
     name : str
         The capture's.
-    instances : tuple of Instance
     frames : tuple of Frame
         In the coordinates of `surface`.
-    surface : Surface
-    lit_diffuse : LitDiffuse
-    samples : Samples
-    shading : Shading
     field : LightField
         The room as E was gathered in it.
     specular : (n, 3) float32
         Part of each element's L_d that is specular.
     irradiance : (n, 3) float32
         The final E.
-    albedo : Albedo
-    materials : list of ObjectMaterial
     coloured : frozenset of int
         Objects whose base colour the artist gave.
     threads, seed : int

@@ -20,7 +20,6 @@ class ObjectEvidence:
 
     Attributes
     ----------
-    object_id : int
     area : float
         Square metres.
     seen_share, measured_share : float

@@ -28,7 +28,6 @@ class Picture:
 
     Attributes
     ----------
-    title : str
     image : (h, w, 3) uint8
     legend : str
         Of heat maps: from what to what; '' for others.

@@ -30,7 +30,6 @@ class LobeFit:
 
     Attributes
     ----------
-    phi : float
     psi : (3,) float64
         Equal in all channels unless the model is coloured.
     kappa : float

@@ -13,7 +13,6 @@ class SeeThrough:
         Share tau of the background's radiance that passes the whole object; of a cut-out, the share of holes.
     surfaces : float
         How many of the object's surfaces a ray crosses, in the mean.
-    cut_out : bool
     score : float
         Held-out cost relative to that of the Lambertian model.
     gain, sigmas : float

@@ -35,8 +35,6 @@ class Exposed(NamedTuple):
     usable : (h, w) bool
         False: it says nothing here.
     clipped : (h, w) bool
-    exposure : float
-    saturation : float
     """
 
     rgb: np.ndarray

@@ -36,11 +36,9 @@ class ColmapImage(NamedTuple):
 
     Attributes
     ----------
-    number : int
     quaternion : (w, x, y, z)
         Not always of unit length.
     translation : (x, y, z)
-    camera : int
     name : str
         Path of the picture, with "/" between folders.
     """

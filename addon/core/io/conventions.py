@@ -37,11 +37,8 @@ class Convention:
 
     Attributes
     ----------
-    world_to_camera : bool
     camera, world : str
         Signed axes, as '+x-y-z'.
-    scale : float
-    up : str
     """
 
     world_to_camera: bool = False

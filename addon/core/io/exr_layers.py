@@ -24,7 +24,6 @@ class ExrLayer:
 
     Attributes
     ----------
-    part : int
     header : ExrHeader
         Of that part.
     name : str

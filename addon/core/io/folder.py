@@ -26,7 +26,6 @@ class Content:
     kind : str
         `CAPTURE`; `RESULT`, a finished one; `WAY`, captures or results are right below or above; `EMPTY`; `OTHER`;
         `ABSENT`.
-    folder : Path
     sentence : str
         What is wrong with it as the folder of a capture, and what to do; '' for a capture.
     name : str

@@ -30,10 +30,8 @@ class Pane:
     ----------
     normal : (3,) float64
         Unit; points x of the pane have normal . x = offset.
-    offset : float
     boundary : (k, 3) float64
         Its corners.
-    reflectivity : float
     """
 
     normal: np.ndarray

@@ -18,7 +18,6 @@ class Lamp:
 
     Attributes
     ----------
-    object_id : int
     radiance : (3,) float32
         Median over its elements, or solved for.
     seen : bool
@@ -31,7 +30,6 @@ class Lamp:
         Its colour is that of the pixels along its edges.
     twin : int or None
         The seen lamp whose radiance it takes, as `solved`, the luminance that was solved for, is near that lamp's.
-    solved : float or None
     mixed : bool
         Frames show it, but no pixel without what is beside it.
     """

@@ -28,7 +28,6 @@ class Mirror:
 
     Attributes
     ----------
-    object_id : int
     point, normal : (3,) float32
         Its plane; the normal on the side that the frames see.
     f0 : (3,) float32

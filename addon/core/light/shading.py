@@ -26,7 +26,6 @@ class Shading:
         Relative error of `irradiance` by interpolation and by the mesh's noise.
     radiance : (n, 3) float32
         L_d with everything filled in: what the light field shows at each element. Lamps have their own radiance.
-    lamps : tuple of Lamp
     environment : Environment
         With the unseen sky solved for where it could be, without the sun.
     notes : tuple of str

@@ -21,7 +21,6 @@ class Lobe:
 
     Attributes
     ----------
-    phi, psi : float
     residual : (m, 3) float64
         I - L_d - I_nd of each pixel; radiance.
     """

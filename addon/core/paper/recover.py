@@ -30,7 +30,6 @@ class TargetFit:
         The target frame's index.
     index : (m,) int
         Its observations, into the samples.
-    lobe : Lobe
     """
 
     frame: int

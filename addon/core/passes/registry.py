@@ -30,7 +30,6 @@ class Pass:
 
     Attributes
     ----------
-    name : str
     does : str
         One sentence.
     stage : str

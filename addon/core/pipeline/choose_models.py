@@ -39,13 +39,8 @@ class Room:
 
     Attributes
     ----------
-    instances : tuple of Instance
-    field : LightField
-    lit_diffuse : LitDiffuse
     irradiance : (n, 3) float32
         E of each element, from L_d.
-    samples : Samples
-    frame_names : list of str
     lamps : tuple of Lamp
         As the shading stage found them.
     noise : float
@@ -102,7 +97,6 @@ class Looked:
 
     Attributes
     ----------
-    choice : Choice
     problem : Problem or None
         The observations that decided.
     target : int

@@ -51,7 +51,6 @@ class Observed:
 
     Attributes
     ----------
-    lit_diffuse : LitDiffuse
     environment : Environment
         Light from outside, as the frames saw it.
     samples : Samples
@@ -147,10 +146,8 @@ class Passes:
 
     Attributes
     ----------
-    surface : Surface
     read : callable
         Gives a frame's pixels.
-    settings : Settings
     folder : Path
         Where the exact median keeps observations meanwhile.
     """

@@ -38,7 +38,6 @@ class Result:
 
     Attributes
     ----------
-    room : Room
     report : dict
         Its report.json.
     materials : dict

@@ -88,7 +88,6 @@ class White:
 
     Attributes
     ----------
-    object_id : int
     albedo : (3,) tuple of float
         Linear Rec.709: the mean over what was measured of the object.
     at : (3,) tuple of float or None
@@ -108,7 +107,6 @@ class Overrides:
     ----------
     objects : dict of int to Given
         By object_id.
-    white : White or None
     back : frozenset of (int or str, str)
         What was null: (object_id, key), (object_id, '') for all of an object, ('white', '').
     """

@@ -37,7 +37,6 @@ class Room:
         Its frames' pictures may be gone.
     atlas_uv : (t, 3, 2) float32
         Atlas coordinates of each triangle's corners.
-    materials : tuple of ObjectMaterial
     folder : Path
         The result folder.
     run : str

@@ -30,7 +30,6 @@ class Sheet:
 
     Attributes
     ----------
-    plane : Plane
     corner, right, up : (3,) float64
         Where the first cell begins, and unit vectors along columns and rows.
     edge : float

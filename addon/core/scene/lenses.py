@@ -175,7 +175,6 @@ class Cropped:
 
     Attributes
     ----------
-    lens : Lens
     across, down : float
         Half axes in image points: the radius in pixels over fx and fy.
     """

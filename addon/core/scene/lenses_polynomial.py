@@ -64,7 +64,6 @@ class Polynomial:
 
     Attributes
     ----------
-    name : str
     fisheye : bool
         (x, y) has the ray's angle from z as its length (up to pi); else it is (X, Y) / Z.
     numerator, denominator : tuple of float

@@ -153,7 +153,6 @@ class Frame:
         How the capture calls it; used in messages and as the camera's name.
     path : Path
         The picture.
-    camera : Camera
     mask_path : Path or None
         Picture whose black pixels are to be ignored.
     exposure : float
@@ -294,7 +293,6 @@ class KnownMirror:
 
     Attributes
     ----------
-    object_id : int
     point, normal : (3,) float64
         Its plane.
     reflectivity : float
@@ -361,8 +359,6 @@ class Capture:
 
     Attributes
     ----------
-    root : Path
-    mesh : Mesh
     instances : tuple of Instance
         Sorted by `object_id`; each has at least one triangle.
     frames : tuple of Frame
@@ -371,7 +367,6 @@ class Capture:
         One sentence each, for the report.
     format : str
         What it was read as.
-    mirrors : tuple of KnownMirror
     """
 
     root: Path

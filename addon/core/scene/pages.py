@@ -35,7 +35,6 @@ class Pages:
 
     Attributes
     ----------
-    pages : tuple of Page
     uv : (t, 3, 2) float32
         Coordinates for the images: in [0, 1] of the object's own, or tile by tile as UDIM has it.
     sheet_uv : (t, 3, 2) float32

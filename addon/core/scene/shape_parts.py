@@ -54,7 +54,6 @@ class Parts(NamedTuple):
         Of each triangle, from 0, the largest surface first.
     names : dict of int to str
         What parts are by their shape, or their number.
-    planes : tuple of Plane
     """
 
     part: np.ndarray

@@ -29,8 +29,6 @@ class Surface:
     mesh : Mesh
         The capture's, with windings turned so that normals face the cameras; then the second sides of the sheets that
         these see both sides of (`Mesh.backs`).
-    atlas : Atlas
-    scene : RayScene
     sign : (s,) number
         Of each of the capture's triangles: negative where its winding was turned.
     texel_size : float

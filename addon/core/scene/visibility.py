@@ -39,7 +39,6 @@ class FrameView:
 
     Attributes
     ----------
-    camera : Camera
     rays : (3, height, width) float32
         Unit directions through the pixels' centres, world; nonsense where no ray leads to the pixel.
     triangle : (height, width) int32

@@ -44,7 +44,6 @@ class Gloss:
     f0 : (n, 3) float32
     inside : (n, 3) float32
         What of the L_d that it is taken to send was its lobe's.
-    microfacets : tuple of Microfacets
     kind : (n,) int8 or int
         Which of the `microfacets`.
     """

@@ -35,12 +35,10 @@ class MissingLight:
         Of every patch, by object.
     brighter : frozenset of int
         Other objects that give more than they could reflect of all this light.
-    openings : Openings
     environment : Environment
         With what was solved for where it is clipped.
     shut : (n,) bool
         Elements of faces that close the mesh and that no frame saw: what they send was solved for like openings.
-    notes : tuple of str
     """
 
     lamps: tuple[Lamp, ...]

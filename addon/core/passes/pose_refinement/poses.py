@@ -72,7 +72,6 @@ class Texture:
 
     Attributes
     ----------
-    field : LightField
     seen : (n,) bool
         Elements that have an L_d.
     """

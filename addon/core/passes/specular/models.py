@@ -25,14 +25,12 @@ class Choice:
 
     Attributes
     ----------
-    model : Brdf
     fit : LobeFit or None
         The best lobe, also where it was not taken; None if there was too little to fit.
     gain : float
         Share of the cost that the lobe takes away on held-out elements.
     sigmas : float
         The same in standard errors.
-    note : str
     scores : dict of str to float
         Cost on held-out elements relative to the Lambertian's, of each model that was tried.
     """

@@ -35,7 +35,6 @@ class Guess:
         What is left of the quantity that was minimised.
     strength : float
         Irradiance, luminance.
-    radius : float
     """
 
     direction: np.ndarray

@@ -66,7 +66,6 @@ class Light:
 
     Attributes
     ----------
-    lamps : tuple of Lamp
     environment : Environment
         With the unseen parts of the sky solved for where they could be.
     notes : tuple of str
@@ -75,7 +74,6 @@ class Light:
         Those that it was solved at.
     received : (m, 3) float64
         E there by all of this light.
-    contribution : Contributions, optional
     mixed : tuple of int
         Lamps that frames show, but mixed with what is beside them (`mixed_lamps`): solved for as if unseen.
     """
