@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy import sparse
+from scipy import ndimage, sparse
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
@@ -87,16 +87,8 @@ def _votes(scene: RayScene, frame: Frame, ids: np.ndarray, step: int) -> tuple[n
             f"Frame '{frame.name}': '{frame.id_path}' has {ids.shape[1]} x {ids.shape[0]} pixels, but "
             f"its camera has {camera.width} x {camera.height}; give them one size."
         )
-    same = np.ones(ids.shape, bool)
-    for axis in (0, 1):
-        equal = np.diff(ids, axis=axis) == 0
-        before, after = (
-            (slice(None, -1), slice(1, None))
-            if axis == 0
-            else ((slice(None), slice(None, -1)), (slice(None), slice(1, None)))
-        )
-        same[before] &= equal
-        same[after] &= equal
+    beside = ndimage.generate_binary_structure(2, 1)
+    same = ndimage.minimum_filter(ids, footprint=beside) == ndimage.maximum_filter(ids, footprint=beside)
     chosen = np.zeros(ids.shape, bool)
     chosen[step // 2 :: step, step // 2 :: step] = True
     y, x = np.nonzero(same & chosen)

@@ -165,7 +165,7 @@ def finished(grey_capture, tmp_path_factory):
         mirrors=False,
         threads=1,
     )
-    run(grey_capture, out, quick, Progress(), "write")
+    run(grey_capture, out, quick, Progress())
     return out
 
 

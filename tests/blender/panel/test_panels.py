@@ -192,8 +192,8 @@ def test_run_hands_over_what_was_chosen(choices, module, monkeypatch, tmp_path):
     monkeypatch.setattr(
         module("addon.bridge.job.run"),
         "run",
-        lambda capture, result, settings, progress, until, **where: (
-            asked.append((capture, result, settings, until, where)) or {"warnings": []}
+        lambda capture, result, settings, progress, what, **where: (
+            asked.append((capture, result, settings, what)) or {"warnings": []}
         ),
     )
     monkeypatch.setenv("HOME", str(tmp_path / "me"))
@@ -201,13 +201,13 @@ def test_run_hands_over_what_was_chosen(choices, module, monkeypatch, tmp_path):
     choices.capture_folder, choices.preset = str(tmp_path / "room"), "draft"
     choices.settings.texel_size = 0.12
     assert bpy.ops.scan_relight.run(from_stage="shading") == {"FINISHED"}
-    [(capture, result, settings, until, where)] = asked
+    [(capture, result, settings, what)] = asked
     from dataclasses import asdict, replace
 
     from addon.core.settings import DRAFT
 
     assert asdict(settings) == asdict(replace(DRAFT, texel_size=0.12))
-    assert capture == str(tmp_path / "room") and until == "write" and where["from_stage"] == "shading"
+    assert capture == str(tmp_path / "room") and (what.until, what.from_stage) == ("write", "shading")
     assert result == str(tmp_path / "me" / "Scan Relight" / "room")
     choices.result_folder = str(tmp_path / "mine")
     bpy.ops.scan_relight.run()
