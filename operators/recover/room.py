@@ -5,7 +5,7 @@ import bpy
 from ...addon.bridge.export import assets
 from ...addon.bridge.results import look
 from ...addon.bridge.scene import parts
-from ...addon.bridge.scene.parts import find_room, own_scene, rooms
+from ...addon.bridge.scene.parts import rooms
 from ...addon.core.errors import BadInputError
 from ..base.operator import AtOnce, NothingDone, has_scene, needs, object_mode
 from ..results.look import needs_recovered
@@ -16,14 +16,6 @@ def show(before: bpy.types.Scene, scene: bpy.types.Scene) -> None:
     if scene != before:
         take(scene.scan_relight, before.scan_relight)
     parts.show(bpy.context.window, scene)
-
-
-def show_own(before: bpy.types.Scene, capture_folder: str) -> None:
-    """`show` the own scene of a capture's room, if it has one."""
-    top = find_room(capture_folder)
-    scene = own_scene(top) if top is not None else None
-    if scene is not None:
-        show(before, scene)
 
 
 def take(choices, before) -> None:

@@ -9,6 +9,7 @@ import bpy
 
 from ...addon.bridge.job.command import command
 from ...addon.bridge.results import home
+from ...addon.bridge.slices import whole
 from ...addon.core.errors import BadInputError
 from ...addon.core.settings import PRESETS, Settings
 from ...addon.core.stages import LABELS, RUN_STAGES, WRITE
@@ -177,7 +178,7 @@ class StageOperator(SettingsProps, CaptureOperator):
     )
 
     def work(self, context) -> list[str]:
-        return self.run(context, self.until)
+        return self.run(context, self.until)["warnings"]
 
     def draw(self, context):
         """The dialog: what is to be decided; all else comes from the preset or from who calls."""
@@ -197,15 +198,15 @@ class StageOperator(SettingsProps, CaptureOperator):
             given["threads"] = ours.threads
         return replace(PRESETS["paper" if self.paper else self.preset], **given)
 
-    def run(self, context, until: str, **where) -> list[str]:
-        """Run the stages up to `until` here; returns the report's warnings. `where` goes to `bridge.job.run.run`."""
+    def run(self, context, until: str, **how) -> dict:
+        """Run the stages up to `until` here; returns the report. `how` goes to `bridge.job.run.run`."""
         from ...addon.bridge.job.run import run
         from ...addon.core.pipeline.run import Asked, progress_of_run  # not earlier: Blender's start should not wait
 
         settings, asked = self.settings(), Asked(until, self.first_stage(), reading=reading_props.reading(self))
         folders = self.folder("capture_folder"), self.folder("result_folder")
         with contextlib.closing(MemoryGuard(self.memory_limit())) as guard:
-            return run(*folders, settings, progress_of_run(should_stop=guard), asked, **where)["warnings"]
+            return run(*folders, settings, progress_of_run(should_stop=guard), asked, **how)
 
     def first_stage(self) -> str | None:
         """The stage that is done anew with all later ones; None goes on from what is stored."""
@@ -246,15 +247,22 @@ class SceneStageOperator(StageOperator):
 
     def work(self, context):
         """Run, then bring the room, so that a failed run leaves the file alone."""
-        scene = context.scene
-        how = {name: getattr(self, name) for name in ("import_first", "target", "images", "copies", "into")}
-        warnings = self.run(context, self.until, scene=scene, **how)
-        if self.into == "OWN":
-            room.show_own(scene, self.folder("capture_folder"))
-        return warnings
+        from ...addon.core.results.room_file import read_room
+        from ...addon.core.results.store import Store
+
+        self.check_target()
+        report, folder = self.run(context, self.until, fresh=False), self.folder("result_folder")
+        report["warnings"] += whole(self.change(context.scene, read_room(folder)))
+        with Store(folder) as store:
+            store.write_json("report.json", report)
+        return report["warnings"]
 
     def begin(self, context):
-        """Start the run; where the capture should be in the file, its absence is told now and not afterwards."""
+        self.check_target()
+        return super().begin(context)
+
+    def check_target(self) -> None:
+        """Raise where the capture should be in the file and is not: now, not after the work."""
         from ...addon.bridge.own_scene.capture import check_own
         from ...addon.bridge.own_scene.write_back import is_own
         from ...addon.bridge.results import images as result_images
@@ -266,7 +274,6 @@ class SceneStageOperator(StageOperator):
             check_own(capture)
         elif not self.import_first:
             imported(capture)
-        return super().begin(context)
 
     def load(self, job):
         from ...addon.core.results.room_file import read_room
@@ -289,5 +296,6 @@ class SceneStageOperator(StageOperator):
         )
         if self.into == "OWN":
             room.show(scene, brought.scene)
-        self.job.facts["room"] = brought.scene.name
+        if self.job is not None:
+            self.job.facts["room"] = brought.scene.name
         return brought.warnings

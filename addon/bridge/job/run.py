@@ -22,13 +22,8 @@ from ...core.settings import Settings
 from ...core.stages import READ, WRITE
 from ...version import VERSION
 from ..data.unwrap import unwrap
-from ..own_scene.capture import check_own, polygons_of
-from ..own_scene.write_back import AUTO, is_own, writing_back
-from ..results import images as result_images
-from ..room.bring import bringing
-from ..scene.parts import imported
+from ..own_scene.capture import polygons_of
 from ..scene.write import write_scene
-from ..slices import whole
 
 SCENE = "scene.blend"
 REFIT_WEIGHTS = {READ: 1, "surface": 2, "lit_diffuse": 0.1, "shading": 0.1, "specular": 3, WRITE: 5}
@@ -42,12 +37,7 @@ def run(
     settings: Settings,
     progress: Progress,
     asked: Asked = WHOLE,
-    scene: bpy.types.Scene | None = None,
-    import_first: bool = True,
-    target: str = AUTO,
-    images: str = result_images.RESULT,
-    copies: bool = False,
-    into: str = "OWN",
+    fresh: bool = True,
 ) -> dict:
     """Recover a capture as far as is asked; stages that the result folder holds already are not done again.
 
@@ -55,16 +45,8 @@ def run(
     ----------
     out_folder : path
         Made where absent.
-    scene : bpy.types.Scene, optional
-        Of a whole run: also bring the room into the file that this scene is of, and leave all else that is open as it
-        is. Without one, scene.blend is made from an empty file.
-    import_first : bool
-        Bring the room where it is not there; False updates one that is.
-    target, images, copies
-        With `scene`: what the materials go onto, see `own_scene.write_back.is_own`, and where their images go, see
-        `results.images`. No room comes where they go onto the artist's own objects.
-    into : str
-        `OWN`: the room has a scene of its own; `SCENE`: it comes into `scene`.
+    fresh : bool
+        scene.blend is made from an empty file: what is open in this process is lost; False leaves that as it is.
 
     Returns
     -------
@@ -83,33 +65,14 @@ def run(
             f"Result folder '{out_folder.absolute()}' has a backslash in its path, which Blender takes for a slash; "
             "choose one without, or run with --no-scene."
         )
-    if scene is not None:
-        result_images.check(images)
     started = time.monotonic()
     progress.stage(READ)
     capture = read_capture(capture_folder, asked.reading)
-    own = is_own(capture.root, target)
-    if scene is not None and own:
-        check_own(capture.root)  # what is absent is told now, not after the work
-    elif scene is not None and not import_first:
-        imported(capture.root)
     whole_run = Run(capture, out_folder, settings, progress, asked, versions(), started)
-
-    def write(recovery: Recovery, facing: Capture) -> tuple[str, ...]:
-        warnings = write_recovered(recovery, facing, fresh=scene is None)
-        surface, folder = recovery.surface(), recovery.store.folder
-        if scene is None:
-            return warnings
-        if own:
-            onto = scene, capture, surface.first_uv, recovery.materials(), folder, images, copies
-            return warnings + whole(writing_back(*onto))
-        brought = whole(bringing(folder, scene if into == "SCENE" else None, images, known=not import_first))
-        return warnings + brought.warnings
-
     with whole_run:
         lay_out = partial(unwrap, polygons=polygons_of(capture.root, capture.mesh))
         report = whole_run.stages(lay_out)
-        return whole_run.write(write) if asked.until == WRITE else report
+        return whole_run.write(partial(write_recovered, fresh=fresh)) if asked.until == WRITE else report
 
 
 def refit(

@@ -21,6 +21,8 @@ from addon.bridge.data.materials import make_material  # noqa: E402
 from addon.bridge.data.mesh_objects import each_object  # noqa: E402
 from addon.bridge.data.unwrap import Polygons, unwrap  # noqa: E402
 from addon.bridge.job.run import run  # noqa: E402
+from addon.bridge.room.bring import bringing  # noqa: E402
+from addon.bridge.slices import whole  # noqa: E402
 from addon.core.progress import Progress  # noqa: E402
 from addon.core.scene.uv_islands import areas  # noqa: E402
 from addon.core.scene.uv_overlap import overlapping_pairs  # noqa: E402
@@ -108,7 +110,8 @@ def test_the_room_in_an_open_scene_has_both_sides_and_a_stored_run_is_the_same(s
     case = sheet_between_rooms()
     taken = Captured(tmp_path / "capture", case.room, case.shown, views=case.views[::2])
     result = tmp_path / "result"
-    first = run(taken.root, result, QUICK, Progress(), scene=scene, into="SCENE")
+    first = run(taken.root, result, QUICK, Progress(), fresh=False)
+    whole(bringing(result, scene))
     images = {name: (result / f"{name}.exr").read_bytes() for name in ("base_color", "shading")}
     [sheet] = [thing for thing in scene.objects if thing.get("object_id") == 8]
     assert len(sheet.data.polygons) == 4 and len(sheet.data.materials) == 1
@@ -116,7 +119,8 @@ def test_the_room_in_an_open_scene_has_both_sides_and_a_stored_run_is_the_same(s
     sheet.data.uv_layers["ScanRelight"].uv.foreach_get("vector", uv)
     assert np.ptp(uv.reshape(-1, 2), axis=0).min() > 0.05
     assert not any("Object 8" in warning for warning in first["warnings"])
-    again = run(taken.root, result, QUICK, Progress(), scene=scene, import_first=False, into="SCENE")
+    again = run(taken.root, result, QUICK, Progress(), fresh=False)
+    whole(bringing(result, scene, known=True))
     assert again["stages"]["surface"]["stored"] and again["figures"] == first["figures"]
     assert images == {name: (result / f"{name}.exr").read_bytes() for name in images}
 

@@ -196,6 +196,8 @@ def test_run_hands_over_what_was_chosen(choices, module, monkeypatch, tmp_path):
             asked.append((capture, result, settings, what)) or {"warnings": []}
         ),
     )
+    monkeypatch.setattr(module("addon.core.results.room_file"), "read_room", lambda folder: None)
+    monkeypatch.setattr(module("operators.recover.settings_props"), "whole", lambda slices: ())  # there is no result
     monkeypatch.setenv("HOME", str(tmp_path / "me"))
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     choices.capture_folder, choices.preset = str(tmp_path / "room"), "draft"
