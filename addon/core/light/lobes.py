@@ -61,6 +61,29 @@ class LobeLight:
         """Those of the observations `chosen` ((m,) bool or indices)."""
         return LobeLight(self.A[chosen], self.B[chosen], self.A_noise[chosen], self.B_noise[chosen], self.grid)
 
+    def widened(self, variance: np.ndarray) -> LobeLight:
+        """The same, of a surface whose normal varies within each pixel.
+
+        phi^2 grows by the variance (Kaplanyan et al. 2016, "Filtering distributions of normals for shading
+        antialiasing"): A and B of the wider lobe, interpolated in the grid.
+
+        Parameters
+        ----------
+        variance : (m,) float32
+            Of the normal, summed over the axes, radians^2.
+        """
+        root = np.sqrt(self.grid)
+        asked = np.minimum((np.square(self.grid) + variance[:, None]) ** 0.25, root[-1])
+        low = np.clip(np.searchsorted(root, asked, "right") - 1, 0, len(root) - 2)
+        share = ((asked - root[low]) / np.diff(root)[low])[..., None].astype(np.float32)
+
+        def between(values: np.ndarray) -> np.ndarray:
+            below, above = (np.take_along_axis(values, at[..., None], 1) for at in (low, low + 1))
+            return below + share * (above - below)
+
+        A, B, A_noise, B_noise = (between(x) for x in (self.A, self.B, self.A_noise, self.B_noise))
+        return LobeLight(A, B, A_noise, B_noise, self.grid)
+
     def as_exact(self) -> LobeLight:
         """The same, taken to have no noise."""
         return LobeLight(self.A, self.B, 0 * self.A_noise, 0 * self.B_noise, self.grid)

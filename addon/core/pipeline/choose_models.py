@@ -187,7 +187,7 @@ def _by_frames(
     maker: Problems, object_id: int, rays: int, may_be_metal: bool
 ) -> tuple[Choice, Problem | None, np.ndarray]:
     """Choose a model by some of the object's samples, which come last."""
-    index = maker.pick(object_id, FIT.elements, FIT.views, seed=1)
+    index = maker.pick(object_id, FIT.elements, FIT.views, seed=1, smooth=True)
     if not len(index):
         return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
     problem = maker.problem(index, rays)

@@ -5,14 +5,14 @@ The lit diffuse texture keeps order statistics only; the specular fit needs to k
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from ..significance import LEVELS
 from .atlas import Atlas
 from .params import SAMPLES
-from .visibility import CLEAN, SATURATED, Observations
+from .visibility import CLEAN, SATURATED, FrameView, Observations, normal_variance
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,8 @@ class Samples:
     direction : (m, 3) float32
         Unit, from the element to the camera.
     saturated : (m,) bool
+    normal_variance : (m,) float32
+        Of the surface's normal within the pixel, summed over the axes, radians^2.
     """
 
     element: np.ndarray
@@ -35,12 +37,13 @@ class Samples:
     radiance: np.ndarray
     direction: np.ndarray
     saturated: np.ndarray
+    normal_variance: np.ndarray
 
     @staticmethod
     def none() -> Samples:
         """Where there are no frames."""
         whole, values = np.zeros(0, np.int32), np.zeros((0, 3), np.float32)
-        return Samples(whole, whole, values, values, np.zeros(0, bool))
+        return Samples(whole, whole, values, values, np.zeros(0, bool), np.zeros(0, np.float32))
 
 
 def choose_elements(atlas: Atlas, seed: int) -> np.ndarray:
@@ -58,34 +61,45 @@ def choose_elements(atlas: Atlas, seed: int) -> np.ndarray:
 
 
 class SampleCollector:
-    """Takes a frame's observations, keeps those of the chosen elements."""
+    """Takes a frame's observations, keeps those of the chosen elements.
 
-    def __init__(self, atlas: Atlas, frames: int, seed: int):
+    Parameters
+    ----------
+    triangle_normal : (t, 3) float32, optional
+        The mesh's, where views are handed over that tell how the surface turns within their pixels.
+    """
+
+    def __init__(self, atlas: Atlas, frames: int, seed: int, triangle_normal: np.ndarray | None = None):
+        self._atlas, self._triangle_normal = atlas, triangle_normal
         self._chosen = np.zeros(len(atlas), bool)
         self._chosen[choose_elements(atlas, seed)] = True
         self._keep = min(1.0, SAMPLES.frames / max(frames, 1))
         self._seed = seed
         self._parts: list[Samples] = []
 
-    def add(self, frame: int, seen: Observations) -> None:
+    def add(self, frame: int, seen: Observations, view: FrameView | None = None) -> None:
         """Take what `frame` saw; observations at depth edges show something else and are left out."""
         keep = self._chosen[seen.element] & ((seen.tier == CLEAN) | (seen.tier == SATURATED))
         if self._keep < 1:
             keep &= np.random.default_rng([self._seed, frame]).random(len(keep)) < self._keep
-        count = int(keep.sum())
+        element = seen.element[keep]
+        variance = np.zeros(len(element), np.float32)
+        if view is not None and self._triangle_normal is not None:
+            variance = normal_variance(view, self._atlas, element, self._triangle_normal)
         self._parts.append(
             Samples(
-                seen.element[keep],
-                np.full(count, frame, np.int32),
+                element,
+                np.full(len(element), frame, np.int32),
                 seen.radiance[keep],
                 seen.direction[keep],
                 seen.tier[keep] == SATURATED,
-            )  # fmt: skip
+                variance,
+            )
         )
 
     def result(self) -> Samples:
         """All of it, ordered by element, then frame."""
-        names = ("element", "frame", "radiance", "direction", "saturated")
+        names = [one.name for one in fields(Samples)]
         together = {name: np.concatenate([getattr(part, name) for part in self._parts]) for name in names}
         order = np.lexsort((together["frame"], together["element"]))
         return Samples(**{name: values[order] for name, values in together.items()})

@@ -277,3 +277,31 @@ def observe(
     mixed = np.flatnonzero(tier != CLEAN)
     x[mixed], y[mixed] = np.floor(x[mixed]) + np.float32(0.5), np.floor(y[mixed]) + np.float32(0.5)
     return Observations(index, _bilinear(pixels.radiance, x, y), tier, to_camera)
+
+
+def normal_variance(view: FrameView, atlas: Atlas, element: np.ndarray, triangle_normal: np.ndarray) -> np.ndarray:
+    """Variance of the surface's normal within what a frame's pixels show of some elements.
+
+    Over the four pixels around: at half a pixel's distance along either axis they have the second moments of a pixel
+    that is looked up between its neighbours (1/12 of its own square, 1/6 of the interpolation).
+
+    Parameters
+    ----------
+    element : (k,) int
+    triangle_normal : (t, 3) float32
+
+    Returns
+    -------
+    (k,) float32
+        Summed over the axes, radians^2. Pixels of other objects don't count.
+    """
+    camera = view.camera
+    x, y, _ = _projected(camera, (atlas.position[element] - camera.centre.astype(np.float32)).T)
+    left = np.clip(np.rint(x).astype(np.int32) - 1, 0, camera.width - 2)
+    top = np.clip(np.rint(y).astype(np.int32) - 1, 0, camera.height - 2)
+    around = top * camera.width + left + np.array([[0], [1], [camera.width], [camera.width + 1]], np.int32)
+    own = (view.object_id.ravel()[around] == atlas.object_id[element]).astype(np.float32)
+    share = own / np.maximum(own.sum(0), 1)
+    mean = np.einsum("jk,jki->ki", share, triangle_normal[view.triangle.ravel()[around]])
+    # The mean of unit vectors falls short of length 1 by their variance.
+    return np.where(own.any(0), np.maximum(1 - np.square(mean).sum(1), 0), 0).astype(np.float32)

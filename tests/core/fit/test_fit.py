@@ -164,3 +164,19 @@ def test_between_grid_points():
     assert at == pytest.approx(0.53) and value == pytest.approx(0.225)
     assert between(x[:2], np.array([1.0, 2.0]), psi[:, :2], 0)[0] == 0.4  # the grid's end
     assert between(x, np.array([1.0, 1.0, 1.0]), psi, 1)[0] == 0.5
+
+
+def test_a_surface_that_turns_within_each_pixel_is_no_rougher(box):
+    """Each pixel shows normals that differ by .05 radians either way: directions of the lobe differ by twice that."""
+    element, direction, _ = box.views(60, 8)
+    rng, phi, turn = np.random.default_rng(0), 0.08, 0.05
+    seen = np.zeros((len(element), 3))
+    for _ in range(24):
+        tilted = direction + rng.normal(0, 2 * turn, direction.shape)
+        A, B = box.lobe(element, tilted / np.linalg.norm(tilted, axis=1, keepdims=True), phi)
+        seen += (0.05 * A + B) / 24
+    problem = box.problem(element, direction, None, None, seen + paint(element))
+    wide = replace(problem, light=problem.light.widened(np.full(len(element), 2 * turn**2, np.float32)))
+    plain, known = (np.sqrt(fit_lobe(one).phi) for one in (problem, wide))
+    assert plain > np.sqrt(phi) + 0.02
+    assert known == pytest.approx(np.sqrt(phi), abs=0.02)

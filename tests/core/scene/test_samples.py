@@ -73,7 +73,7 @@ def grid_samples(elements: int, frames: int) -> Samples:
     m = elements * frames
     return Samples(
         np.repeat(np.arange(elements), frames).astype(np.int32), np.tile(np.arange(frames), elements).astype(np.int32),
-        np.ones((m, 3), np.float32), np.tile(np.float32([0, 0, 1]), (m, 1)), np.zeros(m, bool),
+        np.ones((m, 3), np.float32), np.tile(np.float32([0, 0, 1]), (m, 1)), np.zeros(m, bool), np.zeros(m, np.float32),
     )  # fmt: skip
 
 
@@ -103,7 +103,7 @@ def test_the_specular_part_of_a_median():
     rng = np.random.default_rng(0)
     lobe = rng.uniform(0, 0.5, (36, 3)).astype(np.float32)
     diffuse = np.repeat(np.float32([0.1, 0.3, 1, 0.0]), 9)[:, None]
-    shown = Samples(samples.element, samples.frame, diffuse + lobe, samples.direction, samples.saturated)
+    shown = replace(samples, radiance=diffuse + lobe)
     chosen = np.flatnonzero(samples.element != 2)
     element, part = specular_in_median(shown, chosen, lobe[chosen])
     assert element.tolist() == [0, 1, 3]

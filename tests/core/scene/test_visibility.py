@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from addon.core.scene.element_groups import ElementGroups
-from addon.core.scene.visibility import CLEAN, EDGE, SATURATED, observe, view_frame
+from addon.core.scene.visibility import CLEAN, EDGE, SATURATED, normal_variance, observe, view_frame
 from tests.core.rooms import all_round, around, box_sides, look_at, make_room, pixels_of, quad
 
 WALL = quad((3, 2, -2), (0, -4, 0), (0, 0, 4), 0)  # at x = 3, seen from the origin
@@ -219,6 +219,21 @@ def test_groups_know_that_surfaces_curve():
         candidates = groups.candidates(view)
         assert len(every.element) > 200 and np.isin(every.element, candidates).all()
         assert len(candidates) < 0.9 * len(room.atlas)
+
+
+def test_how_a_surface_turns_within_a_pixel(wall):
+    """A pillar's normal turns by the pixel's width over its radius; half of that on either side of the middle."""
+    at = np.linspace(0, 2 * np.pi, 721)
+    ring = 0.3 * np.stack([np.cos(at), np.sin(at)], 1)
+    pillar = make_room([quad((*a, -0.5), (*(b - a), 0), (0, 0, 1), 0) for a, b in zip(ring[:-1], ring[1:])], 0.02)
+    camera = look_at((2, 0, 0), (0, 0, 0), 64, 64, 40)
+    view, seen = sees(pillar, camera)
+    before = seen.element[pillar.atlas.normal[seen.element, 0] > 0.98]
+    found = normal_variance(view, pillar.atlas, before, pillar.normals)
+    half = camera.pixel_angle * 1.7 / 0.3 / 2
+    assert len(before) > 50 and np.median(found) == pytest.approx(half**2, rel=0.2)
+    view, seen = sees(wall, CAMERA)
+    assert normal_variance(view, wall.atlas, seen.element, wall.normals).max() < 1e-6
 
 
 def test_escaped_pixels_are_clean_where_all_around_escapes():

@@ -55,7 +55,7 @@ def _problem(
     maker: Problems, object_id: int, rays: int, phi: float | None, microfacets: Microfacets
 ) -> tuple[Problem | None, bool]:
     """The object's observations, and whether they can tell what changes with the view."""
-    index, enough = maker.pick(object_id, FIT.elements, FIT.views, seed=1), True
+    index, enough = maker.pick(object_id, FIT.elements, FIT.views, seed=1, smooth=True), True
     if len(np.unique(maker.element(index))) < LEVELS.few:
         index, enough = maker.pick(object_id, FIT.elements, LEVELS.views, least=1, seed=1), False
     if not len(index):

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class FitParams:
@@ -19,6 +21,9 @@ class FitParams:
         A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface.
     neighbours : int
         Elements that an object's other elements take their specular part from, the nearest of those looked at.
+    crease : float
+        Radians by which two faces must turn for an edge between them (`pixel-curvature`); Blender's own for smooth
+        shading.
     unresolved : float
         Roughness up to which the frames show a mirror: a lobe of phi 0.03 is as wide as a few pixels.
     """
@@ -30,6 +35,7 @@ class FitParams:
     separate_views: int = 9
     broadest_phi: float = 0.5
     neighbours: int = 16
+    crease: float = float(np.radians(30))
     unresolved: float = 0.17
 
 

@@ -13,6 +13,7 @@ from ...light.lobes import GRID, LobeLight, reflected_light
 from ...light.params import GATHER
 from ...scene.samples import Samples
 from ...significance import LEVELS
+from .params import FIT
 
 
 def pick(samples: Samples, of_object: np.ndarray, elements: int, views: int, least: int, seed: int) -> np.ndarray:
@@ -65,10 +66,23 @@ class Problems:
         order = np.argsort(owner, kind="stable")
         self._owner, self._usable = owner[order], usable[order]
 
-    def pick(self, object_id: int, elements: int, views: int, least: int = LEVELS.views, seed: int = 0) -> np.ndarray:
-        """Indices into the samples of some of an object's observations, sorted by element."""
+    def pick(
+        self, object_id: int, elements: int, views: int, least: int = LEVELS.views, seed: int = 0, smooth: bool = False
+    ) -> np.ndarray:
+        """Indices into the samples of some of an object's observations, sorted by element.
+
+        Parameters
+        ----------
+        smooth : bool
+            Those alone in whose pixels the surface turns by less than a crease does, or the flattest quarter: over a
+            crease a pixel shows two lobes, which no wider one stands for.
+        """
         first, last = np.searchsorted(self._owner, [object_id, object_id + 1])
-        return pick(self._samples, self._usable[first:last], elements, views, least, self._seed + seed)
+        index = self._usable[first:last]
+        if smooth and len(index) and "pixel-curvature" not in self._without:
+            variance = self._samples.normal_variance[index]
+            index = index[variance <= max(np.sin(FIT.crease / 2) ** 2, np.quantile(variance, 0.25))]
+        return pick(self._samples, index, elements, views, least, self._seed + seed)
 
     def light(
         self, index: np.ndarray, rays: int, phi: float | None = None, microfacets: Microfacets = GGX
@@ -93,5 +107,7 @@ class Problems:
         cosine = np.einsum("ij,ij->i", self._field.atlas.normal[element], self._samples.direction[index])
         radiance = self._samples.radiance[index]
         light = self.light(index, rays, phi, microfacets)
+        if phi is None and "pixel-curvature" not in self._without:
+            light = light.widened(self._samples.normal_variance[index])
         light = light.as_exact() if "ray-noise" in self._without else light
         return Problem(element, radiance, light, cosine, frozenset(self._without))

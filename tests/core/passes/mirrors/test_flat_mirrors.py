@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -32,7 +32,12 @@ def frames(box, f0, diffuse=0.0, noise=0.1, tilt=0.0, seed=0):
     seen = f0 * box.arriving(origin, along) + diffuse
     seen = seen * np.exp(np.random.default_rng(seed).normal(0, noise, seen.shape))
     return Samples(
-        element.astype(np.int32), frame.astype(np.int32), np.float32(seen), direction, np.zeros(len(element), bool)
+        element.astype(np.int32),
+        frame.astype(np.int32),
+        np.float32(seen),
+        direction,
+        np.zeros(len(element), bool),
+        np.zeros(len(element), np.float32),
     )
 
 
@@ -60,7 +65,7 @@ def test_what_is_no_mirror(box, f0, diffuse):
 
 def test_too_little_to_tell(box):
     samples = frames(box, SILVER)
-    few = Samples(*(getattr(samples, name)[:90] for name in ("element", "frame", "radiance", "direction", "saturated")))
+    few = Samples(*(getattr(samples, one.name)[:90] for one in fields(Samples)))
     assert find_mirrors(box.field, (), few, FLOOR) == ()
     assert find_mirrors(box.field, (), replace(samples, saturated=np.ones(len(samples.element), bool)), FLOOR) == ()
 

@@ -44,7 +44,12 @@ def frames(box, f0, diffuse=0.3, noise=0.05):
     seen = np.where(inside[:, None], f0 * shown, diffuse)
     seen = seen * np.exp(np.random.default_rng(0).normal(0, noise, seen.shape))
     return Samples(
-        element.astype(np.int32), frame.astype(np.int32), np.float32(seen), direction, np.zeros(len(element), bool)
+        element.astype(np.int32),
+        frame.astype(np.int32),
+        np.float32(seen),
+        direction,
+        np.zeros(len(element), bool),
+        np.zeros(len(element), np.float32),
     )
 
 

@@ -60,7 +60,7 @@ class Room:
         noise = np.exp(0.02 * np.random.default_rng(1).normal(size=radiance.shape))
         samples = Samples(self.element.astype(np.int32), self.frame.astype(np.int32),
                           (radiance * noise).astype(np.float32), self.direction.astype(np.float32),
-                          np.zeros(len(radiance), bool))  # fmt: skip
+                          np.zeros(len(radiance), bool), np.zeros(len(radiance), np.float32))  # fmt: skip
         own = np.unique(self.element)
         lit, n = self.radiance.copy(), len(self.room.atlas)
         lit[own] = np.median(samples.radiance.reshape(len(own), len(EYES), 3), 1)

@@ -44,7 +44,7 @@ class Seen:
         radiance = self.box.problem(element, direction, phi, psi, diffuse).radiance.astype(np.float32)
         self.samples = Samples(
             element[order].astype(np.int32), frame[order].astype(np.int32), radiance[order], direction[order],
-            np.zeros(len(element), bool),
+            np.zeros(len(element), bool), np.zeros(len(element), np.float32),
         )  # fmt: skip
         n = len(atlas)
         values = self.field.radiance
