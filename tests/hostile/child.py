@@ -12,8 +12,8 @@ import traceback
 from pathlib import Path
 
 from addon.core.errors import ScanRelightError
+from tests.hostile import formats, spoil
 from tests.hostile.readers import readers
-from tests.hostile.spoil import spoiled
 
 
 def peak() -> int:
@@ -62,7 +62,7 @@ def main(limit: int) -> None:
                 how, said = attempt(known[name], root, made[name].name)
                 if how == "traceback" or how == "refused" and not name.startswith("result"):
                     raise RuntimeError(f"{name} is not good before it is spoiled: {said}")
-            content = spoiled(good[name], seed)
+            content = (spoil if seed >= 0 else formats).spoiled(good[name], seed & (1 << 63) - 1)
             made[name].write_bytes(content)
             before, started = peak(), time.process_time()
             how, said = attempt(known[name], root, made[name].name)

@@ -102,9 +102,9 @@ def corpus() -> list[tuple[str, int]]:
 
 
 def chosen(seed: int, only: str = "", blender: bool = True) -> Iterator[tuple[str, int]]:
-    """Readers in turn, without end, each time with another seed."""
+    """Readers in turn, without end, each time with another seed; below 0 by what knows the format."""
     names = [name for name, one in readers().items() if only in name and (blender or not one.blender)]
-    return ((name, count) for count in itertools.count(seed) for name in names)
+    return ((name, count) for k in itertools.count(seed) for name in names for count in (k, -k - 1))
 
 
 def run(tries: Iterable[tuple[str, int]], seconds: float = float("inf")) -> tuple[Counter[str], list[Outcome]]:
