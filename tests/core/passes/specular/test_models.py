@@ -13,6 +13,7 @@ from addon.core.brdf.metal import METAL
 from addon.core.fit.lobe_fit import fit_lobe
 from addon.core.passes.specular import models
 from addon.core.passes.specular.models import Choice, adopt_from_class, choose_model, metal_f0
+from addon.core.passes.specular.one_colour import Coated
 from tests.core.fit.test_fit import paint, steps
 from tests.core.glossy_box import Box
 
@@ -127,6 +128,22 @@ def test_the_class_helps_out(seen):
         assert "object 0" in result[taker].note and result[taker].sigmas == 0
     assert result[3] is diffuse and result[4] is nothing
     assert choices[1] is nothing  # what was handed in is left alone
+
+
+def test_what_looks_coated_takes_its_classs_lobe(seen):
+    """Its frames fit a narrower lobe better. Where looks alone said that it is coated they don't defend that against
+    what views tell of another of its class; where views did, or nobody's do, it stays."""
+    own = choose_model(seen["glossy"])
+    looks = Coated(0.3, 0.2, own.fit.phi, 4.0)
+    broad = replace(own, fit=replace(own.fit, phi=0.5), sigmas=3 * own.sigmas)
+    for looks_of_it, looks_of_other, phi in (
+        (looks, None, 0.5),
+        (None, None, own.fit.phi),
+        (looks, looks, own.fit.phi),
+    ):
+        choices = {0: replace(own, looks=looks_of_it), 1: replace(broad, looks=looks_of_other)}
+        result = adopt_from_class(choices, {0: seen["glossy"]}, dict.fromkeys(choices, "ring"))
+        assert result[0].model == DIELECTRIC and result[0].fit.phi == phi
 
 
 def test_how_another_darkens_says_nothing_against_its_lobe(seen, monkeypatch):
