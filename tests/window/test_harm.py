@@ -19,7 +19,7 @@ def running(open_window, tiny_capture, tmp_path):
 choices = bpy.context.scene.scan_relight
 choices.capture_folder, choices.result_folder = {str(tiny_capture)!r}, {str(tmp_path / "result")!r}
 choices.preset = "draft"
-choices.settings.shading_rays = 2048
+choices.settings.shading_rays = 1 << 20
 with bpy.context.temp_override(**place()):
     bpy.ops.scan_relight.run("INVOKE_DEFAULT", target="recover")
 """)
