@@ -1,5 +1,6 @@
 """The one name that an object of the room has everywhere: Blender, lists, warnings, the report, exports."""
 
+from .errors import one_line
 from .kinds import Code
 
 LONGEST: Code[int] = 48
@@ -7,9 +8,12 @@ LONGEST: Code[int] = 48
 
 
 def object_name(class_name: str, object_id: int) -> str:
-    """'<class> <number>', as 'sofa 12'; a long class is cut, the number never, as it alone tells objects apart."""
+    """'<class> <number>', as 'sofa 12'; a long class is cut, the number never, as it alone tells objects apart.
+
+    Of whatever a capture calls it, it is one line that can be shown and written.
+    """
     number = f" {object_id}"
-    return cut(" ".join(class_name.split()) or "Object", LONGEST - len(number)) + number
+    return cut(one_line(" ".join(class_name.split())) or "Object", LONGEST - len(number)) + number
 
 
 def cut(text: str, longest: int) -> str:

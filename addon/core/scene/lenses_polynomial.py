@@ -248,7 +248,7 @@ class Polynomial:
                 if not worse.any():
                     break
                 step[worse] /= 2
-            stuck = (nx == x[at]) & (ny == y[at])
+            stuck = worse | (nx == x[at]) & (ny == y[at])
             x[at], y[at] = nx, ny
             found[at[stuck & (np.hypot(du, dv) <= 1e3 * goal[at])]] = True  # as near as rounding lets it come
             at, du, dv, j = at[~stuck], du[~stuck], dv[~stuck], tuple(i[~stuck] for i in j)
