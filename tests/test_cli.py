@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -133,6 +134,29 @@ def test_errors_become_one_sentence_and_an_exit_code(error, code, monkeypatch, c
     assert err.startswith("scan-relight: ") and err.count("\n") == 1 and "Traceback" not in err
     foreseen = not isinstance(error, ValueError)
     assert (tmp_path / "error.log").exists() != foreseen
+
+
+COMMANDS = next(action for action in cli.make_parser()._actions if action.choices).choices
+PATHS = [(name, action.dest) for name in COMMANDS for action in COMMANDS[name]._actions if action.type is Path]
+
+
+@pytest.mark.parametrize("command, option", PATHS)
+@pytest.mark.parametrize("kind", ["too long", "a link to itself"])
+def test_a_path_that_no_system_looks_up_is_bad_input(command, option, kind, tmp_path, capsys):
+    odd = tmp_path / ("n" * 256 if kind == "too long" else "loop")
+    if kind != "too long":
+        try:
+            odd.symlink_to(odd)
+        except OSError:
+            pytest.skip("the system makes no links")
+    argv = [command]
+    for one in COMMANDS[command]._actions:
+        if one.dest == option or one.required and one.nargs != "*":
+            value = odd if one.dest == option else one.choices[0] if one.choices else tmp_path / one.dest
+            argv += [*one.option_strings[:1], str(value)]
+    assert cli.main(argv) == 2
+    err = capsys.readouterr().err
+    assert str(odd) in err and err.count("\n") == 1 and list(tmp_path.iterdir()) == [odd] * (kind != "too long")
 
 
 def test_debug_shows_the_traceback(monkeypatch, capsys, tmp_path):

@@ -11,9 +11,10 @@ import os
 import sys
 import traceback
 from collections.abc import Sequence
+from pathlib import Path
 
 from ..console import own_console, unexpected
-from ..core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, ScanRelightError
+from ..core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, ScanRelightError, check_path
 from ..core.parallel import ONE_BLAS_THREAD
 from ..temporary import use_own_folder
 from ..version import VERSION
@@ -52,6 +53,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     os.environ.update(ONE_BLAS_THREAD | os.environ)
     use_own_folder()
     try:
+        for told in vars(arguments).values():
+            for path in told if isinstance(told, list) else [told]:
+                if isinstance(path, Path):
+                    check_path(path)
         with own_console(keep_others=arguments.debug) as stream:
             return arguments.function(arguments, stream)
     except ScanRelightError as error:

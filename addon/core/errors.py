@@ -1,5 +1,7 @@
 """Typed errors. The text of each is the one sentence that a user reads: which file, what is wrong, what to do."""
 
+from pathlib import Path
+
 from .kinds import Code, Shown
 
 EXIT_OK: Code[int] = 0
@@ -31,6 +33,16 @@ class BadInputError(ScanRelightError):
     """The capture, a setting or the output folder can't be used as given."""
 
     exit_code = EXIT_BAD_INPUT
+
+
+def check_path(path: Path) -> None:
+    """Raise `BadInputError` for a path that the system won't look up: too long, a link to itself, a stale disk."""
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        pass  # it may be made yet; who reads it says so
+    except OSError as error:
+        raise BadInputError(f"'{path}' can't be used as a path ({error.strerror or error}); choose another.") from error
 
 
 class MissingStageError(ScanRelightError):

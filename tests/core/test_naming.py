@@ -10,7 +10,13 @@ from addon.core.scene.model import Instance
 
 @pytest.mark.parametrize(
     ("kind", "number", "name"),
-    [("sofa", 12, "sofa 12"), ("", 3, "Object 3"), (" \n", 3, "Object 3"), ("coffee\ttable ", 0, "coffee table 0")],
+    [
+        ("sofa", 12, "sofa 12"),
+        ("", 3, "Object 3"),
+        (" \n", 3, "Object 3"),
+        ("coffee\ttable ", 0, "coffee table 0"),
+        ("half \ud83d", 4, "half \ufffd 4"),
+    ],
 )
 def test_an_object_and_its_material_have_one_name(kind, number, name):
     assert Instance(number, kind).name == ObjectMaterial(number, kind, LAMBERTIAN).name == name

@@ -49,7 +49,8 @@ class Entry:
         if value is None or value == math.inf and default == math.inf:
             return default
         if not is_number(value) or not value > 0:
-            raise BadInputError(f"Frame '{self.name}' has {key} = {value!r}; give a number above 0.")
+            most = " and below 1e300" if isinstance(value, (int, float)) and value > 0 else ""
+            raise BadInputError(f"Frame '{self.name}' has {key} = {value!r}; give a number above 0{most}.")
         return float(value)
 
     def numbers(self, keys: Sequence[str]) -> list[float]:

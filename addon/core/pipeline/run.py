@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..agreement.look import look
-from ..errors import BadInputError, MissingStageError, StorageError
+from ..errors import BadInputError, MissingStageError, StorageError, check_path
 from ..io.conventions import AS_READ
 from ..io.layout import AS_FOUND, Reading
 from ..io.pixels import read_pixels
@@ -87,14 +87,7 @@ class Asked:
                 raise BadInputError(f"There is no stage '{stage}'; choose one of {', '.join(RUN_STAGES)}.")
         if self.block is not None and self.until not in [one.name for one in DECLARED if one.divided_by]:
             raise BadInputError(f"Stage '{self.until}' can't be divided into blocks; leave --block out.")
-        try:
-            out_folder.stat()
-        except (FileNotFoundError, NotADirectoryError):
-            pass  # it is made, or refused, once the capture is read
-        except OSError as error:  # such as a name that is too long, or a link to itself
-            raise BadInputError(
-                f"Result folder '{out_folder}' can't be made ({error.strerror or error}); choose another."
-            ) from error
+        check_path(out_folder)
         if out_folder.resolve() == capture_folder.resolve():
             raise BadInputError(f"Result folder '{out_folder}' is the capture itself; choose another.")
 

@@ -148,7 +148,19 @@ def test_objects_that_are_none(capture, value, words):
     refused(capture, words)
 
 
+def test_an_object_is_called_what_can_be_shown_and_written(capture):
+    names = ["half \ud83d", "two\nlines", "\x1b[31m red"]
+    capture.objects({"objects": [{"id": i, "class_name": name} for i, name in enumerate(names)]})
+    kinds = [one.class_name for one in read_capture(capture.root).instances][:3]
+    assert kinds == ["half \ufffd", "two lines", "\ufffd[31m red"] and "".join(kinds).encode()
+
+
 # --- the frames: one bad one is left out, many are not
+
+
+def test_a_number_that_is_too_large_is_told_so(capture):
+    capture.top(fl_x=1e300)
+    refused(capture, "fl_x = 1e\\+300; give a number above 0 and below 1e300")
 
 
 def test_a_missing_frame(capture):

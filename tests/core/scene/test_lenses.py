@@ -187,6 +187,18 @@ def test_beyond_the_fold_nothing_is_seen():
     assert lens.unproject(np.array([[0, edge * 0.9999], [0, edge * 1.0001]]))[1].tolist() == [True, False]
 
 
+@pytest.mark.parametrize("tangential", [(-0.6, 0.0), (0.0, -0.6), (0.3, 0.1)])
+def test_points_that_no_ray_meets_are_given_up(tangential, monkeypatch):
+    """The lens is asked at some tens of places for each point, not until all steps are used up (140 and more)."""
+    lens = polynomial("OPENCV", numerator=(0.0, 0.0), tangential=tangential)
+    points = np.random.default_rng(0).uniform(-1.6, 1.6, (5000, 2))
+    asked, real = [], type(lens)._off
+    monkeypatch.setattr(type(lens), "_off", lambda self, u, *more: asked.append(len(u)) or real(self, u, *more))
+    rays, seen = lens.unproject(points)
+    assert 0 < seen.sum() < len(points) and sum(asked) < 40 * len(points)
+    np.testing.assert_allclose(lens.project(rays[seen])[0], points[seen], atol=1e-9)
+
+
 def test_fisheyes_see_behind():
     lens = polynomial("FISHEYE", fisheye=True)
     points, seen = lens.project(np.array([[math.sin(2), 0, math.cos(2)]]))
