@@ -147,31 +147,35 @@ def _packed(points, corners, uv, size, margin_texels):
     Boxes are packed, not outlines: now that sparse islands are cut, outlines fill no more and can take minutes.
     """
     uv = (uv * np.sqrt(_EXPECTED_FILL / max(areas(uv).sum(), 1e-12))).astype(np.float32)
-    found = []
-    for turn in ("ANY", "CARDINAL"):
-        # Blender's margin is one before its own scaling: the scale is guessed, and mended once or twice.
-        wanted = margin = margin_texels / 2 / size
-        for _ in range(3):
-            packed = _laid_out(
-                points,
-                corners.ravel(),
-                3 * np.arange(len(corners)),
-                uv,
-                bpy.ops.uv.pack_islands,
-                rotate=True,
-                rotate_method=turn,
-                scale=True,
-                margin=margin,
-                margin_method="ADD",
-                shape_method="AABB",
-                udim_source="CLOSEST_UDIM",
-            ).reshape(-1, 3, 2)
-            border = packed.min()
-            if border >= 0.97 * wanted or border <= 0:
-                break
-            margin *= 1.05 * wanted / border
-        found.append(packed)
-    return max(found, key=lambda packed: areas(packed).sum())
+
+    def placed(turn, margin):
+        return _laid_out(
+            points,
+            corners.ravel(),
+            3 * np.arange(len(corners)),
+            uv,
+            bpy.ops.uv.pack_islands,
+            rotate=True,
+            rotate_method=turn,
+            scale=True,
+            margin=margin,
+            margin_method="ADD",
+            shape_method="AABB",
+            udim_source="CLOSEST_UDIM",
+        ).reshape(-1, 3, 2)
+
+    # Blender's margin is one before its own scaling: the scale is guessed, and mended once or twice.
+    wanted = margin = margin_texels / 2 / size
+    packed, turn = max(
+        ((placed(turn, margin), turn) for turn in ("ANY", "CARDINAL")), key=lambda one: areas(one[0]).sum()
+    )
+    for _ in range(2):
+        border = packed.min()
+        if border >= 0.97 * wanted or border <= 0:
+            break
+        margin *= 1.05 * wanted / border
+        packed = placed(turn, margin)
+    return packed
 
 
 def _split(vertices, triangles, label):

@@ -112,9 +112,8 @@ def refit(
         again.look_closer()
         for name in (REPORT, SCENE) if scene else (REPORT,):
             store.path(name).unlink(missing_ok=True)  # a stopped run must not leave the last one's among new images
-        again.write_images()
+        report = again.write_images()
         progress.update(0.7)
-        report = again.report()
         report["warnings"] = [one for one in report["warnings"] if one != OUTDATED] + [OUTDATED] * (not scene)
         if scene:
             capture = result.room.capture

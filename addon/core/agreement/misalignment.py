@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.ndimage import map_coordinates
 
+from ..parallel import ordered_map
 from ..scene.model import Camera
 from ..scene.rays import RayScene
 from ..significance import LEVELS
@@ -63,9 +64,9 @@ def shift(image: np.ndarray, reference: np.ndarray) -> np.ndarray | None:
 def misalignments(views: Sequence[SmallView], cameras: Sequence[Camera], seen: Sequence[Shown],
                   scene: RayScene) -> np.ndarray:  # fmt: skip
     """Length of each view's shift in pixels of the full frame, (k,) for the views of which it can be told."""
-    lengths = []
-    for i, view in enumerate(views):
-        found = shift(view.log.mean(-1), predicted(i, views, cameras, seen, scene))
-        if found is not None:
-            lengths.append(float(np.linalg.norm(found)) * view.step)
-    return np.array(lengths)
+
+    def found(i: int) -> np.ndarray | None:
+        return shift(views[i].log.mean(-1), predicted(i, views, cameras, seen, scene))
+
+    shifts = zip(views, ordered_map(found, range(len(views)), 0), strict=True)
+    return np.array([float(np.linalg.norm(by)) * view.step for view, by in shifts if by is not None])

@@ -4,7 +4,7 @@ import dataclasses
 import hashlib
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -37,9 +37,12 @@ class Recovery(Corrected):
     _parting: Parting | None = None
 
     def look_closer(self) -> None:
-        """All that writing asks of the frames. It may fail and be stopped: done before what was written is touched."""
+        """All that takes long. It may fail and be stopped: done before what was written is touched."""
         if self.settings.atlas != ROOM and self._parting is None:
             self._parting = look_closer(self)
+        self.albedo, self.materials()  # made first: both of the next ask for them
+        for _ in ordered_map(partial(getattr, self), ("evidence", "texture"), self.settings.threads):
+            pass
 
     def let_go(self) -> None:
         """Hold surface, materials and median radiance alone, which a scene is made of; no more may be asked for then.
@@ -61,10 +64,10 @@ class Recovery(Corrected):
         coordinates = [self.surface().atlas.uv, *([self.parts.uv] if self.parts else [])]
         return hashlib.sha256(b"".join(np.ascontiguousarray(uv).tobytes() for uv in coordinates)).hexdigest()[:16]
 
-    def write_images(self) -> None:
-        """The result folder's images, materials.json and report.html."""
+    def write_images(self) -> dict[str, Any]:
+        """Write the result folder's images, materials.json and report.html; returns the report that this shows."""
         self.look_closer()
-        lit, texture = self.lit_diffuse(), self.texture  # noqa: F841  (made once, before threads ask for it)
+        lit = self.lit_diffuse()
         # Each is made when its turn comes: all of them at once were a tenth of a large room's memory.
         images: dict[str, Callable[[], np.ndarray]] = {
             "albedo": lambda: self.albedo.rho,
@@ -99,7 +102,9 @@ class Recovery(Corrected):
         told |= {name: value for name, value in self.overrides.as_dict().items() if name == "white"}
         self.store.write_json("materials.json", told)
         self.progress.update(0.6)
-        write_bytes(self.store.path("report.html"), make_page(self.findings, self.evidence, self.report()).encode())
+        report = self.report()
+        write_bytes(self.store.path("report.html"), make_page(self.findings, self.evidence, report).encode())
+        return report
 
     @cached_property
     def texture(self) -> Texture:

@@ -158,7 +158,7 @@ class Run:
     def stages(self, unwrap: Unwrap) -> dict[str, Any]:
         """Do the stages that are asked for, over an atlas by `unwrap`; returns the report of a run that ends there.
 
-        What was written before stays untouched where all are: `write` is to follow.
+        It is empty where all are, for `write` reports itself. What was written before stays untouched then.
 
         Raises
         ------
@@ -187,8 +187,10 @@ class Run:
                 getattr(self.recovery, stage)()
                 if stage == asked.until:
                     break
+            if asked.until == WRITE:
+                return {}
             report = self._report(self.recovery.report())
-            if asked.until != WRITE and asked.block is None:
+            if asked.block is None:
                 store.write_json("report.json", report)
             return report
 
@@ -203,13 +205,12 @@ class Run:
             # A stopped run must not leave the last one's among new images.
             for name in ("report.json", "scene.blend", ROOM):
                 store.path(name).unlink(missing_ok=True)
-            recovery.write_images()
+            report = recovery.write_images()
             self._progress.update(0.7)
             # The scene gets the mesh whose normals face the frames: its lamps shine on that side. And the one that the
             # materials were measured on: their colours fit its normals.
             posed = replace(recovery.capture, frames=recovery.room_poses().of(self.capture.frames))
             write_room(store.folder, posed, recovery.surface().first_uv)
-            report = recovery.report()
             warnings: tuple[str, ...] = ()
             if scene is not None:
                 posed = replace(posed, mesh=recovery.written_mesh())

@@ -72,6 +72,10 @@ def _cover(uv: np.ndarray, size: int, threads: int) -> tuple[np.ndarray, np.ndar
     def centres(rows: slice) -> None:
         ask(np.arange(rows.start * size, rows.stop * size), SUBSAMPLES[0])
 
+    def partly(part: slice) -> None:
+        for shift in SUBSAMPLES[1:]:
+            ask(wanted[part][triangle[wanted[part]] < 0], shift)
+
     for_blocks(centres, size, ROWS_AT_ONCE, threads)
     # Only empty texels beside a covered one, or under a triangle too small for any centre, can be covered in part; what
     # is found so has neighbours in turn, along a sliver's whole length.
@@ -82,8 +86,7 @@ def _cover(uv: np.ndarray, size: int, threads: int) -> tuple[np.ndarray, np.ndar
     wanted = np.flatnonzero(near.ravel() & unasked)
     while len(wanted):
         unasked[wanted] = False
-        for shift in SUBSAMPLES[1:]:
-            ask(wanted[triangle[wanted] < 0], shift)
+        for_blocks(partly, len(wanted), 1 << 15, threads)
         covered = np.divmod(wanted[triangle[wanted] >= 0], size)
         rows, columns = (np.clip(at + np.array([-1, 0, 1])[:, None], 0, size - 1) for at in covered)
         around = np.unique(rows[:, None] * size + columns[None])

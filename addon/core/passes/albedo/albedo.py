@@ -7,6 +7,7 @@ import numpy as np
 
 from ...groups import by_label
 from ...kinds import Code
+from ...parallel import ordered_map
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Instance, class_names
@@ -141,16 +142,20 @@ def fill(
     left = error.copy()
     by_class: dict[str, list[np.ndarray]] = {}
     bare: dict[str, list[np.ndarray]] = {}
+    measured = []
     for own in by_label(_parts(atlas, valid)):
         object_id = int(atlas.object_id[own[0]])
         if object_id in emitters:
             result[own], origin[own], left[own] = 0, NONE, 0
-            continue
-        if not valid[own].any():
+        elif not valid[own].any():
             bare.setdefault(class_of.get(object_id, ""), []).append(own)
-            continue
-        result[own], left[own] = shrink(atlas, own, result[own], error[own], without)
-        by_class.setdefault(class_of.get(object_id, ""), []).append(np.median(result[own][valid[own]], 0))
+        else:
+            measured.append(own)
+    each = ordered_map(lambda own: shrink(atlas, own, result[own], error[own], without), measured, 0)
+    for own, shrunk in zip(measured, each, strict=True):
+        result[own], left[own] = shrunk
+        name = class_of.get(int(atlas.object_id[own[0]]), "")
+        by_class.setdefault(name, []).append(np.median(result[own][valid[own]], 0))
     known = [middle for alike in by_class.values() for middle in alike]
     for name, groups in bare.items():
         own, alike = np.concatenate(groups), by_class.get(name)

@@ -26,6 +26,7 @@ from ...light.emitters import BrightTriangles, sample_bright
 from ...light.field import LightField
 from ...light.less_noise import cells
 from ...light.params import LESS_NOISE
+from ...parallel import ordered_map
 from ...scene.atlas import Atlas
 from ...scene.tangent_frame import tangent_frame, to_world
 from .params import CAUSTICS
@@ -78,7 +79,12 @@ class _Light:
 
 
 def caustics(
-    room: LightField, bright: BrightTriangles, gloss: Gloss, seed: int = 0, photons: int = CAUSTICS.photons
+    room: LightField,
+    bright: BrightTriangles,
+    gloss: Gloss,
+    seed: int = 0,
+    photons: int = CAUSTICS.photons,
+    threads: int = 0,
 ) -> np.ndarray:
     """E by way of glossy reflections of what bright triangles send, less what was taken for it.
 
@@ -94,13 +100,14 @@ def caustics(
     (n, 6) float32
         Radiance * steradian, for every element; and half the difference of the photons' two halves, the noise in it.
     """
-    halves = np.zeros((2, 3, len(room.atlas)), np.float32)  # the photons' power, by channel
+    count = len(room.atlas)
     if not len(bright) or not gloss.alpha.any():
-        return np.zeros((len(room.atlas), 6), np.float32)
+        return np.zeros((count, 6), np.float32)
     cube = sobol(photons, seed, 5)
     rng = np.random.default_rng([seed, 2])
+    fallen, power = [], []  # by the second half of photons: `count` elements further on
     for start in range(0, photons, AT_ONCE):
-        part, fallen = cube[start : start + AT_ONCE], halves[2 * start // photons]
+        part, half = cube[start : start + AT_ONCE], count * (2 * start // photons)
         pick = sample_bright(bright, part[None, :, :3])
         normal = bright.normal[pick.index]
         ways = to_world(cosine_hemisphere(part[:, None, 3:]), normal)[:, 0]
@@ -111,20 +118,20 @@ def caustics(
         own = np.maximum(room.radiance[sender] - gloss.inside[sender], 0)
         sent = _Light(origin, ways, np.concatenate([own, -gloss.inside[sender]], 1) * share)
         element, place, at = _met(room, sent)
-        _let_fall(fallen, element, sent.power[at, 3:])
+        fallen.append(element + half)
+        power.append(sent.power[at, 3:])
         for _ in range(CAUSTICS.bounces):
             light = _Light(place, sent.direction[at], sent.power[at, :3])
             sent = _sent_on(room, gloss, element, light, rng)
             if not len(sent.origin):
                 break
             element, place, at = _met(room, sent)
-            _let_fall(fallen, element, sent.power[at])
-    return _over_cells(room.atlas, halves)
-
-
-def _let_fall(fallen: np.ndarray, element: np.ndarray, power: np.ndarray) -> None:
-    for row, values in zip(fallen, power.T, strict=True):
-        row += np.bincount(element, values, len(row))
+            fallen.append(element + half)
+            power.append(sent.power[at])
+    at, halves = np.concatenate(fallen), np.empty((2, 3, count), np.float32)
+    for channel, values in enumerate(np.concatenate(power).T):
+        halves[:, channel] = np.bincount(at, values, 2 * count).reshape(2, count)
+    return _over_cells(room.atlas, halves, threads)
 
 
 def _met(room: LightField, light: _Light) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -156,15 +163,19 @@ def _sent_on(room: LightField, gloss: Gloss, element: np.ndarray, light: _Light,
     return _Light(origin, ways, light.power[alive] * share[alive])
 
 
-def _over_cells(atlas: Atlas, halves: np.ndarray) -> np.ndarray:
+def _over_cells(atlas: Atlas, halves: np.ndarray, threads: int) -> np.ndarray:
     """Power over area, and its noise by the photons' halves, (n, 6): means over cells of several shifted grids."""
     for a, b in zip(*halves, strict=True):  # in place: their sum, and their difference
         a[:], b[:] = a + b, a - b
     held, area = np.zeros((6, len(atlas)), np.float32), np.zeros(len(atlas), np.float32)
+
+    def add(portion: tuple[np.ndarray, np.ndarray]) -> None:
+        own, group = portion
+        for row, values in zip((*held, area), (*halves.reshape(6, -1), atlas.area), strict=True):
+            row[own] += np.bincount(group, values[own])[group]
+
     for k in range(LESS_NOISE.grids):
-        for own, group in cells(atlas.position, atlas.normal, k / LESS_NOISE.grids):
-            for row, values in zip(held, halves.reshape(6, -1), strict=True):
-                row[own] += np.bincount(group, values[own])[group]
-            area[own] += np.bincount(group, atlas.area[own])[group]
+        for _ in ordered_map(add, cells(atlas.position, atlas.normal, k / LESS_NOISE.grids), threads):
+            pass
     held /= np.maximum(area, np.float32(1e-12))
     return held.T

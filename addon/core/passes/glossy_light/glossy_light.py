@@ -77,9 +77,9 @@ class Excess(LightField):
         """Whether there is anything glossy at all."""
         return bool(self._gloss.alpha.any())
 
-    def from_bright(self) -> np.ndarray:
+    def from_bright(self, threads: int = 0) -> np.ndarray:
         """The part of the excess that starts at bright triangles, and its noise, at every element (`caustics`)."""
-        return caustics(self._lit, self._sources, self._gloss, self._seed)
+        return caustics(self._lit, self._sources, self._gloss, self._seed, threads=threads)
 
     def arriving(
         self,
@@ -163,7 +163,7 @@ def glossy_light(
 
     found = TexelBlocks(atlas, element, threads).evaluate(around, block_step(atlas), np.inf)
     if "caustics" not in without:
-        found += excess.from_bright()[element]
+        found += excess.from_bright(threads)[element]
     # Spread like the light itself, the halves' difference has the noise that is left in it.
     found, noise = found[:, :3] - level, found[:, 3:].mean(1)
     if "glossy-smoothing" not in without:

@@ -10,6 +10,8 @@ field has there is one number, F0. Anything else shows its own light:
 | 25 other flat objects, six rooms | .33 to 1.4 | .002 to .10 | at most .40 |
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.optimize import minimize
 
@@ -17,6 +19,7 @@ from ...groups import by_number
 from ...light.field import FLAT, LightField
 from ...light.lamps import Lamp
 from ...light.mirrors import Mirror
+from ...parallel import ordered_map
 from ...scene.model import Instance
 from ...scene.samples import Samples
 from .mirrored import Views, sides_of, turned
@@ -50,21 +53,26 @@ def find_mirrors(
     clear = np.flatnonzero(~samples.saturated)
     shown = by_number(field.atlas.object_id[samples.element[clear]])
     glowing = {lamp.object_id for lamp in lamps}
-    mirrors = []
-    for instance in instances:
-        plane = None if instance.object_id in glowing else plane_of(field, instance.object_id)
-        if plane is None:
-            continue
-        point, normal = plane
-        own = clear[shown.get(instance.object_id, [])]
-        own = own[field.atlas.normal[samples.element[own]] @ normal > FLAT]
-        elements = np.unique(samples.element[own])
-        if len(elements) > MIRRORS.elements:
-            own = own[np.isin(samples.element[own], rng.choice(elements, MIRRORS.elements, replace=False))]
+
+    def flat() -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+        for instance in instances:
+            plane = None if instance.object_id in glowing else plane_of(field, instance.object_id)
+            if plane is None:
+                continue
+            point, normal = plane
+            own = clear[shown.get(instance.object_id, [])]
+            own = own[field.atlas.normal[samples.element[own]] @ normal > FLAT]
+            elements = np.unique(samples.element[own])
+            if len(elements) > MIRRORS.elements:
+                own = own[np.isin(samples.element[own], rng.choice(elements, MIRRORS.elements, replace=False))]
+            yield instance.object_id, point, normal, own
+
+    def mirror(one: tuple[int, np.ndarray, np.ndarray, np.ndarray]) -> Mirror | None:
+        object_id, point, normal, own = one
         found = _mirrored(Views.of(field, samples, own), field.atlas.normal[samples.element[own]], normal)
-        if found is not None:
-            mirrors.append(Mirror(instance.object_id, point, *found))
-    return tuple(mirrors)
+        return None if found is None else Mirror(object_id, point, *found)
+
+    return tuple(found for found in ordered_map(mirror, flat(), 0) if found is not None)
 
 
 def _mirrored(views: Views, facing: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

@@ -16,6 +16,7 @@ from ...light.environment import Environment
 from ...light.field import LightField
 from ...light.sun import Sun, around
 from ...luminance import LUMINANCE
+from ...parallel import ordered_map
 from ...scene.sphere import fibonacci
 from ...significance import LEVELS
 from .params import SUN
@@ -48,10 +49,10 @@ def _on_grid(even: Spots, environment: Environment) -> list[Guess]:
     weight = np.clip(excess[out], 0, 3)
     reached = np.bincount(ray[~hidden], weight[spot[~hidden]], len(way)) / max(weight.sum(), 1e-9)
     best = np.argsort(-reached, kind="stable")[: SUN.kept]
-    guesses = [even.explained(way[k]) for k in best if reached[k] > SUN.reached]
+    guesses = list(ordered_map(even.explained, way[best[reached[best] > SUN.reached]], 0))
     # A patch may be narrower than the grid is wide, and the guess beside the sun then no better than any other.
-    refined = [_searched(even.explained, one, SHARP[:2]) for one in _apart(guesses)[: SUN.refined]]
-    return _apart(refined)[: SUN.tried]
+    refined = ordered_map(lambda one: _searched(even.explained, one, SHARP[:2]), _apart(guesses)[: SUN.refined], 0)
+    return _apart(list(refined))[: SUN.tried]
 
 
 def _apart(guesses: list[Guess]) -> list[Guess]:
@@ -161,7 +162,8 @@ def find_sun(
               for part, count in ((pool[near], SUN.dense * 2 // 3), (pool[~near], SUN.dense // 3))]  # fmt: skip
     dense = np.sort(np.concatenate(chosen))
     spots = Spots(field, dense, irradiance(dense))
-    tried = [_searched(spots.explained, spots.explained(one.direction), SHARP) for one in guesses]
+    starts = (spots.explained(one.direction) for one in guesses)
+    tried = ordered_map(lambda one: _searched(spots.explained, one, SHARP), starts, 0)
     best, before = min(tried, key=lambda one: one.cost), spots.spread()
     if best.cost > (1 - LEVELS.gain) * before:
         return None
