@@ -32,7 +32,7 @@ class TexelBlocks:
 
     def __init__(self, atlas: Atlas, element: np.ndarray, threads: int = 0):
         self._size, self._threads = atlas.size, threads
-        self._row, self._column = np.divmod(atlas.texel[element].astype(np.int32), np.int32(atlas.size))
+        self._row, self._column = np.divmod(atlas.texel[element], np.int32(atlas.size))
         self._atlas, self._element = atlas, element
         self._at = np.full(atlas.size * atlas.size, -1, np.int32)
         self._at[atlas.texel[element]] = np.arange(len(element), dtype=np.int32)

@@ -21,7 +21,7 @@ class Atlas:
         Edge of the square image in texels.
     uv : (t, 3, 2) float32
         Atlas coordinates in [0, 1] of each triangle's corners; no two triangles overlap.
-    texel : (n,) int64
+    texel : (n,) int32
         Flat index (row * size + column) of each element.
     triangle : (n,) int32
     position : (n, 3) float32

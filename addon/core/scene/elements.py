@@ -58,7 +58,7 @@ class Unwrapped:
 def _cover(uv: np.ndarray, size: int, threads: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Covered texels, the triangle over each and the barycentric point, by rays against the unwrapped mesh."""
     if not len(uv):
-        return np.zeros(0, np.int64), np.zeros(0, np.int32), *np.zeros((2, 0), np.float32)
+        return *np.zeros((2, 0), np.int32), *np.zeros((2, 0), np.float32)
     plane = Unwrapped(uv, size)
     triangle = np.full(size * size, -1, np.int32)
     u, v = np.zeros(size * size, np.float32), np.zeros(size * size, np.float32)
@@ -91,7 +91,7 @@ def _cover(uv: np.ndarray, size: int, threads: int) -> tuple[np.ndarray, np.ndar
         rows, columns = (np.clip(at + np.array([-1, 0, 1])[:, None], 0, size - 1) for at in covered)
         around = np.unique(rows[:, None] * size + columns[None])
         wanted = around[unasked[around]]
-    texel = np.flatnonzero(triangle >= 0)
+    texel = np.flatnonzero(triangle >= 0).astype(np.int32)
     return texel, triangle[texel], u[texel], v[texel]
 
 
@@ -181,7 +181,7 @@ def _of_crumbs(mesh, size, area, crumbs):
     """Texel, triangle, position and area of the element of each cell."""
     corner = mesh.vertices[mesh.triangles[crumbs.triangle]].mean(1, dtype=np.float64)
     chosen = _nearest_to_middle(corner, crumbs.cell)
-    texel = crumbs.corner[:, 1].astype(np.int64) * size + crumbs.corner[:, 0]
+    texel = (crumbs.corner[:, 1] * size + crumbs.corner[:, 0]).astype(np.int32)
     total = np.bincount(crumbs.cell, area[crumbs.triangle]).astype(np.float32)
     return texel, crumbs.triangle[chosen].astype(np.int32), corner[chosen].astype(np.float32), total
 
