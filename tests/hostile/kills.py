@@ -1,6 +1,7 @@
 """Runs that are killed at any moment, taken up again, and compared with one that was left alone; and other bad days.
 
-Those are a disk that fills at any byte, several runs into one folder at once, and a clock that jumps.
+Those are a disk that fills at any byte, a network disk whose handle goes stale at any file that is read or written,
+several runs into one folder at once, a clock that jumps, another room's result, and a user without rights.
 
 All of them are forks of one process that has imported what a run takes, so that a kill costs a second.
 """
@@ -22,6 +23,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -67,6 +69,30 @@ def filling(room: int) -> None:
         return real(name, mode, *more, **named)
 
     builtins.open = opened
+
+
+def failing(at: int, number: int, writing: bool, under: Path) -> None:
+    """Let the file number `at` that this process opens, to read or to write, fail with the system's error `number`."""
+    real, files = open, itertools.count()
+
+    def opened(name, mode="r", *more, **named):
+        ours = isinstance(name, (str, Path)) and under in Path(name).parents
+        if ours and writing == any(one in mode for one in "wxa+") and next(files) == at:
+            raise OSError(number, os.strerror(number), str(name))
+        return real(name, mode, *more, **named)
+
+    builtins.open = io.open = opened
+
+
+def of_nobody(capture: Path, out: Path) -> None:
+    """Make this process one of a user without rights, after a run that imports what that user could not."""
+    from scan_relight.addon.cli import main
+
+    main(["recover", str(capture), "--out", str(out), *OPTIONS])
+    if os.geteuid() == 0:
+        os.setgroups([])
+        os.setgid(65534)
+        os.setuid(65534)
 
 
 def jumping() -> None:
@@ -126,7 +152,7 @@ def wrong_after(child: int, out: Path, *codes: int) -> list[str]:
     found = ["a process is left"] if orphan else []
     if code not in codes:
         found.append(f"exit code {code}")
-    if "Traceback" in said or "Exception ignored" in said or len(said.splitlines()) > 1:
+    if any(one in said for one in ("Traceback", "Exception ignored", "Unexpected")) or len(said.splitlines()) > 1:
         found.append(f"said {said[-300:]!r}")
     return found
 
@@ -147,7 +173,7 @@ def all_kills(count: int, seed: int, place: Path) -> list[str]:
     for k in range(count):
         number = SIGNALS[k % len(SIGNALS)]
         child = started(capture, out)
-        what = rng.choice(("moment", *STAGES))
+        what = ("moment", *STAGES)[k // len(SIGNALS) % (1 + len(STAGES))]  # each signal in each stage
         if what == "moment":
             time.sleep(rng.random() * whole)
         else:  # as it is stored, or a little later, when the next has begun
@@ -178,9 +204,39 @@ def all_kills(count: int, seed: int, place: Path) -> list[str]:
         found += wrong_after(started(capture, out, jumping), out, 0)
         if digest(out) != expected:
             found += ["a clock that jumps changes the result"]
+        shutil.rmtree(out)
+        for writing, number in ((False, errno.ESTALE), (True, errno.ESTALE), (True, errno.ENOSPC)):
+            at = rng.randrange(19 if writing else 128)  # so many files a run opens
+            prepare = partial(failing, at, number, writing, place)
+            disturbed = wrong_after(started(capture, out, prepare), out, 0, 1, 2)
+            report = out / "report.json"
+            if report.exists() and "be read (" not in report.read_text() and digest(out) != expected:
+                disturbed.append("another result, and nothing said")
+            found += [f"{errno.errorcode[number]} at file {at}: {one}" for one in disturbed]
+            shutil.rmtree(out, ignore_errors=True)
         wrong += [f"bad day {k}, room for {room} bytes: {one}" for one in found]
-        shutil.rmtree(out, ignore_errors=True)
-    return wrong
+    return wrong + strange_folders(capture, place, expected)
+
+
+def strange_folders(capture: Path, place: Path, expected: dict[str, str]) -> list[str]:
+    """A result of another room is made anew as a whole; what a user may not read or write is told."""
+    from tests.hostile.load import boxes, write
+
+    out, prepare = place / "other", partial(of_nobody, capture, place / "imports")
+    place.chmod(0o755)
+    other = write(place / "capture of others", boxes(6), 8, (48, 36), uv=True)
+    wrong = wrong_after(started(other, out), out, 0) + wrong_after(started(capture, out), out, 0)
+    if digest(out) != expected:
+        wrong.append("a folder that held another room's result holds another one than an empty folder")
+    for path in (out, out / "stages"):
+        path.chmod(0o555)
+    wrong += wrong_after(started(capture, out, prepare), out, 2)
+    if digest(out) != expected:
+        wrong.append("a folder without rights was changed")
+    (other / "mesh.ply").chmod(0)
+    (place / "of all").mkdir()
+    (place / "of all").chmod(0o777)
+    return wrong + wrong_after(started(other, place / "of all/result", prepare), place / "of all/result", 2)
 
 
 def run(count: int, seed: int = 0) -> list[str]:
