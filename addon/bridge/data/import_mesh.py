@@ -16,12 +16,12 @@ from ...core.io.layout import RawMesh
 from ...core.io.self_contained import copy_gltf, copy_obj
 from ..refused import reason_of
 from .added import Made
-from .arrays import layer_of, triangles_of, vertices_of
+from .arrays import layer_of, read, triangles_of, vertices_of
 from .shown import shown
 
 NUMBERED = re.compile(r"^(.*?)(?:\.(\d{3,}))?$", re.DOTALL)
 """Blender's ending of a name that was taken already."""
-PART = re.compile(r"^part (\d+)")
+PART, MATERIAL = re.compile(r"^part (\d+)"), re.compile(r"^material (\d+)")
 
 
 def import_mesh(path: Path) -> RawMesh:
@@ -86,12 +86,13 @@ def _scene_apart() -> Iterator[tuple[bpy.types.Scene, Made]]:
 
 
 class _Part(NamedTuple):
-    """World positions (v, 3) float64, triangles (t, 3), and texture coordinates (t, 3, 2) if any, of a named object."""
+    """World positions (v, 3) float64, triangles (t, 3), texture coordinates (t, 3, 2) if any, materials (t,)."""
 
     name: str
     vertices: np.ndarray
     triangles: np.ndarray
     uv: np.ndarray | None
+    material: np.ndarray
 
 
 def _parts(things: list[bpy.types.Object], placed: list[Placed]) -> list[_Part]:
@@ -106,16 +107,23 @@ def _parts(things: list[bpy.types.Object], placed: list[Placed]) -> list[_Part]:
             continue
         layer, known = thing.data.uv_layers.active, PART.match(thing.name)
         uv = layer and layer_of(thing.data, layer.name)[triangles_of(thing.data, "loops")]
-        vertices = vertices_of(thing.data, thing.matrix_world)
+        vertices, material = vertices_of(thing.data, thing.matrix_world), _materials(thing.data)
         unnamed = [(len(found), Placed(0, thing.name, np.eye(4)))]
         for order, one in places.get(int(known[1]), unnamed) if known else unnamed:
             corners = triangles, uv
             if np.linalg.det(one.matrix[:3, :3]) < 0:  # its triangles are wound the other way
                 corners = triangles[:, [0, 2, 1]], None if uv is None else uv[:, [0, 2, 1]]
             name, number = NUMBERED.match(one.name).groups()
-            part = _Part(name, vertices @ one.matrix[:3, :3].T + one.matrix[:3, 3], *corners)
+            part = _Part(name, vertices @ one.matrix[:3, :3].T + one.matrix[:3, 3], *corners, material)
             found.append(((name, int(number or 0), order), part))
     return [part for _, part in sorted(found, key=lambda one: one[0])]
+
+
+def _materials(data: bpy.types.Mesh) -> np.ndarray:
+    """The number in the file of each triangle's material, -1 for none, (t,) int32."""
+    known = [MATERIAL.match(one.name) if one else None for one in data.materials]
+    number = np.array([int(one[1]) if one else -1 for one in known] or [-1], np.int32)
+    return number[np.clip(read(data.loop_triangles, "material_index", kind=np.int32), 0, len(number) - 1)]
 
 
 def _joined(parts: list[_Part], name: str) -> RawMesh:
@@ -126,7 +134,9 @@ def _joined(parts: list[_Part], name: str) -> RawMesh:
     if any(part.uv is not None for part in parts):
         blank = [np.zeros((len(part.triangles), 3, 2), np.float32) for part in parts]
         uv = np.concatenate([other if part.uv is None else part.uv for part, other in zip(parts, blank)])
+    material = np.concatenate([part.material for part in parts])
     if len(parts) == 1:
-        return RawMesh(vertices, triangles, uv=uv, name=name)
+        return RawMesh(vertices, triangles, uv=uv, name=name, material=material)
     ids = np.repeat(np.arange(len(parts)), [len(part.triangles) for part in parts])
-    return RawMesh(vertices, triangles, ids, uv, {i: part.name for i, part in enumerate(parts)}, name)
+    names = {i: part.name for i, part in enumerate(parts)}
+    return RawMesh(vertices, triangles, ids, uv, names, name, material=material)

@@ -1,6 +1,6 @@
 """What a capture's frames tell of radiance: the first thing to know of how far to trust a result."""
 
-from ..scene.model import AUTO, Capture, Frame
+from ..scene.model import AUTO, Capture, Frame, LitTexture
 
 TIERS = {
     "hdr": "HDR frames: their radiance is as it was recorded.",
@@ -9,6 +9,8 @@ TIERS = {
     "exposures": "Pictures of 8 or 16 bits with known exposures: the curve is estimated; what they clip is not known.",
     "codes": "Pictures of 8 or 16 bits alone: exposures, white balance and curve are estimated, and brightness and "
     "contrast of all albedo may be off.",
+    "baked": "No frames: a scan's baked texture is taken for the light, which is weaker than any frames; nothing tells "
+    "of highlights, exposures or what it clips.",
     "texture": "No frames: the light is the one stored on the mesh, and nothing tells of highlights.",
 }
 """From the best to the least; what report.json says, and the sentence."""
@@ -17,7 +19,7 @@ TIERS = {
 def tier(capture: Capture) -> str:
     """The name in `TIERS` of what most of a capture's frames are."""
     if not capture.frames:
-        return "texture"
+        return "baked" if isinstance(capture.mesh.lit, LitTexture) else "texture"
 
     told = len({frame.exposure for frame in capture.frames}) > 1
 

@@ -10,5 +10,6 @@ FORMATS = {
     "traj": "traj.txt and results/frame000000.exr",
     "nerfstudio": "transforms.json",
     "colmap": "cameras and images of a COLMAP model (.bin or .txt)",
+    "textured": "one textured mesh (.glb, .gltf or .obj) alone",
 }
 """In the order of `readers.READERS`."""

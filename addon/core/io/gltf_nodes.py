@@ -48,7 +48,7 @@ def placed_meshes(nodes: list[dict[str, Any]], meshes: int, path: Path) -> list[
         if not isinstance(children, list):
             raise damaged
         for child in children:
-            if not _is_index(child, len(nodes)) or parent[child] >= 0:
+            if not is_index(child, len(nodes)) or parent[child] >= 0:
                 raise damaged
             parent[child] = i
     world: dict[int, np.ndarray] = {}
@@ -63,14 +63,15 @@ def placed_meshes(nodes: list[dict[str, Any]], meshes: int, path: Path) -> list[
     found = []
     for i, node in enumerate(nodes):
         if "mesh" in node:
-            if not _is_index(node["mesh"], meshes):
+            if not is_index(node["mesh"], meshes):
                 raise damaged
             name = node.get("name")
             found.append(Placed(node["mesh"], name if isinstance(name, str) else "", TO_Z_UP @ world[i] @ TO_Z_UP.T))
     return found
 
 
-def _is_index(value: Any, count: int) -> bool:
+def is_index(value: Any, count: int) -> bool:
+    """Whether a value of a file is a place in a list of so many."""
     return isinstance(value, int) and not isinstance(value, bool) and 0 <= value < count
 
 

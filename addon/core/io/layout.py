@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import BadInputError
-from ..scene.model import Frame, KnownMirror, LitTiles
+from ..scene.model import Frame, KnownMirror, LitTexture, LitTiles
 from .files import EscapesError
 
 
@@ -67,8 +67,10 @@ class RawMesh:
         Class name of each `object_id`, where the mesh itself tells.
     name : str
         The file, for messages.
-    lit : LitTiles or None
+    lit : LitTiles or LitTexture or None
         Light stored on it.
+    material : (t,) int32 or None
+        Number of each triangle's material in the file, as `base_colour` counts them; -1 none. Only for readers.
     """
 
     vertices: np.ndarray
@@ -77,7 +79,8 @@ class RawMesh:
     uv: np.ndarray | None = None
     names: dict[int, str] | None = None
     name: str = "mesh"
-    lit: LitTiles | None = None
+    lit: LitTiles | LitTexture | None = None
+    material: np.ndarray | None = None
 
 
 @dataclass(frozen=True)

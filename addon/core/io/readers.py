@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..errors import BadInputError
 from ..origin import of_point, of_thing
-from . import colmap, fipt, nerfstudio, polycam, record3d, replica, scannetpp, traj
+from . import colmap, fipt, nerfstudio, polycam, record3d, replica, scannetpp, textured, traj
 from .layout import Layout, Reader, Reading
 
 GROUP = "scan_relight.readers"
@@ -21,6 +21,7 @@ READERS: tuple[Reader, ...] = (
     traj.READER,
     nerfstudio.READER,
     colmap.READER,
+    textured.READER,
 )
 _registered: dict[str, Reader] = {}
 

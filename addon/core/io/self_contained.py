@@ -19,21 +19,24 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..kinds import Block, Limit
-from .gltf_nodes import Placed, placed_meshes
+from .gltf_nodes import Placed, is_index, placed_meshes
 
 MAX_JSON: Limit[int] = 1 << 28
 """Bytes of glTF's JSON part that are read at most."""
 MAX_BARE: Limit[int] = 1 << 24
 """Elements that an accessor without a buffer may claim: they are zeros that the importer makes up."""
-DROPPED = ("materials", "textures", "images", "samplers", "animations", "skins", "cameras", "extensions")
+MATERIAL = "material {}"
+"""What copies call the materials, which they keep as names alone: by their numbers in the file."""
+DROPPED = ("textures", "images", "samplers", "animations", "skins", "cameras", "extensions")
 COMPRESSED = "KHR_draco_mesh_compression"
 OBJ_DROPPED = re.compile(rb"^\s*(mtllib|usemtl|usemap|maplib|call|csh)\b")
+OBJ_MATERIAL = re.compile(rb"^\s*usemtl\s+(.*\S)\s*$")
 OBJ_PART = re.compile(rb"^([og] )(.*\S)\s*$")
 BLOCK: Block[int] = 1 << 20
 
 
 def copy_obj(path: Path, folder: Path) -> tuple[Path, bool, list[Placed]]:
-    """Copy the OBJ file `path` into `folder` without its materials, its objects or groups called 'part N'.
+    """Copy the OBJ file `path` into `folder` without what its materials are, its objects or groups called 'part N'.
 
     Returns
     -------
@@ -50,6 +53,7 @@ def copy_obj(path: Path, folder: Path) -> tuple[Path, bool, list[Placed]]:
     """
     copy, named, inside = folder / "mesh.obj", False, False
     placed: list[Placed] = []
+    materials: dict[bytes, int] = {}
     with open(path, "rb") as source, open(copy, "wb") as target:
         # Lines of bounded length: a file without line ends is no reason to hold all of it.
         while line := source.readline(BLOCK):
@@ -59,7 +63,9 @@ def copy_obj(path: Path, folder: Path) -> tuple[Path, bool, list[Placed]]:
             if not dropped and (told := OBJ_PART.match(line)):
                 line = told[1] + f"part {len(placed)}\n".encode()
                 placed.append(Placed(len(placed), told[2].decode("utf-8", "replace").strip(), np.eye(4)))
-            if not dropped:
+            if told := OBJ_MATERIAL.match(line):
+                target.write(f"usemtl {MATERIAL}\n".format(materials.setdefault(told[1], len(materials))).encode())
+            elif not dropped:
                 target.write(line)
     return copy, named, placed
 
@@ -80,21 +86,21 @@ def copy_gltf(path: Path, folder: Path) -> tuple[Path, list[Placed]]:
     OSError
         It can't be read, or the copy not written.
     """
-    top, binary = _read(path)
+    top, binary = read_gltf(path)
     if not isinstance(top.get("asset"), dict) or not str(top["asset"].get("version", "")).startswith("2"):
         raise BadInputError(f"Mesh '{path}' is no glTF 2.0; export it again.")
     sizes = []
-    for i, buffer in enumerate(_list(top, "buffers", path)):
+    for i, buffer in enumerate(list_of(top, "buffers", path)):
         target = folder / f"buffer{i}.bin"
         uri = buffer.get("uri")
         if uri is None:
             if i or binary is None:
                 raise BadInputError(f"Mesh '{path}' has a buffer ({i}) without content; export it again.")
-            _copy_part(path, target, *binary)
+            copy_part(path, target, *binary)
         elif isinstance(uri, str) and uri.startswith("data:"):
             _decode(path, uri, target)
         else:
-            shutil.copyfile(_beside(path, uri), target)
+            shutil.copyfile(beside(path, uri, "buffer"), target)
         buffer["uri"] = target.name
         sizes.append(target.stat().st_size)
         if not _count(buffer.get("byteLength")) <= sizes[-1]:
@@ -102,14 +108,17 @@ def copy_gltf(path: Path, folder: Path) -> tuple[Path, list[Placed]]:
     _check_sizes(top, sizes, path)
     for name in DROPPED:
         top.pop(name, None)
-    for mesh in _list(top, "meshes", path):
-        for primitive in _list(mesh, "primitives", path):
-            primitive.pop("material", None)
+    count = len(list_of(top, "materials", path))
+    top["materials"] = [{"name": MATERIAL.format(i)} for i in range(count)]
+    for mesh in list_of(top, "meshes", path):
+        for primitive in list_of(mesh, "primitives", path):
+            if not is_index(primitive.get("material"), count):
+                primitive.pop("material", None)
             kept = primitive.get("extensions")
             kept = {COMPRESSED: kept[COMPRESSED]} if isinstance(kept, dict) and COMPRESSED in kept else {}
             primitive["extensions"] = kept
-    meshes = _list(top, "meshes", path)
-    placed = placed_meshes(_list(top, "nodes", path), len(meshes), path)
+    meshes = list_of(top, "meshes", path)
+    placed = placed_meshes(list_of(top, "nodes", path), len(meshes), path)
     placed = [one._replace(name=one.name or str(meshes[one.mesh].get("name") or "")) for one in placed]
     used = sorted({one.mesh for one in placed})
     top["nodes"] = [{"mesh": number, "name": f"part {number}"} for number in used]
@@ -126,7 +135,7 @@ def copy_gltf(path: Path, folder: Path) -> tuple[Path, list[Placed]]:
     return copy, placed
 
 
-def _read(path: Path) -> tuple[dict[str, Any], tuple[int, int] | None]:
+def read_gltf(path: Path) -> tuple[dict[str, Any], tuple[int, int] | None]:
     """The JSON part, and where the binary part begins and how long it is."""
     with open(path, "rb") as file:
         head = file.read(20)
@@ -150,7 +159,7 @@ def _read(path: Path) -> tuple[dict[str, Any], tuple[int, int] | None]:
     return top, binary
 
 
-def _list(value: dict[str, Any], name: str, path: Path) -> list[dict[str, Any]]:
+def list_of(value: dict[str, Any], name: str, path: Path) -> list[dict[str, Any]]:
     """The list of objects `name`, empty where absent."""
     found = value.get(name, [])
     if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
@@ -163,8 +172,8 @@ def _count(value: Any) -> float:
     return value if isinstance(value, int) and not isinstance(value, bool) and value >= 0 else float("inf")
 
 
-def _beside(path: Path, uri: Any) -> Path:
-    """The file that `uri` names, which has to lie in the folder of `path` or below."""
+def beside(path: Path, uri: Any, what: str) -> Path:
+    """The file that `uri` names, which has to lie in the folder of `path` or below; `what` it is, for messages."""
     name = unquote(uri) if isinstance(uri, str) else ""
     kinds = PurePosixPath(name), PureWindowsPath(name)
     if (
@@ -174,16 +183,17 @@ def _beside(path: Path, uri: Any) -> Path:
         or any(kind.is_absolute() or kind.drive or kind.root or ".." in kind.parts for kind in kinds)
     ):
         raise BadInputError(
-            f"Mesh '{path}' names the buffer {str(uri)[:80]!r}, which does not lie beside it; "
+            f"Mesh '{path}' names the {what} {str(uri)[:80]!r}, which does not lie beside it; "
             "export it as one GLB file."
         )
     found = path.parent / name
     if not found.is_file():
-        raise BadInputError(f"Mesh '{path}' names the buffer '{found}', which is not there; copy it as well.")
+        raise BadInputError(f"Mesh '{path}' names the {what} '{found}', which is not there; copy it as well.")
     return found
 
 
-def _copy_part(path: Path, target: Path, begin: int, length: int) -> None:
+def copy_part(path: Path, target: Path, begin: int, length: int) -> None:
+    """Write so many bytes of a file, from `begin` on, to another."""
     with open(path, "rb") as source, open(target, "wb") as file:
         source.seek(begin)
         while length > 0 and (block := source.read(min(length, BLOCK))):
@@ -200,11 +210,11 @@ def _decode(path: Path, uri: str, target: Path) -> None:
 
 def _check_sizes(top: dict[str, Any], sizes: list[int], path: Path) -> None:
     """Compare what views and accessors claim with what there is: importers take them at their word."""
-    for view in _list(top, "bufferViews", path):
+    for view in list_of(top, "bufferViews", path):
         buffer = view.get("buffer")
         end = _count(view.get("byteOffset", 0)) + _count(view.get("byteLength"))
         if not isinstance(buffer, int) or _count(buffer) >= len(sizes) or end > sizes[buffer]:
             raise BadInputError(f"Mesh '{path}' points beyond its buffers: it is damaged; export it again.")
-    for accessor in _list(top, "accessors", path):
+    for accessor in list_of(top, "accessors", path):
         if not _count(accessor.get("count")) <= (MAX_BARE if "bufferView" not in accessor else sum(sizes)):
             raise BadInputError(f"Mesh '{path}' claims more values than it holds: it is damaged; export it again.")

@@ -20,7 +20,7 @@ TEXELS_AT_ONCE: Block[int] = 1 << 22
 
 def face_edge(mesh: Mesh) -> float:
     """Edge in metres of the usual face of the stored light's mesh: how large an element should be."""
-    if mesh.lit is None:
+    if not isinstance(mesh.lit, LitTiles):
         raise BadInputError("No light is stored on the mesh; give the capture frames.")
     _, area = _tiles(mesh, mesh.lit)
     return float(np.sqrt(np.median(area)))
@@ -46,7 +46,7 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
         Nothing is stored, or no light; or a texture was changed or taken away since it was read.
     """
     lit, n = mesh.lit, len(atlas)
-    if lit is None:
+    if not isinstance(lit, LitTiles):
         raise BadInputError("The capture has no frames, and no light stored on its mesh; give it either.")
     of_triangle, area = _tiles(mesh, lit)
     key = of_triangle[atlas.triangle]
@@ -90,14 +90,19 @@ def _place(mesh: Mesh, lit: LitTiles, atlas: Atlas) -> np.ndarray:
     result = np.empty((len(atlas), 2))
     for part in blocks(len(atlas), 1 << 18):
         triangle = atlas.triangle[part]
-        a, b, c = (mesh.vertices[mesh.triangles[triangle, i]] for i in range(3))
-        e, f, p = b - a, c - a, atlas.position[part] - a
-        ee, ef, ff, pe, pf = (np.einsum("ij,ij->i", x, y) for x, y in ((e, e), (e, f), (f, f), (p, e), (p, f)))
-        scale = np.maximum(ee * ff - ef * ef, 1e-300)
-        u, v = (pe * ff - pf * ef) / scale, (pf * ee - pe * ef) / scale
+        u, v = barycentric(mesh, triangle, atlas.position[part])
         corner = lit.uv[triangle].astype(np.float64)
         result[part] = (1 - u - v)[:, None] * corner[:, 0] + u[:, None] * corner[:, 1] + v[:, None] * corner[:, 2]
     return np.clip(np.nan_to_num(result), 0, 1)
+
+
+def barycentric(mesh: Mesh, triangle: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Shares of the second and the third corner of triangles ((n,) int) at places in them ((n, 3), metres), (2, n)."""
+    a, b, c = (mesh.vertices[mesh.triangles[triangle, i]] for i in range(3))
+    e, f, p = b - a, c - a, position - a
+    ee, ef, ff, pe, pf = (np.einsum("ij,ij->i", x, y) for x, y in ((e, e), (e, f), (f, f), (p, e), (p, f)))
+    scale = np.maximum(ee * ff - ef * ef, 1e-300)
+    return np.stack([(pe * ff - pf * ef) / scale, (pf * ee - pe * ef) / scale])
 
 
 def _runs(picture: np.ndarray, most: int) -> list[slice]:

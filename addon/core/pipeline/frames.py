@@ -22,6 +22,7 @@ from ..light.environment import Environment, EnvironmentAccumulator
 from ..light.field import LightField
 from ..lit_diffuse.accumulate import accumulate
 from ..lit_diffuse.exact import Exact
+from ..lit_diffuse.from_picture import lit_from_picture
 from ..lit_diffuse.from_texture import lit_from_tiles
 from ..memory import give_back
 from ..passes.clipped_lamps.fringes import FringeCollector, Fringes
@@ -31,7 +32,7 @@ from ..passes.sharpening.sharpen import sharpened
 from ..progress import Progress, Rounds
 from ..scene.elements import triangle_geometry
 from ..scene.lit_diffuse import LitDiffuse
-from ..scene.model import Capture, Frame, Pixels
+from ..scene.model import Capture, Frame, LitTexture, Pixels
 from ..scene.samples import SampleCollector, Samples
 from ..scene.surface import Surface
 from ..scene.visibility import FrameView, Observations
@@ -251,5 +252,9 @@ def observe(passes: Passes, capture: Capture, progress: Progress) -> Observed:
     if capture.frames:
         return passes.all(capture.frames, progress)
     mesh = replace(capture.mesh, vertices=passes.surface.mesh.vertices)
-    lit = lit_from_tiles(mesh, passes.surface.atlas, progress)
+    atlas, stored = passes.surface.atlas, mesh.lit
+    if isinstance(stored, LitTexture):
+        lit = lit_from_picture(mesh, stored, atlas, progress)
+    else:
+        lit = lit_from_tiles(mesh, atlas, progress)
     return Observed(lit, Environment.dark(), Samples.none(), Fringes.none(), Poses.as_read(()), Calibration.none(0))

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 
 from ..kinds import Unit
+from ..lit_diffuse.from_picture import texel_edge
 from ..lit_diffuse.from_texture import face_edge
 from ..origin import OWN, of_thing
 from ..passes.mesh_denoising.denoise import without_noise
 from ..scene.closing import as_scanned, settled
 from ..scene.elements import Elements
-from ..scene.model import Capture, Mesh
+from ..scene.model import Capture, LitTexture, Mesh
 from ..scene.surface import Surface, build_surface, from_uv
 from ..scene.two_sides import with_backs
 from ..scene.unwrap import Unwrap, by_xatlas
@@ -80,7 +81,8 @@ def make_surface(capture: Capture, unwrap: Unwrap, settings: Settings) -> Surfac
     mesh, noise = denoised(capture.mesh, settings) if noisy else (capture.mesh, 0.0)
     texel = settings.texel_size
     if mesh.lit is not None:
-        texel = texel or face_edge(mesh) / settings.detail
+        edge = texel_edge(mesh, mesh.lit) if isinstance(mesh.lit, LitTexture) else face_edge(mesh)
+        texel = texel or edge / settings.detail
     cameras, two_sides = [frame.camera for frame in capture.frames], "two-sides" not in settings.without
     found = build_surface(
         mesh, cameras, unwrap, texel, settings.detail, settings.atlas_size, two_sides,

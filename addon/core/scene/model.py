@@ -288,6 +288,47 @@ class LitTiles:
 
 
 @dataclass(frozen=True)
+class StoredPicture:
+    """A picture that is a file, or lies within one.
+
+    Attributes
+    ----------
+    path : Path
+    begin, length : int
+        Its bytes within the file; a length of 0 is the whole file.
+    """
+
+    path: Path
+    begin: int = 0
+    length: int = 0
+
+
+@dataclass(frozen=True)
+class LitTexture:
+    """Radiance that a scan's baked texture shows, up to one factor: what an app made of pictures that it had taken.
+
+    Attributes
+    ----------
+    pictures : tuple of StoredPicture
+    picture : (t,) int32
+        Which of them each triangle shows; -1 none.
+    uv : (t, 3, 2) float32
+        Its corners on the picture: v points up, and the picture repeats beyond 0...1.
+    transfer : str
+        Curve of the codes.
+    """
+
+    pictures: tuple[StoredPicture, ...]
+    picture: np.ndarray
+    uv: np.ndarray
+    transfer: str
+
+    def part(self, kept: np.ndarray) -> LitTexture:
+        """For some of the triangles ((t,) bool)."""
+        return replace(self, picture=self.picture[kept], uv=self.uv[kept])
+
+
+@dataclass(frozen=True)
 class KnownMirror:
     """A flat mirror that the capture itself tells of.
 
@@ -318,7 +359,7 @@ class Mesh:
         The instance that each triangle belongs to. Every value has an `Instance`.
     uv : (t, 3, 2) float32 or None
         The capture's own texture coordinates for each corner; may overlap and repeat.
-    lit : LitTiles or None
+    lit : LitTiles or LitTexture or None
         Its light, where the capture stores it on the mesh; used where there are no frames.
     backs : (s,) int32 or None
         None in captures. The last s triangles are the second sides of these, in the same place with the other winding:
@@ -333,7 +374,7 @@ class Mesh:
     triangles: np.ndarray
     object_id: np.ndarray
     uv: np.ndarray | None = None
-    lit: LitTiles | None = None
+    lit: LitTiles | LitTexture | None = None
     backs: np.ndarray | None = None
     closed: np.ndarray | None = None
     whole: bool = False

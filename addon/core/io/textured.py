@@ -1,0 +1,68 @@
+"""A mesh with a baked texture and nothing else, as apps on phones export it: the texture is taken for its light.
+
+The weakest of all captures: 8 bits, blended by an app from pictures whose exposures nobody tells, one value for all
+views. A folder with cameras is of another format, and its mesh's texture is not looked at.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..scene.model import AUTO, LitTexture
+from .base_colour import as_file, base_colours
+from .formats import FORMATS
+from .layout import Layout, Reader, Reading
+from .meshes import IMPORTED, find_mesh, read_mesh
+from .pictures import picture_size
+from .transfer import SRGB
+
+
+def find(root: Path) -> bool:
+    """Whether the folder's only mesh is of a kind that can have a texture, and it is no result that was exported."""
+    try:
+        found = [one for one in root.iterdir() if one.suffix.lower() in (".ply", *IMPORTED) and one.is_file()]
+    except OSError:
+        return False
+    return len(found) == 1 and found[0].suffix.lower() in IMPORTED and not (root / "materials.json").exists()
+
+
+def read(root: Path, reading: Reading) -> Layout:
+    """Read the mesh and find its texture.
+
+    Raises
+    ------
+    BadInputError
+        There is no mesh or no texture on it, or one that can't be read.
+    """
+    path = find_mesh(root, reading)
+    if path.suffix.lower() not in IMPORTED:
+        raise BadInputError(f"Mesh '{path}' can't have a texture; give a GLB, glTF or OBJ file, or cameras and frames.")
+    mesh = read_mesh(path, reading)
+    pictures = base_colours(path)
+    known = list(dict.fromkeys(one for one in pictures if one is not None))
+    if mesh.material is None or mesh.uv is None or not known:
+        raise BadInputError(
+            f"Capture '{root}' has no frames, and its mesh '{path.name}' no texture with coordinates; give it either."
+        )
+    for one in known:
+        with as_file(one) as file:
+            try:
+                picture_size(file)
+            except BadInputError as error:
+                what = str(error).replace(str(file), path.name)
+                raise BadInputError(f"The texture of '{path}' can't be read: {what}") from error
+    number = np.array([-1 if one is None else known.index(one) for one in (*pictures, None)], np.int32)
+    shown = number[np.clip(mesh.material, -1, len(pictures) - 1)]
+    if not (shown >= 0).any():
+        raise BadInputError(f"No triangle of '{path}' shows a texture; export it again, or add cameras and frames.")
+    lit = LitTexture(tuple(known), shown, mesh.uv, reading.transfer if reading.transfer not in ("", AUTO) else SRGB)
+    note = (
+        "The capture has no cameras: the light is taken from the texture of its mesh. That is weaker than frames: "
+        "highlights can't be told, nor what the texture clips, nor what lies outside."
+    )
+    return Layout([], replace(mesh, lit=lit, material=None), notes=[note])
+
+
+READER = Reader("textured", FORMATS["textured"], find, read)

@@ -1,0 +1,134 @@
+"""L_d from a scan's baked texture, where there are no frames: what an app blended of pictures that it had taken."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import BadInputError
+from ..io.base_colour import as_file
+from ..io.oiio import CODED, Stored, read_coded
+from ..io.pictures import picture_kind, picture_size, read_picture
+from ..io.transfer import TOP, decode
+from ..kinds import Block
+from ..parallel import blocks
+from ..progress import Progress
+from ..scene.atlas import Atlas
+from ..scene.elements import triangle_geometry
+from ..scene.lit_diffuse import LitDiffuse
+from ..scene.model import LitTexture, Mesh, StoredPicture
+from ..scene.params import VISIBILITY
+from ..scene.visibility import CLEAN, SATURATED
+from .from_texture import barycentric
+
+AT_ONCE: Block[int] = 1 << 18
+
+
+@dataclass(frozen=True)
+class BakedParams:
+    """How a baked texture is sampled.
+
+    Attributes
+    ----------
+    points : int
+        Along an element's edge, at which the texture is looked up; as many texels as an element usually covers, twice.
+    texels : float
+        Along an element's edge: an app's blending of pictures leaves no finer detail.
+    elements : int
+        At most, over the whole mesh: what a room has whose frames are seen at full detail.
+    """
+
+    points: int = 4
+    texels: float = 2.0
+    elements: int = 1 << 20
+
+
+BAKED = BakedParams()
+
+
+def texel_edge(mesh: Mesh, lit: LitTexture) -> float:
+    """Edge in metres of an element for a baked texture: some texels of the usual triangle, by area."""
+    with np.errstate(invalid="ignore"):
+        _, area = triangle_geometry(mesh)
+    (ux, uy), (vx, vy) = (np.moveaxis(lit.uv[:, i] - lit.uv[:, 0], 1, 0).astype(np.float64) for i in (1, 2))
+    texels = np.abs(ux * vy - uy * vx) / 2
+    for i, one in enumerate(lit.pictures):
+        with as_file(one) as file:
+            width, height = picture_size(file)
+        texels[lit.picture == i] *= width * height
+    known = (lit.picture >= 0) & (texels > 0)
+    if not known.any():
+        raise BadInputError("The mesh's texture coordinates span nothing; unwrap and bake it again.")
+    per, weight = area[known] / texels[known], area[known]
+    order = np.argsort(per)
+    usual = per[order][np.searchsorted(weight[order].cumsum(), weight.sum() / 2)]
+    return float(max(BAKED.texels * np.sqrt(usual), np.sqrt(area.sum() / BAKED.elements)))
+
+
+def lit_from_picture(mesh: Mesh, lit: LitTexture, atlas: Atlas, progress: Progress | None = None) -> LitDiffuse:
+    """The mean of the texture over each element, in linear light; 1 at the greatest code.
+
+    It is looked up within the element's triangle alone: what lies beside it on the picture may be any other place.
+    Texels that are 0 in all channels, or transparent, were never seen. Elements most of whose texels are within two
+    codes of the top are clipped. The spread of what was blended is not known: quartiles are the value itself.
+
+    Raises
+    ------
+    BadInputError
+        A picture was changed or taken away since it was read, or nothing is on it.
+    """
+    sums = np.zeros((len(atlas), 5))
+    of_element = lit.picture[atlas.triangle]
+    for i, one in enumerate(lit.pictures):
+        stored = _read(one)
+        own = np.flatnonzero(of_element == i)
+        for part in blocks(len(own), AT_ONCE):
+            sums[own[part]] = _sums(mesh, lit, atlas, own[part], stored)
+        if progress is not None:
+            progress.update(0.9 * (i + 1) / len(lit.pictures))
+    weight = sums[:, 3]
+    seen = weight > 0
+    if not seen.any():
+        raise BadInputError("The texture of the mesh is black all over; bake or export it again.")
+    radiance = np.full((len(atlas), 3), np.nan, np.float32)
+    radiance[seen] = sums[seen, :3] / weight[seen, None]
+    share = (sums[:, 4] / np.maximum(weight, 1)).astype(np.float32)
+    tier = np.where(seen, np.where(share > 0.5, SATURATED, CLEAN), -1).astype(np.int8)
+    return LitDiffuse(radiance, radiance, radiance, np.where(seen, VISIBILITY.enough, 0).astype(np.int32), tier, share)
+
+
+def _read(picture: StoredPicture) -> Stored:
+    """A texture's codes, or linear floats."""
+    with as_file(picture) as file:
+        return read_coded(file) if picture_kind(file) in CODED else Stored(read_picture(file).rgb, None)
+
+
+def _sums(mesh: Mesh, lit: LitTexture, atlas: Atlas, element: np.ndarray, stored: Stored) -> np.ndarray:
+    """Sums of R, G, B, number and number of clipped points over some elements, (n, 5)."""
+    height, width = stored.colour.shape[:2]
+    triangle, result = atlas.triangle[element], np.zeros((len(element), 5))
+    a, b, c = (mesh.vertices[mesh.triangles[triangle, i]] for i in range(3))
+    along = (b - a) / np.maximum(np.linalg.norm(b - a, axis=1), 1e-30)[:, None]
+    across = np.cross(np.cross(b - a, c - a), along)
+    across /= np.maximum(np.linalg.norm(across, axis=1), 1e-30)[:, None]
+    edge = np.sqrt(atlas.area[element])[:, None]
+    corner = lit.uv[triangle].astype(np.float64)
+    steps = (np.arange(BAKED.points) + 0.5) / BAKED.points - 0.5
+    for x, y in ((x, y) for x in steps for y in steps):
+        u, v = np.maximum(barycentric(mesh, triangle, atlas.position[element] + edge * (x * along + y * across)), 0)
+        u, v = (u, v) / np.maximum(u + v, 1)
+        at = (1 - u - v)[:, None] * corner[:, 0] + u[:, None] * corner[:, 1] + v[:, None] * corner[:, 2]
+        column = np.minimum((at[:, 0] % 1 * width).astype(int), width - 1)
+        row = np.minimum(((1 - at[:, 1]) % 1 * height).astype(int), height - 1)
+        value = stored.colour[row, column]
+        known = np.isfinite(value).all(-1) & (value > 0).any(-1)
+        if stored.alpha is not None:
+            known &= stored.alpha[row, column] > 0
+        if value.dtype.kind == "f":
+            linear, over = np.maximum(np.nan_to_num(value), 0), np.zeros(len(value), bool)
+        else:
+            linear, greatest = decode(value, lit.transfer), np.iinfo(value.dtype).max
+            over = (value >= TOP[8 * value.dtype.itemsize] * greatest).any(-1)
+        result[known, :3] += linear[known]
+        result[:, 3] += known
+        result[:, 4] += known & over
+    return result
