@@ -15,6 +15,7 @@ from pathlib import Path
 
 from ..console import own_console, unexpected
 from ..core.errors import EXIT_BAD_INPUT, EXIT_FAILURE, EXIT_INTERRUPTED, ScanRelightError, check_path
+from ..core.memory import give_back_at_once
 from ..core.parallel import ONE_BLAS_THREAD
 from ..temporary import use_own_folder
 from ..version import VERSION
@@ -51,6 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as end:  # argparse has printed help, the version, or what is wrong
         return end.code if isinstance(end.code, int) else EXIT_BAD_INPUT
     os.environ.update(ONE_BLAS_THREAD | os.environ)
+    give_back_at_once()
     use_own_folder()
     try:
         for told in vars(arguments).values():

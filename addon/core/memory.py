@@ -10,6 +10,9 @@ from .kinds import Block
 
 SHARE: Block[float] = 0.7
 """Of what the machine has free, what a run may take where nobody says."""
+LARGE: Block[int] = 1 << 22
+"""Bytes of an array that gets pages of its own: those of blocks are smaller, those of all elements larger."""
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # malloc.h
 
 
 class Budget:
@@ -114,6 +117,14 @@ def give_back() -> None:
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
         if trim is not None:
             trim(0)
+
+
+def give_back_at_once() -> None:
+    """Let the system have large arrays as soon as they are freed: glibc would keep up to 32 MiB of each for later."""
+    set_option = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
+    if set_option is not None:
+        for option, size in (M_MMAP_THRESHOLD, LARGE), (M_TRIM_THRESHOLD, 16 * LARGE):
+            set_option(option, size)
 
 
 def peak_memory() -> int | None:

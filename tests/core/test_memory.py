@@ -1,6 +1,7 @@
 """Memory of this process."""
 
 import ctypes
+import subprocess
 import sys
 from pathlib import Path
 
@@ -24,6 +25,26 @@ def test_what_was_freed_goes_back_to_the_system():
     del held
     give_back()
     assert resident() < full - 1000 * 8000 * 8 // 4096 and last.all()
+
+
+@pytest.mark.skipif(sys.platform != "linux" or not hasattr(ctypes.CDLL(None), "mallopt"), reason="not glibc")
+def test_large_arrays_go_back_at_once():
+    """In a process of its own: the options are for good. By itself glibc keeps arrays once one as large was freed."""
+    script = """
+import numpy as np
+from addon.core.memory import give_back_at_once, resident_memory
+give_back_at_once()
+kept = []
+for _ in range(2):
+    held = []
+    for _ in range(20):
+        held.append(np.ones(1 << 20))
+        kept.append(np.ones(1 << 12))  # between two of them
+    full = resident_memory()
+    del held
+assert resident_memory() < full - 19 * (8 << 20)
+"""
+    subprocess.run([sys.executable, "-c", script], check=True, cwd=Path(__file__).parents[2])
 
 
 def test_pieces_fit_into_half_of_what_is_left():

@@ -206,7 +206,7 @@ class Result:
             "albedo": rho, "base color": self.base_color, "irradiance": shading.irradiance, "escaped": shading.escaped,
             "relative_error": shading.relative_error, "light": shading.radiance, "sky": shading.environment.radiance,
             "specular": self.specular.specular, "L_d": self.lit.radiance[self.lit.seen],
-            "quartiles": np.stack([self.lit.lower, self.lit.upper])[:, self.lit.seen],
+            "interquartile range": self.lit.interquartile_range,
             "position": self.atlas.position, "normal": self.atlas.normal, "area": self.atlas.area,
         }.items():  # fmt: skip
             assert np.isfinite(values).all(), f"{name} holds values that are none"

@@ -43,8 +43,8 @@ def _choose(summary: Callable[[int], Summary]) -> LitDiffuse:
 
     edge, saturated = take(EDGE), take(SATURATED)
     clipped = saturated / np.maximum(clean + edge + saturated, 1)
-    median, lower, upper = map(np.ascontiguousarray, (best.median, best.lower, best.upper))
-    return LitDiffuse(median, lower, upper, best.count, tier, clipped.astype(np.float32))
+    median = np.ascontiguousarray(best.median)
+    return LitDiffuse(median, best.interquartile_range, best.count, tier, clipped.astype(np.float32))
 
 
 def accumulate(

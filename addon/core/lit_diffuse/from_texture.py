@@ -30,7 +30,7 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
     """The mean over the part of its tile that each element stands for.
 
     A stored value is itself the median or mean of many frames, so that an element counts as seen often enough; the
-    spread of those frames is not known, and the quartiles are the value itself. Texels that are 0 in all channels, or
+    interquartile range of those is not known, and is 0. Texels that are 0 in all channels, or
     not finite, were never seen. An element most of whose texels are as bright as a half float can be is clipped.
 
     Parameters
@@ -75,7 +75,8 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
     radiance[seen] = sums[seen, :3] / weight[seen, None]
     share = np.where(seen, clipped / np.maximum(weight, 1e-30), 0).astype(np.float32)
     tier = np.where(seen, np.where(share > 0.5, SATURATED, CLEAN), -1).astype(np.int8)
-    return LitDiffuse(radiance, radiance, radiance, np.where(seen, VISIBILITY.enough, 0).astype(np.int32), tier, share)
+    none = np.zeros(n, np.float32)
+    return LitDiffuse(radiance, none, np.where(seen, VISIBILITY.enough, 0).astype(np.int32), tier, share)
 
 
 def _tiles(mesh: Mesh, lit: LitTiles) -> tuple[np.ndarray, np.ndarray]:

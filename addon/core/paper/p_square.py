@@ -28,6 +28,11 @@ class Summary:
     upper: np.ndarray
     count: np.ndarray
 
+    @property
+    def interquartile_range(self) -> np.ndarray:
+        """Mean of the channels, (n,) float32; 0 where `count` is."""
+        return np.nan_to_num((self.upper - self.lower).mean(1))
+
 
 def between(ordered: np.ndarray, rank: float) -> np.ndarray:
     """Linear interpolation in the last axis at a real-valued rank."""

@@ -41,6 +41,7 @@ class Recovery(Corrected):
         if self.settings.atlas != ROOM and self._parting is None:
             self._parting = look_closer(self)
         self.albedo, self.materials()  # made first: both of the next ask for them
+        give_back()
         for _ in ordered_map(partial(getattr, self), ("evidence", "texture"), self.settings.threads):
             pass
 
@@ -134,8 +135,8 @@ class Recovery(Corrected):
         """Count of observations, their relative spread, and where the albedo comes from, (n, 3) float32."""
         lit = self.lit_diffuse()
         dark = max(1e-6 * self.median_radiance, 1e-30)
-        spread = (lit.upper - lit.lower).mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
-        parts = (lit.count, np.nan_to_num(spread), self.albedo.origin + CLOSED * self.closing)
+        spread = lit.interquartile_range / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
+        parts = (lit.count, spread, self.albedo.origin + CLOSED * self.closing)
         return np.stack([part.astype(np.float32) for part in parts], -1)
 
     def _write_openings(self) -> None:

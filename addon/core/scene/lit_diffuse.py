@@ -13,8 +13,8 @@ class LitDiffuse:
     ----------
     radiance : (n, 3) float32
         L_d, linear Rec.709; NaN where no frame saw the element.
-    lower, upper : (n, 3) float32
-        Quartiles of the observations.
+    interquartile_range : (n,) float32
+        Of the observations, mean of the channels; 0 where there are none.
     count : (n,) int32
         Observations that `radiance` rests on.
     tier : (n,) int8
@@ -24,8 +24,7 @@ class LitDiffuse:
     """
 
     radiance: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
+    interquartile_range: np.ndarray
     count: np.ndarray
     tier: np.ndarray
     clipped: np.ndarray

@@ -81,7 +81,7 @@ def test_irradiance_agrees_with_radiosity(lit):
 def test_exposure_does_not_matter(lit):
     """Pictures a thousand times as bright: the same albedo."""
     room, _, found = lit
-    brighter = {name: getattr(found, name) * 1000 for name in ("radiance", "lower", "upper")}
+    brighter = {name: getattr(found, name) * 1000 for name in ("radiance", "interquartile_range")}
     bright = replace(found, **brighter)
     how = Settings(shading_rays=32, threads=2)
     one, other = (shade(room.surface, room.instances, ld, DARK, how) for ld in (found, bright))
@@ -102,7 +102,7 @@ def test_what_was_not_seen_is_filled_in(lit, monkeypatch):
     gone = (room.atlas.object_id == 0) & (room.atlas.position[:, 0] > 2)
     radiance = np.where(gone[:, None], np.float32(np.nan), found.radiance)
     count = np.where(gone, 0, found.count).astype(np.int32)
-    part = replace(found, radiance=radiance, lower=radiance, upper=radiance, count=count)
+    part = replace(found, radiance=radiance, count=count)
     result = shade(room.surface, room.instances, part, DARK, Settings(threads=2))
     off = result.radiance[gone] / truth[gone] - 1  # guessed without the light that it sends itself: too dark
     assert np.median(np.abs(off)) < 0.12

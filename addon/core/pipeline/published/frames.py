@@ -35,4 +35,4 @@ def lit_diffuse(
     found = running_median(mesh, atlas, scene, frames, read, threads=threads, also=count, progress=progress)
     share = (clipped / np.maximum(found.count, 1)).astype(np.float32)
     tier = np.where(found.count == 0, -1, np.where(share == 1, SATURATED, CLEAN)).astype(np.int8)
-    return LitDiffuse(found.median, found.lower, found.upper, found.count, tier, share)
+    return LitDiffuse(found.median, found.interquartile_range, found.count, tier, share)

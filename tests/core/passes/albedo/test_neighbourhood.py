@@ -180,10 +180,9 @@ def test_a_large_object_is_thinned_reproducibly():
 def observed(median, spread, count, tier) -> LitDiffuse:
     """One element for each entry; `spread`: standard deviation relative to the median."""
     median, spread, count, tier = np.broadcast_arrays(median, spread, count, tier)
-    half = 0.675 * median * spread
-    L, low, high = (grey(np.atleast_1d(x)) for x in (median, median - half, median + half))
+    L, between = grey(np.atleast_1d(median)), np.atleast_1d(1.35 * median * spread).astype(np.float32)
     count, tier = np.atleast_1d(count).astype(np.int32), np.atleast_1d(tier).astype(np.int8)
-    return LitDiffuse(L, low, high, count, tier, np.zeros(len(count), np.float32))
+    return LitDiffuse(L, between, count, tier, np.zeros(len(count), np.float32))
 
 
 def of_one(lit: LitDiffuse) -> np.ndarray:

@@ -59,9 +59,8 @@ def lit() -> tuple[np.ndarray, np.ndarray]:
 
 def seen(radiance: np.ndarray, clipped: np.ndarray) -> LitDiffuse:
     n = len(radiance)
-    return LitDiffuse(
-        radiance, radiance, radiance, np.full(n, 9, np.int32), np.full(n, CLEAN, np.int8), clipped.astype(np.float32)
-    )
+    none = np.zeros(n, np.float32)
+    return LitDiffuse(radiance, none, np.full(n, 9, np.int32), np.full(n, CLEAN, np.int8), clipped.astype(np.float32))
 
 
 def off(found: np.ndarray, true: np.ndarray) -> float:
