@@ -75,7 +75,7 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
     radiance[seen] = sums[seen, :3] / weight[seen, None]
     share = np.where(seen, clipped / np.maximum(weight, 1e-30), 0).astype(np.float32)
     tier = np.where(seen, np.where(share > 0.5, SATURATED, CLEAN), -1).astype(np.int8)
-    none = np.zeros(n, np.float32)
+    none = np.zeros_like(radiance)
     return LitDiffuse(radiance, none, np.where(seen, VISIBILITY.enough, 0).astype(np.int32), tier, share)
 
 

@@ -30,8 +30,8 @@ class Summary:
 
     @property
     def interquartile_range(self) -> np.ndarray:
-        """Mean of the channels, (n,) float32; 0 where `count` is."""
-        return np.nan_to_num((self.upper - self.lower).mean(1))
+        """(n, 3) float32; 0 where `count` is."""
+        return np.nan_to_num(self.upper - self.lower)
 
 
 def between(ordered: np.ndarray, rank: float) -> np.ndarray:

@@ -135,7 +135,7 @@ class Recovery(Corrected):
         """Count of observations, their relative spread, and where the albedo comes from, (n, 3) float32."""
         lit = self.lit_diffuse()
         dark = max(1e-6 * self.median_radiance, 1e-30)
-        spread = lit.interquartile_range / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
+        spread = lit.interquartile_range.mean(1) / np.maximum(np.nan_to_num(lit.radiance).mean(1), dark)
         parts = (lit.count, spread, self.albedo.origin + CLOSED * self.closing)
         return np.stack([part.astype(np.float32) for part in parts], -1)
 

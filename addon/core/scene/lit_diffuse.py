@@ -13,8 +13,8 @@ class LitDiffuse:
     ----------
     radiance : (n, 3) float32
         L_d, linear Rec.709; NaN where no frame saw the element.
-    interquartile_range : (n,) float32
-        Of the observations, mean of the channels; 0 where there are none.
+    interquartile_range : (n, 3) float32
+        Of the observations; 0 where there are none.
     count : (n,) int32
         Observations that `radiance` rests on.
     tier : (n,) int8

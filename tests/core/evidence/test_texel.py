@@ -33,7 +33,7 @@ def known(room, seen=None, tier=CLEAN) -> LitDiffuse:
     seen = np.ones(n, bool) if seen is None else seen
     L = np.ones((n, 3), np.float32)
     tier = np.where(seen, tier, -1).astype(np.int8)
-    return LitDiffuse(L, np.zeros(n, np.float32), np.where(seen, 9, 0).astype(np.int32), tier, np.zeros(n, np.float32))
+    return LitDiffuse(L, np.zeros_like(L), np.where(seen, 9, 0).astype(np.int32), tier, np.zeros(n, np.float32))
 
 
 def grey(room, rho=0.5, error=0.05, filled=None) -> Albedo:

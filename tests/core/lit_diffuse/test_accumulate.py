@@ -104,7 +104,7 @@ def test_the_best_kind_of_observations_is_taken():
     assert result.tier.tolist() == [CLEAN, EDGE, CLEAN, EDGE, SATURATED, -1]
     assert result.count.tolist() == [3, 4, 2, 1, 2, 0]
     assert np.array_equal(result.radiance[:, 0], [1, 2, 1, 2, 3, np.nan], equal_nan=True)
-    assert result.interquartile_range.tolist() == [1, 2, 1, 2, 3, 0]
+    assert result.interquartile_range[:, 0].tolist() == [1, 2, 1, 2, 3, 0]
     assert result.seen.tolist() == [True] * 5 + [False]
 
 

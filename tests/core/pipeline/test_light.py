@@ -33,7 +33,7 @@ def measured(room, radiance, hidden=(), noise=0.03, texture=0.0, seed=0) -> LitD
     seen = ~np.isin(room.atlas.object_id, list(hidden))
     L[~seen] = np.nan
     count, tier = np.where(seen, 9, 0).astype(np.int32), np.where(seen, 0, -1).astype(np.int8)
-    return LitDiffuse(L, np.zeros(len(L), np.float32), count, tier, np.zeros(len(L), np.float32))
+    return LitDiffuse(L, np.zeros_like(L), count, tier, np.zeros(len(L), np.float32))
 
 
 def run(room, lit, rays=64, **options):

@@ -38,7 +38,7 @@ def relative_error(lit: LitDiffuse, object_id: np.ndarray, of_object: bool = Tru
         If not, all that was seen once or twice is equally unsure.
     """
     middle = np.maximum(np.nan_to_num(lit.radiance).mean(1), 1e-12)
-    spread = lit.interquartile_range / 1.35 / middle
+    spread = lit.interquartile_range.mean(1) / 1.35 / middle
     n = np.maximum(lit.count, 1)
     # The median of n values of standard deviation s has the error 1.25 s / sqrt(n); few values hide their spread.
     few: float | np.ndarray = PRIOR.single

@@ -73,7 +73,7 @@ def sharpened(
     found = accumulate(surface.mesh, atlas, surface.scene, frames, read, only=good, change=ratios, **how)
     told = good & (found.tier == CLEAN) & (found.count >= VISIBILITY.enough)
     ratio = np.where(told[:, None], np.clip(found.radiance, 1 / SHARPENING.most, SHARPENING.most), 1).astype(np.float32)
-    return replace(lit, radiance=lit.radiance * ratio, interquartile_range=lit.interquartile_range * ratio.mean(1))
+    return replace(lit, radiance=lit.radiance * ratio, interquartile_range=lit.interquartile_range * ratio)
 
 
 def _detailed(lit: LitDiffuse, atlas: Atlas) -> np.ndarray:

@@ -180,7 +180,7 @@ def test_a_large_object_is_thinned_reproducibly():
 def observed(median, spread, count, tier) -> LitDiffuse:
     """One element for each entry; `spread`: standard deviation relative to the median."""
     median, spread, count, tier = np.broadcast_arrays(median, spread, count, tier)
-    L, between = grey(np.atleast_1d(median)), np.atleast_1d(1.35 * median * spread).astype(np.float32)
+    L, between = grey(np.atleast_1d(median)), grey(np.atleast_1d(1.35 * median * spread))
     count, tier = np.atleast_1d(count).astype(np.int32), np.atleast_1d(tier).astype(np.int8)
     return LitDiffuse(L, between, count, tier, np.zeros(len(count), np.float32))
 

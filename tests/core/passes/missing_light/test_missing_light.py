@@ -59,7 +59,7 @@ def lit() -> tuple[np.ndarray, np.ndarray]:
 
 def seen(radiance: np.ndarray, clipped: np.ndarray) -> LitDiffuse:
     n = len(radiance)
-    none = np.zeros(n, np.float32)
+    none = np.zeros_like(radiance)
     return LitDiffuse(radiance, none, np.full(n, 9, np.int32), np.full(n, CLEAN, np.int8), clipped.astype(np.float32))
 
 

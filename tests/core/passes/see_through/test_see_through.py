@@ -66,7 +66,7 @@ class Room:
         lit[own] = np.median(samples.radiance.reshape(len(own), len(EYES), 3), 1)
         count = np.full(n, 14, np.int32)
         count[np.setdiff1d(np.flatnonzero(self.room.atlas.object_id == PANE), own)] = 0
-        seen = LitDiffuse(lit, np.zeros(n, np.float32), count, np.full(n, CLEAN, np.int8), np.zeros(n, np.float32))
+        seen = LitDiffuse(lit, np.zeros_like(lit), count, np.full(n, CLEAN, np.int8), np.zeros(n, np.float32))
         card = tuple(i for i in self.room.instances if i.object_id == PANE)
         names, settings = [f"{k}" for k in range(len(EYES))], Settings(specular_rays=64, threads=2)
         found = fit_specular(Views(card, self.room.field(lit), seen, np.ones((n, 3), np.float32), samples, names,

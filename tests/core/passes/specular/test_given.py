@@ -48,7 +48,7 @@ class Seen:
         )  # fmt: skip
         n = len(atlas)
         values = self.field.radiance
-        self.lit = LitDiffuse(values, np.zeros(n, np.float32), np.full(n, 9, np.int32), np.full(n, CLEAN, np.int8),
+        self.lit = LitDiffuse(values, np.zeros_like(values), np.full(n, 9, np.int32), np.full(n, CLEAN, np.int8),
                               np.zeros(n, np.float32))  # fmt: skip
         self.maker = Problems(self.field, self.samples, threads=2)
         self.irradiance = self.box.irradiance.astype(np.float32)

@@ -22,9 +22,7 @@ def measured(room, radiance, noise=0.03, texture=0.15, seed=0) -> LitDiffuse:
     patch = rng.normal(0, texture, cells.max() - cells.min() + 1)[cells - cells.min()][:, None]
     n = len(room.atlas)
     L = (radiance * np.exp(rng.normal(0, noise, (n, 3)) + patch)).astype(np.float32)
-    return LitDiffuse(
-        L, np.zeros(n, np.float32), np.full(n, 9, np.int32), np.zeros(n, np.int8), np.zeros(n, np.float32)
-    )
+    return LitDiffuse(L, np.zeros_like(L), np.full(n, 9, np.int32), np.zeros(n, np.int8), np.zeros(n, np.float32))
 
 
 def sky_map(seen=None) -> Environment:
