@@ -93,7 +93,8 @@ def lit_from_picture(mesh: Mesh, lit: LitTexture, atlas: Atlas, progress: Progre
     radiance[seen] = sums[seen, :3] / weight[seen, None]
     share = (sums[:, 4] / np.maximum(weight, 1)).astype(np.float32)
     tier = np.where(seen, np.where(share > 0.5, SATURATED, CLEAN), -1).astype(np.int8)
-    return LitDiffuse(radiance, radiance, radiance, np.where(seen, VISIBILITY.enough, 0).astype(np.int32), tier, share)
+    none = np.zeros_like(radiance)
+    return LitDiffuse(radiance, none, np.where(seen, VISIBILITY.enough, 0).astype(np.int32), tier, share)
 
 
 def _read(picture: StoredPicture) -> Stored:
