@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import importlib.util
 import json
+import re
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,7 +23,10 @@ from addon.core.io.read import describe, read_capture
 from tests.core.io import test_phone_pictures
 from tests.core.io.conftest import CORNERS, HEIGHT, SIDES, WIDTH
 from tests.core.io.hostile import cases, test_coded_spoiled, test_exr_spoiled
+from tests.core.rooms import lit_box, make_room
+from tests.core.textured_on_disk import write_textured
 
+TEXTURED = make_room(lit_box(), 0.5)
 STAGE = {"values": np.arange(30.0).reshape(10, 3), "names": np.array(["a", "bc"])}
 
 
@@ -131,6 +135,33 @@ def other_mesh(name: str) -> Reader:
     return Reader(make, read, blender=True)
 
 
+def textured(name: str, victim: str) -> Reader:
+    """A mesh alone with a baked texture, within a GLB or beside an OBJ file."""
+
+    def make(root: Path) -> Path:
+        root.mkdir(parents=True, exist_ok=True)
+        if name.endswith(".glb"):
+            write_textured(root, TEXTURED, np.full((len(TEXTURED.atlas), 3), 0.5), name)
+        else:
+            whole = mesh_files(root, name).read_text().replace("vt 0 0", "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1")
+            (root / name).write_text(re.sub(r"/1 (\d+)/1 (\d+)/1 (\d+)/1", r"/1 \1/2 \2/3 \3/4", whole))
+            (root / "a.mtl").write_text("newmtl b\nKd 1 1 1\nnewmtl a\nmap_Kd -s 1 1 1 t.png\n")
+            write_png(root / "t.png", np.full((8, 8, 3), 90, np.uint8))
+        return root / victim
+
+    def read(root: Path) -> None:
+        from addon.bridge.data.import_mesh import import_mesh
+        from addon.core.lit_diffuse import from_picture
+
+        found = read_capture(root, Reading(import_mesh=import_mesh))
+        describe(found)
+        from_picture.texel_edge(found.mesh, found.mesh.lit)
+        for one in found.mesh.lit.pictures:
+            from_picture._read(one)
+
+    return Reader(make, read, blender=True)
+
+
 def fipt_ids(ending: str) -> Reader:
     """FIPT's pictures of ids, of a mesh that tells of no objects."""
 
@@ -222,5 +253,7 @@ def readers() -> dict[str, Reader]:
     found |= {f"result {name}": result(name) for name in ("room.npz", "stages/surface.npz")}
     for name in ("materials", "overrides", "report", "openings", "capture"):
         found[f"result {name}.json"] = result(f"{name}.json")
+    found["textured glb"] = textured("scan.glb", "scan.glb")
+    found |= {f"textured {victim}": textured("scan.obj", victim) for victim in ("scan.obj", "a.mtl", "t.png")}
     found |= {f"mesh {ending}": other_mesh(f"mesh.{ending}") for ending in ("obj", "gltf", "glb")}
     return found

@@ -57,7 +57,9 @@ def texel_edge(mesh: Mesh, lit: LitTexture) -> float:
         texels[lit.picture == i] *= width * height
     known = (lit.picture >= 0) & (texels > 0)
     if not known.any():
-        raise BadInputError("The mesh's texture coordinates span nothing; unwrap and bake it again.")
+        raise BadInputError(
+            f"The coordinates of texture {_named(lit)} span nothing; unwrap the mesh and bake it again."
+        )
     per, weight = area[known] / texels[known], area[known]
     order = np.argsort(per)
     usual = per[order][np.searchsorted(weight[order].cumsum(), weight.sum() / 2)]
@@ -88,13 +90,18 @@ def lit_from_picture(mesh: Mesh, lit: LitTexture, atlas: Atlas, progress: Progre
     weight = sums[:, 3]
     seen = weight > 0
     if not seen.any():
-        raise BadInputError("The texture of the mesh is black all over; bake or export it again.")
+        raise BadInputError(f"Texture {_named(lit)} is black all over; bake or export it again.")
     radiance = np.full((len(atlas), 3), np.nan, np.float32)
     radiance[seen] = sums[seen, :3] / weight[seen, None]
     share = (sums[:, 4] / np.maximum(weight, 1)).astype(np.float32)
     tier = np.where(seen, np.where(share > 0.5, SATURATED, CLEAN), -1).astype(np.int8)
     none = np.zeros_like(radiance)
     return LitDiffuse(radiance, none, np.where(seen, VISIBILITY.enough, 0).astype(np.int32), tier, share)
+
+
+def _named(lit: LitTexture) -> str:
+    """The files that hold it, as a sentence gives them."""
+    return ", ".join(f"'{path}'" for path in dict.fromkeys(one.path for one in lit.pictures))
 
 
 def _read(picture: StoredPicture) -> Stored:
