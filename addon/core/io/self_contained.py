@@ -187,8 +187,16 @@ def beside(path: Path, uri: Any, what: str) -> Path:
             "export it as one GLB file."
         )
     found = path.parent / name
-    if not found.is_file():
+    try:
+        there = found.is_file()
+    except OSError:  # a name that no file can have
+        there = False
+    if not there:
         raise BadInputError(f"Mesh '{path}' names the {what} '{found}', which is not there; copy it as well.")
+    if not found.resolve().is_relative_to(path.parent.resolve()):
+        raise BadInputError(
+            f"Mesh '{path}' names the {what} '{found}', a link out of its folder; copy the file there instead."
+        )
     return found
 
 

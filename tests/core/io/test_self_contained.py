@@ -29,6 +29,23 @@ def test_an_obj_loses_its_libraries(tmp_path):
     assert named and copy.read_text() == text and [one.name for one in placed] == ["chair"]
 
 
+def test_a_link_out_of_the_folder_is_not_followed(tmp_path):
+    """A stranger's capture must not have a file from elsewhere on the disk copied and read."""
+    room, private = tmp_path / "room", tmp_path / "private.bin"
+    room.mkdir()
+    (tmp_path / "copy").mkdir()
+    private.write_bytes(b"A" * 12)
+    (room / "mesh.gltf").write_text(json.dumps(gltf()))
+    (room / "mesh.bin").symlink_to(private)
+    with pytest.raises(BadInputError, match=r"mesh\.bin', a link out of"):
+        copy_gltf(room / "mesh.gltf", tmp_path / "copy")
+    (room / "mesh.bin").unlink()
+    (room / "inner.bin").write_bytes(b"A" * 12)
+    (room / "mesh.bin").symlink_to("inner.bin")
+    copy_gltf(room / "mesh.gltf", tmp_path / "copy")
+    assert (tmp_path / "copy/buffer0.bin").read_bytes() == b"A" * 12
+
+
 @pytest.mark.parametrize("binary", [False, True])
 def test_a_gltf_keeps_its_surface_only(tmp_path, binary):
     top = gltf()
@@ -59,6 +76,7 @@ def test_a_gltf_keeps_its_surface_only(tmp_path, binary):
         ({"buffers": [{"uri": "C:\\mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
         ({"buffers": [{"uri": "http://x/mesh.bin", "byteLength": 12}]}, "does not lie beside it"),
         ({"buffers": [{"uri": "no.bin", "byteLength": 12}]}, "is not there"),
+        ({"buffers": [{"uri": 300 * "n", "byteLength": 12}]}, "is not there"),
         ({"buffers": [{"uri": "data:;base64,%%%", "byteLength": 12}]}, "damaged buffer"),
         ({"buffers": [{"byteLength": 12}]}, "without content"),
         ({"buffers": [{"uri": "mesh.bin", "byteLength": 13}]}, "cut off"),
