@@ -7,13 +7,15 @@ LONGEST: Code[int] = 48
 """Bytes of a name in UTF-8. Blender 4.5 cuts names at 63: this leaves room for ' base color' and its own '.001'."""
 
 
-def object_name(class_name: str, object_id: int) -> str:
-    """'<class> <number>', as 'sofa 12'; a long class is cut, the number never, as it alone tells objects apart.
+def writable(name: str) -> str:
+    """What a capture calls something, as one line that can be shown and written."""
+    return one_line(" ".join(name.split()))
 
-    Of whatever a capture calls it, it is one line that can be shown and written.
-    """
+
+def object_name(class_name: str, object_id: int) -> str:
+    """'<class> <number>', as 'sofa 12'; a long class is cut, the number never, as it alone tells objects apart."""
     number = f" {object_id}"
-    return cut(one_line(" ".join(class_name.split())) or "Object", LONGEST - len(number)) + number
+    return cut(writable(class_name) or "Object", LONGEST - len(number)) + number
 
 
 def cut(text: str, longest: int) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 from ..errors import BadInputError
 from ..kinds import Limit
 from ..scene.model import StoredPicture
-from .files import read_bytes
+from .files import read_bytes, readable
 from .gltf_nodes import is_index
 from .self_contained import BLOCK, OBJ_MATERIAL, beside, copy_part, list_of, read_gltf
 
@@ -60,6 +60,11 @@ def _of_gltf(path: Path) -> list[StoredPicture | None]:
     textures, images = list_of(top, "textures", path), list_of(top, "images", path)
     views, buffers = list_of(top, "bufferViews", path), list_of(top, "buffers", path)
 
+    def apart(uri: Any, what: str) -> Path:
+        if str(uri).startswith("data:"):
+            raise BadInputError(f"Mesh '{path}' has its textures written out as text; export it as one GLB file.")
+        return beside(path, uri, what)
+
     def picture(material: dict[str, Any]) -> StoredPicture | None:
         surface = material.get("pbrMetallicRoughness")
         used = surface.get("baseColorTexture") if isinstance(surface, dict) else None
@@ -74,9 +79,7 @@ def _of_gltf(path: Path) -> list[StoredPicture | None]:
             raise damaged
         image = images[source]
         if "bufferView" not in image:
-            if str(image.get("uri")).startswith("data:"):
-                raise BadInputError(f"Mesh '{path}' has its textures written out as text; export it as one GLB file.")
-            return StoredPicture(beside(path, image.get("uri"), "texture"))
+            return StoredPicture(apart(image.get("uri"), "texture"))
         if not is_index(image["bufferView"], len(views)):
             raise damaged
         view = views[image["bufferView"]]
@@ -85,9 +88,7 @@ def _of_gltf(path: Path) -> list[StoredPicture | None]:
         if not sound or (binary is None and "uri" not in buffers[buffer]):
             raise damaged
         if "uri" in buffers[buffer]:
-            if str(buffers[buffer]["uri"]).startswith("data:"):
-                raise BadInputError(f"Mesh '{path}' has its textures written out as text; export it as one GLB file.")
-            return StoredPicture(beside(path, buffers[buffer]["uri"], "buffer"), begin, length)
+            return StoredPicture(apart(buffers[buffer]["uri"], "buffer"), begin, length)
         assert binary is not None
         if begin + length > binary[1]:
             raise damaged
@@ -100,15 +101,12 @@ def _of_gltf(path: Path) -> list[StoredPicture | None]:
 def _of_obj(path: Path) -> list[StoredPicture | None]:
     used: dict[bytes, None] = {}
     libraries: list[bytes] = []
-    try:
-        with open(path, "rb") as file:
-            while line := file.readline(BLOCK):
-                if told := OBJ_MATERIAL.match(line):
-                    used[told[1]] = None
-                elif told := LIBRARY.match(line):
-                    libraries.append(told[1])
-    except OSError as error:
-        raise BadInputError(f"Mesh '{path}' can't be read ({error.strerror or error}); check its rights.") from error
+    with readable(f"Mesh '{path}'", "check its rights"), open(path, "rb") as file:
+        while line := file.readline(BLOCK):
+            if told := OBJ_MATERIAL.match(line):
+                used[told[1]] = None
+            elif told := LIBRARY.match(line):
+                libraries.append(told[1])
     pictures: dict[bytes, StoredPicture] = {}
     for library in dict.fromkeys(libraries):
         name = b""

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import BadInputError, one_line
+from ..errors import BadInputError
 from ..kinds import Limit
+from ..naming import writable
 from ..scene.model import Instance
 from .files import read_json
 
@@ -81,7 +82,7 @@ def assign(
     if names is None:
         warnings.append(f"The capture has no {names_file}; objects are named by their number.")
         names = {int(i): f"object_{i}" for i in present if 0 <= i <= MAX_ID}
-    names = {i: one_line(" ".join(name.split())) for i, name in names.items()}  # no other can be shown and written
+    names = {i: writable(name) for i, name in names.items()}
     known = np.isin(present, np.fromiter(names, np.int64, len(names)))
     kept = present[known]
     instances = [Instance(int(i), names[int(i)]) for i in kept]

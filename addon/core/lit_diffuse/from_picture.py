@@ -18,7 +18,7 @@ from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import LitTexture, Mesh, StoredPicture
 from ..scene.params import VISIBILITY
 from ..scene.visibility import CLEAN, SATURATED
-from .from_texture import barycentric
+from .from_texture import barycentric, interpolated
 
 AT_ONCE: Block[int] = 1 << 18
 
@@ -71,7 +71,7 @@ def lit_from_picture(mesh: Mesh, lit: LitTexture, atlas: Atlas, progress: Progre
 
     It is looked up within the element's triangle alone: what lies beside it on the picture may be any other place.
     Texels that are 0 in all channels, or transparent, were never seen. Elements most of whose texels are within two
-    codes of the top are clipped. The spread of what was blended is not known: quartiles are the value itself.
+    codes of the top are clipped. The interquartile range of what was blended is not known, and is 0.
 
     Raises
     ------
@@ -119,12 +119,12 @@ def _sums(mesh: Mesh, lit: LitTexture, atlas: Atlas, element: np.ndarray, stored
     across = np.cross(np.cross(b - a, c - a), along)
     across /= np.maximum(np.linalg.norm(across, axis=1), 1e-30)[:, None]
     edge = np.sqrt(atlas.area[element])[:, None]
-    corner = lit.uv[triangle].astype(np.float64)
+    corner = lit.uv[triangle]
     steps = (np.arange(BAKED.points) + 0.5) / BAKED.points - 0.5
     for x, y in ((x, y) for x in steps for y in steps):
         u, v = np.maximum(barycentric(mesh, triangle, atlas.position[element] + edge * (x * along + y * across)), 0)
         u, v = (u, v) / np.maximum(u + v, 1)
-        at = (1 - u - v)[:, None] * corner[:, 0] + u[:, None] * corner[:, 1] + v[:, None] * corner[:, 2]
+        at = interpolated(corner, u, v)
         column = np.minimum((at[:, 0] % 1 * width).astype(int), width - 1)
         row = np.minimum(((1 - at[:, 1]) % 1 * height).astype(int), height - 1)
         value = stored.colour[row, column]

@@ -91,9 +91,7 @@ def _place(mesh: Mesh, lit: LitTiles, atlas: Atlas) -> np.ndarray:
     result = np.empty((len(atlas), 2))
     for part in blocks(len(atlas), 1 << 18):
         triangle = atlas.triangle[part]
-        u, v = barycentric(mesh, triangle, atlas.position[part])
-        corner = lit.uv[triangle].astype(np.float64)
-        result[part] = (1 - u - v)[:, None] * corner[:, 0] + u[:, None] * corner[:, 1] + v[:, None] * corner[:, 2]
+        result[part] = interpolated(lit.uv[triangle], *barycentric(mesh, triangle, atlas.position[part]))
     return np.clip(np.nan_to_num(result), 0, 1)
 
 
@@ -104,6 +102,12 @@ def barycentric(mesh: Mesh, triangle: np.ndarray, position: np.ndarray) -> np.nd
     ee, ef, ff, pe, pf = (np.einsum("ij,ij->i", x, y) for x, y in ((e, e), (e, f), (f, f), (p, e), (p, f)))
     scale = np.maximum(ee * ff - ef * ef, 1e-300)
     return np.stack([(pe * ff - pf * ef) / scale, (pf * ee - pe * ef) / scale])
+
+
+def interpolated(corner: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Values at the corners of triangles ((n, 3, 2)), by the shares of the second and the third, (n, 2) float64."""
+    corner = corner.astype(np.float64)
+    return (1 - u - v)[:, None] * corner[:, 0] + u[:, None] * corner[:, 1] + v[:, None] * corner[:, 2]
 
 
 def _runs(picture: np.ndarray, most: int) -> list[slice]:
