@@ -26,9 +26,6 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
         "Where results go whose folder is not chosen and whose .blend was never saved; empty takes 'Scan "
         "Relight' among your documents. A saved .blend has its results beside it",
     )
-    cache_folder: folder_property(
-        "Cache Folder", "The results folder as earlier versions called it; heeded where none is set", "HIDDEN"
-    )
     threads: bpy.props.IntProperty(
         name="Threads", description="Processor threads that a run may take; 0 takes all", min=0, soft_max=64
     )
@@ -46,15 +43,6 @@ class ScanRelightPreferences(bpy.types.AddonPreferences):
         row = layout.row()
         row.label(text=size_text(), icon="FILE_FOLDER")
         row.operator("scan_relight.clear_cache", icon="TRASH")
-        count = len(home.earlier_results())
-        if count:
-            row = layout.row()
-            row.label(
-                text=f"{count} result{'s' * (count != 1)} of an earlier version in the extension's own folder: "
-                "removing the extension would delete them.",
-                icon="ERROR",
-            )
-            row.operator("scan_relight.move_results", icon="EXPORT")
         fields(layout, self, "threads", "memory_limit")
         keymaps.draw(layout, context)
         layout.operator("scan_relight.manual", icon="HELP")
@@ -69,7 +57,7 @@ def preferences() -> ScanRelightPreferences | None:
 def results_folder() -> Path:
     """The folder of results whose own was not chosen and whose .blend was never saved; not made here."""
     ours = preferences()
-    return home.results_folder((ours.results_folder or ours.cache_folder) if ours is not None else "")
+    return home.results_folder(ours.results_folder if ours is not None else "")
 
 
 def result_folder(chosen: str, capture_folder: str, scene: bpy.types.Scene | None = None) -> Path:

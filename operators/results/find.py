@@ -5,9 +5,9 @@ from pathlib import Path
 import bpy
 
 from ...addon.bridge.results import find, home, images
-from ...addon.core.errors import BadInputError, ScanRelightError
+from ...addon.core.errors import BadInputError
 from .. import preferences
-from ..base.operator import FOLDERS, AtOnce, Choosing, NothingDone, folder_property, needs, no_run
+from ..base.operator import FOLDERS, AtOnce, Choosing, folder_property, needs, no_run
 from ..base.panel import SidebarPanel
 from . import told
 
@@ -138,34 +138,6 @@ class SCAN_RELIGHT_OT_clear_cache(AtOnce, bpy.types.Operator):
             f"result{'s' * (done.results != 1)} kept.",
         )
         return done.left
-
-
-@needs(lambda context: home.earlier_results(), "No result lies in the extension's own folder.")
-@no_run
-class SCAN_RELIGHT_OT_move_results(AtOnce, bpy.types.Operator):
-    """Move the results of earlier versions out of the extension's own folder into the results folder, so that removing
-    the extension can't delete them; this file's images are pointed there"""
-
-    bl_label = "Move Out"
-
-    def work(self, context):
-        """Move each; one that can't be moved stays whole where it is, and is told."""
-        there, problems = home.earlier_results(), []
-        for folder in there:
-            try:
-                find.move(folder, preferences.results_folder())
-            except ScanRelightError as error:
-                problems.append(str(error))
-        preferences.forget_size()
-        moved = len(there) - len(problems)
-        if not moved:
-            raise NothingDone(" ".join(problems))
-        self.report(
-            {"INFO"},
-            f"{moved} result{'s' * (moved != 1)} moved into '{preferences.results_folder()}'; save "
-            "this file to keep its images there.",
-        )
-        return problems
 
 
 def _page(context) -> Path | None:

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from addon.core.io.ptex import std_sort
 from tests.core.rooms import Quad, Room, make_room, split
 
 OPENED = "ply\nformat binary_little_endian 1.0\nelement vertex {}\n"
@@ -30,7 +29,6 @@ class ReplicaOnDisk:
         edge: float = 0.5,
         size: int = 4,
         split_size: float = 1.6,
-        order_file: bool = False,
         seed: int = 0,
     ):
         self.root, self.size, self.split_size = root, size, split_size
@@ -59,7 +57,7 @@ class ReplicaOnDisk:
         (root / "habitat/info_semantic.json").write_text(json.dumps(names))
         (root / "textures/parameters.json").write_text(json.dumps({"splitSize": split_size, "tileSize": size}))
         chunks = self.chunks(corners, faces)
-        if order_file:
+        if split_size:
             chunks = [rng.permutation(chunk) for chunk in chunks]
             content = np.uint64(len(chunks)).tobytes()
             for chunk in chunks:
@@ -76,8 +74,7 @@ class ReplicaOnDisk:
             return [np.arange(len(faces))]
         cells = ((corners - corners.min(0)) / np.float32(self.split_size)).astype(int)
         code = np.array([min(interleave(cells[v]) for v in face) for face in faces])
-        order = std_sort(code)
-        return [order[code[order] == one] for one in np.unique(code)]
+        return [np.flatnonzero(code == one) for one in np.unique(code)]
 
     def picture(self, chunk: np.ndarray, room: Room, light: np.ndarray) -> np.ndarray:
         across = int(np.ceil(np.sqrt(len(chunk)))) + 1

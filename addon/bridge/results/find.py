@@ -3,8 +3,6 @@
 A result is known by its run's key, never by its name alone.
 """
 
-import os
-import shutil
 import time
 from collections.abc import Iterable
 from contextlib import suppress
@@ -16,12 +14,10 @@ import bpy
 
 from ...core.errors import BadInputError
 from ...core.kinds import Limit, Shown
-from ...core.results.place import BESIDE, captures, free_folder, write_capture
+from ...core.results.place import BESIDE
 from ...core.results.room_file import MATERIALS, layout_of, run_of
-from ...core.results.store import Store
 from ..data.images import relative_to, result_of
 from ..marks import IMAGE, LAYOUT, OBJECT_ID, RESULT, RUN
-from ..refused import refused
 from . import file
 from .home import shown
 from .images import KEPT, is_there, kept_path, of_results, path_of
@@ -233,35 +229,6 @@ def _show(image: bpy.types.Image, path: Path) -> None:
     if bpy.data.filepath:
         relative_to(image, Path(bpy.data.filepath).parent)
     image.reload()
-
-
-def move(folder: Path, home: Path) -> Path:
-    """Move a result into a folder of results and point the open file there; it is whole in one place at any time."""
-    with Store(folder):
-        pass  # no run is writing it
-    known = captures(folder)
-    target = free_folder(home, known[0].name if known else folder.name)
-    with refused(f"'{folder}' can't be moved to '{target}'", "free some space or choose another results folder"):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if target.exists():
-            target.rmdir()  # it is empty
-        try:
-            os.rename(folder, target)
-        except OSError:  # another disk
-            _copy(folder, target)
-    if known:
-        write_capture(target, known[0])
-    repoint(folder, target)
-    shutil.rmtree(folder, ignore_errors=True)  # what was copied
-    return target
-
-
-def _copy(folder: Path, target: Path) -> None:
-    try:
-        shutil.copytree(folder, target)
-    except OSError:  # shutil.Error, which lists several, is one too
-        shutil.rmtree(target, ignore_errors=True)
-        raise
 
 
 def _owners() -> Iterable[bpy.types.ID]:

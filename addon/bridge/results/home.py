@@ -7,7 +7,6 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import BadInputError
-from ...core.results.cache import results
 from ...core.results.place import BESIDE, HOME, captures, documents, free_folder, own_folder
 from ..marks import CAPTURE, RESULT
 
@@ -73,10 +72,10 @@ def shown(folder: Path) -> str:
 
 def is_ours(folder: Path) -> bool:
     """Whether removing or updating the extension could delete what lies in a folder."""
-    own = [Path(__file__).parents[3], *earlier_homes()]
+    own = [Path(__file__).parents[3]]
     extensions = bpy.utils.user_resource("EXTENSIONS")
     if extensions:
-        own.append(Path(extensions))
+        own.append(Path(extensions))  # with it the folder that Blender keeps for each extension
     folder = folder.resolve()
     return any(folder.is_relative_to(one.resolve()) for one in own)
 
@@ -88,22 +87,6 @@ def check(folder: str) -> None:
             f"Result folder '{folder}' belongs to the extension, and removing that would delete the "
             "result; choose another."
         )
-
-
-def earlier_homes() -> list[Path]:
-    """The folders that earlier versions kept results in."""
-    found = []
-    try:
-        found.append(Path(bpy.utils.extension_path_user(PACKAGE)))
-    except ValueError:  # not installed as an extension
-        pass
-    data = bpy.utils.user_resource("DATAFILES")
-    return [*found, Path(data) / "scan_relight"] if data else found
-
-
-def earlier_results() -> list[Path]:
-    """Results of earlier versions that still lie there."""
-    return [one for home in earlier_homes() for one in results(home / "cache")]
 
 
 def _of_room(scene: bpy.types.Scene, capture: Path) -> Path | None:

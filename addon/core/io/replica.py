@@ -22,7 +22,7 @@ from .formats import FORMATS
 from .instances import FILE, read_instances
 from .layout import Layout, RawMesh, Reader, Reading, holding
 from .ply import PlyMesh, read_ply
-from .ptex import read_sorted_faces, split_faces
+from .ptex import read_sorted_faces
 from .replica_glass import FILE as GLASS
 from .replica_glass import mirrors_of, read_panes
 
@@ -88,10 +88,9 @@ def _tiles(root: Path, ply: PlyMesh) -> LitTiles:
         )
     quads = np.zeros((faces, 4), np.int64)
     quads[ply.face[:, None], ply.corner] = ply.triangles
-    if (root / ORDER).is_file():
-        chunks = read_sorted_faces(root / ORDER, faces)
-    else:
-        chunks = split_faces(ply.vertices, quads, split)
+    if split > 0 and not (root / ORDER).is_file():
+        raise BadInputError(f"'{root / ORDER}' is needed to tell whose texture is whose, but is missing; copy it, too.")
+    chunks = read_sorted_faces(root / ORDER, faces) if split > 0 else [np.arange(faces)]
     paths, sides = [], []
     picture, tile = np.zeros(faces, np.int32), np.zeros(faces, np.int32)
     for i, chunk in enumerate(chunks):

@@ -32,7 +32,7 @@ def result(folder, run=RUN, shift=0.0):
 def home(ops, tmp_path, monkeypatch):
     """The results folder of the preferences."""
     preferences = importlib.import_module("scan_relight.operators.preferences")
-    chosen = SimpleNamespace(results_folder=str(tmp_path / "home"), cache_folder="", threads=0, memory_limit=0)
+    chosen = SimpleNamespace(results_folder=str(tmp_path / "home"), threads=0, memory_limit=0)
     monkeypatch.setattr(preferences, "preferences", lambda: chosen)
     return tmp_path / "home"
 

@@ -15,7 +15,7 @@ bpy = pytest.importorskip("bpy")
 def preferences(module, ops, tmp_path, monkeypatch):
     """The module, with results in `tmp_path` and preferences that were set."""
     found = module("operators.preferences")
-    chosen = SimpleNamespace(results_folder=str(tmp_path / "home"), cache_folder="", threads=2, memory_limit=1.5)
+    chosen = SimpleNamespace(results_folder=str(tmp_path / "home"), threads=2, memory_limit=1.5)
     monkeypatch.setattr(found, "preferences", lambda: chosen)
     found.forget_size()
     return found
@@ -99,12 +99,6 @@ def test_results_of_two_captures_of_one_name_are_apart(preferences, module, ops,
     assert preferences.result_folder("/mine", str(tmp_path)).as_posix().endswith("/mine")
 
 
-def test_settings_of_earlier_versions_are_heeded(preferences, monkeypatch, tmp_path):
-    chosen = SimpleNamespace(results_folder="", cache_folder=str(tmp_path / "before"), threads=0, memory_limit=0)
-    monkeypatch.setattr(preferences, "preferences", lambda: chosen)
-    assert preferences.result_folder("", str(tmp_path / "room")) == tmp_path / "before" / "room"
-
-
 def test_beside_the_file_once_it_is_saved_and_where_the_room_is(preferences, module, ops, tmp_path):
     scene, capture = bpy.context.scene, tmp_path / "room"
     (tmp_path / "project").mkdir()
@@ -149,7 +143,7 @@ def test_no_result_is_kept_where_removing_the_extension_deletes_it(extension, mo
     documents = tmp_path / "me" / "Documents" / "Scan Relight"
     user = extension / ".user" / "scan_relight"
     for preferred in ("", str(user / "cache"), str(extension / "repo"), str(root / "results")):
-        chosen = SimpleNamespace(results_folder=preferred, cache_folder="", threads=0, memory_limit=0)
+        chosen = SimpleNamespace(results_folder=preferred, threads=0, memory_limit=0)
         monkeypatch.setattr(preferences, "preferences", lambda chosen=chosen: chosen)
         assert preferences.results_folder() == documents
         assert preferences.result_folder("", str(tmp_path / "room")) == documents / "room"
@@ -166,29 +160,3 @@ def test_no_result_is_kept_where_removing_the_extension_deletes_it(extension, mo
         bpy.ops.mesh.primitive_cube_add()
         ops.capture_from_scene(result_folder=str(user))
     assert sorted(extension.rglob("*")) == before
-
-
-def test_results_of_an_earlier_version_are_moved_out(extension, module, ops, tmp_path, monkeypatch):
-    from addon.core.io.exr import write_exr
-
-    preferences = module("operators.preferences")
-    chosen = SimpleNamespace(results_folder=str(tmp_path / "home"), cache_folder="", threads=0, memory_limit=0)
-    monkeypatch.setattr(preferences, "preferences", lambda: chosen)
-    with pytest.raises(RuntimeError, match="No result lies in the extension's own folder"):
-        ops.move_results()
-    old = result(module, extension / ".user" / "scan_relight" / "cache" / "room-01234567")
-    write_exr(old / "albedo.exr", np.full((2, 2, 3), 0.25, np.float32))
-    image = module("addon.bridge.data.images").load_image(old / "albedo.exr")
-    thing = bpy.data.objects.new("wall", None)
-    thing["scan_relight_result"] = str(old)
-    from tests.blender.panel.conftest import Layout
-
-    shown = Layout()
-    shown.prop = lambda *_, **__: None
-    preferences.ScanRelightPreferences.draw(SimpleNamespace(layout=shown), bpy.context)
-    assert "scan_relight.move_results" in shown.buttons and "1 result of an earlier version" in shown.text
-    assert ops.move_results() == {"FINISHED"}
-    new = tmp_path / "home" / "room-01234567"
-    assert not old.exists() and (new / "stages" / "surface.npz").is_file()
-    assert thing["scan_relight_result"] == str(new) and image.filepath == str(new / "albedo.exr")
-    assert image.pixels[0] == 0.25

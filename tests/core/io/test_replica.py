@@ -11,7 +11,6 @@ import pytest
 from addon.core.brdf.metal import METAL
 from addon.core.errors import BadInputError
 from addon.core.io.exr import write_exr
-from addon.core.io.ptex import morton, std_sort
 from addon.core.io.read import describe, read_capture
 from addon.core.lit_diffuse.from_texture import face_edge, lit_from_tiles
 from addon.core.pipeline.recover import Recovery
@@ -19,51 +18,8 @@ from addon.core.progress import Progress
 from addon.core.results.store import Store
 from addon.core.scene.visibility import SATURATED
 from tests.core.on_disk import ALBEDO, CHEAP, LAMP, Finished
-from tests.core.replica_on_disk import ReplicaOnDisk, interleave
+from tests.core.replica_on_disk import ReplicaOnDisk
 from tests.core.rooms import lit_box, make_room, radiosity
-
-SORTED_40 = [
-    12,
-    24,
-    23,
-    22,
-    21,
-    0,
-    19,
-    18,
-    17,
-    31,
-    35,
-    28,
-    11,
-    10,
-    9,
-    8,
-    37,
-    6,
-    5,
-    4,
-    3,
-    38,
-    29,
-    34,
-    30,
-    32,
-    33,
-    20,
-    36,
-    39,
-    27,
-    26,
-    25,
-    16,
-    15,
-    14,
-    13,
-    7,
-    2,
-    1,
-]
 
 
 @pytest.fixture(scope="module")
@@ -77,31 +33,8 @@ def replica(lit, tmp_path):
     return ReplicaOnDisk(tmp_path / "room", *lit)
 
 
-def test_the_sort_is_that_of_the_library():
-    """As g++'s `std::sort` leaves these 40 elements of two kinds."""
-    code, state = np.zeros(40, np.int64), 40 * 31 + 2
-    for i in range(40):
-        state = (state * 1664525 + 1013904223) % 2**32
-        code[i] = (state >> 8) % 2
-    assert std_sort(code).tolist() == SORTED_40
-
-
-@pytest.mark.parametrize("n", [0, 1, 16, 17, 33, 1000, 20_000])
-@pytest.mark.parametrize("kinds", [1, 2, 30, 10**6])
-def test_the_sort_sorts(n, kinds):
-    code = np.random.default_rng(n).integers(0, kinds, n)
-    order = std_sort(code)
-    assert sorted(order.tolist()) == list(range(n)) and (np.diff(code[order]) >= 0).all()
-
-
-def test_morton_codes_bit_by_bit():
-    points = np.random.default_rng(0).random((500, 3)) * 9
-    cells = ((points.astype(np.float32) - points.astype(np.float32).min(0)) / np.float32(0.1)).astype(int)
-    assert morton(points, 0.1).tolist() == [interleave(cell) for cell in cells]
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("how", [{}, {"order_file": True}, {"split_size": 0.0}, {"size": 1}, {"size": 5, "edge": 0.7}])
+@pytest.mark.parametrize("how", [{}, {"split_size": 0.0}, {"size": 1}, {"size": 5, "edge": 0.7}])
 def test_each_element_finds_its_light(lit, tmp_path, how):
     room, light = lit
     made = ReplicaOnDisk(tmp_path / "room", room, light, **how)
@@ -226,6 +159,7 @@ SPOILS = {
         lambda r: (r.root / "habitat/mesh_semantic.ply").write_bytes((r.root / "mesh.ply").read_bytes()),
         "no object_id",
     ),
+    "no order": (lambda r: (r.root / "habitat/sorted_faces.bin").unlink(), "whose texture is whose"),
     "another order": (lambda r: (r.root / "habitat/sorted_faces.bin").write_bytes(bytes(8)), "sorted_faces"),
     "a hostile order": (lambda r: (r.root / "habitat/sorted_faces.bin").write_bytes(b"\xff" * 64), "sorted_faces"),
     "a cut mesh": (lambda r: (r.root / "mesh.ply").write_bytes((r.root / "mesh.ply").read_bytes()[:-99]), "cut off"),
