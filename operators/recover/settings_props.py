@@ -173,9 +173,6 @@ class StageOperator(SettingsProps, CaptureOperator):
     result_folder: folder_property("Result", "Folder for the recovered scene and the finished stages", "SKIP_PRESET")
     preset: preset_property("What the settings that are not given start from")
     from_stage: FROM_STAGE
-    paper: bpy.props.BoolProperty(
-        name="As in the Paper", description="The published method; the other settings are not looked at", default=False
-    )
 
     def work(self, context) -> list[str]:
         return self.run(context, self.until)["warnings"]
@@ -191,12 +188,10 @@ class StageOperator(SettingsProps, CaptureOperator):
             for info in setting_infos()
             if self.properties.is_property_set(info.name)
         }
-        if self.paper:
-            given = {name: given[name] for name in ("threads", "seed") if name in given}
         ours = preferences.preferences()
         if not given.get("threads") and ours is not None:
             given["threads"] = ours.threads
-        return replace(PRESETS["paper" if self.paper else self.preset], **given)
+        return replace(PRESETS[self.preset], **given)
 
     def run(self, context, until: str, **how) -> dict:
         """Run the stages up to `until` here; returns the report. `how` goes to `bridge.job.run.run`."""

@@ -172,8 +172,8 @@ def test_missing_packages_are_told(ops, name, package, monkeypatch):
         ("recover", "write"),
     ],
 )
-@pytest.mark.parametrize("paper", [False, True])
-def test_what_is_chosen_arrives(ops, name, until, paper, package, tmp_path, monkeypatch):
+@pytest.mark.parametrize("preset", ["normal", "paper"])
+def test_what_is_chosen_arrives(ops, name, until, preset, package, tmp_path, monkeypatch):
     """Folders, settings and the last stage, in the words of the one function that does the work."""
     asked = []
     module = importlib.import_module("scan_relight.addon.bridge.job.run")
@@ -186,11 +186,11 @@ def test_what_is_chosen_arrives(ops, name, until, paper, package, tmp_path, monk
     monkeypatch.setattr(module, "run", remember)
     bring_nothing(package, monkeypatch)
     monkeypatch.chdir(tmp_path)
-    done = getattr(ops, name)(capture_folder="a", result_folder="b", paper=paper, seed=5, median="mean")
+    done = getattr(ops, name)(capture_folder="a", result_folder="b", preset=preset, seed=5, median="mean")
     assert done == {"FINISHED"}
     [(capture, result, chosen, what)] = asked
     assert (capture, result, what.until) == ("a", "b", until)
-    assert chosen == (replace(settings.PAPER, seed=5) if paper else settings.Settings(seed=5, median="mean"))
+    assert chosen == replace(settings.PRESETS[preset], seed=5, median="mean")
     assert what.from_stage is None and what.reading.format == ""
 
 
