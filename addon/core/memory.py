@@ -6,13 +6,14 @@ import sys
 from pathlib import Path
 
 from .errors import MemoryLimitError
-from .kinds import Block
+from .kinds import Block, Code
 
 SHARE: Block[float] = 0.7
 """Of what the machine has free, what a run may take where nobody says."""
 LARGE: Block[int] = 1 << 22
 """Bytes of an array that gets pages of its own: those of blocks are smaller, those of all elements larger."""
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # malloc.h
+M_TRIM_THRESHOLD: Code[int] = -1  # malloc.h
+M_MMAP_THRESHOLD: Code[int] = -3
 
 
 class Budget:

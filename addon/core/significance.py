@@ -25,6 +25,8 @@ class SignificanceParams:
         Pixels, vertices or pairs of observations that say something where all of them are looked at together.
     sample : int
         Elements, or places of a mesh, that stand for all of a room's, or of a large object's.
+    sure : float
+        Relative standard error up to which an element speaks for others.
     views : int
         Views of an element that tell what changes with the view.
     gain : float
@@ -42,6 +44,7 @@ class SignificanceParams:
     enough: int = 30
     many: int = 100
     sample: int = 4096
+    sure: float = 0.15
     views: int = 4
     gain: float = 0.1
     dark: float = 0.02

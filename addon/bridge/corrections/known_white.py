@@ -8,12 +8,10 @@ from mathutils import Vector
 from mathutils.interpolate import poly_3d_calc
 
 from ...core.errors import BadInputError
+from ...core.pipeline.params import CORRECTED
 from ..data.mesh_objects import ATLAS_UV
 from ..scene.write import ALBEDO
 from . import corrections, unseen
-
-AROUND = 1
-"""Texels to each side of the spot that its albedo is the median of."""
 
 
 def of_object(
@@ -66,7 +64,8 @@ def _around(thing, uv) -> list[float]:
     image = np.array(read_exr(path).rgb)[::-1]
     height, width = image.shape[:2]
     column, row = (min(max(int(at * size), 0), size - 1) for at, size in zip(uv, (width, height), strict=True))
-    window = tuple(slice(max(at - AROUND, 0), at + AROUND + 1) for at in (row, column))
+    far = int(CORRECTED.around)
+    window = tuple(slice(max(at - far, 0), at + far + 1) for at in (row, column))
     measured = unseen.was_measured(quality[window])
     if not measured.any():
         raise BadInputError(f"That spot on '{thing.name}' was not measured by any frame; click on another.")

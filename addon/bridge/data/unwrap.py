@@ -18,8 +18,8 @@ from .arrays import layer_of, make_mesh, set_layer
 from .shown import shown
 
 _PROJECTION_ANGLE = 1.15
-_LAYER = "ScanRelight"
 _EXPECTED_FILL = 0.6
+_LAYER = "ScanRelight"
 
 
 class Polygons(NamedTuple):

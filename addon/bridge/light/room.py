@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from ...core.brdf.lambertian import USUAL_ALBEDO
 from ...core.errors import BadInputError
 from ...core.luminance import LUMINANCE
 from ...core.photo import MIDDLE_GREY
@@ -17,8 +18,8 @@ from ..marks import OBJECT_ID
 
 ROOM_LIGHT = "scan_relight_room_light"
 """Custom property of the scene: median irradiance of the scanned room, in the frames' unit."""
-ALBEDO = 0.5
-"""Of a usual room's surfaces, on average."""
+PICTURE = 11
+"""Rays along a side of the picture, where what it shows is looked at."""
 VIEW, CURSOR, OBJECT = "VIEW", "CURSOR", "OBJECT"
 
 
@@ -138,7 +139,7 @@ def room_light(scene: bpy.types.Scene) -> float:
     kept = scene.get(ROOM_LIGHT)
     if kept:
         return float(kept)
-    found = _median_shading() or math.pi * MIDDLE_GREY / 2**scene.view_settings.exposure / ALBEDO
+    found = _median_shading() or math.pi * MIDDLE_GREY / 2**scene.view_settings.exposure / USUAL_ALBEDO
     scene[ROOM_LIGHT] = found
     return found
 

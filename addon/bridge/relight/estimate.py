@@ -15,15 +15,16 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from ...core.brdf.lambertian import USUAL_ALBEDO
 from ..data.arrays import triangles_of, vertices_of
 from ..light import lamps as relight_lamps
 from ..light import outside
 from ..light.kelvin import luminance
-from ..light.room import ALBEDO, bounds, cast, leaves, picture_ray, sphere
+from ..light.room import PICTURE, bounds, cast, leaves, picture_ray, sphere
 from ..light.units import LUMENS_PER_WATT, efficacy
 
-_GRID, _AROUND, _ON_LAMP = 9, 64, 6
-"""Rays: a side of the picture; all over the room, from the camera and from its middle; from each place to a lamp."""
+_AROUND, _ON_LAMP = 64, 6
+"""Rays: all over the room, from the camera and from its middle; from each place to a lamp."""
 _ALMOST = 0.02
 NO_LIGHT = -math.inf
 Source = Callable[[Vector], Iterator[tuple[Vector, float, float]]]
@@ -89,7 +90,7 @@ def looking(scene: bpy.types.Scene) -> Iterator[None]:
                 found.append(_arriving(scene, source, place, normal))
                 yield
             around = _all_over(scene, key, known.areas, found[known.seen :])
-            reaches[key] = np.array(found[: known.seen] or [0.0]) + around * ALBEDO / (1 - ALBEDO)
+            reaches[key] = np.array(found[: known.seen] or [0.0]) + around * USUAL_ALBEDO / (1 - USUAL_ALBEDO)
     known.reaches = reaches
     _known[scene.name] = known
 
@@ -112,7 +113,7 @@ def _rounded(thing) -> tuple:
 
 def _places(scene) -> tuple[list, int, np.ndarray]:
     """The first fields of `Known`; no place is on a lamp."""
-    corners = [(k + 0.5) / _GRID for k in range(_GRID)]
+    corners = [(k + 0.5) / PICTURE for k in range(PICTURE)]
     rays = [picture_ray(scene, x, y) for y in corners for x in corners]
     seen = len(hits := [hit for ray in rays if (hit := cast(scene, *ray)) and not _is_lamp(hit.thing)])
     areas = []

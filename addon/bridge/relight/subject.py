@@ -8,10 +8,20 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ..light.room import CURSOR, OBJECT, Hit, bounds, cast, picture_ray, room_objects, target_of, view_direction
+from ..light.room import (
+    CURSOR,
+    OBJECT,
+    PICTURE,
+    Hit,
+    bounds,
+    cast,
+    picture_ray,
+    room_objects,
+    target_of,
+    view_direction,
+)
 from ..marks import OBJECT_ID
 
-_GRID = 11
 _THING = 0.05
 """Weighted share of the picture from which on a single thing is what the picture is of."""
 _STANDS_OUT = 0.3, 0.1
@@ -74,7 +84,7 @@ def subject_of(scene: bpy.types.Scene, aim: str, thing: bpy.types.Object | None 
 def _seen(scene) -> dict[Hit, float]:
     """What a grid of the picture's rays meets, and how much each counts: the middle more than the rim."""
     found: dict[Hit, float] = {}
-    steps = [(k + 0.5) / _GRID for k in range(_GRID)]
+    steps = [(k + 0.5) / PICTURE for k in range(PICTURE)]
     for y, x in product(steps, steps) if scene.camera is not None else ():
         hit = cast(scene, *picture_ray(scene, x, y))
         if hit is not None and OBJECT_ID in hit.thing:

@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 from .model import Brdf
 
+USUAL_ALBEDO = 0.5
+"""Of a room's surfaces, on average: what is taken where nothing tells."""
+
 
 @dataclass(frozen=True, eq=False)
 class Lambertian(Brdf):

@@ -29,6 +29,28 @@ VISIBILITY = VisibilityParams()
 
 
 @dataclass(frozen=True)
+class SmallParams:
+    """Frames as they are compared with one another (`poses`, `radiometric_calibration`).
+
+    Attributes
+    ----------
+    width : int
+        Larger pictures are averaged down to about so many pixels across, as poses and mesh are no better.
+    blur : float
+        Pixels, standard deviation, that gradients are taken over, and codes compared.
+    off : int
+        Pixels that poses may be off by: so far around a place all is looked at, and so wide an edge is left out.
+    """
+
+    width: int = 480
+    blur: float = 1.0
+    off: int = 3
+
+
+SMALL = SmallParams()
+
+
+@dataclass(frozen=True)
 class SampleParams:
     """Observations that are kept one by one (`samples`).
 

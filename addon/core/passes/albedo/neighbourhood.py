@@ -131,7 +131,7 @@ def shrink(
     position = atlas.position[own]
     known = np.flatnonzero(np.isfinite(error))
     # The better half at least: the few that are surer may be all of one kind, the frame of a painting.
-    sure = known[error[known] <= max(PRIOR.sure, float(np.median(error[known])))]
+    sure = known[error[known] <= max(LEVELS.sure, float(np.median(error[known])))]
     if len(sure) < PRIOR.neighbours:
         sure = known
     # A thinned set reaches further around.

@@ -42,7 +42,7 @@ def _factors(atlas: Atlas, rho: np.ndarray, measured: Sequence[np.ndarray]) -> n
     colour = np.log(np.maximum([np.median(rho[own], 0) for own in measured], ALBEDO.floor))
     area = np.array([atlas.area[own].sum() for own in measured])
     # E errs by the place: a large member lies in several.
-    variance = np.minimum(CLASS_PRIOR.of_place**2 * CLASS_PRIOR.place / area, CLASS_PRIOR.most**2)
+    variance = np.minimum(CLASS_PRIOR.of_place**2 / area, CLASS_PRIOR.most**2)
     weight = 1 / variance
     # Paints that differ in one channel differ.
     off = np.square(colour - np.average(colour, 0, weight)).max(1)

@@ -23,8 +23,6 @@ class PriorParams:
         Texels, edge of the cells that share one prior.
     least_error : float
         Relative standard error that even the best measured element has: irradiance, texels against pixels.
-    sure : float
-        Relative standard error below which an element may speak for its neighbourhood.
     single : float
         Relative standard error of a single observation, whose spread can't be known, at most; and what is added to that
         of observations at depth edges, where another surface is mixed in.
@@ -38,7 +36,6 @@ class PriorParams:
     alike: float = 0.7
     cell: float = 6.0
     least_error: float = 0.06
-    sure: float = 0.15
     single: float = 0.35
     single_factor: float = 2.0
 
@@ -71,15 +68,14 @@ class ClassPriorParams:
 
     Attributes
     ----------
-    of_place, place : float
-        Relative standard error that E has in common over so many square metres: ten rooms have .03 to .08, as their
-        large objects' albedo varies between places.
+    of_place : float
+        Relative standard error that E has in common over a square metre: ten rooms have .02 to .06, as their large
+        objects' albedo varies between places.
     most : float
         That of an object however small.
     """
 
-    of_place: float = 0.05
-    place: float = 0.5
+    of_place: float = 0.0354
     most: float = 0.2
 
 

@@ -48,7 +48,7 @@ def mirror_patches(field: LightField, samples: Samples) -> Patches:
         within = piece[atlas.triangle[element]]
         there, told = (np.bincount(within[which & (within >= 0)], minlength=1) for which in (mirrored, within >= 0))
         there = np.pad(there, (0, len(told) - len(there)))
-        for one in np.flatnonzero((there >= LEVELS.enough) & (there > MIRRORS.of_piece * told)):
+        for one in np.flatnonzero((there >= LEVELS.enough) & (2 * there > told)):
             triangle = np.flatnonzero(piece == one).astype(np.int32)
             found.append(Patches(triangle, np.full(len(triangle), first, np.int32), np.array([first], np.int32)))
             first += 1

@@ -19,8 +19,6 @@ class MirrorsParams:
         Least correlation, within the elements, of what they show and of what a mirror would.
     least_f0 : float
         A black pane shows the room mirrored as well, as a dielectric: by 0.04 to 0.1 as it is looked at.
-    of_piece : float
-        Share of a flat piece's elements that must show the room mirrored, where nobody told the objects: most of them.
     tells : float
         Share of the deviation under the mesh's own plane that a turned one must come below. What a pane over a dark
         hearth shows tells nothing of its way: it was turned by a degree to take a hundredth off.
@@ -34,7 +32,6 @@ class MirrorsParams:
     elements: int = 400
     together: float = 0.6
     least_f0: float = 0.2
-    of_piece: float = 0.5
     tells: float = 0.98
     tilt: float = 0.01
     tilts: int = 40

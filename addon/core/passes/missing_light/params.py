@@ -9,10 +9,10 @@ import numpy as np
 class MissingLightParams:
     """Of `missing_light`.
 
-    Chosen on three phone-made rooms (a living room, a kitchen, a bathroom), by the PSNR of albedo at the sample,
-    one changed at a time from `sources` .2 and `mean_albedo` .45, which give 18.28 dB in the mean: `sources` .1 18.67,
-    .4 17.98; `mean_albedo` .5 18.41; `level` .1 17.96; `unlike` 1 18.62; `above` 3 18.24 and `highest` .8 18.23, each a
-    gain in the living room and a loss in the bathroom.
+    Chosen on three phone-made rooms (a living room, a kitchen, a bathroom), by the PSNR of albedo at the sample, one
+    changed at a time from `sources` .2 and a usual albedo of .45, which give 18.28 dB in the mean: `sources` .1 18.67,
+    .4 17.98; that albedo .5 18.41; `level` .1 17.96; `unlike` 1 18.62; `highest` .8 18.23, a gain in the living room
+    and a loss in the bathroom.
 
     Attributes
     ----------
@@ -29,22 +29,20 @@ class MissingLightParams:
         Radians either way of the parts in which clipped sky is solved for.
     least_seen : float
         Mean irradiance that an unknown of radiance 1 gives, below which it is left at the room's own radiance.
-    neighbours, far : int
-        Others in the same plane that an element is compared with: the nearest, and some of all.
+    neighbours : int
+        Others in the same plane that an element is compared with: so many of the nearest, and of all.
     same_plane, off_plane : float
         Cosine of their normals, and metres.
     apart : float
         Difference of log albedo from which on two elements count as of two paints (Cauchy's scale).
     level : float
-        Weight of the prior on log albedo, normal about `mean_albedo` with the deviation `deviation`.
-    mean_albedo, deviation : float
+        Weight of the prior on log albedo, normal about `USUAL_ALBEDO` with the deviation `deviation`.
+    deviation : float
     colour, grey : float
         Weight of the prior that albedo is grey, and its scale.
-    above : float
-        Weight of what is above `highest`, the greatest albedo of usual paint, in tenths of log albedo.
     highest : float
-    held : float
-        Tenths of log albedo above it from which on the cost grows linearly, no more by the square (Huber).
+        The greatest albedo of usual paint. What is above it counts in tenths of log albedo, by the square up to
+        `LEVELS.sigmas` of them and linearly beyond (pseudo-Huber).
     sources : float
         Weight of the prior that an opening shows what the room does, and a patch its clipped value: a lamp is an
         exception (Student's t).
@@ -68,18 +66,14 @@ class MissingLightParams:
     sky: float = float(np.radians(30))
     least_seen: float = 2e-4
     neighbours: int = 8
-    far: int = 8
     same_plane: float = 0.97
     off_plane: float = 0.05
     apart: float = 0.1
     level: float = 0.03
-    mean_albedo: float = 0.5
     deviation: float = 0.5
     colour: float = 0.1
     grey: float = 0.15
-    above: float = 1.0
     highest: float = 0.85
-    held: float = 3.0
     sources: float = 0.1
     unlike: float = 0.5
     tint: float = 0.3

@@ -12,6 +12,8 @@ from scipy.optimize import minimize
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
+from ...brdf.lambertian import USUAL_ALBEDO
+from ...significance import LEVELS
 from .params import MISSING
 
 
@@ -22,11 +24,11 @@ def in_one_plane(position: np.ndarray, normal: np.ndarray, seed: int) -> np.ndar
     near = cKDTree(key).query(key, min(MISSING.neighbours + 1, m))[1]
     pairs = [np.stack([np.repeat(np.arange(m), near.shape[1] - 1), near[:, 1:].ravel()], 1)]
     rng = np.random.default_rng(seed)
-    some = rng.integers(0, m, (8 * MISSING.far * m, 2))
+    some = rng.integers(0, m, (8 * MISSING.neighbours * m, 2))
     a, b = some.T
     alike = np.einsum("ij,ij->i", normal[a], normal[b]) > MISSING.same_plane
     off = np.abs(np.einsum("ij,ij->i", position[a] - position[b], normal[a]))
-    pairs.append(some[alike & (off < MISSING.off_plane) & (a != b)][: MISSING.far * m])
+    pairs.append(some[alike & (off < MISSING.off_plane) & (a != b)][: MISSING.neighbours * m])
     return np.concatenate(pairs)
 
 
@@ -74,7 +76,7 @@ class _Plausible:
         apart = self._differ @ a / MISSING.apart
         value = 0.5 * float(np.log1p(apart**2).sum()) / max(len(apart), 1)
         by_a = self._back @ (apart / (1 + apart**2)) / (MISSING.apart * max(len(apart), 1))
-        off = (a.mean(1) - np.log(MISSING.mean_albedo)) / MISSING.deviation
+        off = (a.mean(1) - np.log(USUAL_ALBEDO)) / MISSING.deviation
         value += MISSING.level * 0.5 * float((off**2).mean())
         by_a += (MISSING.level / (MISSING.deviation * channels * m) * off)[:, None]
         paint = (a - a.mean(1, keepdims=True)) / MISSING.grey
@@ -84,9 +86,9 @@ class _Plausible:
         by_a += pull - pull.mean(1, keepdims=True)
         # Beside lamps and panes a few elements hold their light: by its square they alone would decide.
         above = np.maximum(a - np.log(MISSING.highest), 0) / 0.1
-        far = np.sqrt(1 + (above / MISSING.held) ** 2)
-        value += MISSING.above * MISSING.held**2 * float((far - 1).mean())
-        by_a += MISSING.above / (0.1 * channels * m) * above / far
+        far = np.sqrt(1 + (above / LEVELS.sigmas) ** 2)
+        value += LEVELS.sigmas**2 * float((far - 1).mean())
+        by_a += above / far / (0.1 * channels * m)
         gradient = -(self._G.T @ (by_a / E)) * radiance
         odd = x - self.usual
         level = odd.mean(1, keepdims=True) / MISSING.unlike

@@ -13,16 +13,10 @@ class PoseParams:
         Pixels of the small picture, median over the frames: less is what good poses show for highlights, texels and
         noise. Six rooms with their true poses have 0.05 to 0.23; the living room with poses off by 5 mm and 0.2 degrees
         has 0.7.
-    width : int
-        Pictures are made smaller to at most about so many pixels across.
     pixels : int
         Those of the steepest gradients. Living room, poses off as above: 0.30 pixels left with 6,000 as with 12,000.
     samples : int
         Rays along an edge of each of these pixels, so that the texture's edges are as soft as the picture's.
-    blur : float
-        Pixels, standard deviation, that gradients are taken over.
-    border : int
-        Pixels along the picture's edges that don't count.
     least_gradient : float
         Of log radiance over a pixel; less tells of no shift.
     floor : float
@@ -46,11 +40,8 @@ class PoseParams:
     """
 
     least_shift: float = 0.4
-    width: int = 480
     pixels: int = 6000
     samples: int = 2
-    blur: float = 1.0
-    border: int = 3
     least_gradient: float = 0.01
     floor: float = 0.1
     rounds: int = 2

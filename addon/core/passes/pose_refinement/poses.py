@@ -23,6 +23,7 @@ from ...agreement.params import AGREEMENT, MISALIGNMENT
 from ...parallel import ordered_map
 from ...progress import Progress, Rounds
 from ...scene.model import Camera, Frame, Pixels
+from ...scene.params import SMALL
 from ...scene.visibility import bytes_of_frame
 from ...significance import LEVELS
 from ...weighted import weighted_median
@@ -159,11 +160,11 @@ def step_of(camera: Camera, pixels: Pixels, texture: Texture) -> Step | None:
     """
     floor = texture.floor
     picture = np.log(np.maximum(pixels.radiance, 0) + floor).mean(-1).astype(np.float64)
-    good = minimum_filter(pixels.valid & ~pixels.saturated, 2 * round(2 * POSES.blur) + 1)
+    good = minimum_filter(pixels.valid & ~pixels.saturated, 2 * round(2 * SMALL.blur) + 1)
     inner = np.zeros_like(good)
-    inner[POSES.border : -POSES.border, POSES.border : -POSES.border] = True
+    inner[SMALL.off : -SMALL.off, SMALL.off : -SMALL.off] = True
     good &= inner
-    dx, dy = (gaussian_filter(picture, POSES.blur, order=order) for order in ((0, 1), (1, 0)))
+    dx, dy = (gaussian_filter(picture, SMALL.blur, order=order) for order in ((0, 1), (1, 0)))
     steep = np.where(good, np.hypot(dx, dy), 0)
     count = min(POSES.pixels, steep.size - 1)
     least = max(float(np.partition(steep.ravel(), -count)[-count]), POSES.least_gradient)
@@ -234,7 +235,7 @@ def refine_poses(
 
     def look(item: tuple[Frame, Camera]) -> Step | None:
         frame, camera = item
-        step = -(-camera.width // POSES.width)
+        step = -(-camera.width // SMALL.width)
         return step_of(camera.coarser(step), read(frame).coarser(step), texture)
 
     asked = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, AGREEMENT.count).round().astype(int))]

@@ -25,6 +25,7 @@ from ...progress import Progress, Rounds
 from ...scene.model import Frame, Mesh, Pixels
 from ...scene.radiometry import CODES, Radiometry
 from ...scene.rays import RayScene
+from ...significance import LEVELS
 from .observations import CodeObservations, observe_codes
 from .params import CALIBRATION, CalibrationParams
 
@@ -153,7 +154,7 @@ def solve(
         # One weight for all channels: what is no diffuse surface is none in all of them.
         sigma = np.maximum(deviation, spread)
         off = np.square(residual / sigma).mean(1, keepdims=True)
-        weight = np.median(sigma) ** 2 / sigma**2 / (1 + off / params.tuning**2)
+        weight = np.median(sigma) ** 2 / sigma**2 / (1 + off / LEVELS.outlier**2)
     log_response = np.stack([_log_srgb(CODES) + _splines(CODES, k) @ x[at[:k]] for at in index])
     gain = np.stack([x[at[k:own]] for at in index], 1)
     contrast = _stated_contrast(gain.mean(1), stated, params)
@@ -187,7 +188,8 @@ def _penalty(code: np.ndarray, frames: int, params: CalibrationParams) -> np.nda
     curve = _log_srgb(code)
     common = _splines(code, k).T @ (curve - curve.mean()) / np.square(curve - curve.mean()).sum()
     result[:k, :k] += 1e9 * np.outer(common, common)
-    result[k:, k:] = params.loose / frames * np.eye(frames)
+    # As one observation would: frames that share nothing with the others stay at 1.
+    result[k:, k:] = np.eye(frames) / frames
     return result
 
 

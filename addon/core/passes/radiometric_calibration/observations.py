@@ -13,6 +13,7 @@ from ...parallel import ordered_map
 from ...progress import Progress, Rounds
 from ...scene.elements import triangle_geometry
 from ...scene.model import Frame, Mesh, Pixels
+from ...scene.params import SMALL
 from ...scene.rays import RayScene
 from ...scene.visibility import bytes_of_frame
 from .params import CalibrationParams
@@ -109,11 +110,11 @@ def _in_frame(
     normals: np.ndarray,
     params: CalibrationParams,
 ) -> CodeObservations:
-    step = max(round(max(frame.camera.width, frame.camera.height) / params.width), 1)
+    step = max(round(max(frame.camera.width, frame.camera.height) / SMALL.width), 1)
     camera = frame.camera.coarser(step)
     small = pixels.coarser(step)
-    code = gaussian_filter(small.radiance, (params.blur, params.blur, 0))
-    window = (params.around, params.around)
+    code = gaussian_filter(small.radiance, (SMALL.blur, SMALL.blur, 0))
+    window = (2 * SMALL.off + 1, 2 * SMALL.off + 1)
     spread = maximum_filter(code, (*window, 1)) - minimum_filter(code, (*window, 1))
     flat = (spread <= params.flat * code).all(-1) & ~maximum_filter(~small.valid | small.saturated, window)
     flat &= code.min(-1) >= params.darkest
@@ -121,7 +122,7 @@ def _in_frame(
     towards = camera.centre - places
     cosine = np.einsum("ij,ij->i", towards, normals) / np.maximum(np.linalg.norm(towards, axis=1), 1e-30)
     own = np.flatnonzero(cosine > params.grazing)
-    which, at = sees(camera, places[own], scene, params.around // 2, params.behind)
+    which, at = sees(camera, places[own], scene, SMALL.off, params.behind)
     column, row = at.astype(int).T
     kept = flat[row, column]
     own, at, column, row = own[which[kept]], at[kept], column[kept], row[kept]

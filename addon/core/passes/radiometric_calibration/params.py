@@ -13,14 +13,8 @@ class CalibrationParams:
         Of the surface, that are looked for in all frames; gains of 96 frames have a standard error of .01 stops then.
     least_points : int
         For each frame, where there are many.
-    width : int
-        Pixels; larger pictures are averaged down to about that, as the poses are no better.
-    blur : float
-        Pixels, standard deviation: poses that are off by a pixel or two compare the same surface.
     flat : float
         A place counts where codes around it, as far as poses may be off, differ by less than this share.
-    around : int
-        Pixels, edge of what is looked at around it.
     darkest : float
         Codes below this share of the greatest are mostly read noise and quantisation.
     grazing : float
@@ -37,12 +31,8 @@ class CalibrationParams:
         Of a code, standard deviation as share of the greatest: two codes of 8 bits.
     texture : float
         Relative standard deviation that radiance differs by between views of one place beside it.
-    tuning : float
-        Standard deviations beyond which an observation counts less (Cauchy): highlights, other surfaces.
     rounds : int
         Of reweighting.
-    loose : float
-        Weight in observations that holds each gain to the others': frames that share nothing with them stay at 1.
     least_range : float
         Standard deviation of the logarithm of stated exposures from which on they tell the curve's contrast.
     widest : float
@@ -51,10 +41,7 @@ class CalibrationParams:
 
     points: int = 8192
     least_points: int = 16
-    width: int = 480
-    blur: float = 1.0
     flat: float = 0.25
-    around: int = 7
     darkest: float = 0.03
     grazing: float = 0.3
     behind: float = 0.02
@@ -63,9 +50,7 @@ class CalibrationParams:
     roughness: float = 100.0
     noise: float = 2 / 255
     texture: float = 0.03
-    tuning: float = 2.0
     rounds: int = 10
-    loose: float = 1.0
     least_range: float = 0.1
     widest: float = 2.0
 

@@ -9,8 +9,8 @@ class RemovalParams:
 
     Attributes
     ----------
-    fewer, least : int
-        So many times fewer rays a pixel than an observation has in the fit, and at least so many.
+    rays : int
+        Of a pixel: a sixteenth of what an observation has in the fit, as neighbours share theirs.
     pixels : int
         Of a frame that are traced, about; of a larger one, one in each square cell.
     reach : int
@@ -19,8 +19,7 @@ class RemovalParams:
         Times what is left that the specular part may be.
     """
 
-    fewer: int = 32
-    least: int = 8
+    rays: int = 8
     pixels: int = 1 << 17
     reach: int = 2
     most: float = 3.0

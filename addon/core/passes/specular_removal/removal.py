@@ -58,13 +58,10 @@ class SpecularPart:
     field : LightField
     materials : sequence of ObjectMaterial
         Those whose lobes are predicted.
-    rays : int
-        Of each observation in the fit.
     """
 
-    def __init__(self, field: LightField, materials: Sequence[ObjectMaterial], rays: int, seed: int = 0):
-        self._field, self._bright, self._seed = field, bright_triangles(field), seed
-        self._rays = max(rays // REMOVAL.fewer, REMOVAL.least)
+    def __init__(self, field: LightField, materials: Sequence[ObjectMaterial], seed: int = 0, rays: int = REMOVAL.rays):
+        self._field, self._bright, self._seed, self._rays = field, bright_triangles(field), seed, rays
         self._lobes: dict[int, tuple[float, float, Microfacets]] = {}
         for m in materials:
             if m.alpha is None or m.f0 is None or m.model.microfacets is None:

@@ -15,8 +15,8 @@ class PlaneParams:
         Radians between an element's normal and the plane's: what is left of a scan's noise in it, no skirting's slope.
     thickness : float
         Metres to either side of the plane.
-    drawn, tries : int
-        Unmeasured elements, by their area, that planes are judged by; and how many of their own planes are tried.
+    tries : int
+        Planes of its own unmeasured elements that are tried, each judged by `LEVELS.sample` of them.
     planes : int
         Of an object, those with most unmeasured surface.
     cells : int
@@ -29,7 +29,6 @@ class PlaneParams:
 
     tilt: float = float(np.radians(15))
     thickness: float = 0.03
-    drawn: int = 1024
     tries: int = 16
     planes: int = 6
     cells: int = 1_000_000
@@ -45,10 +44,9 @@ class TextureParams:
     ----------
     floor : float
         Albedo that darker ones count for in logarithms.
-    sure : float
-        Relative standard error up to which an element is copied; or the better half of them, where that is more.
     mostly : int
-        Cells along a square of which most have to be so sure for the one in its middle to be copied.
+        Cells along a square of which most have to be sure (`LEVELS.sure`, or the better half) for the one in its middle
+        to be copied.
     decay : float
         A texture's scale is the lag at which its autocorrelation, averaged over directions, has fallen to this.
     samples : float
@@ -63,9 +61,8 @@ class TextureParams:
         Share of such a square that an offset's difference over all of the picture counts for beside it.
     offsets : int
         By which copies are tried.
-    peaks, asked : int
-        Maxima of the autocorrelation, the highest ones, that these are chosen from; cells of the hole, drawn at random,
-        that are asked which of them cover it.
+    peaks : int
+        Maxima of the autocorrelation, the highest ones, that these are chosen from, by which of them cover the hole.
     unlike : float
         Correlation that an offset counts for where it has less: textures without a pattern have no better ones.
     again : float
@@ -73,7 +70,6 @@ class TextureParams:
     """
 
     floor: float = 0.01
-    sure: float = 0.15
     mostly: int = 5
     decay: float = float(np.exp(-1))
     samples: float = 64.0
@@ -83,7 +79,6 @@ class TextureParams:
     before: float = 0.25
     offsets: int = 48
     peaks: int = 2048
-    asked: int = 1024
     unlike: float = 0.02
     again: float = 0.7
 

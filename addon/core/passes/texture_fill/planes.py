@@ -131,7 +131,7 @@ def planes_of(atlas: Atlas, own: np.ndarray, filled: np.ndarray) -> Iterator[Pla
         total = (weight * left).sum()
         if total < least:
             return
-        drawn = random.choice(len(own), PLANES.drawn, p=weight * left / total)
+        drawn = random.choice(len(own), LEVELS.sample, p=weight * left / total)
         tried = [within(normal[k], float(position[k] @ normal[k]), drawn) for k in drawn[: PLANES.tries]]
         best = drawn[max(tried, key=np.count_nonzero)]
         direction = normal[best].mean(0)

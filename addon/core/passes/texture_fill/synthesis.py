@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy import fft, ndimage
 
+from ...significance import LEVELS
 from .params import TEXTURE
 
 
@@ -131,7 +132,7 @@ def dominant_offsets(picture: np.ndarray, source: np.ndarray, hole: np.ndarray, 
     shift -= np.where(2 * shift > shape, shape, 0)
     # Which of them have something for which cells of the hole, some of them for all.
     cells = np.argwhere(hole)
-    cells = cells[np.random.default_rng(0).permutation(len(cells))[: TEXTURE.asked]]
+    cells = cells[np.random.default_rng(0).permutation(len(cells))[: LEVELS.sample]]
     at = cells + shift[:, None]
     inside = ((at >= 0) & (at < source.shape)).all(2)
     covers = inside & source[tuple(np.moveaxis(np.where(inside[..., None], at, 0), 2, 0))]

@@ -89,7 +89,7 @@ def _filled(picture: Picture, rho: np.ndarray, error: np.ndarray) -> tuple[np.nd
     """Texels of one plane and their albedo; none where there is too little to go by."""
     shown, known = picture.paint(rho)
     # As where neighbourhoods are told: what was seen well, the better half at least; and no albedo that was cut off.
-    sure = (error <= max(TEXTURE.sure, float(np.median(error)))) & (rho.max(1) < 1)
+    sure = (error <= max(LEVELS.sure, float(np.median(error)))) & (rho.max(1) < 1)
     around = ndimage.uniform_filter(picture.paint(sure[:, None])[0][..., 0], TEXTURE.mostly, mode="constant")
     source = known & (around > 0.5)
     if source.sum() < LEVELS.many:

@@ -10,6 +10,7 @@ from addon.core.passes.albedo.neighbourhood import relative_error, shrink
 from addon.core.passes.albedo.params import PRIOR
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.scene.visibility import CLEAN, EDGE, SATURATED
+from addon.core.significance import LEVELS
 from tests.core.rooms import make_room, quad
 
 GOOD, POOR, NONE = PRIOR.least_error, 0.8, np.inf
@@ -195,14 +196,14 @@ def test_doubt_falls_with_observations_and_rises_with_spread():
     assert (np.diff(by_count) < 0).all()
     assert by_count[1] == pytest.approx(np.hypot(1.25 * 0.3 / np.sqrt(10), PRIOR.least_error), rel=1e-3)
     by_spread = of_one(observed(5.0, [0.01, 0.3, 1.0], 10, CLEAN))
-    assert (np.diff(by_spread) > 0).all() and by_spread[0] < PRIOR.sure
+    assert (np.diff(by_spread) > 0).all() and by_spread[0] < LEVELS.sure
     assert np.allclose(of_one(observed(5e-3, 0.3, 10, CLEAN)), of_one(observed(5e3, 0.3, 10, CLEAN)))
 
 
 def test_one_or_two_observations_are_no_certainty():
     """Their quartiles coincide, which is no sign of agreement."""
     few = of_one(observed(1.0, 0.0, [1, 2, 3], CLEAN))
-    assert few[0] == pytest.approx(np.hypot(1.25 * PRIOR.single, PRIOR.least_error)) and PRIOR.sure < few[1] < few[0]
+    assert few[0] == pytest.approx(np.hypot(1.25 * PRIOR.single, PRIOR.least_error)) and LEVELS.sure < few[1] < few[0]
     assert few[2] == pytest.approx(PRIOR.least_error)
 
 
@@ -218,7 +219,7 @@ def test_a_single_observation_is_as_unsure_as_the_object_s_others(spread):
 
 def test_edges_and_saturation_are_in_doubt():
     clean, edge, saturated = of_one(observed(1.0, 0.1, 20, [CLEAN, EDGE, SATURATED]))
-    assert edge == pytest.approx(clean + PRIOR.single) and saturated > edge > PRIOR.sure > clean
+    assert edge == pytest.approx(clean + PRIOR.single) and saturated > edge > LEVELS.sure > clean
 
 
 def test_what_nobody_saw_is_no_measurement():

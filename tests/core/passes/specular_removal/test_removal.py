@@ -55,7 +55,7 @@ class Floor:
 
     def removed(self, f0: float = F0, **how):
         material = ObjectMaterial(FLOOR, "floor", DIELECTRIC, alpha=ALPHA, f0=f0)
-        part = SpecularPart(self.box.field, [material], rays=256)
+        part = SpecularPart(self.box.field, [material])
         read = lambda frame: self.pictures[int(frame.name)]  # noqa: E731
         frames = frames_of(self.cameras)
         return without_specular(part, self.box.field, self.lit, self.own, frames, read, threads=2, **how)
@@ -122,7 +122,7 @@ def test_large_pictures_lose_a_mirror_image_by_no_more_rays(floor, monkeypatch):
 
     monkeypatch.setattr(removal, "highlight", counted)
     monkeypatch.setattr(removal, "REMOVAL", replace(REMOVAL, pixels=28 * 21))
-    part = SpecularPart(floor.box.field, [material], rays=4096)
+    part = SpecularPart(floor.box.field, [material], rays=128)
     normal = triangle_geometry(room.mesh)[0]
     shown = [part(view_frame(camera, room.mesh, room.scene, normal), 0) for camera in (small, large)]
     assert traced[1] < 1.1 * traced[0]
