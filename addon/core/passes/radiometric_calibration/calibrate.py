@@ -27,7 +27,7 @@ from ...scene.radiometry import CODES, Radiometry
 from ...scene.rays import RayScene
 from ...significance import LEVELS
 from .observations import CodeObservations, observe_codes
-from .params import CALIBRATION, CalibrationParams
+from .params import CALIBRATION
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,6 @@ def calibrate(
     frames: Sequence[Frame],
     read: Callable[[Frame], Pixels],
     *,
-    params: CalibrationParams = CALIBRATION,
     threads: int = 0,
     seed: int = 0,
     progress: Progress | Rounds | None = None,
@@ -93,23 +92,21 @@ def calibrate(
     """
     asked = np.array([frame.uncalibrated for frame in frames], bool)
     nothing = Calibration.none(len(frames))
-    if asked.sum() < params.least_views:
+    if asked.sum() < CALIBRATION.least_views:
         return nothing
     own = [frame for frame, wanted in zip(frames, asked) if wanted]
-    found = observe_codes(mesh, scene, own, read, params, threads=threads, seed=seed, progress=progress)
-    found = found.part(np.bincount(found.point, minlength=1)[found.point] >= params.least_views)
+    found = observe_codes(mesh, scene, own, read, threads=threads, seed=seed, progress=progress)
+    found = found.part(np.bincount(found.point, minlength=1)[found.point] >= CALIBRATION.least_views)
     stated = np.log([frame.exposure for frame in own])
-    if len(found.point) < params.points:
+    if len(found.point) < CALIBRATION.points:
         return nothing
-    response, gain, falloff, spread = solve(found, len(own), stated, params)
+    response, gain, falloff, spread = solve(found, len(own), stated)
     gains = nothing.gain.copy()
     gains[asked] = gain
     return Calibration(response, gains, falloff, asked, np.array(spread))
 
 
-def solve(
-    seen: CodeObservations, frames: int, stated: np.ndarray, params: CalibrationParams = CALIBRATION
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def solve(seen: CodeObservations, frames: int, stated: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Response, gains, falloff and the residuals' spread, as in `Calibration`, of observations of some frames.
 
     Parameters
@@ -118,7 +115,7 @@ def solve(
         Logarithm of the exposures that somebody stated; the same where nobody did.
     """
     point = np.unique(seen.point, return_inverse=True)[1]
-    rows, places, k = len(point), int(point.max()) + 1, params.splines
+    rows, places, k = len(point), int(point.max()) + 1, CALIBRATION.splines
     prior = _log_srgb(seen.code)
     member = sparse.csr_matrix((np.ones(rows), (point, np.arange(rows))), shape=(places, rows))
     of_frame = sparse.csr_matrix((np.ones(rows), (np.arange(rows), seen.frame)), shape=(rows, frames))
@@ -127,14 +124,14 @@ def solve(
     designs = [sparse.hstack([-_splines(seen.code[:, c], k), of_frame, falloff]).tocsr() for c in range(3)]
     own = k + frames
     index = [np.r_[c * own : (c + 1) * own, 3 * own, 3 * own + 1] for c in range(3)]
-    penalties = [_penalty(seen.code[:, c], frames, params) for c in range(3)]
+    penalties = [_penalty(seen.code[:, c], frames) for c in range(3)]
     # A code's noise counts by the slope of the logarithm.
     slope = np.gradient(_log_srgb(CODES), CODES)
-    deviation = np.hypot(params.texture, params.noise * np.interp(seen.code, CODES, slope))
+    deviation = np.hypot(CALIBRATION.texture, CALIBRATION.noise * np.interp(seen.code, CODES, slope))
     weight = deviation**-2 * np.median(deviation) ** 2
     x = np.zeros(3 * own + 2)
     residual = np.zeros((rows, 3))
-    for _ in range(params.rounds):
+    for _ in range(CALIBRATION.rounds):
         normal, right = np.zeros((len(x), len(x))), np.zeros(len(x))
         for c, (design, at) in enumerate(zip(designs, index)):
             w = weight[:, c]
@@ -157,7 +154,7 @@ def solve(
         weight = np.median(sigma) ** 2 / sigma**2 / (1 + off / LEVELS.outlier**2)
     log_response = np.stack([_log_srgb(CODES) + _splines(CODES, k) @ x[at[:k]] for at in index])
     gain = np.stack([x[at[k:own]] for at in index], 1)
-    contrast = _stated_contrast(gain.mean(1), stated, params)
+    contrast = _stated_contrast(gain.mean(1), stated)
     log_gain = (gain - gain.mean(0)) / contrast
     top = log_response[:, -1:]
     response = np.exp((log_response - top) / contrast)
@@ -177,12 +174,12 @@ def _splines(code: np.ndarray, count: int) -> sparse.csr_matrix:
     return BSpline.design_matrix(np.clip(code, 0, 1), knots, 3)
 
 
-def _penalty(code: np.ndarray, frames: int, params: CalibrationParams) -> np.ndarray:
+def _penalty(code: np.ndarray, frames: int) -> np.ndarray:
     """Of one channel's splines and gains: smooth, of the prior's contrast, and tied to each other."""
-    k = params.splines
+    k = CALIBRATION.splines
     result = np.zeros((k + frames, k + frames))
     second = np.diff(np.eye(k), 2, axis=0)
-    result[:k, :k] = params.roughness * second.T @ second + 1e-3 * np.eye(k)
+    result[:k, :k] = CALIBRATION.roughness * second.T @ second + 1e-3 * np.eye(k)
     # Contrast is what the difference has in common with the prior's own curve over the codes that occur: none.
     code = np.quantile(code, CODES)
     curve = _log_srgb(code)
@@ -193,8 +190,8 @@ def _penalty(code: np.ndarray, frames: int, params: CalibrationParams) -> np.nda
     return result
 
 
-def _stated_contrast(log_gain: np.ndarray, stated: np.ndarray, params: CalibrationParams) -> float:
+def _stated_contrast(log_gain: np.ndarray, stated: np.ndarray) -> float:
     """What the logarithms are too large by, from stated exposures (total least squares); 1 where they don't differ."""
-    if stated.std() < params.least_range or log_gain.std() == 0:
+    if stated.std() < CALIBRATION.least_range or log_gain.std() == 0:
         return 1.0
-    return float(np.clip(log_gain.std() / stated.std(), 1 / params.widest, params.widest))
+    return float(np.clip(log_gain.std() / stated.std(), 1 / CALIBRATION.widest, CALIBRATION.widest))

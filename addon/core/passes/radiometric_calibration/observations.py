@@ -16,7 +16,7 @@ from ...scene.model import Frame, Mesh, Pixels
 from ...scene.params import SMALL
 from ...scene.rays import RayScene
 from ...scene.visibility import bytes_of_frame
-from .params import CalibrationParams
+from .params import CALIBRATION
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,6 @@ def observe_codes(
     scene: RayScene,
     frames: Sequence[Frame],
     read: Callable[[Frame], Pixels],
-    params: CalibrationParams,
     *,
     threads: int = 0,
     seed: int = 0,
@@ -66,11 +65,11 @@ def observe_codes(
     InterruptedRun
         From `progress`.
     """
-    places, normals = _places(mesh, scene, frames, params, seed)
+    places, normals = _places(mesh, scene, frames, seed)
     found = []
 
     def of(index: int) -> CodeObservations:
-        return _in_frame(index, frames[index], read(frames[index]), scene, places, normals, params)
+        return _in_frame(index, frames[index], read(frames[index]), scene, places, normals)
 
     each = bytes_of_frame(frame.camera for frame in frames)
     for index, observed in enumerate(ordered_map(of, range(len(frames)), threads, each=each)):
@@ -81,12 +80,10 @@ def observe_codes(
                               for name in ("point", "frame", "r2", "code")))  # fmt: skip
 
 
-def _places(
-    mesh: Mesh, scene: RayScene, frames: Sequence[Frame], params: CalibrationParams, seed: int
-) -> tuple[np.ndarray, np.ndarray]:
+def _places(mesh: Mesh, scene: RayScene, frames: Sequence[Frame], seed: int) -> tuple[np.ndarray, np.ndarray]:
     """World positions and unit normals, (n, 3) each, of first hits through random pixels."""
     rng = np.random.default_rng(seed)
-    each = max(params.points // len(frames), params.least_points)
+    each = max(CALIBRATION.points // len(frames), CALIBRATION.least_points)
     normal, _ = triangle_geometry(mesh)
     places, normals = [], []
     for frame in frames:
@@ -102,13 +99,7 @@ def _places(
 
 
 def _in_frame(
-    index: int,
-    frame: Frame,
-    pixels: Pixels,
-    scene: RayScene,
-    places: np.ndarray,
-    normals: np.ndarray,
-    params: CalibrationParams,
+    index: int, frame: Frame, pixels: Pixels, scene: RayScene, places: np.ndarray, normals: np.ndarray
 ) -> CodeObservations:
     step = max(round(max(frame.camera.width, frame.camera.height) / SMALL.width), 1)
     camera = frame.camera.coarser(step)
@@ -116,13 +107,13 @@ def _in_frame(
     code = gaussian_filter(small.radiance, (SMALL.blur, SMALL.blur, 0))
     window = (2 * SMALL.off + 1, 2 * SMALL.off + 1)
     spread = maximum_filter(code, (*window, 1)) - minimum_filter(code, (*window, 1))
-    flat = (spread <= params.flat * code).all(-1) & ~maximum_filter(~small.valid | small.saturated, window)
-    flat &= code.min(-1) >= params.darkest
+    flat = (spread <= CALIBRATION.flat * code).all(-1) & ~maximum_filter(~small.valid | small.saturated, window)
+    flat &= code.min(-1) >= CALIBRATION.darkest
 
     towards = camera.centre - places
     cosine = np.einsum("ij,ij->i", towards, normals) / np.maximum(np.linalg.norm(towards, axis=1), 1e-30)
-    own = np.flatnonzero(cosine > params.grazing)
-    which, at = sees(camera, places[own], scene, SMALL.off, params.behind)
+    own = np.flatnonzero(cosine > CALIBRATION.grazing)
+    which, at = sees(camera, places[own], scene, SMALL.off, CALIBRATION.behind)
     column, row = at.astype(int).T
     kept = flat[row, column]
     own, at, column, row = own[which[kept]], at[kept], column[kept], row[kept]

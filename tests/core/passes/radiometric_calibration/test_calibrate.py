@@ -99,7 +99,7 @@ def test_a_room_is_seen_alike_by_calibrated_frames():
         codes = np.round(255 * camera_response(level * pictures[i].radiance * gain[i])) / 255
         return Pixels(np.float32(np.minimum(codes, 1)), pictures[i].valid, (codes >= 253.5 / 255).any(-1))
 
-    found = calibrate(room.mesh, room.scene, frames, read, params=replace(CALIBRATION, points=4000))
+    found = calibrate(room.mesh, room.scene, frames, read)
     assert found.calibrated.all() and np.isfinite(found.spread)
     error = off(found.gain, gain)
     assert np.abs(error.mean(1)).max() < 0.1 * np.log(2)
