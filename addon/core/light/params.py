@@ -102,18 +102,8 @@ class LightFitParams:
 
     Attributes
     ----------
-    coarse : float
-        The cap under which a light is looked for: far from the solution, everything deviates.
     cap : float
-        The cap under which all is refined. Texture, highlights and shadows of small things deviate by more than light
-        does and draw a solution down under the coarse cap (two clipped lamps of 26.2 in the living room: 19 and 22
-        under 1). Of 0.07, 0.12, 0.25 and 0.5, tried on that room alone with both lamps scaled in steps of 15 %, only
-        0.5 had its least at the truth both with and without a perturbed mesh; with it, the smaller ones had theirs
-        above.
-    clipped_cap : float
-        The same where lamps are clipped, and objects of one paint tell of them together (`kinds_of`): two lamps of four
-        perturbed living rooms, eight runs, came to .964 +- .024 of their true luminance under 0.5, .982 +- .017 under
-        0.35, .994 +- .012 under 0.25, 1.004 +- .013 under 0.18 and 1.009 +- .015 under 0.12.
+        The cap under which a light is looked for: far from the solution, everything deviates.
     flat_cell : float
         Edge in metres of the cells in which normals must agree.
     flat : float
@@ -121,13 +111,12 @@ class LightFitParams:
         light: as an error of the regressor it draws the light's radiance down. The same two lamps, mesh off by 5 mm,
         under a cap of 1: 10 and 15 with all elements, 21 and 22 with those on flat spots.
     alike : float
-        Log albedo by which objects of one class may differ to be of one kind. Lamps that are off by a tenth part
-        objects under them from others under the sky by up to .1.
+        Relative difference up to which two solutions of one lamp's luminance agree: by all channels together and each
+        by itself, beside a seen lamp of its model, or as pixels show it.
     same : float
-        The same of each channel beside the others; and relative difference of area up to which two objects of a class
-        can be the same lamp: a scan's noise and holes.
+        Relative difference of area up to which two objects of a class can be the same lamp: a scan's noise and holes.
     reach : float
-        The refined radiance stays within this factor of where it started, and a sky's within it of its middle.
+        Factor within which a lamp's luminance is its class's, and a sky's radiance its middle's.
     lamp_elements : int
         Of an unseen object, at which what it could reflect is looked at.
     rays, emitter_rays : int
@@ -137,9 +126,7 @@ class LightFitParams:
         rest is room for missing light and for noise.
     """
 
-    coarse: float = 1.0
-    cap: float = 0.5
-    clipped_cap: float = 0.25
+    cap: float = 1.0
     flat_cell: float = 0.08
     flat: float = 0.99
     alike: float = 0.25

@@ -77,7 +77,6 @@ PASSES = (
         unseen_lamps="Solves for lamps that no frame sees.",
         unseen_sky="Solves for the parts of the sky that no frame sees.",
         whole_sky="Solves for the sky where no frame sees any of it.",
-        joint_light="Refines all solved lamps and sky together.",
         missing_light="Solves for clipped patches, and for what comes in by openings, where albedos are above 1.",
         sun="Solves for a sun that no frame sees from the patch of light that it makes.",
         seen_sun="Takes a sun that frames see out of the environment map and treats it by itself.",

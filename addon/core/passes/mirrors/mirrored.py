@@ -8,9 +8,9 @@ import numpy as np
 
 from ...kinds import Unit
 from ...light.field import LightField
-from ...light.params import LIGHT_FIT
 from ...scene.samples import Samples
 from ...significance import LEVELS
+from .params import MIRRORS
 
 DARK: Unit[float] = 1e-5
 """What nobody saw is dark in the field so far: 0, but for rounding."""
@@ -70,7 +70,7 @@ class Views:
             return np.inf
         ratio = found[2] - found[3]
         # Beside an edge a ray of a slightly other way meets something else altogether.
-        return float(np.minimum(np.abs(ratio - np.median(ratio)), LIGHT_FIT.cap).mean())
+        return float(np.minimum(np.abs(ratio - np.median(ratio)), MIRRORS.stray).mean())
 
     def compare(self, normals: np.ndarray) -> tuple[float, float, float, np.ndarray]:
         """How well a mirror that faces `normals` ((m, 3) or (3,)) explains what was seen.

@@ -22,6 +22,8 @@ class MirrorsParams:
     tells : float
         Share of the deviation under the mesh's own plane that a turned one must come below. What a pane over a dark
         hearth shows tells nothing of its way: it was turned by a degree to take a hundredth off.
+    stray : float
+        Deviation of log radiance from which on more counts no more: a ray beside an edge meets something else.
     tilt, tilts, fitted : float, int
         Radians by which the plane is turned first to fit what is mirrored, how often, and observations for it: a scan's
         planes are off.
@@ -33,6 +35,7 @@ class MirrorsParams:
     together: float = 0.6
     least_f0: float = 0.2
     tells: float = 0.98
+    stray: float = 0.5
     tilt: float = 0.01
     tilts: int = 40
     fitted: int = 6000

@@ -107,7 +107,7 @@ class Spots:
         return max(float(np.median((sent[use] / rho[use] - received[use]) / contribution[use])), 0.0)
 
     def spread(self, contribution: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
-        return self.sample.spread(self.log_albedo(contribution, strength), LIGHT_FIT.coarse)
+        return self.sample.spread(self.log_albedo(contribution, strength))
 
     def explained(self, direction: np.ndarray) -> Guess:
         """The direction with its strength and the spread that it leaves."""
@@ -129,7 +129,7 @@ class Edges:
     def differ(self, contribution: np.ndarray | float = 0.0, strength: float = 0.0) -> float:
         """Mean difference of log albedo between neighbours, each held at `COARSE`."""
         value = self.spots.log_albedo(contribution, strength)
-        return float(np.minimum(np.abs(value[self.a] - value[self.b]), LIGHT_FIT.coarse).mean()) if len(self.a) else 0.0
+        return float(np.minimum(np.abs(value[self.a] - value[self.b]), LIGHT_FIT.cap).mean()) if len(self.a) else 0.0
 
     def explained(self, direction: np.ndarray, strength: float, radius: float) -> Guess:
         return Guess(direction, self.differ(self.spots.contribution(direction, radius), strength), strength, radius)

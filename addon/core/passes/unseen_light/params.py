@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class UnseenParams:
-    """Of `unseen_light`, `unseen_lamps`, `refine_light` and `whole_sky`, by their names in the ablation.
+    """Of `unseen_light`, `unseen_lamps`, `sky` and `whole_sky`, by their names in the ablation.
 
     Attributes
     ----------

@@ -7,7 +7,7 @@ from ...light.light_fit import Sample
 from ...light.params import LIGHT_FIT, SKY
 from ...luminance import LUMINANCE
 from .params import UNSEEN
-from .refine_light import Sky, all_light
+from .sky import Sky, all_light
 
 
 def solve_lamps(sample: Sample, contribution, least, class_of, model, kin, seen, sky: Sky, base, colours) -> list[Lamp]:

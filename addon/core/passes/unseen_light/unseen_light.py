@@ -2,7 +2,7 @@
 
 A lamp behind the camera, or the sky above what the windows showed, still lights the room. Albedo varies little within
 an object, light a lot: the radiance under which albedo varies least is the one taken (`light_fit`). Lamps are found one
-by one, then all that was solved is refined together.
+by one.
 """
 
 from collections.abc import Collection
@@ -24,13 +24,13 @@ from ...light.few_elements import (
 )
 from ...light.field import LightField
 from ...light.lamps import Lamp, find_seen, lamp_models, mixed_lamps, of_shining_class
-from ...light.light_fit import Sample, kinds_of, on_flat
+from ...light.light_fit import Sample, on_flat
 from ...light.params import LIGHT_FIT
 from ...luminance import LUMINANCE
 from ...scene.model import Instance, class_names
 from ...significance import LEVELS
 from .params import UNSEEN
-from .refine_light import Sky, all_light, refined, shared_by_class
+from .sky import Sky, shared_by_class
 from .unseen_lamps import needed, solve_lamps, solve_sky
 from .whole_sky import with_whole_sky
 
@@ -202,12 +202,6 @@ def find_light(
         lamps = solve_lamps(sample, contribution, least, class_of, model, kin, seen, sky, received[lit], colours)
         solve_sky(sample, lamps, contribution, sky, received[lit])
     lamps, sky = needed(sample, lamps, contribution, sky, received[lit], colours)
-    E = all_light(received[lit], lamps, contribution, sky)
-    log_albedo = np.log(np.maximum(sent, 1e-9) / np.maximum(E, 1e-12))
-    kind = kinds_of(sample.object_id, log_albedo, class_of)
-    sample = replace(sample, kind=kind, cap=LIGHT_FIT.clipped_cap if clipped else LIGHT_FIT.cap)
-    if "joint-light" not in without:
-        lamps = refined(sample, lamps, contribution, least, model, seen, sky, received[lit], colours)
     lamps = [
         replace(lamp, object_id=one, radiance=of_colour(lamp, known_colours.get(one)), mixed=one in mixed)
         for lamp in lamps

@@ -7,7 +7,7 @@ import pytest
 
 from addon.core.light.lamps import Lamp
 from addon.core.light.light_fit import Sample
-from addon.core.passes.unseen_light.refine_light import Sky
+from addon.core.passes.unseen_light.sky import Sky
 from addon.core.passes.unseen_light.unseen_lamps import needed
 
 M, LAMP = 600, 9
