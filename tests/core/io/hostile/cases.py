@@ -240,7 +240,7 @@ def fipt_real(root: Path) -> None:
 
 def replica(root: Path) -> None:
     room = make_room(lit_box(lamps=(((0.3, 0.7), (0.3, 0.7)),)), 0.3)
-    ReplicaOnDisk(root, room, np.ones((len(room.atlas.object_id), 3)), edge=1.0, order_file=True)
+    ReplicaOnDisk(root, room, np.ones((len(room.atlas.object_id), 3)), edge=1.0)
     pane = {"plane_w": [0, 0, 1, 0], "boundary_w": [[0, 0, 0], [1, 0, 0], [1, 1, 0]], "reflectivity": 0.9}
     (root / "glass.sur").write_text(json.dumps([pane]))
 
