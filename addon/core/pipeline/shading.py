@@ -156,7 +156,7 @@ def shade(
     }
     find_mirrors = None if "mirrors" in without else find_mirrors
     colours = None if "fringe-colours" in without else colours
-    tilted = turned_by_noise(mesh, atlas, 0.0 if "tilt-error" in without else surface.noise)
+    tilted = np.zeros(len(atlas)) if "tilt-error" in without else turned_by_noise(mesh, atlas, surface.noise)
 
     environment, sun = (environment, None) if "seen-sun" in without else taken_out(environment)
     # What nobody saw is dark at first, so that a lamp among it is missed and can be solved for.

@@ -15,7 +15,8 @@ from addon.core.pipeline import shading as module
 from addon.core.pipeline.shading import shade
 from addon.core.scene.model import Frame
 from addon.core.settings import Settings
-from tests.core.rooms import DARK, albedo_in, all_round, lit_box, make_room, picture, radiosity
+from tests.core.pipeline.test_light import measured
+from tests.core.rooms import DARK, albedo_in, all_round, lit_box, make_room, picture, quad, radiosity, split
 
 ALBEDO = {0: (0.6, 0.4, 0.2), 1: 0.8, 2: (0.7, 0.2, 0.2), 3: (0.2, 0.7, 0.2), 4: 0.5, 5: (0.3, 0.3, 0.6)}
 LAMP = (10, 9, 8)
@@ -110,3 +111,19 @@ def test_what_was_not_seen_is_filled_in(lit, monkeypatch):
     assert np.allclose(np.median(rho[gone], 0), ALBEDO[0], rtol=0.05)
     wall = room.atlas.object_id == 3  # it stands on the unseen half
     assert np.allclose(np.median(rho[wall], 0), ALBEDO[3], rtol=0.03)
+
+
+def test_light_on_a_scanned_mesh_is_less_certain_unless_that_is_left_out():
+    """A floor that is off by 4 mm from vertex to vertex, 10 cm apart: its triangles face any way by some degrees."""
+    room = make_room(split(quad((0, 0, 0), (2, 0, 0), (0, 2, 0), 0), 20), 0.1)
+    _, place = np.unique(np.round(room.mesh.vertices, 6), axis=0, return_inverse=True)
+    height = np.random.default_rng(0).normal(0, 0.004, place.max() + 1)[place.ravel()]
+    vertices = room.mesh.vertices + height[:, None] * np.array([0, 0, 1.0])
+    scan = replace(room.surface, mesh=replace(room.mesh, vertices=vertices))
+    found = measured(room, np.ones((len(room.atlas), 3)))
+    how = Settings(shading_rays=16, threads=2)
+    unsure, left_out = (
+        shade(scan, room.instances, found, DARK, replace(how, without=without)).relative_error
+        for without in ((), ("tilt-error",))
+    )
+    assert np.median(unsure) > np.median(left_out) + 0.03
