@@ -20,13 +20,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from addon.benchmark.truth_views import projected_truth, psnr, views
+from addon.benchmark.truth_views import psnr, views
 from addon.core.io.read import read_capture
 from addon.core.passes.albedo.albedo import MEASURED, quotient
 from addon.core.pipeline.recover import Recovery
 from addon.core.progress import Progress
 from addon.core.results.store import Store
 from addon.core.settings import Settings
+from scripts.qa_rooms.held import projected_truth
 
 
 def without_excess(recovery: Recovery) -> np.ndarray:

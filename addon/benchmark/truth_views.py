@@ -64,15 +64,3 @@ def psnr(seen: list[dict], value: np.ndarray, only: np.ndarray | None = None) ->
         if counts.sum() > 100:
             result.append(-10 * np.log10(np.mean(error**2)))
     return float(np.mean(result))
-
-
-def projected_truth(seen: list[dict], count: int, fallback: np.ndarray) -> np.ndarray:
-    """The truth as elements could hold it at best: the mean of what the held-out views themselves show of each."""
-    total, hits = np.zeros((count, 3)), np.zeros(count)
-    for view in seen:
-        for element in view["element"]:
-            ok = view["counts"]
-            for c in range(3):
-                total[:, c] += np.bincount(element[ok], view["truth"][ok, c], count)
-            hits += np.bincount(element[ok], minlength=count)
-    return np.where(hits[:, None] > 0, total / np.maximum(hits, 1)[:, None], fallback)

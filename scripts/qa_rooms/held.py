@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from addon.benchmark.truth_views import projected_truth
 from addon.core.brdf.material import Z90
 from addon.core.passes.albedo.albedo import MEASURED
 from addon.core.pipeline.recover import Recovery
@@ -59,3 +58,15 @@ def held(recovery: Recovery, seen: list[dict], truth: dict[int, dict]) -> dict[s
         "objects' means": float(np.mean(means)) if means else float("nan"),
         f"roughness ({len(rough)})": float(np.mean(rough)) if rough else float("nan"),
     }
+
+
+def projected_truth(seen: list[dict], count: int, fallback: np.ndarray) -> np.ndarray:
+    """The truth as elements could hold it at best: the mean of what the held-out views themselves show of each."""
+    total, hits = np.zeros((count, 3)), np.zeros(count)
+    for view in seen:
+        for element in view["element"]:
+            ok = view["counts"]
+            for c in range(3):
+                total[:, c] += np.bincount(element[ok], view["truth"][ok, c], count)
+            hits += np.bincount(element[ok], minlength=count)
+    return np.where(hits[:, None] > 0, total / np.maximum(hits, 1)[:, None], fallback)

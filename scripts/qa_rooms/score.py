@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from addon.benchmark.truth_materials import found_kind, found_roughness, score_materials, true_kind, true_roughness
-from addon.benchmark.truth_views import projected_truth, psnr, views
+from addon.benchmark.truth_views import psnr, views
 from addon.core.io.exr import read_exr
 from addon.core.io.read import read_capture
 from addon.core.passes.albedo.albedo import MEASURED
@@ -21,7 +21,7 @@ from addon.core.progress import Progress
 from addon.core.results.store import Store
 from addon.core.settings import Settings
 
-from .held import held
+from .held import held, projected_truth
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 

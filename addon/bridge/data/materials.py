@@ -32,11 +32,6 @@ def brdf_of(material: bpy.types.Material | None) -> Brdf | None:
     return find(material.get(MODEL)) if material else None
 
 
-def alpha_of(material: bpy.types.Material) -> float | None:
-    """GGX's alpha as it was fitted; None where there is no lobe."""
-    return material.get(_ALPHA, material.get(_BEFORE[_ALPHA]))
-
-
 def f0_of(material: bpy.types.Material) -> float | None:
     """F0 as it was fitted; None where there is no lobe, or a coloured one: that is the material's colour."""
     return material.get(_F0, material.get(_BEFORE[_F0]))

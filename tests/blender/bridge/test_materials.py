@@ -13,7 +13,7 @@ from addon.core.brdf.transparent import TRANSPARENT
 
 bpy = pytest.importorskip("bpy")
 
-from addon.bridge.data.materials import alpha_of, dress, f0_of, make_material  # noqa: E402
+from addon.bridge.data.materials import dress, f0_of, make_material  # noqa: E402
 from addon.core.brdf.compensation import ior_of  # noqa: E402
 
 
@@ -46,9 +46,9 @@ def test_specular(scene, psi):
 def test_a_material_of_version_0_1_is_read_and_renewed(scene):
     material = bpy.data.materials.new("Table")
     material["scan_relight_phi"], material["scan_relight_psi"] = 0.16, 0.05
-    assert (alpha_of(material), f0_of(material)) == (0.16, 0.05)
+    assert f0_of(material) == 0.05
     dress(material, ObjectMaterial(3, "Table", LAMBERTIAN))
-    assert alpha_of(material) is None and f0_of(material) is None
+    assert "scan_relight_phi" not in material and f0_of(material) is None
 
 
 @pytest.mark.parametrize(("surfaces", "alpha"), [(1, 0.36), (2, 0.2), (None, 1)], ids=["sheet", "slab", "cut out"])
