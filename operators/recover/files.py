@@ -27,7 +27,7 @@ NEXT = (
     ("IMPORT", "Import", "Bring objects, cameras and frames into the scene as they were scanned"),
     ("RUN", "Recover", "Run the recovery beside this window"),
 )
-FILTER = "transforms*.json;materials.json;*.ply;*.obj;*.glb;*.gltf;cameras.bin;cameras.txt;scene.blend"
+FILTER = "transforms*.json;materials.json;*.ply;*.obj;*.glb;*.gltf;cameras.bin;cameras.txt;odometry.csv;scene.blend"
 
 
 def show_tab(context) -> None:

@@ -20,7 +20,7 @@ from addon.core.io.pictures import picture_size
 from addon.core.io.pixels import read_pixels
 from addon.core.io.png import write_png
 from addon.core.io.read import describe, read_capture
-from tests.core.io import test_phone_pictures
+from tests.core.io import test_phone_pictures, test_video
 from tests.core.io.conftest import CORNERS, HEIGHT, SIDES, WIDTH
 from tests.core.io.hostile import cases, test_coded_spoiled, test_exr_spoiled
 from tests.core.rooms import lit_box, make_room
@@ -184,6 +184,11 @@ def fipt_ids(ending: str) -> Reader:
     return Reader(make, lambda root: capture(root, Reading(mesh=root / "mesh.ply")))
 
 
+def recording(root: Path) -> Path:
+    """Stray Scanner's, whose video is spoiled."""
+    return test_video.write_recording(root, range(30, 200, 20)) / "rgb.mp4"
+
+
 def ptex(root: Path) -> Path:
     cases.replica(root)
     return root / "textures/0-color-ptex.hdr"
@@ -248,6 +253,8 @@ def readers() -> dict[str, Reader]:
     for name, module in (("heic", "pillow_heif"), ("dng", "rawpy")):
         if importlib.util.find_spec(module):  # extras
             found[f"picture {name}"] = picture(name, test_phone_pictures.WRITERS[name], Reading())
+    if importlib.util.find_spec("av"):
+        found["video"] = Reader(recording, capture)
     found |= {f"ids {ending}": fipt_ids(ending) for ending in ("exr", "png")}
     found["ptex"] = Reader(ptex, read_ptex)
     found |= {f"result {name}": result(name) for name in ("room.npz", "stages/surface.npz")}

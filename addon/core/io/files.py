@@ -1,14 +1,13 @@
 """Files of a capture: read with care, and within its folder, unless the user allows more."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 from ..errors import BadInputError
 from ..kinds import Limit
-from ..scene.model import Frame
 
 MAX_TEXT: Limit[int] = 1 << 28
 """Bytes of a table of poses or cameras."""
@@ -110,15 +109,15 @@ def inside(root: Path, value: Any, name: str, outside: bool = False, folder: Pat
     return (folder or root) / PurePosixPath(value.replace("\\", "/"))
 
 
-def check_links(root: Path, frame: Frame) -> None:
-    """Look where the links among a frame's files lead.
+def check_links(root: Path, name: str, files: Iterable[Path]) -> None:
+    """Look where the links among the files of frame `name` lead.
 
     Raises
     ------
     EscapesError
         A file that lies in the capture by its name lies outside by a link.
     """
-    for path in frame.files:
+    for path in files:
         if not path.is_relative_to(root):
             continue
         try:
@@ -127,6 +126,6 @@ def check_links(root: Path, frame: Frame) -> None:
             continue
         if not inside_root:
             raise EscapesError(
-                f"Frame '{frame.name}': '{path}' is a link or lies behind one that leads out of the "
+                f"Frame '{name}': '{path}' is a link or lies behind one that leads out of the "
                 f"capture '{root}'; allow that with --outside."
             )

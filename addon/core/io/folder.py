@@ -9,6 +9,7 @@ from ..kinds import Limit, Shown
 
 CAPTURE, RESULT, WAY, EMPTY, OTHER, ABSENT = "capture", "result", "way", "empty", "other", "absent"
 MATERIALS, REPORT, SCENE = "materials.json", "report.json", "scene.blend"
+VIDEOS = (".mp4", ".mov", ".m4v")
 ABOVE: Limit[int] = 3
 """Levels above a chosen file on which its capture may begin: `sparse/0/cameras.bin`."""
 LOOKED_AT: Limit[int] = 200
@@ -114,7 +115,7 @@ def of_path(path: Path | str) -> Content:
         return look_into(path)
     if path.name in (MATERIALS, SCENE, REPORT, "report.html") and is_result(path.parent):
         return look_into(path.parent)
-    if path.suffix.lower() in (".json", ".ply", ".obj", ".glb", ".gltf", ".bin", ".txt"):
+    if path.suffix.lower() in (".json", ".ply", ".obj", ".glb", ".gltf", ".bin", ".txt", ".csv", *VIDEOS):
         begins = [one for one in (path.parent, *list(path.absolute().parents)[1:ABOVE]) if is_capture(one)]
         if begins and not (path.suffix.lower() == ".json" and not _is_ours(path)):
             return look_into(begins[-1])
@@ -141,6 +142,12 @@ def _other(name: str, names: list[str]) -> str:
     blend = next((one for one, ending in zip(names, endings, strict=True) if ending == ".blend"), None)
     if blend:
         return f"Folder '{name}' holds the Blender file '{blend}' and no scan; open that by File, Open."
+    film = next((one for one, ending in zip(names, endings, strict=True) if ending in VIDEOS), None)
+    if film:
+        return (
+            f"Folder '{name}' holds the video '{film}', which has no poses; find them and its frames "
+            "(ns-process-data video, or COLMAP), or record by an app that stores poses, such as Stray Scanner."
+        )
     if any(ending in (".exr", ".hdr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".heic", ".dng") for ending in endings):
         return (
             f"Folder '{name}' holds pictures, but no cameras (such as 'transforms.json' or a COLMAP model); "

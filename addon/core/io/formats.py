@@ -7,6 +7,7 @@ FORMATS = {
     "scannet++": "dslr/colmap and scans/mesh_aligned_0.05.ply",
     "polycam": "keyframes with a folder of cameras",
     "record3d": "metadata.json beside rgb or rgbd",
+    "stray": "odometry.csv beside rgb.mp4",
     "traj": "traj.txt and results/frame000000.exr",
     "nerfstudio": "transforms.json",
     "colmap": "cameras and images of a COLMAP model (.bin or .txt)",

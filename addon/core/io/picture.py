@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import BadInputError
+from ..errors import BadInputError, ScanRelightError
 from ..kinds import Limit
 
 MAX_PIXELS: Limit[int] = 1 << 26
@@ -45,14 +45,14 @@ def check_claim(path: Path, width: int, height: int, stored: int, most: float = 
 
 
 @contextmanager
-def decoding(path: Path | str) -> Iterator[None]:
-    """Turn whatever a library raises at the picture `path` into one sentence, a `BadInputError`."""
+def decoding(path: Path | str, what: str = "Picture") -> Iterator[None]:
+    """Turn whatever a library raises at the picture (`what`) `path` into one sentence, a `BadInputError`."""
     try:
         yield
-    except BadInputError:
+    except ScanRelightError:
         raise
     except Exception as error:
-        raise BadInputError(f"Picture '{path}' is damaged or cut off; write or copy it again.") from error
+        raise BadInputError(f"{what} '{path}' is damaged or cut off; write or copy it again.") from error
 
 
 def too_few_bytes(width: int, height: int, size: int) -> bool:

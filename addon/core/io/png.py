@@ -14,8 +14,8 @@ SIGNATURE = b"\x89PNG\r\n\x1a\n"
 LEFT_NEIGHBOUR: Code[int] = 1  # filter: each byte less that of the pixel to its left; halves the size of photos
 
 
-def png(image: np.ndarray) -> bytes:
-    """`image`, (height, width, 3) uint8 or uint16 with row 0 the top, as a PNG file."""
+def png(image: np.ndarray, effort: int = 6) -> bytes:
+    """`image`, (height, width, 3) uint8 or uint16 with row 0 the top, as a PNG file; `effort` is zlib's level."""
     if image.dtype not in (np.uint8, np.uint16) or image.ndim != 3 or image.shape[2] != 3:
         raise ValueError(f"png takes (h, w, 3) uint8 or uint16, not {image.shape} {image.dtype}")
     height, width, _ = image.shape
@@ -26,7 +26,7 @@ def png(image: np.ndarray) -> bytes:
     rows[:, 1 : 1 + 3 * size] = stored[:, 0]
     rows[:, 1 + 3 * size :] = (stored[:, 1:] - stored[:, :-1]).reshape(height, -1)  # wraps around, as it should
     header = struct.pack(">IIBBBBB", width, height, 8 * size, 2, 0, 0, 0)
-    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 6)), (b"IEND", b""))
+    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), effort)), (b"IEND", b""))
     return SIGNATURE + b"".join(
         struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
     )

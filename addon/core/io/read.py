@@ -21,6 +21,7 @@ from .clipping import find_clipping
 from .conventions import parse, upright
 from .exposures import from_csv, from_exif
 from .files import absence, check_links
+from .folder import VIDEOS
 from .frame_codes import with_curves
 from .id_pictures import check_ids, read_ids
 from .layout import AS_FOUND, Layout, RawMesh, Reading, usable
@@ -159,7 +160,7 @@ def _usable(root: Path, layout: Layout, outside: bool) -> tuple[list[Frame], lis
 
     def checked(frame: Frame) -> Frame:
         if not outside:
-            check_links(root, frame)
+            check_links(root, frame.name, frame.files)
         _check_frame(frame)
         return frame
 
@@ -181,6 +182,11 @@ def _refuse_too_many(root: Path, layout: Layout, problems: list[str]) -> tuple[i
     total = len(layout.frames) + len(layout.problems)
     few = " ".join(problems[:LISTED]) + (f" And {len(problems) - LISTED} more." if len(problems) > LISTED else "")
     if len(problems) > MAX_BAD_SHARE * total:
+        videos = sorted(path.name for path in root.iterdir() if path.suffix.lower() in VIDEOS)
+        if videos and not layout.frames:
+            few += (
+                f" Poses don't tell which frames of '{videos[0]}' they are of: run again what took pictures out of it."
+            )
         raise BadInputError(
             f"Capture '{root}' has {len(problems)} bad frames of {total}, too many to leave out; mend these: {few}"
         )

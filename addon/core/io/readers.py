@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..errors import BadInputError
 from ..origin import of_point, of_thing
-from . import colmap, fipt, nerfstudio, polycam, record3d, replica, scannetpp, textured, traj
+from . import colmap, fipt, nerfstudio, polycam, record3d, replica, scannetpp, stray, textured, traj
 from .layout import Layout, Reader, Reading
 
 GROUP = "scan_relight.readers"
@@ -18,6 +18,7 @@ READERS: tuple[Reader, ...] = (
     scannetpp.READER,
     polycam.READER,
     record3d.READER,
+    stray.READER,
     traj.READER,
     nerfstudio.READER,
     colmap.READER,

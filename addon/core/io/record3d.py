@@ -14,23 +14,15 @@ import numpy as np
 from ..errors import BadInputError
 from ..json_values import is_number
 from ..scene.model import Camera, Frame
-from ..scene.pose import check_pose, rotation_of
-from .arkit import read_y_up
+from .arkit import FUSE, MOST, read_pose, read_y_up
 from .files import read_json
 from .formats import FORMATS
-from .gltf_nodes import TO_Z_UP
 from .layout import Layout, Reader, Reading, usable
 from .meshes import find_mesh
 from .pictures import ENDINGS
 
 METADATA, FOLDERS, ARCHIVE = ("metadata.json", "metadata"), ("rgb", "rgbd"), ".r3d"
 PICTURE = re.compile(r"\d{1,9}")
-MOST = 300
-"""Frames that are taken of a recording, evenly: 60 a second show nearly the same. nerfstudio's default."""
-EXPORT = (
-    "Record3D stores depth alone: fuse it to a mesh in the recording's coordinates, put it there as 'mesh.ply', or "
-    "name it with --mesh."
-)
 UP = (
     "Record3D's +Y was taken as up; some recordings begin with the camera's own up instead. If the room does not stand "
     "upright, name the axis that points up (--convention up:+y)."
@@ -70,13 +62,14 @@ def read(root: Path, reading: Reading) -> Layout:
     def frame(index: int) -> Frame:
         if index >= len(poses):
             raise BadInputError(f"Frame '{index}' has no pose in '{path}', which has {len(poses)}.")
-        return Frame(f"{index:06d}", pictures[index], _camera(told, index, _pose(poses[index], index), path))
+        pose = read_pose(poses[index] if isinstance(poses[index], list) else [], f"{index}")
+        return Frame(f"{index:06d}", pictures[index], _camera(told, index, pose, path))
 
     frames, problems = usable(partial(frame, index) for index in chosen)
     notes = [UP]
     if len(chosen) < len(pictures):
         notes.append(f"{len(chosen)} of {len(pictures)} frames were taken, evenly: others show nearly the same.")
-    mesh = read_y_up(find_mesh(root, reading, remedy=EXPORT), reading)
+    mesh = read_y_up(find_mesh(root, reading, remedy=f"Record3D {FUSE}"), reading)
     return Layout(frames, mesh, problems=problems, notes=notes)
 
 
@@ -85,16 +78,6 @@ def _parts(root: Path) -> tuple[Path, Path] | None:
     metadata = next((root / name for name in METADATA if (root / name).is_file()), None)
     folder = next((root / name for name in FOLDERS if (root / name).is_dir()), None)
     return None if metadata is None or folder is None else (metadata, folder)
-
-
-def _pose(told: Any, index: int) -> np.ndarray:
-    """Camera to world, (4, 4), from a quaternion x, y, z, w and a position."""
-    if not isinstance(told, list) or len(told) != 7 or not all(map(is_number, told)) or not any(told[:4]):
-        raise BadInputError(f"Frame '{index}' has a pose that is no quaternion and place; export the recording again.")
-    pose = np.eye(4)
-    pose[:3, :3] = rotation_of(np.array([told[3], *told[:3]], np.float64))
-    pose[:3, 3] = told[4:]
-    return TO_Z_UP @ check_pose(pose, f"{index}")
 
 
 def _camera(told: dict[str, Any], index: int, pose: np.ndarray, path: Path) -> Camera:

@@ -20,7 +20,7 @@ def change(path, **values):
     path.write_text(json.dumps(json.loads(path.read_text()) | values))
 
 
-@pytest.fixture(params=["polycam", "record3d"])
+@pytest.fixture(params=["polycam", "record3d", "stray"])
 def export(request, tmp_path):
     getattr(cases, request.param)(tmp_path / "scan")
     return request.param, tmp_path / "scan"

@@ -6,12 +6,13 @@ import json
 import shutil
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from addon.core.io.layout import Reading
 from addon.core.io.png import write_png
@@ -193,20 +194,42 @@ def polycam(root: Path, corrected: bool = True) -> None:
     (root / "mesh_info.json").write_text(json.dumps(info))
 
 
+def quaternion(pose: np.ndarray) -> list[float]:
+    """x, y, z, w of a pose's rotation."""
+    return Rotation.from_matrix(pose[:3, :3]).as_quat().tolist()
+
+
+def write_odometry(path: Path, poses: Sequence, lens: Sequence[float]) -> None:
+    """Stray Scanner's table of the poses ((4, 4), +Z up, OpenGL axes), all with fx, fy, cx, cy of `lens`."""
+    lines = ["timestamp, frame, x, y, z, qx, qy, qz, qw, fx, fy, cx, cy, distortion_center_x, distortion_center_y"]
+    for i, pose in enumerate(poses):
+        pose = Y_UP @ pose @ np.diag([1.0, -1, -1, 1])
+        values = [i / 60, f"{i:06d}", *pose[:3, 3], *quaternion(pose), *lens]
+        lines.append(", ".join(map(str, values)) + ", , ")
+    path.write_text("\n".join(lines) + "\n")
+
+
 def record3d(root: Path) -> None:
     """A recording as Record3D exports it, and a mesh in its coordinates."""
     frames = mesh_only(root).transforms["frames"]
     jpegs(root, "rgbd", str)
-    poses = []
-    for frame in frames:
-        pose = Y_UP @ frame["transform_matrix"]
-        w = np.sqrt(max(1 + np.trace(pose[:3, :3]), 1e-12)) / 2
-        skew = pose[:3, :3] - pose[:3, :3].T
-        poses.append([*(np.array([skew[2, 1], skew[0, 2], skew[1, 0]]) / (4 * w)), w, *pose[:3, 3]])
+    poses = [[*quaternion(pose), *pose[:3, 3]] for pose in (Y_UP @ frame["transform_matrix"] for frame in frames)]
     told = {"w": WIDTH, "h": HEIGHT, "fps": 60, "K": [6.0, 0, 0, 0, 6.5, 0, 4.0, 3.0, 1]}
     told["poses"] = [[float(x) for x in pose] for pose in poses]
     told["perFrameIntrinsicCoeffs"] = [[6.0, 6.5, 4.0, 3.0]] * COUNT
     (root / "metadata").write_text(json.dumps(told))
+    turn_mesh(root, Y_UP)
+
+
+def stray(root: Path) -> None:
+    """A recording as Stray Scanner exports it, and a mesh in its coordinates; its frames were taken out before."""
+    frames = mesh_only(root).transforms["frames"]
+    shutil.rmtree(root / "images")
+    (root / "rgb.mp4").write_bytes(b"mp4")
+    (root / "rgb.mp4-3").mkdir()
+    for i in range(COUNT):
+        write_png(root / f"rgb.mp4-3/{i:06d}.png", CODES)
+    write_odometry(root / "odometry.csv", [frame["transform_matrix"] for frame in frames], (6.0, 6.5, 4.0, 3.0))
     turn_mesh(root, Y_UP)
 
 
@@ -299,6 +322,7 @@ CASES = (
     Case("polycam_camera", polycam, "keyframes/corrected_cameras/1001.json"),
     Case("polycam_mesh_info", polycam, "mesh_info.json"),
     Case("record3d", record3d, "metadata"),
+    Case("stray", stray, "odometry.csv"),
     Case("scannetpp_segments", scannetpp, "scans/segments.json"),
     Case("scannetpp_objects", scannetpp, "scans/segments_anno.json"),
     Case("scannetpp_lists", scannetpp, "dslr/train_test_lists.json"),
