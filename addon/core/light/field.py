@@ -54,6 +54,8 @@ class LightField:
         self.openings: Openings | None = None
         self.mirror_of = np.full(len(mesh.triangles), -1, np.int8)
         self.lookup = lookup or ElementLookup(mesh, atlas)
+        # By seed, rays that leave the mesh (`portals`): the same for every light, so all fields of the room share them.
+        self.leaving: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     @cached_property
     def room_box(self) -> tuple[np.ndarray, np.ndarray]:

@@ -98,6 +98,26 @@ def find_portals(field: LightField, seed: int = 0) -> Portals | None:
     """
     if not field.environment.radiance.any() and field.openings is None:
         return None
+    if seed not in field.leaving:
+        field.leaving[seed] = _leaving(field, seed)
+    origins, directions = field.leaving[seed]
+    light = field.outside(origins, directions) @ LUMINANCE
+    low, size = field.outer_box
+    telling = np.flatnonzero((light > 0) & within(low, size, origins))
+    if len(telling) < LEVELS.few:
+        return None
+    light = light[telling]
+    cell, _, _ = exits(low, size, origins[telling], directions[telling])
+    chance = np.bincount(cell, light.astype(np.float64), CELLS)
+    side = np.repeat(np.arange(3), 2 * GATHER.cells**2)
+    area = (size[(side + 1) % 3] * size[(side + 2) % 3] / GATHER.cells**2).astype(np.float32)
+    found = np.flatnonzero(chance > 0)
+    chance = chance / chance.sum()
+    return Portals(low, size, found, chance[found], (chance / area).astype(np.float32))
+
+
+def _leaving(field: LightField, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Origins and directions of a few rays, from points spread over the surface, that leave the mesh, (k, 3) each."""
     atlas = field.atlas
     rng = np.random.default_rng(seed)
     weight = np.cumsum(atlas.weight.astype(np.float64))
@@ -108,17 +128,4 @@ def find_portals(field: LightField, seed: int = 0) -> Portals | None:
     directions = to_world(local, normal).reshape(-1, 3)
     origins = np.repeat(field.scene.off_surface(atlas.position[start], normal), GATHER.pilot_rays, 0)
     out = np.flatnonzero(field.scene.intersect(origins, directions).triangle < 0)
-    light = field.outside(origins[out], directions[out]) @ LUMINANCE
-    out, light = out[light > 0], light[light > 0]
-    low, size = field.outer_box
-    inside = within(low, size, origins[out])
-    out, light = out[inside], light[inside]
-    if len(out) < LEVELS.few:
-        return None
-    cell, _, _ = exits(low, size, origins[out], directions[out])
-    chance = np.bincount(cell, light.astype(np.float64), CELLS)
-    side = np.repeat(np.arange(3), 2 * GATHER.cells**2)
-    area = (size[(side + 1) % 3] * size[(side + 2) % 3] / GATHER.cells**2).astype(np.float32)
-    found = np.flatnonzero(chance > 0)
-    chance = chance / chance.sum()
-    return Portals(low, size, found, chance[found], (chance / area).astype(np.float32))
+    return origins[out], directions[out]
