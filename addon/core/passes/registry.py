@@ -55,6 +55,7 @@ def _of(stage: str, **does: str) -> tuple[Pass, ...]:
 PASSES = (
     *_of(
         "surface",
+        frame_choice="Passes over frames that show nothing which others don't show from as near.",
         close_holes="Closes holes of a mesh without objects in its large planes, where frames see nothing there.",
         mesh_denoising="Takes a scan's noise out of its vertices.",
         unfolding="Where triangles are smaller than the noise, draws points towards their neighbours first.",

@@ -209,7 +209,7 @@ class Run:
             self._progress.update(0.7)
             # The scene gets the mesh whose normals face the frames: its lamps shine on that side. And the one that the
             # materials were measured on: their colours fit its normals.
-            posed = replace(recovery.capture, frames=recovery.room_poses().of(self.capture.frames))
+            posed = replace(recovery.capture, frames=recovery.room_poses().of(recovery.capture.frames))
             write_room(store.folder, posed, recovery.surface().first_uv)
             warnings: tuple[str, ...] = ()
             if scene is not None:

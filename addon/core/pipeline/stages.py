@@ -27,6 +27,7 @@ from ..results.overrides import Overrides
 from ..results.store import Store
 from ..results.values import packed, unpacked
 from ..scene.closing import opened
+from ..scene.frame_choice import with_frames_that_add
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Capture, Frame, Mesh
 from ..scene.samples import Samples
@@ -75,7 +76,8 @@ class Stages:
     Attributes
     ----------
     capture : Capture
-        As read; with the lamps set apart that were found in other objects, once `shading` was asked for.
+        As read, without frames that add nothing; with the lamps set apart that were found in other objects, once
+        `shading` was asked for.
     done : dict
         Values of the stages so far.
     log : dict
@@ -96,6 +98,8 @@ class Stages:
         check(settings.without)
         if "close-holes" in settings.without:
             capture = opened(capture)
+        if "frame-choice" not in settings.without and "lit_diffuse" not in settings.published:
+            capture = with_frames_that_add(capture, settings.threads)
         self.capture, self.store, self.settings, self.progress = capture, store, settings, progress
         self._as_read = capture
         self.overrides = overrides

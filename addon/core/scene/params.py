@@ -51,6 +51,28 @@ SMALL = SmallParams()
 
 
 @dataclass(frozen=True)
+class FrameChoiceParams:
+    """Which frames show something new (`frame_choice`); docs/speed-against-error.md has the error against them.
+
+    Attributes
+    ----------
+    few : int
+        Frames that are all taken, as somebody chose them: of 96 of a kitchen, each has something that another lacks.
+    rays : int
+        Into each frame.
+    enough : int
+        Frames that show a cell from one direction at one resolution, from which on another one adds nothing.
+    """
+
+    few: int = 100
+    rays: int = 2000
+    enough: int = 4
+
+
+FRAME_CHOICE = FrameChoiceParams()
+
+
+@dataclass(frozen=True)
 class SampleParams:
     """Observations that are kept one by one (`samples`).
 

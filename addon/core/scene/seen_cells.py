@@ -40,12 +40,7 @@ class SeenCells:
 
     def __init__(self, mesh: Mesh, scene: RayScene, cameras: Sequence[Camera], texel: float, threads: int = 0):
         self._edge = SPARSE.cell * texel
-        normal, area = triangle_geometry(mesh)
-        side = 2 * np.abs(normal).argmax(1)
-        side += np.take_along_axis(normal, (side // 2)[:, None], 1)[:, 0] > 0
-        self._label = (mesh.object_id.astype(np.int64) * 6 + side) * 2
-        if mesh.backs is not None:
-            self._label[len(mesh.triangles) - len(mesh.backs) :] += 1
+        self._label, area = sides(mesh), triangle_geometry(mesh)[1]
         centres = np.array([camera.centre for camera in cameras])
         self._low, self._high = centres.min(0), centres.max(0)
 
@@ -76,9 +71,7 @@ class SeenCells:
         """Number of the cell at points of triangles, (n,) uint64; cells of a level are twice those of the last."""
         edge = self._edge * np.exp2(level)
         place = np.floor(position / (edge[:, None] if np.ndim(edge) else edge)).astype(np.int64)
-        with np.errstate(over="ignore"):
-            found = _numbers(place) + self._label[triangle].astype(np.uint64) * _STEPS[3]
-            return found + np.asarray(level).astype(np.uint64) * _STEPS[4]
+        return cell_numbers(place, self._label[triangle], level)
 
     def seen(self, position: np.ndarray, triangle: np.ndarray) -> np.ndarray:
         """Whether points ((n, 3) float, of triangles (n,) int) lie where the frames look, (n,) bool."""
@@ -112,6 +105,24 @@ class SeenCells:
             edge = self.coarse_edge(position[part], coarser[part])
             found[part] = self._key(position[part], triangle[part], np.log2(edge / self._edge).round().astype(np.int64))
         return found
+
+
+def sides(mesh: Mesh) -> np.ndarray:
+    """A number for each triangle's object and the side that it faces, alike where both are, (t,) int64."""
+    normal, _ = triangle_geometry(mesh)
+    side = 2 * np.abs(normal).argmax(1)
+    side += np.take_along_axis(normal, (side // 2)[:, None], 1)[:, 0] > 0
+    label = (mesh.object_id.astype(np.int64) * 6 + side) * 2
+    if mesh.backs is not None:
+        label[len(mesh.triangles) - len(mesh.backs) :] += 1
+    return label
+
+
+def cell_numbers(place: np.ndarray, label: np.ndarray, level: np.ndarray | int) -> np.ndarray:
+    """A number for each cell's place ((n, 3) int), label and size ((n,) int), (n,) uint64; as good as surely its own."""
+    with np.errstate(over="ignore"):
+        found = _numbers(place) + label.astype(np.uint64) * _STEPS[3]
+        return found + np.asarray(level).astype(np.uint64) * _STEPS[4]
 
 
 def _numbers(place: np.ndarray) -> np.ndarray:
