@@ -61,5 +61,6 @@ def frames_that_add(mesh: Mesh, cameras: Sequence[Camera], threads: int = 0) -> 
 def _spread(count: int) -> np.ndarray:
     """Numbers below `count`, each far from those before it (van der Corput's sequence), (count,) int."""
     bits = max((count - 1).bit_length(), 1)
-    order = sum((np.arange(1 << bits) >> bit & 1) << (bits - 1 - bit) for bit in range(bits))
+    one = 1 << np.arange(bits)
+    order = (np.arange(1 << bits)[:, None] & one > 0) @ one[::-1]
     return order[order < count]

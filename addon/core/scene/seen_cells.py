@@ -119,7 +119,7 @@ def sides(mesh: Mesh) -> np.ndarray:
 
 
 def cell_numbers(place: np.ndarray, label: np.ndarray, level: np.ndarray | int) -> np.ndarray:
-    """A number for each cell's place ((n, 3) int), label and size ((n,) int), (n,) uint64; as good as surely its own."""
+    """A number for each cell's place ((n, 3) int), label and size ((n,) int), (n,) uint64: almost surely its own."""
     with np.errstate(over="ignore"):
         found = _numbers(place) + label.astype(np.uint64) * _STEPS[3]
         return found + np.asarray(level).astype(np.uint64) * _STEPS[4]

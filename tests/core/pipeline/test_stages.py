@@ -17,7 +17,8 @@ from addon.core.pipeline.source import CORE, digest
 from addon.core.pipeline.stages import STAGES, Stages
 from addon.core.progress import Progress
 from addon.core.results.overrides import parse
-from addon.core.settings import Settings
+from addon.core.scene.params import FRAME_CHOICE
+from addon.core.settings import PAPER, Settings
 from tests.core.on_disk import CHEAP, OnDisk
 
 NAMES = [stage.name for stage in STAGES]
@@ -69,6 +70,19 @@ def test_no_setting_is_forgotten(capture, field):
 )
 def test_a_pass_left_out_changes_its_stage_and_those_after(capture, name, first):
     assert changed(capture, Settings(without=(name,))) == [*NAMES, "run"][first:]
+
+
+def test_a_long_video_goes_without_frames_that_add_nothing(capture):
+    """Not where that pass is left out, nor in the paper's way."""
+    many = FRAME_CHOICE.few // len(capture.frames) + 1
+    video = dataclasses.replace(capture, frames=capture.frames * many)
+
+    def taken(settings: Settings) -> int:
+        return len(Stages(video, None, settings, Progress(), lambda mesh, size: None).capture.frames)
+
+    assert taken(DEFAULT) < len(video.frames)
+    assert taken(Settings(without=("frame-choice",))) == taken(PAPER) == len(video.frames)
+    assert changed(video, Settings(without=("frame-choice",))) == [*NAMES, "run"]
 
 
 def test_what_is_given_of_highlights_changes_the_fit_alone(capture):
