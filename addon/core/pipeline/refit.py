@@ -19,7 +19,7 @@ from ..progress import Progress
 from ..results.overrides import Given, Overrides, heeded, parse
 from ..results.room_file import DAMAGE, MATERIALS, Room, read_room
 from ..results.store import Store
-from ..scene.model import Mesh
+from ..scene.model import Capture, Mesh
 from ..settings import ROOM, Settings
 from .parts import STAGE as DETAIL
 from .parts import stored_key as detail_key
@@ -147,6 +147,9 @@ class Refit(Recovery):
         if self.settings.atlas != ROOM and store.stored_key(DETAIL) != detail_key(self):
             raise _again(store.folder, "what its frames show of finer texels was cleared")
         self._specular_before = self._load_specular()
+
+    def _taken(self, capture: Capture, settings: Settings) -> Capture:
+        return capture  # the room has those that the run looked at
 
     def _first_key(self, stage: Stage) -> str:
         return self.store.stored_key(stage.name) or ""

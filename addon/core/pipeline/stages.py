@@ -98,8 +98,7 @@ class Stages:
         check(settings.without)
         if "close-holes" in settings.without:
             capture = opened(capture)
-        if "frame-choice" not in settings.without and "lit_diffuse" not in settings.published:
-            capture = with_frames_that_add(capture, settings.threads)
+        capture = self._taken(capture, settings)
         self.capture, self.store, self.settings, self.progress = capture, store, settings, progress
         self._as_read = capture
         self.overrides = overrides
@@ -108,6 +107,12 @@ class Stages:
         self._unwrap = unwrap
         self.done: dict[str, Any] = {}
         self.log: dict[str, dict[str, Any]] = {}
+
+    def _taken(self, capture: Capture, settings: Settings) -> Capture:
+        """A capture with the frames that are looked at."""
+        if "frame-choice" in settings.without or "lit_diffuse" in settings.published:
+            return capture
+        return with_frames_that_add(capture, settings.threads)
 
     @property
     def frames(self) -> tuple[Frame, ...]:

@@ -21,6 +21,7 @@ from addon.core.progress import Progress
 from addon.core.results.overrides import parse
 from addon.core.results.room_file import write_room
 from addon.core.results.store import Store
+from addon.core.scene.params import FRAME_CHOICE
 from tests.core.on_disk import ALBEDO, LAMP, QUICK, OnDisk
 from tests.core.rooms import radiosity
 
@@ -28,13 +29,14 @@ pytestmark = pytest.mark.usefixtures("few_samples")
 IMAGES = ("albedo", "base_color", "albedo_error", "coverage", "shading", "lit_diffuse", "evidence", "environment")
 
 
-def recover(disk, folder, told=None, settings=QUICK):
-    """A whole run with all that the bridge writes, but the scene."""
+def recover(disk, folder, told=None, settings=QUICK, times=1):
+    """A whole run with all that the bridge writes, but the scene; each frame comes so many times."""
     with Store(folder) as store:
         capture = read_capture(disk.root)
+        capture = replace(capture, frames=capture.frames * times)
         run = Recovery(capture, store, settings, Progress(), disk.unwrap, parse(told or {}, "given", range(7)))
         run.write_images()
-        write_room(folder, capture, run.surface().first_uv)
+        write_room(folder, run.capture, run.surface().first_uv)
         store.write_json("report.json", run.report())
     return run
 
@@ -247,3 +249,12 @@ def test_texture_of_what_is_not_touched_stays(tmp_path):
     del run.texture
     run.capture = replace(run.capture, instances=tuple(replace(one, guess=True) for one in run.capture.instances))
     assert len(run.texture.texel) == 0
+
+
+@pytest.mark.slow
+def test_a_video_is_fitted_again_with_the_frames_that_the_run_chose(disk, tmp_path):
+    before = recover(disk, tmp_path / "result", times=FRAME_CHOICE.few // disk.count + 1)
+    assert len(before.capture.frames) <= FRAME_CHOICE.few
+    again = refit(tmp_path / "result", [3])
+    assert [frame.name for frame in again.capture.frames] == [frame.name for frame in before.capture.frames]
+    assert len(again.room_poses().of(again.capture.frames)) == len(before.capture.frames)
