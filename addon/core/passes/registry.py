@@ -86,6 +86,7 @@ PASSES = (
         portal_rays="Aims rays at the openings to the outside.",
         interpolation="Gathers irradiance at few points and interpolates between them.",
         lamp_noise="Takes the noise of rays and of interpolation out of the irradiance.",
+        crease_error="Counts irradiance beside creases as less certain.",
         tilt_error="Counts irradiance on triangles that noise has turned as less certain.",
         unseen_surfaces="Lets what no frame sees reflect like the rest of its object.",
     ),

@@ -25,6 +25,7 @@ from ..passes.missing_light.missing_light import find_missing_light, is_missing
 from ..passes.unseen_light.unseen_light import Light
 from ..progress import Progress
 from ..scene.atlas import Atlas
+from ..scene.creases import crease_error
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.mesh_noise import tilt
 from ..scene.model import Capture, Instance, Mesh
@@ -186,6 +187,9 @@ def shade(
     )  # fmt: skip
     # A noisy mesh faces elsewhere than the surface did.
     unsure = np.hypot(unsure, tilted)
+    # Near a crease the light of two sides is mixed.
+    if "crease-error" not in without:
+        unsure = np.hypot(unsure, crease_error(mesh, atlas, atlas.texel_edge))
     notes = light.notes if field.sun is None else (*light.notes, field.sun.note)
     return Shading(
         E, escaped, unsure, field.radiance, light.lamps, field.environment, notes, field.mirrors, points, field.sun,

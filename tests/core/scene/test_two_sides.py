@@ -9,6 +9,7 @@ from addon.core.light.emitters import bright_triangles
 from addon.core.light.field import LightField
 from addon.core.light.irradiance import direct, gather
 from addon.core.passes.albedo.albedo import FILLED, fill
+from addon.core.scene.creases import edge_angles
 from addon.core.scene.elements import make_atlas, triangle_geometry
 from addon.core.scene.model import Mesh
 from addon.core.scene.orientation import seen_sides
@@ -134,6 +135,13 @@ def test_rays_meet_the_side_that_they_come_from():
         at = a + hits.u[:, None] * (b - a) + hits.v[:, None] * (c - a)
         np.testing.assert_allclose(at, origins + hits.distance[:, None] * way, atol=1e-5)
     assert scene.intersect(np.float32([[0, 0, 5]]), np.float32([[0, 0, 1]])).triangle.tolist() == [-1]
+
+
+def test_borders_of_a_sheet_stay_borders():
+    angles, single = edge_angles(with_backs(tube(), np.arange(2 * ROUND))), edge_angles(tube())
+    assert (single == np.pi / 2).any(1).all()
+    np.testing.assert_array_equal(angles[: 2 * ROUND], single)
+    np.testing.assert_array_equal(np.sort(angles[2 * ROUND :], 1), np.sort(single, 1))
 
 
 def test_light_of_either_side_goes_its_own_way():

@@ -1,0 +1,82 @@
+"""Near a crease an element's irradiance is uncertain: texel, pixels and facets mix the light of both sides."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from .atlas import Atlas
+from .elements import triangle_geometry
+from .model import Mesh
+from .params import CREASES
+from .two_sides import fronts, other_way
+from .weld import one_place, welded
+
+
+def edge_angles(mesh: Mesh, wanted: np.ndarray | None = None) -> np.ndarray:
+    """Angle in radians, 0...pi/2, by which the surface bends at each triangle's edges, (t, 3); edge k lies opposite
+    corner k. Windings don't matter. Where an edge has no other triangle, pi/2: what goes on there is not known. 0 at a
+    sliver's edges. A sheet's second side bends as its first one does. Of triangles that are not `wanted` ((t,) bool),
+    anything."""
+    if mesh.backs is not None:
+        single, sheet = fronts(mesh)
+        either = None if wanted is None else np.bincount(sheet, wanted, len(single.triangles)) > 0
+        angle = edge_angles(single, either)
+        return np.concatenate([angle, other_way(angle[mesh.backs])])
+    points, faces, _ = welded(mesh, one_place(mesh.vertices))
+    if wanted is not None:
+        # Who shares an edge has two of its points: the others tell nothing, and may be most of a million.
+        used = np.zeros(len(points), bool)
+        used[faces[wanted]] = True
+        kept = np.flatnonzero(used[faces].sum(1) >= 2)
+        result = np.zeros((len(faces), 3))
+        result[kept] = _angles(replace(mesh, triangles=mesh.triangles[kept]), points, faces[kept])
+        return result
+    return _angles(mesh, points, faces)
+
+
+def _angles(mesh: Mesh, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """`edge_angles` of a mesh whose triangles are `faces` of welded `points`."""
+    normal, area = triangle_geometry(mesh)
+    corners = mesh.vertices[mesh.triangles]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
+    sliver = np.repeat(2 * area < CREASES.thin * longest**2, 3)
+    ends = np.sort(np.stack([faces[:, [1, 2]], faces[:, [2, 0]], faces[:, [0, 1]]], 1), 2).reshape(-1, 2)
+    _, edge, count = np.unique(ends[:, 0] * len(points) + ends[:, 1], return_inverse=True, return_counts=True)
+    edge = edge.ravel()
+    own = np.repeat(normal, 3, 0).astype(np.float64)
+    # Each triangle against the next one at its edge, in a circle: of two, that is the other one.
+    order = np.argsort(edge, kind="stable")
+    start = np.cumsum(count) - count
+    rank = np.arange(len(edge)) - start[edge[order]]
+    following = order[start[edge[order]] + (rank + 1) % count[edge[order]]]
+    cosine = np.empty(len(edge))
+    cosine[order] = np.abs((own[order] * own[following]).sum(1))
+    angle = np.arccos(np.clip(cosine, 0, 1))
+    angle[count[edge] == 1] = np.pi / 2
+    angle[np.bincount(edge, sliver, len(count))[edge] > 0] = 0
+    return angle.reshape(-1, 3)
+
+
+def crease_error(mesh: Mesh, atlas: Atlas, texel: float) -> np.ndarray:
+    """Relative standard error of the irradiance for nearby creases, (n,) float32.
+
+    Parameters
+    ----------
+    texel : float
+        Edge of an element in metres.
+    """
+    angles = edge_angles(mesh, np.bincount(atlas.triangle, minlength=len(mesh.triangles)) > 0)
+    relative_error = np.zeros(len(atlas), np.float32)
+    corners = mesh.vertices[mesh.triangles].astype(np.float32)
+    bent = np.flatnonzero((angles[atlas.triangle] > 0.01 * CREASES.knee).any(1))
+    triangle, position = atlas.triangle[bent], atlas.position[bent]
+    for k in range(3):
+        a, b = corners[triangle, (k + 1) % 3], corners[triangle, (k + 2) % 3]
+        way = b - a
+        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
+        off = position - a
+        off -= (off * way).sum(1, keepdims=True) * way
+        near = np.maximum(1 - np.linalg.norm(off, axis=1) / (CREASES.reach * texel), 0)
+        felt = CREASES.most_error * np.minimum(angles[triangle, k] * near / CREASES.knee, 1)
+        relative_error[bent] = np.maximum(relative_error[bent], felt)
+    return relative_error
