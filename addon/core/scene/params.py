@@ -66,7 +66,7 @@ class FrameChoiceParams:
 
     few: int = 100
     rays: int = 2000
-    enough: int = 4
+    enough: int = 8
 
 
 FRAME_CHOICE = FrameChoiceParams()

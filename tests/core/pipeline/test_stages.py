@@ -74,8 +74,8 @@ def test_a_pass_left_out_changes_its_stage_and_those_after(capture, name, first)
 
 def test_a_long_video_goes_without_frames_that_add_nothing(capture):
     """Not where that pass is left out, nor in the paper's way."""
-    many = FRAME_CHOICE.few // len(capture.frames) + 1
-    video = dataclasses.replace(capture, frames=capture.frames * many)
+    video = dataclasses.replace(capture, frames=capture.frames * (2 * FRAME_CHOICE.enough))
+    assert len(video.frames) > FRAME_CHOICE.few
 
     def taken(settings: Settings) -> int:
         return len(Stages(video, None, settings, Progress(), lambda mesh, size: None).capture.frames)
