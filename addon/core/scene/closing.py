@@ -271,10 +271,12 @@ def _outside(sight: Sight, group: np.ndarray, count: int, shown: Shown, gap: flo
     for one in range(count):
         own = np.flatnonzero(of == one)
         told = own[~shown.clipped[own] & np.isfinite(value[own]).all(1)]
-        if len(told) < max(len(own) / 2, 1) or not np.median(value[told].mean(1)) <= shown.bright:
+        if len(told) < max(len(own) / 2, 1):
             continue
         if np.median(sight.out[group == one]) <= shown.views:
             outside[one] = False
+            continue
+        if not np.median(value[told].mean(1)) <= shown.bright:
             continue
         way = np.floor(sight.direction[told] * (np.median(sight.distance[told]) / gap)).astype(int)
         direction = np.unique(way, axis=0, return_inverse=True)[1].ravel()
@@ -357,17 +359,19 @@ def _axes(normal: np.ndarray, walls: Sequence[np.ndarray]) -> tuple[np.ndarray, 
 
 
 def _covered(sheet: Sheet, corners: np.ndarray) -> np.ndarray:
-    """Cells in which triangles ((n, 3, 3)) lie, (h, w) bool."""
-    covered = np.zeros(sheet.open.shape, bool)
+    """Cells that triangles ((n, 3, 3)) cover, (h, w) bool: all of it, as a scan is porous where depth is noisy."""
+    fine = CLOSING.fine
+    covered = np.zeros(np.multiply(sheet.open.shape, fine), bool)
     longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1, initial=0)
-    steps = np.exp2(np.ceil(np.log2(np.maximum(2 * longest / sheet.edge, 1)))).astype(int)
+    steps = np.exp2(np.ceil(np.log2(np.maximum(2 * fine * longest / sheet.edge, 1)))).astype(int)
     for count in np.unique(steps):
         own = corners[steps == count]
         for i in range(count + 1):
             for j in range(count + 1 - i):
                 point = own[:, 0] + (i * (own[:, 1] - own[:, 0]) + j * (own[:, 2] - own[:, 0])) / count
-                away = (point - sheet.corner) / sheet.edge
+                away = (point - sheet.corner) * (fine / sheet.edge)
                 row, column = (np.floor(away @ way).astype(int) for way in (sheet.up, sheet.right))
                 inside = (row >= 0) & (column >= 0) & (row < covered.shape[0]) & (column < covered.shape[1])
                 covered[row[inside], column[inside]] = True
-    return covered
+    height, width = sheet.open.shape
+    return covered.reshape(height, fine, width, fine).all((1, 3))

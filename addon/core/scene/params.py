@@ -335,6 +335,8 @@ class ClosingParams:
         Edge in cells of the squares that close what no frame saw, a power of 2: a third of a metre in a room.
     nearly_all : float
         Of the mesh: the share that is darker than the outside, and that more frames see than what was not fused.
+    fine : int
+        Parts of a cell's edge: a cell is closed of which one is open, 1.6 cm in a room.
     speck : int
         Cells that hang together, of 4 cm in a room: no window is so small, and a hole that is shows black.
     under : float
@@ -343,6 +345,7 @@ class ClosingParams:
 
     block: int = 8
     nearly_all: float = 0.95
+    fine: int = 4
     speck: int = 4
     under: float = 0.025
 

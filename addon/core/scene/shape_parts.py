@@ -151,10 +151,18 @@ def _plane_at(faces: _Faces, seed: np.ndarray, free: np.ndarray, gap: float) -> 
         normal = np.linalg.eigh(arm.T @ arm)[1][:, 0]
         normal *= np.sign(normal @ (weight @ faces.normal[own])) or 1
         near = free[np.abs((faces.centre[free] - point) @ normal) < gap]
-        own = faces.largest(near[faces.normal[near] @ normal > np.cos(PARTS.tilt)])
+        alike = near[faces.normal[near] @ normal > np.cos(PARTS.tilt)]
+        own = faces.largest(alike)
         if not len(own):
             return None
-    return Plane(normal, point, own)
+    # A wall at the far end of what the camera's depth reaches is islands: what bounds the room need not hang together.
+    return Plane(normal, point, alike if _bounds(faces, point, normal, gap) else own)
+
+
+def _bounds(faces: _Faces, point: np.ndarray, normal: np.ndarray, gap: float) -> bool:
+    """Whether (nearly) all of the mesh lies in front of a plane."""
+    inside = (faces.centre - point) @ normal > -gap
+    return bool(faces.area[inside].sum() >= PARTS.outer * faces.area.sum())
 
 
 def _is_curved(faces: _Faces, own: np.ndarray, normal: np.ndarray) -> bool:
@@ -205,8 +213,7 @@ def _over_convex_edges(faces: _Faces, piece: np.ndarray, flat: np.ndarray) -> np
 
 def _name(plane: Plane, faces: _Faces, gap: float) -> str:
     """'floor', 'ceiling' or 'wall' where (nearly) all of the mesh lies in front of a plane; '' else."""
-    inside = (faces.centre - plane.point) @ plane.normal > -gap
-    if faces.area[inside].sum() < PARTS.outer * faces.area.sum():
+    if not _bounds(faces, plane.point, plane.normal, gap):
         return ""
     up, slant = plane.normal[2], np.sin(PARTS.tilt)
     if abs(up) < slant:

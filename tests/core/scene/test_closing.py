@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,33 @@ def test_a_window_stays_open():
     before = leaks(mesh, None)
     assert before > 0.005
     assert leaks(mesh, closing(mesh)) == pytest.approx(before, rel=0.15)
+
+
+def test_what_so_few_frames_see_is_closed_however_bright():
+    """One frame sees the wall and its hole; seven look the other way."""
+    vertices, triangles = room(window)
+    away = []
+    for frame in frames()[1:]:
+        pose = np.diag([-1.0, -1, 1, 1]) @ frame.camera.camera_to_world
+        pose[:3, 3] = frame.camera.centre
+        away.append(replace(frame, camera=replace(frame.camera, camera_to_world=pose)))
+    read = pictures(vertices, triangles, lambda start, rays: np.full(len(rays), 5.0))
+    added = close_holes(vertices, triangles, parts_of(vertices, triangles), (frames()[0], *away), read)
+    assert leaks((vertices, triangles), added) < 1e-3 < leaks((vertices, triangles), None)
+
+
+def test_a_porous_wall_is_closed():
+    """Each cell holds some of the scan, and none is covered by it."""
+    rng = np.random.default_rng(0)
+    vertices, triangles = room(lambda centre, side: (side == 1) & (rng.random(len(side)) < 0.5))
+    corners = vertices[triangles]
+    middle = corners.mean(1, keepdims=True)
+    porous = (np.abs(middle[..., 0] - 3) < 0.05).ravel()
+    small = np.where(porous[:, None, None], middle + 0.5 * (corners - middle), corners)
+    mesh = small.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
+    parts = parts_of(vertices, triangles)
+    added = close_holes(*mesh, parts, frames(), pictures(*mesh, lambda start, rays: np.full(len(rays), 5.0)))
+    assert leaks(mesh, added) < 1e-3 < leaks(mesh, None)
 
 
 def test_a_dark_view_stays_open_and_a_missed_surface_is_closed():

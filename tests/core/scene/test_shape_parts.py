@@ -56,6 +56,17 @@ def test_a_furnished_room_in_one_piece(noise):
     assert sorted(names.values()).count("floor") == 1 and set(names) == set(np.unique(part).tolist())
 
 
+def test_a_wall_at_the_end_of_the_cameras_depth_is_one_plane_though_it_is_islands():
+    vertices, triangles, side = fused()
+    centre = vertices[triangles].mean(1)
+    cell = np.floor(centre[:, 1:] / 0.2).astype(int).sum(1)
+    kept = (side != 1) | (cell % 2 == 0) & (np.abs(centre[:, 1:] - [1.2, 1.0]).max(1) < 0.8)
+    planes = parts_of(vertices, triangles[kept]).planes
+    (wall,) = (one for one in planes if one.normal[0] < -0.9 and one.name == "wall")
+    assert wall.point[0] == pytest.approx(3, abs=0.05)
+    assert len(wall.faces) > 0.8 * (side[kept] == 1).sum()
+
+
 def test_the_unit_of_length_and_the_place_do_not_matter():
     vertices, triangles, _ = fused()
     one = shape_parts(vertices, triangles)

@@ -18,6 +18,7 @@ from ...light.openings import CELLS, Openings, exits
 from ...light.params import GATHER
 from ...luminance import LUMINANCE
 from ...parallel import for_blocks
+from ...scene.atlas import Atlas
 from ...significance import LEVELS
 from .params import MISSING
 from .solve import Unknown, in_one_plane, solve
@@ -84,15 +85,18 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
     part = sky.clipped_parts(MISSING.sky)
     cell, through, shown, by_part = _through_cells(field, part, shut, element, seed)
     received = received + shown
-    thrown = [contribution_of(field, element, [one], seed) for one in patches]
+    thrown = np.reshape([contribution_of(field, element, [one], seed) for one in patches], (-1, len(element))).T
+    same = same_lamps(atlas, list(own.values()))
     usual = np.median(radiance[element], 0).astype(np.float64)
     # What hardly any element sees says nothing, and lights nothing.
     told, lit = (given.mean(0) >= MISSING.least_seen for given in (through, by_part))
     level = sky.mean_of(part, len(lit))
     received = received + through[:, ~told].sum(1)[:, None] * usual + by_part[:, ~lit] @ level[~lit]
-    clipped, cells = np.concatenate([np.reshape([bound[one] for one in patches], (-1, 3)), level[lit]]), int(told.sum())
+    told_by = np.reshape(list(bound.values()), (-1, 3))
+    least = np.reshape([np.median(told_by[w > 0] / w[w > 0, None], 0) for w in same.T], (-1, 3))
+    clipped, cells = np.concatenate([least, level[lit]]), int(told.sum())
     unknown = Unknown(
-        np.concatenate([np.reshape(thrown, (-1, len(element))).T, by_part[:, lit], through[:, told]], 1),
+        np.concatenate([thrown @ same, by_part[:, lit], through[:, told]], 1),
         np.concatenate([clipped, np.full((cells, 3), 1e-6)]),
         np.concatenate([clipped, np.tile(usual, (cells, 1))]),
     )
@@ -100,9 +104,10 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
     pairs = in_one_plane(atlas.position[element], atlas.normal[element], seed)
     found, spread = solve(sent, received, unknown, pairs)
 
-    solved = dict(zip(patches, found, strict=False))
+    of_patch = same @ found[: len(least)]
+    solved = dict(zip(patches, of_patch, strict=True))
     E = received + unknown.contribution @ found
-    of_all = (unknown.contribution[:, : len(patches)] * (found[: len(patches)] @ LUMINANCE)) / (E @ LUMINANCE)[:, None]
+    of_all = thrown * (of_patch @ LUMINANCE) / (E @ LUMINANCE)[:, None]
     strong = (of_all > LEVELS.gain).sum(0) >= LEVELS.many
     lamps = tuple(
         Lamp(one, solved[one].astype(np.float32), False, clipped=True, spread=spread)
@@ -111,9 +116,9 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
     )
     by_opening = np.tile(usual, (len(through.T), 1))
     by_opening[told] = found[len(clipped) :]
-    level[lit] = found[len(patches) : len(clipped)]
+    level[lit] = found[len(least) : len(clipped)]
     low, size = field.outer_box
-    share = float((unknown.contribution[:, len(patches) :] @ found[len(patches) :]).sum() / E.sum())
+    share = float((unknown.contribution[:, len(least) :] @ found[len(least) :]).sum() / E.sum())
     openings = Openings(low, size, by_opening[cell].astype(np.float32), share)
     note = (
         f"{share:.0%} of the light comes in by openings of the mesh, from where it was solved from what it throws: "
@@ -122,6 +127,36 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
     brighter = frozenset(lamp.object_id for lamp in find_seen(atlas.object_id[element], sent, E))
     notes = (note,) if share >= LEVELS.gain else ()
     return MissingLight(lamps, solved, brighter, openings, sky.with_clipped(part, level), shut, notes)
+
+
+def same_lamps(atlas: Atlas, patches: list[np.ndarray]) -> np.ndarray:
+    """Which patches are the same lamp, hung several times in one plane, of about one area: it gives as much light each.
+
+    Parameters
+    ----------
+    patches : list of (n,) bool
+        Elements of each of p.
+
+    Returns
+    -------
+    (p, l) float
+        Radiance of each patch where each of l lamps is of the mean radiance 1; 0 for what is another.
+    """
+    area = np.maximum([atlas.area[own].sum() for own in patches], 1e-12)
+    centre, normal = (
+        np.reshape([atlas.area[own] @ of[own] for own in patches], (-1, 3)) for of in (atlas.position, atlas.normal)
+    )
+    centre = centre / area[:, None]
+    normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    left, lamps = np.ones(len(patches), bool), []
+    for one in np.argsort(-area, kind="stable"):
+        if left[one]:
+            flat = np.abs((centre - centre[one]) @ normal[one]) < MISSING.off_plane
+            alike = left & flat & (normal @ normal[one] > MISSING.same_plane) & (MISSING.alike * area > area[one])
+            alike[one] = True
+            left[alike] = False
+            lamps.append(np.where(alike, area[alike].mean() / area, 0))
+    return np.reshape(lamps, (len(lamps), len(patches))).T
 
 
 def _sample(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:

@@ -33,6 +33,9 @@ class MissingLightParams:
         Others in the same plane that an element is compared with: so many of the nearest, and of all.
     same_plane, off_plane : float
         Cosine of their normals, and metres.
+    alike : float
+        Times the area of another patch in its plane up to which one is the same lamp (`same_lamps`). A lamp's edge is
+        off by an element or a triangle of the scan: spots of .0062 and .0092 square metres came out at .006 to .021.
     apart : float
         Difference of log albedo from which on two elements count as of two paints (Cauchy's scale).
     level : float
@@ -68,6 +71,7 @@ class MissingLightParams:
     neighbours: int = 8
     same_plane: float = 0.97
     off_plane: float = 0.05
+    alike: float = 3.0
     apart: float = 0.1
     level: float = 0.03
     deviation: float = 0.5

@@ -15,7 +15,7 @@ from addon.core.light.mirrors import Mirror
 from addon.core.light.openings import CELLS, Openings
 from addon.core.passes.clipped_lamps.clipped import clipped_objects
 from addon.core.passes.clipped_lamps.patches import clipped_patches, told_of
-from addon.core.passes.missing_light.missing_light import _through_cells, find_missing_light, is_missing
+from addon.core.passes.missing_light.missing_light import _through_cells, find_missing_light, is_missing, same_lamps
 from addon.core.passes.missing_light.params import MISSING
 from addon.core.passes.missing_light.solve import Unknown, solve
 from addon.core.scene.lit_diffuse import LitDiffuse
@@ -128,6 +128,21 @@ def test_a_clipped_lamp_of_the_same_object_gets_its_radiance(seed):
     albedo = np.pi * measured[~in_lamp(room)] / E
     assert off(albedo, rho[~in_lamp(room)]) < 0.2
     assert (albedo > 1).mean() < 0.03
+
+
+def test_patches_of_about_one_area_in_one_plane_are_the_same_lamp():
+    """Each gives as much light, so the smaller is the brighter; what lies elsewhere is another lamp."""
+    room = box()
+    atlas, x = room.atlas, room.atlas.position[:, 0]
+    floor = (atlas.position[:, 2] < 0.01) & (np.abs(x - 2) < 0.4)
+    large, small = (in_lamp(room) & way for way in ((x > 1.4) & (x < 1.8), x < 1.4))
+    radiance = same_lamps(atlas, [small, floor, large])
+    light = radiance * np.array([[atlas.area[own].sum()] for own in (small, floor, large)])
+    assert radiance.shape == (3, 2)
+    (together,) = np.flatnonzero(radiance[0] > 0)
+    assert light[0, together] == pytest.approx(light[2, together]) and not radiance[1, together]
+    assert radiance[1, 1 - together] == pytest.approx(1) and not radiance[[0, 2], 1 - together].any()
+    assert same_lamps(atlas, []).shape == (0, 0)
 
 
 def test_a_patch_that_is_as_bright_as_it_was_measured_is_no_lamp():
