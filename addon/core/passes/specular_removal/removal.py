@@ -58,6 +58,9 @@ class SpecularPart:
     field : LightField
     materials : sequence of ObjectMaterial
         Those whose lobes are predicted.
+    seed : int
+    rays : int
+        Of a pixel.
     """
 
     def __init__(self, field: LightField, materials: Sequence[ObjectMaterial], seed: int = 0, rays: int = REMOVAL.rays):
