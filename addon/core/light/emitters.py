@@ -58,11 +58,16 @@ def triangle_luminance(field: LightField) -> np.ndarray:
 
 def bright_triangles(field: LightField) -> BrightTriangles:
     """The triangles that give most of the light for their size."""
-    normal, area = triangle_geometry(field.mesh)
-    luminance = triangle_luminance(field)
     weight = field.atlas.weight
     mean = (field.radiance @ LUMINANCE * weight).sum() / max(weight.sum(), 1e-30)
-    bright = np.flatnonzero((luminance > GATHER.bright * mean) & (luminance * area > 0))
+    return shining(field, GATHER.bright * mean)
+
+
+def shining(field: LightField, above: float = 0.0) -> BrightTriangles:
+    """The triangles of a luminance above this: those that give most light, if there are too many."""
+    normal, area = triangle_geometry(field.mesh)
+    luminance = triangle_luminance(field)
+    bright = np.flatnonzero((luminance > above) & (luminance * area > 0))
     power = luminance[bright] * area[bright]
     most = np.sort(np.argsort(-power)[: GATHER.max_triangles])
     bright, power = bright[most], power[most]

@@ -7,9 +7,7 @@ from ..kinds import Block
 from ..luminance import LUMINANCE
 from ..parallel import for_blocks
 from ..significance import LEVELS
-from .directions import cosine_patterns, turned
 from .emitters import bright_triangles
-from .environment import Environment
 from .field import LightField
 from .irradiance import direct, gather
 from .params import GATHER, LIGHT_FIT
@@ -84,35 +82,6 @@ def from_sun(field: LightField, element: np.ndarray) -> np.ndarray:
     if field.sun is None:
         return np.zeros((len(element), 3), np.float32)
     return sunlight(field.scene, field.sun, atlas.position[element], atlas.normal[element], atlas.texel_edge)[:, :3]
-
-
-def contribution_of(field: LightField, element: np.ndarray, objects: list[int], seed: int) -> np.ndarray:
-    """E from these objects at radiance 1 and nothing else, (m,) float64."""
-    alone = np.repeat(np.isin(field.atlas.object_id, objects)[:, None], 3, 1).astype(np.float32)
-    lit = field.with_sun(None).with_light(alone, Environment.dark(), objects)
-    return irradiance_at(lit, element, seed)[:, 0]
-
-
-def reaching_most(field: LightField, element: np.ndarray, groups: list[list[int]], count: int, seed: int) -> list[int]:
-    """Of groups of objects the `count` that would light a few elements most, were all of one radiance: rising indices.
-
-    One trace for all groups, so that it takes no longer for thousands.
-    """
-    of_object = np.full(int(field.mesh.object_id.max(initial=0)) + 1, -1)
-    for index, objects in enumerate(groups):
-        of_object[objects] = index
-    position, normal = field.atlas.position[element], field.atlas.normal[element]
-    patterns, rng = cosine_patterns(LIGHT_FIT.emitter_rays, seed), np.random.default_rng(seed)
-    met = np.zeros(len(groups))
-
-    def run(part: slice) -> None:
-        start = np.repeat(field.scene.off_surface(position[part], normal[part]), LIGHT_FIT.emitter_rays, 0)
-        triangle = field.scene.intersect(start, turned(patterns, normal[part], rng)[0].reshape(-1, 3)).triangle
-        group = of_object[field.mesh.object_id[triangle[triangle >= 0]]]
-        np.add.at(met, group[group >= 0], 1)
-
-    for_blocks(run, len(element), ELEMENTS_AT_ONCE, 1)
-    return np.sort(np.argsort(-met, kind="stable")[:count]).tolist()
 
 
 def most_reflected(field: LightField, objects: list[int], seed: int) -> float:

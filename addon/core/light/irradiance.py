@@ -73,10 +73,11 @@ def gather(
         out = hits.triangle < 0
         if emitter_rays and len(bright):
             on, aimed = aimed_at(bright, hits, directions, field.normal)
-            radiance[on] *= _share(rays * cosine[on], emitter_rays * aimed)
+            radiance[on] *= balance(rays * cosine[on], emitter_rays * aimed)[:, None]
         if portals is not None and portal_rays:
             on = np.flatnonzero(out)
-            radiance[on] *= _share(rays * cosine[on], portal_rays * portals.aimed_density(origins[on], directions[on]))
+            density = portals.aimed_density(origins[on], directions[on])
+            radiance[on] *= balance(rays * cosine[on], portal_rays * density)[:, None]
         total[part] = np.float32(np.pi / rays) * np.einsum("nkc->nc", radiance.reshape(len(p), rays, 3))
         near = np.einsum("nk->n", 1 / np.maximum(hits.distance, 1e-9).reshape(len(p), rays))
         radius[part] = rays / np.maximum(near, 1e-20)
@@ -88,10 +89,10 @@ def gather(
     return total, radius, escaped
 
 
-def _share(cosine_rays: np.ndarray, aimed: np.ndarray) -> np.ndarray:
-    """The balance heuristic's weight of cosine-distributed rays, (n, 1); `aimed` is rays times density."""
+def balance(cosine_rays: np.ndarray, aimed: np.ndarray) -> np.ndarray:
+    """The balance heuristic's weight of cosine-distributed rays, (n,); `aimed` is rays times density."""
     own = cosine_rays / np.float32(np.pi)
-    return (own / np.maximum(own + aimed, 1e-20))[:, None]
+    return own / np.maximum(own + aimed, 1e-20)
 
 
 def from_outside(

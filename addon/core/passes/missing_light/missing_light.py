@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...light.contributions import contributions
 from ...light.directions import cosine_patterns, turned
 from ...light.environment import Environment
-from ...light.few_elements import contribution_of, evened, irradiance_at
+from ...light.few_elements import evened, irradiance_at
 from ...light.field import LightField
 from ...light.lamps import Lamp, find_seen
 from ...light.openings import CELLS, Openings, exits
@@ -85,7 +86,7 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
     part = sky.clipped_parts(MISSING.sky)
     cell, through, shown, by_part = _through_cells(field, part, shut, element, seed)
     received = received + shown
-    thrown = np.reshape([contribution_of(field, element, [one], seed) for one in patches], (-1, len(element))).T
+    thrown = contributions(field, element, [[one] for one in patches], seed)
     same = same_lamps(atlas, list(own.values()))
     usual = np.median(radiance[element], 0).astype(np.float64)
     # What hardly any element sees says nothing, and lights nothing.

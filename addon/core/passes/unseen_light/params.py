@@ -17,7 +17,7 @@ class UnseenParams:
         0.035 with 16,000 (six), 1.07 +- 0.02 where large objects count for more (three).
     candidates : int
         Unseen objects, those alike counted once, that are tried as lamps: those that would reach the sample most. Of
-        thousands of things under a table none lights the room, and each takes a fifth of a second.
+        thousands of things under a table none lights the room, and each takes a tenth of a second.
     lamp_gain : float
         A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share.
     sweeps : int

@@ -10,18 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...light.contributions import contributions, reaching_most
 from ...light.environment import Environment
-from ...light.few_elements import (
-    barely_seen,
-    contribution_of,
-    evened,
-    from_sun,
-    irradiance_at,
-    most_reflected,
-    pick,
-    reaching_most,
-    steady,
-)
+from ...light.few_elements import barely_seen, evened, from_sun, irradiance_at, most_reflected, pick, steady
 from ...light.field import LightField
 from ...light.lamps import Lamp, find_seen, lamp_models, mixed_lamps, of_shining_class
 from ...light.light_fit import Sample, on_flat
@@ -188,7 +179,7 @@ def find_light(
     if earlier is not None:
         contribution, least = earlier.lamps, earlier.least
     else:
-        contribution = {i: contribution_of(field, sample.element, own, seed) for i, own in alike.items()}
+        contribution = dict(zip(alike, contributions(field, sample.element, list(alike.values()), seed).T, strict=True))
         # What it could reflect of the light that reaches it is no reason to call an unseen object a lamp.
         lit_room = field.with_light(even, environment)
         least = {i: most_reflected(lit_room, own, seed) for i, own in alike.items()}

@@ -1,0 +1,82 @@
+"""What each of many objects would throw on a few elements, were it the only light: rays that all of them share."""
+
+import numpy as np
+
+from ..parallel import for_blocks
+from .directions import cosine_patterns, turned
+from .emitters import BrightTriangles, shining
+from .environment import Environment
+from .few_elements import ELEMENTS_AT_ONCE
+from .field import LightField
+from .irradiance import balance, direct
+from .over_mirrors import direct_over_mirrors
+from .params import LIGHT_FIT
+
+
+def contributions(field: LightField, element: np.ndarray, groups: list[list[int]], seed: int) -> np.ndarray:
+    """E at m elements from each of g groups of objects at radiance 1 and nothing else, (m, g) float64.
+
+    As by `direct` and `gather`, but that one trace over the hemisphere does for all. No object may be of two groups.
+    """
+    position, normal = field.atlas.position[element], field.atlas.normal[element]
+    rays, emitter_rays = LIGHT_FIT.rays, LIGHT_FIT.emitter_rays
+    E, density = np.zeros((len(element), len(groups))), np.zeros(len(field.mesh.triangles), np.float32)
+    for k, objects in enumerate(groups):
+        alone = np.repeat(np.isin(field.atlas.object_id, objects)[:, None], 3, 1)
+        lit = field.with_light(alone, Environment.dark(), objects)
+        aimed = shining(lit)
+        density[aimed.triangle] = aimed.density[aimed.triangle]
+
+        def aim(part: slice, k: int = k, lit: LightField = lit, aimed: BrightTriangles = aimed) -> None:
+            p, n, own = position[part], normal[part], seed + part.start
+            E[part, k] = direct(lit, aimed, p, n, rays, emitter_rays, own)[0][:, 0]
+            E[part, k] += direct_over_mirrors(lit, aimed, p, n, emitter_rays, own)[:, 0]
+
+        for_blocks(aim, len(element), ELEMENTS_AT_ONCE, 0)
+    group_of, patterns = _group_of(field, groups), cosine_patterns(rays, seed)
+
+    def gather(part: slice) -> None:
+        p, n = position[part], normal[part]
+        directions, cosine = turned(patterns, n, np.random.default_rng(seed + part.start))
+        directions = directions.reshape(-1, 3)
+        hits = field.scene.intersect(np.repeat(field.scene.off_surface(p, n), rays, 0), directions)
+        met = np.flatnonzero((hits.triangle >= 0) & (group_of[hits.triangle] >= 0))
+        triangle = hits.triangle[met]
+        facing = -np.einsum("ij,ij->i", directions[met], field.normal[triangle])
+        aimed = density[triangle] * hits.distance[met] ** 2 / np.maximum(np.abs(facing), 1e-6)
+        # Lamps are dark from behind.
+        value = np.pi / rays * balance(rays * cosine.ravel()[met], emitter_rays * aimed) * (facing > 0)
+        at = met // rays * len(groups) + group_of[triangle]
+        E[part] += np.bincount(at, value, len(p) * len(groups)).reshape(len(p), len(groups))
+
+    if groups:
+        for_blocks(gather, len(element), ELEMENTS_AT_ONCE, 0)
+    return E
+
+
+def reaching_most(field: LightField, element: np.ndarray, groups: list[list[int]], count: int, seed: int) -> list[int]:
+    """Of groups of objects the `count` that would light a few elements most, were all of one radiance: rising indices.
+
+    One trace for all groups, so that it takes no longer for thousands.
+    """
+    group_of = _group_of(field, groups)
+    position, normal = field.atlas.position[element], field.atlas.normal[element]
+    patterns, rng = cosine_patterns(LIGHT_FIT.emitter_rays, seed), np.random.default_rng(seed)
+    met = np.zeros(len(groups))
+
+    def run(part: slice) -> None:
+        start = np.repeat(field.scene.off_surface(position[part], normal[part]), LIGHT_FIT.emitter_rays, 0)
+        triangle = field.scene.intersect(start, turned(patterns, normal[part], rng)[0].reshape(-1, 3)).triangle
+        group = group_of[triangle[triangle >= 0]]
+        np.add.at(met, group[group >= 0], 1)
+
+    for_blocks(run, len(element), ELEMENTS_AT_ONCE, 1)
+    return np.sort(np.argsort(-met, kind="stable")[:count]).tolist()
+
+
+def _group_of(field: LightField, groups: list[list[int]]) -> np.ndarray:
+    """The group that each triangle's object is of, (t,) int; -1 where it is of none."""
+    of_object = np.full(int(field.mesh.object_id.max(initial=0)) + 1, -1)
+    for index, objects in enumerate(groups):
+        of_object[objects] = index
+    return of_object[field.mesh.object_id]
