@@ -49,10 +49,17 @@ def barely_seen(field: LightField, good: np.ndarray) -> np.ndarray:
 
 
 def evened(field: LightField) -> np.ndarray:
-    """L_d with the median of its object where nobody saw an element ((n, 3) float32): it is dark there in `field`."""
-    radiance = field.radiance.copy()
+    """L_d with what is likely sent where nobody saw an element, (n, 3) float32: it is dark there in `field`.
+
+    The field's `unseen`, else the median of its object; nothing where nobody saw anything of the object.
+    """
+    radiance, object_id = field.radiance.copy(), field.atlas.object_id
     seen = radiance.any(1)
-    for own in by_label(field.atlas.object_id):
+    if field.unseen is not None:
+        fill = ~seen & (np.bincount(object_id, seen) > 0)[object_id]
+        radiance[fill] = field.unseen[fill]
+        return radiance
+    for own in by_label(object_id):
         known = seen[own]
         if known.any() and not known.all():
             radiance[own[~known]] = np.median(radiance[own[known]], 0)

@@ -52,6 +52,7 @@ class LightField:
         self.mirrors: tuple[Mirror, ...] = ()
         self.sun: Sun | None = None
         self.openings: Openings | None = None
+        self.unseen: np.ndarray | None = None
         self.mirror_of = np.full(len(mesh.triangles), -1, np.int8)
         self.lookup = lookup or ElementLookup(mesh, atlas)
         # By seed, rays that leave the mesh (`portals`): the same for every light, so all fields of the room share them.
@@ -105,6 +106,12 @@ class LightField:
         """The same room with a sun, or without one. Rays don't meet it: its part of E is `sun.sunlight`."""
         other = self.with_light(self.radiance)
         other.sun = sun
+        return other
+
+    def with_unseen(self, radiance: np.ndarray) -> LightField:
+        """The same room with what is likely sent, (n, 3) float32, where no frame looked and so its own is dark."""
+        other = self.with_light(self.radiance)
+        other.unseen = radiance
         return other
 
     def with_openings(self, openings: Openings | None) -> LightField:

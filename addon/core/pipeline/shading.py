@@ -41,7 +41,7 @@ from .frames import Observed
 from .published import light as published_light
 from .stage import Stage
 from .surface import STAGE as SURFACE
-from .unseen_surfaces import with_unseen_surfaces
+from .unseen_surfaces import with_unseen_by_light, with_unseen_surfaces
 
 STAGE = Stage(
     "shading",
@@ -164,6 +164,9 @@ def shade(
     dark = LightField(
         mesh, atlas, surface.scene, unseen_dark(lit_diffuse), environment, lookup=surface.lookup
     ).with_sun(sun)
+    clean = lit_diffuse.seen & (lit_diffuse.tier == CLEAN)
+    if "unseen-surfaces" not in without and clean.any():
+        dark = with_unseen_by_light(dark, clean, **how)
     field, light = with_all_light(dark, lit_diffuse, instances, find_mirrors, seed, tilted, colours, without)
     solved = np.zeros(len(atlas), bool)
     if patches is not None and "missing-light" not in without:
