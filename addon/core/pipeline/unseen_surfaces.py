@@ -3,7 +3,6 @@
 Twice: roughly before lamps and sky are solved for, and again under all of the light.
 """
 
-from functools import partial
 from typing import Unpack
 
 import numpy as np
@@ -29,11 +28,7 @@ def with_unseen_surfaces(
     lit_diffuse: LitDiffuse,
     instances: tuple[Instance, ...],
     emitters: set[int],
-    *,
-    finest: float,
-    smooth: bool,
-    threads: int,
-    seed: int,
+    **how: Unpack[Gathering],
 ) -> tuple[LightField, np.ndarray, np.ndarray]:
     """The room with what the elements that are not `told` send.
 
@@ -45,8 +40,8 @@ def with_unseen_surfaces(
         Elements whose radiance is known; some are not.
     emitters : set of int
         Objects that are lamps.
-    finest, smooth, threads, seed
-        Of `irradiance`.
+    how
+        Those of `irradiance`.
 
     Returns
     -------
@@ -57,10 +52,9 @@ def with_unseen_surfaces(
         Share of the rays that left the mesh, where not `told`.
     """
     atlas, lit, dark = field.atlas, np.flatnonzero(told), np.flatnonzero(~told)
-    rough = partial(irradiance, **ROUGH, interpolate=True, smooth=smooth, threads=threads, seed=seed)
     E, escaped = np.zeros((len(atlas), 3), np.float32), np.zeros(len(atlas), np.float32)
-    E[lit] = rough(field, lit, finest=GATHER.unseen_coarser * finest)[0]
-    E[dark], escaped[dark], _, _ = rough(field, dark, finest=GATHER.unseen_coarser * finest)
+    E[lit], _ = _rough(field, lit, **how)
+    E[dark], escaped[dark] = _rough(field, dark, **how)
     rho, valid = quotient(lit_diffuse.radiance, E)
     guess = fill(atlas, rho, valid, class_names(instances), emitters).rho
     radiance = field.radiance.copy()
@@ -90,9 +84,8 @@ def with_unseen_by_light(field: LightField, good: np.ndarray, **how: Unpack[Gath
     dark = met[(met >= 0) & even[met].any(1) & ~field.radiance[met].any(1)]
     if not len(dark):
         return field
-    how["finest"] *= GATHER.unseen_coarser
     lit_room = field.with_light(even)
-    E, reached = (irradiance(lit_room, own, **ROUGH, interpolate=True, **how)[0] for own in (lit, dark))
+    E, reached = (_rough(lit_room, own, **how)[0] for own in (lit, dark))
     lamps = {lamp.object_id for lamp in find_seen(atlas.object_id[lit], field.radiance[lit], E)}
     usual = np.zeros((int(atlas.object_id.max()) + 1, 3), np.float32)
     for one, own in by_number(atlas.object_id[lit]).items():
@@ -102,3 +95,10 @@ def with_unseen_by_light(field: LightField, good: np.ndarray, **how: Unpack[Gath
     told = (usual > 0).all(1)
     even[dark[told]] *= reached[told] / usual[told]
     return field.with_unseen(even)
+
+
+def _rough(field: LightField, element: np.ndarray, **how: Unpack[Gathering]) -> tuple[np.ndarray, np.ndarray]:
+    """E ((m, 3) float32) at m elements and the share of rays that left the mesh ((m,)), by few rays at few places."""
+    how["finest"] *= GATHER.unseen_coarser
+    E, escaped, _, _ = irradiance(field, element, **ROUGH, interpolate=True, **how)
+    return E, escaped
