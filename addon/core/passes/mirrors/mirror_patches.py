@@ -1,10 +1,12 @@
 """Mirrors in a mesh that tells of no objects, where they are of one piece with the wall that they hang on.
 
-A mirror hangs before its wall or in a frame, so it is a flat piece by itself. Each of a part's observed elements is
-asked together with those around it whether they show the mirrored room, as `flat_mirrors` asks an object. Share of a
-piece's elements that do: two mirrors of two rooms .69 and .98; polished worktops and fronts, which mirror a window in
-one place, at most .11.
+A mirror hangs before its wall or in a frame, so it is a flat piece by itself. Of a part, which may be a chimney and its
+sides, every way that much of it faces is looked along. Each observed element is asked together with those around it
+whether they show the mirrored room, as `flat_mirrors` asks an object. Share of a piece's elements that do: two mirrors
+of two rooms .69 and .98; polished worktops and fronts, which mirror a window in one place, at most .11.
 """
+
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -34,25 +36,37 @@ def mirror_patches(field: LightField, samples: Samples) -> Patches:
     welded, normals = weld(mesh.vertices), mesh.geometry[0]
     first, found = int(mesh.object_id.max()) + 1, [Patches.none()]
     for number, shown in by_number(atlas.object_id[samples.element[clear]]).items():
-        own = atlas.elements_of(number)
-        normal = (atlas.area[own] @ atlas.normal[own]).astype(np.float32)
-        normal /= np.maximum(np.linalg.norm(normal), np.float32(1e-12))
-        index = clear[shown]
-        index = index[atlas.normal[samples.element[index]] @ normal > FLAT]
-        element, mirrored = _mirrored(Views.of(field, samples, index), normal)
-        if mirrored.sum() < LEVELS.enough:
-            continue
-        flat = np.flatnonzero((mesh.object_id == number) & (normals @ normal > FLAT))
-        piece = np.full(len(mesh.triangles), -1)
-        piece[flat] = connected(welded[mesh.triangles[flat]])
-        within = piece[atlas.triangle[element]]
-        there, told = (np.bincount(within[which & (within >= 0)], minlength=1) for which in (mirrored, within >= 0))
-        there = np.pad(there, (0, len(told) - len(there)))
-        for one in np.flatnonzero((there >= LEVELS.enough) & (2 * there > told)):
-            triangle = np.flatnonzero(piece == one).astype(np.int32)
-            found.append(Patches(triangle, np.full(len(triangle), first, np.int32), np.array([first], np.int32)))
-            first += 1
+        seen, left = clear[shown], mesh.object_id == number
+        for normal in _facings(atlas.normal[np.unique(samples.element[seen])]):
+            flat = np.flatnonzero(left & (normals @ normal > FLAT))
+            left[flat] = False  # none is of two pieces
+            own = seen[atlas.normal[samples.element[seen]] @ normal > FLAT]
+            element, mirrored = _mirrored(Views.of(field, samples, own), normal)
+            if mirrored.sum() < LEVELS.enough:
+                continue
+            piece = np.full(len(mesh.triangles), -1)
+            piece[flat] = connected(welded[mesh.triangles[flat]])
+            within = piece[atlas.triangle[element]]
+            there, told = (np.bincount(within[which & (within >= 0)], minlength=1) for which in (mirrored, within >= 0))
+            there = np.pad(there, (0, len(told) - len(there)))
+            for one in np.flatnonzero((there >= LEVELS.enough) & (2 * there > told)):
+                triangle = np.flatnonzero(piece == one).astype(np.int32)
+                found.append(Patches(triangle, np.full(len(triangle), first, np.int32), np.array([first], np.int32)))
+                first += 1
     return Patches.together(found)
+
+
+def _facings(normals: np.ndarray) -> Iterator[np.ndarray]:
+    """Ways ((3,) float32, unit) that many of some normals ((n, 3)) share, the most common first."""
+    while len(normals):
+        cell = np.round(normals / np.sqrt(1 - FLAT**2))
+        _, cell, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+        if count.max() < LEVELS.many:
+            return
+        normal = normals[cell.ravel() == np.argmax(count)].mean(0)
+        normal = (normal / np.linalg.norm(normal)).astype(np.float32)
+        yield normal
+        normals = normals[normals @ normal <= FLAT]
 
 
 def _mirrored(views: Views, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

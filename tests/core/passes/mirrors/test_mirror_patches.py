@@ -70,6 +70,13 @@ def test_a_mirror_on_a_floor(box):
     np.testing.assert_allclose(mirror.f0, 0.85, rtol=0.1)
 
 
+def test_a_mirror_on_a_part_that_is_a_floor_and_a_wall():
+    box = with_mirror(ABOVE)
+    radiance = box.field.radiance  # the wall's own, as before
+    box.room = make_room([replace(quad, object_id=quad.object_id % 5) for quad in box.room.quads], 0.1)
+    assert len(mirror_patches(box.room.field(radiance), frames(box, 0.85)).mirrors) == 1
+
+
 @pytest.mark.parametrize(("f0", "diffuse"), [(0.0, 0.3), (0.06, 0.05)])  # no mirror at all; a black pane
 def test_what_is_no_mirror(box, f0, diffuse):
     assert not len(mirror_patches(box.field, frames(box, f0, diffuse)))
