@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..brdf.dielectric import USUAL_F0
 from ..brdf.model import Constraints
 from ..significance import LEVELS
 from .params import LOBE_FIT
@@ -62,9 +63,9 @@ class Solution:
     ----------
     psi : (3, h) float32
     size : (h, views, elements) float32
-        Size of the relative residual, over the observation's `spread`.
+        Size of the relative residual, over the observation's spread.
     cost : (h, elements) float64
-        Robust cost of each element's observations, summed, in units of scale^2; the rays' noise taken out.
+        Robust negative log-likelihood of each element's observations, summed; the rays' noise taken out.
     total : (h,) float64
         Sum of the costs, and what the prior says.
     """
@@ -107,9 +108,15 @@ def solve(
         R = dense.I - lobe.B
     shape = np.broadcast_shapes(t.shape, R.shape[1:])
     R = np.broadcast_to(R, (3, *shape))
-    sure = dense.there / np.square(dense.spread)
-    weight = np.broadcast_to(sure, shape)
     fixed = None if psi is None else np.asarray(psi, np.float32)[:, None] * np.ones((1, shape[0]), np.float32)
+
+    def spread_with(values: np.ndarray) -> np.ndarray:
+        if dense.spread is None and lobe is not None:
+            return dense.own_spread(lobe, values, scale)
+        return np.broadcast_to(np.float32(1) if dense.spread is None else dense.spread, shape)
+
+    spread = spread_with(np.full((3, 1), USUAL_F0) if fixed is None else fixed)
+    weight = dense.there / np.square(spread)
     for _ in range(1 if lobe is None or fixed is not None else rounds):
         wt = weight * t
         below = np.maximum((wt * t).sum(1), np.float32(1e-20))
@@ -138,12 +145,15 @@ def solve(
             each = values[:, :, None, None]
             rest = R - each * A
             rest -= ((SR - values[..., None] * SA) / below)[:, :, None] * t
-        size = np.sqrt(np.einsum("chvg,chvg->hvg", rest, rest) / 3) * (dense.inflate / dense.spread)
-        weight = sure * np.minimum(1, LEVELS.outlier * scale / np.maximum(size, 1e-12))
+        spread = spread_with(values)
+        size = np.sqrt(np.einsum("chvg,chvg->hvg", rest, rest) / 3) * (dense.inflate / spread)
+        weight = dense.there / np.square(spread) * np.minimum(1, LEVELS.outlier * scale / np.maximum(size, 1e-12))
     cost = huber(size, scale)
+    if dense.spread is None:  # else the same for all hypotheses
+        cost = cost + np.log(spread)
     if lobe is not None:
         noise = (each * (each * lobe.AA + 2 * lobe.AB) + lobe.BB).sum(0)
-        cost -= weight * left * np.square(dense.spread * dense.inflate / scale) * noise / 6
+        cost -= weight * left * np.square(spread * dense.inflate / scale) * noise / 6
     cost *= dense.there
     by_element = cost.sum(1, dtype=np.float64)
     total = by_element.sum(1)
@@ -164,22 +174,18 @@ def robust_scale(size: np.ndarray) -> float:
 
 
 def fit_lobe(
-    problem: Problem | DenseProblem,
-    constraints: Constraints = FREE,
-    psi: np.ndarray | None = None,
-    as_weighed: bool = False,
+    problem: Problem | DenseProblem, constraints: Constraints = FREE, psi: np.ndarray | None = None
 ) -> LobeFit:
     """Best phi, with its psi.
 
     Parameters
     ----------
     problem : Problem, or its DenseProblem where several fits are made
+        One with a `spread` keeps it, so that costs can be compared with those of the lobe that it is of.
     constraints : Constraints
         Of psi, as the model has them.
     psi : (3,) float, optional
         Given: phi alone is sought.
-    as_weighed : bool
-        Observations keep their `spread`, so that costs can be compared with those of the lobe that it is of.
     """
     dense = problem if isinstance(problem, DenseProblem) else DenseProblem(problem)
     solved = functools.partial(solve, constraints=constraints, psi=psi)
@@ -194,10 +200,10 @@ def fit_lobe(
         return best, by_kappa.psi[:, at], kappas[at], robust_scale(dense.seen(by_kappa.size[at]))
 
     # From a middling kappa, then from the one found, and with the scale of the fit, or every outlier of the poor start
-    # would count as noise. Once more when it is known what is reflected, and so what is how sure.
+    # would count as noise. Once more under the spread of what is reflected, where near widths compare more calmly.
     _, _, kappa, scale = step(dense, kappas[len(kappas) // 2], scale)
     best, shown, kappa, scale = step(dense, kappa, scale)
-    if not as_weighed:
+    if dense.spread is None:
         dense = dense.expecting(float(dense.grid[best]), shown, scale)
         best, _, kappa, scale = step(dense, kappa, scale)
     near = slice(max(best - 1, 0), best + 2)

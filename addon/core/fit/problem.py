@@ -71,8 +71,9 @@ class DenseProblem:
         grow with radiance.
     there : (v, g) float32
         1 where there is an observation, else 0.
-    spread : (v, g) float32
-        Standard deviation of each observation's residual over that of one with no lobe in it.
+    spread : (v, g) float32 or None
+        Standard deviation of each observation's residual over that of one with no lobe in it; None: as each lobe that
+        is tried has it.
     inflate : (g,) float32
         A mean over n views takes part of the residual with it; this makes up for it.
     count : int
@@ -97,7 +98,7 @@ class DenseProblem:
         self._level = level = np.maximum(mean, 0.1 * np.median(mean) + 1e-12).astype(np.float32)
         self.inflate = np.sqrt(views / np.maximum(views - 1, 1)).astype(np.float32)
         self.I = self._laid(problem.radiance.T)[:, None] / level
-        self.spread = np.ones(shape, np.float32)
+        self.spread: np.ndarray | None = None
         self._grazing = (1 - self._laid(problem.cosine)) ** 2
         light = problem.light
         A, B, dA, dB = (self._laid(x.T) / level for x in (light.A, light.B, light.A_noise, light.B_noise))
@@ -141,21 +142,32 @@ class DenseProblem:
         """Of (v, g) values those of observations, (m,)."""
         return values[self.there > 0]
 
-    def expecting(self, phi: float, psi: np.ndarray, scale: float) -> DenseProblem:
-        """The same, residuals being as sure as they are where the lobe is what it is said to be.
+    def own_spread(self, lobe: Regressors, psi: np.ndarray, scale: float) -> np.ndarray:
+        """`spread` under each of several lobes with psi ((3, h)), (h, v, g) float32.
 
-        The light that a lobe reflects is known up to a share of itself, so a view with a highlight says less of the
-        lobe than its radiance does. All hypotheses are then compared under the same weights.
+        By what a view shows of the lobe beyond the view that shows least of it: what all of an element's views show
+        counts as its diffuse part, be it off or not.
+
+        Parameters
+        ----------
+        scale : float
+            Standard deviation of the residual with no lobe, relative to the element's level.
+        """
+        shown = (np.asarray(psi, np.float32)[:, :, None, None] * lobe.A + lobe.B).mean(0)
+        return _spread(shown - np.where(self.there > 0, shown, np.inf).min(1, keepdims=True), scale)
+
+    def expecting(self, phi: float, psi: np.ndarray, scale: float) -> DenseProblem:
+        """The same with one `spread` for all hypotheses, which are compared so: by all that a lobe shows.
 
         Parameters
         ----------
         phi, psi : float, (3,) float
         scale : float
-            Standard deviation of the residual with no lobe, relative to the element's level.
+            See `own_spread`.
         """
         lobe, other = self.lobe(self.at(phi)), copy.copy(self)
-        shown = (np.asarray(psi, np.float32)[:, None, None] * lobe.A[:, 0] + lobe.B[:, 0]).mean(0)
-        other.spread = np.sqrt(1 + np.square(np.float32(LOBE_FIT.light_error / scale) * shown))
+        shown = np.asarray(psi, np.float32)[:, None, None] * lobe.A[:, 0] + lobe.B[:, 0]
+        other.spread = _spread(shown.mean(0), scale)
         return other
 
     def part(self, chosen: np.ndarray) -> DenseProblem:
@@ -163,8 +175,14 @@ class DenseProblem:
         part = object.__new__(DenseProblem)
         part.grid, part.without = self.grid, self.without
         part.there, part.inflate, part.I = self.there[:, chosen], self.inflate[chosen], self.I[..., chosen]
-        part._grazing, part.spread = self._grazing[:, chosen], self.spread[:, chosen]
+        part._grazing = self._grazing[:, chosen]
+        part.spread = None if self.spread is None else self.spread[:, chosen]
         part.count = int(part.there.sum())
         one = self._lobe
         part._lobe = Regressors(*(getattr(one, name)[..., chosen] for name in ("A", "B", "AA", "AB", "BB")))
         return part
+
+
+def _spread(shown: np.ndarray, scale: float) -> np.ndarray:
+    """Spread of observations that show so much of a lobe, whose light is known up to a share of itself."""
+    return np.sqrt(1 + np.square(np.float32(LOBE_FIT.light_error / scale) * shown))

@@ -90,6 +90,21 @@ def test_a_window_that_is_told_too_bright_does_not_broaden_the_lobe(phi):
     assert abs(np.sqrt(fit.phi) - np.sqrt(phi)) < 0.08
 
 
+def test_highlights_where_none_is_seen_do_not_broaden_the_lobe():
+    """Strong highlights are clipped, so left out, but for those that a mesh and poses that are off put elsewhere."""
+    walls = np.array(WALLS)
+    walls[2] *= 30
+    bright = Box(walls)
+    element, direction, _ = bright.views(150, 10)
+    diffuse = paint(element)
+    problem = bright.problem(element, direction, 0.08, 0.04, diffuse, rays=256)
+    clipped = (problem.radiance - diffuse).mean(1) > 2 * diffuse.mean(1)
+    missed = clipped & (np.random.default_rng(0).random(len(element)) < 0.3)
+    seen = replace(problem, radiance=np.where(missed[:, None], diffuse, problem.radiance)).part(missed | ~clipped)
+    fit = fit_lobe(seen, constraints=DIELECTRIC.constraints)
+    assert missed.sum() > 30 and abs(np.sqrt(fit.phi) - np.sqrt(0.08)) < 0.05
+
+
 def test_exposure_does_not_matter(box):
     element, direction, _ = box.views(30, 6)
     p = box.problem(element, direction, 0.11, 0.1, paint(element))
@@ -144,7 +159,7 @@ def test_the_whole_range(box, phi, f0):
     fit = fit_lobe(box.problem(element, direction, phi, f0, paint(element), rays=128, noise=0.01))
     loose = phi > 0.3
     assert abs(np.sqrt(fit.phi) - np.sqrt(phi)) < (0.13 if loose else 0.05)
-    assert fit.psi[0] == pytest.approx(f0, rel=0.5 if loose else 0.2, abs=0.015 if loose else 0.005)
+    assert fit.psi[0] == pytest.approx(f0, rel=0.6 if loose else 0.2, abs=0.015 if loose else 0.005)
 
 
 def test_what_is_known_of_psi_fills_in(box):

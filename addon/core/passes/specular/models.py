@@ -105,7 +105,7 @@ def metal_fit(problem: Problem, dense: DenseProblem) -> LobeFit:
     if _metallic(metal):
         return metal
     widths = dense.grid[dense.grid <= FIT.broadest_phi] if len(dense.grid) > 1 else dense.grid
-    scale = max(1.4826 * metal.residual, 1e-4)
+    dense, scale = _weighed(dense, metal)
     return min((_bare_metal(problem, dense, phi, metal, scale) for phi in widths), key=lambda one: one[1].sum())[0]
 
 
@@ -150,7 +150,7 @@ def choose_model(problem: Problem, may_be_metal: bool = True) -> Choice:
     )
     # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
     dielectric = replace(fit, psi=np.minimum(fit.psi, MOST_F0))
-    metal, likely = fit_lobe(dense, constraints=METAL.constraints, as_weighed=True), None
+    metal, likely = fit_lobe(dense, constraints=METAL.constraints), None
     if may_be_metal and _metallic(metal):
         with_metal, diffuse = held_out(metal, METAL)
         scores[METAL.name] = float(with_metal.sum() / max(diffuse.sum(), 1e-30))
