@@ -1,6 +1,7 @@
 """What a capture's frames tell of radiance: the first thing to know of how far to trust a result."""
 
-from ..scene.model import AUTO, Capture, Frame, LitTexture
+from ..scene.model import AUTO, Capture, Frame
+from ..scene.stored_light import LitTexture
 
 TIERS = {
     "hdr": "HDR frames: their radiance is as it was recorded.",

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..errors import BadInputError
 from ..kinds import Limit
-from ..scene.model import StoredPicture
+from ..scene.stored_light import StoredPicture
 from .files import read_bytes, readable
 from .gltf_nodes import is_index
 from .self_contained import BLOCK, OBJ_MATERIAL, beside, copy_part, list_of, read_gltf

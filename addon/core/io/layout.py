@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import BadInputError
-from ..scene.model import Frame, KnownMirror, LitTexture, LitTiles
+from ..scene.model import Frame, KnownMirror
+from ..scene.stored_light import LitTexture, LitTiles
 from .files import EscapesError
 
 

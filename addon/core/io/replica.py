@@ -15,7 +15,8 @@ from scipy.spatial import cKDTree
 from ..errors import BadInputError
 from ..json_values import is_number
 from ..kinds import Code, Limit
-from ..scene.model import KnownMirror, LitTiles
+from ..scene.model import KnownMirror
+from ..scene.stored_light import LitTiles
 from . import nerfstudio, traj
 from .files import read_json
 from .formats import FORMATS

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import BadInputError
-from ..scene.model import AUTO, LitTexture
+from ..scene.model import AUTO
+from ..scene.stored_light import LitTexture
 from .base_colour import as_file, base_colours
 from .formats import FORMATS
 from .layout import Layout, Reader, Reading

@@ -15,8 +15,9 @@ from ..progress import Progress
 from ..scene.atlas import Atlas
 from ..scene.elements import triangle_geometry
 from ..scene.lit_diffuse import LitDiffuse
-from ..scene.model import LitTexture, Mesh, StoredPicture
+from ..scene.model import Mesh
 from ..scene.params import VISIBILITY
+from ..scene.stored_light import LitTexture, StoredPicture
 from ..scene.visibility import CLEAN, SATURATED
 from .from_texture import barycentric, interpolated
 

@@ -10,8 +10,9 @@ from ..progress import Progress
 from ..scene.atlas import Atlas
 from ..scene.elements import triangle_geometry
 from ..scene.lit_diffuse import LitDiffuse
-from ..scene.model import LitTiles, Mesh
+from ..scene.model import Mesh
 from ..scene.params import VISIBILITY
+from ..scene.stored_light import LitTiles
 from ..scene.visibility import CLEAN, SATURATED
 
 TEXELS_AT_ONCE: Block[int] = 1 << 22

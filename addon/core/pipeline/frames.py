@@ -32,8 +32,9 @@ from ..passes.sharpening.sharpen import sharpened
 from ..progress import Progress, Rounds
 from ..scene.elements import triangle_geometry
 from ..scene.lit_diffuse import LitDiffuse
-from ..scene.model import Capture, Frame, LitTexture, Pixels
+from ..scene.model import Capture, Frame, Pixels
 from ..scene.samples import SampleCollector, Samples
+from ..scene.stored_light import LitTexture
 from ..scene.surface import Surface
 from ..scene.visibility import FrameView, Observations
 from ..settings import Settings

@@ -17,7 +17,8 @@ from ..origin import OWN, of_thing
 from ..passes.mesh_denoising.denoise import without_noise
 from ..scene.closing import as_scanned, settled
 from ..scene.elements import Elements
-from ..scene.model import Capture, LitTexture, Mesh
+from ..scene.model import Capture, Mesh
+from ..scene.stored_light import LitTexture
 from ..scene.surface import Surface, build_surface, from_uv
 from ..scene.two_sides import with_backs
 from ..scene.unwrap import Unwrap, by_xatlas
