@@ -14,6 +14,7 @@ from ..evidence.page import make_page
 from ..memory import give_back
 from ..parallel import ordered_map
 from ..passes.albedo.albedo import CLOSED, FILLED, MEASURED, TEXTURED
+from ..passes.albedo.neighbourhood import relative_error
 from ..passes.texture_fill.texture_fill import NOTHING, Texture, texture_of
 from ..results.room_file import OPENINGS
 from ..settings import ROOM
@@ -114,9 +115,14 @@ class Recovery(Corrected):
             return NOTHING
         surface, albedo = self.surface(), self.albedo
         measured = albedo.origin == MEASURED
-        guessed = [one.object_id for one in self.capture.instances if one.guess]  # these may hold several materials
+        # What is told by its shape alone may hold several materials: a wall its pictures.
+        guessed = [one.object_id for one in self.capture.instances if one.guess and one.class_name != "floor"]
         to_texture = (albedo.origin == FILLED) & ~np.isin(surface.atlas.object_id, guessed)
-        return texture_of(surface.atlas, surface.mesh, albedo.rho, measured, to_texture, albedo.error)
+        # E is off for neighbours alike, which makes no texture.
+        error = relative_error(
+            self.lit_diffuse(), surface.atlas.object_id, "object-spread" not in self.settings.without
+        )
+        return texture_of(surface.atlas, surface.mesh, albedo.rho, measured, to_texture, error)
 
     def over_atlas(self, name: str, values: np.ndarray) -> np.ndarray:
         """The image `name` of the elements' values ((n, c) float32), with texture where there is any, (s, s, c)."""

@@ -245,10 +245,12 @@ def test_texture_of_what_is_not_touched_stays(tmp_path):
     recover(disk, folder, settings=replace(QUICK, texture_fill=False))
     flat = read_exr(folder / "albedo.exr").rgb[tiled], read_exr(folder / "coverage.exr").rgb[tiled]
     assert np.std(flat[0].mean(1)) < 0.5 * np.std(before["albedo"][tiled].mean(1)) and (flat[1][:, 2] == FILLED).all()
-    # Parts that were guessed by shape may hold several materials: none is carried over.
-    del run.texture
-    run.capture = replace(run.capture, instances=tuple(replace(one, guess=True) for one in run.capture.instances))
-    assert len(run.texture.texel) == 0
+    # Parts that were guessed by shape may hold several materials: none is carried over but along a floor.
+    for name, textured in ("wall", False), ("floor", True):
+        del run.texture
+        guesses = tuple(replace(one, class_name=name, guess=True) for one in run.capture.instances)
+        run.capture = replace(run.capture, instances=guesses)
+        assert (len(run.texture.texel) > 100) == textured
 
 
 @pytest.mark.slow
