@@ -37,10 +37,6 @@ class LobeFit:
         How much the diffuse part darkens towards grazing views.
     kappa_lambertian : float
         The same with no lobe.
-    cost : float
-        Mean robust cost of the residual, relative to the object's radiance; the part of the rays' noise taken out.
-    cost_lambertian : float
-        With no lobe at all.
     residual, residual_lambertian : float
         Median size of the relative residual, with the lobe and without any.
     """
@@ -49,8 +45,6 @@ class LobeFit:
     psi: np.ndarray
     kappa: float
     kappa_lambertian: float
-    cost: float
-    cost_lambertian: float
     residual: float
     residual_lambertian: float
 
@@ -208,20 +202,15 @@ def fit_lobe(
         best, _, kappa, scale = step(dense, kappa, scale)
     near = slice(max(best - 1, 0), best + 2)
     found = solved(dense, near, kappa, scale)
-    costs = found.total
     middle = best - near.start
-    root, best_psi = between(np.sqrt(dense.grid[near]), costs, found.psi, middle)
+    root, best_psi = between(np.sqrt(dense.grid[near]), found.total, found.psi, middle)
     flat = solve(dense, None, kappas, 1.0).size
-    flat_costs = huber(flat, scale) * dense.there
-    flattest = int(np.argmin(flat_costs.sum((1, 2))))
-    unit = scale**2 / dense.count
+    flattest = int(np.argmin((huber(flat, scale) * dense.there).sum((1, 2))))
     return LobeFit(
         phi=float(min(max(root**2, dense.grid[0]), dense.grid[-1])),
         psi=best_psi,
         kappa=kappa,
         kappa_lambertian=kappas[flattest],
-        cost=float(found.cost[middle].sum()) * unit,
-        cost_lambertian=float(flat_costs[flattest].sum(dtype=np.float64)) * unit,
         residual=float(np.median(dense.seen(found.size[middle]))),
         residual_lambertian=float(np.median(dense.seen(flat[flattest]))),
     )

@@ -57,4 +57,4 @@ def coated_by_looks(choice: Choice, looks: Coated) -> Choice:
 def _fit(phi: float, psi: np.ndarray, spread: float, diffuse: float) -> LobeFit:
     """The lobe as a fit; its residuals are median sizes, as `LobeFit` has them."""
     residual, without = spread / 1.4826, diffuse / 1.4826
-    return LobeFit(phi, psi, 0.0, 0.0, residual**2, without**2, residual, without)
+    return LobeFit(phi, psi, 0.0, 0.0, residual, without)

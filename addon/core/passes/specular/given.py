@@ -92,7 +92,7 @@ def _fit(
     psi = np.broadcast_to(np.asarray(model.plausible_f0(), float), 3)
     if not model.has_diffuse and problem is not None:
         psi = metal_f0(problem, phi)
-    return LobeFit(phi, psi, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return LobeFit(phi, psi, 0.0, 0.0, 0.0, 0.0)
 
 
 def given_interval(given: Given, choice: Choice, fitted: GlossInterval) -> GlossInterval:

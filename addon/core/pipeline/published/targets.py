@@ -35,8 +35,7 @@ def fit_targets(instances: Sequence[Instance], room: Room) -> dict[int, ObjectMa
         residuals = found.lobe.residual, samples.radiance[found.index] - diffuse
         left, whole = (float(np.median(np.sqrt(np.square(x).mean(1)) / level)) for x in residuals)
         psi = np.full(3, found.lobe.psi)
-        cost, flat_cost = (float(np.square(x).mean()) for x in residuals)
-        choice = Choice(DIELECTRIC, LobeFit(found.lobe.phi, psi, 0.0, 0.0, cost, flat_cost, left, whole))
+        choice = Choice(DIELECTRIC, LobeFit(found.lobe.phi, psi, 0.0, 0.0, left, whole))
         name = names[found.frame]
         material = described(instance, choice, None, name, gloss_interval(choice, None))
         return replace(material, observations=len(found.index))
