@@ -166,7 +166,7 @@ def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Cho
     all of them, and it is not judged by one colour.
     """
     field, samples = room.field, room.samples
-    choice, problem, index = _by_frames(maker, object_id, room.settings.specular_rays, not guess)
+    choice, problem, index = _by_frames(maker, object_id, room.settings.specular_rays, guess)
     element, direction = samples.element[index], samples.direction[index]
     scores = frame_scores(
         field, field.atlas.position[element], field.atlas.normal[element], direction, samples.frame[index],
@@ -183,15 +183,15 @@ def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Cho
     return choice, problem, target_frame(scores)
 
 
-def _by_frames(
-    maker: Problems, object_id: int, rays: int, may_be_metal: bool
-) -> tuple[Choice, Problem | None, np.ndarray]:
-    """Choose a model by some of the object's samples, which come last."""
-    index = maker.pick(object_id, FIT.elements, FIT.views, seed=1, smooth=True)
+def _by_frames(maker: Problems, object_id: int, rays: int, guess: bool) -> tuple[Choice, Problem | None, np.ndarray]:
+    """Choose a model by some of the object's samples, which come last; a `guess` is never called metal."""
+    elements = FIT.part_elements if guess else FIT.elements
+    index = maker.pick(object_id, elements, FIT.views, seed=1, smooth=True)
     if not len(index):
         return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
-    problem = maker.problem(index, rays)
-    return choose_model(problem, may_be_metal), problem, index
+    # The rays' noise is known and counts by elements, so as many rays are spread over more of them.
+    problem = maker.problem(index, rays * FIT.elements // elements)
+    return choose_model(problem, not guess), problem, index
 
 
 def _by_looks(
