@@ -110,11 +110,16 @@ class Environment:
         beside it.
         """
         seen = self.observations > 0
-        wide = ndimage.binary_opening(np.concatenate([seen] * 3, 1), np.ones((3, 3)))[:, seen.shape[1] : -seen.shape[1]]
+        wide = self._wide(seen)
         if not wide.any():
             return (~seen).astype(np.float32)
         away = self._to(wide)[0]
         return np.where(seen, 0, 1 - np.exp(-((away / BESIDE) ** 2))).astype(np.float32)
+
+    def _wide(self, chosen: np.ndarray) -> np.ndarray:
+        """Those of some directions ((h, 2h) bool) that are of spots at least three cells wide."""
+        width = chosen.shape[1]  # directions wrap around
+        return ndimage.binary_opening(np.concatenate([chosen] * 3, 1), np.ones((3, 3)))[:, width:-width]
 
     def _to_seen(self) -> tuple[np.ndarray, np.ndarray]:
         return self._to(self.observations > 0)
@@ -130,7 +135,8 @@ class Environment:
     def clipped_parts(self, angle: float) -> np.ndarray:
         """Parts of what is clipped, cells of so many radians either way; (h, 2h) int from 0, -1 where it is not.
 
-        Unseen directions belong to what the nearest seen one does.
+        Unseen directions belong to what the nearest seen one does. What is narrower than three of the map's cells and
+        not clipped may hold a window's rim, and says nothing of them.
         """
         height, width = self.observations.shape
         row, column = np.mgrid[:height, :width]
@@ -140,7 +146,16 @@ class Environment:
         if chosen.any():
             name = (row // cell * width + column // cell).ravel()[chosen]
             part[chosen] = np.unique(name, return_inverse=True)[1].ravel()
-        return part[self._to_seen()[1]] if self.seen else part.reshape(height, width)
+        part, known = part.reshape(height, width), self.clipped | self._wide(self.told)
+        return np.where(self.observations > 0, part, part.ravel()[self._to(known)[1]]) if known.any() else part
+
+    def shown_in(self, directions: np.ndarray) -> Environment:
+        """The map as if frames had seen only what lies in some `directions` ((k, 3)), and beside those."""
+        chosen = np.zeros(self.observations.shape, bool)
+        chosen.ravel()[_bin(directions, len(chosen))] = True
+        chosen = ndimage.binary_dilation(chosen, np.ones((3, 3)))
+        count = np.where(chosen, self.observations, 0)
+        return Environment(_filled(self.radiance, count), count, self.clipped & chosen)
 
     def at(self, image: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """What an image of the map's size ((h, 2h, ...)) has in unit `directions` ((n, 3)), (n, ...)."""

@@ -6,21 +6,57 @@ different directions, so an environment map can't hold it. A cell of the box can
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import ndimage
 
-from ..kinds import Unit
+from ..kinds import Block, Unit
 from ..luminance import LUMINANCE
+from ..scene.model import Camera
+from ..scene.rays import RayScene
 from .environment import Environment
 from .params import GATHER
 
 CELLS = 6 * GATHER.cells**2
 """Of all six sides: side (2 * axis, + 1 for the high one), row, column."""
 
+LOOKS: Block[int] = 1 << 14
+"""Pixels of a frame, at most, of which it is asked where they look out."""
+
 BEFORE: Unit[float] = 1e-3
 """Sizes of the box that a panel lies before a surface."""
+
+
+def looked_out_by(
+    cameras: Iterable[Camera], scene: RayScene, sky: Environment, usual: float, low: np.ndarray, size: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cells by which most looks of cameras inside of a box go out to where it is brighter than a `usual` luminance.
+
+    What is no brighter than the room may be the room: a wall too far off to be in the scan.
+
+    Returns
+    -------
+    windows : (CELLS,) bool
+    directions : (k, 3) float32
+        Some of those in which cameras look out by them.
+    """
+    looks, outward = np.zeros(CELLS), [np.zeros(0, int)]
+    directions = [np.zeros((0, 3), np.float32)]
+    for camera in cameras:
+        pixels = camera.pixel_centres()
+        way = camera.directions(pixels[:: max(len(pixels) // LOOKS, 1)]).astype(np.float32)
+        origins = np.broadcast_to(camera.centre.astype(np.float32), way.shape)
+        cell = exits(low, size, origins, way)[0]
+        free = (scene.intersect(origins, way).triangle < 0) & within(low, size, origins)
+        free &= sky.at(sky.clipped, way) | (sky(way) @ LUMINANCE > usual)
+        looks += np.bincount(cell, minlength=CELLS)
+        outward.append(cell[free])
+        directions.append(way[free])
+    cell = np.concatenate(outward)
+    windows = 2 * np.bincount(cell, minlength=CELLS) > looks
+    return windows, np.concatenate(directions)[windows[cell]]
 
 
 def within(low: np.ndarray, size: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -72,16 +108,20 @@ class Openings:
     radiance : (CELLS, 3) float32
     share : float
         Of all the light, that which comes from there.
+    windows : (CELLS,) bool
+        Those that frames look out by: what lies behind is far away, and in the environment map.
     """
 
     low: np.ndarray
     size: np.ndarray
     radiance: np.ndarray
     share: float = 0.0
+    windows: np.ndarray = field(default_factory=lambda: np.zeros(CELLS, bool))
 
     def __call__(self, origins: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Radiance along rays that leave the mesh ((n, 3) float32), and which of them start inside of the box."""
-        return self.radiance[exits(self.low, self.size, origins, directions)[0]], within(self.low, self.size, origins)
+        """Radiance along rays that leave the mesh ((n, 3) float32), and which of them leave the box, by no window."""
+        cell = exits(self.low, self.size, origins, directions)[0]
+        return self.radiance[cell], within(self.low, self.size, origins) & ~self.windows[cell]
 
     def filled(self, sky: Environment, place: np.ndarray) -> Environment:
         """A map with these where it has no value, as a `place` ((3,)) sees them: for what knows maps alone.
@@ -91,7 +131,11 @@ class Openings:
         directions = sky.directions
         start = np.broadcast_to(np.asarray(place, np.float32), directions.shape)
         shown = self(start, directions)[0].reshape(sky.radiance.shape)
-        far = (sky.unfamiliar if sky.seen else np.ones(sky.observations.shape, np.float32))[..., None]
+        far = sky.unfamiliar if sky.seen else np.ones(sky.observations.shape, np.float32)
+        # What lies behind a window is seen in other directions from other places.
+        side = np.unique(np.flatnonzero(self.windows) // GATHER.cells**2)
+        out = directions[:, side // 2] * np.where(side % 2, 1, -1) > 0
+        far = np.where(out.any(1).reshape(far.shape), np.float32(0), far)[..., None]
         bound = np.maximum(shown, sky.radiance)
         radiance = np.where(sky.clipped[..., None], bound, (1 - far) * sky.radiance + far * shown)
         return replace(sky, radiance=radiance.astype(np.float32))

@@ -1,6 +1,6 @@
 """The shading stage: from the lit diffuse texture to lamps, irradiance and albedo."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
@@ -12,29 +12,32 @@ from ..light.few_elements import barely_seen, evened
 from ..light.field import LightField
 from ..light.lamps import Lamp
 from ..light.mirrors import Mirror, known_mirror
-from ..light.openings import Openings
+from ..light.openings import Openings, looked_out_by
 from ..light.over_surface import Gathering, finest_spacing, irradiance
 from ..light.shading import Shading
 from ..light.sun import Sun, taken_out
+from ..luminance import LUMINANCE
 from ..memory import give_back
 from ..passes.clipped_lamps.clipped import shade_clipped
 from ..passes.clipped_lamps.patches import clipped_patches, told_of
 from ..passes.mirrors.flat_mirrors import find_mirrors
 from ..passes.mirrors.mirror_patches import mirror_patches
-from ..passes.missing_light.missing_light import find_missing_light, is_missing
+from ..passes.missing_light.missing_light import MissingLight, find_missing_light, is_missing
+from ..passes.sun.sun_patch import find_patch_sun
 from ..passes.unseen_light.unseen_light import Light
 from ..progress import Progress
 from ..scene.atlas import Atlas
 from ..scene.creases import crease_error
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.mesh_noise import tilt
-from ..scene.model import Capture, Instance, Mesh
+from ..scene.model import Camera, Capture, Instance, Mesh
 from ..scene.params import VISIBILITY
 from ..scene.patches import Patches
 from ..scene.surface import Surface
 from ..scene.two_sides import fronts
 from ..scene.visibility import CLEAN, SATURATED
 from ..settings import Settings
+from ..weighted import weighted_median
 from .find_light import find_all_light
 from .frames import STAGE as FRAMES
 from .frames import Observed
@@ -84,7 +87,7 @@ def find_shading(
         return shade(
             surface, capture.instances, lit, observed.environment, s, progress=progress,
             find_mirrors=mirrors if s.mirrors else None, colours=observed.fringes.colours(),
-            patches=patches.lamps if guessed else None,
+            patches=patches.lamps if guessed else None, cameras=[frame.camera for frame in capture.frames],
         )  # fmt: skip
 
     if "clipped-lamps" in s.without:
@@ -130,6 +133,7 @@ def shade(
     find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None = None,
     colours: dict[int, np.ndarray] | None = None,
     patches: list[int] | None = None,
+    cameras: Sequence[Camera] = (),
 ) -> Shading:
     """Lamps and irradiance by aimed rays, interpolated.
 
@@ -142,6 +146,8 @@ def shade(
         Colour of light of objects that were clipped (`fringes`).
     patches : list of int, optional
         Objects that were set apart as they were clipped; None where the capture tells of its objects.
+    cameras : sequence of Camera
+        Of the frames.
 
     Raises
     ------
@@ -170,7 +176,7 @@ def shade(
     field, light = with_all_light(dark, lit_diffuse, instances, find_mirrors, seed, tilted, colours, without)
     solved = np.zeros(len(atlas), bool)
     if patches is not None and "missing-light" not in without:
-        field, light, solved = with_missing_light(dark, field, light, lit_diffuse, patches, seed)
+        field, light, solved = with_missing_light(dark, field, light, lit_diffuse, patches, cameras, without, seed)
     del dark
 
     # Where there is no L_d to divide, the rough E does.
@@ -248,7 +254,14 @@ def with_all_light(
 
 
 def with_missing_light(
-    dark: LightField, field: LightField, light: Light, lit_diffuse: LitDiffuse, patches: list[int], seed: int
+    dark: LightField,
+    field: LightField,
+    light: Light,
+    lit_diffuse: LitDiffuse,
+    patches: list[int],
+    cameras: Sequence[Camera],
+    without: Collection[str],
+    seed: int,
 ) -> tuple[LightField, Light, np.ndarray]:
     """The room with the light of clipped patches and openings, if it lacks light; else as it is.
 
@@ -267,7 +280,27 @@ def with_missing_light(
     told = told_of(patches, field.atlas, lit_diffuse)
     bright = np.isin(field.atlas.object_id, [*told, *(one.object_id for one in field.mirrors)])
     lit_over = dark.with_mirrors(field.mirrors)
-    found = find_missing_light(lit_over, good & ~bright, [one for one in patches if one not in told], seed)
+    unknown, believed = [one for one in patches if one not in told], good & ~bright
+    usual = weighted_median(dark.radiance[good] @ LUMINANCE, field.atlas.area[good])
+    windows, looks = looked_out_by(cameras, field.scene, field.environment, usual, *field.outer_box)
+    # What is seen through a crack is near, and says nothing of what lies in that direction.
+    lit_over = lit_over.with_light(lit_over.radiance, lit_over.environment.shown_in(looks))
+    found = find_missing_light(lit_over, believed, unknown, seed, windows)
+    lit, now = with_found_light(dark, field, light, lit_diffuse, found, told)
+    if "sun" in without or dark.sun is not None:
+        return lit, now, found.shut
+    sun = find_patch_sun(dark, lit, lit_diffuse, patches, seed)
+    if sun is None:
+        return lit, now, found.shut
+    dark, lit_over = dark.with_sun(sun), lit_over.with_sun(sun)
+    found = find_missing_light(lit_over, believed, unknown, seed, windows)
+    return *with_found_light(dark, field, light, lit_diffuse, found, told), found.shut
+
+
+def with_found_light(
+    dark: LightField, field: LightField, light: Light, lit_diffuse: LitDiffuse, found: MissingLight, told: list[int]
+) -> tuple[LightField, Light]:
+    """The room with the light that was `found` to be missing; `told` are the patches whose radiance frames tell."""
     radiance = evened(dark)
     for one, solved in found.radiance.items():
         own = dark.atlas.object_id == one
@@ -285,7 +318,7 @@ def with_missing_light(
     environment = found.openings.without_bright().filled(found.environment, middle)
     field = field.with_light(radiance, environment, [lamp.object_id for lamp in lamps])
     light = replace(light, lamps=lamps, environment=environment, notes=found.notes)
-    return field.with_openings(found.openings).with_sun(dark.sun), light, shut
+    return field.with_openings(found.openings).with_sun(dark.sun), light
 
 
 def to_store(found: Shading) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
@@ -316,8 +349,10 @@ def from_store(a: dict[str, np.ndarray], meta: dict[str, Any]) -> Shading:
         a["irradiance"], a["escaped"], a["relative_error"], a["radiance"], lamps,
         Environment(a["sky"], a["sky_seen"]), tuple(meta["notes"]), mirrors, meta["points"],
         None if meta["sun"] is None else _sun(**meta["sun"]),
-        Openings(a["openings_low"], a["openings_size"], a["openings_radiance"], float(a["openings_share"]))
-        if "openings_low" in a else None,
+        Openings(
+            a["openings_low"], a["openings_size"], a["openings_radiance"], float(a["openings_share"]),
+            a["openings_windows"],
+        ) if "openings_low" in a else None,
         Patches(*(a[f"patches_{one.name}"] for one in fields(Patches))),
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ import numpy as np
 from ...light.contributions import contributions
 from ...light.directions import cosine_patterns, turned
 from ...light.environment import Environment
-from ...light.few_elements import evened, irradiance_at
+from ...light.few_elements import evened, from_sun, irradiance_at
 from ...light.field import LightField
 from ...light.lamps import Lamp, find_seen
 from ...light.openings import CELLS, Openings, exits
@@ -61,19 +61,23 @@ def is_missing(field: LightField, good: np.ndarray, seed: int) -> bool:
     return float((rho.max(1) > 1).mean()) > MISSING.alarm
 
 
-def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], seed: int) -> MissingLight:
+def find_missing_light(
+    field: LightField, good: np.ndarray, patches: list[int], seed: int, windows: np.ndarray | None = None
+) -> MissingLight:
     """Solve for the light of clipped patches, and of all that is seen through the mesh's openings.
 
     Parameters
     ----------
     field : LightField
-        With L_d, dark where no frame saw it, and no lamps.
+        With L_d, dark where no frame saw it, and no lamps. With its sun, if there is one.
     good : (n,) bool
         Elements whose L_d is to be believed.
     patches : list of int
         Objects that were set apart as the sensor clipped them.
+    windows : (CELLS,) bool, optional
+        `Openings.windows`.
     """
-    atlas = field.atlas
+    atlas, windows = field.atlas, np.zeros(CELLS, bool) if windows is None else windows
     radiance = evened(field)
     own = {one: atlas.object_id == one for one in patches}
     bound = {one: np.median(radiance[which], 0).astype(np.float64) for one, which in own.items()}
@@ -84,7 +88,7 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
     received = irradiance_at(field.with_openings(None).with_light(radiance, Environment.dark()), element, seed)
     sky = field.environment
     part = sky.clipped_parts(MISSING.sky)
-    cell, through, shown, by_part = _through_cells(field, part, shut, element, seed)
+    cell, through, shown, by_part = _through_cells(field, part, shut, windows, element, seed)
     received = received + shown
     thrown = contributions(field, element, [[one] for one in patches], seed)
     same = same_lamps(atlas, list(own.values()))
@@ -109,18 +113,19 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
     solved = dict(zip(patches, of_patch, strict=True))
     E = received + unknown.contribution @ found
     of_all = thrown * (of_patch @ LUMINANCE) / (E @ LUMINANCE)[:, None]
+    sunlit = {one for one, which in own.items() if _mostly_lit(field, which)}
     strong = (of_all > LEVELS.gain).sum(0) >= LEVELS.many
     lamps = tuple(
         Lamp(one, solved[one].astype(np.float32), False, clipped=True, spread=spread)
         for k, one in enumerate(patches)
-        if strong[k] and (solved[one] > MISSING.lamp * bound[one]).all()
+        if strong[k] and (solved[one] > MISSING.lamp * bound[one]).all() and one not in sunlit
     )
     by_opening = np.tile(usual, (len(through.T), 1))
     by_opening[told] = found[len(clipped) :]
     level[lit] = found[len(least) : len(clipped)]
     low, size = field.outer_box
     share = float((unknown.contribution[:, len(least) :] @ found[len(least) :]).sum() / E.sum())
-    openings = Openings(low, size, by_opening[cell].astype(np.float32), share)
+    openings = Openings(low, size, by_opening[cell].astype(np.float32), share, windows)
     note = (
         f"{share:.0%} of the light comes in by openings of the mesh, from where it was solved from what it throws: "
         "what no frame saw there may be a lamp."
@@ -128,6 +133,11 @@ def find_missing_light(field: LightField, good: np.ndarray, patches: list[int], 
     brighter = frozenset(lamp.object_id for lamp in find_seen(atlas.object_id[element], sent, E))
     notes = (note,) if share >= LEVELS.gain else ()
     return MissingLight(lamps, solved, brighter, openings, sky.with_clipped(part, level), shut, notes)
+
+
+def _mostly_lit(field: LightField, which: np.ndarray) -> bool:
+    """Whether the sun lights most of some elements, (n,) bool."""
+    return 2 * from_sun(field, np.flatnonzero(which)).any(1).sum() > which.sum()
 
 
 def same_lamps(atlas: Atlas, patches: list[np.ndarray]) -> np.ndarray:
@@ -152,7 +162,10 @@ def same_lamps(atlas: Atlas, patches: list[np.ndarray]) -> np.ndarray:
     left, lamps = np.ones(len(patches), bool), []
     for one in np.argsort(-area, kind="stable"):
         if left[one]:
-            flat = np.abs((centre - centre[one]) @ normal[one]) < MISSING.off_plane
+            # Normals of small patches are off by degrees, which is decimetres across a room: one of the two has to do.
+            away = centre - centre[one]
+            height = np.minimum(np.abs(away @ normal[one]), np.abs(np.einsum("ij,ij->i", away, normal)))
+            flat = height < MISSING.off_plane
             alike = left & flat & (normal @ normal[one] > MISSING.same_plane) & (MISSING.alike * area > area[one])
             alike[one] = True
             left[alike] = False
@@ -179,9 +192,9 @@ def unseen_closing(field: LightField) -> np.ndarray:
 
 
 def _through_cells(
-    field: LightField, part: np.ndarray, shut: np.ndarray, element: np.ndarray, seed: int
+    field: LightField, part: np.ndarray, shut: np.ndarray, windows: np.ndarray, element: np.ndarray, seed: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """What comes to m elements from outside: as far as frames saw that, from the sky, else by the cells of the box.
+    """What comes to m elements from outside: by `windows` from the sky, else by the other cells of the box.
 
     Elements that are `shut` ((n,) bool) let through what comes from there.
 
@@ -220,8 +233,9 @@ def _through_cells(
         closed &= met >= 0
         out = np.flatnonzero((met < 0) | closed)
         place, way, each = out // MISSING.rays, directions[out], each[out]
-        share = np.where(closed[out], 1, sky.at(unfamiliar, way)) * each
-        np.add.at(through[block], (place, unknown[exits(low, size, origins[out], way)[0]]), share)
+        by = exits(low, size, origins[out], way)[0]
+        share = np.where(closed[out], 1, np.where(windows[by], 0, sky.at(unfamiliar, way))) * each
+        np.add.at(through[block], (place, unknown[by]), share)
         rest, own = each - share, sky.at(part, way)
         clipped = own >= 0
         np.add.at(by_part[block], (place[clipped], own[clipped]), rest[clipped])

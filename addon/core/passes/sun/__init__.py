@@ -1,1 +1,1 @@
-"""Finds the sun from the light that it throws through the openings."""
+"""Finds the sun from the light that it throws through the openings, clipped or not."""

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from ...significance import LEVELS
+
 
 @dataclass(frozen=True)
 class SunParams:
@@ -18,6 +20,8 @@ class SunParams:
     kept, refined, tried : int
         Directions of the grid of which the whole sample is asked; of these, those that are refined on it; and then on
         the elements around what stands out.
+    even : int
+        Elements over the whole surface that tell which stand out (`sun_patch`).
     pool : int
         Elements, at most, that these are drawn from.
     near, dense : float, int
@@ -37,6 +41,7 @@ class SunParams:
     kept: int = 160
     refined: int = 24
     tried: int = 4
+    even: int = 3 * LEVELS.sample
     pool: int = 60_000
     near: float = 0.3
     dense: int = 2000

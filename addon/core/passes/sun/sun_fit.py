@@ -51,11 +51,11 @@ def _on_grid(even: Spots, environment: Environment) -> list[Guess]:
     best = np.argsort(-reached, kind="stable")[: SUN.kept]
     guesses = list(ordered_map(even.explained, way[best[reached[best] > SUN.reached]], 0))
     # A patch may be narrower than the grid is wide, and the guess beside the sun then no better than any other.
-    refined = ordered_map(lambda one: _searched(even.explained, one, SHARP[:2]), _apart(guesses)[: SUN.refined], 0)
-    return _apart(list(refined))[: SUN.tried]
+    refined = ordered_map(lambda one: searched(even.explained, one, SHARP[:2]), apart(guesses)[: SUN.refined], 0)
+    return apart(list(refined))[: SUN.tried]
 
 
-def _apart(guesses: list[Guess]) -> list[Guess]:
+def apart(guesses: list[Guess]) -> list[Guess]:
     """The guesses that have none better within 1.5 `GRID`, the best first."""
     chosen: list[Guess] = []
     for guess in sorted(guesses, key=lambda one: one.cost):
@@ -64,7 +64,7 @@ def _apart(guesses: list[Guess]) -> list[Guess]:
     return chosen
 
 
-def _searched(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np.ndarray) -> Guess:
+def searched(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np.ndarray) -> Guess:
     """The direction of least cost near a guess: the best of eight neighbours, again and again, by smaller steps."""
     for step in steps:
         for _ in range(4):
@@ -75,7 +75,7 @@ def _searched(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np.ndarr
     return guess
 
 
-def _along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def along_edges(field: LightField, pool: np.ndarray, direction: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Elements of the pool that the direction, or one within `ASTRAY` of it, leaves lit and another does not."""
     ways = around(direction, ASTRAY * np.concatenate([np.zeros((1, 2)), _ring(8), _ring(4) / 2]))
     position, normal = field.atlas.position[pool], field.atlas.normal[pool]
@@ -163,11 +163,11 @@ def find_sun(
     dense = np.sort(np.concatenate(chosen))
     spots = Spots(field, dense, irradiance(dense))
     starts = (spots.explained(one.direction) for one in guesses)
-    tried = ordered_map(lambda one: _searched(spots.explained, one, SHARP), starts, 0)
+    tried = ordered_map(lambda one: searched(spots.explained, one, SHARP), starts, 0)
     best, before = min(tried, key=lambda one: one.cost), spots.spread()
     if best.cost > (1 - LEVELS.gain) * before:
         return None
-    along = _along_edges(field, pool, best.direction, rng)
+    along = along_edges(field, pool, best.direction, rng)
     if len(along) < LEVELS.few:
         return None
     edges = Edges(Spots(field, along, irradiance(along)))
@@ -177,7 +177,7 @@ def find_sun(
         def cost(way: np.ndarray, now: Guess = found) -> Guess:
             return edges.explained(way, now.strength, now.radius)
 
-        found = _searched(cost, found, steps)
+        found = searched(cost, found, steps)
         contribution = spots.contribution(found.direction, found.radius)
         strength = spots.strength(contribution)
         found = min((edges.explained(found.direction, strength, r) for r in RADII), key=lambda one: one.cost)
@@ -210,11 +210,16 @@ def _of_a_sun(spots: Spots, contribution: np.ndarray) -> bool:
     return bool((np.array(channels) <= luminance * SUN.colour).all())
 
 
+def of_luminance(told: np.ndarray) -> np.ndarray:
+    """A sun's irradiance ((3,) float32) by what each channel says of it, held near the luminance, which comes last."""
+    *channels, luminance = told
+    held = np.clip(channels, luminance / SUN.colour, luminance * SUN.colour)
+    return (held * (luminance / max(float(held @ LUMINANCE), 1e-12))).astype(np.float32)
+
+
 def _coloured(spots: Spots, direction: np.ndarray, radius: float, before: float, after: float) -> Sun:
     """The sun with what each channel says of its irradiance, held near the luminance's."""
-    *channels, luminance = _channels(spots, spots.contribution(direction, radius))
-    held = np.clip(channels, luminance / SUN.colour, luminance * SUN.colour)
-    light = (held * (luminance / float(held @ LUMINANCE))).astype(np.float32)
+    light = of_luminance(_channels(spots, spots.contribution(direction, radius)))
     sun = Sun(np.asarray(direction, np.float32), light, radius)
     note = (
         f"A sun that no frame sees was solved from the patch of light that it throws: {sun.where()} "

@@ -256,8 +256,22 @@ def test_light_by_a_hole_that_a_mirror_shows_counts():
     bright = field.with_openings(Openings(low, size, np.ones((CELLS, 3), np.float32), 1.0))
     for one, seen in ((bright.with_mirrors((mirror,)), True), (bright, False)):
         through = _through_cells(
-            one, one.environment.clipped_parts(MISSING.sky), np.zeros(len(atlas), bool), ceiling, 0
+            one,
+            one.environment.clipped_parts(MISSING.sky),
+            np.zeros(len(atlas), bool),
+            np.zeros(CELLS, bool),
+            ceiling,
+            0,
         )[1].sum(1)
         dark = one.with_light(np.zeros_like(one.radiance))
         assert through.mean() == pytest.approx(irradiance_at(dark, ceiling, 0)[:, 0].mean(), rel=0.1)
         assert (through.mean() > 0.01) == seen
+
+
+def test_patches_in_one_plane_are_one_lamp_though_the_normal_of_one_is_off():
+    tilted = np.deg2rad(6.0)
+    normal = np.repeat(np.float32([[np.sin(tilted), 0, -np.cos(tilted)], [0, 0, -1], [0, 0, -1]]), 4, 0)
+    at = np.repeat(np.float32([[0, 0, 2.4], [2, 0, 2.4], [1, 0, 1.9]]), 4, 0)
+    atlas = replace(box().atlas, position=at, normal=normal, area=np.float32([1.1] * 4 + [1.0] * 8))
+    same = same_lamps(atlas, [np.arange(12) // 4 == k for k in range(3)])
+    assert (same > 0).astype(int).tolist() in ([[1, 0], [1, 0], [0, 1]], [[0, 1], [0, 1], [1, 0]])

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from addon.core.light.environment import Environment
 from addon.core.light.sun import RADIUS, Sun, put_in, sunlight, taken_out
 from addon.core.luminance import LUMINANCE
+from addon.core.passes.sun.sun_patch import find_patch_sun
 from addon.core.pipeline.shading import shade
 from addon.core.scene.lit_diffuse import LitDiffuse
 from addon.core.settings import Settings
@@ -190,3 +193,29 @@ def test_the_edge_of_a_shadow_is_in_doubt():
     edge = np.abs(x - 0.5) < 0.012
     assert edge.any() and (found[edge, 3] > 0.3).mean() > 0.5
     assert found[:, :3] @ LUMINANCE == pytest.approx(found[:, 0] / 3 * float(sun.irradiance @ LUMINANCE), abs=1e-5)
+
+
+def clipped_at(lit: LitDiffuse, level: float) -> LitDiffuse:
+    """The same as a sensor shows it that holds no more than a level in any channel."""
+    over = (lit.radiance > level).any(1)
+    return replace(lit, radiance=np.minimum(lit.radiance, np.float32(level)), clipped=over.astype(np.float32))
+
+
+@pytest.mark.parametrize("albedo", [sunny.ALBEDO, sunny.ALBEDO | {0: (0.35, 0.25, 0.15)}])
+def test_a_sun_is_found_by_a_patch_most_of_which_is_clipped(room, albedo):
+    lit = measured(room, sunny.light(room, albedo), texture=0.3)
+    patch = sunny.sun_on(room) > 0.9 * sunny.TOWARDS[2]
+    lit = clipped_at(lit, float(np.quantile(lit.radiance[patch].max(1), 0.4)))
+    assert lit.clipped[patch].mean() > 0.55
+    dark = room.field(lit.radiance, sky_map())
+    found = find_patch_sun(dark, dark, lit, [], 0)
+    assert found is not None and angle(found.direction, sunny.TOWARDS) < 1.5
+    assert found.irradiance @ LUMINANCE == pytest.approx(sunny.SUN @ LUMINANCE, rel=0.4)
+    assert any("sun" in word for word in found.note.split())
+
+
+def test_without_a_sun_what_is_clipped_is_none(room):
+    lit = measured(room, sunny.light(room, sun=np.zeros(3)), texture=0.3)
+    dark = room.field(lit.radiance, sky_map())
+    level = float(np.quantile(lit.radiance.max(1), 0.95))
+    assert find_patch_sun(dark, dark, clipped_at(lit, level), [], 0) is None
