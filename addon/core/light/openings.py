@@ -6,7 +6,7 @@ different directions, so an environment map can't hold it. A cell of the box can
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,15 +22,15 @@ from .params import GATHER
 CELLS = 6 * GATHER.cells**2
 """Of all six sides: side (2 * axis, + 1 for the high one), row, column."""
 
-LOOKS: Block[int] = 1 << 14
-"""Pixels of a frame, at most, of which it is asked where they look out."""
+LOOKS: Block[int] = 1 << 20
+"""Pixels, about, of all frames together of which it is asked where they look out."""
 
 BEFORE: Unit[float] = 1e-3
 """Sizes of the box that a panel lies before a surface."""
 
 
 def looked_out_by(
-    cameras: Iterable[Camera], scene: RayScene, sky: Environment, usual: float, low: np.ndarray, size: np.ndarray
+    cameras: Sequence[Camera], scene: RayScene, sky: Environment, usual: float, low: np.ndarray, size: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Cells by which most looks of cameras inside of a box go out to where it is brighter than a `usual` luminance.
 
@@ -46,7 +46,7 @@ def looked_out_by(
     directions = [np.zeros((0, 3), np.float32)]
     for camera in cameras:
         pixels = camera.pixel_centres()
-        way = camera.directions(pixels[:: max(len(pixels) // LOOKS, 1)]).astype(np.float32)
+        way = camera.directions(pixels[:: max(len(pixels) * len(cameras) // LOOKS, 1)]).astype(np.float32)
         origins = np.broadcast_to(camera.centre.astype(np.float32), way.shape)
         cell = exits(low, size, origins, way)[0]
         free = (scene.intersect(origins, way).triangle < 0) & within(low, size, origins)
@@ -109,7 +109,7 @@ class Openings:
     share : float
         Of all the light, that which comes from there.
     windows : (CELLS,) bool
-        Those that frames look out by: what lies behind is far away, and in the environment map.
+        Those that frames look out by (`looked_out_by`): what lies behind is far away, and in the environment map.
     """
 
     low: np.ndarray

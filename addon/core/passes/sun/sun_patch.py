@@ -65,8 +65,9 @@ def find_patch_sun(
     if not (told > 0).all():
         return None
     sun = Sun(direction, of_luminance(told))
-    note = f"A sun that no frame sees was found by the patch that it lights, which the sensor clipped: {sun.where()}."
-    return replace(sun, note=note)
+    return replace(
+        sun, note=f"A sun that no frame sees was solved from the patch of light that it throws: {sun.where()}."
+    )
 
 
 def direction_of(spots: Spots, out: np.ndarray, sky: Environment) -> np.ndarray | None:
