@@ -22,6 +22,8 @@ class SunParams:
         the elements around what stands out.
     even : int
         Elements over the whole surface that tell which stand out (`sun_patch`).
+    asked : int
+        Of those that do, so many tell which directions of the grid reach them.
     pool : int
         Elements, at most, that these are drawn from.
     near, dense : float, int
@@ -41,7 +43,8 @@ class SunParams:
     kept: int = 160
     refined: int = 24
     tried: int = 4
-    even: int = 3 * LEVELS.sample
+    even: int = 2 * LEVELS.sample
+    asked: int = 256
     pool: int = 60_000
     near: float = 0.3
     dense: int = 2000

@@ -42,17 +42,21 @@ def _on_grid(even: Spots, environment: Environment) -> list[Guess]:
     excess = value - np.minimum(even.medians(value, np.ones(len(even), bool)), 0)
     out = np.flatnonzero(even.stands_out())
     way = fibonacci(int(4 * np.pi / GRID**2)).astype(np.float32)
-    way = way[~environment.known(way)]
-    spot, ray = np.nonzero(even.normal[out] @ way.T > 0)
-    start = even.scene.off_surface(even.position[out], even.normal[out])
-    hidden = even.scene.occluded(start[spot], way[ray], np.full(len(spot), np.inf, np.float32))
-    weight = np.clip(excess[out], 0, 3)
-    reached = np.bincount(ray[~hidden], weight[spot[~hidden]], len(way)) / max(weight.sum(), 1e-9)
-    best = np.argsort(-reached, kind="stable")[: SUN.kept]
-    guesses = list(ordered_map(even.explained, way[best[reached[best] > SUN.reached]], 0))
+    way = reaching_most(even, out, np.clip(excess[out], 0, 3), way[~environment.known(way)])
+    guesses = list(ordered_map(even.explained, way, 0))
     # A patch may be narrower than the grid is wide, and the guess beside the sun then no better than any other.
     refined = ordered_map(lambda one: searched(even.explained, one, SHARP[:2]), apart(guesses)[: SUN.refined], 0)
     return apart(list(refined))[: SUN.tried]
+
+
+def reaching_most(spots: Spots, some: np.ndarray, weight: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """Of directions ((d, 3)) those that reach most of some spots ((k,) int), which weigh (k,): (e, 3) float32."""
+    spot, ray = np.nonzero(spots.normal[some] @ way.T > 0)
+    start = spots.scene.off_surface(spots.position[some], spots.normal[some])
+    hidden = spots.scene.occluded(start[spot], way[ray], np.full(len(spot), np.inf, np.float32))
+    reached = np.bincount(ray[~hidden], weight[spot[~hidden]], len(way)) / max(weight.sum(), 1e-9)
+    best = np.argsort(-reached, kind="stable")[: SUN.kept]
+    return way[best[reached[best] > SUN.reached]]
 
 
 def apart(guesses: list[Guess]) -> list[Guess]:

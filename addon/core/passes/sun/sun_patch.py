@@ -22,7 +22,7 @@ from ...scene.lit_diffuse import LitDiffuse
 from ...scene.sphere import fibonacci
 from ...significance import LEVELS
 from .params import SUN
-from .sun_fit import GRID, RADII, SHARP, along_edges, apart, of_luminance, searched
+from .sun_fit import GRID, RADII, SHARP, along_edges, apart, of_luminance, reaching_most, searched
 from .sun_spots import Guess, Spots
 
 
@@ -82,7 +82,10 @@ def direction_of(spots: Spots, out: np.ndarray, sky: Environment) -> np.ndarray 
         return Guess(direction, -_ratio(out, spots.contribution(direction) > SUN.lit))
 
     way = fibonacci(int(4 * np.pi / GRID**2)).astype(np.float32)
-    guesses = apart(list(ordered_map(told, way[~sky.known(way)], 0)))[: SUN.tried]
+    some = np.flatnonzero(out)
+    some = some[:: -(-len(some) // SUN.asked)]
+    way = reaching_most(spots, some, np.ones(len(some)), way[~sky.known(way)])
+    guesses = apart(list(ordered_map(told, way, 0)))[: SUN.tried]
     refined = ordered_map(lambda one: searched(told, one, SHARP), guesses, 0)
     best = min(refined, key=lambda one: one.cost, default=None)
     if best is None:
