@@ -27,6 +27,15 @@ def pick(field: LightField, good: np.ndarray, seed: int, samples: int) -> np.nda
     return np.sort(np.concatenate(chosen))
 
 
+def spread_over(field: LightField, element: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    """At most so many of some elements ((m,) int), evenly over the surface that they stand for."""
+    if len(element) <= count:
+        return element
+    weight = field.atlas.weight[element].astype(np.float64)
+    count = min(count, int((weight > 0).sum()))
+    return np.sort(rng.choice(element, count, replace=False, p=weight / weight.sum()))
+
+
 def steady(field: LightField, good: np.ndarray, flat: np.ndarray) -> np.ndarray:
     """The good elements, (n,) bool: of an object with enough on flat spots, those."""
     object_id = field.atlas.object_id

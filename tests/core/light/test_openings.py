@@ -9,8 +9,8 @@ import pytest
 
 from addon.core.light.environment import Environment
 from addon.core.light.openings import CELLS, Openings, exits, looked_out_by
-from addon.core.scene.model import Camera
 from tests.core import sunny
+from tests.core.rooms import look_at
 
 LOW, SIZE = np.float32([-1, 0, 0.5]), np.float32([4, 3, 2])
 USUAL = np.float32([0.2, 0.2, 0.1])
@@ -93,21 +93,12 @@ def test_cells_of_which_one_is_far_brighter_are_two_panels():
     assert sorted(len(panel.corners) for panel in found.panels()) == [1, 2]
 
 
-def looking_at(target, start) -> Camera:
-    """A camera of 60 degrees at `start`."""
-    back = np.subtract(start, target) / np.linalg.norm(np.subtract(start, target))
-    right = np.cross((0, 0, 1), back) / np.linalg.norm(np.cross((0, 0, 1), back))
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = np.stack([right, np.cross(back, right), back], 1), start
-    return Camera(120, 90, 104.0, 104.0, 60.0, 45.0, pose)
-
-
 def window_seen(usual: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Which cells of the sunny room count as windows, with the directions; its box."""
     room, x = sunny.sunny_room(0.2), sunny.SIZE[0]
     sky = Environment(np.ones((32, 64, 3), np.float32), np.ones((32, 64), np.int32))
     field = room.field(np.zeros((len(room.atlas), 3), np.float32), sky)
-    cameras = [looking_at((x, y, 0.9), (0.4, 1.0, 1.0)) for y in (0.3, 1.0, 1.7)]
+    cameras = [look_at((0.4, 1.0, 1.0), (x, y, 0.9), 120, 90, 60.0) for y in (0.3, 1.0, 1.7)]
     return (*looked_out_by(cameras, room.scene, sky, usual, *field.outer_box), *field.outer_box)
 
 
@@ -117,9 +108,8 @@ def test_a_window_is_where_cameras_look_out_to_what_is_brighter_than_the_room():
     assert len(cell) and (cell // 576 == 1).all() and (directions[:, 0] > 0).all()
     row, column = np.divmod(cell % 576, 24)
     at = low[1:] + size[1:] * (np.stack([row, column], 1) + 0.5) / 24
-    (window,) = [
-        np.sort(np.stack([quad.corner, quad.corner + quad.edge_u + quad.edge_v]), 0) for quad in sunny.sides()[1:]
-    ]
+    hole = sunny.sides()[1]
+    window = np.sort(np.stack([hole.corner, hole.corner + hole.edge_u + hole.edge_v]), 0)
     edge = size[1:] / 24
     assert (at > window[0, 1:] - edge).all() and (at < window[1, 1:] + edge).all()
     assert len(cell) * edge.prod() == pytest.approx(np.prod(window[1, 1:] - window[0, 1:]), rel=0.25)

@@ -12,7 +12,7 @@ import numpy as np
 from ...light.contributions import contributions
 from ...light.directions import cosine_patterns, turned
 from ...light.environment import Environment
-from ...light.few_elements import evened, from_sun, irradiance_at
+from ...light.few_elements import evened, from_sun, irradiance_at, spread_over
 from ...light.field import LightField
 from ...light.lamps import Lamp, find_seen
 from ...light.openings import CELLS, Openings, exits
@@ -175,12 +175,7 @@ def same_lamps(atlas: Atlas, patches: list[np.ndarray]) -> np.ndarray:
 
 def _sample(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:
     """Good elements, spread over the surface."""
-    element = np.flatnonzero(good)
-    if len(element) <= MISSING.samples:
-        return element
-    weight = field.atlas.weight[element].astype(np.float64)
-    rng = np.random.default_rng(seed)
-    return np.sort(rng.choice(element, MISSING.samples, replace=False, p=weight / weight.sum()))
+    return spread_over(field, np.flatnonzero(good), MISSING.samples, np.random.default_rng(seed))
 
 
 def unseen_closing(field: LightField) -> np.ndarray:

@@ -41,16 +41,20 @@ def _on_grid(even: Spots, environment: Environment) -> list[Guess]:
     value = even.log_albedo()
     excess = value - np.minimum(even.medians(value, np.ones(len(even), bool)), 0)
     out = np.flatnonzero(even.stands_out())
-    way = fibonacci(int(4 * np.pi / GRID**2)).astype(np.float32)
-    way = reaching_most(even, out, np.clip(excess[out], 0, 3), way[~environment.known(way)])
+    way = reaching_most(even, out, np.clip(excess[out], 0, 3), environment)
     guesses = list(ordered_map(even.explained, way, 0))
     # A patch may be narrower than the grid is wide, and the guess beside the sun then no better than any other.
     refined = ordered_map(lambda one: searched(even.explained, one, SHARP[:2]), apart(guesses)[: SUN.refined], 0)
     return apart(list(refined))[: SUN.tried]
 
 
-def reaching_most(spots: Spots, some: np.ndarray, weight: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """Of directions ((d, 3)) those that reach most of some spots ((k,) int), which weigh (k,): (e, 3) float32."""
+def reaching_most(spots: Spots, some: np.ndarray, weight: np.ndarray, environment: Environment) -> np.ndarray:
+    """Directions of the grid that reach most of some spots ((k,) int), which weigh (k,): (d, 3) float32.
+
+    Of those from which frames don't tell what comes.
+    """
+    way = fibonacci(int(4 * np.pi / GRID**2)).astype(np.float32)
+    way = way[~environment.known(way)]
     spot, ray = np.nonzero(spots.normal[some] @ way.T > 0)
     start = spots.scene.off_surface(spots.position[some], spots.normal[some])
     hidden = spots.scene.occluded(start[spot], way[ray], np.full(len(spot), np.inf, np.float32))

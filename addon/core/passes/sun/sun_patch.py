@@ -13,16 +13,15 @@ from scipy.spatial import cKDTree
 from scipy.stats import CensoredData, ecdf
 
 from ...light.environment import Environment
-from ...light.few_elements import irradiance_at
+from ...light.few_elements import irradiance_at, spread_over
 from ...light.field import LightField
 from ...light.sun import Sun
 from ...luminance import LUMINANCE
 from ...parallel import ordered_map
 from ...scene.lit_diffuse import LitDiffuse
-from ...scene.sphere import fibonacci
 from ...significance import LEVELS
 from .params import SUN
-from .sun_fit import GRID, RADII, SHARP, along_edges, apart, of_luminance, reaching_most, searched
+from .sun_fit import RADII, SHARP, along_edges, apart, of_luminance, reaching_most, searched
 from .sun_spots import Guess, Spots
 
 
@@ -43,19 +42,14 @@ def find_patch_sun(
     rng = np.random.default_rng([seed, 4])
     seen = np.flatnonzero(lit_diffuse.seen)
 
-    def some(element: np.ndarray, count: int) -> np.ndarray:
-        weight = dark.atlas.weight[element].astype(np.float64)
-        count = min(len(element), count, int((weight > 0).sum()))
-        return np.sort(rng.choice(element, count, replace=False, p=weight / weight.sum()))
-
-    element = some(seen, SUN.even)
+    element = spread_over(dark, seen, SUN.even, rng)
     spots = Spots(dark, element, irradiance_at(lit, element, seed))
     out = spots.over() | spots.stands_out() & ~np.isin(spots.sample.object_id, patches)
     direction = direction_of(spots, out, dark.environment)
     if direction is None:
         return None
     lies = np.unique(spots.sample.object_id[spots.contribution(direction) > SUN.lit])
-    pool = some(seen[np.isin(dark.atlas.object_id[seen], lies)], SUN.pool)
+    pool = spread_over(dark, seen[np.isin(dark.atlas.object_id[seen], lies)], SUN.pool, rng)
     along = along_edges(dark, pool, direction, rng)
     told = np.zeros(4)
     if len(along):
@@ -81,10 +75,9 @@ def direction_of(spots: Spots, out: np.ndarray, sky: Environment) -> np.ndarray 
     def told(direction: np.ndarray) -> Guess:
         return Guess(direction, -_ratio(out, spots.contribution(direction) > SUN.lit))
 
-    way = fibonacci(int(4 * np.pi / GRID**2)).astype(np.float32)
     some = np.flatnonzero(out)
     some = some[:: -(-len(some) // SUN.asked)]
-    way = reaching_most(spots, some, np.ones(len(some)), way[~sky.known(way)])
+    way = reaching_most(spots, some, np.ones(len(some)), sky)
     guesses = apart(list(ordered_map(told, way, 0)))[: SUN.tried]
     refined = ordered_map(lambda one: searched(told, one, SHARP), guesses, 0)
     best = min(refined, key=lambda one: one.cost, default=None)
