@@ -11,7 +11,7 @@ from ...parallel import ordered_map
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Instance, class_names
-from .neighbourhood import relative_error, shrink
+from .neighbourhood import References, relative_error, shrink, well_measured
 from .of_class import shrunk_to_class
 from .params import ALBEDO, MAX_ALBEDO
 
@@ -105,7 +105,8 @@ def albedo_of(
     """
     rho, valid = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
     error = np.hypot(relative_error(lit_diffuse, atlas.object_id, "object-spread" not in without), unsure)
-    found = fill(atlas, rho, valid & lit_diffuse.seen, class_names(instances), emitters, error, without)
+    guesses = {one.object_id for one in instances if one.guess}
+    found = fill(atlas, rho, valid & lit_diffuse.seen, class_names(instances), emitters, error, without, guesses)
     if "class-albedo" in without:
         return found
     told = class_names(one for one in instances if not one.guess)
@@ -121,6 +122,7 @@ def fill(
     emitters: set[int],
     error: np.ndarray | None = None,
     without: Collection[str] = (),
+    guesses: Collection[int] = (),
 ) -> Albedo:
     """Clamp, fill in what was not measured, and shrink what was measured badly, from the same object.
 
@@ -131,6 +133,8 @@ def fill(
     error : (n,) float32, optional
         Relative standard error of each quotient (`neighbourhood.relative_error`); without it all count as equally good.
         Where it is inf, the quotient counts as not measured.
+    guesses : collection of int
+        Objects that shape alone tells.
     """
     if error is not None:
         valid = valid & np.isfinite(error)
@@ -151,7 +155,14 @@ def fill(
             bare.setdefault(class_of.get(object_id, ""), []).append(own)
         else:
             measured.append(own)
-    each = ordered_map(lambda own: shrink(atlas, own, result[own], error[own], without), measured, 0)
+    guessed = [own for own in measured if int(atlas.object_id[own[0]]) in guesses]
+    beside = _references(atlas, guessed, result, error) if guessed else None
+
+    def shrunk_part(own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        by = beside if int(atlas.object_id[own[0]]) in guesses else None
+        return shrink(atlas, own, result[own], error[own], without, by)
+
+    each = ordered_map(shrunk_part, measured, 0)
     for own, shrunk in zip(measured, each, strict=True):
         result[own], left[own] = shrunk
         name = class_of.get(int(atlas.object_id[own[0]]), "")
@@ -163,6 +174,12 @@ def fill(
         origin[own] = NONE
         left[own] = _spread(alike if alike and len(alike) > 2 else known)
     return Albedo(np.clip(result, 0, MAX_ALBEDO).astype(np.float32), origin, left)
+
+
+def _references(atlas: Atlas, parts: list[np.ndarray], rho: np.ndarray, error: np.ndarray) -> References:
+    """The well-measured elements of some parts, (m,) int each."""
+    sure = np.concatenate([own[well_measured(error[own])] for own in parts])
+    return References(atlas.position[sure], rho[sure], error[sure])
 
 
 def _parts(atlas: Atlas, valid: np.ndarray) -> np.ndarray:

@@ -6,6 +6,8 @@ log albedo, with the spread of the neighbours as the prior's width; a second col
 """
 
 from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -106,8 +108,49 @@ def _prior(
     return found
 
 
+@dataclass(frozen=True)
+class References:
+    """Well-measured elements of the parts of a scan that shape alone tells.
+
+    Where such parts end is a guess: the rim of one may bear the colour of the next.
+
+    Attributes
+    ----------
+    position : (r, 3) float32
+    rho : (r, 3) float32
+        Clamped quotient.
+    error : (r,) float32
+        Its relative standard error.
+    """
+
+    position: np.ndarray
+    rho: np.ndarray
+    error: np.ndarray
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Of the positions."""
+        return cKDTree(self.position)
+
+
+def well_measured(error: np.ndarray) -> np.ndarray:
+    """Which of an object's elements the prior is made of, (r,) int, in random order; `error` ((m,)) as in `shrink`."""
+    known = np.flatnonzero(np.isfinite(error))
+    # The better half at least: the few that are surer may be all of one kind, the frame of a painting.
+    sure = known[error[known] <= max(LEVELS.sure, float(np.median(error[known])))]
+    if len(sure) < PRIOR.neighbours:
+        sure = known
+    # A thinned set reaches further around.
+    return np.random.default_rng(0).permutation(sure)[: LEVELS.sample]
+
+
 def shrink(
-    atlas: Atlas, own: np.ndarray, rho: np.ndarray, error: np.ndarray, without: Collection[str] = ()
+    atlas: Atlas,
+    own: np.ndarray,
+    rho: np.ndarray,
+    error: np.ndarray,
+    without: Collection[str] = (),
+    beside: References | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Albedo of one object's elements, each shrunk towards its neighbourhood as far as it is uncertain.
 
@@ -121,6 +164,8 @@ def shrink(
         Relative standard error; 0: stays as it is; inf: not measured. At least one is finite.
     without : collection of str
         Passes left out.
+    beside : References, optional
+        Among which a second colour is looked for, in place of the object's own.
 
     Returns
     -------
@@ -129,13 +174,7 @@ def shrink(
         Its relative standard error: the posterior's; the prior's width where nothing was measured.
     """
     position = atlas.position[own]
-    known = np.flatnonzero(np.isfinite(error))
-    # The better half at least: the few that are surer may be all of one kind, the frame of a painting.
-    sure = known[error[known] <= max(LEVELS.sure, float(np.median(error[known])))]
-    if len(sure) < PRIOR.neighbours:
-        sure = known
-    # A thinned set reaches further around.
-    sure = np.random.default_rng(0).permutation(sure)[: LEVELS.sample]
+    sure = well_measured(error)
     cell = PRIOR.cell * float(np.sqrt(np.median(atlas.area[own])))
     place = np.floor((position - position.min(0)) / max(cell, 1e-9)).astype(np.int64)
     extent = place.max(0) + 1
@@ -168,6 +207,10 @@ def shrink(
     left[todo] = np.where(measured, np.sqrt(trust[:, 0]) * error[:, 0], width[:, 0])
     result = trust * log_rho + (1 - trust) * middle
     if not {"second-colour", "albedo-prior"} & set(without):
+        if beside is not None:
+            near = beside.tree.query(centre[asked], k=min(PRIOR.neighbours, len(beside.rho)), workers=-1)[1]
+            around = around._replace(near=near.reshape(len(asked), -1))
+            reference, reference_error = np.maximum(beside.rho, ALBEDO.floor), beside.error
         near = around, index[measured], reference, reference_error
         result[measured] = shrunk_to_second_colour(result[measured], rho[measured], error[measured, 0], *near)
     shrunk[todo] = np.exp(result)

@@ -76,3 +76,20 @@ def test_what_is_above_all_albedos_is_no_colour(atlas, joints):
     lone = fill(atlas, np.minimum(rho, 0.999), everywhere, {}, set(), np.full(len(atlas), 0.14, np.float32)).rho
     far = joints & (atlas.position[:, 0] < 1)
     assert np.median(found[far]) < np.median(lone[far])
+
+
+def test_the_rim_of_a_part_may_bear_its_neighbour_s_colour():
+    """A grey part next to a white one: its outermost 10 cm are white, and badly measured. A told object's turn grey."""
+    grey, white = quad((0, 0, 0), (1.5, 0, 0), (0, 3, 0), 0), quad((1.5, 0, 0), (1.5, 0, 0), (0, 3, 0), 1)
+    atlas = make_room([grey, white], 0.025).atlas
+    rim = (atlas.object_id == 0) & (atlas.position[:, 0] > 1.4)
+    rho = noisy(np.where((atlas.object_id == 1) | rim, 0.7, 0.2), 0.03)
+    error, everywhere = np.where(rim, 0.4, 0.1).astype(np.float32), np.ones(len(atlas), bool)
+
+    def median(guesses):
+        found = fill(atlas, rho, everywhere, {}, set(), error, guesses=guesses).rho
+        grey = (atlas.object_id == 0) & ~rim
+        return np.median(found[rim]), np.median(found[grey])
+
+    assert median({0, 1}) == pytest.approx((0.7, 0.2), rel=0.05)
+    assert median(())[0] < 0.4
