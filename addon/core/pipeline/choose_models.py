@@ -191,7 +191,7 @@ def _by_frames(maker: Problems, object_id: int, rays: int, guess: bool) -> tuple
         return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
     # The rays' noise is known and counts by elements, so as many rays are spread over more of them.
     problem = maker.problem(index, rays * FIT.elements // elements)
-    return choose_model(problem, not guess), problem, index
+    return choose_model(problem, guess), problem, index
 
 
 def _by_looks(

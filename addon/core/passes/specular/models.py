@@ -126,8 +126,12 @@ def _of_class(own: LobeFit, of_class: LobeFit, model: Brdf, problem: Problem | N
     return own if gain > CHOICE.min_gain and sigmas > LEVELS.sigmas else shared
 
 
-def choose_model(problem: Problem, may_be_metal: bool = True) -> Choice:
-    """The simplest model that the observations support, by two-fold cross-validation over the elements."""
+def choose_model(problem: Problem, part: bool = False) -> Choice:
+    """The simplest model that the observations support, by two-fold cross-validation over the elements.
+
+    A `part` that shape alone tells may hold other things without a highlight: its lobe need only be likely, however
+    little it gains. It is never called metal, which would take the texture of all of them.
+    """
     if len(np.unique(problem.element)) < LEVELS.few:
         return Choice(LAMBERTIAN, None, note="Too few observations to look for a highlight.")
     dense = DenseProblem(problem)
@@ -145,13 +149,12 @@ def choose_model(problem: Problem, may_be_metal: bool = True) -> Choice:
     scores = {LAMBERTIAN.name: 1.0, DIELECTRIC.name: float(with_lobe.sum() / max(without.sum(), 1e-30))}
     gain, sigmas = _gain(with_lobe, without)
     large = gain > LEVELS.gain and dense.there.shape[1] >= LEVELS.enough
-    sure = (
-        gain > CHOICE.min_gain and sigmas > (LEVELS.likely if large else LEVELS.sigmas) and fit.phi <= FIT.broadest_phi
-    )
+    enough = sigmas > (LEVELS.likely if large or part else LEVELS.sigmas) and (part or gain > CHOICE.min_gain)
+    sure = enough and fit.phi <= FIT.broadest_phi
     # Too strong for a dielectric, but over a diffuse part, so no metal: the light is off.
     dielectric = replace(fit, psi=np.minimum(fit.psi, MOST_F0))
     metal, likely = fit_lobe(dense, constraints=METAL.constraints), None
-    if may_be_metal and _metallic(metal):
+    if not part and _metallic(metal):
         with_metal, diffuse = held_out(metal, METAL)
         scores[METAL.name] = float(with_metal.sum() / max(diffuse.sum(), 1e-30))
         # A broad lobe of a dielectric can look like a weak metal's: it must be told from that, too.

@@ -48,6 +48,18 @@ def test_each_gets_the_simplest_model(seen):
     assert chosen["diffuse"].gain < 0.02
 
 
+def test_a_part_needs_less_evidence_and_is_never_metal(seen):
+    """A weak highlight in noisy frames: likely, not sure."""
+    box = Box()
+    element, direction, _ = box.views(60, 8)
+    faint = box.problem(element, direction, 0.11, 0.02, paint(element))
+    noise = np.exp(0.14 * np.random.default_rng(3).normal(size=(len(element), 1)))
+    faint = replace(faint, radiance=(faint.radiance * noise).astype(np.float32))
+    assert (choose_model(faint).model, choose_model(faint, part=True).model) == (LAMBERTIAN, DIELECTRIC)
+    assert choose_model(seen["diffuse"], part=True).model == LAMBERTIAN
+    assert choose_model(seen["metal"], part=True).model != METAL
+
+
 def test_a_metals_colour(seen):
     assert np.allclose(metal_f0(seen["metal"], 0.11), COPPER, rtol=0.05)
 
