@@ -238,20 +238,29 @@ def _shut(
     normals, ends = np.repeat([sheet.plane.normal for sheet in sheets], counts, 0), np.cumsum(counts)[:-1]
     sight = sight_of([frame.camera for frame in frames], scene, points, normals, gap)
     closed = 2 * sight.through < np.maximum(sight.through + sight.out, 1)
-    labels, groups = [], 0
-    for sheet, out in zip(sheets, np.split(closed & (sight.out > 0), ends), strict=True):
-        label, count = ndimage.label(sheet.picture(out), np.ones((3, 3)))
-        own = label[sheet.open]
-        labels.append(np.where(own > 0, own + groups - 1, -1))
-        groups += count
-    if groups:
-        group = np.concatenate(labels)
+    looked_at = closed & (sight.out > 0)
+    if looked_at.any():
         normal, area = triangle_geometry(mesh)
         some = np.random.default_rng(0).choice(len(triangles), LEVELS.sample, p=area / area.sum())
         shown = colours(frames, read, sight, scene, vertices[triangles[some]].mean(1), normal[some], gap)
-        closed &= (group < 0) | ~_outside(sight, group, groups, shown, gap)[group]
+        outside = looked_at & _outside(sight, _groups(sheets, looked_at), shown, gap)
+        # Of what hangs together with a window, some may be wall that was not fused: what is not bright is asked again.
+        bright = np.bincount(sight.place, shown.clipped | ~(shown.value.mean(1) <= shown.bright), len(points))
+        dark = outside & (2 * bright <= sight.out)
+        outside &= ~dark | _outside(sight, _groups(sheets, dark), shown, gap)
+        closed &= ~outside
     told = zip(sheets, np.split(closed, ends), np.split(sight.out > 0, ends), strict=True)
     return [(_without_specks(sheet.picture(own), sheet.open), sheet.picture(seen)) for sheet, own, seen in told]
+
+
+def _groups(sheets: Sequence[Sheet], chosen: np.ndarray) -> np.ndarray:
+    """Numbers of the open cells ((n,) bool of all sheets) that hang together, (n,) int; -1 for what is not chosen."""
+    labels, groups, ends = [], 0, np.cumsum([int(sheet.open.sum()) for sheet in sheets])[:-1]
+    for sheet, own in zip(sheets, np.split(chosen, ends), strict=True):
+        label, count = ndimage.label(sheet.picture(own), np.ones((3, 3)))
+        labels.append(np.where(own, label[sheet.open] + groups - 1, -1))
+        groups += count
+    return np.concatenate(labels)
 
 
 def _without_specks(shut: np.ndarray, able: np.ndarray) -> np.ndarray:
@@ -260,13 +269,13 @@ def _without_specks(shut: np.ndarray, able: np.ndarray) -> np.ndarray:
     return shut | (able & ~shut & (np.bincount(label.ravel())[label] <= CLOSING.speck))
 
 
-def _outside(sight: Sight, group: np.ndarray, count: int, shown: Shown, gap: float) -> np.ndarray:
-    """Which groups of places ((n,) int, -1 for none) frames see past the room in, (count,) bool.
+def _outside(sight: Sight, group: np.ndarray, shown: Shown, gap: float) -> np.ndarray:
+    """Places whose group ((n,) int, -1 for none) frames see past the room in, (n,) bool.
 
     What lies within `gap` metres of each other, at a place's distance, lies in one direction.
     """
-    value = shown.value
-    outside = np.ones(count, bool)
+    value, count = shown.value, int(group.max(initial=-1)) + 1
+    outside = np.append(np.ones(count, bool), False)  # the last for no group
     of = group[sight.place]
     for one in range(count):
         own = np.flatnonzero(of == one)
@@ -282,7 +291,7 @@ def _outside(sight: Sight, group: np.ndarray, count: int, shown: Shown, gap: flo
         direction = np.unique(way, axis=0, return_inverse=True)[1].ravel()
         here, far = (between_frames(value[told], of, sight.frame[told]) for of in (sight.place[told], direction))
         outside[one] = here >= far
-    return outside
+    return outside[group]
 
 
 def sheets_of(vertices: np.ndarray, triangles: np.ndarray, planes: Sequence[Plane]) -> list[Sheet]:

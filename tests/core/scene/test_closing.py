@@ -151,6 +151,18 @@ def test_a_dark_view_stays_open_and_a_missed_surface_is_closed():
     assert leaks(mesh, here) == 0 < leaks(mesh, far)
 
 
+def test_a_wall_missing_beside_a_window_is_closed():
+    """One hole: bright outside by its left half, by its right half the wall that was not fused."""
+
+    def outside(start, rays):
+        y = start[:, 1] + rays[:, 1] / -rays[:, 0] * start[:, 0]
+        return np.where(y < 1.2, 5.0, stripes(y))
+
+    mesh = room(window)
+    added = closing(mesh, outside)
+    assert 0.35 * leaks(mesh, None) < leaks(mesh, added) < 0.65 * leaks(mesh, None)
+
+
 def test_a_niche_stays_open():
     """Frames see mesh behind the wall's plane."""
     vertices, triangles = room(window)
