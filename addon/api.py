@@ -146,7 +146,7 @@ class Recovered:
     @property
     def uv(self) -> np.ndarray:
         """Where the corners of `mesh` lie on the atlas, (t, 3, 2) float32; v points up, as in Blender."""
-        return self._recovery.surface().atlas.uv
+        return self._recovery.surface().shown_uv
 
     def write(self, scene: SceneWriter | None = None) -> dict[str, Any]:
         """Write the EXR images, materials.json, report.html and report.json into `folder`.

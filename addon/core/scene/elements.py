@@ -13,6 +13,7 @@ from ..parallel import blocks, for_blocks
 from .atlas import Atlas
 from .model import Mesh
 from .rays import Hits, RayScene
+from .uv_islands import connected, corner_ids
 
 # Where in a texel it is asked which triangle covers it: the centre first, so that a texel which only touches a
 # triangle still gets an element at its border, and thin triangles are not lost.
@@ -247,9 +248,7 @@ def element_of_triangle(mesh: Mesh, atlas: Atlas) -> np.ndarray:
     first[atlas.triangle[::-1]] = np.arange(len(atlas) - 1, -1, -1, dtype=np.int32)
     # What lies under its middle in the atlas: beside its own texels, or the one element of many.
     bare = np.flatnonzero(first < 0)
-    middle = atlas.uv[bare].mean(1, dtype=np.float64) * atlas.size
-    column, row = np.clip(middle.astype(np.int64), 0, atlas.size - 1).T
-    under = atlas.padding[row * atlas.size + column]
+    under = _under(atlas, bare)
     first[bare] = np.where(atlas.object_id[under] == mesh.object_id[bare], under, -1)
     centroid = mesh.vertices[mesh.triangles].mean(1)
     left = np.flatnonzero(first < 0)
@@ -259,6 +258,34 @@ def element_of_triangle(mesh: Mesh, atlas: Atlas) -> np.ndarray:
             own = np.arange(len(atlas))
         first[bare] = own[cKDTree(atlas.position[own]).query(centroid[bare])[1]]
     return first
+
+
+def _under(atlas: Atlas, triangle: np.ndarray) -> np.ndarray:
+    """The element whose texel lies under the middle of each triangle in the atlas, (k,) int32."""
+    middle = atlas.uv[triangle].mean(1, dtype=np.float64) * atlas.size
+    column, row = np.clip(middle.astype(np.int64), 0, atlas.size - 1).T
+    return atlas.padding[row * atlas.size + column]
+
+
+def shown_uv(mesh: Mesh, atlas: Atlas) -> np.ndarray:
+    """Atlas coordinates for a renderer, which looks texels up and no elements, (t, 3, 2) float32.
+
+    An island too small for a texel would show another object's: it lies in the middle of the one that stands for it.
+    """
+    other = atlas.object_id[_under(atlas, np.arange(len(mesh.triangles)))] != mesh.object_id
+    if not other.any():
+        return atlas.uv
+    touched = np.zeros(len(mesh.vertices), bool)
+    touched[mesh.triangles[other]] = True
+    near = np.flatnonzero(touched[mesh.triangles].any(1))
+    island = connected(corner_ids(mesh.triangles[near], atlas.uv[near]))
+    lost = np.bincount(island, ~other[near]) == 0
+    first = near[np.unique(island, return_index=True)[1]]
+    texel = atlas.texel[element_of_triangle(mesh, atlas)[first]]
+    middle = np.stack([texel % atlas.size, texel // atlas.size], 1) + 0.5
+    uv, moved = atlas.uv.copy(), lost[island]
+    uv[near[moved]] = (middle / atlas.size)[island[moved], None]
+    return uv
 
 
 class ElementLookup:

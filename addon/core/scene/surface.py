@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import BadInputError
 from .atlas import Atlas
 from .element_groups import ElementGroups
-from .elements import Crumbs, ElementLookup, Elements, find_elements, make_atlas, triangle_geometry, uv_scale
+from .elements import Crumbs, ElementLookup, Elements, find_elements, make_atlas, shown_uv, triangle_geometry, uv_scale
 from .model import Camera, Mesh
 from .orientation import Sides, seen_sides
 from .params import SURFACE
@@ -50,10 +50,16 @@ class Surface:
         alike: (t, 3, 2) float32."""
         return turned(self.atlas.uv, _every(self.mesh, self.sign))
 
+    @cached_property
+    def shown_uv(self) -> np.ndarray:
+        """Atlas coordinates for a renderer: `elements.shown_uv`."""
+        return shown_uv(self.mesh, self.atlas)
+
     @property
     def first_uv(self) -> np.ndarray:
-        """`uv` of the capture's own triangles. Where a mesh must stay as it is, its sheets show the side seen more."""
-        return self.uv[: len(self.sign)]
+        """`shown_uv` of the capture's own triangles, in their corner order. Where a mesh must stay as it is, its sheets
+        show the side seen more."""
+        return turned(self.shown_uv[: len(self.sign)], self.sign)
 
     @cached_property
     def lookup(self) -> ElementLookup:

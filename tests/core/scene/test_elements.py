@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from addon.core.scene.atlas import Atlas
-from addon.core.scene.elements import Crumbs, ElementLookup, find_elements, make_atlas, triangle_geometry, uv_scale
+from addon.core.scene.elements import (
+    Crumbs,
+    ElementLookup,
+    find_elements,
+    make_atlas,
+    shown_uv,
+    triangle_geometry,
+    uv_scale,
+)  # fmt: skip
 from addon.core.scene.model import Mesh
 from tests.core.rooms import box_sides, make_room, quad
 
@@ -145,6 +153,16 @@ def test_surface_without_a_texel_shows_its_own_object(crumbs):
     away = np.linalg.norm(atlas.position[element[triangle == 5]] - [5.5, 0.5, 0], axis=1)
     assert away.max() < 0.1  # the nearest element of the object's other triangles
     assert (element >= 0).all()  # object 2 has no element at all and takes anybody's
+
+
+def test_a_renderer_sees_the_same_object_by_the_written_coordinates(crumbs):
+    """The crumb lies over object 0's padding; what has texels stays where it is."""
+    mesh, atlas = crumbs
+    uv = shown_uv(mesh, atlas)
+    shown = atlas.object_id[atlas.padding.reshape(32, 32)[tuple((uv * 32).astype(int)[..., ::-1].transpose(2, 0, 1))]]
+    assert (shown[:6] == mesh.object_id[:6, None]).all()
+    assert np.array_equal(uv[:4], atlas.uv[:4]) and not np.array_equal(uv[5], atlas.uv[5])
+    assert np.allclose((uv[5] * 32) % 1, 0.5)  # in a texel's middle, so that no neighbour is mixed in
 
 
 def test_a_sliver_between_texel_centres_gets_elements_at_its_border():
