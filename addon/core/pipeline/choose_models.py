@@ -152,7 +152,9 @@ def choose_models(room: Room, found: Mapping[int, Looked]) -> Chosen:
     problems = {i: one.problem for i, one in found.items() if one.problem is not None}
     targets = {i: one.target for i, one in found.items()}
     if "class-lobes" not in room.settings.without:
-        reflecting = {i: choice for i, choice in choices.items() if not choice.model.gives_light}
+        # That two parts are walls by their shape says nothing of what they are painted with.
+        told = {one.object_id for one in room.instances if not one.guess}
+        reflecting = {i: choice for i, choice in choices.items() if i in told and not choice.model.gives_light}
         adopted = adopt_from_class(reflecting, problems, class_names(room.instances))
         choices |= {i: choice for i, choice in adopted.items() if i not in room.given}
     intervals = ordered_map(lambda i: gloss_interval(choices[i], problems.get(i)), found, room.settings.threads)
