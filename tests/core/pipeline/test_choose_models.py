@@ -16,7 +16,7 @@ from tests.core.glossy_box import Box
 
 @pytest.mark.parametrize("guess", [False, True])
 def test_a_class_that_shape_alone_tells_shares_no_lobe(guess):
-    """A glossy wall, and one whose few frames tell no lobe: they are alike if the capture told that they are of a class."""
+    """A glossy wall, and one whose few frames tell no lobe: alike if the capture told that they are of a class."""
     box = Box()
     element, direction, _ = box.views(60, 10)
     glossy = box.problem(element, direction, 0.11, 0.08, paint(element))
