@@ -159,7 +159,8 @@ def settled(mesh: Mesh) -> Mesh:
     """A mesh whose noise was taken out, with the faces that close it drawn up to the scan beside them.
 
     They were laid out behind all of its noise. A step of a centimetre in a floor throws a shadow of several where light
-    comes in low. Faces that hang together move as one plane, so that none of their edges parts.
+    comes in low. Faces that hang together move as one plane, so that none of their edges parts. Crumbs of the scan over
+    the midst of them, as where it ends far from all cameras, are laid flat onto that plane.
     """
     if mesh.closed is None or not len(mesh.closed):
         return mesh
@@ -187,7 +188,28 @@ def settled(mesh: Mesh) -> Mesh:
         under = max(spread, CLOSING.under * gap)
         rise = lies(at - at.mean(0)) - under - (at - at.mean(0)) @ normal
         vertices[own] = at + np.clip(rise, -gap, gap)[:, None] * normal
+        cover = RayScene(vertices, closing[label == piece])
+        near = np.flatnonzero(((centre > at.min(0) - 2 * gap) & (centre < at.max(0) + 2 * gap)).all(1))
+        off = np.abs((centre[near] - at.mean(0)) @ normal - lies(centre[near] - at.mean(0)))
+        near = near[(off > LEVELS.likely * under) | (facing[near] @ normal < np.cos(PARTS.tilt))]
+        crumbs = np.unique(scan.triangles[near[_over_midst(cover, centre[near], normal, gap)]])
+        place = mesh.vertices[crumbs].astype(np.float64) - at.mean(0)
+        height = lies(place) - place @ normal
+        flat = np.abs(height) < gap
+        vertices[crumbs[flat]] += (height[flat, None] * normal).astype(vertices.dtype)
     return replace(mesh, vertices=vertices)
+
+
+def _over_midst(cover: RayScene, points: np.ndarray, normal: np.ndarray, gap: float) -> np.ndarray:
+    """Points ((n, 3)) that lie over closing faces, as what is `gap` metres around them in the plane does, (n,) bool."""
+    right, up = _axes(normal, [])
+    over = np.ones(len(points), bool)
+    for across in (-gap, 0, gap):
+        for along in (-gap, 0, gap):
+            start = (points + across * right + along * up + gap * normal).astype(np.float32)
+            down = np.broadcast_to(-normal.astype(np.float32), start.shape)
+            over &= ~(cover.intersect(start, down).distance > 2 * gap)
+    return over
 
 
 def _plane_through(points: np.ndarray, normal: np.ndarray, wanted: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
