@@ -175,8 +175,7 @@ def settled(mesh: Mesh) -> Mesh:
         normal = turned[label == piece].mean(0)
         normal = normal / max(float(np.linalg.norm(normal)), 1e-12)
         at = mesh.vertices[own].astype(np.float64)
-        beside = np.unique(np.concatenate([np.zeros(0, int), *map(np.asarray, tree.query_ball_point(at, 2 * gap))]))
-        beside = beside.astype(int)
+        beside = _near(tree, at, 2 * gap)
         beside = beside[facing[beside] @ normal > np.cos(PARTS.tilt)]
         height = (centre[beside] - at.mean(0)) @ normal
         beside = beside[np.abs(height) < gap]
@@ -188,16 +187,24 @@ def settled(mesh: Mesh) -> Mesh:
         under = max(spread, CLOSING.under * gap)
         rise = lies(at - at.mean(0)) - under - (at - at.mean(0)) @ normal
         vertices[own] = at + np.clip(rise, -gap, gap)[:, None] * normal
-        cover = RayScene(vertices, closing[label == piece])
-        near = np.flatnonzero(((centre > at.min(0) - 2 * gap) & (centre < at.max(0) + 2 * gap)).all(1))
+        faces = np.searchsorted(own, closing[label == piece])
+        corners = vertices[own][faces].astype(np.float64)
+        middle = corners.mean(1)
+        near = _near(tree, middle, np.linalg.norm(corners - middle[:, None], axis=2).max(1) + 2 * gap)
         off = np.abs((centre[near] - at.mean(0)) @ normal - lies(centre[near] - at.mean(0)))
         near = near[(off > LEVELS.likely * under) | (facing[near] @ normal < np.cos(PARTS.tilt))]
-        crumbs = np.unique(scan.triangles[near[_over_midst(cover, centre[near], normal, gap)]])
+        over = _over_midst(RayScene(vertices[own], faces), centre[near], normal, gap)
+        crumbs = np.unique(scan.triangles[near[over]])
         place = mesh.vertices[crumbs].astype(np.float64) - at.mean(0)
         height = lies(place) - place @ normal
         flat = np.abs(height) < gap
         vertices[crumbs[flat]] += (height[flat, None] * normal).astype(vertices.dtype)
     return replace(mesh, vertices=vertices)
+
+
+def _near(tree: cKDTree, points: np.ndarray, radius: float | np.ndarray) -> np.ndarray:
+    """What lies within a radius of any of n points ((n, 3)), (k,) int."""
+    return np.unique(np.concatenate([np.zeros(0), *tree.query_ball_point(points, radius)])).astype(int)
 
 
 def _over_midst(cover: RayScene, points: np.ndarray, normal: np.ndarray, gap: float) -> np.ndarray:
