@@ -189,8 +189,10 @@ def settled(mesh: Mesh) -> Mesh:
         vertices[own] = at + np.clip(rise, -gap, gap)[:, None] * normal
         faces = np.searchsorted(own, closing[label == piece])
         corners = vertices[own][faces].astype(np.float64)
-        middle = corners.mean(1)
-        near = _near(tree, middle, np.linalg.norm(corners - middle[:, None], axis=2).max(1) + 2 * gap)
+        # What frames saw is closed in single cells. Where they saw none, a curtain may hang before a wall.
+        single = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).min(1) < LEVELS.likely * gap
+        faces, middle = faces[single], corners[single].mean(1)
+        near = _near(tree, middle, 3 * gap)
         off = np.abs((centre[near] - at.mean(0)) @ normal - lies(centre[near] - at.mean(0)))
         near = near[(off > LEVELS.likely * under) | (facing[near] @ normal < np.cos(PARTS.tilt))]
         over = _over_midst(RayScene(vertices[own], faces), centre[near], normal, gap)
