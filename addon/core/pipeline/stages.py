@@ -26,7 +26,7 @@ from ..results.overrides import NONE as NO_OVERRIDES
 from ..results.overrides import Overrides
 from ..results.store import Store
 from ..results.values import packed, unpacked
-from ..scene.closing import opened
+from ..scene.closed_mesh import opened
 from ..scene.frame_choice import with_frames_that_add
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Capture, Frame, Mesh

@@ -15,7 +15,7 @@ from ..lit_diffuse.from_picture import texel_edge
 from ..lit_diffuse.from_texture import face_edge
 from ..origin import OWN, of_thing
 from ..passes.mesh_denoising.denoise import without_noise
-from ..scene.closing import as_scanned, settled
+from ..scene.closed_mesh import as_scanned, settled
 from ..scene.elements import Elements
 from ..scene.model import Capture, Mesh
 from ..scene.stored_light import LitTexture

@@ -15,7 +15,7 @@ from addon.core.io.exr import write_exr
 from addon.core.io.id_pictures import read_ids
 from addon.core.io.png import write_png
 from addon.core.io.read import read_capture
-from addon.core.scene.closing import opened
+from addon.core.scene.closed_mesh import opened
 from addon.core.scene.connected_parts import connected_parts
 from addon.core.scene.model import Frame
 from addon.core.scene.params import SURFACE

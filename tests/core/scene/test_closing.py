@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from addon.core.scene.closing import as_scanned, close_holes, opened, settled
+from addon.core.scene.closed_mesh import as_scanned, opened, settled
+from addon.core.scene.closing import close_holes
 from addon.core.scene.model import Camera, Capture, Frame, Instance, Mesh, Pixels
 from addon.core.scene.rays import RayScene
 from addon.core.scene.shape_parts import parts_of

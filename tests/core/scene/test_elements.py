@@ -14,7 +14,7 @@ from addon.core.scene.elements import (
     shown_uv,
     triangle_geometry,
     uv_scale,
-)  # fmt: skip
+)
 from addon.core.scene.model import Mesh
 from tests.core.rooms import box_sides, make_room, quad
 
