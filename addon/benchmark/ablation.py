@@ -28,7 +28,7 @@ from ..core.settings import PRESETS, Settings
 from ..core.stages import RUN_STAGES, STAGES, WRITE
 from .rerender import rerender_psnr
 from .truth_materials import score_materials
-from .truth_views import psnr, views
+from .truth_views import pairs, psnr, views
 
 LINES = "ablation.jsonl"
 WHOLE = ""
@@ -225,9 +225,7 @@ class Bench:
         if surface not in self._views:
             self._views = {surface: views(self.room, recovery)}
         seen = self._views[surface]
-        ids = np.concatenate([view["id"] for view in seen])
-        pixels = dict(zip(*(x.tolist() for x in np.unique(ids, return_counts=True)), strict=True))
-        found = score_materials(recovery.materials(), self._truth, pixels)
+        found = score_materials(recovery.materials(), self._truth, pairs(seen))
         figures = {
             "albedo": psnr(seen, recovery.base_color()),
             "rerender": rerender_psnr(recovery, seen),

@@ -6,6 +6,7 @@ view shows, in a second.
 
 import numpy as np
 
+from ..core.evidence.tier import tier
 from ..core.kinds import Workload
 from ..core.light.emitters import bright_triangles
 from ..core.light.lobes import highlight
@@ -20,29 +21,28 @@ RAYS: Workload[int] = 64
 def rerender_psnr(recovery: Recovery, seen: list[dict], seed: int = 0) -> float:
     """Mean PSNR (dB) in display values of `truth_views.views` as the result would show them.
 
-    The exposure puts each view's median luminance to middle grey. Lamps, glass and pixels at edges are left out.
+    The exposure puts each view's median luminance to middle grey. Lamps, glass and pixels at edges are left out. Where
+    the frames don't tell their radiance's unit, the median ratio to the truth gives it.
     """
     materials = {m.object_id: m for m in recovery.materials()}
     left_out = [i for i, m in materials.items() if m.model.gives_light or m.model.see_through]
     rng = np.random.default_rng(seed)
-    element, direction, true, view = [], [], [], []
-    for number, one in enumerate(seen):
-        usable = np.flatnonzero(one["inside"] & ~np.isin(one["id"], left_out) & np.isfinite(one["image"]).all(1))
+    element, direction, true, levels = [], [], [], []
+    for one in seen:
+        usable = np.flatnonzero(one["inside"] & ~np.isin(one["found"], left_out) & np.isfinite(one["image"]).all(1))
+        level = MIDDLE_GREY / max(float(np.median(one["image"][usable].mean(1))), 1e-12)
         chosen = rng.choice(usable, min(PIXELS, len(usable)), replace=False)
         element.append(one["element"][0][chosen])
         direction.append(one["directions"][chosen])
-        true.append(one["image"][chosen] / max(float(np.median(one["image"][usable].mean(1))), 1e-12) * MIDDLE_GREY)
-        view.append(np.full(len(chosen), number))
-    element, direction, true, view = (np.concatenate(x) for x in (element, direction, true, view))
+        true.append(one["image"][chosen])
+        levels.append(np.full(len(chosen), level, np.float32))
+    number = np.repeat(np.arange(len(levels)), [len(own) for own in levels])
+    element, direction, true, level = (np.concatenate(x) for x in (element, direction, true, levels))
     shown = _shown(recovery, materials, element, np.asarray(direction, np.float32), seed)
-    result = []
-    for number, one in enumerate(seen):
-        own = view == number
-        usable = one["inside"] & ~np.isin(one["id"], left_out) & np.isfinite(one["image"]).all(1)
-        level = MIDDLE_GREY / max(float(np.median(one["image"][usable].mean(1))), 1e-12)
-        error = srgb(shown[own] * level) - srgb(true[own])
-        result.append(-10 * np.log10(max(float(np.mean(error**2)), 1e-12)))
-    return float(np.mean(result))
+    if tier(recovery.capture) in ("exposures", "codes"):
+        shown = shown * np.median(true.mean(1) / np.maximum(shown.mean(1), 1e-12))
+    error = np.mean((srgb(shown * level[:, None]) - srgb(true * level[:, None])) ** 2, axis=1)
+    return float(np.mean([-10 * np.log10(max(float(np.mean(error[number == n])), 1e-12)) for n in range(len(seen))]))
 
 
 def _shown(recovery: Recovery, materials: dict, element: np.ndarray, direction: np.ndarray, seed: int) -> np.ndarray:

@@ -60,32 +60,48 @@ def found_roughness(material: ObjectMaterial) -> float | None:
     return None if material.alpha is None else float(np.sqrt(material.alpha))
 
 
+def _roughness(material: ObjectMaterial) -> float:
+    """Blender's own where none was found."""
+    rough = found_roughness(material)
+    return UNTOLD if rough is None else rough
+
+
 def true_roughness(known: Mapping[str, Any]) -> float | None:
     """sqrt(alpha) in truth."""
     return None if known["alpha"] is None or known["emission"] else float(np.sqrt(known["alpha"]))
 
 
 def score_materials(
-    materials: Iterable[ObjectMaterial], truth: Mapping[int, Mapping[str, Any]], pixels: Mapping[int, int]
+    materials: Iterable[ObjectMaterial], truth: Mapping[int, Mapping[str, Any]], pixels: Mapping[tuple[int, int], int]
 ) -> MaterialScores:
-    """Compare what was found with truth/materials.json by object id, over what the held-out views show well enough.
+    """Compare what was found with truth/materials.json, object by object, over what held-out views show well enough.
+
+    Where a capture has no objects, an object of the truth has the model that most of its pixels show.
 
     Parameters
     ----------
-    pixels : mapping of int to int
-        Of each object in the held-out views.
+    pixels : mapping of (int, int) to int
+        Of each object of the truth, by the object found there: `truth_views.pairs`.
     """
+    found = {material.object_id: material for material in materials}
+    shown: dict[int, dict[int, int]] = {}
+    for (true_id, found_id), count in pixels.items():
+        if true_id in truth and found_id in found:
+            shown.setdefault(true_id, {})[found_id] = count
     errors, weights, models = [], [], {}
-    for material in materials:
-        known = truth.get(material.object_id)
-        seen = pixels.get(material.object_id, 0)
-        if known is None or seen < LEAST_PIXELS or known["masked"] or known["bsdf"] == "dielectric":
+    for true_id, by_part in sorted(shown.items()):
+        known, seen = truth[true_id], sum(by_part.values())
+        if seen < LEAST_PIXELS or known["masked"] or known["bsdf"] == "dielectric":
             continue
-        rough, true = found_roughness(material), true_roughness(known)
+        true = true_roughness(known)
         if true is not None:
-            errors.append(abs((UNTOLD if rough is None else rough) - true))
+            off = {i: abs(_roughness(found[i]) - true) for i in by_part}
+            errors.append(sum(off[i] * n for i, n in by_part.items()) / seen)
             weights.append(seen)
-        name = f"{true_kind(known)} as {found_kind(material)}"
+        by_kind: dict[str, int] = {}
+        for i, n in by_part.items():
+            by_kind[found_kind(found[i])] = by_kind.get(found_kind(found[i]), 0) + n
+        name = f"{true_kind(known)} as {max(by_kind, key=by_kind.__getitem__)}"
         models[name] = models.get(name, 0) + 1
     if not errors:
         return MaterialScores(float("nan"), float("nan"), models)

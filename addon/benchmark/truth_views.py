@@ -17,8 +17,8 @@ SHIFTS: Workload[tuple[tuple[float, float], ...]] = ((-0.25, -0.25), (0.25, 0.25
 def views(capture: Path, recovery: Recovery) -> list[dict]:
     """For each held-out view: the element under each of four points a pixel, truth, and the pixels that count.
 
-    'truth' is the albedo, 'image' the radiance, 'id' the object; 'counts' are the pixels of one object with an albedo,
-    'inside' those of any one object; 'directions' lead to the camera.
+    'truth' is the albedo, 'image' the radiance, 'id' the object, 'found' the one that the result has there; 'counts'
+    are the pixels of one object with an albedo, 'inside' those of any one object; 'directions' lead to the camera.
     """
     surface = recovery.surface()
     lookup = ElementLookup(surface.mesh, surface.atlas)
@@ -47,7 +47,7 @@ def views(capture: Path, recovery: Recovery) -> list[dict]:
         inside = inside.ravel() & (element >= 0).all(0)
         found.append({
             "element": element, "truth": truth, "counts": inside & np.isin(ids.ravel(), list(plain)),
-            "id": ids.ravel(), "inside": inside,
+            "id": ids.ravel(), "found": surface.atlas.object_id[element[0]], "inside": inside,
             "image": read_exr(capture / "truth" / "image" / name).rgb.reshape(-1, 3),
             "directions": -camera.directions(camera.pixel_centres()),
         })  # fmt: skip
@@ -64,3 +64,10 @@ def psnr(seen: list[dict], value: np.ndarray, only: np.ndarray | None = None) ->
         if counts.sum() > 100:
             result.append(-10 * np.log10(np.mean(error**2)))
     return float(np.mean(result))
+
+
+def pairs(seen: list[dict]) -> dict[tuple[int, int], int]:
+    """How many pixels of each true object show which object of the result: the same one, unless parts were found."""
+    ids, found, inside = (np.concatenate([view[key] for view in seen]) for key in ("id", "found", "inside"))
+    both, count = np.unique(np.stack([ids, found], 1)[inside], axis=0, return_counts=True)
+    return {(true, mine): n for (true, mine), n in zip(both.tolist(), count.tolist(), strict=True)}

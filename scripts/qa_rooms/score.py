@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from addon.benchmark.truth_materials import found_kind, found_roughness, score_materials, true_kind, true_roughness
-from addon.benchmark.truth_views import psnr, views
+from addon.benchmark.truth_views import pairs, psnr, views
 from addon.core.io.exr import read_exr
 from addon.core.io.read import read_capture
 from addon.core.passes.albedo.albedo import MEASURED
@@ -102,7 +102,7 @@ def compare(capture: Path, result: Path) -> dict:
                 if ratio.get(kind) is not None:
                     fixed[own] *= np.asarray(ratio[kind]) if kind == "E" else 1 / np.maximum(ratio[kind], 0.05)
         scores[f"Base Color with each object's {name} put right (one factor a channel)"] = psnr(seen, fixed)
-    rows, scored = [], score_materials(materials.values(), truth, pixels)
+    rows, scored = [], score_materials(materials.values(), truth, pairs(seen))
     for i, true in truth.items():
         mine = materials[i]
         own = np.isin(ids_of, [i])
