@@ -66,6 +66,7 @@ PASSES = (
     *_of(
         "lit_diffuse",
         radiometric_calibration="Tells what codes mean, and exposures, by places that several frames show.",
+        white_balance="Tells the white balance that all frames have, by how a camera follows what it sees.",
         pose_refinement="Puts frames right that lie beside what all of them show together.",
         sharpening="Takes the projection's blur out of the lit diffuse texture.",
         edge_tier="Uses observations at depth edges only where there are too few others.",

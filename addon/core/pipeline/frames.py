@@ -222,7 +222,8 @@ class Passes:
         if "radiometric-calibration" not in settings.without and any(frame.uncalibrated for frame in frames):
             calibration = calibrate(
                 surface.mesh, surface.scene, frames, lambda frame: self.read(as_codes(frame)),
-                threads=settings.threads, seed=settings.seed, progress=rounds,
+                threads=settings.threads, seed=settings.seed,
+                white_balance="white-balance" not in settings.without, progress=rounds,
             )  # fmt: skip
             frames = calibration.of(frames)
             rounds.next()

@@ -28,6 +28,7 @@ from ...scene.rays import RayScene
 from ...significance import LEVELS
 from .observations import CodeObservations, observe_codes
 from .params import CALIBRATION
+from .white_balance import mean_white_balance
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Calibration:
     response : (3, 256) float64
         Inverse camera response, as in `Radiometry`.
     gain : (f, 3) float64
-        Of each frame; the geometric mean over the calibrated ones is 1 in each channel, as no frame tells the unit.
+        Of each frame; the geometric mean over the calibrated ones and the channels is 1, as no frame tells the unit.
     falloff : (2,) float64
         Vignetting, as in `Radiometry`.
     calibrated : (f,) bool
@@ -76,6 +77,7 @@ def calibrate(
     *,
     threads: int = 0,
     seed: int = 0,
+    white_balance: bool = True,
     progress: Progress | Rounds | None = None,
 ) -> Calibration:
     """Calibrate frames whose curve nobody told (`Frame.uncalibrated`); the others are left alone.
@@ -84,6 +86,8 @@ def calibrate(
     ----------
     read : callable
         A frame's codes as "radiance", 0...1.
+    white_balance : bool
+        Whether to look for the white balance that all frames have in common.
 
     Raises
     ------
@@ -101,6 +105,10 @@ def calibrate(
     if len(found.point) < CALIBRATION.points:
         return nothing
     response, gain, falloff, spread = solve(found, len(own), stated)
+    if white_balance:
+        mean = np.einsum("fck,ck->fc", found.histogram, response)
+        told = (np.bincount(found.frame, minlength=len(own)) > 0) & (mean > 0).all(1)
+        gain = gain * np.exp(mean_white_balance(np.log(gain), np.log(np.maximum(mean, 1e-6)), told))
     gains = nothing.gain.copy()
     gains[asked] = gain
     return Calibration(response, gains, falloff, asked, np.array(spread))

@@ -31,16 +31,19 @@ class CodeObservations:
         Squared distance from the principal point over focal length.
     code : (m, 3) float
         0...1.
+    histogram : (f, 3, 256) float
+        Of each frame's codes by channel, as a share of its pixels: of the middle, by which cameras meter.
     """
 
     point: np.ndarray
     frame: np.ndarray
     r2: np.ndarray
     code: np.ndarray
+    histogram: np.ndarray
 
     def part(self, index: np.ndarray) -> CodeObservations:
         """Some of them."""
-        return CodeObservations(self.point[index], self.frame[index], self.r2[index], self.code[index])
+        return CodeObservations(self.point[index], self.frame[index], self.r2[index], self.code[index], self.histogram)
 
 
 def observe_codes(
@@ -77,7 +80,7 @@ def observe_codes(
         if progress is not None:
             progress.update((index + 1) / len(frames))
     return CodeObservations(*(np.concatenate([getattr(one, name) for one in found])
-                              for name in ("point", "frame", "r2", "code")))  # fmt: skip
+                              for name in ("point", "frame", "r2", "code", "histogram")))  # fmt: skip
 
 
 def _places(mesh: Mesh, scene: RayScene, frames: Sequence[Frame], seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -118,4 +121,15 @@ def _in_frame(
     kept = flat[row, column]
     own, at, column, row = own[which[kept]], at[kept], column[kept], row[kept]
     r2 = np.square((at - (camera.cx, camera.cy)) / (camera.fx, camera.fy)).sum(1)
-    return CodeObservations(own, np.full(len(own), index), r2, code[row, column].astype(np.float64))
+    return CodeObservations(
+        own, np.full(len(own), index), r2, code[row, column].astype(np.float64), _histogram(pixels)[None]
+    )
+
+
+def _histogram(pixels: Pixels) -> np.ndarray:
+    height, width = pixels.valid.shape
+    middle = np.s_[int(height * CALIBRATION.border) : int(np.ceil(height * (1 - CALIBRATION.border))),
+                   int(width * CALIBRATION.border) : int(np.ceil(width * (1 - CALIBRATION.border)))]  # fmt: skip
+    code = np.rint(pixels.radiance[middle][pixels.valid[middle]] * 255).astype(np.uint8)
+    count = np.stack([np.bincount(code[:, c], minlength=256) for c in range(3)])
+    return count / max(len(code), 1)

@@ -37,6 +37,14 @@ class CalibrationParams:
         Standard deviation of the logarithm of stated exposures from which on they tell the curve's contrast.
     widest : float
         Contrast that stated exposures may give the curve, over the prior's.
+    border : float
+        Share of a picture at each side by which cameras don't meter.
+    rates : int
+        By which a camera may follow what it sees, from the first frame alone to at once, that are tried.
+    cast : float
+        Standard deviation of the logarithm of the mean white balance: light of 4500 K for 6500 K is .3.
+    strength_error : float
+        Standard error of how much a camera balances, beside that of its fit: none does as the model has it.
     """
 
     points: int = 8192
@@ -53,6 +61,10 @@ class CalibrationParams:
     rounds: int = 10
     least_range: float = 0.1
     widest: float = 2.0
+    border: float = 1 / 6
+    rates: int = 32
+    cast: float = 0.3
+    strength_error: float = 0.1
 
 
 CALIBRATION = CalibrationParams()

@@ -41,7 +41,8 @@ def seen_by(rng, gain, places=3000, views=8, outliers=0.1):
     light *= 1 + (rng.random(len(point)) < outliers)[:, None] * rng.exponential(1.0, (len(point), 1))
     code = camera_response(light) + rng.normal(0, 2 / 255, light.shape)
     usable = (code > CALIBRATION.darkest).all(1) & (code < 253.5 / 255).all(1)
-    return CodeObservations(point[usable], frame[usable], r2[usable], code[usable])
+    histogram = np.zeros((len(gain), 3, 256))
+    return CodeObservations(point[usable], frame[usable], r2[usable], code[usable], histogram)
 
 
 def off(found, true):
