@@ -107,6 +107,7 @@ def _report_lit(run: Corrected, figures: dict[str, Any], warnings: list[str]) ->
             "calibrated_frames": int(found.calibrated.sum()),
             "exposure_range_stops": float(np.ptp(exposure)),
             "calibration_spread": float(found.spread),
+            "mean_white_balance": np.exp(np.log(found.gain[found.calibrated]).mean(0)).tolist(),
         }
     poses = run.poses()
     if np.isfinite(poses.shift):
