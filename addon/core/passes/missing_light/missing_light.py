@@ -92,7 +92,7 @@ def find_missing_light(
     received = received + shown
     thrown = contributions(field, element, [[one] for one in patches], seed)
     same = same_lamps(atlas, list(own.values()))
-    usual = np.median(radiance[element], 0).astype(np.float64)
+    usual = _daylight(np.median(radiance[element], 0).astype(np.float64))
     # What hardly any element sees says nothing, and lights nothing.
     told, lit = (given.mean(0) >= MISSING.least_seen for given in (through, by_part))
     level = sky.mean_of(part, len(lit))
@@ -103,7 +103,7 @@ def find_missing_light(
     unknown = Unknown(
         np.concatenate([thrown @ same, by_part[:, lit], through[:, told]], 1),
         np.concatenate([clipped, np.full((cells, 3), 1e-6)]),
-        np.concatenate([clipped, np.tile(usual, (cells, 1))]),
+        np.concatenate([least, _daylight(level[lit]), np.tile(usual, (cells, 1))]),
     )
     sent = field.radiance[element].astype(np.float64)
     pairs = in_one_plane(atlas.position[element], atlas.normal[element], seed)
@@ -133,6 +133,11 @@ def find_missing_light(
     brighter = frozenset(lamp.object_id for lamp in find_seen(atlas.object_id[element], sent, E))
     notes = (note,) if share >= LEVELS.gain else ()
     return MissingLight(lamps, solved, brighter, openings, sky.with_clipped(part, level), shut, notes)
+
+
+def _daylight(radiance: np.ndarray) -> np.ndarray:
+    """Of the luminance of some radiances ((..., 3)), white: nothing comes from outside that is as warm as a room."""
+    return np.repeat(radiance[..., None, :] @ LUMINANCE, 3, -1)
 
 
 def _mostly_lit(field: LightField, which: np.ndarray) -> bool:
