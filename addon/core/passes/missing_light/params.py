@@ -42,14 +42,12 @@ class MissingLightParams:
     level : float
         Weight of the prior on log albedo, normal about `USUAL_ALBEDO` with the deviation `deviation`.
     deviation : float
-    colour, grey : float
-        Weight of the prior that albedo is grey, and its scale.
     highest : float
         The greatest albedo of usual paint. What is above it counts in tenths of log albedo, by the square up to
         `LEVELS.sigmas` of them and linearly beyond (pseudo-Huber).
     sources : float
-        Weight of the prior that an opening shows what the room does, and a patch its clipped value: a lamp is an
-        exception (Student's t).
+        Weight of the prior that an opening shows daylight as bright as the room, and a patch its clipped value: a lamp
+        is an exception (Student's t).
     unlike : float
         Its scale, in log radiance, of all channels together.
     tint : float
@@ -76,8 +74,6 @@ class MissingLightParams:
     apart: float = 0.05
     level: float = 0.03
     deviation: float = 0.5
-    colour: float = 0.1
-    grey: float = 0.15
     highest: float = 0.85
     sources: float = 0.1
     unlike: float = 0.5

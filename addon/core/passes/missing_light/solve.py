@@ -1,8 +1,9 @@
 """The radiances of unknown sources under which the albedo of a scan without objects is most plausible.
 
 With E = E0 + sum s_k G_k, log albedo a = log(pi L_d / E) is to be alike where the surface is of one plane, which is
-robust against edges of paint (Land and McCann's Retinex in three dimensions), to be near a usual albedo and grey, and
-not above what paint reflects. All radiances are solved for together, in log, by L-BFGS.
+robust against edges of paint (Land and McCann's Retinex in three dimensions), to be near a usual albedo, and not above
+what paint reflects. Colour is told by the light, which is white from outside. All radiances are solved for together, in
+log, by L-BFGS.
 """
 
 from dataclasses import dataclass
@@ -79,11 +80,6 @@ class _Plausible:
         off = (a.mean(1) - np.log(USUAL_ALBEDO)) / MISSING.deviation
         value += MISSING.level * 0.5 * float((off**2).mean())
         by_a += (MISSING.level / (MISSING.deviation * channels * m) * off)[:, None]
-        paint = (a - a.mean(1, keepdims=True)) / MISSING.grey
-        length = np.sqrt(1 + paint**2)
-        value += MISSING.colour * float((length - 1).mean())
-        pull = MISSING.colour / (MISSING.grey * channels * m) * paint / length
-        by_a += pull - pull.mean(1, keepdims=True)
         # Beside lamps and panes a few elements hold their light: by its square they alone would decide.
         above = np.maximum(a - np.log(MISSING.highest), 0) / 0.1
         far = np.sqrt(1 + (above / LEVELS.sigmas) ** 2)
