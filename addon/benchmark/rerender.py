@@ -6,7 +6,6 @@ view shows, in a second.
 
 import numpy as np
 
-from ..core.evidence.tier import tier
 from ..core.kinds import Workload
 from ..core.light.emitters import bright_triangles
 from ..core.light.lobes import highlight
@@ -39,7 +38,7 @@ def rerender_psnr(recovery: Recovery, seen: list[dict], seed: int = 0) -> float:
     number = np.repeat(np.arange(len(levels)), [len(own) for own in levels])
     element, direction, true, level = (np.concatenate(x) for x in (element, direction, true, levels))
     shown = _shown(recovery, materials, element, np.asarray(direction, np.float32), seed)
-    if tier(recovery.capture) in ("exposures", "codes"):
+    if any(frame.uncalibrated for frame in recovery.capture.frames):
         shown = shown * np.median(true.mean(1) / np.maximum(shown.mean(1), 1e-12))
     error = np.mean((srgb(shown * level[:, None]) - srgb(true * level[:, None])) ** 2, axis=1)
     return float(np.mean([-10 * np.log10(max(float(np.mean(error[number == n])), 1e-12)) for n in range(len(seen))]))

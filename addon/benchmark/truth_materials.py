@@ -1,5 +1,6 @@
 """Materials as found against a capture's truth: roughness and model, object by object. Never read by the pipeline."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -60,8 +61,8 @@ def found_roughness(material: ObjectMaterial) -> float | None:
     return None if material.alpha is None else float(np.sqrt(material.alpha))
 
 
-def _roughness(material: ObjectMaterial) -> float:
-    """Blender's own where none was found."""
+def written_roughness(material: ObjectMaterial) -> float:
+    """sqrt(alpha), Blender's own where none was found."""
     rough = found_roughness(material)
     return UNTOLD if rough is None else rough
 
@@ -88,21 +89,20 @@ def score_materials(
     for (true_id, found_id), count in pixels.items():
         if true_id in truth and found_id in found:
             shown.setdefault(true_id, {})[found_id] = count
-    errors, weights, models = [], [], {}
+    errors, weights, models = [], [], Counter[str]()
     for true_id, by_part in sorted(shown.items()):
         known, seen = truth[true_id], sum(by_part.values())
         if seen < LEAST_PIXELS or known["masked"] or known["bsdf"] == "dielectric":
             continue
         true = true_roughness(known)
         if true is not None:
-            off = {i: abs(_roughness(found[i]) - true) for i in by_part}
+            off = {i: abs(written_roughness(found[i]) - true) for i in by_part}
             errors.append(sum(off[i] * n for i, n in by_part.items()) / seen)
             weights.append(seen)
-        by_kind: dict[str, int] = {}
+        by_kind: Counter[str] = Counter()
         for i, n in by_part.items():
-            by_kind[found_kind(found[i])] = by_kind.get(found_kind(found[i]), 0) + n
-        name = f"{true_kind(known)} as {max(by_kind, key=by_kind.__getitem__)}"
-        models[name] = models.get(name, 0) + 1
+            by_kind[found_kind(found[i])] += n
+        models[f"{true_kind(known)} as {by_kind.most_common(1)[0][0]}"] += 1
     if not errors:
         return MaterialScores(float("nan"), float("nan"), models)
     return MaterialScores(float(np.average(errors, weights=weights)), float(np.mean(errors)), models)

@@ -72,7 +72,7 @@ def compare(capture: Path, result: Path) -> dict:
     truth = {o["id"]: o for o in json.loads((capture / "truth" / "materials.json").read_text())}
     with Store(result) as store:
         recovery = Recovery(read_capture(capture), store, settings, Progress(), None)
-        seen, ids = views(capture, recovery), []
+        seen = views(capture, recovery)
         lit, shading, specular = recovery.lit_diffuse(), recovery.shading(), recovery.specular()
         base, rho, E = recovery.base_color(), recovery.albedo.rho, recovery.irradiance
         materials = {m.object_id: m for m in recovery.materials()}
@@ -80,12 +80,10 @@ def compare(capture: Path, result: Path) -> dict:
         warnings, shares = recovery.report()["warnings"], held(recovery, seen, truth)
     for view, frame in zip(seen, json.loads((capture / "truth" / "transforms.json").read_text())["frames"]):
         name = Path(frame["file_path"]).name
-        view["id"] = np.rint(read_exr(capture / "truth" / "object_id" / name).rgb[..., 0]).astype(int).ravel()
         for kind in ("diffuse_light", "diffuse_color"):
             path = capture / "truth" / kind / name
             view[kind] = read_exr(path).rgb.reshape(-1, 3) if path.exists() else np.full_like(view["truth"], np.nan)
-        ids.append(view["id"])
-    every = np.concatenate(ids)
+    every = np.concatenate([view["id"] for view in seen])
     pixels = {i: int((every == i).sum()) for i in truth}
     split = {"albedo": rho, "L_d": np.maximum(lit.radiance - specular.specular, 0), "median": lit.radiance, "E": E}
     ratios, share = _ratios(seen, split, base, truth)

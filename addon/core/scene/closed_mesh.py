@@ -53,32 +53,33 @@ def settled(mesh: Mesh) -> Mesh:
     closing, turned = mesh.triangles[mesh.closed], triangle_geometry(mesh)[0][mesh.closed]
     label = connected(closing)
     for piece in range(int(label.max()) + 1):
-        own = np.unique(closing[label == piece])
-        normal = turned[label == piece].mean(0)
+        faces = label == piece
+        own, normal = np.unique(closing[faces]), turned[faces].mean(0)
         normal = normal / max(float(np.linalg.norm(normal)), 1e-12)
         at = mesh.vertices[own].astype(np.float64)
+        middle = at.mean(0)
         beside = _near(tree, at, 2 * gap)
         beside = beside[facing[beside] @ normal > np.cos(PARTS.tilt)]
-        height = (centre[beside] - at.mean(0)) @ normal
+        height = (centre[beside] - middle) @ normal
         beside = beside[np.abs(height) < gap]
         if len(beside) < LEVELS.few:
             continue
-        lies = _plane_through(centre[beside] - at.mean(0), normal, at - at.mean(0))
-        off = (centre[beside] - at.mean(0)) @ normal - lies(centre[beside] - at.mean(0))
+        lies = _plane_through(centre[beside] - middle, normal, at - middle)
+        off = (centre[beside] - middle) @ normal - lies(centre[beside] - middle)
         spread = 1.4826 * float(np.median(np.abs(off)))
         under = max(spread, CLOSING.under * gap)
-        rise = lies(at - at.mean(0)) - under - (at - at.mean(0)) @ normal
+        rise = lies(at - middle) - under - (at - middle) @ normal
         vertices[own] = at + np.clip(rise, -gap, gap)[:, None] * normal
-        faces = np.searchsorted(own, closing[label == piece])
-        corners = vertices[own][faces].astype(np.float64)
+        corner = np.searchsorted(own, closing[faces])
+        corners = vertices[own][corner].astype(np.float64)
         # What frames saw is closed in single cells. Where they saw none, a curtain may hang before a wall.
         single = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).min(1) < LEVELS.likely * gap
         near = _near(tree, corners[single].mean(1), 3 * gap)
-        off = np.abs((centre[near] - at.mean(0)) @ normal - lies(centre[near] - at.mean(0)))
+        off = np.abs((centre[near] - middle) @ normal - lies(centre[near] - middle))
         near = near[(off > LEVELS.likely * under) | (facing[near] @ normal < np.cos(PARTS.tilt))]
-        over = _over_midst(RayScene(vertices[own], faces[single]), centre[near], normal, gap)
+        over = _over_midst(RayScene(vertices[own], corner[single]), centre[near], normal, gap)
         crumbs = np.unique(scan.triangles[near[over]])
-        place = mesh.vertices[crumbs].astype(np.float64) - at.mean(0)
+        place = mesh.vertices[crumbs].astype(np.float64) - middle
         height = lies(place) - place @ normal
         flat = np.abs(height) < gap
         vertices[crumbs[flat]] += (height[flat, None] * normal).astype(vertices.dtype)

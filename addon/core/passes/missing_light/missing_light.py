@@ -137,7 +137,7 @@ def find_missing_light(
 
 def _daylight(radiance: np.ndarray) -> np.ndarray:
     """Of the luminance of some radiances ((..., 3)), white: nothing comes from outside that is as warm as a room."""
-    return np.repeat(radiance[..., None, :] @ LUMINANCE, 3, -1)
+    return np.repeat((radiance @ LUMINANCE)[..., None], 3, -1)
 
 
 def _mostly_lit(field: LightField, which: np.ndarray) -> bool:

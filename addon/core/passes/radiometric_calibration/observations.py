@@ -128,8 +128,8 @@ def _in_frame(
 
 def _histogram(pixels: Pixels) -> np.ndarray:
     height, width = pixels.valid.shape
-    middle = np.s_[int(height * CALIBRATION.border) : int(np.ceil(height * (1 - CALIBRATION.border))),
-                   int(width * CALIBRATION.border) : int(np.ceil(width * (1 - CALIBRATION.border)))]  # fmt: skip
+    above, left = int(height * CALIBRATION.border), int(width * CALIBRATION.border)
+    middle = np.s_[above : height - above, left : width - left]
     code = np.rint(pixels.radiance[middle][pixels.valid[middle]] * 255).astype(np.uint8)
     count = np.stack([np.bincount(code[:, c], minlength=256) for c in range(3)])
     return count / max(len(code), 1)
