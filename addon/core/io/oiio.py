@@ -155,9 +155,14 @@ def _open(path: Path | str) -> Any:
     wishes = library.ImageSpec()
     wishes.attribute("oiio:UnassociatedAlpha", 1)  # else colours are multiplied by alpha
     try:
-        file = library.ImageInput.open(os.fsencode(path), wishes)  # bytes: a name need not be UTF-8
+        try:
+            file = library.ImageInput.open(os.fspath(path), wishes)
+        except (UnicodeEncodeError, TypeError):  # a name that is not UTF-8: OpenImageIO takes its bytes before 3.2
+            file = library.ImageInput.open(os.fsencode(path), wishes)
     except MemoryError:
         file = None
+    except TypeError as error:
+        raise BadInputError(f"The name of picture '{path}' is not UTF-8, and OpenImageIO can't open it; rename it.") from error
     if file is None or file.format_name() not in READERS:
         library.geterror()  # cleared, as it is kept for the thread's next picture
         raise BadInputError(f"Picture '{path}' is damaged or cut off; write or copy it again.")
