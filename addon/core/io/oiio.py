@@ -162,7 +162,9 @@ def _open(path: Path | str) -> Any:
     except MemoryError:
         file = None
     except TypeError as error:
-        raise BadInputError(f"The name of picture '{path}' is not UTF-8, and OpenImageIO can't open it; rename it.") from error
+        raise BadInputError(
+            f"The name of picture '{path}' is not UTF-8, which OpenImageIO can't open; rename it."
+        ) from error
     if file is None or file.format_name() not in READERS:
         library.geterror()  # cleared, as it is kept for the thread's next picture
         raise BadInputError(f"Picture '{path}' is damaged or cut off; write or copy it again.")

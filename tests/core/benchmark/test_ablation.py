@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import numpy as np
 import pytest
 
 from addon import cli
-from addon.benchmark.ablation import LINES, Ablation, read_lines, run_ablation
+from addon.benchmark.ablation import LINES, Ablation, _unwrap, read_lines, run_ablation
 from addon.benchmark.ablation_table import FIGURES, gain_of, seconds_of, write_report
 from addon.core.errors import BadInputError
 from addon.core.io.exr import read_exr, write_exr
 from addon.core.io.read import read_capture
 from addon.core.passes.registry import PASSES
 from addon.core.scene.rays import RayScene
+from addon.core.scene.unwrap import by_xatlas
 from tests.core.on_disk import ALBEDO, LAMP, OnDisk
 
 
@@ -154,3 +156,8 @@ def test_gains_and_their_error(tmp_path):
     assert "| +4.00 ± 0.00 |" in (text := (tmp_path / "table.md").read_text()) and "gains albedo" not in text
     with pytest.raises(BadInputError, match="no runs"):
         write_report(tmp_path / "empty", tmp_path / "other.md")
+
+
+def test_without_blender_xatlas_lays_meshes_out(monkeypatch):
+    monkeypatch.setitem(sys.modules, "addon.bridge.data.unwrap", None)
+    assert _unwrap() is by_xatlas

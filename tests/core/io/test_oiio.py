@@ -204,7 +204,11 @@ def test_a_name_of_another_kind_and_in_no_language(tmp_path):
             path.write_bytes(JPEG)
         except OSError:
             continue  # systems whose names are UTF-8
-        assert coded_header(path) == (8, 6, 8)
+        if name.startswith(b"\xff") and pytest.importorskip("OpenImageIO").VERSION >= 30200:
+            with pytest.raises(BadInputError, match="is not UTF-8.*rename it"):  # it takes text alone
+                coded_header(path)
+        else:
+            assert coded_header(path) == (8, 6, 8)
 
 
 def test_many_threads(tmp_path):
