@@ -222,7 +222,10 @@ def _describe(i: Instance, room: Room, chosen: Chosen) -> ObjectMaterial:
     own, choice = field.atlas.elements_of(number), chosen.choices.get(number)
 
     def lamp(radiance: np.ndarray, note: str) -> ObjectMaterial:
-        albedo, why = (None, "") if "unlit-lamps" in room.settings.without else unlit(i, field, room.settings.seed)
+        albedo, why = None, ""
+        if "unlit-lamps" not in room.settings.without:
+            told = room.lit_diffuse.seen & ~np.isin(field.atlas.object_id, [lamp.object_id for lamp in room.lamps])
+            albedo, why = unlit(i, field, room.irradiance, told, room.settings.seed)
         return lamp_material(i, radiance, room.irradiance[own], " ".join(filter(None, (note, why))), albedo)
 
     if choice is not None and choice.model.gives_light:

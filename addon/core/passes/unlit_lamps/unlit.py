@@ -1,4 +1,4 @@
-"""Which lamps are dark with their light off: windows, by where they are or by their class, and screens."""
+"""What lamps reflect with their light off: windows and screens are dark, pieces of a surface are as the rest of it."""
 
 import re
 
@@ -7,20 +7,57 @@ import numpy as np
 from ...light.directions import cosine_hemisphere, sobol
 from ...light.field import LightField
 from ...light.params import LIGHT_FIT
+from ...luminance import LUMINANCE
 from ...scene.model import Instance
 from ...scene.tangent_frame import to_world
+from ...significance import LEVELS
 from .params import UNLIT
 
 OUTSIDE = "Behind it there is nothing of the room, so with its light off it is dark, as a window at night: a guess."
 CLASS = "With its light off it is dark, as its class is: a guess."
+SURFACE = "With its light off it is as grey as the surface that it is a piece of: a guess."
 
 
-def unlit(instance: Instance, field: LightField, seed: int = 0) -> tuple[float | None, str]:
-    """Albedo of a lamp with its light off, and a sentence on why; None where nothing tells."""
-    if looks_outside(instance.object_id, field, seed):
-        return UNLIT.dark, OUTSIDE
+def unlit(
+    instance: Instance, field: LightField, irradiance: np.ndarray, told: np.ndarray, seed: int = 0
+) -> tuple[float | None, str]:
+    """Albedo of a lamp with its light off, and a sentence on why; None where nothing tells.
+
+    Parameters
+    ----------
+    irradiance : (n, 3) float
+        E.
+    told : (n,) bool
+        Elements whose albedo L_d and E tell.
+    """
     words = re.split(r"[^a-z]+", instance.class_name.casefold())
-    return (UNLIT.dark, CLASS) if set(words) & set(UNLIT.dark_classes) else (None, "")
+    if set(words) & set(UNLIT.dark_classes):
+        return UNLIT.dark, CLASS
+    if not looks_outside(instance.object_id, field, seed):
+        return None, ""
+    # Behind a wall that was fused from depth there is nothing either, and where panes are it mostly has holes.
+    around = of_surface(instance.object_id, field, irradiance, told) if field.mesh.whole else None
+    return (UNLIT.dark, OUTSIDE) if around is None else (around, SURFACE)
+
+
+def of_surface(object_id: int, field: LightField, irradiance: np.ndarray, told: np.ndarray) -> float | None:
+    """Median albedo (its luminance) of what lies in the plane of a patch, around it; None where too little is told.
+
+    Wall beside a shade may be so bright that it is taken for a lamp.
+    """
+    atlas = field.atlas
+    own = atlas.elements_of(object_id)
+    if not len(own):
+        return None
+    normal = atlas.normal[own].mean(0)
+    offset = atlas.position - atlas.position[own].mean(0)
+    away, height = np.linalg.norm(offset, axis=1), np.abs(offset @ (normal / max(np.linalg.norm(normal), 1e-9)))
+    near = told & (atlas.object_id != object_id) & (away < 2 * away[own].max())
+    near &= (height < height[own].max() + atlas.texel_edge) & (atlas.normal @ normal > 0)
+    if near.sum() < LEVELS.enough:
+        return None
+    albedo = np.pi * (field.radiance[near] @ LUMINANCE) / np.maximum(irradiance[near] @ LUMINANCE, 1e-12)
+    return float(min(np.median(albedo), 1))
 
 
 def looks_outside(object_id: int, field: LightField, seed: int = 0) -> bool:

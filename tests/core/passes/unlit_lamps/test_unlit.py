@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -31,6 +33,10 @@ def piece(side: int):
     return quad(found.corner, found.edge_u, found.edge_v, LAMP)
 
 
+def guess(instance, field):
+    return unlit(instance, field, np.ones_like(field.radiance), np.ones(len(field.radiance), bool))
+
+
 def box(low, high):
     """The six outer faces of a box."""
     (x, y, z), (X, Y, Z) = low, high
@@ -55,15 +61,30 @@ def box(low, high):
 def test_what_stands_between_the_room_and_nothing_is_a_window(lamp, taken_from, outside):
     field = field_of(lamp, taken_from)
     assert looks_outside(LAMP, field) == outside
-    albedo, why = unlit(Instance(LAMP, "lamp"), field)
+    albedo, why = guess(Instance(LAMP, "lamp"), field)
     assert (albedo == UNLIT.dark and "guess" in why) if outside else (albedo, why) == (None, "")
 
 
 @pytest.mark.parametrize("name, dark", [("TV screen", True), ("window_2", True), ("sunscreen lamp", False)])
 def test_a_class_may_say_so(name, dark):
     field = field_of(box((0.01, 0.9, 0.8), (0.05, 2.1, 1.7)))
-    albedo, why = unlit(Instance(LAMP, name), field)
+    albedo, why = guess(Instance(LAMP, name), field)
     assert (albedo == UNLIT.dark and "guess" in why) if dark else albedo is None
+
+
+def test_a_piece_of_a_wall_is_as_grey_as_the_rest_of_it():
+    """In a mesh that tells of no objects, as wall beside a shade may be so bright that it is taken for a lamp."""
+    field = field_of([piece(WALL)], WALL)
+    beside = field.atlas.object_id == WALL
+    field = field.with_light(np.where(beside, 0.7, 0.2)[:, None].repeat(3, 1), field.environment)
+    irradiance, told = np.full_like(field.radiance, np.pi), field.atlas.object_id != LAMP
+    lamp = Instance(LAMP, "lamp")
+    assert unlit(lamp, field, irradiance, told)[0] == UNLIT.dark
+    field.mesh = replace(field.mesh, whole=True)
+    albedo, why = unlit(lamp, field, irradiance, told)
+    assert albedo == pytest.approx(0.7) and "guess" in why
+    assert unlit(lamp, field, irradiance, told & ~beside)[0] == UNLIT.dark
+    assert unlit(Instance(LAMP, "screen"), field, irradiance, told)[0] == UNLIT.dark
 
 
 def test_it_gives_of_itself_what_it_does_not_reflect():
