@@ -20,7 +20,7 @@ from tests.blender.evidence.known_rooms import known_rooms  # noqa: E402
 
 pytestmark = [pytest.mark.slow, pytest.mark.arithmetic]
 
-FRAMES, SIZE, SAMPLES = 16, (72, 54), 16
+FRAMES, SIZE, SAMPLES = 16, (72, 54), 32
 """So small that a lamp which is solved for comes out 8 % too bright: the intervals must know."""
 SETTINGS = Settings(specular_rays=128, texel_size=0.05)
 ROOMS = ("demo", "light, window", "lamp unseen")

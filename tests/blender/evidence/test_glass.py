@@ -56,7 +56,7 @@ def test_glass_is_set_apart(tmp_path, monkeypatch):
     things = room()
     pane = slab(max(one.object_id for one in things) + 1, (1.6, 1.5, 0.7), (1.2, 0, 0), (0, 0, 1.1), 0.01)
     known = KnownRoom((*things, pane), tour(20))
-    capture = read_capture(known.render(tmp_path / "capture", (96, 72), 12))
+    capture = read_capture(known.render(tmp_path / "capture", (96, 72), 24))
     with Store(tmp_path / "result") as store:
         run = Recovery(capture, store, Settings(specular_rays=64, texel_size=0.04), Progress(), unwrap)
         found = {m.class_name: m for m in run.materials() if m.model == TRANSPARENT}
