@@ -41,19 +41,19 @@ def unlit(
 
 
 def of_surface(object_id: int, field: LightField, irradiance: np.ndarray, told: np.ndarray) -> float | None:
-    """Median albedo (its luminance) of what lies in the plane of a patch, around it; None where too little is told.
+    """Median albedo (its luminance) of what else lies in the plane of a patch; None where too little is told.
 
-    Wall beside a shade may be so bright that it is taken for a lamp.
+    Wall beside a shade may be so bright that it is taken for a lamp. A halo is left around it: the whole wall counts.
     """
     atlas = field.atlas
     own = atlas.elements_of(object_id)
     if not len(own):
         return None
     normal = atlas.normal[own].mean(0)
-    offset = atlas.position - atlas.position[own].mean(0)
-    away, height = np.linalg.norm(offset, axis=1), np.abs(offset @ (normal / max(np.linalg.norm(normal), 1e-9)))
-    near = told & (atlas.object_id != object_id) & (away < 2 * away[own].max())
-    near &= (height < height[own].max() + atlas.texel_edge) & (atlas.normal @ normal > 0)
+    normal = normal / max(np.linalg.norm(normal), 1e-9)
+    height = np.abs((atlas.position - atlas.position[own].mean(0)) @ normal)
+    near = told & (atlas.object_id != object_id) & (atlas.normal @ normal > 0)
+    near &= height < height[own].max() + atlas.texel_edge
     if near.sum() < LEVELS.enough:
         return None
     albedo = np.pi * (field.radiance[near] @ LUMINANCE) / np.maximum(irradiance[near] @ LUMINANCE, 1e-12)
