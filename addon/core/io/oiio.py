@@ -154,11 +154,13 @@ def _open(path: Path | str) -> Any:
     library = _library(Path(path))
     wishes = library.ImageSpec()
     wishes.attribute("oiio:UnassociatedAlpha", 1)  # else colours are multiplied by alpha
+    name: str | bytes = (text := os.fspath(path))
     try:
-        try:
-            file = library.ImageInput.open(os.fspath(path), wishes)
-        except (UnicodeEncodeError, TypeError):  # a name that is not UTF-8: OpenImageIO takes its bytes before 3.2
-            file = library.ImageInput.open(os.fsencode(path), wishes)
+        text.encode()
+    except UnicodeEncodeError:
+        name = os.fsencode(path)  # which OpenImageIO takes before 3.2
+    try:
+        file = library.ImageInput.open(name, wishes)
     except MemoryError:
         file = None
     except TypeError as error:

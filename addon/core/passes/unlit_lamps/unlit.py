@@ -8,6 +8,7 @@ from ...light.directions import cosine_hemisphere, sobol
 from ...light.field import LightField
 from ...light.params import LIGHT_FIT
 from ...luminance import LUMINANCE
+from ...paper.albedo import albedo
 from ...scene.model import Instance
 from ...scene.tangent_frame import to_world
 from ...significance import LEVELS
@@ -47,17 +48,14 @@ def of_surface(object_id: int, field: LightField, irradiance: np.ndarray, told: 
     """
     atlas = field.atlas
     own = atlas.elements_of(object_id)
-    if not len(own):
-        return None
     normal = atlas.normal[own].mean(0)
     normal = normal / max(np.linalg.norm(normal), 1e-9)
     height = np.abs((atlas.position - atlas.position[own].mean(0)) @ normal)
-    near = told & (atlas.object_id != object_id) & (atlas.normal @ normal > 0)
+    near = told & (irradiance > 0).all(1) & (atlas.object_id != object_id) & (atlas.normal @ normal > 0)
     near &= height < height[own].max() + atlas.texel_edge
     if near.sum() < LEVELS.enough:
         return None
-    albedo = np.pi * (field.radiance[near] @ LUMINANCE) / np.maximum(irradiance[near] @ LUMINANCE, 1e-12)
-    return float(min(np.median(albedo), 1))
+    return float(min(np.median(albedo(field.radiance[near] @ LUMINANCE, irradiance[near] @ LUMINANCE)), 1))
 
 
 def looks_outside(object_id: int, field: LightField, seed: int = 0) -> bool:
