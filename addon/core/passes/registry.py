@@ -109,6 +109,7 @@ PASSES = (
     ),
     *_of(
         "write",
+        bias_field="Takes the smooth error that irradiance leaves in an object's albedo out of it.",
         albedo_prior="Shrinks uncertain albedo towards its neighbourhood's.",
         second_colour="Shrinks it to a second colour of the neighbourhood where that is likelier.",
         wide_prior="Widens the neighbourhood for as long as it stays alike.",

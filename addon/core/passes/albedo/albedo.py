@@ -11,6 +11,7 @@ from ...parallel import ordered_map
 from ...scene.atlas import Atlas
 from ...scene.lit_diffuse import LitDiffuse
 from ...scene.model import Instance, class_names
+from .bias_field import without_bias
 from .neighbourhood import References, relative_error, shrink, well_measured
 from .of_class import shrunk_to_class
 from .params import ALBEDO, MAX_ALBEDO
@@ -105,6 +106,9 @@ def albedo_of(
     """
     rho, valid = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
     error = np.hypot(relative_error(lit_diffuse, atlas.object_id, "object-spread" not in without), unsure)
+    if "bias-field" not in without:
+        reflecting = without_emitters(atlas, valid & lit_diffuse.seen & np.isfinite(error), emitters)
+        rho = without_bias(atlas, rho, reflecting, atlas.object_id if atlas.back is None else atlas.side)
     guesses = {one.object_id for one in instances if one.guess}
     found = fill(atlas, rho, valid & lit_diffuse.seen, class_names(instances), emitters, error, without, guesses)
     if "class-albedo" in without:

@@ -79,7 +79,37 @@ class ClassPriorParams:
     most: float = 0.2
 
 
+@dataclass(frozen=True)
+class BiasParams:
+    """Of `bias_field` (`bias-field` in the ablation).
+
+    Attributes
+    ----------
+    reach : float
+        Standard deviation of the Gaussian that the field is smoothed by, as a share of the square root of the area that
+        frames see: 20 cm in a room.
+    tolerance : float
+        Standard deviation of log albedo among elements of one colour, beside the field.
+    prior : float
+        Area without bias that is counted in everywhere, as a share of the most that the Gaussian holds anywhere.
+    rounds : int
+        Of the iteration.
+    least : int
+        Elements that a part has at least.
+    sample : int
+        Elements that a part's field is found by.
+    """
+
+    reach: float = 0.02
+    tolerance: float = 0.2
+    prior: float = 0.1
+    rounds: int = 4
+    least: int = 100
+    sample: int = 1 << 14
+
+
 PRIOR = PriorParams()
+BIAS = BiasParams()
 SECOND_COLOUR = SecondColourParams()
 CLASS_PRIOR = ClassPriorParams()
 

@@ -1,0 +1,106 @@
+"""The smooth error that E leaves in an object's albedo.
+
+E errs smoothly: around a lamp under a shade, in a corner whose bounce is too weak. What surfaces are painted with changes
+at once, or finely. So what changes slowly is E's error (Land and McCann 1971), where it changes what the object mostly
+is of. Found as the bias field of a magnetic resonance image is (Wells et al. 1996): by turns, which elements are of the
+main colour under the field, and the field as the smoothed residuals of those.
+"""
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from ...groups import by_label
+from ...kinds import Block, Unit
+from ...parallel import ordered_map
+from ...scene.atlas import Atlas
+from .params import ALBEDO, BIAS
+
+FACINGS: Unit[int] = 6
+GRID: Block[int] = 1 << 18
+
+
+def without_bias(atlas: Atlas, rho: np.ndarray, measured: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """Albedo with each part's bias field taken out, (n, 3) float32; the median of its field stays.
+
+    Parameters
+    ----------
+    rho : (n, 3) float32
+        Quotient, not clamped; anything where nothing was measured.
+    measured : (n,) bool
+    part : (n,) int
+        Number of what is of one main colour: an object.
+    """
+    result = rho.copy()
+    reach = BIAS.reach * np.sqrt(float(atlas.area[measured].sum()))
+
+    def corrected(own: np.ndarray) -> np.ndarray:
+        known = own[measured[own]]
+        field = _field(atlas, known, rho[known], reach)
+        return rho[known] / np.exp(field)
+
+    parts = [own for own in by_label(part) if np.count_nonzero(measured[own]) >= BIAS.least]
+    for own, without in zip(parts, ordered_map(corrected, parts, 0), strict=True):
+        result[own[measured[own]]] = without
+    return result
+
+
+def _field(atlas: Atlas, own: np.ndarray, rho: np.ndarray, reach: float) -> np.ndarray:
+    """Log of the bias field of one part's m measured elements, (m, 3), around its median."""
+    some = np.random.default_rng(0).permutation(len(own))[: BIAS.sample]
+    colour = np.log(np.maximum(rho, ALBEDO.floor))
+    area = atlas.area[own][some].astype(float)
+    grid = _Grid(atlas.position[own], atlas.normal[own], some, reach)
+    offset = colour[some] - _mode(colour[some], area)
+    field = np.zeros_like(offset)
+    for _ in range(BIAS.rounds):
+        square = np.square(offset - field).mean(1)
+        weight = area * np.exp(-square / (2 * BIAS.tolerance**2))
+        smooth = grid.smooth(offset, weight)
+        field = grid.at(smooth, some)
+    return grid.at(smooth) - np.median(field, 0)
+
+
+def _mode(colour: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """What log colours, (m, 3), gather around, (3,): mean shift from their median."""
+    mode = np.median(colour, 0)
+    for _ in range(BIAS.rounds):
+        near = weight * np.exp(-np.square(colour - mode).mean(1) / (2 * (2 * BIAS.tolerance) ** 2))
+        mode = near @ colour / max(near.sum(), 1e-30)
+    return mode
+
+
+class _Grid:
+    """A field over positions and normals: a grid of cells for each side of an ambient cube (McTaggart 2004).
+
+    A normal's squared components are what each side counts there; they sum to 1.
+    """
+
+    def __init__(self, position: np.ndarray, normal: np.ndarray, some: np.ndarray, reach: float):
+        low, high = position.min(0), position.max(0)
+        cell = max(reach / 3, float(np.prod(np.maximum(high - low, reach)) / GRID) ** (1 / 3), 1e-9)
+        self.place = (position - low) / cell
+        self.shape = tuple(np.floor(self.place.max(0) + 0.5).astype(int) + 1)
+        self.sides = np.concatenate([np.square(np.maximum(normal, 0)), np.square(np.minimum(normal, 0))], 1)
+        self.some = some
+        self.sigma = max(reach / cell, 1.0)
+        self.cell = np.ravel_multi_index(np.floor(self.place[some] + 0.5).astype(int).T, self.shape)
+
+    def smooth(self, values: np.ndarray, weight: np.ndarray) -> np.ndarray:
+        """Weighted Gaussian mean of values ((s, 3)) of `some`, (sides, 3, *shape), drawn towards 0."""
+        summed = np.empty((FACINGS, 4, *self.shape), np.float32)
+        for side, counts in zip(summed, self.sides[self.some].T, strict=True):
+            for channel, value in zip(side, (*values.T, 1), strict=True):
+                channel[:] = np.bincount(self.cell, weight * counts * value, channel.size).reshape(self.shape)
+        around = gaussian_filter(summed, (0, 0, *[self.sigma] * 3), mode="constant", truncate=3)
+        return around[:, :3] / (around[:, 3:] + max(BIAS.prior * float(around[:, 3].max()), 1e-30))
+
+    def at(self, field: np.ndarray, some: np.ndarray | slice = slice(None)) -> np.ndarray:
+        """A field's values at the elements, (m, 3)."""
+        place, sides = self.place[some], self.sides[some]
+        result = np.zeros((len(place), 3), np.float32)
+        for side in range(FACINGS):
+            there = np.flatnonzero(sides[:, side] > 1e-3)
+            for channel in range(3 if len(there) else 0):
+                value = map_coordinates(field[side, channel], place[there].T, order=1, mode="nearest")
+                result[there, channel] += sides[there, side] * value
+        return result
