@@ -1,9 +1,9 @@
 """The smooth error that E leaves in an object's albedo.
 
-E errs smoothly: around a lamp under a shade, in a corner whose bounce is too weak. What surfaces are painted with changes
-at once, or finely. So what changes slowly is E's error (Land and McCann 1971), where it changes what the object mostly
-is of. Found as the bias field of a magnetic resonance image is (Wells et al. 1996): by turns, which elements are of the
-main colour under the field, and the field as the smoothed residuals of those.
+E errs smoothly: around a lamp under a shade, in a corner whose bounce is too weak. Paint changes at once, or finely. So
+what changes slowly is taken for E's error (Land and McCann 1971). It is found as the bias field of a magnetic resonance
+image is (Wells et al. 1996), by turns: which elements are of the object's main colour under the field, and the field as
+those elements' residuals, smoothed.
 """
 
 import numpy as np
@@ -13,6 +13,7 @@ from ...groups import by_label
 from ...kinds import Block, Unit
 from ...parallel import ordered_map
 from ...scene.atlas import Atlas
+from ...significance import LEVELS
 from .params import ALBEDO, BIAS
 
 FACINGS: Unit[int] = 6
@@ -38,7 +39,7 @@ def without_bias(atlas: Atlas, rho: np.ndarray, measured: np.ndarray, part: np.n
         field = _field(atlas, known, rho[known], reach)
         return rho[known] / np.exp(field)
 
-    parts = [own for own in by_label(part) if np.count_nonzero(measured[own]) >= BIAS.least]
+    parts = [own for own in by_label(part) if np.count_nonzero(measured[own]) >= LEVELS.many]
     for own, without in zip(parts, ordered_map(corrected, parts, 0), strict=True):
         result[own[measured[own]]] = without
     return result
@@ -46,7 +47,7 @@ def without_bias(atlas: Atlas, rho: np.ndarray, measured: np.ndarray, part: np.n
 
 def _field(atlas: Atlas, own: np.ndarray, rho: np.ndarray, reach: float) -> np.ndarray:
     """Log of the bias field of one part's m measured elements, (m, 3), around its median."""
-    some = np.random.default_rng(0).permutation(len(own))[: BIAS.sample]
+    some = np.random.default_rng(0).permutation(len(own))[: LEVELS.sample]
     colour = np.log(np.maximum(rho, ALBEDO.floor))
     area = atlas.area[own][some].astype(float)
     grid = _Grid(atlas.position[own], atlas.normal[own], some, reach)

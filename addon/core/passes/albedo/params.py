@@ -94,18 +94,12 @@ class BiasParams:
         Area without bias that is counted in everywhere, as a share of the most that the Gaussian holds anywhere.
     rounds : int
         Of the iteration.
-    least : int
-        Elements that a part has at least.
-    sample : int
-        Elements that a part's field is found by.
     """
 
     reach: float = 0.02
     tolerance: float = 0.2
     prior: float = 0.1
     rounds: int = 4
-    least: int = 100
-    sample: int = 1 << 14
 
 
 PRIOR = PriorParams()
