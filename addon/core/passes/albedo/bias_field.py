@@ -50,22 +50,30 @@ def _field(atlas: Atlas, own: np.ndarray, rho: np.ndarray, reach: float) -> np.n
     some = np.random.default_rng(0).permutation(len(own))[: LEVELS.sample]
     colour = np.log(np.maximum(rho, ALBEDO.floor))
     area = atlas.area[own][some].astype(float)
-    grid = _Grid(atlas.position[own], atlas.normal[own], some, reach)
+    grid = _Grid(atlas.position[own], atlas.normal[own], some, reach, float(np.sqrt(np.median(area))))
     offset = colour[some] - _mode(colour[some], area)
     field = np.zeros_like(offset)
     for _ in range(BIAS.rounds):
-        square = np.square(offset - field).mean(1)
-        weight = area * np.exp(-square / (2 * BIAS.tolerance**2))
+        weight = area * _alike(offset - field)
         smooth = grid.smooth(offset, weight)
         field = grid.at(smooth, some)
-    return grid.at(smooth) - np.median(field, 0)
+    found = grid.at(smooth) - np.median(field, 0)
+    # Taken for an error, a patch of another colour keeps its edge, and slopes come about around it.
+    return found if grid.variation(colour - found) < grid.variation(colour) else np.zeros_like(found)
+
+
+def _alike(offset: np.ndarray) -> np.ndarray:
+    """How far log colours that are this far from the main one, (m, 3), are of it, (m,): 0...1."""
+    grey = offset.mean(1)
+    hue = np.square(offset - grey[:, None]).mean(1)
+    return np.exp(-(np.square(grey) + np.square(BIAS.hue) * hue) / (2 * BIAS.tolerance**2))
 
 
 def _mode(colour: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """What log colours, (m, 3), gather around, (3,): mean shift from their median."""
     mode = np.median(colour, 0)
     for _ in range(BIAS.rounds):
-        near = weight * np.exp(-np.square(colour - mode).mean(1) / (2 * (2 * BIAS.tolerance) ** 2))
+        near = weight * _alike((colour - mode) / 2)
         mode = near @ colour / max(near.sum(), 1e-30)
     return mode
 
@@ -76,15 +84,16 @@ class _Grid:
     A normal's squared components are what each side counts there; they sum to 1.
     """
 
-    def __init__(self, position: np.ndarray, normal: np.ndarray, some: np.ndarray, reach: float):
+    def __init__(self, position: np.ndarray, normal: np.ndarray, some: np.ndarray, reach: float, texel: float):
         low, high = position.min(0), position.max(0)
-        cell = max(reach / 3, float(np.prod(np.maximum(high - low, reach)) / GRID) ** (1 / 3), 1e-9)
+        cell = max(reach / 3, 2 * texel, float(np.prod(np.maximum(high - low, reach)) / GRID) ** (1 / 3), 1e-9)
         self.place = (position - low) / cell
         self.shape = tuple(np.floor(self.place.max(0) + 0.5).astype(int) + 1)
         self.sides = np.concatenate([np.square(np.maximum(normal, 0)), np.square(np.minimum(normal, 0))], 1)
         self.some = some
         self.sigma = max(reach / cell, 1.0)
-        self.cell = np.ravel_multi_index(np.floor(self.place[some] + 0.5).astype(int).T, self.shape)
+        self.every = np.ravel_multi_index(np.floor(self.place + 0.5).astype(int).T, self.shape)
+        self.cell = self.every[some]
 
     def smooth(self, values: np.ndarray, weight: np.ndarray) -> np.ndarray:
         """Weighted Gaussian mean of values ((s, 3)) of `some`, (sides, 3, *shape), drawn towards 0."""
@@ -105,3 +114,12 @@ class _Grid:
                 value = map_coordinates(field[side, channel], place[there].T, order=1, mode="nearest")
                 result[there, channel] += sides[there, side] * value
         return result
+
+    def variation(self, colour: np.ndarray) -> float:
+        """Total variation of the cells' mean log colour, of (m, 3) of all elements by the side they mostly face."""
+        size = int(np.prod(self.shape))
+        place = size * self.sides.argmax(1) + self.every
+        count = np.bincount(place, minlength=FACINGS * size)
+        with np.errstate(invalid="ignore"):
+            mean = (np.bincount(place, colour.mean(1), FACINGS * size) / count).reshape(FACINGS, *self.shape)
+        return float(sum(np.nansum(np.abs(np.diff(mean, axis=axis))) for axis in (1, 2, 3)))

@@ -90,6 +90,8 @@ class BiasParams:
         frames see: 20 cm in a room.
     tolerance : float
         Standard deviation of log albedo among elements of one colour, beside the field.
+    hue : float
+        So many times less may the channels differ by from their mean.
     prior : float
         Area without bias that is counted in everywhere, as a share of the most that the Gaussian holds anywhere.
     rounds : int
@@ -98,6 +100,7 @@ class BiasParams:
 
     reach: float = 0.02
     tolerance: float = 0.2
+    hue: float = 2.0
     prior: float = 0.1
     rounds: int = 4
 

