@@ -2,7 +2,8 @@
 
 For each room and seed the whole method, then the method without each pass. Stages before the first that a pass changes
 are taken from the whole run's store; where that stage comes out the same without the pass, the rest does, too. One line
-of JSON for each run goes to `LINES`: what is there is not done again, and files of several machines can be joined.
+of JSON for each run goes to `LINES`: what the same source has done is not done again, and files of several machines can
+be joined.
 """
 
 import contextlib
@@ -20,8 +21,9 @@ from ..core.errors import BadInputError
 from ..core.io.read import read_capture
 from ..core.memory import peak_memory
 from ..core.passes.registry import PASSES, check, stage_of
+from ..core.pipeline import corrected
 from ..core.pipeline.recover import Recovery
-from ..core.pipeline.stages import code
+from ..core.pipeline.source import digest
 from ..core.progress import Progress
 from ..core.results.store import Store
 from ..core.scene.unwrap import by_xatlas
@@ -131,7 +133,8 @@ def run_ablation(asked: Ablation, tell: Callable[[str], None] = lambda text: Non
         ) from error
     path = asked.out / LINES
     lines = read_lines([path]) if path.exists() else []
-    done = {(one["room"], one["preset"], one["seed"], one["without"]) for one in lines}
+    source = digest(Path(corrected.__file__))[:16]
+    done = {(one["room"], one["preset"], one["seed"], one["without"]) for one in lines if one.get("code") == source}
     for seed in asked.seeds:
         for room in asked.rooms:
             todo = [name for name in (WHOLE, *names) if (room.name, asked.preset, seed, name) not in done]
@@ -141,7 +144,7 @@ def run_ablation(asked: Ablation, tell: Callable[[str], None] = lambda text: Non
             for name in todo:
                 if asked.over:
                     break
-                line = bench.run(name) | {"code": code()}
+                line = bench.run(name) | {"code": source}
                 with open(path, "a", encoding="utf-8") as file:
                     file.write(json.dumps(line) + "\n")
                 tell(_told(line))

@@ -170,7 +170,7 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None, older: bool = False
         "",
         f"Rooms ({', '.join(presets)} preset): {', '.join(_room(one) for one in rooms)}. "
         f"Seeds: {', '.join(str(seed) for seed in sorted({seed for _, seed, _ in runs}))}. "
-        f"Source of the stages (`code` in report.json): {', '.join(codes) or 'not recorded'}.",
+        f"Digest of the source: {', '.join(codes) or 'not recorded'}.",
         "",
     ]
     if image:

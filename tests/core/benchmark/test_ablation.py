@@ -73,6 +73,10 @@ def test_runs_that_are_there_are_not_done_again(room, tmp_path):
     assert set(compensation["seconds"]) == {"write"}
     run_ablation(asked(room, tmp_path), told.append)
     assert path.read_bytes() == first and len(told) == 4
+    # Another source's run is no measure for this one's.
+    path.write_text(first.decode().replace(compensation["code"], "another", 1))
+    run_ablation(asked(room, tmp_path), told.append)
+    assert len(told) == 5 and read_lines([path])[0]["code"] == compensation["code"]
 
 
 @pytest.mark.slow
