@@ -10,14 +10,13 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from ...groups import by_label
-from ...kinds import Block, Unit
+from ...kinds import Unit
 from ...parallel import ordered_map
 from ...scene.atlas import Atlas
 from ...significance import LEVELS
 from .params import ALBEDO, BIAS
 
 FACINGS: Unit[int] = 6
-GRID: Block[int] = 1 << 18
 
 
 def without_bias(atlas: Atlas, rho: np.ndarray, measured: np.ndarray, part: np.ndarray) -> np.ndarray:
@@ -86,7 +85,9 @@ class _Grid:
 
     def __init__(self, position: np.ndarray, normal: np.ndarray, some: np.ndarray, reach: float, texel: float):
         low, high = position.min(0), position.max(0)
-        cell = max(reach / 3, 2 * texel, float(np.prod(np.maximum(high - low, reach)) / GRID) ** (1 / 3), 1e-9)
+        cell = max(reach / 3, 2 * texel, 1e-9)
+        while np.prod((high - low) / cell + 1.5) > BIAS.cells:
+            cell *= 1.2
         self.place = (position - low) / cell
         self.shape = tuple(np.floor(self.place.max(0) + 0.5).astype(int) + 1)
         self.sides = np.concatenate([np.square(np.maximum(normal, 0)), np.square(np.minimum(normal, 0))], 1)

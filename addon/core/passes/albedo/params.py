@@ -96,6 +96,8 @@ class BiasParams:
         Area without bias that is counted in everywhere, as a share of the most that the Gaussian holds anywhere.
     rounds : int
         Of the iteration.
+    cells : int
+        Of a part's grid, at most: in what is larger than a room they grow.
     """
 
     reach: float = 0.02
@@ -103,6 +105,7 @@ class BiasParams:
     hue: float = 2.0
     prior: float = 0.1
     rounds: int = 4
+    cells: int = 1 << 18
 
 
 PRIOR = PriorParams()

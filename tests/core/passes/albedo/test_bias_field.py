@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -150,3 +151,14 @@ def test_a_few_elements_are_left_alone(atlas):
     measured = np.arange(len(atlas)) < 20
     rho = painted(atlas).astype(np.float32)
     assert np.array_equal(run(atlas, rho, measured), rho)
+
+
+def test_a_huge_ground_needs_no_huge_grid(atlas):
+    """A thousand times as large in two directions, and as high: cells grow."""
+    wide = replace(atlas, position=atlas.position * np.float32([1000, 1000, 1000]), area=atlas.area)
+    rho = painted(atlas) * np.exp(halo(atlas))
+    tracemalloc.start()
+    found = run(wide, rho)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert np.isfinite(found).all() and peak < 300e6
