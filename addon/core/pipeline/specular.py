@@ -224,7 +224,7 @@ def _describe(i: Instance, room: Room, chosen: Chosen) -> ObjectMaterial:
     def lamp(radiance: np.ndarray, note: str) -> ObjectMaterial:
         albedo, why = None, ""
         if "unlit-lamps" not in room.settings.without:
-            told = room.lit_diffuse.seen & ~np.isin(field.atlas.object_id, [lamp.object_id for lamp in room.lamps])
+            told = room.lit_diffuse.seen & ~np.isin(field.atlas.object_id, [one.object_id for one in room.lamps])
             albedo, why = unlit(i, field, room.irradiance, told, room.settings.seed)
         return lamp_material(i, radiance, room.irradiance[own], " ".join(filter(None, (note, why))), albedo)
 

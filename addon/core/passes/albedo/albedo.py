@@ -106,11 +106,11 @@ def albedo_of(
     """
     rho, valid = quotient(np.maximum(lit_diffuse.radiance - specular, 0), irradiance)
     error = np.hypot(relative_error(lit_diffuse, atlas.object_id, "object-spread" not in without), unsure)
+    valid &= lit_diffuse.seen
     if "bias-field" not in without:
-        reflecting = without_emitters(atlas, valid & lit_diffuse.seen & np.isfinite(error), emitters)
-        rho = without_bias(atlas, rho, reflecting, atlas.object_id if atlas.back is None else atlas.side)
+        rho = without_bias(atlas, rho, without_emitters(atlas, valid & np.isfinite(error), emitters))
     guesses = {one.object_id for one in instances if one.guess}
-    found = fill(atlas, rho, valid & lit_diffuse.seen, class_names(instances), emitters, error, without, guesses)
+    found = fill(atlas, rho, valid, class_names(instances), emitters, error, without, guesses)
     if "class-albedo" in without:
         return found
     told = class_names(one for one in instances if not one.guess)

@@ -19,33 +19,32 @@ from .params import ALBEDO, BIAS
 FACINGS: Unit[int] = 6
 
 
-def without_bias(atlas: Atlas, rho: np.ndarray, measured: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """Albedo with each part's bias field taken out, (n, 3) float32; the median of its field stays.
+def without_bias(atlas: Atlas, rho: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """Albedo with each object's bias field taken out, (n, 3) float32; the median of its field stays.
+
+    A sheet's second side has a field of its own.
 
     Parameters
     ----------
     rho : (n, 3) float32
         Quotient, not clamped; anything where nothing was measured.
     measured : (n,) bool
-    part : (n,) int
-        Number of what is of one main colour: an object.
     """
     result = rho.copy()
-    reach = BIAS.reach * np.sqrt(float(atlas.area[measured].sum()))
+    known = np.flatnonzero(measured)
+    reach = BIAS.reach * np.sqrt(float(atlas.area[known].sum()))
+    parts = [known[own] for own in by_label(atlas.side[known]) if len(own) >= LEVELS.many]
 
     def corrected(own: np.ndarray) -> np.ndarray:
-        known = own[measured[own]]
-        field = _field(atlas, known, rho[known], reach)
-        return rho[known] / np.exp(field)
+        return rho[own] / np.exp(_field(atlas, own, rho[own], reach))
 
-    parts = [own for own in by_label(part) if np.count_nonzero(measured[own]) >= LEVELS.many]
-    for own, without in zip(parts, ordered_map(corrected, parts, 0), strict=True):
-        result[own[measured[own]]] = without
+    for own, cleared in zip(parts, ordered_map(corrected, parts, 0), strict=True):
+        result[own] = cleared
     return result
 
 
 def _field(atlas: Atlas, own: np.ndarray, rho: np.ndarray, reach: float) -> np.ndarray:
-    """Log of the bias field of one part's m measured elements, (m, 3), around its median."""
+    """Log of the bias field of one object's m measured elements, (m, 3), around its median."""
     some = np.random.default_rng(0).permutation(len(own))[: LEVELS.sample]
     colour = np.log(np.maximum(rho, ALBEDO.floor))
     area = atlas.area[own][some].astype(float)
@@ -95,6 +94,7 @@ class _Grid:
         self.sigma = max(reach / cell, 1.0)
         self.every = np.ravel_multi_index(np.floor(self.place + 0.5).astype(int).T, self.shape)
         self.cell = self.every[some]
+        self.facing = self.sides.argmax(1)
 
     def smooth(self, values: np.ndarray, weight: np.ndarray) -> np.ndarray:
         """Weighted Gaussian mean of values ((s, 3)) of `some`, (sides, 3, *shape), drawn towards 0."""
@@ -119,7 +119,7 @@ class _Grid:
     def variation(self, colour: np.ndarray) -> float:
         """Total variation of the cells' mean log colour, of (m, 3) of all elements by the side they mostly face."""
         size = int(np.prod(self.shape))
-        place = size * self.sides.argmax(1) + self.every
+        place = size * self.facing + self.every
         count = np.bincount(place, minlength=FACINGS * size)
         with np.errstate(invalid="ignore"):
             mean = (np.bincount(place, colour.mean(1), FACINGS * size) / count).reshape(FACINGS, *self.shape)

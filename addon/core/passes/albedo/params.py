@@ -97,7 +97,7 @@ class BiasParams:
     rounds : int
         Of the iteration.
     cells : int
-        Of a part's grid, at most: in what is larger than a room they grow.
+        Of an object's grid, at most: in what is larger than a room they grow.
     """
 
     reach: float = 0.02
