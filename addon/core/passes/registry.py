@@ -105,7 +105,6 @@ PASSES = (
         specular_removal="Takes the fitted specular part out of every observation, and the median of what is left.",
         glossy_light="Lights the room by what glossy things really reflect.",
         caustics="Follows light from bright triangles over glossy things by photons.",
-        glossy_smoothing="Takes noise out of the glossy things' light.",
     ),
     *_of(
         "write",

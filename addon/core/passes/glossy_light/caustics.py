@@ -97,17 +97,17 @@ def caustics(
 
     Returns
     -------
-    (n, 6) float32
-        Radiance * steradian, for every element; and half the difference of the photons' two halves, the noise in it.
+    (n, 3) float32
+        Radiance * steradian, for every element.
     """
     count = len(room.atlas)
     if not len(bright) or not gloss.alpha.any():
-        return np.zeros((count, 6), np.float32)
+        return np.zeros((count, 3), np.float32)
     cube = sobol(photons, seed, 5)
     rng = np.random.default_rng([seed, 2])
-    fallen, power = [], []  # by the second half of photons: `count` elements further on
+    fallen, power = [], []
     for start in range(0, photons, AT_ONCE):
-        part, half = cube[start : start + AT_ONCE], count * (2 * start // photons)
+        part = cube[start : start + AT_ONCE]
         pick = sample_bright(bright, part[None, :, :3])
         normal = bright.normal[pick.index]
         ways = to_world(cosine_hemisphere(part[:, None, 3:]), normal)[:, 0]
@@ -118,7 +118,7 @@ def caustics(
         own = np.maximum(room.radiance[sender] - gloss.inside[sender], 0)
         sent = _Light(origin, ways, np.concatenate([own, -gloss.inside[sender]], 1) * share)
         element, place, at = _met(room, sent)
-        fallen.append(element + half)
+        fallen.append(element)
         power.append(sent.power[at, 3:])
         for _ in range(CAUSTICS.bounces):
             light = _Light(place, sent.direction[at], sent.power[at, :3])
@@ -126,12 +126,11 @@ def caustics(
             if not len(sent.origin):
                 break
             element, place, at = _met(room, sent)
-            fallen.append(element + half)
+            fallen.append(element)
             power.append(sent.power[at])
-    at, halves = np.concatenate(fallen), np.empty((2, 3, count), np.float32)
-    for channel, values in enumerate(np.concatenate(power).T):
-        halves[:, channel] = np.bincount(at, values, 2 * count).reshape(2, count)
-    return _over_cells(room.atlas, halves, threads)
+    at = np.concatenate(fallen)
+    total = np.stack([np.bincount(at, values, count).astype(np.float32) for values in np.concatenate(power).T])
+    return _over_cells(room.atlas, total, threads)
 
 
 def _met(room: LightField, light: _Light) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -163,15 +162,13 @@ def _sent_on(room: LightField, gloss: Gloss, element: np.ndarray, light: _Light,
     return _Light(origin, ways, light.power[alive] * share[alive])
 
 
-def _over_cells(atlas: Atlas, halves: np.ndarray, threads: int) -> np.ndarray:
-    """Power over area, and its noise by the photons' halves, (n, 6): means over cells of several shifted grids."""
-    for a, b in zip(*halves, strict=True):  # in place: their sum, and their difference
-        a[:], b[:] = a + b, a - b
-    held, area = np.zeros((6, len(atlas)), np.float32), np.zeros(len(atlas), np.float32)
+def _over_cells(atlas: Atlas, power: np.ndarray, threads: int) -> np.ndarray:
+    """Power ((3, n)) over area, (n, 3) float32: means over cells of several shifted grids."""
+    held, area = np.zeros((3, len(atlas)), np.float32), np.zeros(len(atlas), np.float32)
 
     def add(portion: tuple[np.ndarray, np.ndarray]) -> None:
         own, group = portion
-        for row, values in zip((*held, area), (*halves.reshape(6, -1), atlas.area), strict=True):
+        for row, values in zip((*held, area), (*power, atlas.area), strict=True):
             row[own] += np.bincount(group, values[own])[group]
 
     for k in range(LESS_NOISE.grids):

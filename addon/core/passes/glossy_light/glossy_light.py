@@ -18,14 +18,12 @@ from ...light.environment import Environment
 from ...light.field import LightField
 from ...light.interpolate import interpolated
 from ...light.irradiance import gather
-from ...light.less_noise import less_noise
 from ...light.lobes import GRID, highlight
 from ...light.over_surface import block_step, finest_spacing
 from ...light.texel_blocks import TexelBlocks
 from ...parallel import for_blocks
 from ...progress import Progress, Rounds
 from ...scene.rays import Hits
-from ...significance import LEVELS
 from .caustics import Gloss, caustics
 from .params import GLOSSY
 
@@ -78,7 +76,7 @@ class Excess(LightField):
         return bool(self._gloss.alpha.any())
 
     def from_bright(self, threads: int = 0) -> np.ndarray:
-        """The part of the excess that starts at bright triangles, and its noise, at every element (`caustics`)."""
+        """The part of the excess that starts at bright triangles, at every element (`caustics`)."""
         return caustics(self._lit, self._sources, self._gloss, self._seed, threads=threads)
 
     def arriving(
@@ -136,21 +134,14 @@ def glossy_light(
     rounds, steps = Rounds(progress, *share), {"count": 0}
 
     def gathered(index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean of two halves and half their difference, (k, 6), and the radius."""
-        value, radius = np.empty((len(index), 6), np.float32), np.empty(len(index), np.float32)
+        """E and `level`, (k, 3), and the radius."""
+        value, radius = np.empty((len(index), 3), np.float32), np.empty(len(index), np.float32)
         steps["count"] += 1
 
         def run(part: slice) -> None:
-            at = element[index[part]]
-            here = seed + 7919 * steps["count"] + part.start
-            (a, near, _), (b, also_near, _) = (
-                gather(
-                    excess, bright, atlas.position[at], atlas.normal[at], GLOSSY.rays // 2, 0, here + (1 << 20) * half
-                )
-                for half in range(2)
-            )
-            value[part] = np.concatenate([level + (a + b) / 2, (a - b) / 2], 1)
-            radius[part] = 2 / (1 / near + 1 / also_near)
+            at, here = element[index[part]], seed + 7919 * steps["count"] + part.start
+            found, radius[part], _ = gather(excess, bright, atlas.position[at], atlas.normal[at], GLOSSY.rays, 0, here)
+            value[part] = level + found
 
         for_blocks(run, len(index), 1 << 11, threads, rounds)
         rounds.next()
@@ -161,16 +152,7 @@ def glossy_light(
         at = element[index]
         return interpolated(atlas.position[at], atlas.normal[at], lambda i: gathered(index[i]), finest, threads)[0]
 
-    found = TexelBlocks(atlas, element, threads).evaluate(around, block_step(atlas), np.inf)
+    found = TexelBlocks(atlas, element, threads).evaluate(around, block_step(atlas), np.inf) - level
     if "caustics" not in without:
         found += excess.from_bright(threads)[element]
-    # Spread like the light itself, the halves' difference has the noise that is left in it.
-    found, noise = found[:, :3] - level, found[:, 3:].mean(1)
-    if "glossy-smoothing" not in without:
-        # As shares of E: what is lost in the noise of bright places is much beside them in the dark.
-        whole = np.maximum(irradiance, LEVELS.dark * level)
-        part, _ = less_noise(
-            atlas.position[element], atlas.normal[element], found / whole, noise / whole.mean(1), GLOSSY.smooth, threads
-        )
-        found = part * whole
     return np.maximum(found, -GLOSSY.most_taken * irradiance).astype(np.float32)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class GlossyLightParams:
-    """Of `glossy_light` (`glossy-light`, `glossy-smoothing` in the ablation).
+    """Of `glossy_light` (`glossy-light` in the ablation).
 
     Attributes
     ----------
@@ -16,9 +16,6 @@ class GlossyLightParams:
         Least distance of two places, as a share of the room: four times that of all light. Albedo of a kitchen with
         .04, this and .01: 28.49, 28.64, 28.71 dB, of a bathroom 27.19, 27.22, 27.21; .01 takes 2 s longer in the living
         room.
-    smooth : float
-        Metres: cells in which the rays' and photons' noise is taken out. A tiled bathroom had clouds of 5 to 10 % in
-        its albedo: 26.81 dB without, 27.05, 27.14 and 27.21 with cells of .25, .5 and 1 m.
     most_taken : float
         Of E that may be taken away, by noise or where a median was all highlight.
     """
@@ -26,7 +23,6 @@ class GlossyLightParams:
     rays: int = 32
     lobe_rays: int = 4
     finest_share: float = 0.02
-    smooth: float = 1.0
     most_taken: float = 0.5
 
 

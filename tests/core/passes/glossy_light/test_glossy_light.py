@@ -92,28 +92,3 @@ def test_never_more_than_there_is(box):
     assert excess.min() >= -10 - 1e-4
     nothing = Excess(box.field, (), np.zeros((len(box.room.atlas), 3), np.float32))
     assert not glossy_light(nothing, element, np.ones((len(element), 3), np.float32)).any()
-
-
-def test_noise_of_bright_places_is_not_spread_into_dark_ones(box, monkeypatch):
-    """Rays that find a tenth of E, and err by half of that, on a floor whose one half is 100 times as dark."""
-    atlas = box.room.atlas
-    element = np.flatnonzero(atlas.object_id == 0)
-
-    def irradiance(position):
-        return np.where(position[:, :1] < 2, 20.0, 0.2).astype(np.float32) * np.ones(3, np.float32)
-
-    def noisy(excess, bright, position, *more):
-        error = 1 + 0.5 * np.random.default_rng(more[-1]).normal(size=(len(position), 1)).astype(np.float32)
-        return 0.1 * irradiance(position) * error, np.full(len(position), 1e-3, np.float32), None
-
-    monkeypatch.setattr(glossy_light_module, "gather", noisy)
-    excess = Excess(box.field, polished(), box.room.by_object({0: 0.0}))
-    whole, errors = irradiance(atlas.position[element]), {}
-    for smoothed in (True, False):
-        without = ("caustics", *(() if smoothed else ("glossy-smoothing",)))
-        found = glossy_light(excess, element, whole, threads=1, without=without)
-        errors[smoothed] = np.abs(found / whole - 0.1)
-    dark = whole[:, 0] < 1
-    # At the edge between both, places that are interpolated from either side err with smoothing as without.
-    assert (errors[True] - errors[False])[dark].max() < 0.1
-    assert all(np.median(errors[True][half]) < 0.7 * np.median(errors[False][half]) for half in (dark, ~dark))
