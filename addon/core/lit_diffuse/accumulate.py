@@ -74,7 +74,8 @@ def accumulate(
     read : callable
         Gives a frame's pixels.
     median : str
-        'exact', 'p2' or 'mean'; see `medians`.
+        As `medians.make_estimator` has it. An observation's weight is the inverse of the surface that a pixel covers
+        there: what is smaller than that area is lost in it.
     folder : Path, optional
         Where the exact median keeps observations meanwhile.
     edge_tier : bool
@@ -120,7 +121,8 @@ def accumulate(
             tiers = seen.tier if edge_tier else np.where(seen.tier == EDGE, CLEAN, seen.tier)
             for tier, estimator in estimators.items():
                 chosen = np.flatnonzero(tiers == tier)
-                estimator.add(seen.element.take(chosen), seen.radiance.take(chosen, 0))
+                weight = 1 / seen.pixel_area.take(chosen)
+                estimator.add(seen.element.take(chosen), seen.radiance.take(chosen, 0), weight)
             if also is not None:
                 also(index, view, pixels, seen)
             if progress is not None:
