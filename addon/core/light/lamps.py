@@ -7,8 +7,8 @@ import numpy as np
 
 from ..groups import by_number
 from ..luminance import LUMINANCE
-from ..scene.atlas import Atlas
-from ..scene.model import Instance
+from ..scene.elements import triangle_geometry
+from ..scene.model import Instance, Mesh
 from .params import LIGHT_FIT
 
 
@@ -29,7 +29,8 @@ class Lamp:
     from_edges : bool
         Its colour is that of the pixels along its edges.
     twin : int or None
-        The seen lamp whose radiance it takes, as `solved`, the luminance that was solved for, is near that lamp's.
+        The seen lamp of its model whose radiance it takes, which explains nearly as well as `solved`, the luminance
+        that was solved for.
     mixed : bool
         Frames show it, but no pixel without what is beside it.
     """
@@ -57,7 +58,9 @@ class Lamp:
         if self.from_edges:
             told += "; its colour from its edges"
         if self.twin is not None:
-            told += f": {self.solved:.3g}, near that of the seen '{names[self.twin]}', which it takes"
+            told += (
+                f": {self.solved:.3g}; that of the seen '{names[self.twin]}' explains it nearly as well, and is taken"
+            )
         return f"{told}."
 
 
@@ -120,15 +123,17 @@ def mixed_lamps(lamps: Collection[Lamp], clean: np.ndarray) -> list[int]:
     return [lamp.object_id for lamp in lamps if lamp.seen and lamp.object_id not in shown]
 
 
-def lamp_models(atlas: Atlas, instances: tuple[Instance, ...]) -> dict[int, int]:
+def lamp_models(mesh: Mesh, instances: tuple[Instance, ...]) -> dict[int, int]:
     """Which objects would be the same lamp hung several times: of one class that was told, and of about the same area.
+
+    That of their triangles: the elements of a bulb are too few to measure it by.
 
     Returns
     -------
     dict of int
         Of each object the first that is like it, or its own number.
     """
-    area = np.bincount(atlas.object_id, atlas.area)
+    area = np.bincount(mesh.object_id, triangle_geometry(mesh)[1])
     model: dict[int, int] = {}
     firsts: dict[str, list[int]] = {}
     for one in instances:
@@ -140,12 +145,3 @@ def lamp_models(atlas: Atlas, instances: tuple[Instance, ...]) -> dict[int, int]
         if own and not like:
             known.append(one.object_id)
     return model
-
-
-def twin(object_id: int, luminance: float, model: dict[int, int], seen: list[Lamp]) -> Lamp | None:
-    """A seen lamp of the object's model with about the luminance that was solved for the object."""
-    for other in seen:
-        if model.get(other.object_id) == model.get(object_id):
-            if abs(luminance / float(other.radiance @ LUMINANCE) - 1) < LIGHT_FIT.alike:
-                return other
-    return None

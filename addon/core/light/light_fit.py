@@ -64,16 +64,19 @@ class Sample:
         off = np.minimum(np.abs(log_albedo - self._medians(log_albedo)), LIGHT_FIT.cap)
         return float(np.average(off, weights=self._weight))
 
+    def spread_under(self, sent: np.ndarray, received: np.ndarray) -> float:
+        """The spread of log albedo under an E: both (m,), of all light together or of one channel."""
+        return self.spread(np.log(np.maximum(sent, 1e-9)) - np.log(received + 1e-12))
+
     def best(
         self, sent: np.ndarray, received: np.ndarray, contribution: np.ndarray
     ) -> tuple[float, float, float] | None:
         """The radiance s that explains best what is `sent`, with the spread before and after; None if unbounded."""
         if not (contribution > 0).any():
             return None
-        sent = np.log(np.maximum(sent, 1e-9))
 
         def cost(log_s: float) -> float:
-            return self.spread(sent - np.log(received + np.exp(log_s) * contribution + 1e-12))
+            return self.spread_under(sent, received + np.exp(log_s) * contribution)
 
         # The scale to search around: where the trial light gives as much as all known light together.
         grid = np.log(max(received.mean(), 1e-9) / contribution.mean()) + np.linspace(-5, 4, 37)
@@ -82,4 +85,4 @@ class Sample:
         if at == len(grid) - 1:
             return None  # more is always better: this says nothing about the light
         found = minimize_scalar(cost, bounds=(grid[max(at - 1, 0)], grid[at + 1]), method="bounded")
-        return float(np.exp(found.x)), self.spread(sent - np.log(received + 1e-12)), float(found.fun)
+        return float(np.exp(found.x)), self.spread_under(sent, received), float(found.fun)

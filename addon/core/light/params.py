@@ -112,7 +112,7 @@ class LightFitParams:
         under a cap of 1: 10 and 15 with all elements, 21 and 22 with those on flat spots.
     alike : float
         Relative difference up to which two solutions of one lamp's luminance agree: by all channels together and each
-        by itself, beside a seen lamp of its model, or as pixels show it.
+        by itself, or as pixels show it.
     same : float
         Relative difference of area up to which two objects of a class can be the same lamp: a scan's noise and holes.
     reach : float

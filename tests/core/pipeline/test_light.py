@@ -274,7 +274,9 @@ def test_a_lamp_says_how_it_was_found():
         ),
         "Clipped in every frame; solved from the light it throws (spread of log albedo 0.500 to 0.400); its colour "
         "from its edges.": Lamp(1, radiance, False, clipped=True, spread=(0.5, 0.4), from_edges=True),
-        "No frame sees it; solved from the light it throws (spread of log albedo 0.500 to 0.400): 2.5, near that of "
-        "the seen 'lamp 3', which it takes.": Lamp(1, radiance, False, spread=(0.5, 0.4), twin=3, solved=2.5),
+        "No frame sees it; solved from the light it throws (spread of log albedo 0.500 to 0.400): 2.5; that of the "
+        "seen 'lamp 3' explains it nearly as well, and is taken.": Lamp(
+            1, radiance, False, spread=(0.5, 0.4), twin=3, solved=2.5
+        ),
     }
     assert all(lamp.note(names) == sentence for sentence, lamp in told.items())

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...light.lamps import Lamp, twin
+from ...light.lamps import Lamp
 from ...light.light_fit import Sample
 from ...light.params import LIGHT_FIT, SKY
 from ...luminance import LUMINANCE
@@ -32,9 +32,9 @@ def solve_lamps(sample: Sample, contribution, least, class_of, model, kin, seen,
             sample.best(sample.radiance[:, c], all_light(base, lamps, contribution, sky)[:, c], left[object_id])
             for c in range(3)
         ]
+        same = twin(object_id, found[object_id][2], sample, sent, received, left[object_id], model, seen)
         known = colours.get(object_id)
-        s, before, after = found[object_id]
-        lamps.append(_coloured(object_id, s, before, after, class_of, model, seen, sample.received, by_channel, known))
+        lamps.append(_coloured(object_id, *found[object_id], class_of, same, seen, sample.received, by_channel, known))
         del left[object_id]
     return lamps
 
@@ -47,22 +47,35 @@ def needed(sample: Sample, lamps: list[Lamp], contribution, sky: Sky, base, colo
     alone = Sky(sky.contribution, sky.guess, sky.clipped, sky.told)
     for _ in range(UNSEEN.sweeps):
         solve_sky(sample, shining, contribution, alone, base)
-    sent = np.log(np.maximum(sample.radiance @ LUMINANCE, 1e-9))
+    sent = sample.radiance @ LUMINANCE
     with_lamps, without = (
-        sample.spread(sent - np.log(all_light(base, some, contribution, above) @ LUMINANCE + 1e-12))
+        sample.spread_under(sent, all_light(base, some, contribution, above) @ LUMINANCE)
         for some, above in ((lamps, sky), (shining, alone))
     )
     return (lamps, sky) if with_lamps < (1 - UNSEEN.lamp_gain) * without else (shining, alone)
 
 
-def _coloured(object_id, s, before, after, class_of, model, seen, received, by_channel, known) -> Lamp:
+def twin(object_id: int, least: float, sample: Sample, sent, received, contribution, model, seen) -> Lamp | None:
+    """The seen lamp of the object's model that explains best what is sent, if it does nearly as well as any radiance.
+
+    Lamps of one model mostly shine alike; that one differs is believed as any lamp is, by `lamp_gain` of the `least`
+    spread of log albedo.
+    """
+    alike = [lamp for lamp in seen if model.get(lamp.object_id) == model.get(object_id)]
+    light = (received + float(lamp.radiance @ LUMINANCE) * contribution for lamp in alike)
+    spread = [sample.spread_under(sent, E) for E in light]
+    if not alike or least < (1 - UNSEEN.lamp_gain) * min(spread):
+        return None
+    return alike[int(np.argmin(spread))]
+
+
+def _coloured(object_id, s, before, after, class_of, same, seen, received, by_channel, known) -> Lamp:
     """Give a solved luminance its colour.
 
-    A seen lamp's of the same model if they agree; else that which is `known` from its edges; else what each channel
+    That of a lamp that is the `same` as a seen one; else that which is `known` from its edges; else what each channel
     says by itself, if together they make that luminance; else that of the lamps, or of the light.
     """
     spread = float(before), float(after)
-    same = twin(object_id, s, model, seen)
     if same is not None:
         return Lamp(int(object_id), same.radiance, False, spread=spread, twin=same.object_id, solved=float(s))
     if known is not None:

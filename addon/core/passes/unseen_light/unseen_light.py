@@ -165,7 +165,7 @@ def find_light(
     most = LEVELS.sample / len(np.unique(atlas.object_id[element])) / 2 if clipped else np.inf
     sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit], most)
     # The same lamp hung several times is one unknown.
-    model, kin = lamp_models(atlas, instances), of_shining_class(seen, atlas.object_id[good], instances)
+    model, kin = lamp_models(field.mesh, instances), of_shining_class(seen, atlas.object_id[good], instances)
     alike: dict[int, list[int]] = {}
     for one in unseen_objects:
         alike.setdefault(model.get(one, one), []).append(one)
