@@ -4,6 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .kinds import Unit
+
+ROUNDING: Unit[float] = 1e-10
+
 
 def weighted_median(values: np.ndarray, weight: np.ndarray) -> float:
     """The first of the values ((m,)), in rising order, that at least half of the weight ((m,)) does not exceed."""
@@ -14,7 +18,8 @@ def weighted_median(values: np.ndarray, weight: np.ndarray) -> float:
 def weighted_quantiles(values: np.ndarray, weight: np.ndarray, shares: Sequence[float]) -> list[np.ndarray]:
     """Quantiles along the last axis; where weights are equal, NumPy's by `method="hazen"`.
 
-    Each value stands in the middle of its weight, and between two of them it goes by a straight line.
+    The mean of the quantile function over as much of the weight as one value has of m equal ones; where weights differ
+    m is their effective number (Kish 1965). A straight line between two values would hang on the order of equal ones.
 
     Parameters
     ----------
@@ -27,17 +32,17 @@ def weighted_quantiles(values: np.ndarray, weight: np.ndarray, shares: Sequence[
     list of (...)
         For each of the `shares`.
     """
-    order, last = np.argsort(values, -1), values.shape[-1] - 1
+    order = np.argsort(values, -1)
     values = np.take_along_axis(values, order, -1)
+    # In double precision: what rounding leaves of a neighbour's part must not count, be it a million times as large.
+    weight = weight / weight.sum(-1, dtype=np.float64, keepdims=True)
     weight = np.take_along_axis(np.broadcast_to(weight, values.shape), order, -1)
-    total = weight.cumsum(-1)
-    place = total - weight / 2
+    above = weight.cumsum(-1)
+    below, half = above - weight, np.square(weight).sum(-1, keepdims=True) / 2
 
     def at(share: float) -> np.ndarray:
-        asked = share * total[..., -1:]
-        high = np.minimum((place < asked).sum(-1, keepdims=True), last)
-        low = np.maximum(high - 1, 0)
-        (p, v), (q, w) = ([np.take_along_axis(x, i, -1) for x in (place, values)] for i in (low, high))
-        return (v + np.clip((asked - p) / np.where(q > p, q - p, 1), 0, 1) * (w - v))[..., 0]
+        part = np.minimum(above, share + half) - np.maximum(below, share - half)
+        part[part < ROUNDING] = 0
+        return (part * values).sum(-1) / part.sum(-1)
 
     return [at(share) for share in shares]

@@ -85,15 +85,16 @@ class Exact:
             low, high = np.searchsorted(count, (seen, seen + 1), sorter=by_count)
             alike = by_count[low:high]
             rows = record[start[alike, None] + np.arange(seen)]
-            found = weighted_quantiles(rows["value"].transpose(2, 0, 1), rows["weight"], QUARTILES)
-            quartiles[alike] = np.stack(found).transpose(2, 1, 0)
+            for channel in range(3):
+                found = weighted_quantiles(rows["value"][..., channel], rows["weight"], QUARTILES)
+                quartiles[alike, channel] = np.stack(found, -1)
         return quartiles, count
 
     def result(self) -> Summary:
         lower, median, upper = np.empty((len(QUARTILES), self._count, 3), np.float32)
         count = np.empty(self._count, np.int32)
         sizes = sum((np.diff(starts) for starts in self._flushed), np.zeros(self._buckets, np.int64))
-        each = 3 * self.RECORD.itemsize * int(sizes.max(initial=0))  # read, put in order, and its values sorted
+        each = 5 * self.RECORD.itemsize * int(sizes.max(initial=0))  # read, put in order, and a channel's values sorted
         found = ordered_map(self._summarise, range(self._buckets), self._threads, each=each)
         for part, (quartiles, seen) in zip(blocks(self._count, self.BUCKET), found, strict=True):
             lower[part], median[part], upper[part] = quartiles.transpose(2, 0, 1)

@@ -100,6 +100,19 @@ def test_what_weighs_next_to_nothing_does_not_count(tmp_path):
     assert exact.result().median[0] == pytest.approx([2.0] * 3, abs=1e-3)
 
 
+def test_weights_of_all_but_equal_values_may_change_places():
+    """What rounding makes of two observations decides nothing."""
+    rest = [(3.0, 1.0), (4.0, 0.5)]
+    found = []
+    for first in ([(1.0, 2.0), (1.0 + 1e-6, 0.1)], [(1.0, 0.1), (1.0 + 1e-6, 2.0)]):
+        exact = Exact(1, weighted=True)
+        for value, weight in first + rest:
+            exact.add(np.zeros(1, np.int32), np.full((1, 3), value, np.float32), np.float32([weight]))
+        result = exact.result()
+        found.append([result.lower, result.median, result.upper])
+    assert np.allclose(*found, rtol=2e-6)
+
+
 def test_exact_takes_zeros_of_either_sign():
     """Half-float pictures hold -0.0, which passes as 'not negative'."""
     assert one_by_one(Exact(1), [-0.0, -0.0, 1.0]).median[0, 0] == 0
