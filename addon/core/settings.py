@@ -32,9 +32,8 @@ class Settings:
         Move frames that lie beside what all of them show together; good ones, and the cameras of your own scene, stay
         as they are.
     median : str
-        How the frames' views of a spot become one colour. 'exact' (what shows it closer counts more; all observations
-        go to disk meanwhile, 20 bytes each), 'p2' (as in the paper: P-square over all observations, in the order of the
-        video) or 'mean'.
+        How the frames' views of a spot become one colour. 'exact' (all observations go to disk meanwhile, 16 bytes
+        each), 'p2' (as in the paper: P-square over all observations, in the order of the video) or 'mean'.
     sharpen : bool
         Give the texture back the detail that averaging has blurred; reads the frames once more.
     shading : str
@@ -112,11 +111,6 @@ class Settings:
             raise BadInputError(f"Setting 'detail' is {self.detail}; give more than 0.")
         if self.shading_rays < 1 or self.specular_rays < 1 or self.atlas_size < 64:
             raise BadInputError("Settings shading_rays and specular_rays must be at least 1, atlas_size at least 64.")
-
-    @property
-    def estimator(self) -> str:
-        """What takes the median of observations, as `lit_diffuse.medians` names it."""
-        return "weighted" if self.median == "exact" and "footprints" not in self.without else self.median
 
     @property
     def published(self) -> frozenset[str]:

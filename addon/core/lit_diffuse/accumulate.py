@@ -74,8 +74,7 @@ def accumulate(
     read : callable
         Gives a frame's pixels.
     median : str
-        As `medians.make_estimator` has it. An observation's weight is the inverse of the surface that a pixel covers
-        there: what is smaller than that area is lost in it.
+        'exact', 'p2' or 'mean'; see `medians`.
     folder : Path, optional
         Where the exact median keeps observations meanwhile.
     edge_tier : bool
@@ -121,8 +120,7 @@ def accumulate(
             tiers = seen.tier if edge_tier else np.where(seen.tier == EDGE, CLEAN, seen.tier)
             for tier, estimator in estimators.items():
                 chosen = np.flatnonzero(tiers == tier)
-                weight = 1 / seen.pixel_area.take(chosen)
-                estimator.add(seen.element.take(chosen), seen.radiance.take(chosen, 0), weight)
+                estimator.add(seen.element.take(chosen), seen.radiance.take(chosen, 0))
             if also is not None:
                 also(index, view, pixels, seen)
             if progress is not None:

@@ -1,13 +1,12 @@
-"""The exact median, weighted or not: every observation is kept on disk meanwhile."""
+"""The exact median: every observation is kept on disk meanwhile."""
 
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
-from ..paper.p_square import QUARTILES, Summary
+from ..paper.p_square import QUARTILES, Summary, between
 from ..parallel import blocks, ordered_map
-from ..weighted import weighted_quantiles
 
 
 class Exact:
@@ -15,19 +14,14 @@ class Exact:
 
     Observations are held until there are `HELD`, then go to one file, grouped by buckets of `BUCKET` elements; at the
     end each bucket is read and sorted by itself.
-
-    Parameters
-    ----------
-    weighted : bool
-        Weights are heeded.
     """
 
     BUCKET = 1 << 14
     HELD = 1 << 22
-    RECORD = np.dtype([("element", "<u4"), ("value", "<f4", 3), ("weight", "<f4")])
+    RECORD = np.dtype([("element", "<u4"), ("value", "<f4", 3)])
 
-    def __init__(self, count: int, folder: Path | str | None = None, threads: int = 0, weighted: bool = False):
-        self._count, self._weighted = count, weighted
+    def __init__(self, count: int, folder: Path | str | None = None, threads: int = 0):
+        self._count = count
         self._threads = threads
         self._buckets = -(-count // self.BUCKET)
         self._folder = tempfile.TemporaryDirectory(dir=folder, prefix="tmp-observations-")
@@ -35,12 +29,11 @@ class Exact:
         self._held: list[tuple[np.ndarray, np.ndarray]] = []  # records, and where each bucket starts in them
         self._flushed: list[np.ndarray] = []  # for each flush where each bucket starts in the file, in records
 
-    def add(self, element: np.ndarray, values: np.ndarray, weight: np.ndarray | None = None) -> None:
+    def add(self, element: np.ndarray, values: np.ndarray) -> None:
         if not len(element):
             return
         record = np.empty(len(element), self.RECORD)
         record["element"], record["value"] = element, values
-        record["weight"] = weight if self._weighted else 1
         self._held.append((record, np.searchsorted(element, np.arange(self._buckets + 1) * self.BUCKET)))
         if sum(len(held) for held, _ in self._held) >= self.HELD:
             self._flush()
@@ -75,7 +68,7 @@ class Exact:
         record = self._records(bucket)
         size = min(self.BUCKET, self._count - bucket * self.BUCKET)
         local = (record["element"] - np.uint32(bucket * self.BUCKET)).astype(np.uint16)  # BUCKET fits: a radix sort
-        record = record[np.argsort(local, kind="stable")]
+        value = record["value"][np.argsort(local, kind="stable")]
         count = np.bincount(local, minlength=size)
         start = np.cumsum(count) - count
         quartiles = np.full((size, 3, len(QUARTILES)), np.nan, np.float32)
@@ -84,17 +77,17 @@ class Exact:
         for seen in np.unique(count[count > 0]):
             low, high = np.searchsorted(count, (seen, seen + 1), sorter=by_count)
             alike = by_count[low:high]
-            rows = record[start[alike, None] + np.arange(seen)]
-            for channel in range(3):
-                found = weighted_quantiles(rows["value"][..., channel], rows["weight"], QUARTILES)
-                quartiles[alike, channel] = np.stack(found, -1)
+            rows = value[start[alike, None] + np.arange(seen)].transpose(2, 0, 1).copy()
+            rows.sort(axis=-1)
+            for which, share in enumerate(QUARTILES):
+                quartiles[alike, :, which] = between(rows, share * (seen - 1)).T
         return quartiles, count
 
     def result(self) -> Summary:
         lower, median, upper = np.empty((len(QUARTILES), self._count, 3), np.float32)
         count = np.empty(self._count, np.int32)
         sizes = sum((np.diff(starts) for starts in self._flushed), np.zeros(self._buckets, np.int64))
-        each = 5 * self.RECORD.itemsize * int(sizes.max(initial=0))  # read, put in order, and a channel's values sorted
+        each = 3 * self.RECORD.itemsize * int(sizes.max(initial=0))  # read, put in order, and its values sorted
         found = ordered_map(self._summarise, range(self._buckets), self._threads, each=each)
         for part, (quartiles, seen) in zip(blocks(self._count, self.BUCKET), found, strict=True):
             lower[part], median[part], upper[part] = quartiles.transpose(2, 0, 1)

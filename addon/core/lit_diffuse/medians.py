@@ -18,8 +18,8 @@ __all__ = ["Estimator", "Exact", "Mean", "PSquare", "Summary", "make_estimator"]
 class Estimator(Protocol):
     """What accumulation needs of an estimator."""
 
-    def add(self, element: np.ndarray, values: np.ndarray, weight: np.ndarray | None = None) -> None:
-        """Take values ((m, 3) float32) of elements ((m,) int32, sorted, each once), of a weight ((m,) float32)."""
+    def add(self, element: np.ndarray, values: np.ndarray) -> None:
+        """Take values ((m, 3) float32) of elements ((m,) int32, sorted, each once)."""
 
     def result(self) -> Summary:
         """The summary of all that was added."""
@@ -28,22 +28,15 @@ class Estimator(Protocol):
         """Take back what was written to disk. May be called more than once."""
 
 
-class RunningMedian(PSquare):
-    """The paper's estimator: all values count alike."""
-
-    def add(self, element: np.ndarray, values: np.ndarray, weight: np.ndarray | None = None) -> None:
-        super().add(element, values)
-
-
 class Mean:
-    """Mean and standard deviation, which keep highlights in, by Welford's update in float32; all values count alike."""
+    """Mean and standard deviation, which keep highlights in, by Welford's update in float32."""
 
     def __init__(self, count: int):
         self._n = np.zeros(count, np.int32)
         self._mean = np.zeros((count, 3), np.float32)
         self._squares = np.zeros((count, 3), np.float32)
 
-    def add(self, element: np.ndarray, values: np.ndarray, weight: np.ndarray | None = None) -> None:
+    def add(self, element: np.ndarray, values: np.ndarray) -> None:
         self._n[element] += 1
         delta = values - self._mean[element]
         self._mean[element] += delta / self._n[element, None].astype(np.float32)
@@ -59,14 +52,10 @@ class Mean:
 
 
 def make_estimator(name: str, count: int, folder: Path | str | None = None, threads: int = 0) -> Estimator:
-    """'weighted', 'exact' (all weights 1), 'p2' (the paper's) or 'mean' for `count` elements.
-
-    `folder` takes what the first two write to disk.
-    """
+    """'exact', 'p2' (the paper's) or 'mean' for `count` elements; `folder` takes what 'exact' writes to disk."""
     make: dict[str, Callable[[], Estimator]] = {
-        "weighted": lambda: Exact(count, folder, threads, weighted=True),
         "exact": lambda: Exact(count, folder, threads),
-        "p2": lambda: RunningMedian(count),
+        "p2": lambda: PSquare(count),
         "mean": lambda: Mean(count),
     }
     return make[name]()

@@ -69,7 +69,6 @@ PASSES = (
         white_balance="Tells the white balance that all frames have, by how a camera follows what it sees.",
         pose_refinement="Puts frames right that lie beside what all of them show together.",
         sharpening="Takes the projection's blur out of the lit diffuse texture.",
-        footprints="Counts an observation the less, the more of the surface its pixel covers.",
         edge_tier="Uses observations at depth edges only where there are too few others.",
     ),
     *_of(

@@ -172,7 +172,7 @@ class Passes:
         if "lit_diffuse" in s.published:
             return running_lit_diffuse(*where, threads=s.threads, also=also, progress=progress)
         return accumulate(
-            *where, median=s.estimator, edge_tier="edge-tier" not in s.without, seed=s.seed, threads=s.threads,
+            *where, median=s.median, edge_tier="edge-tier" not in s.without, seed=s.seed, threads=s.threads,
             folder=self.folder, also=also, groups=surface.groups, progress=progress,
         )  # fmt: skip
 
@@ -182,8 +182,8 @@ class Passes:
         """L_d with its detail given back; `how` and errors as of `sharpen.sharpened`."""
         s = self.settings
         return sharpened(
-            lit, self.surface, frames, self.read, median=s.estimator, seed=s.seed, threads=s.threads,
-            folder=self.folder, progress=progress, **how,
+            lit, self.surface, frames, self.read, median=s.median, seed=s.seed, threads=s.threads, folder=self.folder,
+            progress=progress, **how,
         )  # fmt: skip
 
     def once(self, frames: Sequence[Frame], poses: Poses, progress: Progress | Rounds) -> Observed:

@@ -264,7 +264,7 @@ def _remove(specular: np.ndarray, materials: list[ObjectMaterial], room: Room, p
         return np.zeros(len(own), bool)
     found = without_specular(
         SpecularPart(field, glossy, how.seed), field, room.lit_diffuse, own,
-        [pictures.frames[i] for i in looking], pictures.read, median=how.estimator, seed=how.seed, threads=how.threads,
+        [pictures.frames[i] for i in looking], pictures.read, median=how.median, seed=how.seed, threads=how.threads,
         folder=pictures.folder, groups=pictures.groups, progress=Rounds(room.progress, 0.7, 1.0),
     )  # fmt: skip
     specular[own] = found.specular[own]

@@ -81,15 +81,12 @@ class Observations:
         CLEAN, EDGE or SATURATED.
     direction : (m, 3) float32
         Unit, from the element to the camera.
-    pixel_area : (m,) float32
-        Of the surface that a pixel covers there, square metres.
     """
 
     element: np.ndarray
     radiance: np.ndarray
     tier: np.ndarray
     direction: np.ndarray
-    pixel_area: np.ndarray
 
 
 def bytes_of_frame(cameras: Iterable[Camera]) -> int:
@@ -274,15 +271,12 @@ def observe(
         reach = distance.take(angle) - np.float32(2 * scene.offset)
         open_ = np.flatnonzero(~scene.occluded(origins, to_camera, reach))
         index, to_camera, keep = index.take(open_), to_camera.take(open_, 0), keep.take(open_)
-        angle, normal = angle.take(open_), normal.take(open_, 0)
-    edge = distance.take(angle) * np.float32(camera.pixel_angle)
-    pixel_area = np.square(edge) / _dot(to_camera.T, normal.T)
 
     x, y, pixel = x.take(keep), y.take(keep), pixel.take(keep)
     tier = _tiers(view, pixels).take(pixel)
     mixed = np.flatnonzero(tier != CLEAN)
     x[mixed], y[mixed] = np.floor(x[mixed]) + np.float32(0.5), np.floor(y[mixed]) + np.float32(0.5)
-    return Observations(index, _bilinear(pixels.radiance, x, y), tier, to_camera, pixel_area)
+    return Observations(index, _bilinear(pixels.radiance, x, y), tier, to_camera)
 
 
 def normal_variance(view: FrameView, atlas: Atlas, element: np.ndarray, triangle_normal: np.ndarray) -> np.ndarray:

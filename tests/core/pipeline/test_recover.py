@@ -275,9 +275,9 @@ def test_far_from_the_origin(tmp_path, distance):
 def test_disk_for_observations_is_asked_for_before_frames_are_read(disk, tmp_path, monkeypatch):
     kept, add = [], Exact.add
 
-    def count(self, element, values, weight):
-        kept.append(values.nbytes + element.nbytes + weight.nbytes)
-        add(self, element, values, weight)
+    def count(self, element, values):
+        kept.append(values.nbytes + element.nbytes)
+        add(self, element, values)
 
     def with_free(size, folder):
         monkeypatch.setattr(frames, "shutil", SimpleNamespace(disk_usage=lambda at: SimpleNamespace(free=size)))

@@ -244,9 +244,7 @@ def test_texture_of_what_is_not_touched_stays(tmp_path):
         assert np.array_equal(image[tiled], before[name][tiled]), name
     recover(disk, folder, settings=replace(QUICK, texture_fill=False))
     flat = read_exr(folder / "albedo.exr").rgb[tiled], read_exr(folder / "coverage.exr").rgb[tiled]
-    # One colour for each of a few cells: light or dark, as most of the tiles around it happen to be.
-    cells, tiles = (len(np.unique(values.mean(1).round(3))) for values in (flat[0], before["albedo"][tiled]))
-    assert cells < 0.1 * tiled.sum() and tiles > 5 * cells and (flat[1][:, 2] == FILLED).all()
+    assert np.std(flat[0].mean(1)) < 0.5 * np.std(before["albedo"][tiled].mean(1)) and (flat[1][:, 2] == FILLED).all()
     # Parts that were guessed by shape may hold several materials: none is carried over but along a floor.
     for name, textured in ("wall", False), ("floor", True):
         del run.texture

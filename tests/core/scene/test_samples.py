@@ -41,11 +41,7 @@ def seen(elements, tiers, value=1.0) -> Observations:
     n = len(elements)
     direction = np.tile(np.float32([0, 0, 1]), (n, 1))
     return Observations(
-        np.asarray(elements, np.int32),
-        np.full((n, 3), value, np.float32),
-        np.asarray(tiers, np.int8),
-        direction,
-        np.ones(n, np.float32),
+        np.asarray(elements, np.int32), np.full((n, 3), value, np.float32), np.asarray(tiers, np.int8), direction
     )
 
 
