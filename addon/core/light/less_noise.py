@@ -19,12 +19,7 @@ AT_ONCE: Block[int] = 1 << 17
 
 
 def less_noise(
-    position: np.ndarray,
-    normal: np.ndarray,
-    light: np.ndarray,
-    noise: np.ndarray,
-    size: float = LESS_NOISE.cell,
-    threads: int = 0,
+    position: np.ndarray, normal: np.ndarray, light: np.ndarray, noise: np.ndarray, threads: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Light with less noise, and how noisy it was around each place.
 
@@ -40,8 +35,6 @@ def less_noise(
         Any unit.
     noise : (m,) float32
         Standard error of the mean of its channels; its mean square over a cell is what counts.
-    size : float
-        Edge of the cells, metres: some times as far as neighbours share their noise.
 
     Returns
     -------
@@ -56,7 +49,7 @@ def less_noise(
         """Add what is left of the light in some cells, and the mean square of their noise."""
         own, group = portion
         light_here, count = light[own], np.bincount(group)
-        fitted = _planes(position[own], light_here, group, count, size)
+        fitted = _planes(position[own], light_here, group, count)
         rest = (light_here - fitted).mean(1)
         n2, v = (np.bincount(group, x.astype(np.float64) ** 2) / count for x in (noise[own], rest))
         keep = np.where(count >= LEVELS.few, np.maximum(v - n2, 0) / np.maximum(v, 1e-30), 1)
@@ -64,14 +57,12 @@ def less_noise(
         around[own] += n2[group]
 
     for k in range(LESS_NOISE.grids):
-        for _ in ordered_map(lessen, cells(position, normal, k / LESS_NOISE.grids, size), threads):
+        for _ in ordered_map(lessen, cells(position, normal, k / LESS_NOISE.grids), threads):
             pass
     return (result / np.float32(LESS_NOISE.grids)), np.sqrt(around / LESS_NOISE.grids).astype(np.float32)
 
 
-def cells(
-    position: np.ndarray, normal: np.ndarray, shift: float, size: float = LESS_NOISE.cell
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def cells(position: np.ndarray, normal: np.ndarray, shift: float) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Elements by cells, which go by place and by the way that they face, some whole cells at once.
 
     Yields
@@ -92,7 +83,7 @@ def cells(
 
     # One axis after the other: all six at once were the most memory that a large room took.
     for along in position.T:
-        tell_apart(np.floor(along / size + shift))
+        tell_apart(np.floor(along / LESS_NOISE.cell + shift))
     for facing in normal.T:
         tell_apart(np.round(facing * LESS_NOISE.turned / 2) + LESS_NOISE.turned)
     order = np.argsort(key, kind="stable")
@@ -104,14 +95,14 @@ def cells(
         yield order[first:last], np.cumsum(new[first:last]) - 1
 
 
-def _planes(position: np.ndarray, light: np.ndarray, group: np.ndarray, count: np.ndarray, size: float) -> np.ndarray:
+def _planes(position: np.ndarray, light: np.ndarray, group: np.ndarray, count: np.ndarray) -> np.ndarray:
     """Least squares of light over the position, cell by cell: its values at the elements, (m, 3) float32."""
     cells = len(count)
 
     def mean(values: np.ndarray) -> np.ndarray:
         return np.bincount(group, values, cells) / count
 
-    x = [(along - mean(along)[group]) / size for along in position.T]
+    x = [(along - mean(along)[group]) / LESS_NOISE.cell for along in position.T]
     second, both = np.empty((cells, 3, 3)), np.empty((cells, 3, 3))
     for i in range(3):
         for j in range(3):

@@ -24,6 +24,11 @@ def on_flat(atlas: Atlas) -> np.ndarray:
     return (np.linalg.norm(total, axis=1) >= LIGHT_FIT.flat * count)[group]
 
 
+def log_of(sent: np.ndarray) -> np.ndarray:
+    """Logarithm of radiance, which may be 0."""
+    return np.log(np.maximum(sent, 1e-9))
+
+
 @dataclass
 class Sample:
     """m elements with a good L_d.
@@ -64,9 +69,9 @@ class Sample:
         off = np.minimum(np.abs(log_albedo - self._medians(log_albedo)), LIGHT_FIT.cap)
         return float(np.average(off, weights=self._weight))
 
-    def spread_under(self, sent: np.ndarray, received: np.ndarray) -> float:
-        """The spread of log albedo under an E: both (m,), of all light together or of one channel."""
-        return self.spread(np.log(np.maximum(sent, 1e-9)) - np.log(received + 1e-12))
+    def spread_under(self, log_sent: np.ndarray, received: np.ndarray) -> float:
+        """The spread of log albedo under an E, (m,), of the logarithm of what is sent, (m,) (`log_of`)."""
+        return self.spread(log_sent - np.log(received + 1e-12))
 
     def best(
         self, sent: np.ndarray, received: np.ndarray, contribution: np.ndarray
@@ -74,6 +79,7 @@ class Sample:
         """The radiance s that explains best what is `sent`, with the spread before and after; None if unbounded."""
         if not (contribution > 0).any():
             return None
+        sent = log_of(sent)
 
         def cost(log_s: float) -> float:
             return self.spread_under(sent, received + np.exp(log_s) * contribution)

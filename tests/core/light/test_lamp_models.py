@@ -8,7 +8,7 @@ from tests.core.rooms import make_room, quad
 
 
 def test_models_are_told_by_the_mesh():
-    """Small lamps have a handful of elements, whose areas differ by where texels happen to lie."""
+    """Two of one size are one model, a larger one is another."""
     sides = [
         quad((x, 0, 0), (0, size, 0), (0, 0, size), i) for i, (x, size) in enumerate(((0, 0.1), (0.37, 0.1), (1, 0.2)))
     ]

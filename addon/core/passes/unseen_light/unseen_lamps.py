@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...light.lamps import Lamp
-from ...light.light_fit import Sample
+from ...light.light_fit import Sample, log_of
 from ...light.params import LIGHT_FIT, SKY
 from ...luminance import LUMINANCE
 from .params import UNSEEN
@@ -22,16 +22,14 @@ def solve_lamps(sample: Sample, contribution, least, class_of, model, kin, seen,
     lamps: list[Lamp] = []
     left = dict(contribution)
     while left:
-        received = all_light(base, lamps, contribution, sky) @ LUMINANCE
+        light = all_light(base, lamps, contribution, sky)
+        received = light @ LUMINANCE
         best = {i: sample.best(sent, received, G) for i, G in left.items()}
         found = {i: f for i, f in best.items() if f is not None and f[2] < (1 - gain[i]) * f[1] and f[0] > least[i]}
         if not found:
             break
         object_id = min(found, key=lambda i: found[i][2])
-        by_channel = [
-            sample.best(sample.radiance[:, c], all_light(base, lamps, contribution, sky)[:, c], left[object_id])
-            for c in range(3)
-        ]
+        by_channel = [sample.best(sample.radiance[:, c], light[:, c], left[object_id]) for c in range(3)]
         same = twin(object_id, found[object_id][2], sample, sent, received, left[object_id], model, seen)
         known = colours.get(object_id)
         lamps.append(_coloured(object_id, *found[object_id], class_of, same, seen, sample.received, by_channel, known))
@@ -47,7 +45,7 @@ def needed(sample: Sample, lamps: list[Lamp], contribution, sky: Sky, base, colo
     alone = Sky(sky.contribution, sky.guess, sky.clipped, sky.told)
     for _ in range(UNSEEN.sweeps):
         solve_sky(sample, shining, contribution, alone, base)
-    sent = sample.radiance @ LUMINANCE
+    sent = log_of(sample.radiance @ LUMINANCE)
     with_lamps, without = (
         sample.spread_under(sent, all_light(base, some, contribution, above) @ LUMINANCE)
         for some, above in ((lamps, sky), (shining, alone))
@@ -62,8 +60,8 @@ def twin(object_id: int, least: float, sample: Sample, sent, received, contribut
     spread of log albedo.
     """
     alike = [lamp for lamp in seen if model.get(lamp.object_id) == model.get(object_id)]
-    light = (received + float(lamp.radiance @ LUMINANCE) * contribution for lamp in alike)
-    spread = [sample.spread_under(sent, E) for E in light]
+    log_sent, luminance = log_of(sent), [float(lamp.radiance @ LUMINANCE) for lamp in alike]
+    spread = [sample.spread_under(log_sent, received + s * contribution) for s in luminance]
     if not alike or least < (1 - UNSEEN.lamp_gain) * min(spread):
         return None
     return alike[int(np.argmin(spread))]
