@@ -25,13 +25,15 @@ def blocks(count: int, size: int) -> list[slice]:
     return [slice(start, min(start + size, count)) for start in range(0, count, size)]
 
 
-def ordered_map(function: Callable, items: Iterable, threads: int, ahead: int = 1, each: int = 0) -> Iterator:
+def ordered_map(function: Callable, items: Iterable, threads: int, ahead: int | None = None, each: int = 0) -> Iterator:
     """Yield function(item) in the order of the items, with a bounded number of results waiting.
 
     At most `threads + ahead` results exist at once, so that memory does not grow with the number of items; and no more
-    than fit into the budget if each takes `each` bytes.
+    than fit into the budget if each takes `each` bytes. `ahead` is as many as there are threads where not given: with
+    fewer, threads wait for work while the next in order is a slow one.
     """
     workers = thread_count(threads)
+    ahead = workers if ahead is None else ahead
     fitting = BUDGET.fitting(workers + ahead, each)
     workers = min(workers, fitting)
     ahead = fitting - workers

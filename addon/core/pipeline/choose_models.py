@@ -133,11 +133,13 @@ def look_at(
         return Looked(*_look(room, maker, object_id, object_id in guesses))
 
     found: dict[int, Looked] = {}
-    for object_id, one in zip(wanted, ordered_map(look, wanted, room.settings.threads, ahead=len(wanted)), strict=True):
+    size = np.bincount(room.field.atlas.object_id, minlength=max(wanted, default=0) + 1)
+    order = sorted(wanted, key=lambda one: -size[one])  # the longest last would have one thread work alone
+    for object_id, one in zip(order, ordered_map(look, order, room.settings.threads, ahead=len(order)), strict=True):
         found[object_id] = one
         if room.progress is not None:
             room.progress.update(0.7 * len(found) / len(wanted))
-    return found
+    return {object_id: found[object_id] for object_id in wanted}
 
 
 def choose_models(room: Room, found: Mapping[int, Looked]) -> Chosen:
@@ -157,8 +159,11 @@ def choose_models(room: Room, found: Mapping[int, Looked]) -> Chosen:
         reflecting = {i: choice for i, choice in choices.items() if i in told and not choice.model.gives_light}
         adopted = adopt_from_class(reflecting, problems, class_names(room.instances))
         choices |= {i: choice for i, choice in adopted.items() if i not in room.given}
-    intervals = ordered_map(lambda i: gloss_interval(choices[i], problems.get(i)), found, room.settings.threads)
-    return Chosen(choices, problems, targets, dict(zip(found, intervals, strict=True)))
+    order = sorted(found, key=lambda i: -len(problems[i].radiance) if i in problems else 0)
+    intervals = ordered_map(
+        lambda i: gloss_interval(choices[i], problems.get(i)), order, room.settings.threads, ahead=len(order)
+    )
+    return Chosen(choices, problems, targets, dict(zip(order, intervals, strict=True)))
 
 
 def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Choice, Problem | None, int]:

@@ -73,7 +73,7 @@ def find_shading(
         )  # fmt: skip
     patches, guessed = Patches.none(), capture.mesh.whole
     if guessed and not {"clipped-patches", "missing-light"} & set(s.without):
-        patches = clipped_patches(surface.mesh, surface.atlas, lit)
+        patches = clipped_patches(surface.mesh, surface.atlas, surface.lookup, lit)
         surface = patches.surface(surface)
     if guessed and s.mirrors and "mirrors" not in s.without:
         seen = LightField(

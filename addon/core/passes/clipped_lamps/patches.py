@@ -44,17 +44,15 @@ class PatchParams:
 PATCHES = PatchParams()
 
 
-def clipped_patches(mesh: Mesh, atlas: Atlas, lit: LitDiffuse) -> Patches:
-    """Connected triangles that nearly all frames show clipped, or that are bright."""
+def clipped_patches(mesh: Mesh, atlas: Atlas, lookup: ElementLookup, lit: LitDiffuse) -> Patches:
+    """Connected triangles that nearly all frames show clipped, or that are bright; `lookup` is the atlas's."""
     count = len(mesh.triangles)
     told = np.where(lit.seen, atlas.area, 0)
     apart = np.maximum(lit.clipped, _bright(atlas, lit))
     of_triangle = np.bincount(atlas.triangle, told, count)
     share = np.bincount(atlas.triangle, told * apart, count) / np.maximum(of_triangle, 1e-20)
     # A triangle too small for an element of its own shows one beside it.
-    bare = np.flatnonzero(np.bincount(atlas.triangle, minlength=count) == 0).astype(np.int32)
-    third = np.full(len(bare), 1 / 3, np.float32)
-    beside = ElementLookup(mesh, atlas)(bare, third, third)
+    bare, beside = lookup.bare
     share[bare] = np.where(lit.seen[beside], apart[beside], 0)
     # At a patch's edge poses that are off mix in what lies beside it: of a ceiling lamp's 0.27 square metres 0.285
     # have more than .3, 0.279 more than .5 and 0.261 more than .7, and none of the wall.

@@ -18,7 +18,9 @@ from addon.core.passes.clipped_lamps.patches import clipped_patches, told_of
 from addon.core.passes.missing_light.missing_light import _through_cells, find_missing_light, is_missing, same_lamps
 from addon.core.passes.missing_light.params import MISSING
 from addon.core.passes.missing_light.solve import Unknown, solve
+from addon.core.scene.elements import ElementLookup
 from addon.core.scene.lit_diffuse import LitDiffuse
+from addon.core.scene.patches import Patches
 from addon.core.scene.visibility import CLEAN, EDGE
 from tests.core.rooms import DARK, Room, around, box_sides, cut, make_room, split
 
@@ -34,6 +36,10 @@ def box(hole: bool = False) -> Room:
     ceiling = sides.pop(1)
     quads = [cell for one in [*sides, *around(ceiling, *AT)] for cell in split(one, 6)]
     return make_room(quads if hole else [*quads, *split(cut(ceiling, *AT), 4)], texel=0.2)
+
+
+def patches_of(room: Room, lit: LitDiffuse) -> Patches:
+    return clipped_patches(room.mesh, room.atlas, ElementLookup(room.mesh, room.atlas), lit)
 
 
 def in_lamp(room: Room) -> np.ndarray:
@@ -73,7 +79,7 @@ def test_a_patch_is_what_nearly_all_frames_clip():
     window = (room.atlas.position[:, 0] < 0.01) & (room.atlas.position[:, 2] > 1)
     share = np.where(in_lamp(room), 0.85, np.where(window, 0.3, 0.0))
     share[np.flatnonzero(in_lamp(room))[::3]] = 1.0
-    found = clipped_patches(room.mesh, room.atlas, seen(lit()[1], share))
+    found = patches_of(room, seen(lit()[1], share))
     assert sorted(found.triangle) == list(range(len(room.mesh.triangles) - 32, len(room.mesh.triangles)))
     assert found.objects == [1]
 
@@ -81,7 +87,7 @@ def test_a_patch_is_what_nearly_all_frames_clip():
 def test_a_lamp_that_no_frame_clips_is_a_patch_whose_radiance_is_told():
     room, (_, radiance) = box(), lit()
     shown = seen(radiance, np.zeros(len(room.atlas)))
-    patches = clipped_patches(room.mesh, room.atlas, shown)
+    patches = patches_of(room, shown)
     assert sorted(patches.triangle) == list(range(len(room.mesh.triangles) - 32, len(room.mesh.triangles)))
     apart = replace(room.atlas, object_id=patches.mesh(room.mesh).object_id[room.atlas.triangle])
     assert told_of(patches.objects, apart, shown) == patches.objects
@@ -94,7 +100,7 @@ def test_sunlight_on_the_floor_is_no_patch():
     dim = np.where(in_lamp(room)[:, None], np.float32(0.1), radiance)
     spot = (room.atlas.position[:, 2] < 0.01) & (np.abs(room.atlas.position[:, 0] - 2) < 0.4)
     dim[spot] = 20 * np.median(dim, 0)
-    assert not len(clipped_patches(room.mesh, room.atlas, seen(dim, np.zeros(len(room.atlas)))))
+    assert not len(patches_of(room, seen(dim, np.zeros(len(room.atlas)))))
 
 
 def test_an_object_is_clipped_if_most_frames_show_most_of_it_clipped():
@@ -114,7 +120,7 @@ def test_an_object_is_clipped_if_most_frames_show_most_of_it_clipped():
 def test_a_clipped_lamp_of_the_same_object_gets_its_radiance(seed):
     room, (rho, radiance) = box(), lit()
     measured = np.where(in_lamp(room)[:, None], np.float32(CLIPPED), radiance)
-    patches = clipped_patches(room.mesh, room.atlas, seen(measured, in_lamp(room).astype(float)))
+    patches = patches_of(room, seen(measured, in_lamp(room).astype(float)))
     mesh = patches.mesh(room.mesh)
     apart = replace(room, mesh=mesh)
     field, good = apart.field(measured), np.ones(len(room.atlas), bool)
@@ -149,7 +155,7 @@ def test_a_patch_that_is_as_bright_as_it_was_measured_is_no_lamp():
     room, (_, radiance) = box(), lit()
     floor = (room.atlas.position[:, 2] < 0.01) & (np.abs(room.atlas.position[:, 0] - 2) < 0.4)
     shown = seen(radiance, floor.astype(float))
-    patches = clipped_patches(room.mesh, room.atlas, shown)
+    patches = patches_of(room, shown)
     mesh = patches.mesh(room.mesh)
     told = told_of(patches.objects, replace(room.atlas, object_id=mesh.object_id[room.atlas.triangle]), shown)
     (clipped,) = set(patches.objects) - set(told)
