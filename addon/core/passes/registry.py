@@ -58,7 +58,6 @@ PASSES = (
         frame_choice="Passes over frames that show nothing which others don't show from as near.",
         close_holes="Closes holes of a mesh without objects in its large planes, where frames see nothing there.",
         mesh_denoising="Takes a scan's noise out of its vertices.",
-        unfolding="Where triangles are smaller than the noise, draws points towards their neighbours first.",
         sheets="Puts what lies in flat parts into their planes.",
         coarse_unseen="Lets one element stand for many texels where no frame looks.",
         two_sides="Gives triangles that frames see from both sides a second side of its own.",

@@ -11,9 +11,6 @@ Rangarajan 1996). Angles know no size, so nothing shrinks: a sphere keeps its ra
 and no angle. What a mesh of large triangles measured well already is left alone by itself: flattening it would move
 its points by many times the noise.
 
-Where points are crowded, closer together than a third of the noise, none of them says much by itself and angles say
-nothing: there x0 is what the crowd makes of them (`unfold`), and x stays near it.
-
 It is solved by Gauss-Newton steps with weights from the last one's angles, while `scale` goes down (graduated
 non-convexity, Blake and Zisserman 1987): first all is smoothed alike, then what stays sharp is let go.
 Last, what lies in flat parts is put into their planes (`planes`), which angles alone can't tell.
@@ -25,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import cg
 
 from ...scene.mesh_noise import noise_of
 from ...scene.model import Mesh
@@ -33,7 +31,6 @@ from ...scene.weld import one_place, point_normals, ring_of, welded
 from ...significance import LEVELS
 from .params import DENOISE
 from .planes import onto_sheets
-from .unfold import solved, unfolded
 
 SCALES = np.geomspace(0.5, 0.02, 8)
 """Radians, one for each step."""
@@ -110,8 +107,8 @@ def dihedral(
 
 
 def _linear(
-    points: np.ndarray, normal: np.ndarray, hinges: Hinges, held: np.ndarray, noise: float, scale: float
-) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix, sparse.csr_matrix]:  # fmt: skip
+    points: np.ndarray, normal: np.ndarray, hinges: Hinges, noise: float, scale: float
+) -> tuple[np.ndarray, np.ndarray, sparse.csr_matrix, sparse.csr_matrix]:
     """Angles, their weights, their change by each point's way along its normal, and the normal equations' matrix."""
     count = len(points)
     theta, gradient = dihedral(points, hinges, noise)
@@ -120,7 +117,13 @@ def _linear(
     values = np.concatenate([(by * normal[at]).sum(1) for by, at in zip(gradient, ends)])
     rows = np.tile(np.arange(len(theta)), 4)
     change = sparse.csr_matrix((values, (rows, np.concatenate(ends))), (len(theta), count))
-    return theta, weight, change, (sparse.diags(held) + change.T @ sparse.diags(weight) @ change).tocsr()
+    return theta, weight, change, (sparse.eye(count) / noise**2 + change.T @ sparse.diags(weight) @ change).tocsr()
+
+
+def _solved(system: sparse.csr_matrix, right: np.ndarray) -> np.ndarray:
+    """The solution of a symmetric positive definite system, by conjugate gradients."""
+    scaled = sparse.diags(1 / system.diagonal())
+    return cg(system, right, rtol=DENOISE.tolerance, maxiter=DENOISE.most_steps, M=scaled)[0]
 
 
 def _within(points: np.ndarray, measured: np.ndarray, farthest: float) -> np.ndarray:
@@ -170,16 +173,12 @@ def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndar
     if not len(faces):
         return mesh.vertices
     hinges = hinges_of(faces)
-    points, crowded = measured, np.zeros(len(measured))
-    if "unfolding" not in without:
-        points, crowded = unfolded(measured, faces, noise)
-    points = _within(points, measured, LEVELS.sigmas * noise)
-    told, held = measured + crowded[:, None] * (points - measured), (1 + DENOISE.held * crowded) / noise**2
+    points = measured
     for scale in SCALES:
         normal = point_normals(points, faces)
-        theta, weight, change, system = _linear(points, normal, hinges, held, noise, scale)
-        gone = ((points - told) * normal).sum(1)
-        step = solved(system, -gone * held - change.T @ (weight * theta))
+        theta, weight, change, system = _linear(points, normal, hinges, noise, scale)
+        gone = ((points - measured) * normal).sum(1)
+        step = _solved(system, -gone / noise**2 - change.T @ (weight * theta))
         # The angles are linear over small steps only.
         points = points + np.clip(step, -noise, noise)[:, None] * normal
         points = _within(points, measured, LEVELS.sigmas * noise)

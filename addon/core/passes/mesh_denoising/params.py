@@ -9,12 +9,12 @@ class DenoiseParams:
 
     Attributes
     ----------
-    held : float
-        Times more that a point in a crowd is held where the crowd has put it (`unfold`): angles there are mostly noise,
-        and took a bottle cap's normals from 9 degrees back to 30.
+    tolerance, most_steps : float, int
+        Of each linear solve, by conjugate gradients.
     """
 
-    held: float = 100.0
+    tolerance: float = 1e-3
+    most_steps: int = 200
 
 
 DENOISE = DenoiseParams()
@@ -65,33 +65,3 @@ class PlanesParams:
 
 
 PLANES = PlanesParams()
-
-
-@dataclass(frozen=True)
-class UnfoldParams:
-    """Of `unfold` (`unfolding` in the ablation).
-
-    Attributes
-    ----------
-    shortest : float
-        Times the noise, edges are taken for no shorter.
-    crowd, near : int, float
-        A point is in a crowd with so many within that many times the noise, itself among them. A frame's thin profile
-        has fewer: it would shrink to a line.
-    fine : float
-        Times that the noise exceeds the length of edges, from where on a crowd counts; one more and it does fully.
-        The living room's bottle cap and skirting under 5 mm of independent noise: normals off by 31 and 2 degrees in
-        the median, by 99 and 73 for a tenth of the surface, without the second plate; by 10 and 2, 33 and 34 with it.
-    tolerance, most_steps : float, int
-        Of each linear solve, by conjugate gradients.
-    """
-
-    shortest: float = 0.25
-    crowd: int = 8
-    near: float = 2.5
-    fine: float = 3.0
-    tolerance: float = 1e-3
-    most_steps: int = 200
-
-
-UNFOLD = UnfoldParams()

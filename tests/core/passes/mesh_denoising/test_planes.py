@@ -122,7 +122,7 @@ def test_small_triangles_do_not_lead_around_an_edge():
     found = Mesh(denoise.denoised(off, 0.008), true.triangles, true.object_id)
     before = tilted(by_angles_alone(off, 0.008), true)
     assert np.quantile(tilted(found, true), 0.9) < 0.6 < np.quantile(before, 0.9)
-    assert rms(found.vertices - true.vertices) < 0.4 * rms(off.vertices - true.vertices)
+    assert rms(found.vertices - true.vertices) < 0.5 * rms(off.vertices - true.vertices)
 
 
 def test_a_moulding_around_a_room_is_no_plane():
