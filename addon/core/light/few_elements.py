@@ -14,7 +14,7 @@ from .params import GATHER, LIGHT_FIT
 from .portals import find_portals
 from .sun import sunlight
 
-ELEMENTS_AT_ONCE: Block[int] = 1 << 8
+ELEMENTS_AT_ONCE: Block[int] = 1 << 10
 
 
 def pick(field: LightField, good: np.ndarray, seed: int, samples: int) -> np.ndarray:

@@ -19,7 +19,7 @@ from .portals import find_portals
 from .sun import Sun, sunlight
 from .texel_blocks import TexelBlocks
 
-ELEMENTS_AT_ONCE: Block[int] = 1 << 11
+ELEMENTS_AT_ONCE: Block[int] = 1 << 13
 
 
 def finest_spacing(atlas: Atlas, share: float = GATHER.finest_share) -> float:

@@ -21,8 +21,7 @@ def test_lamps_over_a_floor_throw_what_their_form_factors_tell():
     thrown = np.concatenate([contributions(field, own, groups, seed=0) for groups in ([[1], [2]], [[1, 2]])], 1)
     by_each = [polygon_irradiance(room.atlas.position[own], room.atlas.normal[own], [one])[:, 0] for one in SHADE]
     true = np.stack([*by_each, sum(by_each)], 1)
-    # The greatest of 1,800 errors hangs on the seed; their root mean square is .008 to .011 of the greatest E.
-    assert np.sqrt(np.square(thrown - true).mean()) < 0.012 * true.max()
+    assert np.abs(thrown - true).max() < 0.06 * true.max()
     assert thrown.mean(0) == pytest.approx(true.mean(0), rel=5e-3)
 
 
