@@ -117,7 +117,8 @@ def _linear(
     values = np.concatenate([(by * normal[at]).sum(1) for by, at in zip(gradient, ends)])
     rows = np.tile(np.arange(len(theta)), 4)
     change = sparse.csr_matrix((values, (rows, np.concatenate(ends))), (len(theta), count))
-    return theta, weight, change, (sparse.eye(count) / noise**2 + change.T @ sparse.diags(weight) @ change).tocsr()
+    system = sparse.diags(np.full(count, 1 / noise**2)) + change.T @ sparse.diags(weight) @ change
+    return theta, weight, change, system.tocsr()
 
 
 def _solved(system: sparse.csr_matrix, right: np.ndarray) -> np.ndarray:
@@ -178,7 +179,7 @@ def denoised(mesh: Mesh, noise: float, without: Collection[str] = ()) -> np.ndar
         normal = point_normals(points, faces)
         theta, weight, change, system = _linear(points, normal, hinges, noise, scale)
         gone = ((points - measured) * normal).sum(1)
-        step = _solved(system, -gone / noise**2 - change.T @ (weight * theta))
+        step = _solved(system, -gone * (1 / noise**2) - change.T @ (weight * theta))
         # The angles are linear over small steps only.
         points = points + np.clip(step, -noise, noise)[:, None] * normal
         points = _within(points, measured, LEVELS.sigmas * noise)
