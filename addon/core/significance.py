@@ -27,14 +27,26 @@ class SignificanceParams:
         Elements, or places of a mesh, that stand for all of a room's, or of a large object's.
     sure : float
         Relative standard error up to which an element speaks for others.
+    of_object : int
+        Elements that stand for an object where many rays are asked for each.
     views : int
         Views of an element that tell what changes with the view.
+    neighbours : int
+        The nearest elements or points that one is compared with, or takes its value from.
+    most : int
+        Objects of a kind that are looked at one by one: the greatest, or those that matter most.
+    reweighted : int
+        Rounds of reweighted least squares; more change nothing.
+    steps : int
+        Of an iterative solution, at most.
+    nearly_all : float
+        The share that is all but a few.
     gain : float
         Share by which something that was not there before (a sun, a sky, a highlight, glass) must lower what is left
         unexplained, besides that being beyond chance. Without a sun a living room gains .01, with one bedrooms .25 to
         .39; opaque things taken for glass gain up to .08. What adds so much may be refused again.
     dark : float
-        Of the room's median radiance: what is darker in a channel is all noise there.
+        Of the room's median radiance, or an albedo: what is darker in a channel is all noise there.
     """
 
     sigmas: float = 3.0
@@ -45,7 +57,13 @@ class SignificanceParams:
     many: int = 100
     sample: int = 4096
     sure: float = 0.15
+    of_object: int = 350
     views: int = 4
+    neighbours: int = 8
+    most: int = 64
+    reweighted: int = 10
+    steps: int = 200
+    nearly_all: float = 0.95
     gain: float = 0.1
     dark: float = 0.02
 

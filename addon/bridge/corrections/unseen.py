@@ -15,6 +15,7 @@ from mathutils import Color
 from ...core.errors import BadInputError
 from ...core.scene.atlas import Atlas
 from ...core.scene.model import Mesh
+from ...core.significance import LEVELS
 from ..data.arrays import layer_of, triangles_of, vertices_of
 from ..data.images import DATA, array_image, image_array, load_image
 from ..data.materials import BASE_COLOR, principled
@@ -30,8 +31,6 @@ _UV = "scan_relight_painted_uv"
 """Of an object: digest of the texture coordinates that its painted image was made for."""
 _SOURCE = "scan_relight_painted_over"
 """Of a painted image: the result's image that it is a copy of."""
-NEIGHBOURS = 12
-"""Measured spots that a filled one is the mean of, nearer ones counting more."""
 MASK = "unseen"
 
 
@@ -224,7 +223,7 @@ def paint(context: bpy.types.Context, thing: bpy.types.Object, where: str, colou
 def fill(things: Iterable[bpy.types.Object], where: str = images.PACK) -> tuple[int, list[str]]:
     """Fill what no frame saw of objects from the measured spots around, on the artist's image.
 
-    Each spot becomes the mean of the `NEIGHBOURS` measured ones of the same object that lie nearest and face alike;
+    Each spot becomes the mean of the `LEVELS.neighbours` measured ones of its object that lie nearest and face alike;
     what was seen stays as it is.
 
     Returns
@@ -274,7 +273,7 @@ def _fill(things, seen, where, passed) -> int:
         spots[thing] = wanted, measured
     flat = image_array(image).reshape(seen.shape[0] * seen.shape[1], -1) if spots else None
     for wanted, measured in spots.values():
-        tree, nearest = cKDTree(atlas.place(measured)), min(NEIGHBOURS, len(measured))
+        tree, nearest = cKDTree(atlas.place(measured)), min(LEVELS.neighbours, len(measured))
         distance, near = (
             found.reshape(len(wanted), -1) for found in tree.query(atlas.place(wanted), nearest, workers=-1)
         )

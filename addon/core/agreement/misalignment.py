@@ -44,7 +44,7 @@ def shift(image: np.ndarray, reference: np.ndarray) -> np.ndarray | None:
     dy, dx = np.gradient(reference)
     slope = np.stack([dx.ravel(), dy.ravel()], 1)
     moved = np.zeros(2)
-    for _ in range(MISALIGNMENT.rounds):
+    for _ in range(LEVELS.reweighted):
         off = bilinear(image, grid + moved) - reference.ravel()
         good = np.isfinite(off) & np.isfinite(slope).all(1)
         if good.sum() < LEVELS.many:

@@ -59,8 +59,6 @@ class MisalignmentParams:
 
     Attributes
     ----------
-    rounds : int
-        Of Gauss and Newton's method.
     largest : float
         Pixels of the small view; a shift beyond is not found by following gradients.
     least_texture : float
@@ -69,7 +67,6 @@ class MisalignmentParams:
         Residuals beyond so many times their median, or this if that is more, count as highlights or occlusion.
     """
 
-    rounds: int = 12
     largest: float = 4.0
     least_texture: float = 1e-3
     least_residual: float = 0.02

@@ -92,13 +92,11 @@ def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, relative_
     clipped = lit.tier == SATURATED
     surface = (~lit.seen | clipped) & ~solved
     off = np.where(
-        clipped,
-        CALIBRATION.poorly,
-        CALIBRATION.surfaces * np.minimum(np.hypot(relative_error, CALIBRATION.rough_light), 1),
+        clipped, CALIBRATION.poorly, CALIBRATION.surfaces * np.minimum(np.hypot(relative_error, CALIBRATION.roughly), 1)
     )
     kinds = [luminance * (surface | solved), luminance * surface * off, luminance * solved * CALIBRATION.solved]
     sky = (shading.environment.radiance @ LUMINANCE) * (shading.environment.observations == 0)
-    sky = np.stack([sky, np.zeros_like(sky), CALIBRATION.solved_sky * sky], -1).astype(np.float32)
+    sky = np.stack([sky, np.zeros_like(sky), CALIBRATION.roughly * sky], -1).astype(np.float32)
     sun = None
     if shading.sun is not None and not shading.sun.seen:
         level = float(shading.sun.irradiance @ LUMINANCE)
@@ -107,7 +105,7 @@ def unsure_light(field: LightField, shading: Shading, lit: LitDiffuse, relative_
     openings = field.openings
     if openings is not None:
         shown = openings.radiance @ LUMINANCE
-        shown = np.stack([shown, np.zeros_like(shown), CALIBRATION.solved_sky * shown], -1).astype(np.float32)
+        shown = np.stack([shown, np.zeros_like(shown), CALIBRATION.roughly * shown], -1).astype(np.float32)
         openings = replace(openings, radiance=shown)
     return room.with_sun(sun).with_openings(openings)
 

@@ -16,8 +16,8 @@ class CalibrationParams:
 
     Attributes
     ----------
-    solved, solved_sky, rough_light : float
-        Relative error of light that no frame looked at: lamps and a sun that were solved for, sky that was; and,
+    solved, roughly : float
+        Relative error of light that no frame looked at: lamps and a sun that were solved for; sky that was, and,
         besides the error of their albedo, surfaces: the light on them is gathered roughly. (An unseen ceiling lamp came
         out at 0.93 to 1.08 of its radiance in the rooms, at 0.99 in the living room; four bulbs in shades at 0.98 to
         1.43: what their shades' unseen insides throw is put to them.)
@@ -61,9 +61,8 @@ class CalibrationParams:
     """
 
     solved: float = 0.1
-    solved_sky: float = 0.2
     poorly: float = 0.4
-    rough_light: float = 0.25
+    roughly: float = 0.25
     surfaces: float = 0.5
     light_floor: float = 0.015
     noise_left: float = 0.4

@@ -8,15 +8,12 @@ import numpy as np
 
 from ..kinds import Limit
 from ..scene.model import KnownMirror
+from ..scene.params import COPLANAR
 from .layout import RawMesh
 
 FILE = "glass.sur"
 MIRROR = 0.5
 """From this reflectivity on a pane counts as a mirror; below it is glass."""
-NEAR = 0.05
-"""Metres from the plane within which triangles are of the pane."""
-ALONG = 0.9
-"""Cosine between their normals."""
 OWN_SHARE = 0.7
 """Share of an object's surface that lies in the pane from which on the object is that pane."""
 MAX_BYTES: Limit[int] = 1 << 26
@@ -107,7 +104,9 @@ def _object(pane: Pane, mesh: RawMesh) -> tuple[int, np.ndarray] | None:
     area = np.linalg.norm(cross, axis=1) / 2
     centre = (a + b + c) / 3
     off = np.abs(centre @ pane.normal - pane.offset)
-    within = (off < NEAR) & (np.abs(cross @ pane.normal) > ALONG * 2 * area) & _inside(centre, pane)
+    within = (
+        (off < COPLANAR.off) & (np.abs(cross @ pane.normal) > np.cos(COPLANAR.turn) * 2 * area) & _inside(centre, pane)
+    )
     if not within.any():
         return None
     ids, place = np.unique(mesh.object_id, return_inverse=True)
@@ -128,7 +127,7 @@ def _inside(points: np.ndarray, pane: Pane) -> np.ndarray:
     ring = np.stack([pane.boundary @ u, pane.boundary @ v], -1)
     # Triangles whose centres lie on its rim are its own as well.
     middle = (ring.max(0) + ring.min(0)) / 2
-    ring = middle + (ring - middle) * (1 + 2 * NEAR / max(float(np.ptp(ring, axis=0).max()), NEAR))
+    ring = middle + (ring - middle) * (1 + 2 * COPLANAR.off / max(float(np.ptp(ring, axis=0).max()), COPLANAR.off))
     odd = np.zeros(len(points), bool)
     for (x0, y0), (x1, y1) in zip(ring, np.roll(ring, 1, 0)):
         if y0 != y1:

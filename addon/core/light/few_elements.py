@@ -102,5 +102,5 @@ def from_sun(field: LightField, element: np.ndarray) -> np.ndarray:
 
 def most_reflected(field: LightField, objects: list[int], seed: int) -> float:
     """Luminance that objects would send out at an albedo of `EMITTER_ALBEDO`, in the median over their elements."""
-    own = pick(field, np.isin(field.atlas.object_id, objects), seed, LIGHT_FIT.lamp_elements)
+    own = pick(field, np.isin(field.atlas.object_id, objects), seed, LEVELS.of_object)
     return LIGHT_FIT.emitter_albedo / np.pi * float(np.median(irradiance_at(field, own, seed) @ LUMINANCE))

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 from ..kinds import Block
 from ..parallel import for_blocks
 from ..scene.atlas import room_box
+from ..significance import LEVELS
 from .params import GATHER
 
 REACH = 2 * GATHER.allowed
@@ -130,7 +131,7 @@ def _spread(
     """
     # Distance in place and in orientation as one space: a turn by 40 degrees counts like one spacing.
     tree = cKDTree(np.concatenate([points.position / spacing, points.normal * GATHER.turn], 1))
-    k = min(GATHER.neighbours, len(points.radius))
+    k = min(LEVELS.neighbours, len(points.radius))
     covered = np.zeros(len(todo), bool)
 
     def fill(part: slice) -> None:

@@ -21,8 +21,6 @@ class GatherParams:
         Error bound (Ward's epsilon) under which an element is interpolated.
     contrast : float
         Mean relative deviation between an element's neighbours up to which it is interpolated.
-    neighbours : int
-        Gathered points, at most, that an element is interpolated from.
     turn : float
         Weight of the normals' difference, in Ward's error.
     off_place : float
@@ -56,7 +54,6 @@ class GatherParams:
     smooth: float = 0.05
     allowed: float = 0.2
     contrast: float = 0.15
-    neighbours: int = 8
     turn: float = 1.5
     off_place: float = 0.15
     stretch: float = 3.0
@@ -117,8 +114,6 @@ class LightFitParams:
         Relative difference of area up to which two objects of a class can be the same lamp: a scan's noise and holes.
     reach : float
         Factor within which a lamp's luminance is its class's, and a sky's radiance its middle's.
-    lamp_elements : int
-        Of an unseen object, at which what it could reflect is looked at.
     rays, emitter_rays : int
         Of each element that a solution looks at: into its hemisphere, at bright triangles, at openings.
     emitter_albedo : float
@@ -132,7 +127,6 @@ class LightFitParams:
     alike: float = 0.25
     same: float = 0.1
     reach: float = 3.0
-    lamp_elements: int = 500
     rays: int = 256
     emitter_rays: int = 64
     emitter_albedo: float = 2.0
@@ -154,7 +148,7 @@ class SkyParams:
     shadow_rays : int
         Of each element, over the sun's disc.
     above : float
-        How often brighter than the sky around it a seen sun must be.
+        How often brighter than the sky around it a seen sun must be, and clipped sky can be at most.
     least_share : float
         Of the irradiance by all the sky: less is left in the map.
     """

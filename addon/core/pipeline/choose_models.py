@@ -192,12 +192,12 @@ def _look(room: Room, maker: Problems, object_id: int, guess: bool) -> tuple[Cho
 
 def _by_frames(maker: Problems, object_id: int, rays: int, guess: bool) -> tuple[Choice, Problem | None, np.ndarray]:
     """Choose a model by some of the object's samples, which come last; a `guess` is never called metal."""
-    elements = FIT.part_elements if guess else FIT.elements
+    elements = FIT.part_elements if guess else LEVELS.of_object
     index = maker.pick(object_id, elements, FIT.views, seed=1, smooth=True)
     if not len(index):
         return Choice(LAMBERTIAN, None, note="Seen too little to look for a highlight."), None, index
     # The rays' noise is known and counts by elements, so as many rays are spread over more of them.
-    problem = maker.problem(index, rays * FIT.elements // elements)
+    problem = maker.problem(index, rays * LEVELS.of_object // elements)
     return choose_model(problem, guess), problem, index
 
 
@@ -214,7 +214,7 @@ def _by_looks(
             coat = None if choice.model.has_lobe else compare_coat(problem, irradiance)
             if coat is None or coat.ratio > 1:
                 return choice, problem
-    index = maker.pick(object_id, FIT.elements, LEVELS.views, least=1, seed=1)
+    index = maker.pick(object_id, LEVELS.of_object, LEVELS.views, least=1, seed=1)
     if not len(index):
         return choice, problem
     whole = maker.problem(index, room.settings.specular_rays)

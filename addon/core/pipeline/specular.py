@@ -28,6 +28,7 @@ from ..results.overrides import NOTHING, Given, Overrides
 from ..scene.element_groups import ElementGroups
 from ..scene.model import Frame, Instance, Pixels, class_names
 from ..scene.samples import Samples
+from ..significance import LEVELS
 from .choose_models import Chosen, Looked, Room, choose_models, look_at
 from .frames import STAGE as FRAMES
 from .published.targets import fit_targets
@@ -287,7 +288,7 @@ def _without_background(
 ) -> tuple[np.ndarray, np.ndarray]:
     """A glass object's elements (n,), and the part of their L_d that came from behind, (n, 3)."""
     own = field.atlas.elements_of(material.object_id)
-    index = maker.pick(material.object_id, FIT.separate_elements, FIT.separate_views, least=1, seed=2)
+    index = maker.pick(material.object_id, LEVELS.sample, FIT.views, least=1, seed=2)
     if not len(index):
         return own, np.zeros((len(own), 3), np.float32)
     behind = look_behind(field, seen, samples.element[index], samples.direction[index], material.object_id)

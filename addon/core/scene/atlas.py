@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from ..groups import by_number
+from ..significance import LEVELS
 from .params import SPARSE, SURFACE
 
 
@@ -100,7 +101,7 @@ def room_box(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     between.
     """
     low, high = position.min(0), position.max(0)
-    outer, few = SPARSE.outer, SPARSE.few
-    start, first, last, end = np.percentile(position, (few, outer, 100 - outer, 100 - few), axis=0)
+    outer, few = SPARSE.outer, 1 - LEVELS.nearly_all
+    start, first, last, end = np.quantile(position, (few, outer, 1 - outer, 1 - few), axis=0)
     least, most = first - (last - first) / 2, last + (last - first) / 2
     return np.where(low < least, np.maximum(start, least), low), np.where(high > most, np.minimum(end, most), high)

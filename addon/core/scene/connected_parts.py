@@ -5,6 +5,7 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..significance import LEVELS
 from .params import SURFACE
 from .weld import weld
 
@@ -13,7 +14,7 @@ def connected_parts(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """The part that each triangle belongs to, (t,) int64 from 0, the greatest surface first.
 
     Triangles that share a vertex are of one part. Crumbs join the nearest other part, and so does what is
-    beyond `SURFACE.most_parts`.
+    beyond `LEVELS.most`.
 
     Parameters
     ----------
@@ -31,7 +32,7 @@ def connected_parts(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     surface = np.bincount(part, area)
     order = np.argsort(-surface, kind="stable")
-    kept = order[: max(int((surface[order[: SURFACE.most_parts]] >= SURFACE.tiny * surface.sum()).sum()), 1)]
+    kept = order[: max(int((surface[order[: LEVELS.most]] >= SURFACE.tiny * surface.sum()).sum()), 1)]
     number = np.full(len(surface), -1)
     number[kept] = np.arange(len(kept))
     return to_nearest(number[part], (a + b + c) / 3)

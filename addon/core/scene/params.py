@@ -29,6 +29,25 @@ VISIBILITY = VisibilityParams()
 
 
 @dataclass(frozen=True)
+class CoplanarParams:
+    """What lies in one plane.
+
+    Attributes
+    ----------
+    turn : float
+        Radians between two normals, or a normal and the plane's: what is left of a scan's noise, no skirting's slope.
+    off : float
+        Metres to either side.
+    """
+
+    turn: float = float(np.radians(15))
+    off: float = 0.05
+
+
+COPLANAR = CoplanarParams()
+
+
+@dataclass(frozen=True)
 class SmallParams:
     """Frames as they are compared with one another (`poses`, `radiometric_calibration`).
 
@@ -162,18 +181,12 @@ class NoiseParams:
     ----------
     least_noise : float
         Metres. Below, what is measured may be shape: a modelled living room has 0.13 mm.
-    tilt : float
-        Radians by which a triangle of height 1 is tilted by vertices off by 1: each of three vertices adds its share.
-    most : float
-        Radians; what is tilted by so much faces any way.
     left : float
         Share of a tilt that is left once the noise is taken out (`denoise`): in the living room 0.2 to 0.3 in the
         median, 0.6 to 0.9 in the root mean square, as triangles lower than the noise stay wrong.
     """
 
     least_noise: float = 0.001
-    tilt: float = 1.2
-    most: float = 3.0
     left: float = 0.5
 
 
@@ -199,8 +212,6 @@ class SurfaceParams:
         twice.
     tiny : float
         A part of less than this share of the surface is a crumb of a scan, no object.
-    most_parts : int
-        More parts are not told apart: the greatest remain.
     overlap_texels : float
         Triangles may penetrate each other by this much; far less than what moves a texel's centre, more than rounding.
     margin : int
@@ -217,7 +228,6 @@ class SurfaceParams:
     turned: float = 0.2
     weld: float = 1e-6
     tiny: float = 1e-3
-    most_parts: int = 64
     overlap_texels: float = 0.02
     margin: int = 2
     full: float = 0.6
@@ -233,7 +243,7 @@ class PartsParams:
     """How a mesh is taken apart by its shape (`shape_parts`); shares and angles, so no unit of length counts.
 
     Over three rooms fused from depth the share of the surface in the right part moves by less than .02 for half or
-    double of each of `piece`, `smooth` and `concave`.
+    double of each of `SURFACE.tiny`, `smooth` and `concave`.
 
     Attributes
     ----------
@@ -251,8 +261,6 @@ class PartsParams:
         Rounds of least squares of a plane.
     smooth : float
         Radians of the bend below which two triangles are of one piece.
-    piece : float
-        Least share of the surface in a piece: less joins a neighbour.
     concave : float
         Radians of the mean bend from which on an edge parts two things.
     outer : float
@@ -268,7 +276,6 @@ class PartsParams:
     seed: float = 0.05
     fits: int = 3
     smooth: float = float(np.radians(15))
-    piece: float = 0.0005
     concave: float = float(np.radians(20))
     outer: float = 0.85
 
@@ -300,9 +307,8 @@ class SparseParams:
         larger ones are asked for the share of them that was seen.
     seen_part : float
         A large triangle takes at most so many times the texels of what was seen of it, to a factor of 4.
-    outer, few : float
-        Per cent of the elements at either end of an axis: between them is the room's middle, and where some lie far
-        off it, all that may be its own (`atlas.room_box`).
+    outer : float
+        Share of the elements at either end of an axis: between them is the room's middle (`atlas.room_box`).
     highest : float
         Of the atlas's edge sparse triangles take at most this: else their texels grow.
     """
@@ -314,8 +320,7 @@ class SparseParams:
     fine: float = 0.5
     large: int = 64
     seen_part: float = 16
-    outer: float = 15
-    few: float = 5
+    outer: float = 0.15
     highest: float = 0.25
 
 
@@ -333,8 +338,6 @@ class ClosingParams:
     ----------
     block : int
         Edge in cells of the squares that close what no frame saw, a power of 2: a third of a metre in a room.
-    nearly_all : float
-        Of the mesh: the share that is darker than the outside, and that more frames see than what was not fused.
     fine : int
         Parts of a cell's edge: a cell is closed of which one is open, 1.6 cm in a room.
     speck : int
@@ -344,7 +347,6 @@ class ClosingParams:
     """
 
     block: int = 8
-    nearly_all: float = 0.95
     fine: int = 4
     speck: int = 4
     under: float = 0.025

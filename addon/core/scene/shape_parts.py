@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from .connected_parts import connected_parts, to_nearest
 from .elements import triangle_geometry
 from .model import Mesh
-from .params import PARTS
+from .params import PARTS, SURFACE
 from .sphere import fibonacci
 from .weld import weld
 
@@ -188,7 +188,7 @@ def _without_crumbs(faces: _Faces, piece: np.ndarray) -> np.ndarray:
 
     What hangs together with nothing joins what is nearest.
     """
-    least = PARTS.piece * faces.area.sum()
+    least = SURFACE.tiny * faces.area.sum()
     while True:
         border = _borders(faces, piece, faces.length)
         crumb, alone = np.bincount(piece, faces.area) < least, np.diff(border.indptr) == 0

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kinds import Limit
+from ..significance import LEVELS
 from .model import Camera, Frame, Pixels
-from .params import CLOSING, VISIBILITY
+from .params import VISIBILITY
 from .rays import RayScene
 
 FLOOR: Limit[float] = 1e-4
@@ -129,8 +130,8 @@ def colours(
         gain = np.nan_to_num(_median(shown - level, 1))
     value -= gain[np.searchsorted(used, sight.frame), 0]
     known = level.mean(-1)[np.isfinite(level).all(-1)]
-    bright = float(np.quantile(known, CLOSING.nearly_all)) if len(known) else np.nan
-    few = float(np.quantile(views[views > 0], 1 - CLOSING.nearly_all)) if views.any() else 0.0
+    bright = float(np.quantile(known, LEVELS.nearly_all)) if len(known) else np.nan
+    few = float(np.quantile(views[views > 0], 1 - LEVELS.nearly_all)) if views.any() else 0.0
     return Shown(value, clipped, bright, few)
 
 

@@ -18,9 +18,9 @@ from addon.core.io.read import read_capture
 from addon.core.scene.closed_mesh import opened
 from addon.core.scene.connected_parts import connected_parts
 from addon.core.scene.model import Frame
-from addon.core.scene.params import SURFACE
 from addon.core.scene.rays import RayScene
 from addon.core.scene.vote import vote
+from addon.core.significance import LEVELS
 from tests.core.rooms import all_round, lit_box, make_room
 from tests.core.scene.test_closing import CEILING
 from tests.core.scene.test_closing import room as torn
@@ -51,8 +51,8 @@ def test_the_greatest_part_comes_first_and_crumbs_join_the_nearest():
 
 
 def test_the_number_of_parts_is_bounded():
-    part = connected_parts(*boxes(*((3.0 * i, 0, 0) for i in range(SURFACE.most_parts + 9))))
-    assert np.unique(part).tolist() == list(range(SURFACE.most_parts))
+    part = connected_parts(*boxes(*((3.0 * i, 0, 0) for i in range(LEVELS.most + 9))))
+    assert np.unique(part).tolist() == list(range(LEVELS.most))
 
 
 def test_a_capture_of_loose_parts_gets_an_object_for_each(capture, text_of_ply):

@@ -29,15 +29,12 @@ class PatchParams:
     ----------
     core : float
         Of an element's, somewhere in a patch: what frames only clip at times has none.
-    most : int
-        Patches; the greatest are taken.
     bright : float
         Times the median radiance of the surface that an element must send to be of a patch unclipped. Sunlight on a
         floor is some ten to twenty times as bright as a room, a lamp some hundred times.
     """
 
     core: float = 0.9
-    most: int = 24
     bright: float = 40.0
 
 
@@ -68,7 +65,7 @@ def clipped_patches(mesh: Mesh, atlas: Atlas, lookup: ElementLookup, lit: LitDif
     core = np.bincount(of_element[own & (apart > PATCHES.core)], minlength=parts)
     area = np.bincount(of_element[own], atlas.area[own], parts)
     enough = np.flatnonzero((elements >= LEVELS.few) & (core > 0))
-    kept = enough[np.argsort(-area[enough], kind="stable")][: PATCHES.most]
+    kept = enough[np.argsort(-area[enough], kind="stable")][: LEVELS.most]
     first = int(mesh.object_id.max()) + 1
     number = np.full(parts, -1)
     number[kept] = first + np.arange(len(kept))

@@ -124,7 +124,7 @@ def _linear(
 def _solved(system: sparse.csr_matrix, right: np.ndarray) -> np.ndarray:
     """The solution of a symmetric positive definite system, by conjugate gradients."""
     scaled = sparse.diags(1 / system.diagonal())
-    return cg(system, right, rtol=DENOISE.tolerance, maxiter=DENOISE.most_steps, M=scaled)[0]
+    return cg(system, right, rtol=DENOISE.tolerance, maxiter=LEVELS.steps, M=scaled)[0]
 
 
 def _within(points: np.ndarray, measured: np.ndarray, farthest: float) -> np.ndarray:

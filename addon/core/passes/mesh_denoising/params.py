@@ -9,12 +9,11 @@ class DenoiseParams:
 
     Attributes
     ----------
-    tolerance, most_steps : float, int
+    tolerance : float
         Of each linear solve, by conjugate gradients.
     """
 
     tolerance: float = 1e-3
-    most_steps: int = 200
 
 
 DENOISE = DenoiseParams()

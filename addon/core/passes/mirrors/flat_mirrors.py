@@ -22,6 +22,7 @@ from ...light.mirrors import Mirror
 from ...parallel import ordered_map
 from ...scene.model import Instance
 from ...scene.samples import Samples
+from ...significance import LEVELS
 from .mirrored import Views, sides_of, turned
 from .params import MIRRORS
 
@@ -63,8 +64,8 @@ def find_mirrors(
             own = clear[shown.get(instance.object_id, [])]
             own = own[field.atlas.normal[samples.element[own]] @ normal > FLAT]
             elements = np.unique(samples.element[own])
-            if len(elements) > MIRRORS.elements:
-                own = own[np.isin(samples.element[own], rng.choice(elements, MIRRORS.elements, replace=False))]
+            if len(elements) > LEVELS.of_object:
+                own = own[np.isin(samples.element[own], rng.choice(elements, LEVELS.of_object, replace=False))]
             yield instance.object_id, point, normal, own
 
     def mirror(one: tuple[int, np.ndarray, np.ndarray, np.ndarray]) -> Mirror | None:
@@ -89,7 +90,7 @@ def _mirrored(views: Views, facing: np.ndarray, normal: np.ndarray) -> tuple[np.
     if not (off < own and together > MIRRORS.together and f0.mean() > MIRRORS.least_f0):
         return None
     sides = sides_of(normal)
-    few = views.part(np.arange(0, len(views), -(-len(views) // MIRRORS.fitted)))
+    few = views.part(np.arange(0, len(views), -(-len(views) // LEVELS.sample)))
     by = np.zeros(2)
     # What goes together finds the way from farther, what is least off tells it more closely.
     for cost in (lambda way: -few.compare(way)[2], few.off):

@@ -13,8 +13,6 @@ class MirrorsParams:
         Share of an object's surface that must lie in one plane.
     plane_share : float
         How far from that plane, as a share of the object's size.
-    elements : int
-        That a mirror is looked at by.
     together : float
         Least correlation, within the elements, of what they show and of what a mirror would.
     least_f0 : float
@@ -24,21 +22,18 @@ class MirrorsParams:
         hearth shows tells nothing of its way: it was turned by a degree to take a hundredth off.
     stray : float
         Deviation of log radiance from which on more counts no more: a ray beside an edge meets something else.
-    tilt, tilts, fitted : float, int
-        Radians by which the plane is turned first to fit what is mirrored, how often, and observations for it: a scan's
-        planes are off.
+    tilt, tilts : float, int
+        Radians by which the plane is turned first to fit what is mirrored, and how often: a scan's planes are off.
     """
 
     flat_share: float = 0.8
     plane_share: float = 0.02
-    elements: int = 400
     together: float = 0.6
     least_f0: float = 0.2
     tells: float = 0.98
     stray: float = 0.5
     tilt: float = 0.01
     tilts: int = 40
-    fitted: int = 6000
 
 
 MIRRORS = MirrorsParams()

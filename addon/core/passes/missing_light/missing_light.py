@@ -20,6 +20,7 @@ from ...light.params import GATHER
 from ...luminance import LUMINANCE
 from ...parallel import for_blocks
 from ...scene.atlas import Atlas
+from ...scene.params import COPLANAR
 from ...significance import LEVELS
 from .params import MISSING
 from .solve import Unknown, in_one_plane, solve
@@ -170,8 +171,8 @@ def same_lamps(atlas: Atlas, patches: list[np.ndarray]) -> np.ndarray:
             # Normals of small patches are off by degrees, which is decimetres across a room: one of the two has to do.
             away = centre - centre[one]
             height = np.minimum(np.abs(away @ normal[one]), np.abs(np.einsum("ij,ij->i", away, normal)))
-            flat = height < MISSING.off_plane
-            alike = left & flat & (normal @ normal[one] > MISSING.same_plane) & (MISSING.alike * area > area[one])
+            flat = height < COPLANAR.off
+            alike = left & flat & (normal @ normal[one] > np.cos(COPLANAR.turn)) & (MISSING.alike * area > area[one])
             alike[one] = True
             left[alike] = False
             lamps.append(np.where(alike, area[alike].mean() / area, 0))
@@ -180,7 +181,7 @@ def same_lamps(atlas: Atlas, patches: list[np.ndarray]) -> np.ndarray:
 
 def _sample(field: LightField, good: np.ndarray, seed: int) -> np.ndarray:
     """Good elements, spread over the surface."""
-    return spread_over(field, np.flatnonzero(good), MISSING.samples, np.random.default_rng(seed))
+    return spread_over(field, np.flatnonzero(good), LEVELS.sample, np.random.default_rng(seed))
 
 
 def unseen_closing(field: LightField) -> np.ndarray:

@@ -19,8 +19,6 @@ class MissingLightParams:
     alarm : float
         Share of the elements whose albedo would have to be above 1, from which on light is missing: the level at which
         the report warns.
-    samples : int
-        Elements that it is solved at.
     rays : int
         Of each of them into its hemisphere, to find through which cells it sees out.
     merged : int
@@ -29,10 +27,6 @@ class MissingLightParams:
         Radians either way of the parts in which clipped sky is solved for.
     least_seen : float
         Mean irradiance that an unknown of radiance 1 gives, below which it is left at the room's own radiance.
-    neighbours : int
-        Others in the same plane that an element is compared with: so many of the nearest, and of all.
-    same_plane, off_plane : float
-        Cosine of their normals, and metres.
     alike : float
         Times the area of another patch in its plane up to which one is the same lamp (`same_lamps`). A lamp's edge is
         off by an element or a triangle of the scan: spots of .0062 and .0092 square metres came out at .006 to .021.
@@ -55,21 +49,15 @@ class MissingLightParams:
         With the channels apart, a phone's room got cyan light from its ceiling.
     start : float
         Times that, where the search starts.
-    steps : int
-        Of the minimisation.
     lamp : float
         Times its clipped value, in each channel, that the room's light must ask for of a patch that is called a lamp.
     """
 
     alarm: float = 0.05
-    samples: int = 5000
     rays: int = 2048
     merged: int = 2
     sky: float = float(np.radians(30))
     least_seen: float = 2e-4
-    neighbours: int = 8
-    same_plane: float = 0.97
-    off_plane: float = 0.05
     alike: float = 3.0
     apart: float = 0.05
     level: float = 0.03
@@ -79,7 +67,6 @@ class MissingLightParams:
     unlike: float = 0.5
     tint: float = 0.3
     start: float = 3.0
-    steps: int = 200
     lamp: float = 2.0
 
 

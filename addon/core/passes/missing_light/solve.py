@@ -14,6 +14,7 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from ...brdf.lambertian import USUAL_ALBEDO
+from ...scene.params import COPLANAR
 from ...significance import LEVELS
 from .params import MISSING
 
@@ -22,14 +23,14 @@ def in_one_plane(position: np.ndarray, normal: np.ndarray, seed: int) -> np.ndar
     """Pairs of m elements that lie in one plane, the nearest and some of all, (p, 2) int."""
     m = len(position)
     key = np.concatenate([position, 3 * normal], 1)
-    near = cKDTree(key).query(key, min(MISSING.neighbours + 1, m))[1]
+    near = cKDTree(key).query(key, min(LEVELS.neighbours + 1, m))[1]
     pairs = [np.stack([np.repeat(np.arange(m), near.shape[1] - 1), near[:, 1:].ravel()], 1)]
     rng = np.random.default_rng(seed)
-    some = rng.integers(0, m, (8 * MISSING.neighbours * m, 2))
+    some = rng.integers(0, m, (8 * LEVELS.neighbours * m, 2))
     a, b = some.T
-    alike = np.einsum("ij,ij->i", normal[a], normal[b]) > MISSING.same_plane
+    alike = np.einsum("ij,ij->i", normal[a], normal[b]) > np.cos(COPLANAR.turn)
     off = np.abs(np.einsum("ij,ij->i", position[a] - position[b], normal[a]))
-    pairs.append(some[alike & (off < MISSING.off_plane) & (a != b)][: MISSING.neighbours * m])
+    pairs.append(some[alike & (off < COPLANAR.off) & (a != b)][: LEVELS.neighbours * m])
     return np.concatenate(pairs)
 
 
@@ -123,7 +124,7 @@ def solve(
     if low.size:
         found = minimize(
             cost, np.maximum(start, low).ravel(), jac=True, method="L-BFGS-B",
-            bounds=[(one, 12.0) for one in low.ravel()], options={"maxiter": MISSING.steps},
+            bounds=[(one, 12.0) for one in low.ravel()], options={"maxiter": LEVELS.steps},
         ).x.reshape(low.shape)  # fmt: skip
 
     def spread(x: np.ndarray) -> float:

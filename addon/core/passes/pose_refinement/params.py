@@ -13,8 +13,6 @@ class PoseParams:
         Pixels of the small picture, median over the frames: less is what good poses show for highlights, texels and
         noise. Six rooms with their true poses have 0.05 to 0.23; the living room with poses off by 5 mm and 0.2 degrees
         has 0.7.
-    pixels : int
-        Those of the steepest gradients. Living room, poses off as above: 0.30 pixels left with 6,000 as with 12,000.
     samples : int
         Rays along an edge of each of these pixels, so that the texture's edges are as soft as the picture's.
     least_gradient : float
@@ -23,8 +21,6 @@ class PoseParams:
         Share of the room's median radiance that is added before the logarithm: noise in the dark says nothing.
     rounds : int
         All frames are refined so often, each against the others as last refined.
-    reweighted : int
-        Rounds of robust weights within each.
     least_spread : float
         Of the logarithm: a picture of flat colours fits to the last bit but at its edges, all that there is to go by.
     independent : float
@@ -40,12 +36,10 @@ class PoseParams:
     """
 
     least_shift: float = 0.4
-    pixels: int = 6000
     samples: int = 2
     least_gradient: float = 0.01
     floor: float = 0.1
     rounds: int = 2
-    reweighted: int = 8
     least_spread: float = 0.05
     independent: float = 0.05
     stray: float = 4.0

@@ -166,7 +166,7 @@ def step_of(camera: Camera, pixels: Pixels, texture: Texture) -> Step | None:
     good &= inner
     dx, dy = (gaussian_filter(picture, SMALL.blur, order=order) for order in ((0, 1), (1, 0)))
     steep = np.where(good, np.hypot(dx, dy), 0)
-    count = min(POSES.pixels, steep.size - 1)
+    count = min(LEVELS.sample, steep.size - 1)
     least = max(float(np.partition(steep.ravel(), -count)[-count]), POSES.least_gradient)
     y, x = np.nonzero(steep >= least)
     if len(x) < LEVELS.many:
@@ -195,7 +195,7 @@ def _fit(change: np.ndarray, residual: np.ndarray, telling: np.ndarray) -> np.nd
     """
     prior = np.diag(np.r_[np.full(3, ROTATION**-2), np.full(3, WAY**-2), 0])
     way = np.zeros(7)
-    for _ in range(POSES.reweighted):
+    for _ in range(LEVELS.reweighted):
         left = residual - change @ way
         spread = max(1.4826 * weighted_median(np.abs(left), telling), POSES.least_spread)
         weight = POSES.independent / spread**2 / (1 + (left / (LEVELS.outlier * spread)) ** 2)

@@ -23,6 +23,7 @@ from scipy.interpolate import BSpline
 from ...photo import srgb_to_linear
 from ...progress import Progress, Rounds
 from ...scene.model import Frame, Mesh, Pixels
+from ...scene.params import VISIBILITY
 from ...scene.radiometry import CODES, Radiometry
 from ...scene.rays import RayScene
 from ...significance import LEVELS
@@ -96,11 +97,11 @@ def calibrate(
     """
     asked = np.array([frame.uncalibrated for frame in frames], bool)
     nothing = Calibration.none(len(frames))
-    if asked.sum() < CALIBRATION.least_views:
+    if asked.sum() < VISIBILITY.enough:
         return nothing
     own = [frame for frame, wanted in zip(frames, asked) if wanted]
     found = observe_codes(mesh, scene, own, read, threads=threads, seed=seed, progress=progress)
-    found = found.part(np.bincount(found.point, minlength=1)[found.point] >= CALIBRATION.least_views)
+    found = found.part(np.bincount(found.point, minlength=1)[found.point] >= VISIBILITY.enough)
     stated = np.log([frame.exposure for frame in own])
     if len(found.point) < CALIBRATION.points:
         return nothing
@@ -139,7 +140,7 @@ def solve(seen: CodeObservations, frames: int, stated: np.ndarray) -> tuple[np.n
     weight = deviation**-2 * np.median(deviation) ** 2
     x = np.zeros(3 * own + 2)
     residual = np.zeros((rows, 3))
-    for _ in range(CALIBRATION.rounds):
+    for _ in range(LEVELS.reweighted):
         normal, right = np.zeros((len(x), len(x))), np.zeros(len(x))
         for c, (design, at) in enumerate(zip(designs, index)):
             w = weight[:, c]

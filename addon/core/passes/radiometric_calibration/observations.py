@@ -13,7 +13,7 @@ from ...parallel import ordered_map
 from ...progress import Progress, Rounds
 from ...scene.elements import triangle_geometry
 from ...scene.model import Frame, Mesh, Pixels
-from ...scene.params import SMALL
+from ...scene.params import SMALL, VISIBILITY
 from ...scene.rays import RayScene
 from ...scene.visibility import bytes_of_frame
 from .params import CALIBRATION
@@ -116,7 +116,7 @@ def _in_frame(
     towards = camera.centre - places
     cosine = np.einsum("ij,ij->i", towards, normals) / np.maximum(np.linalg.norm(towards, axis=1), 1e-30)
     own = np.flatnonzero(cosine > CALIBRATION.grazing)
-    which, at = sees(camera, places[own], scene, SMALL.off, CALIBRATION.behind)
+    which, at = sees(camera, places[own], scene, SMALL.off, VISIBILITY.depth_tolerance)
     column, row = at.astype(int).T
     kept = flat[row, column]
     own, at, column, row = own[which[kept]], at[kept], column[kept], row[kept]

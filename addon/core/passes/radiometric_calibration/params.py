@@ -19,10 +19,6 @@ class CalibrationParams:
         Codes below this share of the greatest are mostly read noise and quantisation.
     grazing : float
         Cosine below which a surface is seen too flatly.
-    behind : float
-        Share of the distance by which a fused mesh may lie in front of a point.
-    least_views : int
-        Frames that must show a point for it to tell anything.
     splines : int
         Of a cubic B-spline that the logarithm of the response may differ by from the prior's.
     roughness : float
@@ -31,8 +27,6 @@ class CalibrationParams:
         Of a code, standard deviation as share of the greatest: two codes of 8 bits.
     texture : float
         Relative standard deviation that radiance differs by between views of one place beside it.
-    rounds : int
-        Of reweighting.
     least_range : float
         Standard deviation of the logarithm of stated exposures from which on they tell the curve's contrast.
     widest : float
@@ -52,13 +46,10 @@ class CalibrationParams:
     flat: float = 0.25
     darkest: float = 0.03
     grazing: float = 0.3
-    behind: float = 0.02
-    least_views: int = 3
     splines: int = 10
     roughness: float = 100.0
     noise: float = 2 / 255
     texture: float = 0.03
-    rounds: int = 10
     least_range: float = 0.1
     widest: float = 2.0
     border: float = 1 / 6

@@ -13,6 +13,7 @@ taken out. The nearer s is to 1 the less it tells, and the more c is shrunk.
 
 import numpy as np
 
+from ...scene.params import VISIBILITY
 from .params import CALIBRATION
 
 
@@ -34,7 +35,7 @@ def mean_white_balance(log_gain: np.ndarray, log_mean: np.ndarray, told: np.ndar
         To be added to `log_gain`; of mean 0, and 0 where the frames' white balances don't follow their colours.
     """
     balance, seen = _chroma(log_gain), _chroma(log_mean - log_gain)
-    if told.sum() < CALIBRATION.least_views:
+    if told.sum() < VISIBILITY.enough:
         return np.zeros(3)
     fits = [_fit(balance, _followed(seen, rate), told) for rate in np.geomspace(1 / len(seen), 1, CALIBRATION.rates)]
     _, strength, error, mean_seen = min(fits, key=lambda fit: fit[0])

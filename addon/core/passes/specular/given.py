@@ -55,9 +55,9 @@ def _problem(
     maker: Problems, object_id: int, rays: int, phi: float | None, microfacets: Microfacets
 ) -> tuple[Problem | None, bool]:
     """The object's observations, and whether they can tell what changes with the view."""
-    index, enough = maker.pick(object_id, FIT.elements, FIT.views, seed=1, smooth=True), True
+    index, enough = maker.pick(object_id, LEVELS.of_object, FIT.views, seed=1, smooth=True), True
     if len(np.unique(maker.element(index))) < LEVELS.few:
-        index, enough = maker.pick(object_id, FIT.elements, LEVELS.views, least=1, seed=1), False
+        index, enough = maker.pick(object_id, LEVELS.of_object, LEVELS.views, least=1, seed=1), False
     if not len(index):
         return None, False
     width = None if phi is None else max(phi, float(GRID[0]))

@@ -11,20 +11,16 @@ class FitParams:
 
     Attributes
     ----------
-    elements, views : int
-        Elements of an object that the fit looks at, and views of each.
+    views : int
+        Views of each of the `LEVELS.of_object` elements that the fit looks at.
     part_elements : int
         Elements of a part that its shape alone tells: it is a whole wall, with other things on it. Five phone-made
         rooms: models right on .66 of the pixels with 350, on .77 with 1050 (bathroom .47 to .90, office .74 to .88, a
         kitchen .54 to .52).
     looks_like_none : float
         A metal whose spread is so many times the other's over the views that were fitted is not asked for over all.
-    separate_elements, separate_views : int
-        The same for what is behind glass.
     broadest_phi : float
         A lobe broader than this, of a metal or over a diffuse part, can't be told from a diffuse surface.
-    neighbours : int
-        Elements that an object's other elements take their specular part from, the nearest of those looked at.
     crease : float
         Radians by which two faces must turn for an edge between them (`pixel-curvature`); Blender's own for smooth
         shading.
@@ -32,14 +28,10 @@ class FitParams:
         Roughness up to which the frames show a mirror: a lobe of phi 0.03 is as wide as a few pixels.
     """
 
-    elements: int = 350
     part_elements: int = 1050
     views: int = 12
     looks_like_none: float = 1.5
-    separate_elements: int = 2500
-    separate_views: int = 9
     broadest_phi: float = 0.5
-    neighbours: int = 16
     crease: float = float(np.radians(30))
     unresolved: float = 0.17
 

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from ...scene.atlas import Atlas
 from ...scene.samples import Samples
-from .params import FIT
+from ...significance import LEVELS
 
 
 def grouped_median(values: np.ndarray, group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -60,7 +60,7 @@ def spread_over_object(atlas: Atlas, own: np.ndarray, element: np.ndarray, value
     (n, 3) float32
         Weighted mean of the nearest known ones, in place and orientation.
     """
-    k = min(FIT.neighbours, len(element))
+    k = min(LEVELS.neighbours, len(element))
     distance, near = cKDTree(atlas.place(element)).query(atlas.place(own), k=k)
     distance, near = distance.reshape(len(own), k), near.reshape(len(own), k)
     # Weights that level off within the neighbourhood: each known value is noisy by itself.

@@ -22,10 +22,6 @@ class SunParams:
         the elements around what stands out.
     even : int
         Elements over the whole surface that tell which stand out (`sun_patch`).
-    asked : int
-        Of those that do, so many tell which directions of the grid reach them.
-    pool : int
-        Elements, at most, that these are drawn from.
     near, dense : float, int
         Metres around what stands out; elements from there, and from elsewhere on the same objects, for the refinement.
     colour : float
@@ -35,8 +31,6 @@ class SunParams:
         Elements that reflect more than this share of what they get are short of light.
     stands_out : float
         So may be those whose log albedo is so far above their object's median (2.7 times).
-    lit : float
-        Cosine from which on something counts as lit by the sun.
     """
 
     reached: float = 0.05
@@ -44,14 +38,11 @@ class SunParams:
     refined: int = 24
     tried: int = 4
     even: int = 2 * LEVELS.sample
-    asked: int = 256
-    pool: int = 60_000
     near: float = 0.3
     dense: int = 2000
     colour: float = 1.6
     over: float = 1.2
     stands_out: float = 1.0
-    lit: float = 0.02
 
 
 SUN = SunParams()

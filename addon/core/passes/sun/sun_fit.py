@@ -17,6 +17,7 @@ from ...light.field import LightField
 from ...light.sun import Sun, around
 from ...luminance import LUMINANCE
 from ...parallel import ordered_map
+from ...scene.params import SAMPLES
 from ...scene.sphere import fibonacci
 from ...significance import LEVELS
 from .params import SUN
@@ -96,7 +97,7 @@ def _pool(field: LightField, good: np.ndarray, even: Spots, rng: np.random.Gener
     """Elements of the objects on which something stands out ((k,)), and whether they lie `near` that ((k,) bool)."""
     atlas, out = field.atlas, even.stands_out()
     pool = np.flatnonzero(good & np.isin(atlas.object_id, even.sample.object_id[out]))
-    pool = np.sort(rng.choice(pool, min(len(pool), SUN.pool), replace=False))
+    pool = np.sort(rng.choice(pool, min(len(pool), SAMPLES.in_all), replace=False))
 
     def key(element: np.ndarray) -> np.ndarray:
         return np.concatenate([atlas.position[element], 100.0 * atlas.object_id[element][:, None]], 1)
@@ -191,7 +192,7 @@ def find_sun(
         found = min((edges.explained(found.direction, strength, r) for r in RADII), key=lambda one: one.cost)
     contribution = spots.contribution(found.direction, found.radius)
     after = spots.spread(contribution, found.strength)
-    short = spots.over() & (contribution > SUN.lit)
+    short = spots.over() & (contribution > 0)
     left = short & spots.over(contribution, found.strength)
     if (
         found.cost > (1 - LEVELS.gain) * edges.differ()

@@ -19,6 +19,7 @@ from ...light.sun import Sun
 from ...luminance import LUMINANCE
 from ...parallel import ordered_map
 from ...scene.lit_diffuse import LitDiffuse
+from ...scene.params import SAMPLES
 from ...significance import LEVELS
 from .params import SUN
 from .sun_fit import RADII, SHARP, along_edges, apart, of_luminance, reaching_most, searched
@@ -48,8 +49,8 @@ def find_patch_sun(
     direction = direction_of(spots, out, dark.environment)
     if direction is None:
         return None
-    lies = np.unique(spots.sample.object_id[spots.contribution(direction) > SUN.lit])
-    pool = spread_over(dark, seen[np.isin(dark.atlas.object_id[seen], lies)], SUN.pool, rng)
+    lies = np.unique(spots.sample.object_id[spots.contribution(direction) > 0])
+    pool = spread_over(dark, seen[np.isin(dark.atlas.object_id[seen], lies)], SAMPLES.in_all, rng)
     along = along_edges(dark, pool, direction, rng)
     told = np.zeros(4)
     if len(along):
@@ -73,17 +74,17 @@ def direction_of(spots: Spots, out: np.ndarray, sky: Environment) -> np.ndarray 
         return None
 
     def told(direction: np.ndarray) -> Guess:
-        return Guess(direction, -_ratio(out, spots.contribution(direction) > SUN.lit))
+        return Guess(direction, -_ratio(out, spots.contribution(direction) > 0))
 
     some = np.flatnonzero(out)
-    some = some[:: -(-len(some) // SUN.asked)]
+    some = some[:: -(-len(some) // LEVELS.of_object)]
     way = reaching_most(spots, some, np.ones(len(some)), sky)
     guesses = apart(list(ordered_map(told, way, 0)))[: SUN.tried]
     refined = ordered_map(lambda one: searched(told, one, SHARP), guesses, 0)
     best = min(refined, key=lambda one: one.cost, default=None)
     if best is None:
         return None
-    lit = spots.contribution(best.direction) > SUN.lit
+    lit = spots.contribution(best.direction) > 0
     return best.direction if lit.sum() >= LEVELS.enough and 2 * (out & lit).sum() > lit.sum() else None
 
 
@@ -98,7 +99,7 @@ def strength_of(spots: Spots, direction: np.ndarray, clipped: np.ndarray) -> np.
         Those of the elements of which a lower bound is known.
     """
     full, contribution = spots.contribution(direction), spots.contribution(direction, RADII[-1])
-    lit = np.flatnonzero((full > SUN.lit) & (contribution > 0.99 * full))
+    lit = np.flatnonzero((full > 0) & (contribution > 0.99 * full))
     shade = np.flatnonzero((contribution <= 0) & ~clipped)
     if not len(lit) or not len(shade):
         return np.zeros(4)

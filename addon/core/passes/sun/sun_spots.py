@@ -98,7 +98,7 @@ class Spots:
 
     def strength(self, contribution: np.ndarray, weights=LUMINANCE) -> float:
         """Irradiance that makes what is lit as bright as it is, if its albedo is that of its object's shaded rest."""
-        lit = contribution > SUN.lit
+        lit = contribution > 0
         rho = np.exp(self.medians(self.log_albedo(weights=weights), contribution <= 0))
         use = lit & np.isfinite(rho)
         if use.sum() < 3:

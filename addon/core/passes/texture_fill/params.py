@@ -11,10 +11,6 @@ class PlaneParams:
 
     Attributes
     ----------
-    tilt : float
-        Radians between an element's normal and the plane's: what is left of a scan's noise in it, no skirting's slope.
-    thickness : float
-        Metres to either side of the plane.
     tries : int
         Planes of its own unmeasured elements that are tried, each judged by `LEVELS.sample` of them.
     planes : int
@@ -27,8 +23,6 @@ class PlaneParams:
         Times that an atlas's axis may be longer than the other, and a texel larger than the picture's cells.
     """
 
-    tilt: float = float(np.radians(15))
-    thickness: float = 0.03
     tries: int = 16
     planes: int = 6
     cells: int = 1_000_000
@@ -42,8 +36,6 @@ class TextureParams:
 
     Attributes
     ----------
-    floor : float
-        Albedo that darker ones count for in logarithms.
     mostly : int
         Cells along a square of which most have to be sure (`LEVELS.sure`, or the better half) for the one in its middle
         to be copied.
@@ -69,7 +61,6 @@ class TextureParams:
         What a place counts for in the choice of offsets once one more of them covers it.
     """
 
-    floor: float = 0.01
     mostly: int = 5
     decay: float = float(np.exp(-1))
     samples: float = 64.0

@@ -11,6 +11,7 @@ from scipy import ndimage
 from ...scene.atlas import Atlas
 from ...scene.elements import Unwrapped
 from ...scene.model import Mesh
+from ...scene.params import COPLANAR
 from ...scene.tangent_frame import tangent_frame
 from ...significance import LEVELS
 from .params import PLANES
@@ -113,7 +114,7 @@ class Plane:
 
     def near(self, position: np.ndarray) -> np.ndarray:
         """Points ((k, 3)) that lie in it, (k,) bool."""
-        return np.abs(position @ self.normal - self.offset) < PLANES.thickness
+        return np.abs(position @ self.normal - self.offset) < COPLANAR.off
 
 
 def planes_of(atlas: Atlas, own: np.ndarray, filled: np.ndarray) -> Iterator[Plane]:
@@ -124,7 +125,7 @@ def planes_of(atlas: Atlas, own: np.ndarray, filled: np.ndarray) -> Iterator[Pla
 
     def within(direction: np.ndarray, offset: float, some: np.ndarray) -> np.ndarray:
         off = np.abs(position[some] @ direction - offset)
-        return (normal[some] @ direction > np.cos(PLANES.tilt)) & (off < PLANES.thickness)
+        return (normal[some] @ direction > np.cos(COPLANAR.turn)) & (off < COPLANAR.off)
 
     left = np.ones(len(own), bool)
     for _ in range(PLANES.planes):

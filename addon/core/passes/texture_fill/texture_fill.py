@@ -51,7 +51,7 @@ def texture_of(
     Texture
         Of planes whose measured part has detail beyond its error, and enough of it.
     """
-    level, told = np.log(np.maximum(rho.mean(1), TEXTURE.floor)), []
+    level, told = np.log(np.maximum(rho.mean(1), LEVELS.dark)), []
     objects = [
         own for own in by_label(atlas.object_id) if filled[own].any() and _textured(level, error, own[measured[own]])
     ]
@@ -94,12 +94,12 @@ def _filled(picture: Picture, rho: np.ndarray, error: np.ndarray) -> tuple[np.nd
     source = known & (around > 0.5)
     if source.sum() < LEVELS.many:
         return NOTHING.texel, NOTHING.rho
-    log = np.log(np.maximum(shown, TEXTURE.floor))
+    log = np.log(np.maximum(shown, LEVELS.dark))
     detail = np.where(source[..., None], log - log[source].mean(0), 0).astype(np.float32)
     scale = scale_of(*autocovariance(detail, source))
     if source.sum() < TEXTURE.samples * scale**2:
         return NOTHING.texel, NOTHING.rho
-    smooth = np.maximum(smooth_mean(shown, known, TEXTURE.smooth * scale), TEXTURE.floor)
+    smooth = np.maximum(smooth_mean(shown, known, TEXTURE.smooth * scale), LEVELS.dark)
     detail = np.where(known[..., None], log - np.log(smooth), 0).astype(np.float32)
     if not _beyond(usual_contrast(detail, source, TEXTURE.smooth * scale), error):
         return NOTHING.texel, NOTHING.rho

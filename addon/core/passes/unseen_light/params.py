@@ -15,9 +15,6 @@ class UnseenParams:
         with many rays each find more of it than many with few (a sky of 1.7: 16,000 with 64 rays give 1.4). Lamps over
         the truth in perturbed living rooms, two seeds each: 0.99 +- 0.06 with 4,000 elements (seven scans), 1.01 +-
         0.035 with 16,000 (six), 1.07 +- 0.02 where large objects count for more (three).
-    candidates : int
-        Unseen objects, those alike counted once, that are tried as lamps: those that would reach the sample most. Of
-        thousands of things under a table none lights the room, and each takes a tenth of a second.
     lamp_gain : float
         A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share.
     sweeps : int
@@ -27,16 +24,12 @@ class UnseenParams:
         draws solutions down. The living room's ground, .22 where it was seen, came out at .08 and took two clipped
         lamps down with it (two perturbed scans: .95 of their luminance; .97 under 1.5, .994 under 1.25, 1.03 under
         1.1).
-    brightest : float
-        The same for a part of the sky that is clipped.
     """
 
     clipped: int = 4
-    candidates: int = 64
     lamp_gain: float = 0.03
     sweeps: int = 2
     darker: float = 1.25
-    brightest: float = 30.0
 
 
 UNSEEN = UnseenParams()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...light.lamps import Lamp
-from ...light.params import LIGHT_FIT
+from ...light.params import LIGHT_FIT, SKY
 from ...scene.model import Instance, class_names
 from .params import UNSEEN
 
@@ -46,7 +46,7 @@ class Sky:
         """Least and greatest radiance that is believed, (3,) each."""
         guess = np.maximum(self.guess[i], 1e-12)
         if self.clipped[i]:
-            return guess, UNSEEN.brightest * guess
+            return guess, SKY.above * guess
         return guess / (UNSEEN.darker if self.told[i] else LIGHT_FIT.reach), np.full(3, LIGHT_FIT.reach * guess.max())
 
     def without(self, parts: Collection[int]) -> Sky:

@@ -170,11 +170,11 @@ def find_light(
     for one in unseen_objects:
         alike.setdefault(model.get(one, one), []).append(one)
     alike = {own[0]: own for own in alike.values()}
-    if len(alike) > UNSEEN.candidates:
+    if len(alike) > LEVELS.most:
         shining = [i for i in alike if i in kin]
         others = [i for i in alike if i not in kin]
-        best = reaching_most(field, sample.element, [alike[i] for i in others], UNSEEN.candidates, seed)
-        alike = {i: alike[i] for i in [*shining, *(others[k] for k in best)][: UNSEEN.candidates]}
+        best = reaching_most(field, sample.element, [alike[i] for i in others], LEVELS.most, seed)
+        alike = {i: alike[i] for i in [*shining, *(others[k] for k in best)][: LEVELS.most]}
     earlier = old if old is not None and np.array_equal(old.element, sample.element) else None
     if earlier is not None:
         contribution, least = earlier.lamps, earlier.least
