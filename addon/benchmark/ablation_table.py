@@ -34,8 +34,10 @@ class Figure:
     digits: int = 2
 
 
-OLDER = "benchmark/ablation_older.md"
-"""Beside the page, if there is any: what was measured of older sources."""
+APPENDIX = "benchmark"
+"""Folder beside docs/ablation.md that holds the other pages; such a table may be one of them."""
+OLDER = "ablation_older.md"
+"""Among them, if there is any: what was measured of older sources."""
 ALBEDO = Figure("albedo", "albedo", "albedo, dB")
 FIGURES = (
     ALBEDO,
@@ -135,11 +137,10 @@ def write_report(folder: Path, path: Path) -> None:
     if plotted:
         image.parent.mkdir(parents=True, exist_ok=True)
         _plot(runs, image)
-    older = (path.parent / OLDER).is_file()
-    write_bytes(path, _markdown(runs, f"images/{image.name}" if plotted else None, older).encode())
+    write_bytes(path, _markdown(runs, path, f"images/{image.name}" if plotted else None).encode())
 
 
-def _markdown(runs: Mapping[tuple, Line], image: str | None, older: bool = False) -> str:
+def _markdown(runs: Mapping[tuple, Line], path: Path, image: str | None) -> str:
     rooms = sorted({room for room, _, _ in runs})
     acting = [one for one in PASSES if _acts(one.name, runs)]
     idle = [one for one in PASSES if _was_run(one.name, runs) and not _acts(one.name, runs)]
@@ -149,12 +150,13 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None, older: bool = False
     together, gone = ([name for name in others if (TOGETHER in name) is joined] for joined in (True, False))
     presets = sorted({preset for _, preset in rooms})
     codes = sorted({str(line["code"]) for line in runs.values() if "code" in line})
+    appendix = "" if path.parent.name == APPENDIX else f"{APPENDIX}/"
     lines = [
         "# What each pass gains",
         "",
         "Every pass is left out by itself (`--without PASS`) and the room is recovered again, by `scan-relight "
         "benchmark ablation ROOM ... --out DIR`; this page is `scan-relight benchmark ablation --out DIR --table "
-        "docs/ablation.md`.",
+        f"{path.as_posix()}`.",
         "A gain is the whole method's figure less the figure without the pass, under the same seed: above 0 the pass "
         "helps. After the sign ± is the standard error of the mean over the rooms by the seeds alone (by the rooms "
         "where there is one seed); rooms differ by more, as worst and best room show. Albedo: PSNR of Base Color over "
@@ -166,11 +168,11 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None, older: bool = False
         "matter, all figures jump: gains of a single seed say little.",
         "",
         "What parts of the mesh denoising gain on meshes with known noise: "
-        "[benchmark/mesh_denoising.md](benchmark/mesh_denoising.md).",
+        f"[mesh_denoising.md]({appendix}mesh_denoising.md).",
         "",
         f"Rooms ({', '.join(presets)} preset): {', '.join(_room(one) for one in rooms)}. "
         f"Seeds: {', '.join(str(seed) for seed in sorted({seed for _, seed, _ in runs}))}. "
-        f"Digest of the source: {', '.join(codes) or 'not recorded'}.",
+        f"Source of the stages (`code` in report.json): {', '.join(codes) or 'not recorded'}.",
         "",
     ]
     if image:
@@ -192,8 +194,8 @@ def _markdown(runs: Mapping[tuple, Line], image: str | None, older: bool = False
         ) + [""]
     if missing:
         lines += ["## Not measured", "", ", ".join(one.name for one in missing) + ".", ""]
-        if older:
-            lines += [f"Figures of older sources: [{OLDER}]({OLDER}).", ""]
+        if (path.parent / appendix / OLDER).is_file():
+            lines += [f"Figures of older sources: [{OLDER}]({appendix}{OLDER}).", ""]
     lines += [
         "## What they do",
         "",
