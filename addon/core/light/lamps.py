@@ -26,8 +26,6 @@ class Lamp:
         The sensor clipped it in every frame. If it is `seen` all the same, `radiance` is a lower bound.
     spread : (2,) tuple of float or None
         Standard deviation of log albedo before and after the lamp was solved for.
-    from_edges : bool
-        Its colour is that of the pixels along its edges.
     twin : int or None
         The seen lamp of its model whose radiance it takes, which explains nearly as well as `solved`, the luminance
         that was solved for.
@@ -40,7 +38,6 @@ class Lamp:
     seen: bool
     clipped: bool = False
     spread: tuple[float, float] | None = None
-    from_edges: bool = False
     twin: int | None = None
     solved: float | None = None
     mixed: bool = False
@@ -55,8 +52,6 @@ class Lamp:
         if self.spread is not None:
             before, after = self.spread
             told += f" (spread of log albedo {before:.3f} to {after:.3f})"
-        if self.from_edges:
-            told += "; its colour from its edges"
         if self.twin is not None:
             told += (
                 f": {self.solved:.3g}; that of the seen '{names[self.twin]}' explains it nearly as well, and is taken"

@@ -41,33 +41,25 @@ class Sample:
         L_d.
     received : (m, 3) float64
         E from all light known so far.
-    most : float
-        Elements that an object counts for at most; of one that has more each counts less.
     """
 
     element: np.ndarray
     object_id: np.ndarray
     radiance: np.ndarray
     received: np.ndarray
-    most: float = np.inf
 
     def __post_init__(self):
         _, self.group = np.unique(self.object_id, return_inverse=True)
-        self._weight = np.minimum(1, self.most / np.bincount(self.group))[self.group]
-        before = np.concatenate([[0.0], np.cumsum(np.bincount(self.group, self._weight))])
-        self._middle = (before[:-1] + before[1:]) / 2
+        count = np.bincount(self.group)
+        self._middle = np.cumsum(count) - count + (count - 1) // 2
 
     def _medians(self, values: np.ndarray) -> np.ndarray:
-        """Of each value ((m,)), its object's weighted median."""
-        order = np.lexsort((values, self.group))
-        reached = np.cumsum(self._weight[order])
-        at = np.minimum(np.searchsorted(reached, self._middle), len(order) - 1)
-        return values[order[at]][self.group]
+        """Of each value ((m,)), its object's median: a value, the lower of two in the middle."""
+        return values[np.lexsort((values, self.group))[self._middle]][self.group]
 
     def spread(self, log_albedo: np.ndarray) -> float:
         """Mean absolute deviation of log albedo ((m,)) from its object's median, each held at a cap."""
-        off = np.minimum(np.abs(log_albedo - self._medians(log_albedo)), LIGHT_FIT.cap)
-        return float(np.average(off, weights=self._weight))
+        return float(np.minimum(np.abs(log_albedo - self._medians(log_albedo)), LIGHT_FIT.cap).mean())
 
     def spread_under(self, log_sent: np.ndarray, received: np.ndarray) -> float:
         """The spread of log albedo under an E, (m,), of the logarithm of what is sent, (m,) (`log_of`)."""

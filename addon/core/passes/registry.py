@@ -74,7 +74,6 @@ PASSES = (
         "shading",
         clipped_lamps="Solves for lamps that the sensor clipped, from the light that they send.",
         clipped_patches="Takes what nearly all frames clip, or is far brighter than a room without objects, as lamps.",
-        fringe_colours="Takes the colour of clipped lamps from the pixels along their edges.",
         unseen_lamps="Solves for lamps that no frame sees.",
         unseen_sky="Solves for the parts of the sky that no frame sees.",
         whole_sky="Solves for the sky where no frame sees any of it.",

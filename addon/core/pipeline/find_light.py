@@ -18,7 +18,7 @@ def find_all_light(
     instances: tuple,
     seed: int = 0,
     tilted: np.ndarray | None = None,
-    colours: dict[int, np.ndarray] | None = None,
+    shining: Collection[int] = (),
     without: Collection[str] = (),
 ) -> tuple[Light, Sun | None]:
     """`find_light`, and the sun; parameters are those of `find_light`.
@@ -26,7 +26,7 @@ def find_all_light(
     A room without a patch that is short of light has what `find_light` gives, to the last bit. A field that has its
     sun keeps it.
     """
-    light = find_light(field, good, unseen_objects, instances, seed, tilted, colours, without=without)
+    light = find_light(field, good, unseen_objects, instances, seed, tilted, shining, without=without)
     field = light.without_mixed(field)
     if field.sun is not None or not len(light.received) or "sun" in without:
         return light, field.sun
@@ -38,7 +38,7 @@ def find_all_light(
     if solved is None:
         return light, None
     lit_by_sun = field.with_sun(solved.sun)
-    again = find_light(lit_by_sun, good, unseen_objects, instances, seed, tilted, colours, light, without)
+    again = find_light(lit_by_sun, good, unseen_objects, instances, seed, tilted, shining, light, without)
     if not len(again.received):
         return again, solved.sun
     # Lamps and sky that stood in for the sun no longer do, so its strength is told anew beside them.

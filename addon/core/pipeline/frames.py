@@ -25,7 +25,6 @@ from ..lit_diffuse.exact import Exact
 from ..lit_diffuse.from_picture import lit_from_picture
 from ..lit_diffuse.from_texture import lit_from_tiles
 from ..memory import give_back
-from ..passes.clipped_lamps.fringes import FringeCollector, Fringes
 from ..passes.pose_refinement.poses import Poses, Texture, refine_poses
 from ..passes.radiometric_calibration.calibrate import Calibration, calibrate
 from ..passes.sharpening.sharpen import sharpened
@@ -58,8 +57,6 @@ class Observed:
         Light from outside, as the frames saw it.
     samples : Samples
         Observations kept one by one for the specular fit.
-    fringes : Fringes
-        Colours along the edges of what was clipped.
     poses : Poses
         Where the frames were found to be.
     calibration : Calibration
@@ -69,7 +66,6 @@ class Observed:
     lit_diffuse: LitDiffuse
     environment: Environment
     samples: Samples
-    fringes: Fringes
     poses: Poses
     calibration: Calibration
 
@@ -85,7 +81,7 @@ class Observed:
     @staticmethod
     def from_arrays(arrays: dict[str, np.ndarray]) -> Observed:
         """The inverse of `arrays`."""
-        kinds = (LitDiffuse, Environment, Samples, Fringes, Poses, Calibration)
+        kinds = (LitDiffuse, Environment, Samples, Poses, Calibration)
         return Observed(*(
             kind(**{one.name: arrays[f"{part.name}.{one.name}"] for one in fields(kind)})
             for part, kind in zip(fields(Observed), kinds, strict=True)
@@ -201,19 +197,17 @@ class Passes:
         kept = SampleCollector(
             self.surface.atlas, len(frames), self.settings.seed, triangle_geometry(self.surface.mesh)[0]
         )
-        fringes = FringeCollector()
 
         def also(index, view, pixels, seen):
             sky.add(view, pixels)
             kept.add(index, seen, view)
-            fringes.add(view, pixels)
 
         lit = self.lit_diffuse(frames, progress, also)
         if not lit.seen.any():
             raise BadInputError(
                 "No frame shows any of the mesh: all pixels are invalid or the poses look elsewhere; check the frames."
             )
-        return Observed(lit, sky.result(), kept.result(), fringes.result(), poses, Calibration.none(len(frames)))
+        return Observed(lit, sky.result(), kept.result(), poses, Calibration.none(len(frames)))
 
     def all(self, frames: Sequence[Frame], progress: Progress) -> Observed:
         """What `once` finds with the poses as read, or put right; errors as its."""
@@ -259,4 +253,4 @@ def observe(passes: Passes, capture: Capture, progress: Progress) -> Observed:
         lit = lit_from_picture(mesh, stored, atlas, progress)
     else:
         lit = lit_from_tiles(mesh, atlas, progress)
-    return Observed(lit, Environment.dark(), Samples.none(), Fringes.none(), Poses.as_read(()), Calibration.none(0))
+    return Observed(lit, Environment.dark(), Samples.none(), Poses.as_read(()), Calibration.none(0))

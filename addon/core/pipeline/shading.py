@@ -83,10 +83,10 @@ def find_shading(
         patches, surface = Patches.together([patches, glass]), glass.surface(surface)
     capture = patches.capture(capture)
 
-    def shaded(lit: LitDiffuse) -> Shading:
+    def shaded(lit: LitDiffuse, shining: Collection[int] = ()) -> Shading:
         return shade(
             surface, capture.instances, lit, observed.environment, s, progress=progress,
-            find_mirrors=mirrors if s.mirrors else None, colours=observed.fringes.colours(),
+            find_mirrors=mirrors if s.mirrors else None, shining=shining,
             patches=patches.lamps if guessed else None, cameras=[frame.camera for frame in capture.frames],
         )  # fmt: skip
 
@@ -131,7 +131,7 @@ def shade(
     *,
     progress: Progress | None = None,
     find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None = None,
-    colours: dict[int, np.ndarray] | None = None,
+    shining: Collection[int] = (),
     patches: list[int] | None = None,
     cameras: Sequence[Camera] = (),
 ) -> Shading:
@@ -142,8 +142,8 @@ def shade(
     find_mirrors : callable, optional
         Tells the flat mirrors, as light is followed over them: with None for the lamps before those are known, and
         again with them.
-    colours : dict of (3,) float, optional
-        Colour of light of objects that were clipped (`fringes`).
+    shining : collection of int
+        Objects that frames show clipped, of which `lit_diffuse` holds nothing.
     patches : list of int, optional
         Objects that were set apart as they were clipped; None where the capture tells of its objects.
     cameras : sequence of Camera
@@ -162,7 +162,6 @@ def shade(
         "seed": seed,
     }
     find_mirrors = None if "mirrors" in without else find_mirrors
-    colours = None if "fringe-colours" in without else colours
     tilted = np.zeros(len(atlas)) if "tilt-error" in without else turned_by_noise(mesh, atlas, surface.noise)
 
     environment, sun = (environment, None) if "seen-sun" in without else taken_out(environment)
@@ -173,7 +172,7 @@ def shade(
     clean = lit_diffuse.seen & (lit_diffuse.tier == CLEAN)
     if "unseen-surfaces" not in without and clean.any():
         dark = with_unseen_by_light(dark, clean, **how)
-    field, light = with_all_light(dark, lit_diffuse, instances, find_mirrors, seed, tilted, colours, without)
+    field, light = with_all_light(dark, lit_diffuse, instances, find_mirrors, seed, tilted, shining, without)
     solved = np.zeros(len(atlas), bool)
     if patches is not None and "missing-light" not in without:
         field, light, solved = with_missing_light(dark, field, light, lit_diffuse, patches, cameras, without, seed)
@@ -219,7 +218,7 @@ def with_all_light(
     find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None,
     seed: int,
     tilted: np.ndarray,
-    colours: dict[int, np.ndarray] | None,
+    shining: Collection[int],
     without: Collection[str],
 ) -> tuple[LightField, Light]:
     """The room with lamps, sky, sun and mirrors, and what was found of the first two.
@@ -242,7 +241,7 @@ def with_all_light(
     # Mirrors first: what hangs opposite or over one gets light over it, which lamps would have to answer for.
     field = field.with_mirrors(find_mirrors(field, None) if find_mirrors else ())
     good = good if good.any() else seen
-    light, sun = find_all_light(field, good, unseen, instances, seed, tilted, colours, without=without)
+    light, sun = find_all_light(field, good, unseen, instances, seed, tilted, shining, without=without)
     field = field.with_mirrors(()).with_sun(sun)
     radiance = field.radiance.copy()
     for lamp in light.lamps:

@@ -272,8 +272,9 @@ def test_a_lamp_says_how_it_was_found():
         "No frame sees it; solved from the light it throws (spread of log albedo 0.500 to 0.400).": Lamp(
             1, radiance, False, spread=(0.5, 0.4)
         ),
-        "Clipped in every frame; solved from the light it throws (spread of log albedo 0.500 to 0.400); its colour "
-        "from its edges.": Lamp(1, radiance, False, clipped=True, spread=(0.5, 0.4), from_edges=True),
+        "Clipped in every frame; solved from the light it throws (spread of log albedo 0.500 to 0.400).": Lamp(
+            1, radiance, False, clipped=True, spread=(0.5, 0.4)
+        ),
         "No frame sees it; solved from the light it throws (spread of log albedo 0.500 to 0.400): 2.5; that of the "
         "seen 'lamp 3' explains it nearly as well, and is taken.": Lamp(
             1, radiance, False, spread=(0.5, 0.4), twin=3, solved=2.5

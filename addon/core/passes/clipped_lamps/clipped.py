@@ -42,14 +42,14 @@ def unseen(lit: LitDiffuse, atlas: Atlas, objects: list[int]) -> LitDiffuse:
 
 
 def shade_clipped(
-    shade: Callable[[LitDiffuse], Shading], lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()
+    shade: Callable[[LitDiffuse, Collection[int]], Shading], lit: LitDiffuse, atlas: Atlas, but: Collection[int] = ()
 ) -> Shading:
     """`shade(lit)`, with clipped lamps solved for.
 
     Parameters
     ----------
     shade : callable
-        Gives a Shading for an L_d.
+        Gives a Shading for an L_d, and objects that count in it as unseen though they shine.
     but : collection of int
         Objects that are left to `shade`.
 
@@ -60,8 +60,8 @@ def shade_clipped(
     """
     bounds = clipped_objects(lit, atlas, but)
     if not bounds:
-        return shade(lit)
-    found = shade(unseen(lit, atlas, list(bounds)))
+        return shade(lit, ())
+    found = shade(unseen(lit, atlas, list(bounds)), bounds)
     solved = {
         lamp.object_id for lamp in found.lamps
         if lamp.object_id in bounds and float(lamp.radiance @ LUMINANCE) >= bounds[lamp.object_id]
@@ -69,7 +69,7 @@ def shade_clipped(
     if len(solved) < len(bounds):
         # Once more, as the first run had nothing where those that were not solved for are: their bound lights the
         # others, and has to be there when these are solved for. Where all were solved, the first run stands.
-        found = shade(unseen(lit, atlas, list(solved)) if solved else lit)
+        found = shade(unseen(lit, atlas, list(solved)) if solved else lit, solved)
 
     return replace(
         found, lamps=tuple(replace(lamp, clipped=lamp.clipped or lamp.object_id in bounds) for lamp in found.lamps)

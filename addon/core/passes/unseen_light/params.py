@@ -9,12 +9,6 @@ class UnseenParams:
 
     Attributes
     ----------
-    clipped : int
-        Times as many elements as `LEVELS.sample` where lamps are clipped, as then all albedos hang on the solution; no
-        object counts for more than it does among those. Noise in E or G draws the solved radiance to 0: few elements
-        with many rays each find more of it than many with few (a sky of 1.7: 16,000 with 64 rays give 1.4). Lamps over
-        the truth in perturbed living rooms, two seeds each: 0.99 +- 0.06 with 4,000 elements (seven scans), 1.01 +-
-        0.035 with 16,000 (six), 1.07 +- 0.02 where large objects count for more (three).
     lamp_gain : float
         A lamp nobody saw is believed in when it lowers the spread of log albedo by at least this share.
     sweeps : int
@@ -26,7 +20,6 @@ class UnseenParams:
         1.1).
     """
 
-    clipped: int = 4
     lamp_gain: float = 0.03
     sweeps: int = 2
     darker: float = 1.25

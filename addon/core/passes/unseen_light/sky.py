@@ -9,7 +9,6 @@ import numpy as np
 
 from ...light.lamps import Lamp
 from ...light.params import LIGHT_FIT, SKY
-from ...scene.model import Instance, class_names
 from .params import UNSEEN
 
 
@@ -84,15 +83,3 @@ def all_light(
         if i != without:
             total += G[:, None] * s
     return total
-
-
-def shared_by_class(
-    colours: dict[int, np.ndarray], objects: list[int], instances: tuple[Instance, ...]
-) -> dict[int, np.ndarray]:
-    """The known colours, and for those of `objects` without one the mean of their class's."""
-    class_of = class_names(instances)
-    alike: dict[str | None, list[np.ndarray]] = {}
-    for i, colour in colours.items():
-        alike.setdefault(class_of.get(i), []).append(colour)
-    of_class = {name: np.mean(known, 0) for name, known in alike.items()}
-    return {i: of_class[class_of.get(i)] for i in objects if class_of.get(i) in of_class} | colours

@@ -1,5 +1,7 @@
 """Lamps that nobody saw shine, found one by one from what they throw, and the sky beside them."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from ...light.lamps import Lamp
@@ -10,7 +12,7 @@ from .params import UNSEEN
 from .sky import Sky, all_light
 
 
-def solve_lamps(sample: Sample, contribution, least, class_of, model, kin, seen, sky: Sky, base, colours) -> list[Lamp]:
+def solve_lamps(sample: Sample, contribution, least, class_of, model, kin, seen, sky: Sky, base) -> list[Lamp]:
     """Unseen lamps, the one that explains most first; none once the gain falls below `lamp_gain`.
 
     A small lamp lights too little of a room to gain much. So of objects whose class shines (`kin`, with its luminance)
@@ -31,26 +33,27 @@ def solve_lamps(sample: Sample, contribution, least, class_of, model, kin, seen,
         object_id = min(found, key=lambda i: found[i][2])
         by_channel = [sample.best(sample.radiance[:, c], light[:, c], left[object_id]) for c in range(3)]
         same = twin(object_id, found[object_id][2], sample, sent, received, left[object_id], model, seen)
-        known = colours.get(object_id)
-        lamps.append(_coloured(object_id, *found[object_id], class_of, same, seen, sample.received, by_channel, known))
+        lamps.append(_coloured(object_id, *found[object_id], class_of, same, seen, sample.received, by_channel))
         del left[object_id]
     return lamps
 
 
-def needed(sample: Sample, lamps: list[Lamp], contribution, sky: Sky, base, colours) -> tuple[list[Lamp], Sky]:
-    """The lamps and sky found; lamps that nobody saw shine only where the sky alone, which is there, explains less."""
-    shining = [lamp for lamp in lamps if lamp.object_id in colours]
-    if not sky.contribution or len(shining) == len(lamps):
+def needed(
+    sample: Sample, lamps: list[Lamp], contribution, sky: Sky, base, shining: Collection[int]
+) -> tuple[list[Lamp], Sky]:
+    """The lamps and sky found; lamps that are not surely `shining` shine only where the sky alone explains less."""
+    sure = [lamp for lamp in lamps if lamp.object_id in shining]
+    if not sky.contribution or len(sure) == len(lamps):
         return lamps, sky
     alone = Sky(sky.contribution, sky.guess, sky.clipped, sky.told)
     for _ in range(UNSEEN.sweeps):
-        solve_sky(sample, shining, contribution, alone, base)
+        solve_sky(sample, sure, contribution, alone, base)
     sent = log_of(sample.radiance @ LUMINANCE)
     with_lamps, without = (
         sample.spread_under(sent, all_light(base, some, contribution, above) @ LUMINANCE)
-        for some, above in ((lamps, sky), (shining, alone))
+        for some, above in ((lamps, sky), (sure, alone))
     )
-    return (lamps, sky) if with_lamps < (1 - UNSEEN.lamp_gain) * without else (shining, alone)
+    return (lamps, sky) if with_lamps < (1 - UNSEEN.lamp_gain) * without else (sure, alone)
 
 
 def twin(object_id: int, least: float, sample: Sample, sent, received, contribution, model, seen) -> Lamp | None:
@@ -67,17 +70,15 @@ def twin(object_id: int, least: float, sample: Sample, sent, received, contribut
     return alike[int(np.argmin(spread))]
 
 
-def _coloured(object_id, s, before, after, class_of, same, seen, received, by_channel, known) -> Lamp:
+def _coloured(object_id, s, before, after, class_of, same, seen, received, by_channel) -> Lamp:
     """Give a solved luminance its colour.
 
-    That of a lamp that is the `same` as a seen one; else that which is `known` from its edges; else what each channel
-    says by itself, if together they make that luminance; else that of the lamps, or of the light.
+    That of a lamp that is the `same` as a seen one; else what each channel says by itself, if together they make that
+    luminance; else that of the lamps, or of the light.
     """
     spread = float(before), float(after)
     if same is not None:
         return Lamp(int(object_id), same.radiance, False, spread=spread, twin=same.object_id, solved=float(s))
-    if known is not None:
-        return Lamp(int(object_id), (s * known).astype(np.float32), False, spread=spread, from_edges=True)
     alike = [lamp for lamp in seen if class_of.get(lamp.object_id) == class_of.get(object_id)]
     solved = [found[0] for found in by_channel if found is not None]
     if not alike and len(solved) == 3:

@@ -21,7 +21,7 @@ from ...luminance import LUMINANCE
 from ...scene.model import Instance, class_names
 from ...significance import LEVELS
 from .params import UNSEEN
-from .sky import Sky, shared_by_class
+from .sky import Sky
 from .unseen_lamps import needed, solve_lamps, solve_sky
 from .whole_sky import with_whole_sky
 
@@ -90,7 +90,7 @@ def find_light(
     instances: tuple[Instance, ...],
     seed: int = 0,
     tilted: np.ndarray | None = None,
-    colours: dict[int, np.ndarray] | None = None,
+    shining: Collection[int] = (),
     before: Light | None = None,
     without: Collection[str] = (),
 ) -> Light:
@@ -107,8 +107,8 @@ def find_light(
         Objects of which no frame saw anything.
     tilted : (n,) float, optional
         Radians, how far the mesh's noise may have turned each element: E of those turned much tells little.
-    colours : dict of (3,) float, optional
-        Colour of light that is known of unseen objects, of luminance 1.
+    shining : collection of int
+        Of the unseen objects, those that surely are lamps.
     before : Light, optional
         What was found in the same room without its sun, or of its mixed lamps.
     without : collection of str
@@ -120,11 +120,10 @@ def find_light(
     flat = on_flat(field.atlas)
     if tilted is not None:
         flat &= tilted < np.arccos(LIGHT_FIT.flat)
-    clipped = any(i in (colours or {}) for i in unseen_objects)
     usable = steady(field, good, flat) | barely_seen(field, good)
     # What a mirror shows is no albedo.
     usable &= ~np.isin(field.atlas.object_id, [mirror.object_id for mirror in field.mirrors])
-    element = pick(field, usable, seed, LEVELS.sample * (UNSEEN.clipped if clipped else 1))
+    element = pick(field, usable, seed, LEVELS.sample)
     if not len(element):
         return Light((), field.environment, (), element, np.zeros((0, 3)), mixed=mixed)
     old = before.contribution if before is not None and field.environment.seen else None
@@ -154,16 +153,14 @@ def find_light(
         mixed = tuple(mixed_lamps(seen, atlas.object_id[good]))
         if mixed:
             told = Light((), shown.environment, (), element, filled, mixed=mixed)
-            return find_light(shown, good, unseen_objects, instances, seed, tilted, colours, told, without)
+            return find_light(shown, good, unseen_objects, instances, seed, tilted, shining, told, without)
     lit = ~np.isin(atlas.object_id[element], [lamp.object_id for lamp in seen])
     if (lit & flat[element]).sum() >= LEVELS.many:
         lit &= flat[element]
     if lit.sum() < LEVELS.enough:
         return Light(tuple(seen), environment, found, element, filled, mixed=mixed)
     sent = field.radiance[element[lit]].astype(np.float64)
-    # About half of the elements are on flat spots, of large objects as of small ones.
-    most = LEVELS.sample / len(np.unique(atlas.object_id[element])) / 2 if clipped else np.inf
-    sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit], most)
+    sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit])
     # The same lamp hung several times is one unknown.
     model, kin = lamp_models(field.mesh, instances), of_shining_class(seen, atlas.object_id[good], instances)
     alike: dict[int, list[int]] = {}
@@ -171,10 +168,10 @@ def find_light(
         alike.setdefault(model.get(one, one), []).append(one)
     alike = {own[0]: own for own in alike.values()}
     if len(alike) > LEVELS.most:
-        shining = [i for i in alike if i in kin]
+        of_class = [i for i in alike if i in kin]
         others = [i for i in alike if i not in kin]
         best = reaching_most(field, sample.element, [alike[i] for i in others], LEVELS.most, seed)
-        alike = {i: alike[i] for i in [*shining, *(others[k] for k in best)][: LEVELS.most]}
+        alike = {i: alike[i] for i in [*of_class, *(others[k] for k in best)][: LEVELS.most]}
     earlier = old if old is not None and np.array_equal(old.element, sample.element) else None
     if earlier is not None:
         contribution, least = earlier.lamps, earlier.least
@@ -186,18 +183,12 @@ def find_light(
 
     sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.told for z in zones])
     class_of = class_names(instances)
-    known_colours = shared_by_class(colours or {}, unseen_objects, instances)
-    colours = {i: np.mean([known_colours[one] for one in own], 0) for i, own in alike.items() if i in known_colours}
-
+    surely = {i for i, own in alike.items() if not set(own).isdisjoint(shining)}
     for _ in range(UNSEEN.sweeps if zones else 1):
-        lamps = solve_lamps(sample, contribution, least, class_of, model, kin, seen, sky, received[lit], colours)
+        lamps = solve_lamps(sample, contribution, least, class_of, model, kin, seen, sky, received[lit])
         solve_sky(sample, lamps, contribution, sky, received[lit])
-    lamps, sky = needed(sample, lamps, contribution, sky, received[lit], colours)
-    lamps = [
-        replace(lamp, object_id=one, radiance=of_colour(lamp, known_colours.get(one)), mixed=one in mixed)
-        for lamp in lamps
-        for one in alike[lamp.object_id]
-    ]
+    lamps, sky = needed(sample, lamps, contribution, sky, received[lit], surely)
+    lamps = [replace(lamp, object_id=one, mixed=one in mixed) for lamp in lamps for one in alike[lamp.object_id]]
     lamps = [as_shown(lamp, shown) if lamp.mixed else lamp for lamp in lamps]
     for zone, radiance in zip(zones, sky.radiance, strict=True):
         environment = environment.with_zone(zone, radiance.astype(np.float32))
@@ -224,13 +215,6 @@ def bright_all_over(field: LightField, element: np.ndarray, irradiance: np.ndarr
         if find_seen(atlas.object_id[own], field.radiance[own], np.broadcast_to(E, (len(own), 3))):
             found.append(lamp)
     return found
-
-
-def of_colour(lamp: Lamp, known: np.ndarray | None) -> np.ndarray:
-    """A lamp's radiance ((3,) float32), in the colour of its own edges where the lamp has one of edges."""
-    if known is None or not lamp.from_edges:
-        return lamp.radiance
-    return (lamp.radiance @ LUMINANCE * known).astype(np.float32)
 
 
 def as_shown(lamp: Lamp, field: LightField) -> Lamp:

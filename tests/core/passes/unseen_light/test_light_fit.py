@@ -3,23 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from addon.core.light.environment import EnvironmentAccumulator
-from addon.core.light.light_fit import Sample, on_flat
-from addon.core.passes.unseen_light.sky import shared_by_class
-from addon.core.scene.model import Instance
+from addon.core.light.light_fit import on_flat
 from tests.core.light.test_environment import FAR_BELOW, add
 from tests.core.rooms import look_at, make_room, quad
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-TRUE = np.array([[20.0, 18.0, 15.0], [1.0, 1.2, 1.5]])
-
-
-def test_a_colour_is_shared_by_a_class():
-    instances = (Instance(1, "lamp"), Instance(2, "lamp"), Instance(3, "wall"))
-    shared = shared_by_class({1: TRUE[0]}, [1, 2, 3], instances)
-    assert sorted(shared) == [1, 2] and (shared[2] == TRUE[0]).all()
 
 
 def test_flat_spots():
@@ -46,11 +34,3 @@ def test_a_clipped_sky_is_a_bound_and_gives_way_to_what_is_not():
     zone = next(zone for zone in environment.unknown_zones() if zone.clipped)
     assert (zone.weight[clipped] == 1).all() and not zone.weight[other].all()
     assert environment.with_zone(zone, np.float32([20] * 3)).clipped is clipped
-
-
-def test_heavy_objects_count_for_no_more():
-    """An object of many elements counts for `most` of them."""
-    ids = np.repeat([0, 1, 2], [30, 30, 600])
-    log_albedo = np.where(np.arange(660) % 2, 0.1, 0.0) * (ids < 2)
-    one = Sample(np.arange(660), ids, np.ones((660, 3)), np.ones((660, 3)), 30.0)
-    assert one.spread(log_albedo) == pytest.approx(0.1 / 2 * 2 / 3, abs=1e-9)

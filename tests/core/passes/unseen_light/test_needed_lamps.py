@@ -25,7 +25,7 @@ def solved(sky: float, lamp: float, wrong_sky: float, wrong_lamp: float, shining
     found = Sky([FROM_SKY], [np.full(3, 2.5)], [False], [False])
     found.radiance[0] = np.full(3, wrong_sky)
     lamps = [Lamp(LAMP, np.full(3, wrong_lamp, np.float32), False)]
-    return needed(sample, lamps, {LAMP: FROM_LAMP}, found, BASE, dict.fromkeys(shining, np.ones(3)))
+    return needed(sample, lamps, {LAMP: FROM_LAMP}, found, BASE, shining)
 
 
 def test_a_lamp_that_the_sky_alone_makes_needless_goes():
