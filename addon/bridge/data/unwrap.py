@@ -17,6 +17,8 @@ from ...core.scene.uv_overlap import layers, overlapping_pairs
 from .arrays import layer_of, make_mesh, set_layer
 from .shown import shown
 
+_PROJECTION_ANGLE = 1.15
+_EXPECTED_FILL = 0.6
 _LAYER = "ScanRelight"
 
 
@@ -123,6 +125,7 @@ def _projected(points, vertex, start):
         start,
         np.zeros((len(vertex), 2)),
         bpy.ops.uv.smart_project,
+        angle_limit=_PROJECTION_ANGLE,
         island_margin=0.0,
         area_weight=0.0,
         correct_aspect=False,
@@ -143,7 +146,7 @@ def _packed(points, corners, uv, size, margin_texels):
 
     Boxes are packed, not outlines: now that sparse islands are cut, outlines fill no more and can take minutes.
     """
-    uv = (uv * np.sqrt(SURFACE.expected_fill / max(areas(uv).sum(), 1e-12))).astype(np.float32)
+    uv = (uv * np.sqrt(_EXPECTED_FILL / max(areas(uv).sum(), 1e-12))).astype(np.float32)
 
     def placed(turn, margin):
         return _laid_out(
