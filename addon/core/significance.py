@@ -1,11 +1,11 @@
-"""What counts as beyond chance, and how few are too few to tell, wherever that is asked."""
+"""What counts as beyond chance, how few are too few to tell, and how many are enough, wherever that is asked."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class SignificanceParams:
-    """One set of levels for all passes.
+    """One set of levels, sizes and rounds for all passes.
 
     Attributes
     ----------
