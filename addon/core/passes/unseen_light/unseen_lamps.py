@@ -91,15 +91,27 @@ def _coloured(object_id, s, before, after, class_of, same, seen, received, by_ch
 
 
 def solve_sky(sample: Sample, lamps, contribution, sky: Sky, base) -> None:
-    """Radiance of the sky's unknown parts, channel by channel, one after another."""
+    """Radiance of the sky's unknown parts, channel by channel, one after another.
+
+    What explains no better than the guess stays that: a part that lights little of the room tells nothing of itself.
+    """
     for i, G in enumerate(sky.contribution):
         others = all_light(base, lamps, contribution, sky, without=i)
         likely = sky.bounds(i)[1] if sky.clipped[i] else sky.guess[i]
         if (G[:, None] * likely).mean() < SKY.least_share * others.mean():
             continue
-        found = [sample.best(sample.radiance[:, c], others[:, c], G) for c in range(3)]
-        solved = [one[0] for one in found if one is not None]
-        if len(solved) < 3:
-            continue
-        sky.solved.add(i)
-        sky.radiance[i] = np.clip(solved, *sky.bounds(i))
+        low, high = sky.bounds(i)
+        radiance = sky.guess[i].copy()
+        for c in range(3):
+            sent = sample.radiance[:, c]
+            found = sample.best(sent, others[:, c], G)
+            if found is None:
+                break
+            solved = np.clip(found[0], low[c], high[c])
+            if sample.spread_under(log_of(sent), others[:, c] + solved * G) < sample.spread_under(
+                log_of(sent), others[:, c] + radiance[c] * G
+            ):
+                radiance[c] = solved
+        else:
+            sky.radiance[i] = radiance
+            (sky.solved.discard if np.array_equal(radiance, sky.guess[i]) else sky.solved.add)(i)
