@@ -32,8 +32,8 @@ from .params import POSES
 if TYPE_CHECKING:
     from ...light.field import LightField
 
-ROTATION, WAY = np.radians(1.0), 0.03
-"""Radians and metres, standard deviations that are expected: what the pictures don't tell stays as it is."""
+ROTATION = np.radians(1.0)
+"""Standard deviation of a rotation that is expected of poses of which nothing is known."""
 
 
 @dataclass(frozen=True)
@@ -150,13 +150,16 @@ def _flow(camera: Camera, points: np.ndarray) -> np.ndarray:
     return np.stack([(moved(camera, way).project(points)[0] - here) / small for way in ways], -1)
 
 
-def step_of(camera: Camera, pixels: Pixels, texture: Texture) -> Step | None:
+def step_of(camera: Camera, pixels: Pixels, texture: Texture, rotation: float = ROTATION) -> Step | None:
     """Compare a picture with the texture; None where too little of it shows anything.
 
     Parameters
     ----------
     camera : Camera
         Of this very picture.
+    rotation : float
+        Radians about each axis, the standard deviation that is expected; and of the place what moves the picture as
+        much. Turning and moving look nearly alike: what the picture does not tell apart stays as it is.
     """
     floor = texture.floor
     picture = np.log(np.maximum(pixels.radiance, 0) + floor).mean(-1).astype(np.float64)
@@ -181,19 +184,22 @@ def step_of(camera: Camera, pixels: Pixels, texture: Texture) -> Step | None:
     # The texture's image T moves with the camera: T - gradient . flow way + gain = picture.
     change = -(dx[y, x, None] * flow[:, 0] + dy[y, x, None] * flow[:, 1])
     telling = steep[y, x] ** 2
-    way = _fit(np.column_stack([change, np.ones(len(x))]), residual, telling)
+    expected = rotation * np.r_[np.ones(3), np.full(3, np.median(distance[known]))]
+    way = _fit(np.column_stack([change, np.ones(len(x))]), residual, telling, expected)
     far = float(np.sqrt(((flow @ way) ** 2).sum(1).mean()))
     left = np.abs(residual - weighted_median(residual, telling))
     return Step(way, far, float(np.average(np.minimum(left, LEVELS.outlier * POSES.least_spread), weights=telling)))
 
 
-def _fit(change: np.ndarray, residual: np.ndarray, telling: np.ndarray) -> np.ndarray:
+def _fit(change: np.ndarray, residual: np.ndarray, telling: np.ndarray, expected: np.ndarray) -> np.ndarray:
     """The six ways, (6,), by robust least squares under a prior; the last column of `change` is a gain's.
+
+    `expected` ((6,)) are the prior's standard deviations.
 
     `telling` ((m,)) weighs the pixels where it is told how large residuals usually are: where the picture is flat they
     are small wherever the camera is, and would make those at edges look like outliers.
     """
-    prior = np.diag(np.r_[np.full(3, ROTATION**-2), np.full(3, WAY**-2), 0])
+    prior = np.diag(np.r_[expected**-2, 0])
     way = np.zeros(7)
     for _ in range(LEVELS.reweighted):
         left = residual - change @ way
@@ -233,10 +239,11 @@ def refine_poses(
         From `progress`.
     """
 
-    def look(item: tuple[Frame, Camera]) -> Step | None:
+    def look(item: tuple[Frame, Camera], shift: float = np.inf) -> Step | None:
         frame, camera = item
         step = -(-camera.width // SMALL.width)
-        return step_of(camera.coarser(step), read(frame).coarser(step), texture)
+        small = camera.coarser(step)
+        return step_of(small, read(frame).coarser(step), texture, min(shift * small.pixel_angle, ROTATION))
 
     asked = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, AGREEMENT.count).round().astype(int))]
     each = bytes_of_frame(frame.camera for frame in frames)
@@ -250,7 +257,8 @@ def refine_poses(
     moves = np.ones(len(frames), bool)
     for turn in range(POSES.rounds):
         todo = np.flatnonzero(moves)
-        steps = ordered_map(look, [(frames[i], cameras[i]) for i in todo], threads, each=each)
+        # Frames are off by as much as those that were asked: what one needs is expected of all.
+        steps = ordered_map(lambda item: look(item, shift), [(frames[i], cameras[i]) for i in todo], threads, each=each)
         for done, (i, step) in enumerate(zip(todo, steps, strict=True), 1):
             if progress is not None:
                 progress.update((turn + done / len(todo)) / POSES.rounds)
