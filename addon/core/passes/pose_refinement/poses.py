@@ -184,11 +184,13 @@ def step_of(camera: Camera, pixels: Pixels, texture: Texture, rotation: float = 
     # The texture's image T moves with the camera: T - gradient . flow way + gain = picture.
     change = -(dx[y, x, None] * flow[:, 0] + dy[y, x, None] * flow[:, 1])
     telling = steep[y, x] ** 2
-    expected = rotation * np.r_[np.ones(3), np.full(3, np.median(distance[known]))]
+    # What frames show of the sky tells no distance.
+    far = min(float(np.median(distance[known])), texture.field.scene.diagonal)
+    expected = rotation * np.r_[np.ones(3), np.full(3, far)]
     way = _fit(np.column_stack([change, np.ones(len(x))]), residual, telling, expected)
-    far = float(np.sqrt(((flow @ way) ** 2).sum(1).mean()))
+    shift = float(np.sqrt(((flow @ way) ** 2).sum(1).mean()))
     left = np.abs(residual - weighted_median(residual, telling))
-    return Step(way, far, float(np.average(np.minimum(left, LEVELS.outlier * POSES.least_spread), weights=telling)))
+    return Step(way, shift, float(np.average(np.minimum(left, LEVELS.outlier * POSES.least_spread), weights=telling)))
 
 
 def _fit(change: np.ndarray, residual: np.ndarray, telling: np.ndarray, expected: np.ndarray) -> np.ndarray:
