@@ -100,18 +100,29 @@ def solve_sky(sample: Sample, lamps, contribution, sky: Sky, base) -> None:
         likely = sky.bounds(i)[1] if sky.clipped[i] else sky.guess[i]
         if (G[:, None] * likely).mean() < SKY.least_share * others.mean():
             continue
-        low, high = sky.bounds(i)
-        radiance = sky.guess[i].copy()
-        for c in range(3):
-            sent = sample.radiance[:, c]
-            found = sample.best(sent, others[:, c], G)
-            if found is None:
-                break
-            solved = np.clip(found[0], low[c], high[c])
-            if sample.spread_under(log_of(sent), others[:, c] + solved * G) < sample.spread_under(
-                log_of(sent), others[:, c] + radiance[c] * G
-            ):
-                radiance[c] = solved
+        bounds = np.transpose(sky.bounds(i))
+        each = [
+            _explaining(sample, sample.radiance[:, c], others[:, c], G, sky.guess[i][c], bounds[c]) for c in range(3)
+        ]
+        found = [s for s in each if s is not None]
+        if len(found) < 3:
+            continue
+        sky.radiance[i] = np.array(found)
+        if np.array_equal(found, sky.guess[i]):
+            sky.solved.discard(i)
         else:
-            sky.radiance[i] = radiance
-            (sky.solved.discard if np.array_equal(radiance, sky.guess[i]) else sky.solved.add)(i)
+            sky.solved.add(i)
+
+
+def _explaining(sample: Sample, sent, others, contribution, guess: float, bounds) -> float | None:
+    """A channel of a part of the sky: what explains best what is `sent`, or the guess; None if unbounded.
+
+    `best` alone does not do: the least radiance that it tries may be far more than there is.
+    """
+    found = sample.best(sent, others, contribution)
+    if found is None:
+        return None
+    log_sent = log_of(sent)
+    return min(
+        (guess, np.clip(found[0], *bounds)), key=lambda s: sample.spread_under(log_sent, others + s * contribution)
+    )

@@ -16,11 +16,11 @@ SHOWN = np.random.default_rng(5).uniform(0, 1, M) ** 3
 GUESS = np.array([2.0, 2.5, 2.9])
 
 
-def solved(true: np.ndarray, share: float, clipped: bool, noise: float) -> Sky:
+def solved(true: np.ndarray, share: float, clipped: bool) -> Sky:
     """What is found of a part of the sky that gives `share` of E at radiance 1."""
     rng = np.random.default_rng(6)
     G = share * SHOWN / SHOWN.mean()
-    albedo = np.array([0.2, 0.5, 0.7, 0.4])[np.arange(M) % 4] * np.exp(rng.normal(0, noise, M))
+    albedo = np.array([0.2, 0.5, 0.7, 0.4])[np.arange(M) % 4] * np.exp(rng.normal(0, 0.02, M))
     received = BASE + G[:, None] * true
     sample = Sample(np.arange(M), np.arange(M) % 4, albedo[:, None] * received, BASE)
     sky = Sky([G], [GUESS], [clipped], [True])
@@ -29,17 +29,17 @@ def solved(true: np.ndarray, share: float, clipped: bool, noise: float) -> Sky:
 
 
 def test_a_clipped_part_that_lights_the_room_is_solved_for():
-    sky = solved(4 * GUESS, 0.1, True, 0.02)
+    sky = solved(4 * GUESS, 0.1, True)
     assert sky.radiance[0] == pytest.approx(4 * GUESS, rel=0.05) and sky.solved == {0}
 
 
 def test_a_clipped_part_is_no_darker_than_it_was_seen():
-    sky = solved(0.5 * GUESS, 0.1, True, 0.02)
+    sky = solved(0.5 * GUESS, 0.1, True)
     assert sky.radiance[0].tolist() == GUESS.tolist() and not sky.solved and not sky.notes()
 
 
 @pytest.mark.parametrize("clipped", [False, True])
 def test_a_part_that_gives_next_to_nothing_stays_as_it_was_seen(clipped):
     """Even the least radiance that is tried, .7 % of all light, explains worse than what frames show."""
-    sky = solved(GUESS, 3e-4, clipped, 0.02)
+    sky = solved(GUESS, 3e-4, clipped)
     assert sky.radiance[0] == pytest.approx(GUESS, rel=0.3)
