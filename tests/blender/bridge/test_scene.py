@@ -8,6 +8,7 @@ import pytest
 from addon.core.brdf.emitter import EMITTER, LAMP_ALBEDO
 from addon.core.brdf.lambertian import LAMBERTIAN
 from addon.core.brdf.material import ObjectMaterial
+from addon.core.brdf.metal import METAL
 from addon.core.errors import StorageError
 from addon.core.io.exr import write_exr
 from addon.core.pipeline.parts import Parts
@@ -102,6 +103,45 @@ def test_it_renders_when_opened_elsewhere(scene, tmp_path, result, capture, fres
     np.testing.assert_allclose(picture[:, 1:3].mean((0, 1)), [0.2, 0.5, 0.8], rtol=0.02)
     lamp = np.array([6, 3, 1.5]) + LAMP_ALBEDO  # what it gives, and what it reflects of that world
     np.testing.assert_allclose(picture[:, 5:7].mean((0, 1)), lamp, rtol=1e-3)
+
+
+@pytest.mark.slow
+def test_light_over_a_mirror_is_all_there(scene, tmp_path, result, capture):
+    """A floor lit over a mirror alone gets E = L A cos^2 / d^2 from a small lamp, d by way of the mirror."""
+
+    def square(x, half, z, up):
+        corners = np.array([[x - half, -half, z], [x + half, -half, z], [x + half, half, z], [x - half, half, z]])
+        return corners if up else corners[::-1]
+
+    # From below: the floor, a black plate that keeps the lamp's own light off it, the lamp, the mirror.
+    sides = [square(0, 0.1, 0, True), square(1, 0.06, 0.99, False), square(1, 0.05, 1, True), square(0, 2, 1.5, False)]
+    triangles = np.concatenate([np.array([[0, 1, 2], [0, 2, 3]]) + 4 * k for k in range(4)]).astype(np.int32)
+    mesh = Mesh(np.concatenate(sides), triangles, np.repeat([4, 5, 9, 6], 2).astype(np.int32))
+    names = {4: "floor", 5: "plate", 9: "lamp", 6: "mirror"}
+    pose = np.eye(4)
+    pose[2, 3] = 0.5
+    frame = Frame("frame", tmp_path, Camera(8, 8, 80, 80, 4, 4, pose))
+    room = Capture(tmp_path, mesh, tuple(Instance(i, name) for i, name in names.items()), (frame,))
+    materials = [
+        ObjectMaterial(4, "floor", LAMBERTIAN), ObjectMaterial(5, "plate", LAMBERTIAN),
+        ObjectMaterial(9, "lamp", EMITTER, emission=(400.0, 400.0, 400.0), unlit=0.0),
+        ObjectMaterial(6, "mirror", METAL, alpha=0.0, f0=(1.0, 1.0, 1.0)),
+    ]  # fmt: skip
+    color = np.zeros((8, 8, 3), np.float32)
+    color[:, :4] = 0.5
+    write_exr(result / "base_color.exr", color)
+    write_exr(result / "environment.exr", np.zeros((4, 8, 3), np.float32))
+    left = np.float32([[0.1, 0.1], [0.4, 0.1], [0.4, 0.4]])
+    uv = np.stack([left, left] + [left + (0.5, 0)] * 6)
+    write_scene(result / "scene.blend", room, uv, materials, result, 0.36)
+    bpy.ops.wm.open_mainfile(filepath=str(result / "scene.blend"))
+    opened = bpy.context.scene
+    opened.cycles.samples, opened.cycles.use_denoising, opened.cycles.use_adaptive_sampling = 4096, False, False
+    opened.render.image_settings.file_format, opened.render.image_settings.color_depth = "OPEN_EXR", "32"
+    opened.render.filepath = str(tmp_path / "render.exr")
+    bpy.ops.render.render(write_still=True)
+    picture = np.array(bpy.data.images.load(opened.render.filepath).pixels[:]).reshape(8, 8, 4)[2:6, 2:6, :3]
+    assert picture.mean() == pytest.approx(0.5 / np.pi * 400 * 0.1**2 * (4 / 5) / 5, rel=0.03)
 
 
 def test_the_open_file_is_left_alone(scene, result, capture):
