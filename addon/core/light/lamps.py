@@ -1,6 +1,6 @@
 """Lamps that the frames see: objects that give more light than they could reflect."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +8,8 @@ import numpy as np
 from ..groups import by_number
 from ..luminance import LUMINANCE
 from ..scene.elements import triangle_geometry
-from ..scene.model import Instance, Mesh
+from ..scene.model import Instance, Mesh, class_names
+from ..significance import LEVELS
 from .params import LIGHT_FIT
 
 
@@ -77,7 +78,66 @@ def find_seen(object_id: np.ndarray, radiance: np.ndarray, irradiance: np.ndarra
     return lamps
 
 
-def of_shining_class(lamps: Collection[Lamp], clean: np.ndarray, instances: tuple[Instance, ...]) -> dict[int, float]:
+@dataclass(frozen=True)
+class Kinds:
+    """Which objects are of one kind.
+
+    Attributes
+    ----------
+    class_of : dict of str
+        The class of each object that the capture tells of; empty where it tells none.
+    model : dict of int
+        Of each object the first that would be the same lamp hung once more, or its own number.
+    """
+
+    class_of: dict[int, str]
+    model: dict[int, int]
+
+    def classes(self) -> dict[str, list[int]]:
+        """The objects of each class that was told."""
+        members: dict[str, list[int]] = {}
+        for one, name in self.class_of.items():
+            if name:
+                members.setdefault(name, []).append(one)
+        return members
+
+
+def kinds(mesh: Mesh, instances: Iterable[Instance], noise: float = 0.0) -> Kinds:
+    """Classes as told, and as models those of a class that are of about one size.
+
+    Parameters
+    ----------
+    noise : float
+        That a scan had along its normals, in metres.
+    """
+    size, class_of = radius_of_gyration(mesh), class_names(instances)
+    told = Kinds(class_of, {one: one for one in class_of})
+    for members in told.classes().values():
+        firsts: list[int] = []
+        for one in members:
+            own = size[one] if one < len(size) else 0.0
+            apart = LIGHT_FIT.same * own + LEVELS.likely * noise
+            like = [i for i in firsts if abs(own - size[i]) <= apart] if own else []
+            if like:
+                told.model[one] = like[0]
+            elif own:
+                firsts.append(one)
+    return told
+
+
+def radius_of_gyration(mesh: Mesh) -> np.ndarray:
+    """Root mean square distance of each object's surface from its centroid in metres, (objects,) float64.
+
+    A scan's noise changes it less than an area, as that grows with every triangle that is tilted.
+    """
+    area, middle = triangle_geometry(mesh)[1], mesh.vertices[mesh.triangles].mean(1, dtype=np.float64)
+    total = np.maximum(np.bincount(mesh.object_id, area), 1e-30)
+    centroid = np.stack([np.bincount(mesh.object_id, area * middle[:, k]) / total for k in range(3)], 1)
+    off = ((middle - centroid[mesh.object_id]) ** 2).sum(1)
+    return np.sqrt(np.bincount(mesh.object_id, area * off) / total)
+
+
+def of_shining_class(lamps: Collection[Lamp], clean: np.ndarray, kinds: Kinds) -> dict[int, float]:
     """Objects of a class of which most that frames show unmixed are lamps, with the median luminance of those.
 
     The capture has to tell classes.
@@ -90,15 +150,12 @@ def of_shining_class(lamps: Collection[Lamp], clean: np.ndarray, instances: tupl
         Objects that have an element whose L_d rests on clean observations, each at least once.
     """
     luminance = {lamp.object_id: float(lamp.radiance @ LUMINANCE) for lamp in lamps}
-    members: dict[str, list[int]] = {}
-    for one in instances:
-        members.setdefault(one.class_name, []).append(one.object_id)
     shown = set(np.unique(clean).tolist())
     found: dict[int, float] = {}
-    for name, own in members.items():
+    for own in kinds.classes().values():
         seen = shown & set(own)
         shining = [luminance[i] for i in seen if i in luminance]
-        if name and len(shining) * 2 > len(seen):
+        if len(shining) * 2 > len(seen):
             found |= dict.fromkeys(own, float(np.median(shining)))
     return found
 
@@ -116,27 +173,3 @@ def mixed_lamps(lamps: Collection[Lamp], clean: np.ndarray) -> list[int]:
     """
     shown = set(np.unique(clean).tolist())
     return [lamp.object_id for lamp in lamps if lamp.seen and lamp.object_id not in shown]
-
-
-def lamp_models(mesh: Mesh, instances: tuple[Instance, ...]) -> dict[int, int]:
-    """Which objects would be the same lamp hung several times: of one class that was told, and of about the same area.
-
-    That of their triangles: the elements of a bulb are too few to measure it by.
-
-    Returns
-    -------
-    dict of int
-        Of each object the first that is like it, or its own number.
-    """
-    area = np.bincount(mesh.object_id, triangle_geometry(mesh)[1])
-    model: dict[int, int] = {}
-    firsts: dict[str, list[int]] = {}
-    for one in instances:
-        told = one.class_name and one.object_id < len(area)
-        own = area[one.object_id] if told else 0.0
-        known = firsts.setdefault(one.class_name, [])
-        like = [i for i in known if abs(own - area[i]) <= LIGHT_FIT.same * area[i]] if own else []
-        model[one.object_id] = like[0] if like else one.object_id
-        if own and not like:
-            known.append(one.object_id)
-    return model

@@ -111,7 +111,7 @@ class LightFitParams:
         Relative difference up to which two solutions of one lamp's luminance agree: by all channels together and each
         by itself, or as pixels show it.
     same : float
-        Relative difference of area up to which two objects of a class can be the same lamp: a scan's noise and holes.
+        Relative difference of size up to which two objects of a class can be the same lamp, besides a scan's noise.
     reach : float
         Factor within which a lamp's luminance is its class's, and a sky's radiance its middle's.
     rays, emitter_rays : int
@@ -125,7 +125,7 @@ class LightFitParams:
     flat_cell: float = 0.08
     flat: float = 0.99
     alike: float = 0.25
-    same: float = 0.1
+    same: float = 0.05
     reach: float = 3.0
     rays: int = 256
     emitter_rays: int = 64

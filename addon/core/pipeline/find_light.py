@@ -6,6 +6,7 @@ import numpy as np
 
 from ..light.few_elements import from_sun, irradiance_at
 from ..light.field import LightField
+from ..light.lamps import Kinds
 from ..light.sun import Sun
 from ..passes.sun.sun_fit import find_sun
 from ..passes.unseen_light.unseen_light import Light, find_light, lit_by
@@ -15,7 +16,7 @@ def find_all_light(
     field: LightField,
     good: np.ndarray,
     unseen_objects: list[int],
-    instances: tuple,
+    kinds: Kinds,
     seed: int = 0,
     tilted: np.ndarray | None = None,
     shining: Collection[int] = (),
@@ -26,7 +27,7 @@ def find_all_light(
     A room without a patch that is short of light has what `find_light` gives, to the last bit. A field that has its
     sun keeps it.
     """
-    light = find_light(field, good, unseen_objects, instances, seed, tilted, shining, without=without)
+    light = find_light(field, good, unseen_objects, kinds, seed, tilted, shining, without=without)
     field = light.without_mixed(field)
     if field.sun is not None or not len(light.received) or "sun" in without:
         return light, field.sun
@@ -38,7 +39,7 @@ def find_all_light(
     if solved is None:
         return light, None
     lit_by_sun = field.with_sun(solved.sun)
-    again = find_light(lit_by_sun, good, unseen_objects, instances, seed, tilted, shining, light, without)
+    again = find_light(lit_by_sun, good, unseen_objects, kinds, seed, tilted, shining, light, without)
     if not len(again.received):
         return again, solved.sun
     # Lamps and sky that stood in for the sun no longer do, so its strength is told anew beside them.

@@ -4,7 +4,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from ...light.lamps import Lamp
+from ...light.lamps import Kinds, Lamp
 from ...light.light_fit import Sample, log_of
 from ...light.params import LIGHT_FIT, SKY
 from ...luminance import LUMINANCE
@@ -12,7 +12,7 @@ from .params import UNSEEN
 from .sky import Sky, all_light
 
 
-def solve_lamps(sample: Sample, contribution, least, class_of, model, kin, seen, sky: Sky, base) -> list[Lamp]:
+def solve_lamps(sample: Sample, contribution, least, kinds: Kinds, kin, seen, sky: Sky, base) -> list[Lamp]:
     """Unseen lamps, the one that explains most first; none once the gain falls below `lamp_gain`.
 
     A small lamp lights too little of a room to gain much. So of objects whose class shines (`kin`, with its luminance)
@@ -32,8 +32,8 @@ def solve_lamps(sample: Sample, contribution, least, class_of, model, kin, seen,
             break
         object_id = min(found, key=lambda i: found[i][2])
         by_channel = [sample.best(sample.radiance[:, c], light[:, c], left[object_id]) for c in range(3)]
-        same = twin(object_id, found[object_id][2], sample, sent, received, left[object_id], model, seen)
-        lamps.append(_coloured(object_id, *found[object_id], class_of, same, seen, sample.received, by_channel))
+        same = twin(object_id, found[object_id][2], sample, sent, received, left[object_id], kinds.model, seen)
+        lamps.append(_coloured(object_id, *found[object_id], kinds.class_of, same, seen, sample.received, by_channel))
         del left[object_id]
     return lamps
 

@@ -14,11 +14,10 @@ from ...light.contributions import contributions, reaching_most
 from ...light.environment import Environment
 from ...light.few_elements import barely_seen, evened, from_sun, irradiance_at, most_reflected, pick, steady
 from ...light.field import LightField
-from ...light.lamps import Lamp, find_seen, lamp_models, mixed_lamps, of_shining_class
+from ...light.lamps import Kinds, Lamp, find_seen, mixed_lamps, of_shining_class
 from ...light.light_fit import Sample, on_flat
 from ...light.params import LIGHT_FIT
 from ...luminance import LUMINANCE
-from ...scene.model import Instance, class_names
 from ...significance import LEVELS
 from .params import UNSEEN
 from .sky import Sky
@@ -39,7 +38,7 @@ class Contributions:
     element : (k,) int
         Those of the sample that tell of lamps.
     lamps : dict of (k,) float64
-        E there at radiance 1 from each unseen object, and from those like it (`lamp_models`).
+        E there at radiance 1 from each unseen object, and from those of its model (`Kinds`).
     least : dict of float
         Luminance below which each would be no lamp.
     """
@@ -87,7 +86,7 @@ def find_light(
     field: LightField,
     good: np.ndarray,
     unseen_objects: list[int],
-    instances: tuple[Instance, ...],
+    kinds: Kinds,
     seed: int = 0,
     tilted: np.ndarray | None = None,
     shining: Collection[int] = (),
@@ -153,7 +152,7 @@ def find_light(
         mixed = tuple(mixed_lamps(seen, atlas.object_id[good]))
         if mixed:
             told = Light((), shown.environment, (), element, filled, mixed=mixed)
-            return find_light(shown, good, unseen_objects, instances, seed, tilted, shining, told, without)
+            return find_light(shown, good, unseen_objects, kinds, seed, tilted, shining, told, without)
     lit = ~np.isin(atlas.object_id[element], [lamp.object_id for lamp in seen])
     if (lit & flat[element]).sum() >= LEVELS.many:
         lit &= flat[element]
@@ -162,10 +161,10 @@ def find_light(
     sent = field.radiance[element[lit]].astype(np.float64)
     sample = Sample(element[lit], atlas.object_id[element[lit]], sent, filled[lit])
     # The same lamp hung several times is one unknown.
-    model, kin = lamp_models(field.mesh, instances), of_shining_class(seen, atlas.object_id[good], instances)
+    kin = of_shining_class(seen, atlas.object_id[good], kinds)
     alike: dict[int, list[int]] = {}
     for one in unseen_objects:
-        alike.setdefault(model.get(one, one), []).append(one)
+        alike.setdefault(kinds.model.get(one, one), []).append(one)
     alike = {own[0]: own for own in alike.values()}
     if len(alike) > LEVELS.most:
         of_class = [i for i in alike if i in kin]
@@ -182,10 +181,9 @@ def find_light(
         least = {i: most_reflected(lit_room, own, seed) for i, own in alike.items()}
 
     sky = Sky([G[lit] for G in sky_contributions], guess, [z.clipped for z in zones], [z.told for z in zones])
-    class_of = class_names(instances)
     surely = {i for i, own in alike.items() if not set(own).isdisjoint(shining)}
     for _ in range(UNSEEN.sweeps if zones else 1):
-        lamps = solve_lamps(sample, contribution, least, class_of, model, kin, seen, sky, received[lit])
+        lamps = solve_lamps(sample, contribution, least, kinds, kin, seen, sky, received[lit])
         solve_sky(sample, lamps, contribution, sky, received[lit])
     lamps, sky = needed(sample, lamps, contribution, sky, received[lit], surely)
     lamps = [replace(lamp, object_id=one, mixed=one in mixed) for lamp in lamps for one in alike[lamp.object_id]]
