@@ -76,6 +76,21 @@ def texture_of(
     return Texture(texel, value)
 
 
+def _of_others(log: np.ndarray, source: np.ndarray, known: np.ndarray, error: float) -> np.ndarray:
+    """Cells that belong to something else in the plane, (h, w) bool: outliers side by side as far as the picture's rim.
+
+    A hearth in a scan's floor, the feet of a table, the fringe of a sofa. An outlier that nothing unknown borders, a
+    dark tile or a knot, is part of the texture.
+    """
+    off = np.abs(log - np.median(log[source], 0))
+    spread = np.maximum(1.4826 * np.median(off[source], 0), error)
+    odd = known & (off > LEVELS.sigmas * spread).any(2)
+    wide = odd & (ndimage.uniform_filter(odd.astype(np.float32), TEXTURE.mostly, mode="constant") > 0.5)
+    label, _ = ndimage.label(ndimage.binary_propagation(wide, mask=odd))
+    at_rim = np.setdiff1d(label[ndimage.binary_dilation(~known, border_value=1)], [0])
+    return np.isin(label, at_rim)
+
+
 def _textured(level: np.ndarray, error: np.ndarray, known: np.ndarray) -> bool:
     """Whether elements `known` ((m,) int) have more detail than their errors explain."""
     return len(known) >= LEVELS.many and _beyond(float(np.std(level[known])), error[known])
@@ -95,11 +110,13 @@ def _filled(picture: Picture, rho: np.ndarray, error: np.ndarray) -> tuple[np.nd
     if source.sum() < LEVELS.many:
         return NOTHING.texel, NOTHING.rho
     log = np.log(np.maximum(shown, LEVELS.dark))
+    own = known & ~_of_others(log, source, known, float(np.median(error)))
+    source &= own
     detail = np.where(source[..., None], log - log[source].mean(0), 0).astype(np.float32)
     scale = scale_of(*autocovariance(detail, source))
     if source.sum() < TEXTURE.samples * scale**2:
         return NOTHING.texel, NOTHING.rho
-    smooth = np.maximum(smooth_mean(shown, known, TEXTURE.smooth * scale), LEVELS.dark)
+    smooth = np.maximum(smooth_mean(shown, own, TEXTURE.smooth * scale), LEVELS.dark)
     detail = np.where(known[..., None], log - np.log(smooth), 0).astype(np.float32)
     if not _beyond(usual_contrast(detail, source, TEXTURE.smooth * scale), error):
         return NOTHING.texel, NOTHING.rho

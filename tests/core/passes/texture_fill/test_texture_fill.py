@@ -81,6 +81,35 @@ def test_boards_keep_their_direction_and_contrast(room):
     assert np.allclose(shown.mean(0), true.mean(0), rtol=0.12)
 
 
+def test_what_stands_at_the_rim_is_not_copied(room):
+    """A hearth in a floor's plane, by the wall and beside the hole, has no boards."""
+    at = room.atlas.position[:, :2]
+    hole = hole_in(room.atlas)
+    hearth = ((at > (2.4, 0.9)) & (at < (2.8, 1.9))).all(1) | (at[:, 0] < 0.3)
+
+    def floor(position):
+        mine = np.where(hearth[room.atlas.object_id == FLOOR][:, None], (0.02, 0.03, 0.3), planks(position))
+        return mine.astype(np.float32)
+
+    found, shown, _ = filled(room, floor, hole)
+    assert len(found.texel) and shown.any(1).all()
+    assert (shown[:, 2] < shown[:, 0]).mean() > 0.99
+
+
+def test_a_rare_dark_tile_is_copied(room):
+    """One tile of ten is dark: more than three deviations from the usual one, and yet of the floor."""
+
+    def tiles(position):
+        at = np.floor(position[:, :2] / 0.12).astype(int)
+        dark = (at[:, 0] + 3 * at[:, 1]) % 10 == 0
+        grain = 0.5 + 0.03 * np.sin(2 * np.pi * position[:, :1] / 0.04)
+        return (grain * np.where(dark[:, None], 0.2, 1.0) * np.ones(3)).astype(np.float32)
+
+    hole = hole_in(room.atlas)
+    _, shown, _ = filled(room, tiles, hole, error=0.03)
+    assert np.mean(shown.mean(1) < 0.25) == pytest.approx(0.1, abs=0.04)
+
+
 def test_colour_that_varies_slowly_is_not_copied(room):
     """Light tiles that get darker across the room: the copies take the level of where they are put."""
 
