@@ -268,8 +268,8 @@ def _prepare(scene, median_radiance):
     scene.render.engine = "CYCLES"
     scene.cycles.samples = 128
     scene.cycles.use_denoising = True
-    # Clamping would darken a room that is lit by small bright lamps, and so would Filter Glossy: 12 % of a bathroom's
-    # light came over tiles and a mirror. White rooms need more bounces than four; they cost no time there.
+    # Clamping would darken a room that is lit by small bright lamps, and Filter Glossy one with mirrors or tiles; white
+    # rooms need many bounces, which cost others no time.
     scene.cycles.sample_clamp_indirect = scene.cycles.blur_glossy = 0.0
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces, scene.cycles.glossy_bounces = 24, 24, 12
     if median_radiance > 0 and math.isfinite(median_radiance):

@@ -79,7 +79,7 @@ def find_seen(object_id: np.ndarray, radiance: np.ndarray, irradiance: np.ndarra
 
 
 @dataclass(frozen=True)
-class Kinds:
+class LampKinds:
     """Which objects are of one kind.
 
     Attributes
@@ -102,7 +102,7 @@ class Kinds:
         return members
 
 
-def kinds(mesh: Mesh, instances: Iterable[Instance], noise: float = 0.0) -> Kinds:
+def lamp_kinds(mesh: Mesh, instances: Iterable[Instance], noise: float = 0.0) -> LampKinds:
     """Classes as told, and as models those of a class that are of about one size.
 
     Parameters
@@ -111,7 +111,7 @@ def kinds(mesh: Mesh, instances: Iterable[Instance], noise: float = 0.0) -> Kind
         That a scan had along its normals, in metres.
     """
     size, class_of = radius_of_gyration(mesh), class_names(instances)
-    told = Kinds(class_of, {one: one for one in class_of})
+    told = LampKinds(class_of, {one: one for one in class_of})
     for members in told.classes().values():
         firsts: list[int] = []
         for one in members:
@@ -137,7 +137,7 @@ def radius_of_gyration(mesh: Mesh) -> np.ndarray:
     return np.sqrt(np.bincount(mesh.object_id, area * off) / total)
 
 
-def of_shining_class(lamps: Collection[Lamp], clean: np.ndarray, kinds: Kinds) -> dict[int, float]:
+def of_shining_class(lamps: Collection[Lamp], clean: np.ndarray, kinds: LampKinds) -> dict[int, float]:
     """Objects of a class of which most that frames show unmixed are lamps, with the median luminance of those.
 
     The capture has to tell classes.

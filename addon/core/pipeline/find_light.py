@@ -6,7 +6,7 @@ import numpy as np
 
 from ..light.few_elements import from_sun, irradiance_at
 from ..light.field import LightField
-from ..light.lamps import Kinds
+from ..light.lamps import LampKinds
 from ..light.sun import Sun
 from ..passes.sun.sun_fit import find_sun
 from ..passes.unseen_light.unseen_light import Light, find_light, lit_by
@@ -16,7 +16,7 @@ def find_all_light(
     field: LightField,
     good: np.ndarray,
     unseen_objects: list[int],
-    kinds: Kinds,
+    kinds: LampKinds,
     seed: int = 0,
     tilted: np.ndarray | None = None,
     shining: Collection[int] = (),

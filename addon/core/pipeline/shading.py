@@ -10,7 +10,7 @@ import numpy as np
 from ..light.environment import Environment
 from ..light.few_elements import barely_seen, evened
 from ..light.field import LightField
-from ..light.lamps import Kinds, Lamp, kinds
+from ..light.lamps import Lamp, LampKinds, lamp_kinds
 from ..light.mirrors import Mirror, known_mirror
 from ..light.openings import Openings, looked_out_by
 from ..light.over_surface import Gathering, finest_spacing, irradiance
@@ -172,8 +172,8 @@ def shade(
     clean = lit_diffuse.seen & (lit_diffuse.tier == CLEAN)
     if "unseen-surfaces" not in without and clean.any():
         dark = with_unseen_by_light(dark, clean, **how)
-    alike = kinds(mesh, instances, surface.noise)
-    field, light = with_all_light(dark, lit_diffuse, alike, find_mirrors, seed, tilted, shining, without)
+    kinds = lamp_kinds(mesh, instances, surface.noise)
+    field, light = with_all_light(dark, lit_diffuse, kinds, find_mirrors, seed, tilted, shining, without)
     solved = np.zeros(len(atlas), bool)
     if patches is not None and "missing-light" not in without:
         field, light, solved = with_missing_light(dark, field, light, lit_diffuse, patches, cameras, without, seed)
@@ -215,7 +215,7 @@ def turned_by_noise(mesh: Mesh, atlas: Atlas, noise: float) -> np.ndarray:
 def with_all_light(
     field: LightField,
     lit_diffuse: LitDiffuse,
-    alike: Kinds,
+    kinds: LampKinds,
     find_mirrors: Callable[[LightField, tuple[Lamp, ...] | None], tuple[Mirror, ...]] | None,
     seed: int,
     tilted: np.ndarray,
@@ -242,7 +242,7 @@ def with_all_light(
     # Mirrors first: what hangs opposite or over one gets light over it, which lamps would have to answer for.
     field = field.with_mirrors(find_mirrors(field, None) if find_mirrors else ())
     good = good if good.any() else seen
-    light, sun = find_all_light(field, good, unseen, alike, seed, tilted, shining, without=without)
+    light, sun = find_all_light(field, good, unseen, kinds, seed, tilted, shining, without=without)
     field = field.with_mirrors(()).with_sun(sun)
     radiance = field.radiance.copy()
     for lamp in light.lamps:

@@ -55,6 +55,16 @@ def counts():
     return {kind: sorted(x.name for x in getattr(bpy.data, kind)) for kind in KINDS}
 
 
+def rendered(scene, path, samples):
+    """What the scene's camera sees, (h, w, 3), linear Rec.709."""
+    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.use_adaptive_sampling = samples, False, False
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
+    scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(str(path))
+    return np.array(image.pixels[:]).reshape(image.size[1], image.size[0], 4)[..., :3]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("fresh", [True, False])
 def test_it_renders_when_opened_elsewhere(scene, tmp_path, result, capture, fresh):
@@ -93,12 +103,7 @@ def test_it_renders_when_opened_elsewhere(scene, tmp_path, result, capture, fres
         assert (thing["scan_relight_result"], thing["scan_relight_run"]) == (str(result), "0123456789abcdef")
     assert top["scan_relight_capture"] == str(capture.root)
     assert opened.render.engine == "CYCLES" and opened.view_settings.exposure == pytest.approx(-1)
-    opened.cycles.samples, opened.cycles.use_denoising = 64, False
-    opened.render.image_settings.file_format = "OPEN_EXR"
-    opened.render.image_settings.color_depth = "32"
-    opened.render.filepath = str(tmp_path / "render.exr")
-    bpy.ops.render.render(write_still=True)
-    picture = np.array(bpy.data.images.load(opened.render.filepath).pixels[:]).reshape(4, 8, 4)[..., :3]
+    picture = rendered(opened, tmp_path / "render.exr", 64)
     # Floor and lamp lie in one plane: the floor sees the white world alone.
     np.testing.assert_allclose(picture[:, 1:3].mean((0, 1)), [0.2, 0.5, 0.8], rtol=0.02)
     lamp = np.array([6, 3, 1.5]) + LAMP_ALBEDO  # what it gives, and what it reflects of that world
@@ -135,12 +140,7 @@ def test_light_over_a_mirror_is_all_there(scene, tmp_path, result, capture):
     uv = np.stack([left, left] + [left + (0.5, 0)] * 6)
     write_scene(result / "scene.blend", room, uv, materials, result, 0.36)
     bpy.ops.wm.open_mainfile(filepath=str(result / "scene.blend"))
-    opened = bpy.context.scene
-    opened.cycles.samples, opened.cycles.use_denoising, opened.cycles.use_adaptive_sampling = 4096, False, False
-    opened.render.image_settings.file_format, opened.render.image_settings.color_depth = "OPEN_EXR", "32"
-    opened.render.filepath = str(tmp_path / "render.exr")
-    bpy.ops.render.render(write_still=True)
-    picture = np.array(bpy.data.images.load(opened.render.filepath).pixels[:]).reshape(8, 8, 4)[2:6, 2:6, :3]
+    picture = rendered(bpy.context.scene, tmp_path / "render.exr", 4096)[2:6, 2:6]
     assert picture.mean() == pytest.approx(0.5 / np.pi * 400 * 0.1**2 * (4 / 5) / 5, rel=0.03)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.light.lamps import kinds, radius_of_gyration
+from addon.core.light.lamps import lamp_kinds, radius_of_gyration
 from addon.core.scene.elements import triangle_geometry
 from addon.core.scene.model import Instance, Mesh
 from tests.core.rooms import make_room, quad
@@ -35,22 +35,22 @@ def test_models_are_told_by_the_mesh():
         quad((x, 0, 0), (0, size, 0), (0, 0, size), i) for i, (x, size) in enumerate(((0, 0.1), (0.37, 0.1), (1, 0.2)))
     ]
     room = make_room(sides, 0.06)
-    assert kinds(room.mesh, CLASSES).model == {0: 0, 1: 0, 2: 2}
+    assert lamp_kinds(room.mesh, CLASSES).model == {0: 0, 1: 0, 2: 2}
 
 
 def test_of_another_class_is_another_model():
     """What looks alike is one lamp only where the capture calls it the same; without a class nothing is."""
     mesh = balls([0.05, 0.05, 0.05])
     told = (Instance(0, "bulb"), Instance(1, "spot"), Instance(2, ""))
-    assert kinds(mesh, told).model == {0: 0, 1: 1, 2: 2}
-    assert kinds(mesh, told).classes() == {"bulb": [0], "spot": [1]}
+    assert lamp_kinds(mesh, told).model == {0: 0, 1: 1, 2: 2}
+    assert lamp_kinds(mesh, told).classes() == {"bulb": [0], "spot": [1]}
 
 
 def test_noise_of_a_scan_leaves_one_model():
     """A scan that is off by millimetres along the normals makes bulbs larger or smaller."""
     mesh = balls([0.040, 0.045, 0.080], noise=0.003)
-    assert kinds(mesh, CLASSES).model == {0: 0, 1: 1, 2: 2}
-    assert kinds(mesh, CLASSES, noise=0.004).model == {0: 0, 1: 0, 2: 2}
+    assert lamp_kinds(mesh, CLASSES).model == {0: 0, 1: 1, 2: 2}
+    assert lamp_kinds(mesh, CLASSES, noise=0.004).model == {0: 0, 1: 0, 2: 2}
 
 
 def test_radius_of_gyration():

@@ -104,13 +104,14 @@ def _filled(picture: Picture, rho: np.ndarray, error: np.ndarray) -> tuple[np.nd
     """Texels of one plane and their albedo; none where there is too little to go by."""
     shown, known = picture.paint(rho)
     # As where neighbourhoods are told: what was seen well, the better half at least; and no albedo that was cut off.
-    sure = (error <= max(LEVELS.sure, float(np.median(error)))) & (rho.max(1) < 1)
+    usual = float(np.median(error))
+    sure = (error <= max(LEVELS.sure, usual)) & (rho.max(1) < 1)
     around = ndimage.uniform_filter(picture.paint(sure[:, None])[0][..., 0], TEXTURE.mostly, mode="constant")
     source = known & (around > 0.5)
     if source.sum() < LEVELS.many:
         return NOTHING.texel, NOTHING.rho
     log = np.log(np.maximum(shown, LEVELS.dark))
-    own = known & ~_of_others(log, source, known, float(np.median(error)))
+    own = known & ~_of_others(log, source, known, usual)
     source &= own
     detail = np.where(source[..., None], log - log[source].mean(0), 0).astype(np.float32)
     scale = scale_of(*autocovariance(detail, source))

@@ -4,7 +4,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from ...light.lamps import Kinds, Lamp
+from ...light.lamps import Lamp, LampKinds
 from ...light.light_fit import Sample, log_of
 from ...light.params import LIGHT_FIT, SKY
 from ...luminance import LUMINANCE
@@ -12,7 +12,7 @@ from .params import UNSEEN
 from .sky import Sky, all_light
 
 
-def solve_lamps(sample: Sample, contribution, least, kinds: Kinds, kin, seen, sky: Sky, base) -> list[Lamp]:
+def solve_lamps(sample: Sample, contribution, least, kinds: LampKinds, kin, seen, sky: Sky, base) -> list[Lamp]:
     """Unseen lamps, the one that explains most first; none once the gain falls below `lamp_gain`.
 
     A small lamp lights too little of a room to gain much. So of objects whose class shines (`kin`, with its luminance)

@@ -14,7 +14,7 @@ from ...light.contributions import contributions, reaching_most
 from ...light.environment import Environment
 from ...light.few_elements import barely_seen, evened, from_sun, irradiance_at, most_reflected, pick, steady
 from ...light.field import LightField
-from ...light.lamps import Kinds, Lamp, find_seen, mixed_lamps, of_shining_class
+from ...light.lamps import Lamp, LampKinds, find_seen, mixed_lamps, of_shining_class
 from ...light.light_fit import Sample, on_flat
 from ...light.params import LIGHT_FIT
 from ...luminance import LUMINANCE
@@ -38,7 +38,7 @@ class Contributions:
     element : (k,) int
         Those of the sample that tell of lamps.
     lamps : dict of (k,) float64
-        E there at radiance 1 from each unseen object, and from those of its model (`Kinds`).
+        E there at radiance 1 from each unseen object, and from those of its model (`LampKinds`).
     least : dict of float
         Luminance below which each would be no lamp.
     """
@@ -86,7 +86,7 @@ def find_light(
     field: LightField,
     good: np.ndarray,
     unseen_objects: list[int],
-    kinds: Kinds,
+    kinds: LampKinds,
     seed: int = 0,
     tilted: np.ndarray | None = None,
     shining: Collection[int] = (),
