@@ -52,10 +52,10 @@ def _on_grid(even: Spots, environment: Environment) -> list[Guess]:
 def reaching_most(spots: Spots, some: np.ndarray, weight: np.ndarray, environment: Environment) -> np.ndarray:
     """Directions of the grid that reach most of some spots ((k,) int), which weigh (k,): (d, 3) float32.
 
-    Of those from which frames don't tell what comes.
+    Of those above the horizon from which frames don't tell what comes.
     """
     way = fibonacci(int(4 * np.pi / GRID**2)).astype(np.float32)
-    way = way[~environment.known(way)]
+    way = way[(way[:, 2] > 0) & ~environment.known(way)]
     spot, ray = np.nonzero(spots.normal[some] @ way.T > 0)
     start = spots.scene.off_surface(spots.position[some], spots.normal[some])
     hidden = spots.scene.occluded(start[spot], way[ray], np.full(len(spot), np.inf, np.float32))
@@ -74,10 +74,14 @@ def apart(guesses: list[Guess]) -> list[Guess]:
 
 
 def searched(cost: Callable[[np.ndarray], Guess], guess: Guess, steps: np.ndarray) -> Guess:
-    """The direction of least cost near a guess: the best of eight neighbours, again and again, by smaller steps."""
+    """The direction of least cost near a guess: the best of eight neighbours, again and again, by smaller steps.
+
+    It stays above the horizon.
+    """
     for step in steps:
         for _ in range(4):
-            new = min((cost(way) for way in around(guess.direction, step * _ring(8))), key=lambda one: one.cost)
+            ways = (way for way in around(guess.direction, step * _ring(8)) if way[2] > 0)
+            new = min(map(cost, ways), key=lambda one: one.cost, default=guess)
             if new.cost >= guess.cost:
                 break
             guess = new

@@ -107,6 +107,15 @@ def test_what_copper_throws_is_no_sun(room):
 
 
 @pytest.mark.slow
+def test_what_shines_from_below_the_horizon_is_no_sun(room):
+    """A patch high up opposite the window, as a lamp in the street throws it; the same from above is a sun."""
+    below = np.array([0.93, -0.2, -0.3]) / np.linalg.norm([0.93, -0.2, -0.3])
+    nothing_known = sky_map(np.zeros((64, 128), np.int32))
+    assert run(room, sunny.light(room, towards=below), nothing_known).sun is None
+    assert run(room, sunny.light(room), nothing_known).sun is not None
+
+
+@pytest.mark.slow
 def test_no_sun_is_looked_for_where_frames_saw_the_sky(room):
     """The same patch, but every direction of the sky is known."""
     assert run(room, sunny.light(room), sky_map(np.ones((64, 128), np.int32))).sun is None
