@@ -48,18 +48,19 @@ class FurnishedRoom:
     sun: tuple | None = None
     windows: list = field(default_factory=list)
     things: list[Thing] = field(default_factory=list)
-    smooth: set[int] = field(default_factory=set)
 
     def __post_init__(self):
         self.rng = np.random.default_rng([self.seed, sum(map(ord, self.name))])
 
-    def add(self, class_name: str, shapes, *finishes: Finish, slots=None, smooth: bool = False) -> None:
-        """One more object. Smooth ones are shaded round, and their quads are split."""
+    def add(self, class_name: str, shapes, *finishes: Finish, slots=None, triangles: bool = False) -> None:
+        """One more object."""
         quads, uv = np.concatenate([s[0] for s in shapes]), np.concatenate([s[1] for s in shapes])
         slot = np.repeat([0] * len(shapes) if slots is None else slots, [len(s[0]) for s in shapes])
-        if smooth:
-            self.smooth.add(len(self.things))
-        self.things.append(Thing(len(self.things), class_name, quads, uv, slot, finishes, smooth))
+        self.things.append(Thing(len(self.things), class_name, quads, uv, slot, finishes, triangles))
+
+    def add_round(self, class_name: str, shapes, finish: Finish) -> None:
+        """One more object that is shaded smooth, its quads split in triangles."""
+        self.add(class_name, shapes, finish, triangles=True)
 
     def tint(self, colour, spread: float = 0.12) -> np.ndarray:
         """The colour a little changed by the seed."""

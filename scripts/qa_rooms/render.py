@@ -92,7 +92,7 @@ def build(room: FurnishedRoom, scene) -> None:
                 shader.inputs[METALLIC].default_value = 1.0
             if paint.glass:
                 _clear(tree)
-        if thing.object_id in room.smooth:
+        if thing.triangles:
             made.data.shade_smooth()
             made.data.set_sharp_from_angle(angle=np.radians(40))
     if any(room.sky):

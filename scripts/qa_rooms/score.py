@@ -23,8 +23,6 @@ from addon.core.settings import Settings
 
 from .held import held, projected_truth
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-
 
 def table(capture: Path, result: Path) -> str:
     """All figures as text; RESULT/qa.json gets them too."""
