@@ -126,28 +126,10 @@ def fetch(platform: str, names: list[str], hashes: dict[str, tuple[str, set[str]
                 # Hashes are taken from a requirements file alone.
                 lines = [requirement, *(f"--hash=sha256:{value}" for value in sorted(allowed))]
                 (Path(scratch) / "wheel.txt").write_text(" ".join(lines) + "\n")
-                subprocess.run(
-                    [
-                        sys.executable,
-                        "-m",
-                        "pip",
-                        "--disable-pip-version-check",
-                        "download",
-                        "--quiet",
-                        "--no-deps",
-                        "--only-binary=:all:",
-                        "--require-hashes",
-                        "--dest",
-                        WHEELS,
-                        "--platform",
-                        PIP_PLATFORMS[platform],
-                        "--python-version",
-                        python_of(name),
-                        "-r",
-                        Path(scratch) / "wheel.txt",
-                    ],
-                    check=True,
-                )
+                pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet", "--no-deps"]
+                only = ["--only-binary=:all:", "--require-hashes", "--platform", PIP_PLATFORMS[platform]]
+                what = ["--python-version", python_of(name), "-r", Path(scratch) / "wheel.txt", "--dest", WHEELS]
+                subprocess.run([*pip, *only, *what], check=True)
         if not wheel.is_file():
             sys.exit(f"pip fetched another wheel of {requirement} than the manifest's {name}; mend the manifest.")
 

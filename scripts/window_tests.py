@@ -34,14 +34,9 @@ def main() -> int:
     os.environ["BLENDER"] = blender
     shutil.rmtree(ROOT / "build" / "window", ignore_errors=True)
     python = sys.executable if running_inside() else str(prepare(tools=True))
-    return hand_over(
-        [
-            python,
-            "-m",
-            "pytest",
-            *(words if any("tests/window" in word for word in words) else ["tests/window", *words]),
-        ]
-    )
+    if not any("tests/window" in word for word in words):
+        words = ["tests/window", *words]
+    return hand_over([python, "-m", "pytest", *words])
 
 
 def running_inside() -> bool:
