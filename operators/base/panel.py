@@ -24,10 +24,7 @@ def say(layout, sentence: str, icon: str = "NONE") -> None:
     column = layout.column(align=True)
     column.scale_y = 0.8
     for number, line in enumerate(lines(sentence, int(room), points(context) * scale)):
-        if icon == "NONE":
-            column.label(text=line)
-        else:
-            column.label(text=line, icon="BLANK1" if number else icon)
+        column.label(text=line, icon="BLANK1" if number and icon != "NONE" else icon)
 
 
 def fields(layout, owner=None, *names: str):
@@ -134,7 +131,4 @@ class NamedRows:
 
 def places(keys: list) -> list[int]:
     """Where each of `keys` stands when they are sorted, as `UIList.filter_items` returns it."""
-    found = [0] * len(keys)
-    for place, number in enumerate(sorted(range(len(keys)), key=keys.__getitem__)):
-        found[number] = place
-    return found
+    return bpy.types.UI_UL_list.sort_items_helper(list(enumerate(keys)), key=lambda pair: pair[1])
