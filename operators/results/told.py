@@ -74,9 +74,6 @@ def refused(things) -> list[tuple[str, Path | None]]:
     ]
 
 
-forget = file.forget
-
-
 def label(model: str) -> str:
     """What the panel calls a model."""
     brdf = find(model)
