@@ -21,8 +21,6 @@ class View:
 
     Attributes
     ----------
-    index : int
-        Of the frame.
     radiance : (h, w, 3) float32
         Seen.
     valid : (h, w) bool
@@ -34,7 +32,6 @@ class View:
         Diffuse light and highlight, as recovered.
     """
 
-    index: int
     radiance: np.ndarray
     valid: np.ndarray
     element: np.ndarray
@@ -92,10 +89,8 @@ def view(found: Findings, index: int) -> View:
     _add_lobes(found, predicted, element, directions)
     shape = (camera.height, camera.width)
     ids = np.where(element >= 0, surface.atlas.object_id[element], -1)
-    return View(
-        index, pixels.radiance, pixels.valid & ~pixels.saturated, element.reshape(shape), ids.reshape(shape),
-        predicted.reshape(*shape, 3),
-    )  # fmt: skip
+    valid, predicted = pixels.valid & ~pixels.saturated, predicted.reshape(*shape, 3)
+    return View(pixels.radiance, valid, element.reshape(shape), ids.reshape(shape), predicted)
 
 
 def _add_lobes(found: Findings, predicted: np.ndarray, element: np.ndarray, directions: np.ndarray) -> None:
