@@ -48,7 +48,6 @@ WHEEL_PLATFORMS = {
 
 
 def main() -> int:
-    """Fetch, stage, build."""
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     pythons = sorted({python_of(wheel) for wheel in manifest["wheels"]})
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -135,7 +134,6 @@ def fetch(platform: str, names: list[str], hashes: dict[str, tuple[str, set[str]
 
 
 def sha256(path: Path) -> str:
-    """Hash of a file's content."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

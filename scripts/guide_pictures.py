@@ -47,7 +47,6 @@ QUALITY = 88
 
 
 def main() -> int:
-    """Play, cut."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("capture", type=Path)
     parser.add_argument("--zip", type=Path, required=True)

@@ -48,7 +48,6 @@ def halved(vertices: np.ndarray, triangles: np.ndarray, owner: np.ndarray) -> tu
 
 
 def enlarge(source: Path, out: Path, frames: int, size: tuple[int, int], doublings: int, seed: int = 0) -> None:
-    """Write the capture."""
     told = json.loads((source / "transforms.json").read_text())
     (out / "images").mkdir(parents=True)
     shutil.copy(source / "info_semantic.json", out)

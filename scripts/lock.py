@@ -20,7 +20,6 @@ LOCKS = {
 
 
 def main() -> int:
-    """Compile each lock."""
     uv = sys.argv[1] if len(sys.argv) > 1 else "uv"
     for name, options in LOCKS.items():
         lock = FOLDER / f"{name}.txt"

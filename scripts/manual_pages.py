@@ -45,7 +45,6 @@ def write_pages(docs: Path, out: Path) -> None:
 
 
 def page(text: str) -> str:
-    """Markdown as HTML."""
     found, lines = [], text.splitlines()
     at = 0
     while at < len(lines):

@@ -24,7 +24,6 @@ BAR = 30
 
 
 def main() -> int:
-    """Render, show, join."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("frame", type=Path)
     parser.add_argument("blends", type=Path, nargs=3, metavar="BLEND")

@@ -23,7 +23,6 @@ SKIPPED = 3
 
 
 def main() -> int:
-    """Find or make a Blender, run the tests."""
     words = sys.argv[1:]
     required = "--required" in words
     words = [word for word in words if word != "--required"]

@@ -108,7 +108,6 @@ class SidebarPanel:
         return context.scene is not None
 
     def draw_header_preset(self, context):
-        """The way to the documentation."""
         if self.manual:
             self.layout.operator("scan_relight.manual", text="", icon="HELP", emboss=False).page = self.manual
 

@@ -36,7 +36,6 @@ class ScanRelightSettings(SettingsProps, bpy.types.PropertyGroup):
         return Settings(**{info.name: setting_value(self, info) for info in setting_infos()})
 
     def take(self, settings: Settings) -> None:
-        """Show `settings`."""
         for info in setting_infos():
             setattr(self, info.name, getattr(settings, info.name))
 

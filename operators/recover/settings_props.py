@@ -144,7 +144,6 @@ class CaptureOperator(ReadingProps, OneSentence, JobOperator):
         return context.window_manager.invoke_props_dialog(self, width=420)
 
     def execute(self, context):
-        """Do the work, or start it."""
 
         def work() -> set[str]:
             if not bpy.app.background:

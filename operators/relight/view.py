@@ -190,7 +190,6 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
     percentage: PERCENTAGE
 
     def target(self, scene) -> Path:
-        """The file to write."""
         if self.filepath:
             return Path(bpy.path.abspath(self.filepath)).absolute()
         folder, stays = before_after.picture_folder(scene, scene.scan_relight.result_folder)
@@ -212,7 +211,6 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         return self.attempt(lambda: self.begin(context))
 
     def begin(self, context) -> set[str]:
-        """Start the job."""
         out = self.target(context.scene)
         pictures.check_format(out)
         self._folder = Path(tempfile.mkdtemp(prefix="scan_relight_"))

@@ -25,7 +25,6 @@ class FurnishedRoom:
 
     Attributes
     ----------
-    size : tuple of float
     walk : tuple of float
         Low x, low y, high x, high y of where the camera may be.
     pitch : tuple of float
@@ -67,7 +66,6 @@ class FurnishedRoom:
         return np.clip(np.asarray(colour) * self.rng.uniform(1 - spread, 1 + spread, 3), 0.005, 0.92)
 
     def diffuse(self, *colour) -> Finish:
-        """Diffuse."""
         return Finish(np.float32(self.tint(colour)))
 
     def matt_picture(self, picture) -> Finish:
@@ -138,5 +136,4 @@ STEEL, CHROME, BRASS, COPPER, GOLD = (
 
 
 def legs(x0, y0, x1, y1, height, thick):
-    """Four square legs."""
     return [box((a, b, 0.002), (a + thick, b + thick, height)) for a in (x0, x1 - thick) for b in (y0, y1 - thick)]
