@@ -365,9 +365,7 @@ class SCAN_RELIGHT_OT_restore_painted(CorrectOperator, bpy.types.Operator):
     bl_label = "Restore"
 
     discard: bpy.props.BoolProperty(
-        name="Forget What Was Painted",
-        description="Take it out of your image too; else Paint shows it again",
-        default=False,
+        name="Forget What Was Painted", description="Take it out of your image too; else Paint shows it again"
     )
 
     def work(self, context):

@@ -37,7 +37,7 @@ class SCAN_RELIGHT_OT_export(SceneOperator, bpy.types.Operator):
     format: bpy.props.EnumProperty(name="Format", description="Of a file whose name has no ending", items=FORMATS)
     scope: bpy.props.EnumProperty(name="Objects", description="What is written", items=SCOPES)
     lights: bpy.props.BoolProperty(name="Lights", description="Also the lights that were added", default=True)
-    cameras: bpy.props.BoolProperty(name="Camera", description="Also the scene's camera", default=False)
+    cameras: bpy.props.BoolProperty(name="Camera", description="Also the scene's camera")
 
     def invoke(self, context, event):
         if not self.filepath:

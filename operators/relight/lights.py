@@ -78,7 +78,7 @@ class SCAN_RELIGHT_OT_switch_lamps(RelightOperator, bpy.types.Operator):
 
     bl_label = "Switch All Lamps"
 
-    on: bpy.props.BoolProperty(name="On", description="On or off", default=False)
+    on: bpy.props.BoolProperty(name="On", description="On or off")
 
     def work(self, context):
         for lamp in lamps.find_lamps(context.scene):

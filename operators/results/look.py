@@ -44,9 +44,7 @@ class SCAN_RELIGHT_OT_select_result_object(AtOnce, bpy.types.Operator):
     bl_label = "Select Object"
 
     object_id: bpy.props.IntProperty(name="Object", description="Number of the object in the capture", min=0)
-    extend: bpy.props.BoolProperty(
-        name="Extend", description="Keep what is selected", default=False, options={"SKIP_SAVE"}
-    )
+    extend: bpy.props.BoolProperty(name="Extend", description="Keep what is selected", options={"SKIP_SAVE"})
 
     def work(self, context):
         thing = result_objects(context.scene).get(self.object_id)
