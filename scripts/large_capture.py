@@ -47,7 +47,7 @@ def halved(vertices: np.ndarray, triangles: np.ndarray, owner: np.ndarray) -> tu
     return vertices, cut.reshape(-1, 3), np.repeat(owner, 2)
 
 
-def enlarge(source: Path, out: Path, frames: int, size: tuple[int, int], doublings: int, seed: int = 0) -> None:
+def enlarge(source: Path, out: Path, frames: int, size: tuple[int, int], doublings: int) -> None:
     told = json.loads((source / "transforms.json").read_text())
     (out / "images").mkdir(parents=True)
     shutil.copy(source / "info_semantic.json", out)
@@ -56,7 +56,7 @@ def enlarge(source: Path, out: Path, frames: int, size: tuple[int, int], doublin
     for _ in range(doublings):
         parts = halved(*parts)
     (out / "mesh.ply").write_bytes(ply_bytes(parts[0], [(parts[1], parts[2])]))
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     old = np.array([told["w"], told["h"]])
     focal, centre = np.array([told["fl_x"], told["fl_y"]]), np.array([told["cx"], told["cy"]])
     jobs = []

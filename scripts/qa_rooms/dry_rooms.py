@@ -7,7 +7,7 @@ import numpy as np
 from addon.bridge.demo.room import ball, box, cone, grid, painting, planks
 
 from .furnish import BRASS, CHROME, GOLD, STEEL, Finish, FurnishedRoom, legs
-from .shapes import arc, clouds, curtain, cushion, moved, stripes, tiles, tube, turned, wood
+from .shapes import arc, clouds, curtain, cushion, stripes, tiles, tube, turned, wood
 
 
 def bedroom(seed: int) -> FurnishedRoom:
@@ -294,6 +294,6 @@ def hall(seed: int) -> FurnishedRoom:
         ],
         r.gloss(0.4, (0.78, 0.77, 0.74)),
     )
-    r.add_round("globe lamp (off)", [moved(ball((0, 0, 0), 0.2, 10), (1.8, 2.5, 2.9))], r.gloss(0.1, (0.8, 0.8, 0.78)))
+    r.add_round("globe lamp (off)", [ball((1.8, 2.5, 2.9), 0.2, 10)], r.gloss(0.1, (0.8, 0.8, 0.78)))
     r.add("cord", [tube([(1.8, 2.5, 3.1), (1.8, 2.5, z)], 0.006, 6)], r.diffuse(0.03, 0.03, 0.03))
     return r

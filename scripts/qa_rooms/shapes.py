@@ -100,11 +100,6 @@ def wall(origin, across, up, holes=(), cell: float = 0.3) -> Shape:
     return quads, uv
 
 
-def moved(shape: Shape, by) -> Shape:
-    """The shape elsewhere."""
-    return shape[0] + np.asarray(by, float), shape[1]
-
-
 def _xy(size: int):
     y, x = np.mgrid[:size, :size] / size
     return x, y
