@@ -1,6 +1,5 @@
 """`bpy.ops.scan_relight.*` for what is seen: a frame's camera, things that are set into the room, before and after."""
 
-import os
 import shutil
 import tempfile
 from contextlib import suppress
@@ -240,6 +239,5 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         yield 1.0
         return ()
 
-    def _leave(self, context, verdict):
-        shutil.rmtree(getattr(self, "_folder", os.devnull), ignore_errors=True)
-        return super()._leave(context, verdict)
+    def tidy(self, job):
+        shutil.rmtree(self._folder, ignore_errors=True)
