@@ -18,12 +18,13 @@ ICON: Shown[int] = 20
 def say(layout, sentence: str, icon: str = "NONE") -> None:
     """Write `sentence` over as many lines as the region's width asks for; the icon stands before the first."""
     sentence = translations.told(sentence)
-    context = bpy.context
-    scale = context.preferences.system.ui_scale or 1.0  # 0 where there was never a window
+    preferences = bpy.context.preferences
+    scale = preferences.system.ui_scale or 1.0  # 0 where there was never a window
+    points = preferences.ui_styles[0].widget.points if preferences.ui_styles else 11.0
     room = region_width() - (MARGIN + (ICON if icon != "NONE" else 0)) * scale
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for number, line in enumerate(lines(sentence, int(room), points(context) * scale)):
+    for number, line in enumerate(lines(sentence, int(room), points * scale)):
         column.label(text=line, icon="BLANK1" if number and icon != "NONE" else icon)
 
 
@@ -46,12 +47,6 @@ def region_width() -> int:
     """Pixels that the region is wide that is drawn."""
     region = bpy.context.region
     return region.width if region else 300
-
-
-def points(context) -> float:
-    """Size of the interface's letters."""
-    styles = context.preferences.ui_styles
-    return styles[0].widget.points if styles else 11.0
 
 
 @lru_cache(maxsize=512)
