@@ -160,13 +160,8 @@ def office(seed: int) -> FurnishedRoom:
                 (cx + side, cy + 0.21 * away, 0.45),
                 (cx + side, cy - 0.15 * away, 0.43),
             ]
-            path += [
-                tuple(p)
-                for p in arc(
-                    (cx + side, cy - 0.2 * away, 0.4), (cx + side, cy - 0.2 * away, 0.02), (0, -0.05 * away, 0)
-                )
-            ]
-            frame.append(tube([*path, (cx + side, cy + 0.22 * away, 0.015)], 0.012, 8))
+            bend = arc((cx + side, cy - 0.2 * away, 0.4), (cx + side, cy - 0.2 * away, 0.02), (0, -0.05 * away, 0))
+            frame.append(tube([*path, *bend, (cx + side, cy + 0.22 * away, 0.015)], 0.012, 8))
         r.add_round("chair frame", frame, r.metal(0.12, CHROME))
     r.add(
         "glass wall",
@@ -256,8 +251,7 @@ def hall(seed: int) -> FurnishedRoom:
         [box((1.2, 0.02, 0.8), (2.6, 0.4, 0.84)), *legs(1.2, 0.03, 2.6, 0.4, 0.8, 0.04)],
         r.gloss(0.15, (0.015, 0.014, 0.013)),
     )
-    for k in range(3):
-        c = [(0.5, 0.05, 0.04), (0.05, 0.25, 0.06), (0.75, 0.72, 0.65)][k]
+    for k, c in enumerate([(0.5, 0.05, 0.04), (0.05, 0.25, 0.06), (0.75, 0.72, 0.65)]):
         r.add_round(
             "bowl",
             [

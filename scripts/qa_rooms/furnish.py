@@ -116,23 +116,13 @@ class FurnishedRoom:
     def window_frame(self, finish: Finish) -> None:
         """A frame of bars around and across each window."""
         for origin, across, up in self.windows:
-            bars = []
-            for a in (0, 0.5, 1):
-                at = origin + across * a
-                bars.append(tube([at, at + up], 0.03, 6))
-            for b in (0, 1):
-                at = origin + up * b
-                bars.append(tube([at, at + across], 0.03, 6))
+            bars = [tube([at, at + up], 0.03, 6) for at in (origin, origin + across * 0.5, origin + across)]
+            bars += [tube([at, at + across], 0.03, 6) for at in (origin, origin + up)]
             self.add("window frame", bars, finish)
 
 
-STEEL, CHROME, BRASS, COPPER, GOLD = (
-    (0.56, 0.55, 0.53),
-    (0.55, 0.56, 0.57),
-    (0.76, 0.6, 0.33),
-    (0.9, 0.58, 0.45),
-    (0.98, 0.76, 0.36),
-)
+STEEL, CHROME = (0.56, 0.55, 0.53), (0.55, 0.56, 0.57)
+BRASS, COPPER, GOLD = (0.76, 0.6, 0.33), (0.9, 0.58, 0.45), (0.98, 0.76, 0.36)
 
 
 def legs(x0, y0, x1, y1, height, thick):

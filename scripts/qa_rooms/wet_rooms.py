@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from addon.bridge.demo.room import ball, box, grid
 
 from .furnish import BRASS, CHROME, COPPER, STEEL, FurnishedRoom, legs
@@ -48,22 +46,12 @@ def kitchen(seed: int) -> FurnishedRoom:
         r.metal(0.28, STEEL),
     )
     r.add("oven", [box((1.24, y - 0.625, 0.2), (1.78, y - 0.605, 0.75))], r.gloss(0.12, (0.012, 0.012, 0.013)))
-    r.add_round(
-        "tap",
-        [
-            tube(
-                np.concatenate(
-                    [
-                        [(2.3, y - 0.15, 0.9)],
-                        arc((2.3, y - 0.15, 1.15), (2.3, y - 0.37, 1.15), (0, 0, 0.12)),
-                        [(2.3, y - 0.37, 1.08)],
-                    ]
-                ),
-                0.017,
-            )
-        ],
-        r.metal(0.1, CHROME),
-    )
+    path = [
+        (2.3, y - 0.15, 0.9),
+        *arc((2.3, y - 0.15, 1.15), (2.3, y - 0.37, 1.15), (0, 0, 0.12)),
+        (2.3, y - 0.37, 1.08),
+    ]
+    r.add_round("tap", [tube(path, 0.017)], r.metal(0.1, CHROME))
     # An island with stools.
     top = r.gloss(0.4, wood((0.42, 0.25, 0.12), 6, seed))
     r.add("table", [box((1.3, 0.2, 0.84), (2.9, 0.8, 0.9)), *legs(1.35, 0.25, 2.85, 0.75, 0.84, 0.06)], top)
@@ -155,7 +143,7 @@ def bathroom(seed: int) -> FurnishedRoom:
         at = 0.95 + 0.9 * k
         basin = [(0.1, 0), (0.2, 0.05), (0.23, 0.13), (0.22, 0.13), (0.18, 0.05), (0.002, 0.03)]
         r.add_round("basin", [turned((at, y - 0.28, 0.862), basin, 30)], r.gloss(0.12, (0.84, 0.84, 0.84)))
-        path = np.concatenate([[(at, y - 0.08, 0.86)], arc((at, y - 0.08, 1.05), (at, y - 0.25, 1.05), (0, 0, 0.08))])
+        path = [(at, y - 0.08, 0.86), *arc((at, y - 0.08, 1.05), (at, y - 0.25, 1.05), (0, 0, 0.08))]
         r.add_round("tap", [tube(path, 0.015)], r.metal(0.08, CHROME))
         r.add_round(
             "soap",
@@ -167,7 +155,7 @@ def bathroom(seed: int) -> FurnishedRoom:
     r.add_round("tub", [(quads * (1.0, 1.9, 1.0) + (2.5, 1.15, 0.002), uv)], r.gloss(0.12, (0.84, 0.84, 0.83)))
     r.add_round(
         "tub tap",
-        [tube(np.concatenate([[(2.93, 0.3, 0.002)], arc((2.93, 0.3, 0.8), (2.7, 0.45, 0.8), (0, 0, 0.1))]), 0.02)],
+        [tube([(2.93, 0.3, 0.002), *arc((2.93, 0.3, 0.8), (2.7, 0.45, 0.8), (0, 0, 0.1))], 0.02)],
         r.metal(0.15, BRASS),
     )
     r.add_round("towel rail", [tube([(0.06, 0.5, 1.15), (0.06, 1.3, 1.15)], 0.012)], r.metal(0.12, CHROME))
