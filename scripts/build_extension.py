@@ -10,8 +10,6 @@ Fetches into wheels/ exactly the wheels that blender_manifest.toml lists and req
 is there already is checked, not fetched again.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import importlib.util

@@ -6,8 +6,6 @@ Labels and tooltips are asked of Blender (all that we register); texts of panels
 the code in operators/. A sentence with figures in it is listed with '{}' in their places.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import importlib

@@ -9,8 +9,6 @@ and what depends on the sharpness of frames is not to be judged by it: this is f
 cuts all triangles in two, through the middle of an edge.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import shutil

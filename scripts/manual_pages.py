@@ -3,8 +3,6 @@
 Knows the Markdown that docs/ is written in: headings, paragraphs, lists, tables, code, emphasis, links, pictures.
 """
 
-from __future__ import annotations
-
 import html
 import re
 import shutil

@@ -19,8 +19,6 @@ clip       pixels above are held there; after the exposure ('sensor'), or before
 tell       write the key `saturation`; without it, the reader has to find the clipping itself
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import shutil

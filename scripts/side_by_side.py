@@ -7,8 +7,6 @@ photograph under those of SCENE.blend. The camera is the one that was made for F
 and the third, rendered with the same seed. Refit nothing meanwhile: all three files show the result folder's images.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

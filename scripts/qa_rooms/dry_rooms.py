@@ -1,7 +1,5 @@
 """Bedroom, office and hall: sun through a window, fluorescent panels, a window alone."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from addon.bridge.demo.room import ball, box, cone, grid, painting, planks

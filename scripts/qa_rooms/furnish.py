@@ -1,7 +1,5 @@
 """A room under construction: things are added one by one, in colours and gloss that the seed changes a little."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Render a furnished room as a capture with truth, laid out like the captures that results are scored on."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

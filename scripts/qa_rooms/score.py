@@ -4,8 +4,6 @@ The albedo of an element is pi L_d / E. The truth's views hold E / pi (diffuse_l
 for each object the median of estimate / truth is known for the albedo, for L_d and for E, channel by channel.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

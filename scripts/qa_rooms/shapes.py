@@ -3,8 +3,6 @@
 A shape is corners (q, 4, 3) and uv (q, 4, 2), as in `addon.bridge.demo.room`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from addon.bridge.demo.room import ball, grid

@@ -1,7 +1,5 @@
 """Study: books, leather, a black piano, a patterned wallpaper; evening sky and warm lamps at once."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from addon.bridge.demo.room import ball, box, cone, grid, painting, planks

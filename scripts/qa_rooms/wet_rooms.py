@@ -1,7 +1,5 @@
 """Kitchen and bathroom: gloss, steel, tiles, many small lamps."""
 
-from __future__ import annotations
-
 from addon.bridge.demo.room import ball, box, grid
 
 from .furnish import BRASS, CHROME, COPPER, STEEL, FurnishedRoom, legs
