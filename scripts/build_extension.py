@@ -31,18 +31,13 @@ CONTENT = ("__init__.py", "LICENSE", "README.md", "CHANGELOG.md", "addon", "oper
 """What goes into the zip, besides the manifest and the wheels."""
 LEFT_OUT = "addon/farm"
 """What does not: Blender's window has no use for it, and it talks to managers over the network."""
-PIP_PLATFORMS = {
-    "linux-x64": "manylinux_2_28_x86_64",
-    "windows-x64": "win_amd64",
-    "macos-arm64": "macosx_14_0_arm64",
-    "macos-x64": "macosx_13_0_x86_64",
+PLATFORMS = {
+    "linux-x64": ("manylinux_2_28_x86_64", r"manylinux.*x86_64"),
+    "windows-x64": ("win_amd64", r"win_amd64"),
+    "macos-arm64": ("macosx_14_0_arm64", r"macosx.*arm64"),
+    "macos-x64": ("macosx_13_0_x86_64", r"macosx.*x86_64"),
 }
-WHEEL_PLATFORMS = {
-    "linux-x64": r"manylinux.*x86_64",
-    "windows-x64": r"win_amd64",
-    "macos-arm64": r"macosx.*arm64",
-    "macos-x64": r"macosx.*x86_64",
-}
+"""What pip calls a platform, and what its wheels' names end with."""
 
 
 def main() -> int:
@@ -63,7 +58,7 @@ def main() -> int:
             wheels = [
                 Path(wheel).name
                 for wheel in manifest["wheels"]
-                if re.search(WHEEL_PLATFORMS[platform] + r"\.whl$", wheel) and python_of(wheel) in versions
+                if re.search(PLATFORMS[platform][1] + r"\.whl$", wheel) and python_of(wheel) in versions
             ]
             fetch(platform, wheels, hashes)
             name = f"{manifest['id']}-{manifest['version']}-{platform.replace('-', '_')}"
@@ -124,7 +119,7 @@ def fetch(platform: str, names: list[str], hashes: dict[str, tuple[str, set[str]
                 lines = [requirement, *(f"--hash=sha256:{value}" for value in sorted(allowed))]
                 (Path(scratch) / "wheel.txt").write_text(" ".join(lines) + "\n")
                 pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet", "--no-deps"]
-                only = ["--only-binary=:all:", "--require-hashes", "--platform", PIP_PLATFORMS[platform]]
+                only = ["--only-binary=:all:", "--require-hashes", "--platform", PLATFORMS[platform][0]]
                 what = ["--python-version", python_of(name), "-r", Path(scratch) / "wheel.txt", "--dest", WHEELS]
                 subprocess.run([*pip, *only, *what], check=True)
         if not wheel.is_file():
