@@ -35,13 +35,12 @@ class ScanRelightSettings(SettingsProps, bpy.types.PropertyGroup):
 
     def changed(self, preset: str) -> list[str]:
         """Names of the settings that differ from the preset's."""
-        wanted = PRESETS[preset]
-        same = {bool: bool.__eq__, int: int.__eq__, str: str.__eq__, float: lambda a, b: abs(a - b) <= 1e-5}
-        return [
-            info.name
-            for info in setting_infos()
-            if info.name not in HOW and not same[info.kind](getattr(self, info.name), getattr(wanted, info.name))
-        ]
+
+        def differs(info) -> bool:
+            own, wanted = getattr(self, info.name), getattr(PRESETS[preset], info.name)
+            return abs(own - wanted) > 1e-5 if info.kind is float else own != wanted
+
+        return [info.name for info in setting_infos() if info.name not in HOW and differs(info)]
 
 
 class ScanRelightReading(ReadingProps, bpy.types.PropertyGroup):

@@ -56,9 +56,8 @@ def picture(name: str) -> int:
 
         _pictures = previews.new()
         atexit.register(forget_pictures)
-    path = PICTURES / f"{name.lower()}.png"
     if name not in _pictures:
-        _pictures.load(name, str(path), "IMAGE")
+        _pictures.load(name, str(PICTURES / f"{name.lower()}.png"), "IMAGE")
     return _pictures[name].icon_id
 
 
