@@ -4,35 +4,12 @@ As a library: `import scan_relight; scan_relight.recover(...)`. Blender starts w
 is loaded when it is first asked for.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .addon.api import (
-        PRESETS,
-        BadInputError,
-        Camera,
-        Capture,
-        Frame,
-        InterruptedRun,
-        Layout,
-        Mesh,
-        ObjectMaterial,
-        ProgressEvent,
-        RawMesh,
-        Reader,
-        Reading,
-        Recovered,
-        ScanRelightError,
-        Settings,
-        read_capture,
-        recover,
-        register_reader,
-        unwrapper,
-    )
+    from .addon.api import *  # noqa: F403  (its `__all__` is the same)
 
-__all__ = [
+__all__ = [  # noqa: F405
     "PRESETS",
     "BadInputError",
     "Camera",

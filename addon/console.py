@@ -49,7 +49,6 @@ class ConsoleProgress:
         self._stage, self._share, self._said, self._width = None, 0.0, 0.0, 0
 
     def __call__(self, event: ProgressEvent) -> None:
-        """Take in one event."""
         if self._quiet or not event.stage:
             return
         new, now = event.stage != self._stage, time.monotonic()

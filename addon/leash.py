@@ -21,19 +21,13 @@ GIGABYTE: Unit[float] = 1e9
 
 
 class JsonProgress:
-    """A listener for `Progress` that writes each event as one line of JSON.
-
-    Parameters
-    ----------
-    stream : text file
-    """
+    """A listener for `Progress` that writes each event as one line of JSON."""
 
     def __init__(self, stream: TextIO):
         self._stream = stream
         self._stage, self._share, self._said = None, 0.0, 0.0
 
     def __call__(self, event: ProgressEvent) -> None:
-        """Take in one event of the run."""
         now = time.monotonic()
         new = event.stage != self._stage
         ended = event.share >= 1.0 > self._share
@@ -122,7 +116,6 @@ class MemoryGuard:
 
     @property
     def sentence(self) -> str:
-        """What the user is told."""
         return (
             f"The run needs more than the memory limit of {self.limit:.3g} GB and was stopped; the finished stages "
             "are kept. Raise the limit, or take a greater texel size, a smaller atlas size or fewer threads."
@@ -135,7 +128,6 @@ class MemoryGuard:
         return False
 
     def close(self) -> None:
-        """Watch no longer."""
         self._done.set()
         BUDGET.limit = 0
 

@@ -39,7 +39,6 @@ class RunFolder:
         return {} if self.path is None else dict.fromkeys(ASKED, str(self.path))
 
     def close(self) -> None:
-        """Take the folder away."""
         if self._lock is not None:
             self._lock.close()
         if self.path is not None:

@@ -7,12 +7,10 @@ def classes() -> tuple[type, ...]:
     from .base import job_operator
     from .correct import correct
     from .correct import panel as correct_panel
-    from .correct import props as correct_props
     from .preferences import ScanRelightPreferences
     from .recover import files, panel_capture, panel_recover, room, scene_props, stages
     from .relight import export, lights, view
     from .relight import panel as relight_panel
-    from .relight import props as relight_props
     from .results import find, look
     from .results import panel as results_panel
 
@@ -28,11 +26,7 @@ def classes() -> tuple[type, ...]:
         *(find, panel_capture, panel_recover, results_panel, correct_panel, look, relight_panel, export),
         kinds=("PT", "UL"),
     )
-    groups = (
-        *(scene_props.ScanRelightSettings, scene_props.ScanRelightReading, scene_props.ScanRelightScene),
-        *(relight_props.ScanRelightLamp, relight_props.ScanRelightLight, relight_props.ScanRelightOutside),
-        *(relight_props.ScanRelightStudio, correct_props.ScanRelightCorrection, correct_props.ScanRelightCorrecting),
-    )
+    groups = scene_props.ScanRelightSettings, scene_props.ScanRelightReading, *(group for _, _, group in pointers())
     return *groups, ScanRelightPreferences, *operators, *panels
 
 
@@ -101,10 +95,10 @@ def unregister():
 
     from ..addon.bridge.corrections import corrections
     from ..addon.bridge.job import job
+    from ..addon.bridge.results import file
     from . import keymaps, manual, menus, translations
     from .recover import findings
     from .relight import lights
-    from .results import told
 
     bpy.utils.unregister_manual_map(manual.manual_map)
     keymaps.unregister()
@@ -112,7 +106,7 @@ def unregister():
     translations.unregister()
     for known, ours in handlers():
         known.remove(ours)
-    for one in (corrections, findings, told, job):
+    for one in (corrections, findings, file, job):
         one.forget()
     lights.forget_pictures()
     job.end_all()

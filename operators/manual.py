@@ -45,11 +45,6 @@ def file_name(page: str) -> str:
     return f"{name}.{ending}{mark}{part}"
 
 
-def address(page: str) -> str:
-    """A page's address, for a browser."""
-    return f"{DOCS.as_uri()}/{file_name(page)}"
-
-
 def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
     """What `bpy.utils.register_manual_map` asks for."""
     return f"{DOCS.as_uri()}/", tuple((pattern, file_name(page)) for pattern, page in MAP)
@@ -66,11 +61,12 @@ class SCAN_RELIGHT_OT_manual(bpy.types.Operator):
 
     def execute(self, context):
         """Open it; in the background only say where it lies."""
-        found = address(self.page)
-        if not (DOCS / file_name(self.page).partition("#")[0]).is_file():
+        name = file_name(self.page)
+        if not (DOCS / name.partition("#")[0]).is_file():
             self.report({"ERROR"}, f"The documentation has no page '{self.page}'; install the extension again.")
             return {"CANCELLED"}
+        address = f"{DOCS.as_uri()}/{name}"
         if bpy.app.background:
-            self.report({"INFO"}, found)
+            self.report({"INFO"}, address)
             return {"FINISHED"}
-        return bpy.ops.wm.url_open(url=found)
+        return bpy.ops.wm.url_open(url=address)

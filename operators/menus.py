@@ -28,12 +28,9 @@ def names() -> list[str]:
     """The operators in the menu."""
     from . import classes
 
-    found = (
-        cls
-        for cls in classes()
-        if issubclass(cls, bpy.types.Operator) and "INTERNAL" not in getattr(cls, "bl_options", ())
-    )
-    return [name for name in (cls.bl_idname.partition(".")[2] for cls in found) if name not in NEED_MORE]
+    operators = [cls for cls in classes() if issubclass(cls, bpy.types.Operator)]
+    found = [cls.bl_idname.partition(".")[2] for cls in operators if "INTERNAL" not in getattr(cls, "bl_options", ())]
+    return [name for name in found if name not in NEED_MORE]
 
 
 def object_entry(menu, context) -> None:

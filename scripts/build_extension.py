@@ -10,8 +10,6 @@ Fetches into wheels/ exactly the wheels that blender_manifest.toml lists and req
 is there already is checked, not fetched again.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import importlib.util
@@ -33,22 +31,16 @@ CONTENT = ("__init__.py", "LICENSE", "README.md", "CHANGELOG.md", "addon", "oper
 """What goes into the zip, besides the manifest and the wheels."""
 LEFT_OUT = "addon/farm"
 """What does not: Blender's window has no use for it, and it talks to managers over the network."""
-PIP_PLATFORMS = {
-    "linux-x64": "manylinux_2_28_x86_64",
-    "windows-x64": "win_amd64",
-    "macos-arm64": "macosx_14_0_arm64",
-    "macos-x64": "macosx_13_0_x86_64",
+PLATFORMS = {
+    "linux-x64": ("manylinux_2_28_x86_64", r"manylinux.*x86_64"),
+    "windows-x64": ("win_amd64", r"win_amd64"),
+    "macos-arm64": ("macosx_14_0_arm64", r"macosx.*arm64"),
+    "macos-x64": ("macosx_13_0_x86_64", r"macosx.*x86_64"),
 }
-WHEEL_PLATFORMS = {
-    "linux-x64": r"manylinux.*x86_64",
-    "windows-x64": r"win_amd64",
-    "macos-arm64": r"macosx.*arm64",
-    "macos-x64": r"macosx.*x86_64",
-}
+"""What pip calls a platform, and what its wheels' names end with."""
 
 
 def main() -> int:
-    """Fetch, stage, build."""
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
     pythons = sorted({python_of(wheel) for wheel in manifest["wheels"]})
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -66,7 +58,7 @@ def main() -> int:
             wheels = [
                 Path(wheel).name
                 for wheel in manifest["wheels"]
-                if re.search(WHEEL_PLATFORMS[platform] + r"\.whl$", wheel) and python_of(wheel) in versions
+                if re.search(PLATFORMS[platform][1] + r"\.whl$", wheel) and python_of(wheel) in versions
             ]
             fetch(platform, wheels, hashes)
             name = f"{manifest['id']}-{manifest['version']}-{platform.replace('-', '_')}"
@@ -126,34 +118,15 @@ def fetch(platform: str, names: list[str], hashes: dict[str, tuple[str, set[str]
                 # Hashes are taken from a requirements file alone.
                 lines = [requirement, *(f"--hash=sha256:{value}" for value in sorted(allowed))]
                 (Path(scratch) / "wheel.txt").write_text(" ".join(lines) + "\n")
-                subprocess.run(
-                    [
-                        sys.executable,
-                        "-m",
-                        "pip",
-                        "--disable-pip-version-check",
-                        "download",
-                        "--quiet",
-                        "--no-deps",
-                        "--only-binary=:all:",
-                        "--require-hashes",
-                        "--dest",
-                        WHEELS,
-                        "--platform",
-                        PIP_PLATFORMS[platform],
-                        "--python-version",
-                        python_of(name),
-                        "-r",
-                        Path(scratch) / "wheel.txt",
-                    ],
-                    check=True,
-                )
+                pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "download", "--quiet", "--no-deps"]
+                only = ["--only-binary=:all:", "--require-hashes", "--platform", PLATFORMS[platform][0]]
+                what = ["--python-version", python_of(name), "-r", Path(scratch) / "wheel.txt", "--dest", WHEELS]
+                subprocess.run([*pip, *only, *what], check=True)
         if not wheel.is_file():
             sys.exit(f"pip fetched another wheel of {requirement} than the manifest's {name}; mend the manifest.")
 
 
 def sha256(path: Path) -> str:
-    """Hash of a file's content."""
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -6,12 +6,9 @@ Labels and tooltips are asked of Blender (all that we register); texts of panels
 the code in operators/. A sentence with figures in it is listed with '{}' in their places.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import importlib
-import importlib.util
 import sys
 from pathlib import Path
 
@@ -23,28 +20,18 @@ SENTENCES = {"say": 1, "check": 2, "poll_message_set": 0, "told": 0, "needs": 1,
 
 
 def main() -> int:
-    """Print them."""
+    import scan_relight  # the checkout, as `.venv` has it
+
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--missing", metavar="LANGUAGE", help="only what operators/translations lacks of a language")
     arguments = parser.parse_args()
-    package = load()
-    package.register()
+    scan_relight.register()
     found = collect()
     if arguments.missing:
         found -= set(importlib.import_module("scan_relight.operators.translations").texts(arguments.missing))
     print("\n".join(sorted(found)))
-    package.unregister()
+    scan_relight.unregister()
     return 0
-
-
-def load():
-    """The checkout as the package `scan_relight`."""
-    spec = importlib.util.spec_from_file_location(
-        "scan_relight", ROOT / "__init__.py", submodule_search_locations=[str(ROOT)]
-    )
-    package = sys.modules["scan_relight"] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(package)
-    return package
 
 
 def collect() -> set[str]:

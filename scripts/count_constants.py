@@ -12,8 +12,6 @@ keeps a quotient from dividing by 0). Most are a formula's, a format's or a layo
 shows whether constants move there.
 """
 
-from __future__ import annotations
-
 import ast
 import sys
 from collections import Counter

@@ -8,8 +8,6 @@ only this script reads. RESULT is what `scan-relight recover` left there, with i
 views are traced with embree and show the nearest surface element.
 """
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import json

@@ -10,8 +10,6 @@ Only two things differ from what a reader does: buttons are looked for in Solid 
 over every one of them, and a picture is taken once the Rendered viewport has had time.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shutil
@@ -47,7 +45,6 @@ QUALITY = 88
 
 
 def main() -> int:
-    """Play, cut."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("capture", type=Path)
     parser.add_argument("--zip", type=Path, required=True)

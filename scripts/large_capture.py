@@ -9,8 +9,6 @@ and what depends on the sharpness of frames is not to be judged by it: this is f
 cuts all triangles in two, through the middle of an edge.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import shutil
@@ -47,8 +45,7 @@ def halved(vertices: np.ndarray, triangles: np.ndarray, owner: np.ndarray) -> tu
     return vertices, cut.reshape(-1, 3), np.repeat(owner, 2)
 
 
-def enlarge(source: Path, out: Path, frames: int, size: tuple[int, int], doublings: int, seed: int = 0) -> None:
-    """Write the capture."""
+def enlarge(source: Path, out: Path, frames: int, size: tuple[int, int], doublings: int) -> None:
     told = json.loads((source / "transforms.json").read_text())
     (out / "images").mkdir(parents=True)
     shutil.copy(source / "info_semantic.json", out)
@@ -57,7 +54,7 @@ def enlarge(source: Path, out: Path, frames: int, size: tuple[int, int], doublin
     for _ in range(doublings):
         parts = halved(*parts)
     (out / "mesh.ply").write_bytes(ply_bytes(parts[0], [(parts[1], parts[2])]))
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     old = np.array([told["w"], told["h"]])
     focal, centre = np.array([told["fl_x"], told["fl_y"]]), np.array([told["cx"], told["cy"]])
     jobs = []

@@ -20,26 +20,12 @@ LOCKS = {
 
 
 def main() -> int:
-    """Compile each lock."""
     uv = sys.argv[1] if len(sys.argv) > 1 else "uv"
     for name, options in LOCKS.items():
         lock = FOLDER / f"{name}.txt"
-        command = [
-            uv,
-            "pip",
-            "compile",
-            "--quiet",
-            "--upgrade",
-            "--generate-hashes",
-            "--no-emit-index-url",
-            "--no-header",
-            "--no-annotate",
-            *options,
-            f"{name}.in",
-            "-o",
-            lock.name,
-        ]
-        subprocess.run(command, cwd=FOLDER, check=True)
+        compiled = [uv, "pip", "compile", "--quiet", "--upgrade", "--generate-hashes", *options]
+        plain = ["--no-emit-index-url", "--no-header", "--no-annotate"]
+        subprocess.run([*compiled, *plain, f"{name}.in", "-o", lock.name], cwd=FOLDER, check=True)
         lock.write_text(f"# Made by scripts/lock.py from {name}.in; do not edit.\n" + lock.read_text())
         print(lock.relative_to(FOLDER.parent))
     return 0

@@ -3,8 +3,6 @@
 Knows the Markdown that docs/ is written in: headings, paragraphs, lists, tables, code, emphasis, links, pictures.
 """
 
-from __future__ import annotations
-
 import html
 import re
 import shutil
@@ -45,7 +43,6 @@ def write_pages(docs: Path, out: Path) -> None:
 
 
 def page(text: str) -> str:
-    """Markdown as HTML."""
     found, lines = [], text.splitlines()
     at = 0
     while at < len(lines):

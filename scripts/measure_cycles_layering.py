@@ -19,7 +19,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import bpy
 import numpy as np
 
-from addon.bridge.data.materials import make_material
+from addon.bridge.data.materials import make_material, principled
+from addon.bridge.data.nodes import find_node, make_world
 from addon.core.brdf.dielectric import DIELECTRIC
 from addon.core.brdf.material import ObjectMaterial
 
@@ -33,11 +34,8 @@ def furnace(samples):
     scene = bpy.context.scene
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=6)
     sphere = bpy.context.object
-    world = bpy.data.worlds.new("white")
-    if world.node_tree is None:
-        world.use_nodes = True
-    next(n for n in world.node_tree.nodes if n.type == "BACKGROUND").inputs["Color"].default_value = (1, 1, 1, 1)
-    scene.world = world
+    scene.world = make_world("white", None, 1.0)
+    find_node(scene.world, "BACKGROUND").inputs["Color"].default_value = (1, 1, 1, 1)
     camera = bpy.data.cameras.new("camera")
     camera.type, camera.ortho_scale = "ORTHO", 2.1
     scene.camera = bpy.data.objects.new("camera", camera)
@@ -56,8 +54,7 @@ def furnace(samples):
 def reflectance(sphere, phi, psi, base):
     """Mean over the sphere's disc."""
     material = make_material(ObjectMaterial(0, "sphere", DIELECTRIC, alpha=float(phi), f0=float(psi)))
-    node = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
-    node.inputs["Base Color"].default_value = (base, base, base, 1)
+    principled(material).inputs["Base Color"].default_value = (base, base, base, 1)
     sphere.data.materials.clear()
     sphere.data.materials.append(material)
     with tempfile.TemporaryDirectory() as folder:

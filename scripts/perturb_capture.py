@@ -19,8 +19,6 @@ clip       pixels above are held there; after the exposure ('sensor'), or before
 tell       write the key `saturation`; without it, the reader has to find the clipping itself
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import shutil
@@ -140,7 +138,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         perturb_mesh(source / "mesh.ply", out / "mesh.ply", given.mesh / 1000, given.mesh_smooth, mesh)
     else:
         shutil.copyfile(source / "mesh.ply", out / "mesh.ply")
-    clip = np.inf if given.clip is None else given.clip
+    clip, sensor = np.inf if given.clip is None else given.clip, given.clip_at == "sensor"
     for frame in top["frames"]:
         if given.poses:
             millimetres, degrees = given.poses
@@ -152,16 +150,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             exposure = float(2 ** exposures.uniform(-given.exposure / 2, given.exposure / 2))
             frame["exposure"] = exposure
         if given.tell and given.clip:
-            frame["saturation"] = clip if given.clip_at == "sensor" else clip * exposure
-        perturb_picture(
-            source / frame["file_path"],
-            out / frame["file_path"],
-            given.noise or 0.0,
-            exposure,
-            clip,
-            given.clip_at == "sensor",
-            pictures,
-        )
+            frame["saturation"] = clip if sensor else clip * exposure
+        paths = source / frame["file_path"], out / frame["file_path"]
+        perturb_picture(*paths, given.noise or 0.0, exposure, clip, sensor, pictures)
     (out / "transforms.json").write_text(json.dumps(top, indent=1))
     return 0
 

@@ -7,8 +7,6 @@ photograph under those of SCENE.blend. The camera is the one that was made for F
 and the third, rendered with the same seed. Refit nothing meanwhile: all three files show the result folder's images.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile
@@ -24,7 +22,6 @@ BAR = 30
 
 
 def main() -> int:
-    """Render, show, join."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("frame", type=Path)
     parser.add_argument("blends", type=Path, nargs=3, metavar="BLEND")

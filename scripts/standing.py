@@ -9,8 +9,6 @@ a line first, from the scores of a recovered scene against the capture's truth (
 CAPTURE --out scores.json`) and the run's own report. Nothing on the page is written by hand.
 """
 
-from __future__ import annotations
-
 import argparse
 import datetime
 import json

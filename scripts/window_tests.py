@@ -23,7 +23,6 @@ SKIPPED = 3
 
 
 def main() -> int:
-    """Find or make a Blender, run the tests."""
     words = sys.argv[1:]
     required = "--required" in words
     words = [word for word in words if word != "--required"]
@@ -34,14 +33,9 @@ def main() -> int:
     os.environ["BLENDER"] = blender
     shutil.rmtree(ROOT / "build" / "window", ignore_errors=True)
     python = sys.executable if running_inside() else str(prepare(tools=True))
-    return hand_over(
-        [
-            python,
-            "-m",
-            "pytest",
-            *(words if any("tests/window" in word for word in words) else ["tests/window", *words]),
-        ]
-    )
+    if not any("tests/window" in word for word in words):
+        words = ["tests/window", *words]
+    return hand_over([python, "-m", "pytest", *words])
 
 
 def running_inside() -> bool:

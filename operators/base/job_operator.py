@@ -115,7 +115,6 @@ class JobOperator:
     def cancel(self, context):
         """Blender ends the operator: it closes, or its window does."""
         self.job.stop()
-        self.job.facts["phase"] = "end"
         self._leave(context, set())
 
     def tidy(self, job: jobs.Job) -> None:
@@ -129,7 +128,6 @@ class JobOperator:
         if job.state == jobs.FAILED:
             return self._fail(context, job.sentence)
         if job.state == jobs.STOPPED or job.facts.get("unwanted"):
-            job.facts["phase"] = "end"
             return self._leave(context, {"CANCELLED"})
         if self._loader is None:
             job.facts["phase"] = "load"
@@ -168,7 +166,6 @@ class JobOperator:
         """Work at the scene for one slice; nothing else reaches Blender's data until it is done."""
         if stop:
             self._slices.close()
-            self.job.facts["phase"] = "end"
             self.report({"WARNING"}, "Stopped while the result came in; undo takes back what has come.")
             return self._leave(context, {"FINISHED"})
         if event.type != "TIMER":
@@ -185,7 +182,6 @@ class JobOperator:
     def _done(self, context, warnings, verdict: set[str]):
         job = self.job
         job.warnings.extend(one for one in warnings if one not in job.warnings)
-        job.facts["phase"] = "end"
         count = len(job.warnings)
         also = f"; {count} warning{'s' * (count > 1)}, see the panel" if count else ""
         self.report({"INFO"}, f"{self.bl_label}: done in {duration(job.seconds)}{also}.")
@@ -193,7 +189,7 @@ class JobOperator:
 
     def _fail(self, context, sentence: str):
         half = self.job.facts["phase"] == "change"
-        self.job.facts["phase"], self.job.facts["failed"] = "end", sentence
+        self.job.facts["failed"] = sentence
         self.report({"ERROR"}, sentence)
         return self._leave(context, {"FINISHED"} if half else {"CANCELLED"})
 
@@ -207,6 +203,7 @@ class JobOperator:
         redraw(context)
 
     def _leave(self, context, verdict: set[str]) -> set[str]:
+        self.job.facts["phase"] = "end"
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None

@@ -18,16 +18,14 @@ ICON: Shown[int] = 20
 def say(layout, sentence: str, icon: str = "NONE") -> None:
     """Write `sentence` over as many lines as the region's width asks for; the icon stands before the first."""
     sentence = translations.told(sentence)
-    context = bpy.context
-    scale = context.preferences.system.ui_scale or 1.0  # 0 where there was never a window
+    preferences = bpy.context.preferences
+    scale = preferences.system.ui_scale or 1.0  # 0 where there was never a window
+    points = preferences.ui_styles[0].widget.points if preferences.ui_styles else 11.0
     room = region_width() - (MARGIN + (ICON if icon != "NONE" else 0)) * scale
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for number, line in enumerate(lines(sentence, int(room), points(context) * scale)):
-        if icon == "NONE":
-            column.label(text=line)
-        else:
-            column.label(text=line, icon="BLANK1" if number else icon)
+    for number, line in enumerate(lines(sentence, int(room), points * scale)):
+        column.label(text=line, icon="BLANK1" if number and icon != "NONE" else icon)
 
 
 def fields(layout, owner=None, *names: str):
@@ -49,12 +47,6 @@ def region_width() -> int:
     """Pixels that the region is wide that is drawn."""
     region = bpy.context.region
     return region.width if region else 300
-
-
-def points(context) -> float:
-    """Size of the interface's letters."""
-    styles = context.preferences.ui_styles
-    return styles[0].widget.points if styles else 11.0
 
 
 @lru_cache(maxsize=512)
@@ -111,7 +103,6 @@ class SidebarPanel:
         return context.scene is not None
 
     def draw_header_preset(self, context):
-        """The way to the documentation."""
         if self.manual:
             self.layout.operator("scan_relight.manual", text="", icon="HELP", emboss=False).page = self.manual
 
@@ -134,7 +125,4 @@ class NamedRows:
 
 def places(keys: list) -> list[int]:
     """Where each of `keys` stands when they are sorted, as `UIList.filter_items` returns it."""
-    found = [0] * len(keys)
-    for place, number in enumerate(sorted(range(len(keys)), key=keys.__getitem__)):
-        found[number] = place
-    return found
+    return bpy.types.UI_UL_list.sort_items_helper(list(enumerate(keys)), key=lambda pair: pair[1])

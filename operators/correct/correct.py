@@ -10,11 +10,11 @@ from ...addon.bridge.job import job as jobs
 from ...addon.bridge.job.command import command
 from ...addon.bridge.light.room import cast, depsgraph_of
 from ...addon.bridge.marks import OBJECT_ID
+from ...addon.bridge.results import file
 from ...addon.bridge.slices import whole
 from ...addon.core.errors import BadInputError, ScanRelightError
 from ..base.job_operator import FOLLOWED, JobOperator
 from ..base.operator import TURNING, AtOnce, OneSentence, has_scene, mouse_ray, needs, no_run, object_mode
-from ..results import told
 from .props import ALBEDO, SMOOTH_ANGLE, STATEMENTS
 
 
@@ -97,7 +97,7 @@ class RefitOperator(OneSentence, JobOperator):
 
     def change(self, scene, loaded):
         warnings = yield from refitted.bringing(scene, *loaded)
-        told.forget()
+        file.forget()
         return warnings
 
     def _leave(self, context, verdict):
@@ -365,9 +365,7 @@ class SCAN_RELIGHT_OT_restore_painted(CorrectOperator, bpy.types.Operator):
     bl_label = "Restore"
 
     discard: bpy.props.BoolProperty(
-        name="Forget What Was Painted",
-        description="Take it out of your image too; else Paint shows it again",
-        default=False,
+        name="Forget What Was Painted", description="Take it out of your image too; else Paint shows it again"
     )
 
     def work(self, context):

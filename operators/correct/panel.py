@@ -42,7 +42,6 @@ class SCAN_RELIGHT_PT_correct(SidebarPanel, bpy.types.Panel):
         self.refit(layout, context, choices, thing)
 
     def statements(self, layout, context, choices, thing) -> None:
-        """What it is, in one click."""
         column = layout.column(align=True)
         column.label(text="This is:")
         said = corrections.given(thing)

@@ -56,7 +56,6 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
             self.progress(job)
 
     def choices(self, layout, context) -> None:
-        """Preset, folder, settings."""
         choices = context.scene.scan_relight
         fields(layout, choices, "preset")
         fields(layout, choices.settings, "detail", "shading_rays")
@@ -92,7 +91,6 @@ class SCAN_RELIGHT_PT_recover(SidebarPanel, bpy.types.Panel):
             again.target, again.from_stage = "recover", STAGES[0]
 
     def progress(self, job: jobs.Job) -> None:
-        """One bar, and Stop."""
         factor, text = bar(job)
         column = self.layout.column(align=True)
         if job.facts.get("title") not in (None, "", "Recover Capture"):  # no heading twice

@@ -75,12 +75,8 @@ class SCAN_RELIGHT_OT_mark_assets(AtOnce, bpy.types.Operator):
     bl_label = "Mark Materials as Assets"
     remarks = "INFO"
 
-    selected_only: bpy.props.BoolProperty(
-        name="Selected Only", description="Only what the selected objects wear", default=False
-    )
-    clear: bpy.props.BoolProperty(
-        name="Take Out", description="They are no assets any more", default=False, options={"SKIP_SAVE"}
-    )
+    selected_only: bpy.props.BoolProperty(name="Selected Only", description="Only what the selected objects wear")
+    clear: bpy.props.BoolProperty(name="Take Out", description="They are no assets any more", options={"SKIP_SAVE"})
 
     def work(self, context):
         things = look.recovered(context.scene)
@@ -111,7 +107,7 @@ class SCAN_RELIGHT_OT_restore_materials(AtOnce, bpy.types.Operator):
     bl_label = "Restore Materials"
 
     selected_only: bpy.props.BoolProperty(
-        name="Selected Only", description="Leave the objects that are not selected as they are", default=False
+        name="Selected Only", description="Leave the objects that are not selected as they are"
     )
 
     def work(self, context):

@@ -1,24 +1,26 @@
 """What the artist chose, kept in the scene: plain choices only. What a run does at the moment is nobody's to save."""
 
 from contextlib import suppress
-from dataclasses import replace
 
 import bpy
 
 from ...addon.core.errors import StorageError
-from ...addon.core.settings import PRESETS, Settings
+from ...addon.core.settings import PRESETS
 from ...addon.settings_info import setting_infos
 from ..base.operator import folder_property
 from . import findings
 from .reading_props import ReadingProps
-from .settings_props import COPIES, IMAGES, SettingsProps, preset_property, setting_value
+from .settings_props import COPIES, IMAGES, SettingsProps, preset_property
+
+HOW = ("threads", "seed")
+"""Settings that say how and not what is computed: no preset's."""
 
 
 def preset_chosen(choices, context) -> None:
-    """Lay the preset's values into the settings, keeping what says how and not what is computed."""
-    choices.settings.take(
-        replace(PRESETS[choices.preset], threads=choices.settings.threads, seed=choices.settings.seed)
-    )
+    """Lay the preset's values into the settings."""
+    for info in setting_infos():
+        if info.name not in HOW:
+            setattr(choices.settings, info.name, getattr(PRESETS[choices.preset], info.name))
 
 
 def capture_chosen(choices, context) -> None:
@@ -31,25 +33,14 @@ def capture_chosen(choices, context) -> None:
 class ScanRelightSettings(SettingsProps, bpy.types.PropertyGroup):
     """The settings as they are chosen."""
 
-    def value(self) -> Settings:
-        """The settings as chosen; raises `BadInputError` on one that can't be."""
-        return Settings(**{info.name: setting_value(self, info) for info in setting_infos()})
-
-    def take(self, settings: Settings) -> None:
-        """Show `settings`."""
-        for info in setting_infos():
-            setattr(self, info.name, getattr(settings, info.name))
-
     def changed(self, preset: str) -> list[str]:
         """Names of the settings that differ from the preset's."""
-        wanted = PRESETS[preset]
-        same = {bool: bool.__eq__, int: int.__eq__, str: str.__eq__, float: lambda a, b: abs(a - b) <= 1e-5}
-        return [
-            info.name
-            for info in setting_infos()
-            if info.name not in ("threads", "seed")
-            and not same[info.kind](getattr(self, info.name), getattr(wanted, info.name))
-        ]
+
+        def differs(info) -> bool:
+            own, wanted = getattr(self, info.name), getattr(PRESETS[preset], info.name)
+            return abs(own - wanted) > 1e-5 if info.kind is float else own != wanted
+
+        return [info.name for info in setting_infos() if info.name not in HOW and differs(info)]
 
 
 class ScanRelightReading(ReadingProps, bpy.types.PropertyGroup):

@@ -60,7 +60,6 @@ COPIES = bpy.props.BoolProperty(
     name="Make Copies",
     description="Where modifiers or instances make an object's faces, put the material onto a "
     "copy of it and hide the object; without this such objects are left as they are",
-    default=False,
 )
 FROM_STAGE = bpy.props.EnumProperty(
     name="Again From",
@@ -144,7 +143,6 @@ class CaptureOperator(ReadingProps, OneSentence, JobOperator):
         return context.window_manager.invoke_props_dialog(self, width=420)
 
     def execute(self, context):
-        """Do the work, or start it."""
 
         def work() -> set[str]:
             if not bpy.app.background:

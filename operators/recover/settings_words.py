@@ -1,7 +1,5 @@
 """What the interface calls the settings and their choices; what each does is the `Settings` docstring's to say."""
 
-from typing import NamedTuple
-
 from ...addon.settings_info import SettingInfo
 
 LABELS = {
@@ -45,19 +43,11 @@ CHOICES = {
 }
 
 
-class Words(NamedTuple):
+def words(info: SettingInfo) -> tuple[str, str, dict[str, tuple[str, str]]]:
     """Label and tooltip of a setting; label and tooltip of each of its choices."""
-
-    label: str
-    text: str
-    choices: dict[str, tuple[str, str]]
-
-
-def words(info: SettingInfo) -> Words:
-    """What the interface calls a setting."""
     choices = CHOICES.get(info.name, {})
     choices = {name: choices.get(name, (_title(name), f"Take '{name}'")) for name in info.choices}
-    return Words(LABELS.get(info.name, _title(info.name)), info.help.partition(". ")[0], choices)
+    return LABELS.get(info.name, _title(info.name)), info.help.partition(". ")[0], choices
 
 
 def _title(name: str) -> str:

@@ -31,11 +31,6 @@ def has_room(scene: bpy.types.Scene) -> bool:
     return any(OBJECT_ID in thing for thing in scene.objects)
 
 
-def default_folder(scene: bpy.types.Scene) -> str:
-    """Where pictures and exports go unless told: the result folder, else beside the file, else nowhere ('')."""
-    return bpy.path.abspath(scene.scan_relight.result_folder or "//")
-
-
 _REST: Shown[float] = 0.2
 _SLICE: Shown[float] = 0.02
 """Seconds that a slider stays still to count as let go; that looking takes of the window's time at once."""

@@ -9,7 +9,7 @@ from ...addon.core.errors import BadInputError
 from ...addon.core.io.folder import capture_name
 from ..base.operator import file_property, needs
 from ..base.panel import SidebarPanel
-from .base import SceneOperator, default_folder
+from .base import SceneOperator
 
 FORMATS = (
     (".glb", "glTF (.glb)", "One file; most viewers and game engines"),
@@ -37,11 +37,11 @@ class SCAN_RELIGHT_OT_export(SceneOperator, bpy.types.Operator):
     format: bpy.props.EnumProperty(name="Format", description="Of a file whose name has no ending", items=FORMATS)
     scope: bpy.props.EnumProperty(name="Objects", description="What is written", items=SCOPES)
     lights: bpy.props.BoolProperty(name="Lights", description="Also the lights that were added", default=True)
-    cameras: bpy.props.BoolProperty(name="Camera", description="Also the scene's camera", default=False)
+    cameras: bpy.props.BoolProperty(name="Camera", description="Also the scene's camera")
 
     def invoke(self, context, event):
         if not self.filepath:
-            folder = default_folder(context.scene)
+            folder = bpy.path.abspath(context.scene.scan_relight.result_folder or "//")  # '' where no file was saved
             self.filepath = str(Path(folder, capture_name(folder) + self.format)) if folder else f"room{self.format}"
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}

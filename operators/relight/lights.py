@@ -56,9 +56,8 @@ def picture(name: str) -> int:
 
         _pictures = previews.new()
         atexit.register(forget_pictures)
-    path = PICTURES / f"{name.lower()}.png"
     if name not in _pictures:
-        _pictures.load(name, str(path), "IMAGE")
+        _pictures.load(name, str(PICTURES / f"{name.lower()}.png"), "IMAGE")
     return _pictures[name].icon_id
 
 
@@ -78,7 +77,7 @@ class SCAN_RELIGHT_OT_switch_lamps(RelightOperator, bpy.types.Operator):
 
     bl_label = "Switch All Lamps"
 
-    on: bpy.props.BoolProperty(name="On", description="On or off", default=False)
+    on: bpy.props.BoolProperty(name="On", description="On or off")
 
     def work(self, context):
         for lamp in lamps.find_lamps(context.scene):

@@ -227,7 +227,6 @@ class ScanRelightStudio(bpy.types.PropertyGroup):
         name="Follow",
         description="Set the exposure after each change of the light here, by an estimate, good to "
         "about a stop; nothing is rendered",
-        default=False,
         update=lambda self, context: follow(self.id_data),
     )
     setup: bpy.props.StringProperty(

@@ -1,6 +1,5 @@
 """`bpy.ops.scan_relight.*` for what is seen: a frame's camera, things that are set into the room, before and after."""
 
-import os
 import shutil
 import tempfile
 from contextlib import suppress
@@ -190,7 +189,6 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
     percentage: PERCENTAGE
 
     def target(self, scene) -> Path:
-        """The file to write."""
         if self.filepath:
             return Path(bpy.path.abspath(self.filepath)).absolute()
         folder, stays = before_after.picture_folder(scene, scene.scan_relight.result_folder)
@@ -212,7 +210,6 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         return self.attempt(lambda: self.begin(context))
 
     def begin(self, context) -> set[str]:
-        """Start the job."""
         out = self.target(context.scene)
         pictures.check_format(out)
         self._folder = Path(tempfile.mkdtemp(prefix="scan_relight_"))
@@ -242,6 +239,5 @@ class SCAN_RELIGHT_OT_before_after(JobOperator, RelightOperator, bpy.types.Opera
         yield 1.0
         return ()
 
-    def _leave(self, context, verdict):
-        shutil.rmtree(getattr(self, "_folder", os.devnull), ignore_errors=True)
-        return super()._leave(context, verdict)
+    def tidy(self, job):
+        shutil.rmtree(self._folder, ignore_errors=True)

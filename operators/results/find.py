@@ -41,7 +41,6 @@ class SCAN_RELIGHT_OT_find_result(Choosing, AtOnce, bpy.types.Operator):
         return [left.sentence] if left is not None else []
 
     def wanted(self) -> find.Missing:
-        """The missing result in question."""
         lost = find.missing()
         if self.missing:
             folder = Path(bpy.path.abspath(self.missing)).absolute()

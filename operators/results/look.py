@@ -9,15 +9,6 @@ from ..base.operator import AtOnce, has_scene, needs, object_mode
 from ..base.panel import SidebarPanel
 
 
-def result_objects(scene) -> dict[int, bpy.types.Object]:
-    """The recovered objects of a scene by `object_id`; of several imports the last one's."""
-    return {
-        thing[OBJECT_ID]: thing
-        for thing in scene.objects
-        if thing.type == "MESH" and isinstance(thing.get(OBJECT_ID), int)
-    }
-
-
 def make_active(context, thing: bpy.types.Object, extend: bool = False) -> None:
     """Select an object, with `extend` beside what is selected, and make it the active one."""
     if not extend:
@@ -44,15 +35,14 @@ class SCAN_RELIGHT_OT_select_result_object(AtOnce, bpy.types.Operator):
     bl_label = "Select Object"
 
     object_id: bpy.props.IntProperty(name="Object", description="Number of the object in the capture", min=0)
-    extend: bpy.props.BoolProperty(
-        name="Extend", description="Keep what is selected", default=False, options={"SKIP_SAVE"}
-    )
+    extend: bpy.props.BoolProperty(name="Extend", description="Keep what is selected", options={"SKIP_SAVE"})
 
     def work(self, context):
-        thing = result_objects(context.scene).get(self.object_id)
-        if thing is None:
+        meshes = (thing for thing in context.scene.objects if thing.type == "MESH")
+        found = [thing for thing in meshes if thing.get(OBJECT_ID) == self.object_id]
+        if not found:
             raise BadInputError(f"Object {self.object_id} is not in this scene; import the capture first.")
-        select(context, thing, self.extend)
+        select(context, found[-1], self.extend)  # of several imports the last one's
 
 
 LOOKS = [(name, one.label, one.text) for name, one in look.LOOKS.items()]

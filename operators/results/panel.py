@@ -162,7 +162,6 @@ class SCAN_RELIGHT_PT_results(SidebarPanel, bpy.types.Panel):
             layout.operator("scan_relight.open_result", text="Bring In", icon="IMPORT").folder = str(folder)
 
     def details(self, layout, context, name: str, one: dict) -> None:
-        """Everything of one object."""
         column = layout.column(align=True)
         column.label(text=name, icon=getattr(find(one.get("model")), "icon", "BLANK1"), translate=False)
         for label, text in results.facts(one):

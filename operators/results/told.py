@@ -1,5 +1,6 @@
 """What a result folder says of its objects, for the panel: read when a file changed, kept in memory, never saved."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -53,11 +54,8 @@ def refused(things) -> list[tuple[str, Path | None]]:
     list of (str, Path or None)
         A sentence, and the folder whose run has to be brought in; None where nobody can tell.
     """
-    counts: dict[Path | None, int] = {}
-    for state, result in standings(things).values():
-        if state in (EARLIER, UNTOLD):
-            folder = result.folder if state == EARLIER else None
-            counts[folder] = counts.get(folder, 0) + 1
+    states = [(state, result) for state, result in standings(things).values() if state in (EARLIER, UNTOLD)]
+    counts = Counter(result.folder if state == EARLIER else None for state, result in states)
     return [
         (
             f"{count} object{'s' * (count > 1)} of this scene {'are' if count > 1 else 'is'} "
@@ -72,9 +70,6 @@ def refused(things) -> list[tuple[str, Path | None]]:
         )
         for folder, count in counts.items()
     ]
-
-
-forget = file.forget
 
 
 def label(model: str) -> str:

@@ -8,8 +8,6 @@ KIND is kitchen, bathroom, bedroom, office, hall or study. `score` needs no rend
 `scan-relight recover CAPTURE --out RESULT` left. Run from the repository's root.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

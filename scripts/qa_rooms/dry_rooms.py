@@ -1,13 +1,11 @@
 """Bedroom, office and hall: sun through a window, fluorescent panels, a window alone."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from addon.bridge.demo.room import ball, box, cone, grid, painting, planks
 
 from .furnish import BRASS, CHROME, GOLD, STEEL, Finish, FurnishedRoom, legs
-from .shapes import arc, clouds, curtain, cushion, moved, stripes, tiles, tube, turned, wood
+from .shapes import arc, clouds, curtain, cushion, stripes, tiles, tube, turned, wood
 
 
 def bedroom(seed: int) -> FurnishedRoom:
@@ -34,22 +32,19 @@ def bedroom(seed: int) -> FurnishedRoom:
     cloth = r.diffuse(0.35, 0.05, 0.1)
     r.add("curtain", [curtain((x - 0.07, 0.85, 0.05), (0, 0.4, 0), 2.3, (0.035, 0, 0), 4, 40)], cloth)
     r.add("curtain", [curtain((x - 0.07, 2.45, 0.05), (0, 0.4, 0), 2.3, (0.035, 0, 0), 4, 40)], cloth)
-    r.add("rod", [tube([(x - 0.07, 0.6, 2.37), (x - 0.07, 3.1, 2.37)], 0.015)], r.metal(0.25, BRASS), smooth=True)
+    r.add_round("rod", [tube([(x - 0.07, 0.6, 2.37), (x - 0.07, 3.1, 2.37)], 0.015)], r.metal(0.25, BRASS))
     dark = r.gloss(0.35, wood((0.1, 0.05, 0.025), 4, seed))
     r.add(
         "bed frame",
         [box((1.2, 1.85, 0.08), (2.95, y - 0.08, 0.3)), box((1.15, y - 0.08, 0.05), (3.0, y - 0.02, 1.15))],
         dark,
     )
-    r.add("mattress", [cushion((2.075, 2.9, 0.4), (0.85, 1.0, 0.13), 10, 0.3)], r.diffuse(0.8, 0.79, 0.77), smooth=True)
+    r.add_round("mattress", [cushion((2.075, 2.9, 0.4), (0.85, 1.0, 0.13), 10, 0.3)], r.diffuse(0.8, 0.79, 0.77))
     blanket = stripes([(0.05, 0.12, 0.3), (0.55, 0.5, 0.4), (0.08, 0.2, 0.35)], 12)
-    r.add("blanket", [cushion((2.075, 2.55, 0.44), (0.89, 0.68, 0.13), 10, 0.25)], r.matt_picture(blanket), smooth=True)
+    r.add_round("blanket", [cushion((2.075, 2.55, 0.44), (0.89, 0.68, 0.13), 10, 0.25)], r.matt_picture(blanket))
     for k in range(2):
-        r.add(
-            "pillow",
-            [cushion((1.65 + 0.85 * k, 3.55, 0.6), (0.33, 0.2, 0.1), 10, 0.6)],
-            r.diffuse(0.75, 0.7, 0.55),
-            smooth=True,
+        r.add_round(
+            "pillow", [cushion((1.65 + 0.85 * k, 3.55, 0.6), (0.33, 0.2, 0.1), 10, 0.6)], r.diffuse(0.75, 0.7, 0.55)
         )
         left = 0.55 + 2.6 * k
         r.add(
@@ -63,17 +58,17 @@ def bedroom(seed: int) -> FurnishedRoom:
         )
         at = (left + 0.25, 3.75)
         stand = [(0.08, 0), (0.07, 0.02), (0.015, 0.04), (0.03, 0.14), (0.012, 0.2), (0.01, 0.3), (0.002, 0.3)]
-        r.add("lamp stand", [turned((*at, 0.472), stand, 24)], r.metal(0.25, BRASS), smooth=True)
+        r.add_round("lamp stand", [turned((*at, 0.472), stand, 24)], r.metal(0.25, BRASS))
         r.add("lamp shade", [cone((*at, 0.72), 0.17, 0.1, 0.24, 32)], r.diffuse(0.72, 0.62, 0.42))
         r.add("bulb", [ball((*at, 0.82), 0.04, 5)], r.lamp(120, 84, 48))
     r.add("wardrobe", [box((0.01, 0.5, 0.06), (0.6, 2.4, 2.2))], r.gloss(0.3, wood((0.16, 0.075, 0.035), 3, seed + 1)))
-    r.add("knob", [ball((0.63, a, 1.1), 0.02, 5) for a in (1.4, 1.5)], r.metal(0.2, BRASS), smooth=True)
+    r.add_round("knob", [ball((0.63, a, 1.1), 0.02, 5) for a in (1.4, 1.5)], r.metal(0.2, BRASS))
     r.add(
         "rug",
         [box((1.0, 0.6, 0.001), (3.2, 1.75, 0.014))],
         r.matt_picture(clouds((0.35, 0.04, 0.03), (0.5, 0.3, 0.1), 26, seed, sharp=3)),
     )
-    r.add(
+    r.add_round(
         "armchair",
         [
             cushion((3.75, 0.55, 0.28), (0.36, 0.34, 0.14), 8, 0.4),
@@ -82,7 +77,6 @@ def bedroom(seed: int) -> FurnishedRoom:
             cushion((4.12, 0.55, 0.45), (0.08, 0.34, 0.12), 8, 0.4),
         ],
         r.gloss(0.5, (0.09, 0.04, 0.02)),
-        smooth=True,
     )
     for k in range(2):
         frame = r.gloss(0.25, (0.02, 0.02, 0.02))
@@ -98,13 +92,12 @@ def bedroom(seed: int) -> FurnishedRoom:
         bars += [box((a, y - 0.045, 1.5), (a + 0.03, y - 0.002, 2.0)) for a in (left - 0.03, left + 0.6)]
         r.add("picture frame", bars, frame)
     r.add("dresser", [box((1.5, 0.01, 0.08), (2.7, 0.45, 0.8))], r.gloss(0.3, (0.6, 0.6, 0.56)))
-    r.add(
+    r.add_round(
         "vase",
         [turned((1.8, 0.22, 0.802), [(0.05, 0), (0.1, 0.12), (0.05, 0.26), (0.06, 0.3), (0.002, 0.28)], 28)],
         r.gloss(0.12, (0.03, 0.1, 0.35)),
-        smooth=True,
     )
-    r.add("globe", [ball((2.4, 0.23, 0.95), 0.14, 12)], r.gloss(0.3, (0.1, 0.28, 0.12)), smooth=True)
+    r.add_round("globe", [ball((2.4, 0.23, 0.95), 0.14, 12)], r.gloss(0.3, (0.1, 0.28, 0.12)))
     return r
 
 
@@ -129,11 +122,10 @@ def office(seed: int) -> FurnishedRoom:
     for k in range(4):
         a, b = 0.8 + 2.3 * (k % 2), 0.35 + 2.9 * (k // 2)
         r.add("desk", [box((a, b, 0.7), (a + 1.5, b + 0.7, 0.74))], top)
-        r.add(
+        r.add_round(
             "desk legs",
             [tube([(a + p, b + q, 0.002), (a + p, b + q, 0.7)], 0.022, 10) for p in (0.06, 1.44) for q in (0.06, 0.64)],
             r.metal(0.3, STEEL),
-            smooth=True,
         )
         face = b + (0.1 if k < 2 else 0.55)
         r.add(
@@ -151,14 +143,13 @@ def office(seed: int) -> FurnishedRoom:
         cx, cy = a + 0.75, (b + 1.0 if k < 2 else b - 0.3)
         away = 1 if k < 2 else -1
         seat = r.gloss(0.45, [(0.55, 0.05, 0.03), (0.03, 0.03, 0.032), (0.05, 0.3, 0.1), (0.03, 0.03, 0.032)][k])
-        r.add(
+        r.add_round(
             "chair",
             [
                 cushion((cx, cy, 0.45), (0.22, 0.21, 0.03), 8, 0.4),
                 cushion((cx, cy + 0.22 * away, 0.75), (0.21, 0.025, 0.17), 8, 0.4),
             ],
             seat,
-            smooth=True,
         )
         frame = []
         for side in (-0.2, 0.2):
@@ -167,49 +158,34 @@ def office(seed: int) -> FurnishedRoom:
                 (cx + side, cy + 0.21 * away, 0.45),
                 (cx + side, cy - 0.15 * away, 0.43),
             ]
-            path += [
-                tuple(p)
-                for p in arc(
-                    (cx + side, cy - 0.2 * away, 0.4), (cx + side, cy - 0.2 * away, 0.02), (0, -0.05 * away, 0)
-                )
-            ]
-            frame.append(tube([*path, (cx + side, cy + 0.22 * away, 0.015)], 0.012, 8))
-        r.add("chair frame", frame, r.metal(0.12, CHROME), smooth=True)
+            bend = arc((cx + side, cy - 0.2 * away, 0.4), (cx + side, cy - 0.2 * away, 0.02), (0, -0.05 * away, 0))
+            frame.append(tube([*path, *bend, (cx + side, cy + 0.22 * away, 0.015)], 0.012, 8))
+        r.add_round("chair frame", frame, r.metal(0.12, CHROME))
     r.add(
         "glass wall",
         [grid((4.5, 0.0, 0.0), (0, 1.3, 0), (0, 0, 2.2), 4, 6)],
         Finish(np.float32([1, 1, 1]), 0.0, 0.04, glass=True),
     )
-    r.add(
+    r.add_round(
         "glass frame",
         [tube([(4.5, 1.3, 0), (4.5, 1.3, 2.2)], 0.025, 8), tube([(4.5, 0, 2.2), (4.5, 1.3, 2.2)], 0.025, 8)],
         r.gloss(0.4, (0.02, 0.02, 0.02)),
-        smooth=True,
     )
-    r.add(
+    r.add_round(
         "plant pot",
         [turned((5.1, 0.6, 0.002), [(0.15, 0), (0.2, 0.4), (0.18, 0.4), (0.002, 0.36)], 28)],
         r.gloss(0.25, (0.7, 0.68, 0.62)),
-        smooth=True,
     )
     leaves = [
         cushion((5.1 + 0.2 * np.cos(k), 0.6 + 0.2 * np.sin(k), 0.55 + 0.09 * k), (0.16, 0.12, 0.012), 4, 0.8)
         for k in range(9)
     ]
-    r.add(
-        "plant",
-        [tube([(5.1, 0.6, 0.36), (5.1, 0.6, 1.3)], 0.015, 8), *leaves],
-        r.gloss(0.5, (0.06, 0.22, 0.04)),
-        smooth=True,
+    r.add_round(
+        "plant", [tube([(5.1, 0.6, 0.36), (5.1, 0.6, 1.3)], 0.015, 8), *leaves], r.gloss(0.5, (0.06, 0.22, 0.04))
     )
     r.add("white board", [box((0.9, y - 0.03, 1.0), (2.6, y - 0.005, 2.0))], r.gloss(0.16, (0.82, 0.83, 0.83)))
     r.add("door", [box((4.7, y - 0.04, 0.0), (5.5, y - 0.002, 2.05))], r.gloss(0.4, (0.45, 0.3, 0.15)))
-    r.add(
-        "door handle",
-        [tube([(4.8, y - 0.09, 1.02), (4.93, y - 0.09, 1.02)], 0.011, 8)],
-        r.metal(0.25, STEEL),
-        smooth=True,
-    )
+    r.add_round("door handle", [tube([(4.8, y - 0.09, 1.02), (4.93, y - 0.09, 1.02)], 0.011, 8)], r.metal(0.25, STEEL))
     r.add("cupboard", [box((x - 0.5, 1.5, 0.02), (x - 0.01, 3.3, 1.3))], r.metal(0.55, (0.4, 0.41, 0.42)))
     folders = [
         box((x - 0.4, 1.6 + 0.085 * k, 1.302), (x - 0.1, 1.6 + 0.085 * k + 0.075, 1.302 + 0.32)) for k in range(14)
@@ -217,17 +193,15 @@ def office(seed: int) -> FurnishedRoom:
     colours = [r.gloss(0.4, c) for c in ((0.02, 0.02, 0.02), (0.5, 0.04, 0.03), (0.03, 0.1, 0.4), (0.6, 0.5, 0.1))]
     colours = [Finish(c.albedo, colours[0].roughness, 0.04) for c in colours]
     r.add("folders", folders, *colours, slots=[int(k) for k in r.rng.integers(0, 4, 14)])
-    r.add(
+    r.add_round(
         "bin",
         [turned((0.5, 1.9, 0.002), [(0.12, 0), (0.15, 0.35), (0.145, 0.35), (0.115, 0.01), (0.002, 0.01)], 28)],
         r.metal(0.4, (0.35, 0.36, 0.38)),
-        smooth=True,
     )
-    r.add(
+    r.add_round(
         "clock",
         [turned((0, 0, 0), [(0.16, 0), (0.16, 0.03), (0.15, 0.035), (0.002, 0.03)], 28)],
         r.gloss(0.2, (0.75, 0.75, 0.72)),
-        smooth=True,
     )
     clock = r.things[-1]
     clock.quads[:] = clock.quads[..., [2, 0, 1]] + (0.002, 2.1, 2.2)
@@ -255,31 +229,28 @@ def hall(seed: int) -> FurnishedRoom:
         r.add("stair tread", [box((x - 1.1, a, h - 0.04), (x - 0.01, a + 0.3, h))], step)
         r.add("stair riser", [box((x - 1.08, a + 0.02, h - 0.17), (x - 0.01, a + 0.035, h - 0.04))], riser)
     slope = [(x - 1.05, 0.7, 1.05), (x - 1.05, 3.7, 1.05 + 11 * 0.17)]
-    r.add(
-        "hand rail", [tube([(x - 1.05, 0.68, 0.05), *slope], 0.025, 10)], r.gloss(0.25, (0.12, 0.06, 0.03)), smooth=True
-    )
+    r.add_round("hand rail", [tube([(x - 1.05, 0.68, 0.05), *slope], 0.025, 10)], r.gloss(0.25, (0.12, 0.06, 0.03)))
     bars = [
         tube([(x - 1.05, 0.75 + 0.27 * k, 0.17 * (k + 1)), (x - 1.05, 0.75 + 0.27 * k, 1.07 + 0.17 * k)], 0.009, 6)
         for k in range(12)
     ]
-    r.add("railing", bars, r.metal(0.3, (0.3, 0.3, 0.31)), smooth=True)
+    r.add_round("railing", bars, r.metal(0.3, (0.3, 0.3, 0.31)))
     r.add(
         "sculpture",
         [turned((1.3, 4.45, 0.0), [(0.22, 0), (0.2, 0.9), (0.002, 0.9)], 32)],
         r.gloss(0.5, (0.75, 0.75, 0.73)),
     )
-    r.add("gold ball", [ball((1.3, 4.45, 1.15), 0.25, 14)], r.metal(0.3, GOLD), smooth=True)
+    r.add_round("gold ball", [ball((1.3, 4.45, 1.15), 0.25, 14)], r.metal(0.3, GOLD))
     vase = [(0.1, 0), (0.2, 0.25), (0.14, 0.5), (0.08, 0.62), (0.11, 0.7), (0.1, 0.7), (0.06, 0.6), (0.002, 0.5)]
-    r.add("vase", [turned((0.35, 4.5, 0.002), vase, 32)], r.gloss(0.1, (0.02, 0.12, 0.3)), smooth=True)
-    r.add("vase", [turned((0.4, 0.4, 0.002), vase, 32)], r.gloss(0.1, (0.7, 0.68, 0.6)), smooth=True)
+    r.add_round("vase", [turned((0.35, 4.5, 0.002), vase, 32)], r.gloss(0.1, (0.02, 0.12, 0.3)))
+    r.add_round("vase", [turned((0.4, 0.4, 0.002), vase, 32)], r.gloss(0.1, (0.7, 0.68, 0.6)))
     r.add(
         "console",
         [box((1.2, 0.02, 0.8), (2.6, 0.4, 0.84)), *legs(1.2, 0.03, 2.6, 0.4, 0.8, 0.04)],
         r.gloss(0.15, (0.015, 0.014, 0.013)),
     )
-    for k in range(3):
-        c = [(0.5, 0.05, 0.04), (0.05, 0.25, 0.06), (0.75, 0.72, 0.65)][k]
-        r.add(
+    for k, c in enumerate([(0.5, 0.05, 0.04), (0.05, 0.25, 0.06), (0.75, 0.72, 0.65)]):
+        r.add_round(
             "bowl",
             [
                 turned(
@@ -287,19 +258,17 @@ def hall(seed: int) -> FurnishedRoom:
                 )
             ],
             r.gloss(0.2 + 0.15 * k, c),
-            smooth=True,
         )
     r.add("picture", [box((1.3, 0.002, 1.3), (2.5, 0.03, 2.2))], Finish(np.float32([0.03] * 3)), Finish(painting()))
     r.things[-1].slot[3] = 1
-    r.add("bench", [cushion((2.3, 4.6, 0.42), (0.6, 0.22, 0.06), 10, 0.3)], r.diffuse(0.06, 0.16, 0.12), smooth=True)
-    r.add(
+    r.add_round("bench", [cushion((2.3, 4.6, 0.42), (0.6, 0.22, 0.06), 10, 0.3)], r.diffuse(0.06, 0.16, 0.12))
+    r.add_round(
         "bench legs",
         [
             tube(arc((1.85 + 0.9 * k, 4.45, 0.004), (1.85 + 0.9 * k, 4.75, 0.004), (0, 0, 0.36)), 0.014, 8)
             for k in range(2)
         ],
         r.metal(0.2, BRASS),
-        smooth=True,
     )
     r.add(
         "rug",
@@ -317,11 +286,6 @@ def hall(seed: int) -> FurnishedRoom:
         ],
         r.gloss(0.4, (0.78, 0.77, 0.74)),
     )
-    r.add(
-        "globe lamp (off)",
-        [moved(ball((0, 0, 0), 0.2, 10), (1.8, 2.5, 2.9))],
-        r.gloss(0.1, (0.8, 0.8, 0.78)),
-        smooth=True,
-    )
+    r.add_round("globe lamp (off)", [ball((1.8, 2.5, 2.9), 0.2, 10)], r.gloss(0.1, (0.8, 0.8, 0.78)))
     r.add("cord", [tube([(1.8, 2.5, 3.1), (1.8, 2.5, z)], 0.006, 6)], r.diffuse(0.03, 0.03, 0.03))
     return r

@@ -1,7 +1,5 @@
 """A room under construction: things are added one by one, in colours and gloss that the seed changes a little."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,7 +23,6 @@ class FurnishedRoom:
 
     Attributes
     ----------
-    size : tuple of float
     walk : tuple of float
         Low x, low y, high x, high y of where the camera may be.
     pitch : tuple of float
@@ -48,25 +45,25 @@ class FurnishedRoom:
     sun: tuple | None = None
     windows: list = field(default_factory=list)
     things: list[Thing] = field(default_factory=list)
-    smooth: set[int] = field(default_factory=set)
 
     def __post_init__(self):
         self.rng = np.random.default_rng([self.seed, sum(map(ord, self.name))])
 
-    def add(self, class_name: str, shapes, *finishes: Finish, slots=None, smooth: bool = False) -> None:
-        """One more object. Smooth ones are shaded round, and their quads are split."""
+    def add(self, class_name: str, shapes, *finishes: Finish, slots=None, triangles: bool = False) -> None:
+        """One more object."""
         quads, uv = np.concatenate([s[0] for s in shapes]), np.concatenate([s[1] for s in shapes])
         slot = np.repeat([0] * len(shapes) if slots is None else slots, [len(s[0]) for s in shapes])
-        if smooth:
-            self.smooth.add(len(self.things))
-        self.things.append(Thing(len(self.things), class_name, quads, uv, slot, finishes, smooth))
+        self.things.append(Thing(len(self.things), class_name, quads, uv, slot, finishes, triangles))
+
+    def add_round(self, class_name: str, shapes, finish: Finish) -> None:
+        """One more object that is shaded smooth, its quads split in triangles."""
+        self.add(class_name, shapes, finish, triangles=True)
 
     def tint(self, colour, spread: float = 0.12) -> np.ndarray:
         """The colour a little changed by the seed."""
         return np.clip(np.asarray(colour) * self.rng.uniform(1 - spread, 1 + spread, 3), 0.005, 0.92)
 
     def diffuse(self, *colour) -> Finish:
-        """Diffuse."""
         return Finish(np.float32(self.tint(colour)))
 
     def matt_picture(self, picture) -> Finish:
@@ -117,25 +114,14 @@ class FurnishedRoom:
     def window_frame(self, finish: Finish) -> None:
         """A frame of bars around and across each window."""
         for origin, across, up in self.windows:
-            bars = []
-            for a in (0, 0.5, 1):
-                at = origin + across * a
-                bars.append(tube([at, at + up], 0.03, 6))
-            for b in (0, 1):
-                at = origin + up * b
-                bars.append(tube([at, at + across], 0.03, 6))
+            bars = [tube([at, at + up], 0.03, 6) for at in (origin, origin + across * 0.5, origin + across)]
+            bars += [tube([at, at + across], 0.03, 6) for at in (origin, origin + up)]
             self.add("window frame", bars, finish)
 
 
-STEEL, CHROME, BRASS, COPPER, GOLD = (
-    (0.56, 0.55, 0.53),
-    (0.55, 0.56, 0.57),
-    (0.76, 0.6, 0.33),
-    (0.9, 0.58, 0.45),
-    (0.98, 0.76, 0.36),
-)
+STEEL, CHROME = (0.56, 0.55, 0.53), (0.55, 0.56, 0.57)
+BRASS, COPPER, GOLD = (0.76, 0.6, 0.33), (0.9, 0.58, 0.45), (0.98, 0.76, 0.36)
 
 
 def legs(x0, y0, x1, y1, height, thick):
-    """Four square legs."""
     return [box((a, b, 0.002), (a + thick, b + thick, height)) for a in (x0, x1 - thick) for b in (y0, y1 - thick)]

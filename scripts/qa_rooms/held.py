@@ -1,7 +1,5 @@
 """Shares of the truth that a result's 90 % intervals hold, in the room's held-out views."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from addon.core.brdf.material import Z90

@@ -1,7 +1,5 @@
 """Render a furnished room as a capture with truth, laid out like the captures that results are scored on."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -10,7 +8,8 @@ import numpy as np
 import OpenEXR
 from mathutils import Matrix
 
-from addon.bridge.data.materials import BASE_COLOR, METALLIC
+from addon.bridge.data.materials import BASE_COLOR, METALLIC, principled
+from addon.bridge.data.nodes import add_node, feed, find_node, fresh_tree
 from addon.bridge.demo import render as demo_render
 from addon.bridge.demo.room import FIELD_OF_VIEW, frame_path, look_at, write_all_but_frames
 from addon.core.io.exr import write_exr
@@ -86,13 +85,11 @@ def build(room: FurnishedRoom, scene) -> None:
         made = demo_render.build(thing)
         scene.collection.objects.link(made)
         for paint, material in zip(thing.paints, made.data.materials):
-            tree = material.node_tree
-            shader = next((n for n in tree.nodes if n.type == "BSDF_PRINCIPLED"), None)
             if paint.metallic:
-                shader.inputs[METALLIC].default_value = 1.0
+                principled(material).inputs[METALLIC].default_value = 1.0
             if paint.glass:
-                _clear(tree)
-        if thing.object_id in room.smooth:
+                _clear(material)
+        if thing.triangles:
             made.data.shade_smooth()
             made.data.set_sharp_from_angle(angle=np.radians(40))
     if any(room.sky):
@@ -121,42 +118,30 @@ def _link(scene, data, pose) -> None:
     scene.collection.objects.link(thing)
 
 
-def _clear(tree) -> None:
+def _clear(material) -> None:
     """Thin clear glass: light goes straight through or is mirrored."""
-    nodes, links = tree.nodes, tree.links
-    mix, fresnel = nodes.new("ShaderNodeMixShader"), nodes.new("ShaderNodeFresnel")
-    gloss = nodes.new("ShaderNodeBsdfGlossy")
-    gloss.inputs["Roughness"].default_value, fresnel.inputs["IOR"].default_value = 0.0, 1.5
-    links.new(fresnel.outputs[0], mix.inputs[0])
-    links.new(nodes.new("ShaderNodeBsdfTransparent").outputs[0], mix.inputs[1])
-    links.new(gloss.outputs[0], mix.inputs[2])
-    links.new(mix.outputs[0], next(n for n in nodes if n.type == "OUTPUT_MATERIAL").inputs["Surface"])
+    tree = material.node_tree
+    fresnel = add_node(tree, "ShaderNodeFresnel", 1.5)
+    through, gloss = add_node(tree, "ShaderNodeBsdfTransparent"), add_node(tree, "ShaderNodeBsdfGlossy", None, 0.0)
+    mix = add_node(tree, "ShaderNodeMixShader", fresnel.outputs[0], through.outputs[0], gloss.outputs[0])
+    feed(find_node(material, "OUTPUT_MATERIAL").inputs["Surface"], mix.outputs[0])
 
 
 def _sky(room: FurnishedRoom):
     """A world that is bright above the horizon, brightest near it, and earthy below."""
     world = bpy.data.worlds.new("sky")
-    if world.node_tree is None:
-        world.use_nodes = True
-    nodes, links = world.node_tree.nodes, world.node_tree.links
-    nodes.clear()
-    place, split, ramp = (nodes.new(f"ShaderNode{n}") for n in ("TexCoord", "SeparateXYZ", "ValToRGB"))
-    shine, out = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
-    top = max(room.sky)
-    add = nodes.new("ShaderNodeMath")
-    add.operation = "MULTIPLY_ADD"
-    add.inputs[1].default_value = add.inputs[2].default_value = 0.5
+    tree, top = fresh_tree(world), max(room.sky)
+    place = add_node(tree, "ShaderNodeTexCoord")
+    split = add_node(tree, "ShaderNodeSeparateXYZ", place.outputs["Generated"])
+    height = add_node(tree, "ShaderNodeMath", split.outputs["Z"], 0.5, 0.5, operation="MULTIPLY_ADD")
+    ramp = add_node(tree, "ShaderNodeValToRGB", height.outputs[0])
     stops = ramp.color_ramp.elements
     stops[0].position, stops[0].color = 0.49, (*(c / top for c in room.ground), 1)
     stops[1].position, stops[1].color = 0.51, (*(min(1.0, 1.15 * c / top) for c in room.sky), 1)
     higher = stops.new(0.8)
     higher.color = (*(0.6 * c / top for c in room.sky), 1)
-    shine.inputs["Strength"].default_value = top
-    links.new(place.outputs["Generated"], split.inputs[0])
-    links.new(split.outputs["Z"], add.inputs[0])
-    links.new(add.outputs[0], ramp.inputs[0])
-    links.new(ramp.outputs[0], shine.inputs["Color"])
-    links.new(shine.outputs[0], out.inputs["Surface"])
+    shine = add_node(tree, "ShaderNodeBackground", ramp.outputs[0], top)
+    add_node(tree, "ShaderNodeOutputWorld", shine.outputs[0])
     return world
 
 
@@ -164,16 +149,12 @@ def _override(scene) -> None:
     """Every surface shows its base colour as light."""
     scene.world = None
     for material in bpy.data.materials:
-        tree = material.node_tree
-        shader = next((n for n in tree.nodes if n.type == "BSDF_PRINCIPLED"), None)
-        light = tree.nodes.new("ShaderNodeEmission")
-        light.inputs[0].default_value = (0, 0, 0, 1)
+        shader, colour = principled(material), (0, 0, 0, 1)
         if shader:
             socket = shader.inputs[BASE_COLOR]
-            light.inputs[0].default_value = tuple(socket.default_value)
-            if socket.links:
-                tree.links.new(socket.links[0].from_socket, light.inputs[0])
-        tree.links.new(light.outputs[0], next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL").inputs["Surface"])
+            colour = socket.links[0].from_socket if socket.links else tuple(socket.default_value)
+        light = add_node(material.node_tree, "ShaderNodeEmission", colour)
+        feed(find_node(material, "OUTPUT_MATERIAL").inputs["Surface"], light.outputs[0])
 
 
 def _relight(scene, room: FurnishedRoom, pose: np.ndarray) -> None:
@@ -189,19 +170,11 @@ def _relight(scene, room: FurnishedRoom, pose: np.ndarray) -> None:
     mesh = bpy.data.meshes.new("light")
     mesh.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
     material = bpy.data.materials.new("light")
-    material.use_nodes = True
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    nodes.clear()
-    side, front, shine, out = (
-        nodes.new(f"ShaderNode{n}") for n in ("NewGeometry", "Math", "Emission", "OutputMaterial")
-    )
-    top = max(RELIT[1][1:])
-    front.operation, front.inputs[0].default_value = "MULTIPLY_ADD", 1.0
-    front.inputs[1].default_value, front.inputs[2].default_value = -top, top
-    links.new(side.outputs["Backfacing"], front.inputs[0])
-    links.new(front.outputs[0], shine.inputs["Strength"])
-    shine.inputs["Color"].default_value = (*(c / top for c in RELIT[1][1:]), 1)
-    links.new(shine.outputs[0], out.inputs["Surface"])
+    tree, top = fresh_tree(material), max(RELIT[1][1:])
+    side = add_node(tree, "ShaderNodeNewGeometry")
+    front = add_node(tree, "ShaderNodeMath", side.outputs["Backfacing"], -top, top, operation="MULTIPLY_ADD")
+    shine = add_node(tree, "ShaderNodeEmission", (*(c / top for c in RELIT[1][1:]), 1), front.outputs[0])
+    add_node(tree, "ShaderNodeOutputMaterial", shine.outputs[0])
     mesh.materials.append(material)
     _link(scene, mesh, pose)
 
@@ -228,14 +201,15 @@ def render(
     if bpy.app.version >= TOO_NEW:
         raise SystemExit(f"Rooms are made with Blender 4.5: {bpy.app.version_string} as a module writes no passes.")
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    write_all_but_frames(folder, room.things, np.eye(4)[None], size)
     vertices, triangles, object_id = _triangles(room)
     rays = RayScene(vertices, triangles)
     poses, held = walk(room, frames, 0.0, rays), walk(room, held_out, 0.43, rays)
-    _transforms(folder / "transforms.json", poses, size, frame_path)
+    write_all_but_frames(folder, room.things, poses, size)
     truth = folder / "truth"
     (truth / "materials.json").write_text(json.dumps(truth_of(room), indent=1))
-    _transforms(truth / "transforms.json", held, size, lambda k: f"image/view_{k:03d}.exr")
+    views = [{"file_path": f"image/view_{k:03d}.exr", "transform_matrix": pose.tolist()} for k, pose in enumerate(held)]
+    lens = json.loads((folder / "transforms.json").read_text())
+    (truth / "transforms.json").write_text(json.dumps(lens | {"frames": views}, indent=1))
     scene = bpy.context.scene
     build(room, scene)
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
@@ -305,23 +279,3 @@ def _triangles(room: FurnishedRoom) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     triangles = (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
     ids = np.repeat([thing.object_id for thing in room.things], [2 * len(thing.quads) for thing in room.things])
     return quads.reshape(-1, 3).astype(np.float32), triangles.astype(np.int32), ids
-
-
-def _transforms(path: Path, poses: np.ndarray, size: tuple[int, int], name) -> None:
-    width, height = size
-    focal = width / 2 / np.tan(FIELD_OF_VIEW / 2)
-    path.write_text(
-        json.dumps(
-            {
-                "camera_model": "PINHOLE",
-                "w": width,
-                "h": height,
-                "fl_x": focal,
-                "fl_y": focal,
-                "cx": width / 2,
-                "cy": height / 2,
-                "frames": [{"file_path": name(k), "transform_matrix": pose.tolist()} for k, pose in enumerate(poses)],
-            },
-            indent=1,
-        )
-    )

@@ -4,8 +4,6 @@ The albedo of an element is pi L_d / E. The truth's views hold E / pi (diffuse_l
 for each object the median of estimate / truth is known for the albedo, for L_d and for E, channel by channel.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -22,8 +20,6 @@ from addon.core.results.store import Store
 from addon.core.settings import Settings
 
 from .held import held, projected_truth
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def table(capture: Path, result: Path) -> str:
@@ -144,10 +140,19 @@ def compare(capture: Path, result: Path) -> dict:
     }
 
 
+def _true(seen: list[dict], key: str) -> np.ndarray:
+    """What the views hold at the pixels that count, view after view."""
+    return np.concatenate([view[key][view["counts"]] for view in seen])
+
+
+def _shown(seen: list[dict], values: np.ndarray) -> np.ndarray:
+    """What the views show there of elements' values."""
+    return np.concatenate([values[view["element"]].mean(0)[view["counts"]] for view in seen])
+
+
 def _scaled(seen: list[dict], base: np.ndarray) -> dict[str, float]:
     """PSNR after one scale, and after one for each channel."""
-    pairs = [(base[v["element"]].mean(0)[v["counts"]], v["truth"][v["counts"]]) for v in seen]
-    mine, true = (np.concatenate(x).astype(np.float64) for x in zip(*pairs))
+    mine, true = _shown(seen, base).astype(np.float64), _true(seen, "truth").astype(np.float64)
     one = (mine * true).sum() / (mine * mine).sum()
     three = (mine * true).sum(0) / (mine * mine).sum(0)
     return {
@@ -158,21 +163,10 @@ def _scaled(seen: list[dict], base: np.ndarray) -> dict[str, float]:
 
 def _ratios(seen, split, base, truth) -> tuple[dict, dict]:
     """Median of estimate / truth by object, quantity and channel; and each object's share of the squared error."""
-    found = {kind: [] for kind in split}
-    true = {kind: [] for kind in split}
-    ids, error = [], []
-    for view in seen:
-        ok = view["counts"]
-        ids.append(view["id"][ok])
-        error.append(
-            np.square(np.clip(base[view["element"]].mean(0)[ok], 0, 1) - np.clip(view["truth"][ok], 0, 1)).sum(1)
-        )
-        light, colour = view["diffuse_light"][ok], view["diffuse_color"][ok]
-        targets = {"albedo": colour, "L_d": light * colour, "median": light * colour, "E": np.pi * light}
-        for kind, values in split.items():
-            found[kind].append(values[view["element"]].mean(0)[ok])
-            true[kind].append(targets[kind])
-    ids, error = np.concatenate(ids), np.concatenate(error)
+    light, colour, ids = (_true(seen, key) for key in ("diffuse_light", "diffuse_color", "id"))
+    true = {"albedo": colour, "L_d": light * colour, "median": light * colour, "E": np.pi * light}
+    found = {kind: _shown(seen, values) for kind, values in split.items()}
+    error = np.square(np.clip(_shown(seen, base), 0, 1) - np.clip(_true(seen, "truth"), 0, 1)).sum(1)
     share = {int(i): float(error[ids == i].sum() / error.sum()) for i in np.unique(ids)}
     ratios = {}
     for i in truth:
@@ -181,7 +175,7 @@ def _ratios(seen, split, base, truth) -> tuple[dict, dict]:
             continue
         ratios[i] = {}
         for kind in split:
-            a, b = np.concatenate(found[kind])[own], np.concatenate(true[kind])[own]
+            a, b = found[kind][own], true[kind][own]
             good = np.isfinite(a).all(1) & np.isfinite(b).all(1)
             # The truth's light is noisy: sums over blocks of pixels are compared.
             n = max(1, good.sum() // 40)

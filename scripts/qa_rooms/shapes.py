@@ -3,8 +3,6 @@
 A shape is corners (q, 4, 3) and uv (q, 4, 2), as in `addon.bridge.demo.room`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from addon.bridge.demo.room import ball, grid
@@ -98,11 +96,6 @@ def wall(origin, across, up, holes=(), cell: float = 0.3) -> Shape:
     quads = np.concatenate(quads)
     uv = np.stack([(quads - origin) @ across / width**2, (quads - origin) @ up / height**2], -1)
     return quads, uv
-
-
-def moved(shape: Shape, by) -> Shape:
-    """The shape elsewhere."""
-    return shape[0] + np.asarray(by, float), shape[1]
 
 
 def _xy(size: int):

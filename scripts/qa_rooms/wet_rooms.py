@@ -1,9 +1,5 @@
 """Kitchen and bathroom: gloss, steel, tiles, many small lamps."""
 
-from __future__ import annotations
-
-import numpy as np
-
 from addon.bridge.demo.room import ball, box, grid
 
 from .furnish import BRASS, CHROME, COPPER, STEEL, FurnishedRoom, legs
@@ -41,48 +37,30 @@ def kitchen(seed: int) -> FurnishedRoom:
         r.gloss(0.25, clouds((0.02, 0.02, 0.02), (0.16, 0.15, 0.14), 18, seed, sharp=1.5)),
     )
     r.add("fridge", [box((3.2, y - 0.68, 0.03), (3.95, y - 0.02, 1.85))], r.metal(0.35, STEEL))
-    r.add(
-        "fridge handle",
-        [tube([(3.27, y - 0.73, 0.7), (3.27, y - 0.73, 1.6)], 0.015)],
-        r.metal(0.15, CHROME),
-        smooth=True,
-    )
-    r.add(
+    r.add_round("fridge handle", [tube([(3.27, y - 0.73, 0.7), (3.27, y - 0.73, 1.6)], 0.015)], r.metal(0.15, CHROME))
+    r.add_round(
         "hood",
         [turned((1.51, y - 0.32, 1.5), [(0.3, 0), (0.28, 0.1), (0.12, 0.3), (0.12, 0.9)], 24)],
         r.metal(0.28, STEEL),
-        smooth=True,
     )
     r.add("oven", [box((1.24, y - 0.625, 0.2), (1.78, y - 0.605, 0.75))], r.gloss(0.12, (0.012, 0.012, 0.013)))
-    r.add(
-        "tap",
-        [
-            tube(
-                np.concatenate(
-                    [
-                        [(2.3, y - 0.15, 0.9)],
-                        arc((2.3, y - 0.15, 1.15), (2.3, y - 0.37, 1.15), (0, 0, 0.12)),
-                        [(2.3, y - 0.37, 1.08)],
-                    ]
-                ),
-                0.017,
-            )
-        ],
-        r.metal(0.1, CHROME),
-        smooth=True,
-    )
+    path = [
+        (2.3, y - 0.15, 0.9),
+        *arc((2.3, y - 0.15, 1.15), (2.3, y - 0.37, 1.15), (0, 0, 0.12)),
+        (2.3, y - 0.37, 1.08),
+    ]
+    r.add_round("tap", [tube(path, 0.017)], r.metal(0.1, CHROME))
     # An island with stools.
     top = r.gloss(0.4, wood((0.42, 0.25, 0.12), 6, seed))
     r.add("table", [box((1.3, 0.2, 0.84), (2.9, 0.8, 0.9)), *legs(1.35, 0.25, 2.85, 0.75, 0.84, 0.06)], top)
     for k in range(3):
         at = 1.55 + 0.5 * k
-        r.add(
+        r.add_round(
             "stool",
             [turned((at, 1.0, 0.6), [(0.002, 0), (0.16, 0), (0.17, 0.02), (0.16, 0.04), (0.002, 0.045)], 24)],
             r.gloss(0.45, (0.08, 0.2, 0.32)),
-            smooth=True,
         )
-        r.add(
+        r.add_round(
             "stool legs",
             [
                 tube([(at + 0.11 * a, 1 + 0.11 * b, 0.6), (at + 0.18 * a, 1 + 0.18 * b, 0.004)], 0.012, 8)
@@ -90,20 +68,18 @@ def kitchen(seed: int) -> FurnishedRoom:
                 for b in (-1, 1)
             ],
             r.metal(0.2, CHROME),
-            smooth=True,
         )
-        r.add(
+        r.add_round(
             "pendant",
             [turned((at, 0.5, 1.62), [(0.17, 0), (0.16, 0.06), (0.06, 0.16), (0.02, 0.2)], 24)],
             r.metal(0.3, COPPER),
-            smooth=True,
         )
         r.add("cord", [tube([(at, 0.5, 1.82), (at, 0.5, z)], 0.005, 6)], r.diffuse(0.03, 0.03, 0.03))
         r.add("bulb", [ball((at, 0.5, 1.68), 0.045, 5)], r.lamp(150, 120, 82))
     bowl = [(0.03, 0), (0.09, 0.02), (0.15, 0.08), (0.145, 0.08), (0.085, 0.03), (0.002, 0.015)]
-    r.add("bowl", [turned((2.55, 0.5, 0.902), bowl, 24)], r.gloss(0.15, (0.75, 0.75, 0.76)), smooth=True)
+    r.add_round("bowl", [turned((2.55, 0.5, 0.902), bowl, 24)], r.gloss(0.15, (0.75, 0.75, 0.76)))
     for k, c in enumerate([(0.75, 0.3, 0.02), (0.6, 0.04, 0.03), (0.35, 0.5, 0.05)]):
-        r.add("fruit", [ball((2.51 + 0.05 * k, 0.47 + 0.05 * (k % 2), 0.965), 0.045, 6)], r.gloss(0.35, c), smooth=True)
+        r.add_round("fruit", [ball((2.51 + 0.05 * k, 0.47 + 0.05 * (k % 2), 0.965), 0.045, 6)], r.gloss(0.35, c))
     for k in range(4):
         at = (0.8 + 0.85 * k, 2.25, z - 0.012)
         r.add("spot", [turned(at, [(0.055, 0), (0.002, 0.0)], 16)], r.lamp(70, 62, 50))
@@ -112,11 +88,10 @@ def kitchen(seed: int) -> FurnishedRoom:
             [turned(at, [(0.055, 0.01), (0.056, -0.006), (0.075, -0.006), (0.076, 0.01)], 16)],
             r.metal(0.25, STEEL),
         )
-    r.add(
+    r.add_round(
         "kettle",
         [turned((0.5, y - 0.3, 0.902), [(0.09, 0), (0.1, 0.05), (0.07, 0.17), (0.03, 0.2), (0.002, 0.2)], 24)],
         r.gloss(0.18, (0.03, 0.25, 0.22)),
-        smooth=True,
     )
     r.add(
         "curtain", [curtain((x - 0.05, 0.75, 0.9), (0, 0.42, 0), 1.25, (0.03, 0, 0), 4, 32)], r.diffuse(0.6, 0.5, 0.12)
@@ -128,7 +103,7 @@ def kitchen(seed: int) -> FurnishedRoom:
     )
     for k in range(6):
         h = r.rng.uniform(0.12, 0.26)
-        r.add(
+        r.add_round(
             "jar",
             [
                 turned(
@@ -138,13 +113,11 @@ def kitchen(seed: int) -> FurnishedRoom:
                 )
             ],
             r.gloss(r.rng.uniform(0.15, 0.5), r.rng.uniform(0.04, 0.75, 3)),
-            smooth=True,
         )
-    r.add(
+    r.add_round(
         "pan",
         [turned((0.95, y - 0.35, 0.903), [(0.11, 0), (0.13, 0.07), (0.12, 0.07), (0.1, 0.006), (0.002, 0.006)], 24)],
         r.metal(0.3, COPPER),
-        smooth=True,
     )
     return r
 
@@ -167,40 +140,36 @@ def bathroom(seed: int) -> FurnishedRoom:
     for k in range(2):
         at = 0.95 + 0.9 * k
         basin = [(0.1, 0), (0.2, 0.05), (0.23, 0.13), (0.22, 0.13), (0.18, 0.05), (0.002, 0.03)]
-        r.add("basin", [turned((at, y - 0.28, 0.862), basin, 30)], r.gloss(0.12, (0.84, 0.84, 0.84)), smooth=True)
-        path = np.concatenate([[(at, y - 0.08, 0.86)], arc((at, y - 0.08, 1.05), (at, y - 0.25, 1.05), (0, 0, 0.08))])
-        r.add("tap", [tube(path, 0.015)], r.metal(0.08, CHROME), smooth=True)
-        r.add(
+        r.add_round("basin", [turned((at, y - 0.28, 0.862), basin, 30)], r.gloss(0.12, (0.84, 0.84, 0.84)))
+        path = [(at, y - 0.08, 0.86), *arc((at, y - 0.08, 1.05), (at, y - 0.25, 1.05), (0, 0, 0.08))]
+        r.add_round("tap", [tube(path, 0.015)], r.metal(0.08, CHROME))
+        r.add_round(
             "soap",
             [turned((at + 0.33, y - 0.2, 0.862), [(0.03, 0), (0.035, 0.09), (0.012, 0.12), (0.002, 0.12)], 20)],
             r.gloss(0.25, (0.5, 0.05, 0.2)),
-            smooth=True,
         )
     tub = [(0.3, 0.0), (0.38, 0.2), (0.42, 0.55), (0.39, 0.55), (0.34, 0.2), (0.002, 0.12)]
     quads, uv = turned((0, 0, 0), tub, 40)
-    r.add("tub", [(quads * (1.0, 1.9, 1.0) + (2.5, 1.15, 0.002), uv)], r.gloss(0.12, (0.84, 0.84, 0.83)), smooth=True)
-    r.add(
+    r.add_round("tub", [(quads * (1.0, 1.9, 1.0) + (2.5, 1.15, 0.002), uv)], r.gloss(0.12, (0.84, 0.84, 0.83)))
+    r.add_round(
         "tub tap",
-        [tube(np.concatenate([[(2.93, 0.3, 0.002)], arc((2.93, 0.3, 0.8), (2.7, 0.45, 0.8), (0, 0, 0.1))]), 0.02)],
+        [tube([(2.93, 0.3, 0.002), *arc((2.93, 0.3, 0.8), (2.7, 0.45, 0.8), (0, 0, 0.1))], 0.02)],
         r.metal(0.15, BRASS),
-        smooth=True,
     )
-    r.add("towel rail", [tube([(0.06, 0.5, 1.15), (0.06, 1.3, 1.15)], 0.012)], r.metal(0.12, CHROME), smooth=True)
+    r.add_round("towel rail", [tube([(0.06, 0.5, 1.15), (0.06, 1.3, 1.15)], 0.012)], r.metal(0.12, CHROME))
     r.add("towel", [curtain((0.085, 0.58, 0.45), (0, 0.45, 0), 0.7, (0.012, 0, 0), 3, 24)], r.diffuse(0.62, 0.12, 0.04))
     r.add("towel", [curtain((0.085, 1.06, 0.6), (0, 0.2, 0), 0.55, (0.01, 0, 0), 2, 16)], r.diffuse(0.62, 0.12, 0.04))
     seat = [(0.12, 0), (0.1, 0.15), (0.18, 0.36), (0.2, 0.42), (0.002, 0.43)]
-    r.add(
+    r.add_round(
         "toilet",
         [turned((0.55, 0.45, 0.002), seat, 30), cushion((0.55, 0.12, 0.62), (0.2, 0.09, 0.2))],
         r.gloss(0.14, (0.82, 0.82, 0.8)),
-        smooth=True,
     )
-    r.add("mat", [cushion((1.5, 1.35, 0.015), (0.4, 0.3, 0.012))], r.diffuse(0.2, 0.35, 0.3), smooth=True)
-    r.add(
+    r.add_round("mat", [cushion((1.5, 1.35, 0.015), (0.4, 0.3, 0.012))], r.diffuse(0.2, 0.35, 0.3))
+    r.add_round(
         "bin",
         [turned((1.25, 0.25, 0.002), [(0.12, 0), (0.13, 0.3), (0.12, 0.32), (0.002, 0.33)], 28)],
         r.metal(0.35, STEEL),
-        smooth=True,
     )
     r.add(
         "stool",
@@ -208,12 +177,11 @@ def bathroom(seed: int) -> FurnishedRoom:
         r.gloss(0.4, (0.35, 0.22, 0.1)),
     )
     r.add("door", [box((1.1, 0.001, 0.0), (1.9, 0.03, 2.0))], r.gloss(0.5, (0.13, 0.2, 0.18)))
-    r.add("door handle", [tube([(1.8, 0.06, 1.0), (1.67, 0.06, 1.0)], 0.01)], r.metal(0.3, BRASS), smooth=True)
-    r.add(
+    r.add_round("door handle", [tube([(1.8, 0.06, 1.0), (1.67, 0.06, 1.0)], 0.01)], r.metal(0.3, BRASS))
+    r.add_round(
         "shower head",
         [turned((2.5, 2.2, 2.0), [(0.1, 0), (0.1, 0.02), (0.02, 0.05), (0.015, 0.39)], 24)],
         r.metal(0.1, CHROME),
-        smooth=True,
     )
     for k in range(6):
         at = (0.6 + 0.9 * (k % 3), 0.75 + 1.1 * (k // 3), z - 0.012)

@@ -12,14 +12,7 @@ from .texel import TexelEvidence, texel_evidence, without_light
 
 @dataclass(frozen=True)
 class Evidence:
-    """How sure a recovery is.
-
-    Attributes
-    ----------
-    light : LightEvidence
-    texels : TexelEvidence
-    objects : list of ObjectEvidence
-    """
+    """How sure a recovery is."""
 
     light: LightEvidence
     texels: TexelEvidence

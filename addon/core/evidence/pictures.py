@@ -95,13 +95,8 @@ def worst_blocks(residual: np.ndarray, object_id: np.ndarray) -> list[tuple[int,
 
 def _boxed(image: np.ndarray, corners: list[tuple[int, int, float]]) -> np.ndarray:
     for y, x, _ in corners:
-        for edge in (
-            image[y, x : x + BLOCK],
-            image[y + BLOCK - 1, x : x + BLOCK],
-            image[y : y + BLOCK, x],
-            image[y : y + BLOCK, x + BLOCK - 1],
-        ):
-            edge[:] = MARK
+        image[[y, y + BLOCK - 1], x : x + BLOCK] = MARK
+        image[y : y + BLOCK, [x, x + BLOCK - 1]] = MARK
     return image
 
 
@@ -111,8 +106,7 @@ def _where(nothing: np.ndarray, image: np.ndarray) -> np.ndarray:
 
 
 def _models(found: Findings, view: View) -> np.ndarray:
-    image = np.empty((*view.object_id.shape, 3), np.uint8)
-    image[:] = NOTHING
+    image = np.full((*view.object_id.shape, 3), NOTHING, np.uint8)
     for m in found.materials:
         image[view.object_id == m.object_id] = gloss(m.model.colour, m.alpha)
     return image

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from ..io.pixels import read_pixels
 from ..kinds import Shown
@@ -21,8 +22,6 @@ class View:
 
     Attributes
     ----------
-    index : int
-        Of the frame.
     radiance : (h, w, 3) float32
         Seen.
     valid : (h, w) bool
@@ -34,7 +33,6 @@ class View:
         Diffuse light and highlight, as recovered.
     """
 
-    index: int
     radiance: np.ndarray
     valid: np.ndarray
     element: np.ndarray
@@ -47,12 +45,10 @@ class View:
 
         0 where nothing can be said: past the mesh, masked, clipped, and at the objects' edges, where pixels mix.
         """
-        inner = self.valid & (self.element >= 0)
-        for axis in (0, 1):
-            same = np.diff(self.object_id, axis=axis) == 0
-            ahead, behind = [(0, 0), (0, 0)], [(0, 0), (0, 0)]
-            ahead[axis], behind[axis] = (1, 0), (0, 1)
-            inner = inner & np.pad(same, ahead, constant_values=True) & np.pad(same, behind, constant_values=True)
+        cross = ndimage.generate_binary_structure(2, 1)
+        low = ndimage.minimum_filter(self.object_id, footprint=cross, mode="nearest")
+        high = ndimage.maximum_filter(self.object_id, footprint=cross, mode="nearest")
+        inner = self.valid & (self.element >= 0) & (low == high)
         seen, told = self.radiance.mean(2), self.predicted.mean(2)
         level = (seen + told) / 2 + 0.02 * float(np.median(seen))
         return np.where(inner, np.abs(told - seen) / np.maximum(level, 1e-30), 0)
@@ -92,10 +88,8 @@ def view(found: Findings, index: int) -> View:
     _add_lobes(found, predicted, element, directions)
     shape = (camera.height, camera.width)
     ids = np.where(element >= 0, surface.atlas.object_id[element], -1)
-    return View(
-        index, pixels.radiance, pixels.valid & ~pixels.saturated, element.reshape(shape), ids.reshape(shape),
-        predicted.reshape(*shape, 3),
-    )  # fmt: skip
+    valid, predicted = pixels.valid & ~pixels.saturated, predicted.reshape(*shape, 3)
+    return View(pixels.radiance, valid, element.reshape(shape), ids.reshape(shape), predicted)
 
 
 def _add_lobes(found: Findings, predicted: np.ndarray, element: np.ndarray, directions: np.ndarray) -> None:
