@@ -130,21 +130,17 @@ def _row(m: ObjectMaterial, e: ObjectEvidence) -> str:
     bare = m.model.lobe_alone
     colour = m.f0 if bare and m.f0 else e.albedo
     albedo = "" if bare else f"{np.mean(e.albedo):.2f} &plusmn; {_relative_width(e):.0%}"
-    specular = "coloured" if isinstance(m.f0, tuple) else _interval(m.f0, *_range(m, "specular"))
-    roughness = None if m.alpha is None else float(np.sqrt(m.alpha))
+    specular = "coloured" if isinstance(m.f0, tuple) else _interval(m.f0, m.f0_low, m.f0_high)
+    roughness = _interval(None if m.alpha is None else float(np.sqrt(m.alpha)), m.roughness_low, m.roughness_high)
     return (
         f"<tr><td>{_swatch(colour)}</td><td>{escape(m.name)}</td>"
-        f"<td>{escape(m.model.name)}</td><td>{albedo}</td><td>{_interval(roughness, *_range(m, 'roughness'))}</td>"
+        f"<td>{escape(m.model.name)}</td><td>{albedo}</td><td>{roughness}</td>"
         f"<td>{specular}</td><td>{e.seen_share:.0%}</td><td>{escape(m.note)}</td></tr>"
     )
 
 
 def _swatch(linear) -> str:
     return '<i style="background:rgb({} {} {})"></i>'.format(*encoded(np.asarray(linear)))
-
-
-def _range(m: ObjectMaterial, name: str) -> tuple[float | None, float | None]:
-    return getattr(m, f"{name}_low", None), getattr(m, f"{name}_high", None)
 
 
 def _interval(value: float | None, low: float | None, high: float | None) -> str:

@@ -103,6 +103,10 @@ def check_page(text: str) -> Checker:
     return found
 
 
+def _shown(f0: float | None) -> str:
+    return "unknown " if f0 is None else f"{f0:.2f} "
+
+
 @pytest.mark.slow
 def test_the_page_of_a_run(tmp_path):
     from addon.core.io.read import read_capture
@@ -117,8 +121,10 @@ def test_the_page_of_a_run(tmp_path):
         run.specular()
         run.write_images()
         sure = run.report()["figures"]["evidence"]
+        told = [one for one in run.materials() if one.f0_low is not None]
     text = (tmp_path / "result" / "report.html").read_text(encoding="utf-8")
     page = check_page(text)
     assert page.tags.count("img") == 3 * 8 and "&lt;cap &amp; ture&gt;" in text
     assert text.count("<tr>") == 2 + 6 + 1
+    assert told and all(f"<td>{_shown(m.f0)}<small>{m.f0_low:.2f}&ndash;{m.f0_high:.2f}</small>" in text for m in told)
     assert 0 < sure["albedo_error_median"] < 0.15 and sure["unseen_light_mean"] < 0.05
