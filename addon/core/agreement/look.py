@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 
 from ..io.conventions import SCALES, Convention, alternatives
-from ..scene.elements import triangle_geometry
 from ..scene.model import Capture, Frame, Pixels
 from ..scene.rays import RayScene
 from .edges import Shown, edge_score, shown
@@ -153,7 +152,7 @@ def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True)
     -------
     Agreement
     """
-    normal, _ = triangle_geometry(capture.mesh)
+    normal, _ = capture.mesh.geometry
     scene = _Scene(
         small_views(capture.frames, read), capture, RayScene(capture.mesh.vertices, capture.mesh.triangles), normal
     )

@@ -7,7 +7,6 @@ import numpy as np
 from ..io.conventions import Convention
 from ..kinds import Shown
 from ..photo import photo
-from ..scene.elements import triangle_geometry
 from ..scene.model import Capture, Frame, Pixels
 from ..scene.rays import RayScene
 from .edges import shown
@@ -26,7 +25,7 @@ def overlay(capture: Capture, read: Callable[[Frame], Pixels], conventions: Sequ
     -------
     (height, width, 3) uint8
     """
-    normal, _ = triangle_geometry(capture.mesh)
+    normal, _ = capture.mesh.geometry
     rays = RayScene(capture.mesh.vertices, capture.mesh.triangles)
     chosen = np.unique(np.linspace(0, len(capture.frames) - 1, ROWS + 2).round().astype(int)[1:-1])
     rows = []

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..luminance import LUMINANCE
-from ..scene.elements import triangle_geometry
 from ..scene.rays import Hits
 from .field import LightField
 from .params import GATHER
@@ -65,7 +64,7 @@ def bright_triangles(field: LightField) -> BrightTriangles:
 
 def shining(field: LightField, above: float = 0.0) -> BrightTriangles:
     """The triangles of a luminance above this: those that give most light, if there are too many."""
-    normal, area = triangle_geometry(field.mesh)
+    normal, area = field.mesh.geometry
     luminance = triangle_luminance(field)
     bright = np.flatnonzero((luminance > above) & (luminance * area > 0))
     power = luminance[bright] * area[bright]

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..scene.atlas import Atlas
-from ..scene.elements import ElementLookup, triangle_geometry
+from ..scene.elements import ElementLookup
 from ..scene.model import Mesh
 from ..scene.rays import Hits, RayScene
 from .environment import Environment
@@ -47,7 +47,7 @@ class LightField:
     ):
         self.mesh, self.atlas, self.scene, self.environment = mesh, atlas, scene, environment
         self.radiance = np.ascontiguousarray(radiance, np.float32)
-        self.normal, _ = triangle_geometry(mesh)
+        self.normal, _ = mesh.geometry
         self._say_lamps(lamps)
         self.mirrors: tuple[Mirror, ...] = ()
         self.sun: Sun | None = None

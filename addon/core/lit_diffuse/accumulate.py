@@ -10,7 +10,6 @@ from ..parallel import ordered_map
 from ..progress import Progress, Rounds
 from ..scene.atlas import Atlas
 from ..scene.element_groups import ElementGroups
-from ..scene.elements import triangle_geometry
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Frame, Mesh, Pixels
 from ..scene.params import VISIBILITY
@@ -95,7 +94,7 @@ def accumulate(
     InterruptedRun
         From `progress`.
     """
-    normal, _ = triangle_geometry(mesh)
+    normal, _ = mesh.geometry
     groups = groups or ElementGroups(atlas)
     estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
     wanted, each = frame_order(len(frames), seed), bytes_of_frame(frame.camera for frame in frames)

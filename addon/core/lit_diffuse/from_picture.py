@@ -13,7 +13,6 @@ from ..kinds import Block
 from ..parallel import blocks
 from ..progress import Progress
 from ..scene.atlas import Atlas
-from ..scene.elements import triangle_geometry
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Mesh
 from ..scene.params import VISIBILITY
@@ -49,7 +48,7 @@ BAKED = BakedParams()
 def texel_edge(mesh: Mesh, lit: LitTexture) -> float:
     """Edge in metres of an element for a baked texture: some texels of the usual triangle, by area."""
     with np.errstate(invalid="ignore"):
-        _, area = triangle_geometry(mesh)
+        _, area = mesh.geometry
     (ux, uy), (vx, vy) = (np.moveaxis(lit.uv[:, i] - lit.uv[:, 0], 1, 0).astype(np.float64) for i in (1, 2))
     texels = np.abs(ux * vy - uy * vx) / 2
     for i, one in enumerate(lit.pictures):

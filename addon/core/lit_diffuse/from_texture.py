@@ -8,7 +8,6 @@ from ..kinds import Block
 from ..parallel import blocks
 from ..progress import Progress
 from ..scene.atlas import Atlas
-from ..scene.elements import triangle_geometry
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Mesh
 from ..scene.params import VISIBILITY
@@ -82,7 +81,7 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
 
 def _tiles(mesh: Mesh, lit: LitTiles) -> tuple[np.ndarray, np.ndarray]:
     """A number for each triangle's tile, (t,), and the surface that each tile covers, square metres."""
-    _, area = triangle_geometry(mesh)
+    _, area = mesh.geometry
     of_triangle = np.unique(lit.picture.astype(np.int64) * (1 << 32) + lit.tile, return_inverse=True)[1].ravel()
     return of_triangle, np.bincount(of_triangle, area)
 

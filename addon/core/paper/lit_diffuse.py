@@ -11,7 +11,6 @@ from ..parallel import ordered_map
 from ..progress import Progress, Rounds
 from ..scene.atlas import Atlas
 from ..scene.element_groups import ElementGroups
-from ..scene.elements import triangle_geometry
 from ..scene.model import Frame, Mesh, Pixels
 from ..scene.rays import RayScene
 from ..scene.visibility import FrameView, Observations, bytes_of_frame, observe, view_frame
@@ -55,7 +54,7 @@ def lit_diffuse(
     InterruptedRun
         From `progress`.
     """
-    normal, _ = triangle_geometry(mesh)
+    normal, _ = mesh.geometry
     groups, each = ElementGroups(atlas), bytes_of_frame(frame.camera for frame in frames)
     median = PSquare(len(atlas))
 

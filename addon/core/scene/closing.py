@@ -14,7 +14,6 @@ import numpy as np
 from scipy import ndimage
 
 from ..significance import LEVELS
-from .elements import triangle_geometry
 from .model import Frame, Mesh, Pixels
 from .params import CLOSING, PARTS
 from .rays import RayScene
@@ -158,7 +157,7 @@ def _shut(
     closed = 2 * sight.through < np.maximum(sight.through + sight.out, 1)
     looked_at = closed & (sight.out > 0)
     if looked_at.any():
-        normal, area = triangle_geometry(mesh)
+        normal, area = mesh.geometry
         some = np.random.default_rng(0).choice(len(triangles), LEVELS.sample, p=area / area.sum())
         shown = colours(frames, read, sight, scene, vertices[triangles[some]].mean(1), normal[some], gap)
         outside = looked_at & _outside(sight, _groups(sheets, looked_at), shown, gap)

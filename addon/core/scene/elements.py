@@ -1,7 +1,7 @@
 """Surface elements: the atlas's texels with their place on the surface."""
 
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
@@ -13,6 +13,7 @@ from ..parallel import blocks, for_blocks
 from .atlas import Atlas
 from .model import Mesh
 from .rays import Hits, RayScene
+from .seen_cells import SeenCells
 from .uv_islands import connected, corner_ids
 
 # Where in a texel it is asked which triangle covers it: the centre first, so that a texel which only touches a
@@ -25,14 +26,9 @@ SUBSAMPLES = np.array(
 ROWS_AT_ONCE: Block[int] = 128
 
 
-def triangle_geometry(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """`Mesh.geometry`: unit normals ((t, 3) float32, by the winding) and areas ((t,) float64, square metres)."""
-    return mesh.geometry
-
-
 def uv_scale(mesh: Mesh, uv: np.ndarray) -> float:
     """Atlas units for one metre: root of UV area over surface area, over the whole mesh."""
-    _, area = triangle_geometry(mesh)
+    _, area = mesh.geometry
     p = uv.astype(np.float64)
     e, f = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     uv_area = np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]).sum() / 2
@@ -129,18 +125,13 @@ class Crumbs(NamedTuple):
     corner: np.ndarray
 
 
-class Coarse(Protocol):
-    """Where one element stands for many texels (`seen_cells.SeenCells`)."""
-
-    def seen(self, position: np.ndarray, triangle: np.ndarray) -> np.ndarray:
-        """Points ((n, 3) float, of triangles (n,) int) that have elements of their own, (n,) bool."""
-
-    def coarse(self, position: np.ndarray, triangle: np.ndarray) -> np.ndarray:
-        """A number for each of the others, (n,) uint64: those alike share an element."""
-
-
 def find_elements(
-    mesh: Mesh, uv: np.ndarray, size: int, coarse: Coarse | None = None, crumbs: Crumbs | None = None, threads: int = 0
+    mesh: Mesh,
+    uv: np.ndarray,
+    size: int,
+    coarse: SeenCells | None = None,
+    crumbs: Crumbs | None = None,
+    threads: int = 0,
 ) -> Elements:
     """The elements at the texels that `uv` covers.
 
@@ -148,7 +139,7 @@ def find_elements(
     ----------
     mesh, uv, size
         See `make_atlas`.
-    coarse : Coarse, optional
+    coarse : SeenCells, optional
         Where one element stands for many texels; not given: each texel has its own.
     crumbs : Crumbs, optional
         Triangles that have elements together.
@@ -165,7 +156,7 @@ def find_elements(
     del u, v
     # Each triangle's surface is shared out between its texels; what no texel covers is left out.
     count = np.bincount(triangle, minlength=len(mesh.triangles))
-    area = triangle_geometry(mesh)[1]
+    area = mesh.geometry[1]
     shared = (area[triangle] / count[triangle]).astype(np.float32)
     element = np.full(size * size, -1, np.int32)
     element[texel] = np.arange(len(texel), dtype=np.int32)
@@ -196,7 +187,7 @@ def _nearest_to_middle(position: np.ndarray, group: np.ndarray) -> np.ndarray:
     return order[np.cumsum(count) - count]
 
 
-def _merged(found: Elements, count: int, coarse: Coarse | None) -> Elements:
+def _merged(found: Elements, count: int, coarse: SeenCells | None) -> Elements:
     """Elements, by rising texel, of which one stands for all of its coarse cell; the first `count` are asked."""
     own = np.ones(len(found.texel), bool)
     if coarse is not None:
@@ -231,7 +222,7 @@ def make_atlas(mesh: Mesh, uv: np.ndarray, size: int, known: Elements | None = N
         Of the same atlas; not given: each texel has its own.
     """
     found = known or find_elements(mesh, uv, size)
-    normal, _ = triangle_geometry(mesh)
+    normal, _ = mesh.geometry
     return Atlas(
         size=size,
         uv=uv,

@@ -15,7 +15,6 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .connected_parts import connected_parts, to_nearest
-from .elements import triangle_geometry
 from .model import Mesh
 from .params import PARTS, SURFACE
 from .sphere import fibonacci
@@ -269,7 +268,7 @@ def parts_of(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
         At least one; vertices used are finite.
     """
     part, names, planes = Parts(connected_parts(vertices, triangles), {})
-    area = triangle_geometry(Mesh(vertices, triangles, part))[1]
+    area = Mesh(vertices, triangles, part).geometry[1]
     if 2 * area[part == 0].sum() > area.sum():
         used, corner = np.unique(triangles.ravel(), return_inverse=True)
         place = weld(vertices[used])[corner.ravel()]

@@ -13,7 +13,6 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..significance import LEVELS
-from .elements import triangle_geometry
 from .model import Mesh
 from .params import SIDES
 from .weld import point_normals, welded
@@ -77,7 +76,7 @@ def two_sided(mesh: Mesh, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def worth_it(mesh: Mesh, both: np.ndarray) -> np.ndarray:
     """Those of the triangles `both` that are a substantial part of their object or of the room, (t,) bool."""
-    _, area = triangle_geometry(mesh)
+    _, area = mesh.geometry
     count = int(mesh.object_id.max()) + 1
     own, sheets = (np.bincount(mesh.object_id, weight, count) for weight in (area, area * both))
     large = (sheets >= SIDES.least_of_object * own) | (sheets >= SIDES.least_of_room * area.sum())
