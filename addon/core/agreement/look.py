@@ -117,7 +117,6 @@ class _Scene:
     views: list[SmallView]
     capture: Capture
     rays: RayScene
-    normal: np.ndarray
 
     @cached_property
     def exposed(self) -> bool:
@@ -132,7 +131,7 @@ class _Scene:
     def shown(self, convention: Convention) -> list[Shown]:
         cameras = convention.cameras([view.camera for view in self.views])
         bends = not self.capture.mesh.whole
-        return [shown(camera, self.normal, self.rays, bends) for camera in cameras]
+        return [shown(camera, self.capture.mesh, self.rays, bends) for camera in cameras]
 
     def whole(self, fit: Fit) -> Fit:
         return replace(fit, edge=edge_score(self.views, self.shown(fit.convention)))
@@ -152,10 +151,8 @@ def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True)
     -------
     Agreement
     """
-    normal, _ = capture.mesh.geometry
-    scene = _Scene(
-        small_views(capture.frames, read), capture, RayScene(capture.mesh.vertices, capture.mesh.triangles), normal
-    )
+    mesh = capture.mesh
+    scene = _Scene(small_views(capture.frames, read), capture, RayScene(mesh.vertices, mesh.triangles))
     seen = scene.shown(Convention())
     plain = replace(scene.colour(Convention()), edge=edge_score(scene.views, seen))
     if plain.quality >= AGREEMENT.agree:

@@ -25,7 +25,6 @@ def overlay(capture: Capture, read: Callable[[Frame], Pixels], conventions: Sequ
     -------
     (height, width, 3) uint8
     """
-    normal, _ = capture.mesh.geometry
     rays = RayScene(capture.mesh.vertices, capture.mesh.triangles)
     chosen = np.unique(np.linspace(0, len(capture.frames) - 1, ROWS + 2).round().astype(int)[1:-1])
     rows = []
@@ -39,7 +38,7 @@ def overlay(capture: Capture, read: Callable[[Frame], Pixels], conventions: Sequ
         images = []
         for convention in conventions:
             image = plain.copy()
-            image[shown(convention.cameras([camera])[0], normal, rays).edge] = LINE
+            image[shown(convention.cameras([camera])[0], capture.mesh, rays).edge] = LINE
             images.append(image)
         rows.append(_beside(images, 1))
     return _beside(rows, 0)

@@ -94,7 +94,6 @@ def accumulate(
     InterruptedRun
         From `progress`.
     """
-    normal, _ = mesh.geometry
     groups = groups or ElementGroups(atlas)
     estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
     wanted, each = frame_order(len(frames), seed), bytes_of_frame(frame.camera for frame in frames)
@@ -102,7 +101,7 @@ def accumulate(
     def look(index: int) -> tuple[int, FrameView, Pixels, Observations]:
         frame = frames[index]
         pixels = read(frame)
-        view = view_frame(frame.camera, mesh, scene, normal)
+        view = view_frame(frame.camera, mesh, scene)
         pixels = pixels if change is None else change(frame, view, pixels)
         known = groups.seen(frame.camera, pixels.valid)
         asked = groups.candidates(view) if known is None else known

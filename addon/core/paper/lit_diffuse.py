@@ -54,13 +54,12 @@ def lit_diffuse(
     InterruptedRun
         From `progress`.
     """
-    normal, _ = mesh.geometry
     groups, each = ElementGroups(atlas), bytes_of_frame(frame.camera for frame in frames)
     median = PSquare(len(atlas))
 
     def look(index: int) -> Seen:
         pixels = read(frames[index])
-        view = view_frame(frames[index].camera, mesh, scene, normal)
+        view = view_frame(frames[index].camera, mesh, scene)
         return index, view, pixels, observe(view, pixels, atlas, scene, groups.candidates(view))
 
     for index, view, pixels, seen in ordered_map(look, range(len(frames)), threads, each=each):

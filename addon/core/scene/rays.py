@@ -76,19 +76,20 @@ class RayScene:
         self.offset = max(RELATIVE_OFFSET * min(self.diagonal, 2 * extent), self._coarse)
 
     def _run(self, origins, directions, **options):
-        return self._scene.run(
-            np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32), **options
-        )
+        origins = np.ascontiguousarray(np.broadcast_to(origins, directions.shape), np.float32)
+        return self._scene.run(origins, np.ascontiguousarray(directions, np.float32), **options)
 
     def intersect(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
         """First hit of each ray.
 
         Parameters
         ----------
-        origins, directions : (n, 3) float32
-            Directions of unit length.
+        origins : (n, 3) or (3,) float
+            Where each starts, or all of them.
+        directions : (n, 3) float32
+            Of unit length.
         """
-        if len(origins) == 0:
+        if len(directions) == 0:
             none = np.zeros(0, np.float32)
             return Hits(np.zeros(0, np.int32), none, none, none)
         found = self._run(origins, directions, output=True)

@@ -11,7 +11,7 @@ from .atlas import Atlas
 from .element_groups import ElementGroups
 from .elements import Crumbs, ElementLookup, Elements, find_elements, make_atlas, shown_uv, uv_scale
 from .model import Camera, Mesh
-from .orientation import Sides, seen_sides
+from .orientation import seen_sides
 from .params import SURFACE
 from .rays import RayScene
 from .seen_cells import SeenCells
@@ -84,12 +84,6 @@ def turned(corners: np.ndarray, sign: np.ndarray) -> np.ndarray:
     return result
 
 
-def oriented(mesh: Mesh, cameras: Sequence[Camera]) -> Sides:
-    """What the cameras see of each triangle."""
-    normal, _ = mesh.geometry
-    return seen_sides(mesh, normal, RayScene(mesh.vertices, mesh.triangles), cameras)
-
-
 def without_triangles(mesh: Mesh, which: np.ndarray) -> Mesh:
     """What an unwrap needs of a mesh's other triangles; second sides count as any."""
     left = np.ones(len(mesh.triangles), bool)
@@ -156,7 +150,7 @@ def build_surface(
     BadInputError
         No camera looks at the mesh.
     """
-    sides = oriented(mesh, cameras)
+    sides = seen_sides(mesh, cameras)
     if sides.footprint <= 0 and (cameras or not texel_size):
         raise BadInputError(
             "No camera of the capture looks at the mesh; check that transforms.json and mesh.ply share one frame."

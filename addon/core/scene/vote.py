@@ -94,7 +94,7 @@ def _votes(scene: RayScene, frame: Frame, ids: np.ndarray, step: int) -> tuple[n
     y, x = np.nonzero(same & chosen)
     directions, ok = camera.rays(np.stack([x + 0.5, y + 0.5], -1))
     y, x, directions = y[ok], x[ok], directions[ok]
-    hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
+    hits = scene.intersect(camera.centre, directions)
     hit = hits.triangle >= 0
     triangle, seen = hits.triangle[hit].astype(np.int64), ids[y[hit], x[hit]]
     return _summed([(triangle, seen, np.ones(len(triangle), np.int64))])

@@ -96,7 +96,7 @@ def test_bends_of_a_fused_mesh_are_no_edges(room):
     camera = capture.frames[0].camera
 
     def edges(mesh, bends):
-        return shown(camera, mesh.geometry[0], RayScene(mesh.vertices, mesh.triangles), bends).edge
+        return shown(camera, mesh, RayScene(mesh.vertices, mesh.triangles), bends).edge
 
     assert edges(rough, True).mean() > 1.3 * edges(capture.mesh, True).mean()
     steps = edges(capture.mesh, False)

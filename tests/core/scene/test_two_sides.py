@@ -54,8 +54,7 @@ def shade_views():
 
 def test_a_shade_is_a_sheet_though_each_triangle_shows_one_side():
     mesh = tube(flip=(3, 30))
-    scene = RayScene(mesh.vertices, mesh.triangles)
-    sides = seen_sides(mesh, mesh.geometry[0], scene, shade_views())
+    sides = seen_sides(mesh, shade_views())
     assert sides.both.all()
     facing = outwards(mesh) * sides.sign
     assert (facing > 0).all() or (facing < 0).all()
