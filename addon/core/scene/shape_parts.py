@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .connected_parts import connected_parts, to_nearest
 from .model import Mesh
 from .params import PARTS, SURFACE
 from .sphere import fibonacci
+from .uv_islands import components
 from .weld import weld
 
 
@@ -102,8 +102,7 @@ class _Faces:
 
     def pieces(self, joined: np.ndarray) -> np.ndarray:
         """The piece of each triangle, where the pairs that are `joined` hang together, (t,) int from 0."""
-        graph = sparse.coo_matrix((np.ones(joined.sum(), bool), (self.a[joined], self.b[joined])), (self.count,) * 2)
-        return connected_components(graph, directed=False)[1]
+        return components(self.a[joined], self.b[joined], self.count)
 
     def largest(self, chosen: np.ndarray) -> np.ndarray:
         """Those of some triangles ((k,) int) that hang together and have the most surface, (n,) int."""
@@ -113,8 +112,7 @@ class _Faces:
         number[chosen] = np.arange(len(chosen))
         a, b = number[self.a], number[self.b]
         both = (a >= 0) & (b >= 0)
-        graph = sparse.coo_matrix((np.ones(both.sum(), bool), (a[both], b[both])), (len(chosen),) * 2)
-        piece = connected_components(graph, directed=False)[1]
+        piece = components(a[both], b[both], len(chosen))
         return chosen[piece == np.bincount(piece, self.area[chosen]).argmax()]
 
 
@@ -196,8 +194,7 @@ def _without_crumbs(faces: _Faces, piece: np.ndarray) -> np.ndarray:
             return np.unique(piece, return_inverse=True)[1].ravel()
         small = np.flatnonzero(crumb & ~alone)
         neighbour = np.asarray(border.argmax(1)).ravel()[small]
-        graph = sparse.coo_matrix((np.ones(len(small), bool), (small, neighbour)), border.shape)
-        piece = connected_components(graph, directed=False)[1][piece]
+        piece = components(small, neighbour, len(crumb))[piece]
 
 
 def _over_convex_edges(faces: _Faces, piece: np.ndarray, flat: np.ndarray) -> np.ndarray:
@@ -206,8 +203,7 @@ def _over_convex_edges(faces: _Faces, piece: np.ndarray, flat: np.ndarray) -> np
     bend = _borders(faces, piece, faces.length * faces.bends()).tocoo()
     mean = bend.data / np.asarray(border[bend.row, bend.col]).ravel()
     joined = (mean > -PARTS.concave) & ~flat[bend.row] & ~flat[bend.col]
-    graph = sparse.coo_matrix((np.ones(joined.sum(), bool), (bend.row[joined], bend.col[joined])), border.shape)
-    return connected_components(graph, directed=False)[1][piece]
+    return components(bend.row[joined], bend.col[joined], len(flat))[piece]
 
 
 def _name(plane: Plane, faces: _Faces, gap: float) -> str:
