@@ -15,10 +15,9 @@ from ..progress import Progress
 from ..scene.atlas import Atlas
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Mesh
-from ..scene.params import VISIBILITY
 from ..scene.stored_light import LitTexture, StoredPicture
-from ..scene.visibility import CLEAN, SATURATED
-from .from_texture import barycentric, interpolated
+from ..weighted import weighted_median
+from .from_texture import barycentric, interpolated, of_sums
 
 AT_ONCE: Block[int] = 1 << 18
 
@@ -60,9 +59,7 @@ def texel_edge(mesh: Mesh, lit: LitTexture) -> float:
         raise BadInputError(
             f"The coordinates of texture {_named(lit)} span nothing; unwrap the mesh and bake it again."
         )
-    per, weight = area[known] / texels[known], area[known]
-    order = np.argsort(per)
-    usual = per[order][np.searchsorted(weight[order].cumsum(), weight.sum() / 2)]
+    usual = weighted_median(area[known] / texels[known], area[known])
     return float(max(BAKED.texels * np.sqrt(usual), np.sqrt(area.sum() / BAKED.elements)))
 
 
@@ -87,16 +84,9 @@ def lit_from_picture(mesh: Mesh, lit: LitTexture, atlas: Atlas, progress: Progre
             sums[own[part]] = _sums(mesh, lit, atlas, own[part], stored)
         if progress is not None:
             progress.update(0.9 * (i + 1) / len(lit.pictures))
-    weight = sums[:, 3]
-    seen = weight > 0
-    if not seen.any():
+    if not sums[:, 3].any():
         raise BadInputError(f"Texture {_named(lit)} is black all over; bake or export it again.")
-    radiance = np.full((len(atlas), 3), np.nan, np.float32)
-    radiance[seen] = sums[seen, :3] / weight[seen, None]
-    share = (sums[:, 4] / np.maximum(weight, 1)).astype(np.float32)
-    tier = np.where(seen, np.where(share > 0.5, SATURATED, CLEAN), -1).astype(np.int8)
-    none = np.zeros_like(radiance)
-    return LitDiffuse(radiance, none, np.where(seen, VISIBILITY.enough, 0).astype(np.int32), tier, share)
+    return of_sums(sums)
 
 
 def _named(lit: LitTexture) -> str:

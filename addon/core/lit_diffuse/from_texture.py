@@ -67,13 +67,18 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
         sums[own] = _window_sums(texels, local, place[own] * lit.size, width[own], lit.size)
         if progress is not None:
             progress.update(0.9 * part.stop / len(tiles))
-    weight, clipped = sums[:, 3], sums[:, 4]
-    seen = weight > 0
-    if not seen.any():
+    if not sums[:, 3].any():
         raise BadInputError("The textures on the mesh hold no light at all; copy them again.")
-    radiance = np.full((n, 3), np.nan, np.float32)
+    return of_sums(sums)
+
+
+def of_sums(sums: np.ndarray) -> LitDiffuse:
+    """L_d of sums of R, G, B, number and number of clipped texels over each element, (n, 5)."""
+    weight = sums[:, 3]
+    seen = weight > 0
+    radiance = np.full((len(sums), 3), np.nan, np.float32)
     radiance[seen] = sums[seen, :3] / weight[seen, None]
-    share = np.where(seen, clipped / np.maximum(weight, 1e-30), 0).astype(np.float32)
+    share = (sums[:, 4] / np.maximum(weight, 1)).astype(np.float32)
     tier = np.where(seen, np.where(share > 0.5, SATURATED, CLEAN), -1).astype(np.int8)
     none = np.zeros_like(radiance)
     return LitDiffuse(radiance, none, np.where(seen, VISIBILITY.enough, 0).astype(np.int32), tier, share)
