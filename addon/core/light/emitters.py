@@ -20,10 +20,8 @@ class BrightTriangles:
         Which of the mesh's they are.
     corner, edge_u, edge_v : (k, 3) float32
     normal : (k, 3) float32
-    chance : (k,) float64
-        Of being aimed at; sums to 1. In proportion to area * luminance.
     reached : (k,) float64
-        Sum of the chances up to each.
+        Sum of the chances of being aimed at, up to each. They sum to 1, in proportion to area * luminance.
     density : (t,) float32
         Chance over area for every triangle of the mesh: density of aimed points per square metre; 0 if not bright.
     """
@@ -33,12 +31,11 @@ class BrightTriangles:
     edge_u: np.ndarray
     edge_v: np.ndarray
     normal: np.ndarray
-    chance: np.ndarray
     reached: np.ndarray
     density: np.ndarray
 
     def __len__(self) -> int:
-        return len(self.chance)
+        return len(self.triangle)
 
 
 def triangle_luminance(field: LightField) -> np.ndarray:
@@ -75,9 +72,7 @@ def shining(field: LightField, above: float = 0.0) -> BrightTriangles:
     density[bright] = chance / area[bright]
     corners = field.mesh.vertices[field.mesh.triangles[bright]].astype(np.float32)
     corner, edge_u, edge_v = corners[:, 0].copy(), corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return BrightTriangles(
-        bright.astype(np.int32), corner, edge_u, edge_v, normal[bright], chance, np.cumsum(chance), density
-    )
+    return BrightTriangles(bright.astype(np.int32), corner, edge_u, edge_v, normal[bright], np.cumsum(chance), density)
 
 
 def aimed_at(

@@ -6,7 +6,7 @@ coarse to fine: every element whose bound is above `allowed` asks for a new one 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -22,8 +22,7 @@ REACH = 2 * GATHER.allowed
 BLOCK: Block[int] = 1 << 15
 
 
-@dataclass
-class _Points:
+class _Points(NamedTuple):
     position: np.ndarray
     normal: np.ndarray
     value: np.ndarray
@@ -98,10 +97,7 @@ def interpolated(
         # A lone close hit must not ask for endless points.
         radius = np.maximum(radius, finest / GATHER.allowed)
         batch = _Points(position[new], normal[new], value, radius)
-        names = ("position", "normal", "value", "radius")
-        points = batch if points is None else _Points(
-            *(np.concatenate([getattr(points, name), getattr(batch, name)]) for name in names)
-        )  # fmt: skip
+        points = batch if points is None else _Points(*map(np.concatenate, zip(points, batch, strict=True)))
         chosen = np.concatenate([chosen, new])
         if result is None:
             result = np.empty((len(position), value.shape[1]), np.float32)

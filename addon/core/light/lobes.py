@@ -22,7 +22,6 @@ from ..brdf.fresnel import rise
 from ..brdf.model import Microfacets
 from ..kinds import Block, Code
 from ..parallel import for_blocks
-from ..progress import Progress
 from ..scene.tangent_frame import tangent_frame
 from .emitters import BrightTriangles, aimed_density, sample_bright
 from .field import LightField
@@ -106,7 +105,6 @@ def reflected_light(
     microfacets: Microfacets = ggx.GGX,
     threads: int = 0,
     seed: int = 0,
-    progress: Progress | None = None,
 ) -> LobeLight:
     """A and B of every observation.
 
@@ -166,7 +164,7 @@ def reflected_light(
         weighted = np.concatenate([L * (1 - s)[..., None], L * s[..., None]], -1)
         both[part] = (microfacets.lobes(n_w, n_wo, sin2_h, grid) @ weighted).reshape(-1, 2, p, 6)
 
-    for_blocks(run, m, max(RAYS_AT_ONCE // max(rays, 1), 1), threads, progress)
+    for_blocks(run, m, max(RAYS_AT_ONCE // max(rays, 1), 1), threads)
     mean, noise = both.mean(1), (both[:, 0] - both[:, 1]) / 2
     return LobeLight(mean[..., :3], mean[..., 3:], noise[..., :3], noise[..., 3:], np.asarray(grid, np.float32))
 
