@@ -113,7 +113,6 @@ def base_colors(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[O
     albedo : (n, 3) float32
         Diffuse albedo.
     object_id : (n,) int
-    materials : iterable of ObjectMaterial
     """
     color, elements = albedo.copy(), by_number(object_id)
     for m in materials:

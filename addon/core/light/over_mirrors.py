@@ -22,7 +22,6 @@ def direct_over_mirrors(
 
     Parameters
     ----------
-    field : LightField
     position, normal : (n, 3) float32
     emitter_rays : int
         For each point and mirror.

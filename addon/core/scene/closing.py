@@ -113,7 +113,6 @@ def close_holes(
     triangles : (t, 3) int
     parts : Parts
         Of this mesh.
-    frames : sequence of Frame
     read : callable
         Gives a frame's pixels, none of them valid where it is damaged; called where frames look out of the mesh.
     """

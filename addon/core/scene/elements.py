@@ -213,7 +213,6 @@ def make_atlas(mesh: Mesh, uv: np.ndarray, size: int, known: Elements | None = N
 
     Parameters
     ----------
-    mesh : Mesh
     uv : (t, 3, 2) float32
         Atlas coordinates in [0, 1], without overlap.
     size : int
@@ -280,13 +279,7 @@ def shown_uv(mesh: Mesh, atlas: Atlas) -> np.ndarray:
 
 
 class ElementLookup:
-    """The element at points on the surface, made ready for many millions of them.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    atlas : Atlas
-    """
+    """The element at points on the surface, made ready for many millions of them."""
 
     def __init__(self, mesh: Mesh, atlas: Atlas):
         self._atlas, self._object_id = atlas, mesh.object_id

@@ -34,7 +34,6 @@ class SeenCells:
         At least one.
     texel : float
         Edge of an element in metres.
-    threads : int
     """
 
     def __init__(self, mesh: Mesh, scene: RayScene, cameras: Sequence[Camera], texel: float, threads: int = 0):

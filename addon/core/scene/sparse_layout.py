@@ -43,8 +43,6 @@ class Sparse:
 
     Parameters
     ----------
-    mesh : Mesh
-    cells : SeenCells
     texel : float
         Edge of the room's elements, metres.
     """
