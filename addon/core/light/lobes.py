@@ -21,6 +21,7 @@ from ..brdf import ggx
 from ..brdf.fresnel import rise
 from ..brdf.model import Microfacets
 from ..kinds import Block, Code
+from ..paper.brdf import G1
 from ..parallel import for_blocks
 from ..scene.tangent_frame import tangent_frame
 from .emitters import BrightTriangles, aimed_density, sample_bright
@@ -159,7 +160,7 @@ def reflected_light(
         for phi in proposals:
             a = np.float32(phi * phi)
             base = sin2_h + a * (1 - sin2_h)
-            density += each * a / (2 * np.float32(np.pi)) * ggx.G1(n_wo, phi) / (base * base)
+            density += each * a / (2 * np.float32(np.pi)) * G1(n_wo, phi) / (base * base)
         L *= (n_w / np.maximum(density, 1e-12))[..., None]
         weighted = np.concatenate([L * (1 - s)[..., None], L * s[..., None]], -1)
         both[part] = (microfacets.lobes(n_w, n_wo, sin2_h, grid) @ weighted).reshape(-1, 2, p, 6)
@@ -226,12 +227,7 @@ def _dot(planes: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def _stratified(count: int, each: int, rng: np.random.Generator) -> np.ndarray:
-    """`each` points of the unit square for each of `count` observations, one in each stratum of either axis.
-
-    Returns
-    -------
-    (2, count, each) float32
-    """
+    """`each` points of the unit square, one in each stratum of either axis, `count` times: (2, count, each) float32."""
     first = (np.arange(each, dtype=np.float32) + rng.random((count, each), np.float32)) / each
     second = (rng.permuted(np.tile(np.arange(each, dtype=np.float32), (count, 1)), axis=1) + 0.5) / each
     return np.stack([first, second]).astype(np.float32)
