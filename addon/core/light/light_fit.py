@@ -9,16 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from ..groups import cell_of
 from ..scene.atlas import Atlas
 from .params import LIGHT_FIT
 
 
 def on_flat(atlas: Atlas) -> np.ndarray:
     """Elements around which the normals of their object agree, (n,) bool."""
-    cell = np.floor(atlas.position / LIGHT_FIT.flat_cell).astype(np.int64)
-    cell -= cell.min(0, initial=0)
-    extent = cell.max(0, initial=0) + 1
-    key = ((cell[:, 0] * extent[1] + cell[:, 1]) * extent[2] + cell[:, 2]) * (int(atlas.object_id.max(initial=0)) + 1)
+    key = cell_of(atlas.position, LIGHT_FIT.flat_cell) * (int(atlas.object_id.max(initial=0)) + 1)
     _, group, count = np.unique(key + atlas.object_id, return_inverse=True, return_counts=True)
     total = np.stack([np.bincount(group, atlas.normal[:, k], len(count)) for k in range(3)], 1)
     return (np.linalg.norm(total, axis=1) >= LIGHT_FIT.flat * count)[group]
