@@ -48,18 +48,11 @@ def shown(camera: Camera, mesh: Mesh, scene: RayScene, bends: bool = True) -> Sh
     return Shown(triangle, distance, edge)
 
 
-def gradient(view: SmallView) -> np.ndarray:
-    """Size of the gradient of the logarithm of the luminance, (height, width); NaN where unknown."""
-    grey = view.log.mean(-1)
-    dy, dx = np.gradient(grey)
-    return np.hypot(dx, dy)
-
-
 def edge_score(views: Sequence[SmallView], seen: Sequence[Shown]) -> float:
     """Probability that the picture changes more at an edge of the mesh than elsewhere: 0.5 by chance; NaN: no edges."""
     at, off = [], []
     for view, one in zip(views, seen, strict=True):
-        change = gradient(view)
+        change = np.hypot(*np.gradient(view.log.mean(-1)))  # NaN where unknown
         known = np.isfinite(change)
         rank = np.full(change.shape, np.nan)
         rank[known] = np.argsort(np.argsort(change[known])) / max(known.sum(), 1)

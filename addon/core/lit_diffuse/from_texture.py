@@ -1,5 +1,7 @@
 """L_d from light that the capture stores on its mesh, where there are no frames to take the median of."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from ..errors import BadInputError
@@ -117,14 +119,12 @@ def interpolated(corner: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray
 
 def _runs(picture: np.ndarray, most: int) -> list[slice]:
     """Slices of at most so many tiles, each within one picture."""
-    result: list[slice] = []
-    at = 0
-    changes = np.append(np.flatnonzero(np.diff(picture)) + 1, len(picture))
-    for end in changes.tolist():
-        while at < end:
-            result.append(slice(at, min(at + most, end)))
-            at = result[-1].stop
-    return result
+    ends = [*(np.flatnonzero(np.diff(picture)) + 1).tolist(), len(picture)]
+    return [
+        slice(first + part.start, first + part.stop)
+        for first, end in pairwise([0, *ends])
+        for part in blocks(end - first, most)
+    ]
 
 
 def _read(lit: LitTiles, picture: int, number: np.ndarray) -> np.ndarray:
@@ -140,16 +140,9 @@ def _read(lit: LitTiles, picture: int, number: np.ndarray) -> np.ndarray:
 
 
 def _window_sums(texels: np.ndarray, tile: np.ndarray, centre: np.ndarray, width: np.ndarray, size: int) -> np.ndarray:
-    """Sums of R, G, B, number and number of clipped texels over a square around each place, (n, 5).
+    """Sums of R, G, B, number and number of clipped texels ((k, size, size, 3)) over squares of some tiles, (n, 5).
 
-    Parameters
-    ----------
-    texels : (k, size, size, 3) float32
-    tile : (n,) int
-    centre : (n, 2) float
-        x and y in texels.
-    width : (n,) float
-        Edge of the square in texels; it is moved to lie within the tile.
+    Their `centre` ((n, 2) x and y) and `width` ((n,)) are in texels; they are moved to lie within the tile ((n,) int).
     """
     known = np.isfinite(texels).all(-1) & (texels >= 0).all(-1) & (texels > 0).any(-1)
     over = np.isposinf(texels).any(-1)

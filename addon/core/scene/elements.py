@@ -14,7 +14,7 @@ from .atlas import Atlas
 from .model import Mesh
 from .rays import Hits, RayScene
 from .seen_cells import SeenCells
-from .uv_islands import connected, corner_ids
+from .uv_islands import areas, connected, corner_ids
 
 # Where in a texel it is asked which triangle covers it: the centre first, so that a texel which only touches a
 # triangle still gets an element at its border, and thin triangles are not lost.
@@ -29,10 +29,7 @@ ROWS_AT_ONCE: Block[int] = 128
 def uv_scale(mesh: Mesh, uv: np.ndarray) -> float:
     """Atlas units for one metre: root of UV area over surface area, over the whole mesh."""
     _, area = mesh.geometry
-    p = uv.astype(np.float64)
-    e, f = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    uv_area = np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]).sum() / 2
-    return float(np.sqrt(uv_area / max(area.sum(), 1e-30)))
+    return float(np.sqrt(areas(uv).sum() / max(area.sum(), 1e-30)))
 
 
 class Unwrapped:
