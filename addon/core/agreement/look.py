@@ -155,18 +155,17 @@ def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True)
     scene = _Scene(small_views(capture.frames, read), capture, RayScene(mesh.vertices, mesh.triangles))
     seen = scene.shown(Convention())
     plain = replace(scene.colour(Convention()), edge=edge_score(scene.views, seen))
+    up = _up(scene.views, Convention())
     if plain.quality >= AGREEMENT.agree:
-        moved = misalignments(scene.views, [v.camera for v in scene.views], seen, scene.rays)
-        return Agreement(plain, None, moved, False, _up(scene.views, Convention()))
+        return Agreement(plain, None, misalignments(scene.views, seen, scene.rays), False, up)
     if _flat(scene.views):
-        return Agreement(replace(plain, colour=np.nan), None, np.zeros(0), False, _up(scene.views, Convention()))
+        plain, search = replace(plain, colour=np.nan), False
     if not search or len(scene.views) < 2:
-        return Agreement(plain, None, np.zeros(0), False, _up(scene.views, Convention()))
+        return Agreement(plain, None, np.zeros(0), False, up)
     best = _search(scene)
     if best is not None and best.quality < max(AGREEMENT.agree, plain.quality + AGREEMENT.better):
         best = None
-    chosen = Convention() if best is None else best.convention
-    return Agreement(plain, best, np.zeros(0), True, _up(scene.views, chosen))
+    return Agreement(plain, best, np.zeros(0), True, up if best is None else _up(scene.views, best.convention))
 
 
 def _flat(views: Sequence[SmallView]) -> bool:

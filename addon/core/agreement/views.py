@@ -82,6 +82,5 @@ def _small(pixels: Pixels, step: int) -> np.ndarray:
     small = pixels.coarser(step)
     lit = small.radiance[small.valid]
     floor = 1e-3 * float(np.median(lit)) if len(lit) else 1.0
-    return np.where(small.valid[..., None], np.log(np.maximum(small.radiance, max(floor, 1e-30))), np.nan).astype(
-        np.float32
-    )
+    log = np.log(np.maximum(small.radiance, max(floor, 1e-30)))
+    return np.where(small.valid[..., None], log, np.nan).astype(np.float32)
