@@ -232,9 +232,8 @@ class Environment:
         row, column = np.mgrid[:height, :width] + 0.5
         around, up = (0.5 - column / width) * 2 * np.pi, (row / height - 0.5) * np.pi
         level = np.cos(up)
-        return (
-            np.stack([level * np.cos(around), level * np.sin(around), np.sin(up)], -1).reshape(-1, 3).astype(np.float32)
-        )
+        away = np.stack([level * np.cos(around), level * np.sin(around), np.sin(up)], -1)
+        return away.reshape(-1, 3).astype(np.float32)
 
     def refilled(self, radiance: np.ndarray) -> Environment:
         """The map with another `radiance` where frames saw it; the rest is filled in from that."""

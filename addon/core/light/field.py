@@ -189,9 +189,7 @@ class LightField:
                 radiance[seen] = self._mirrored(hits.part(seen), directions.take(seen, 0), dark_in_mirrors)
         return radiance
 
-    def _sent(
-        self, hits: Hits, element: np.ndarray, directions: np.ndarray, origins: np.ndarray | None = None
-    ) -> np.ndarray:
+    def _sent(self, hits: Hits, element: np.ndarray, directions: np.ndarray, origins: np.ndarray | None) -> np.ndarray:
         """L_d at hits, the environment where rays escape; lamps are dark from behind."""
         radiance = self.radiance.take(element, 0)  # indexing by arrays takes several times as long
         escaped = np.flatnonzero(element < 0)

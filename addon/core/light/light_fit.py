@@ -51,13 +51,11 @@ class Sample:
         count = np.bincount(self.group)
         self._middle = np.cumsum(count) - count + (count - 1) // 2
 
-    def _medians(self, values: np.ndarray) -> np.ndarray:
-        """Of each value ((m,)), its object's median: a value, the lower of two in the middle."""
-        return values[np.lexsort((values, self.group))[self._middle]][self.group]
-
     def spread(self, log_albedo: np.ndarray) -> float:
         """Mean absolute deviation of log albedo ((m,)) from its object's median, each held at a cap."""
-        return float(np.minimum(np.abs(log_albedo - self._medians(log_albedo)), LIGHT_FIT.cap).mean())
+        # A value each, the lower of two in the middle.
+        medians = log_albedo[np.lexsort((log_albedo, self.group))[self._middle]]
+        return float(np.minimum(np.abs(log_albedo - medians[self.group]), LIGHT_FIT.cap).mean())
 
     def spread_under(self, log_sent: np.ndarray, received: np.ndarray) -> float:
         """The spread of log albedo under an E, (m,), of the logarithm of what is sent, (m,) (`log_of`)."""

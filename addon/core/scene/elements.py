@@ -89,12 +89,6 @@ def _cover(uv: np.ndarray, size: int, threads: int) -> tuple[np.ndarray, np.ndar
     return texel, triangle[texel], u[texel], v[texel]
 
 
-def _padding(element: np.ndarray) -> np.ndarray:
-    """The nearest element of every texel, (size * size,) int32, of an image with -1 where there is none."""
-    nearest = ndimage.distance_transform_edt(element < 0, return_distances=False, return_indices=True)
-    return element[nearest[0], nearest[1]].ravel()
-
-
 class Elements(NamedTuple):
     """What takes time to find of an atlas's elements: fields of `Atlas`."""
 
@@ -163,7 +157,9 @@ def find_elements(
         at = more[0][:, None] + np.array([0, 1, size, size + 1])
         element[at] = len(texel) + np.arange(len(at), dtype=np.int32)[:, None]
         found = tuple(np.concatenate(both) for both in zip(found, more, strict=True))
-    return _merged(Elements(*found, _padding(element.reshape(size, size))), len(texel), coarse)
+    element = element.reshape(size, size)
+    row, column = ndimage.distance_transform_edt(element < 0, return_distances=False, return_indices=True)
+    return _merged(Elements(*found, element[row, column].ravel()), len(texel), coarse)
 
 
 def _of_crumbs(mesh, size, area, crumbs):

@@ -57,12 +57,11 @@ class RayScene:
         # Far from the origin float32 itself is coarser than that: 1 mm at 10 km.
         self._coarse = 4 * float(np.spacing(np.float32(np.abs([low, high]).max())))
         self.offset = max(RELATIVE_OFFSET * self.diagonal, self._coarse)
-        self.triangle_count = len(triangles)
         self._sides: tuple[np.ndarray, np.ndarray] | None = None  # of each triangle: its second side, and its normal
         if backs is not None and len(backs):
             triangles = triangles[: len(triangles) - len(backs)]
             back = np.full(len(triangles), -1, np.int32)
-            back[backs] = np.arange(len(triangles), self.triangle_count)
+            back[backs] = len(triangles) + np.arange(len(backs))
             a, b, c = (vertices[triangles[:, i]] for i in range(3))
             self._sides = back, np.cross(b - a, c - a).astype(np.float32)
         self._scene = EmbreeScene()

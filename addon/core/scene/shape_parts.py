@@ -80,20 +80,16 @@ class _Faces:
 
     def _filtered(self, normal: np.ndarray) -> np.ndarray:
         """Bilateral filter of the normals, which keeps creases (Zheng et al., 2011)."""
+        pairs = np.concatenate([self.a, self.b]), np.concatenate([self.b, self.a])
         for _ in range(PARTS.rounds):
             weight = np.exp(-0.5 * (self._angles(normal) / PARTS.crease) ** 2)
-            normal = self._graph(weight * self.area[self.b], weight * self.area[self.a]) @ normal + (
-                self.area[:, None] * normal
-            )
+            areas = np.concatenate([weight * self.area[self.b], weight * self.area[self.a]])
+            normal = sparse.csr_matrix((areas, pairs), (self.count, self.count)) @ normal + self.area[:, None] * normal
             normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
         return normal
 
     def _angles(self, normal: np.ndarray) -> np.ndarray:
         return np.arccos(np.clip((normal[self.a] * normal[self.b]).sum(1), -1, 1))
-
-    def _graph(self, there: np.ndarray, back: np.ndarray) -> sparse.csr_matrix:
-        pairs = np.concatenate([self.a, self.b]), np.concatenate([self.b, self.a])
-        return sparse.csr_matrix((np.concatenate([there, back]), pairs), (self.count, self.count))
 
     def bends(self) -> np.ndarray:
         """Angle at each pair's edge, above 0 where it is convex, (p,)."""
