@@ -49,17 +49,16 @@ def vote(
     step = max(int(np.ceil(np.sqrt(total / SIDES.max_rays))), 1)
     problems: list[str] = []
     votes: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-    packed: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for frame in frames:
         try:
             votes.append(_votes(scene, frame, read(frame), step))
         except BadInputError as error:
             problems.append(str(error))
-        if len(votes) == PACK:
-            packed, votes = [_summed([*packed, *votes])], []
+        if len(votes) > PACK:
+            votes = [_summed(votes)]
     if problems and len(problems) == len(frames):
         raise BadInputError(f"No picture of object ids can be used; the first: {problems[0]}")
-    triangle, ids, count = _summed([*packed, *votes])
+    triangle, ids, count = _summed(votes)
     if not len(triangle):
         raise BadInputError("No picture of object ids shows any of the mesh; check the poses and the mesh.")
     # The last of a triangle's entries in this order has most votes; of equal ones the lowest id.
