@@ -1,4 +1,4 @@
-"""Elements grouped by what they belong to."""
+"""Elements grouped by what they belong to, or where they lie."""
 
 import numpy as np
 
@@ -10,6 +10,14 @@ def by_label(label: np.ndarray) -> list[np.ndarray]:
     """
     order = np.argsort(label, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+
+
+def cell_of(position: np.ndarray, edge: float) -> np.ndarray:
+    """A number for the cell of a grid that each point ((n, 3)) lies in, rising with x, then y, then z, (n,) int64."""
+    place = np.floor(position / edge).astype(np.int64)
+    place -= place.min(0, initial=np.iinfo(np.int64).max)
+    extent = place.max(0, initial=0) + 1
+    return (place[:, 0] * extent[1] + place[:, 1]) * extent[2] + place[:, 2]
 
 
 def by_number(label: np.ndarray) -> dict[int, np.ndarray]:

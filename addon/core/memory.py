@@ -61,7 +61,7 @@ def free_memory() -> int | None:
     """Bytes that this process could have: of the machine, or of the control group that it runs in; None if untold."""
     if sys.platform == "win32":
         return _windows_free()
-    told = [_linux_available(), *map(_left_of_group, (_GROUP_V2, _GROUP_V1))]
+    told = [_told_by("/proc/meminfo", "MemAvailable:"), *map(_left_of_group, (_GROUP_V2, _GROUP_V1))]
     known = [one for one in told if one is not None]
     if known:
         return min(known)
@@ -77,10 +77,11 @@ _GROUP_V1 = tuple(
 )
 
 
-def _linux_available() -> int | None:
+def _told_by(file: str, name: str) -> int | None:
+    """Bytes that a file of /proc tells under a name, in kB."""
     try:
-        with open("/proc/meminfo", encoding="ascii", errors="replace") as told:
-            return next((int(line.split()[1]) * 1024 for line in told if line.startswith("MemAvailable:")), None)
+        with open(file, encoding="ascii", errors="replace") as told:
+            return next((int(line.split()[1]) * 1024 for line in told if line.startswith(name)), None)
     except OSError:
         return None
 
@@ -132,13 +133,9 @@ def peak_memory() -> int | None:
     """Highest resident size so far in bytes; None where the system doesn't tell."""
     if sys.platform == "linux":
         # Not getrusage: there a process starts with the peak of the one that started it, such as a full Blender.
-        try:
-            with open("/proc/self/status", encoding="ascii", errors="replace") as status:
-                for line in status:
-                    if line.startswith("VmHWM:"):
-                        return int(line.split()[1]) * 1024
-        except OSError:
-            pass
+        told = _told_by("/proc/self/status", "VmHWM:")
+        if told is not None:
+            return told
     if sys.platform == "win32":
         return _windows_peak()
     try:

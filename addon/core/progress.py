@@ -88,7 +88,6 @@ class Rounds:
 
     Parameters
     ----------
-    progress : Progress or None
     start, end : float
         Shares of the stage.
     """

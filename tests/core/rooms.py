@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from addon.core.light.environment import Environment
 from addon.core.light.field import LightField
 from addon.core.passes.albedo.albedo import albedo_of
-from addon.core.scene.elements import ElementLookup, make_atlas, triangle_geometry
+from addon.core.scene.elements import ElementLookup, make_atlas
 from addon.core.scene.model import Camera, Instance, Mesh, Pixels
 from addon.core.scene.rays import RayScene
 from addon.core.scene.surface import Surface
@@ -95,7 +95,7 @@ class Room:
 
     @cached_property
     def normals(self) -> np.ndarray:
-        return triangle_geometry(self.mesh)[0]
+        return self.mesh.geometry[0]
 
     def by_object(self, values: dict[int, object], default=0.0) -> np.ndarray:
         """(n, 3) float32: a value for each object's elements."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from ..scene.model import Camera
+from ..scene.model import Camera, Mesh
 from ..scene.rays import RayScene
 from ..significance import LEVELS
 from .params import AGREEMENT
@@ -21,21 +21,20 @@ class Shown(NamedTuple):
     edge: np.ndarray
 
 
-def shown(camera: Camera, normal: np.ndarray, scene: RayScene, bends: bool = True) -> Shown:
+def shown(camera: Camera, mesh: Mesh, scene: RayScene, bends: bool = True) -> Shown:
     """Trace a view and find the mesh's edges: steps in depth, bends, borders of objects.
 
     Parameters
     ----------
-    normal : (t, 3) float32
     bends : bool
         Not so in a mesh that was fused from depth: most of its bends are noise.
     """
     directions = camera.directions(camera.pixel_centres())
-    hits = scene.intersect(np.broadcast_to(np.float32(camera.centre), directions.shape), directions)
+    hits = scene.intersect(camera.centre, directions)
     shape = camera.height, camera.width
     triangle, distance = hits.triangle.reshape(shape), hits.distance.reshape(shape)
     hit = triangle >= 0
-    facing = np.where(hit[..., None], normal[triangle], 0)
+    facing = np.where(hit[..., None], mesh.geometry[0][triangle], 0)
     edge = np.zeros(shape, bool)
     for own, other in (((slice(None), slice(1, None)), (slice(None), slice(None, -1))),
                        ((slice(1, None), slice(None)), (slice(None, -1), slice(None)))):  # fmt: skip
@@ -49,18 +48,11 @@ def shown(camera: Camera, normal: np.ndarray, scene: RayScene, bends: bool = Tru
     return Shown(triangle, distance, edge)
 
 
-def gradient(view: SmallView) -> np.ndarray:
-    """Size of the gradient of the logarithm of the luminance, (height, width); NaN where unknown."""
-    grey = view.log.mean(-1)
-    dy, dx = np.gradient(grey)
-    return np.hypot(dx, dy)
-
-
 def edge_score(views: Sequence[SmallView], seen: Sequence[Shown]) -> float:
     """Probability that the picture changes more at an edge of the mesh than elsewhere: 0.5 by chance; NaN: no edges."""
     at, off = [], []
     for view, one in zip(views, seen, strict=True):
-        change = gradient(view)
+        change = np.hypot(*np.gradient(view.log.mean(-1)))  # NaN where unknown
         known = np.isfinite(change)
         rank = np.full(change.shape, np.nan)
         rank[known] = np.argsort(np.argsort(change[known])) / max(known.sum(), 1)

@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 
 from ..io.conventions import SCALES, Convention, alternatives
-from ..scene.elements import triangle_geometry
 from ..scene.model import Capture, Frame, Pixels
 from ..scene.rays import RayScene
 from .edges import Shown, edge_score, shown
@@ -118,7 +117,6 @@ class _Scene:
     views: list[SmallView]
     capture: Capture
     rays: RayScene
-    normal: np.ndarray
 
     @cached_property
     def exposed(self) -> bool:
@@ -133,7 +131,7 @@ class _Scene:
     def shown(self, convention: Convention) -> list[Shown]:
         cameras = convention.cameras([view.camera for view in self.views])
         bends = not self.capture.mesh.whole
-        return [shown(camera, self.normal, self.rays, bends) for camera in cameras]
+        return [shown(camera, self.capture.mesh, self.rays, bends) for camera in cameras]
 
     def whole(self, fit: Fit) -> Fit:
         return replace(fit, edge=edge_score(self.views, self.shown(fit.convention)))
@@ -153,24 +151,21 @@ def look(capture: Capture, read: Callable[[Frame], Pixels], search: bool = True)
     -------
     Agreement
     """
-    normal, _ = triangle_geometry(capture.mesh)
-    scene = _Scene(
-        small_views(capture.frames, read), capture, RayScene(capture.mesh.vertices, capture.mesh.triangles), normal
-    )
+    mesh = capture.mesh
+    scene = _Scene(small_views(capture.frames, read), capture, RayScene(mesh.vertices, mesh.triangles))
     seen = scene.shown(Convention())
     plain = replace(scene.colour(Convention()), edge=edge_score(scene.views, seen))
+    up = _up(scene.views, Convention())
     if plain.quality >= AGREEMENT.agree:
-        moved = misalignments(scene.views, [v.camera for v in scene.views], seen, scene.rays)
-        return Agreement(plain, None, moved, False, _up(scene.views, Convention()))
+        return Agreement(plain, None, misalignments(scene.views, seen, scene.rays), False, up)
     if _flat(scene.views):
-        return Agreement(replace(plain, colour=np.nan), None, np.zeros(0), False, _up(scene.views, Convention()))
+        plain, search = replace(plain, colour=np.nan), False
     if not search or len(scene.views) < 2:
-        return Agreement(plain, None, np.zeros(0), False, _up(scene.views, Convention()))
+        return Agreement(plain, None, np.zeros(0), False, up)
     best = _search(scene)
     if best is not None and best.quality < max(AGREEMENT.agree, plain.quality + AGREEMENT.better):
         best = None
-    chosen = Convention() if best is None else best.convention
-    return Agreement(plain, best, np.zeros(0), True, _up(scene.views, chosen))
+    return Agreement(plain, best, np.zeros(0), True, up if best is None else _up(scene.views, best.convention))
 
 
 def _flat(views: Sequence[SmallView]) -> bool:

@@ -6,7 +6,6 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from ..parallel import ordered_map
-from ..scene.model import Camera
 from ..scene.rays import RayScene
 from ..significance import LEVELS
 from .edges import Shown
@@ -14,18 +13,17 @@ from .params import AGREEMENT, MISALIGNMENT
 from .views import SmallView, sees
 
 
-def predicted(index: int, views: Sequence[SmallView], cameras: Sequence[Camera], seen: Sequence[Shown],
-              scene: RayScene) -> np.ndarray:  # fmt: skip
+def predicted(index: int, views: Sequence[SmallView], seen: Sequence[Shown], scene: RayScene) -> np.ndarray:
     """What the other views say that view `index` shows, (height, width) logarithm of grey; NaN where fewer than two."""
-    camera, own = cameras[index], seen[index]
+    camera, own = views[index].camera, seen[index]
     directions = camera.directions(camera.pixel_centres())
     at = np.flatnonzero((own.triangle >= 0).ravel())
     points = camera.centre + own.distance.ravel()[at, None].astype(np.float64) * directions[at]
-    way = [np.linalg.norm(eye.centre - camera.centre) for eye in cameras]
+    way = [np.linalg.norm(view.camera.centre - camera.centre) for view in views]
     nearest = [j for j in np.argsort(way, kind="stable") if j != index][: AGREEMENT.coarse]
     said = np.full((len(nearest), len(at)), np.nan, np.float32)
     for row, j in enumerate(nearest):
-        inside, pixels = sees(cameras[j], points, scene, margin=1)
+        inside, pixels = sees(views[j].camera, points, scene, margin=1)
         said[row, inside] = bilinear(views[j].log.mean(-1), pixels - 0.5)
     enough = np.isfinite(said).sum(0) >= 2
     image = np.full(camera.height * camera.width, np.nan, np.float32)
@@ -61,12 +59,11 @@ def shift(image: np.ndarray, reference: np.ndarray) -> np.ndarray | None:
     return moved
 
 
-def misalignments(views: Sequence[SmallView], cameras: Sequence[Camera], seen: Sequence[Shown],
-                  scene: RayScene) -> np.ndarray:  # fmt: skip
+def misalignments(views: Sequence[SmallView], seen: Sequence[Shown], scene: RayScene) -> np.ndarray:
     """Length of each view's shift in pixels of the full frame, (k,) for the views of which it can be told."""
 
     def found(i: int) -> np.ndarray | None:
-        return shift(views[i].log.mean(-1), predicted(i, views, cameras, seen, scene))
+        return shift(views[i].log.mean(-1), predicted(i, views, seen, scene))
 
     shifts = zip(views, ordered_map(found, range(len(views)), 0), strict=True)
     return np.array([float(np.linalg.norm(by)) * view.step for view, by in shifts if by is not None])

@@ -7,7 +7,6 @@ import numpy as np
 from ..io.conventions import Convention
 from ..kinds import Shown
 from ..photo import photo
-from ..scene.elements import triangle_geometry
 from ..scene.model import Capture, Frame, Pixels
 from ..scene.rays import RayScene
 from .edges import shown
@@ -26,7 +25,6 @@ def overlay(capture: Capture, read: Callable[[Frame], Pixels], conventions: Sequ
     -------
     (height, width, 3) uint8
     """
-    normal, _ = triangle_geometry(capture.mesh)
     rays = RayScene(capture.mesh.vertices, capture.mesh.triangles)
     chosen = np.unique(np.linspace(0, len(capture.frames) - 1, ROWS + 2).round().astype(int)[1:-1])
     rows = []
@@ -40,7 +38,7 @@ def overlay(capture: Capture, read: Callable[[Frame], Pixels], conventions: Sequ
         images = []
         for convention in conventions:
             image = plain.copy()
-            image[shown(convention.cameras([camera])[0], normal, rays).edge] = LINE
+            image[shown(convention.cameras([camera])[0], capture.mesh, rays).edge] = LINE
             images.append(image)
         rows.append(_beside(images, 1))
     return _beside(rows, 0)

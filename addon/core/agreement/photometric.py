@@ -26,12 +26,9 @@ class Consistency(NamedTuple):
 
     score: float
     hit: float
-    pairs: int
 
 
-def consistency(
-    views: Sequence[SmallView], cameras: Sequence[Camera], scene: RayScene, exposed: bool = True, seed: int = 0
-) -> Consistency:
+def consistency(views: Sequence[SmallView], cameras: Sequence[Camera], scene: RayScene, exposed: bool) -> Consistency:
     """Compare views of the same spots.
 
     Parameters
@@ -41,7 +38,7 @@ def consistency(
     exposed : bool
         Whether exposures and white balance are told; if not, each two views may differ by a factor in each channel.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     near, far, hits, rays = [], [], 0, 0
     for i, (view, camera) in enumerate(zip(views, cameras, strict=True)):
         x, y = (
@@ -49,7 +46,7 @@ def consistency(
         )
         column, row = (a.ravel() for a in np.meshgrid(x, y))
         directions = camera.directions(np.stack([column + 0.5, row + 0.5], -1))
-        found = scene.intersect(np.broadcast_to(np.float32(camera.centre), directions.shape), directions)
+        found = scene.intersect(camera.centre, directions)
         own = view.log[row, column]
         rays += len(own)
         hits += int((found.triangle >= 0).sum())
@@ -69,8 +66,8 @@ def consistency(
                     theirs = theirs + np.median(own[inside] - theirs, 0)
                 near.append(np.abs(own[inside] - theirs).mean(1))
                 far.append(np.abs(own[inside] - theirs[rng.permutation(len(inside))]).mean(1))
-    pairs = sum(map(len, near))
-    if pairs < LEVELS.many:
-        return Consistency(float("nan"), hits / max(rays, 1), pairs)
+    hit = hits / max(rays, 1)
+    if sum(map(len, near)) < LEVELS.many:
+        return Consistency(float("nan"), hit)
     a, b = np.concatenate(near), np.concatenate(far)
-    return Consistency(float((a < b).mean() + (a == b).mean() / 2), hits / max(rays, 1), pairs)
+    return Consistency(float((a < b).mean() + (a == b).mean() / 2), hit)

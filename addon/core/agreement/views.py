@@ -25,17 +25,14 @@ class SmallView:
         Pixels of the frame along an edge of one of these.
     """
 
-    name: str
     camera: Camera
     log: np.ndarray
     step: int
 
 
-def small_views(
-    frames: Sequence[Frame], read: Callable[[Frame], Pixels], count: int = AGREEMENT.count
-) -> list[SmallView]:
-    """`count` of the frames, evenly spread; those that can't be read are left out."""
-    chosen = np.unique(np.linspace(0, len(frames) - 1, count).round().astype(int)) if frames else ()
+def small_views(frames: Sequence[Frame], read: Callable[[Frame], Pixels]) -> list[SmallView]:
+    """`AGREEMENT.count` of the frames, evenly spread; those that can't be read are left out."""
+    chosen = np.unique(np.linspace(0, len(frames) - 1, AGREEMENT.count).round().astype(int)) if frames else ()
     views = []
     for frame in (frames[i] for i in chosen):
         try:
@@ -45,7 +42,7 @@ def small_views(
         shorter = min(frame.camera.width, frame.camera.height)  # of a strip, edges are to be left
         step = max(1, min(round(frame.camera.width / AGREEMENT.width), shorter // 2))
         camera = frame.camera.coarser(step)
-        views.append(SmallView(frame.name, camera, _small(pixels, step), step))
+        views.append(SmallView(camera, _small(pixels, step), step))
     return views
 
 
@@ -85,6 +82,5 @@ def _small(pixels: Pixels, step: int) -> np.ndarray:
     small = pixels.coarser(step)
     lit = small.radiance[small.valid]
     floor = 1e-3 * float(np.median(lit)) if len(lit) else 1.0
-    return np.where(small.valid[..., None], np.log(np.maximum(small.radiance, max(floor, 1e-30))), np.nan).astype(
-        np.float32
-    )
+    log = np.log(np.maximum(small.radiance, max(floor, 1e-30)))
+    return np.where(small.valid[..., None], log, np.nan).astype(np.float32)

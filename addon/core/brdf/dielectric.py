@@ -1,13 +1,12 @@
 """A diffuse part under a dielectric's microfacet lobe: the paper's model (sec. 3.3)."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from .compensation import base_color, ior_of
 from .ggx import GGX
-from .model import F0, Brdf, Constraints, Microfacets, Parameters, Principled, Prior
+from .model import F0, Brdf, Constraints, Microfacets, Parameters, Principled, Prior, roughness
 
 LEAST_F0 = 0.02
 """No solid dielectric reflects less at normal incidence (n = 1.33); a smaller fitted F0 is no lobe at all."""
@@ -43,8 +42,7 @@ class Dielectric(Brdf):
 
     def principled(self, of: Parameters) -> Principled:
         """The lobe by its index of refraction."""
-        roughness = None if of.alpha is None else math.sqrt(min(max(of.alpha, 0.0), 1.0))
-        return Principled(roughness=roughness, ior=ior_of(float(np.mean(of.f0 or 0.0))), specular_level=0.5)
+        return Principled(roughness=roughness(of), ior=ior_of(float(np.mean(of.f0 or 0.0))), specular_level=0.5)
 
 
 DIELECTRIC = Dielectric(

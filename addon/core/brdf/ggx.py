@@ -6,10 +6,7 @@ phi is GGX's alpha (Blender's Roughness is its square root). All arguments are c
 import numpy as np
 
 from ..kinds import Unit
-from ..paper.brdf import G1, D, F, G, f_nd
-
-__all__ = ["GGX", "D", "F", "G", "G1", "f_nd", "lobes", "sample_visible_normal", "visible_normal_density"]
-
+from ..paper.brdf import G1, D
 
 LEAST: Unit[float] = 1e-4
 """Cosine below which a direction runs along the surface."""
@@ -21,43 +18,6 @@ def visible_normal_density(n_wo: np.ndarray, n_h: np.ndarray, phi: float) -> np.
     Smith's G1(wo) D(h) / (4 n.wo); with this module's `G1` that is G1 D / 2.
     """
     return G1(n_wo, phi) * D(n_h, phi) / 2
-
-
-def lobes(n_w: np.ndarray, n_wo: np.ndarray, sin2_h: np.ndarray, grid: np.ndarray) -> np.ndarray:
-    """G D of every phi of a grid at once.
-
-    The same as `G` times `D`, but for each phi one division and one root in buffers that stay in the cache: 45 ns a ray
-    for 16 phi instead of 160 ns.
-
-    Parameters
-    ----------
-    n_w : (m, k) float32
-    n_wo : (m, 1) float32
-    sin2_h : (m, k) float32
-        1 - (n.h)^2.
-    grid : (p,) float
-        phi.
-
-    Returns
-    -------
-    (m, p, k) float32
-    """
-    m, k = n_w.shape
-    result = np.empty((m, len(grid), k), np.float32)
-    square, cos2_h, base = n_w * n_w, 1 - sin2_h, np.empty_like(n_w)
-    below = np.empty_like(n_w)
-    for i, phi in enumerate(grid):
-        a = np.float32(phi) * np.float32(phi)
-        np.multiply(cos2_h, a, out=base)
-        base += sin2_h
-        base *= base
-        np.multiply(square, 1 - a, out=below)
-        below += a
-        np.sqrt(below, out=below)
-        below += n_w
-        below *= base
-        np.divide(G1(n_wo, phi) * (a / np.float32(np.pi)), below, out=result[:, i])
-    return result
 
 
 def sample_visible_normal(wo: np.ndarray, square: np.ndarray, phi: float) -> np.ndarray:
@@ -104,7 +64,26 @@ class _GGX:
     """GGX's distribution of normals under Smith's masking, as `model.Microfacets` has it."""
 
     def lobes(self, n_w: np.ndarray, n_wo: np.ndarray, sin2_h: np.ndarray, grid: np.ndarray) -> np.ndarray:
-        return lobes(n_w, n_wo, sin2_h, grid)
+        """The same as `G` times `D`, but for each phi one division and one root in buffers that stay in the cache.
+
+        45 ns a ray for 16 phi instead of 160 ns.
+        """
+        m, k = n_w.shape
+        result = np.empty((m, len(grid), k), np.float32)
+        square, cos2_h, base = n_w * n_w, 1 - sin2_h, np.empty_like(n_w)
+        below = np.empty_like(n_w)
+        for i, phi in enumerate(grid):
+            a = np.float32(phi) * np.float32(phi)
+            np.multiply(cos2_h, a, out=base)
+            base += sin2_h
+            base *= base
+            np.multiply(square, 1 - a, out=below)
+            below += a
+            np.sqrt(below, out=below)
+            below += n_w
+            below *= base
+            np.divide(G1(n_wo, phi) * (a / np.float32(np.pi)), below, out=result[:, i])
+        return result
 
     def reflect(self, wi: np.ndarray, square: np.ndarray, alpha: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         wo, w_h, _ = reflected(wi, square, alpha)

@@ -12,7 +12,6 @@ from ..naming import object_name
 from .lambertian import LAMBERTIAN
 from .model import F0, Brdf
 from .registry import named
-from .transparent import opacity
 
 Z90: Unit[float] = 1.645
 """A 90 % interval is the value -+ this many standard errors."""
@@ -85,11 +84,6 @@ class ObjectMaterial:
         """What the object is called everywhere."""
         return object_name(self.class_name, self.object_id)
 
-    @property
-    def opacity(self) -> float:
-        """Blender's Alpha: share of the light that each surface of the object stops; 1 but for glass."""
-        return opacity(self)
-
     def as_dict(self) -> dict[str, Any]:
         """As materials.json and a stored stage have it."""
         return {one.name: getattr(self, one.name) for one in fields(self)} | {"model": self.model.name}
@@ -113,7 +107,6 @@ def base_colors(albedo: np.ndarray, object_id: np.ndarray, materials: Iterable[O
     albedo : (n, 3) float32
         Diffuse albedo.
     object_id : (n,) int
-    materials : iterable of ObjectMaterial
     """
     color, elements = albedo.copy(), by_number(object_id)
     for m in materials:

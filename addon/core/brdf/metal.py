@@ -1,13 +1,12 @@
 """A metal: the lobe alone, coloured."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..luminance import rgb
 from .ggx import GGX
-from .model import F0, Brdf, Constraints, Microfacets, Parameters, Principled
+from .model import F0, Brdf, Constraints, Microfacets, Parameters, Principled, roughness
 
 USUAL_F0 = 0.6
 """What common metals reflect at normal incidence."""
@@ -37,9 +36,8 @@ class Metal(Brdf):
 
     def principled(self, of: Parameters) -> Principled:
         """Metallic, in the colour of its F0."""
-        roughness = None if of.alpha is None else math.sqrt(min(max(of.alpha, 0.0), 1.0))
         colour = (0.5, 0.5, 0.5) if of.f0 is None else rgb(np.clip(np.broadcast_to(of.f0, 3), 0, 1))
-        return Principled(base_color=colour, roughness=roughness, metallic=1.0, specular_level=0.5)
+        return Principled(base_color=colour, roughness=roughness(of), metallic=1.0, specular_level=0.5)
 
 
 METAL = Metal(

@@ -10,6 +10,7 @@ The specular part of a model is linear in F0, s being how Fresnel's term rises w
 so the light transport needs G D alone, of many widths at once (`Microfacets`), and the fit is linear least squares.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -37,6 +38,11 @@ class Parameters(Protocol):
     def transmission(self) -> float | None: ...
     @property
     def surfaces(self) -> float | None: ...
+
+
+def roughness(of: Parameters) -> float | None:
+    """Blender's Roughness, the root of GGX's alpha; None where there is no lobe."""
+    return None if of.alpha is None else math.sqrt(min(max(of.alpha, 0.0), 1.0))
 
 
 class Microfacets(Protocol):
@@ -210,7 +216,6 @@ class Brdf:
 
         Parameters
         ----------
-        of : Parameters
         albedo : (3,) float
         n_w, n_wo, n_h, w_h : (m,) float
             Cosines between normal n, half vector h and the directions w and wo; all of them in front of the surface.

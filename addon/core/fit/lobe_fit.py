@@ -78,7 +78,6 @@ def solve(
     *,
     psi: np.ndarray | None = None,
     constraints: Constraints = FREE,
-    rounds: int = LOBE_FIT.rounds,
 ) -> Solution:
     """psi, robust cost and residuals for some phi, or one phi and several kappa: iteratively reweighted least squares.
 
@@ -86,7 +85,6 @@ def solve(
     ----------
     phi : slice or None
         Of the grid; None for no lobe at all.
-    kappa : float or tuple of float
     psi : (3,) float, optional
         Given: nothing is solved for but the diffuse part.
     constraints : Constraints
@@ -111,7 +109,7 @@ def solve(
 
     spread = spread_with(np.full((3, 1), USUAL_F0) if fixed is None else fixed)
     weight = dense.there / np.square(spread)
-    for _ in range(1 if lobe is None or fixed is not None else rounds):
+    for _ in range(1 if lobe is None or fixed is not None else LOBE_FIT.rounds):
         wt = weight * t
         below = np.maximum((wt * t).sum(1), np.float32(1e-20))
         left = weight * (1 - wt * t / below[:, None])  # of independent noise, once the diffuse part has had its share

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..luminance import LUMINANCE
-from ..scene.elements import triangle_geometry
 from ..scene.rays import Hits
 from .field import LightField
 from .params import GATHER
@@ -21,10 +20,8 @@ class BrightTriangles:
         Which of the mesh's they are.
     corner, edge_u, edge_v : (k, 3) float32
     normal : (k, 3) float32
-    chance : (k,) float64
-        Of being aimed at; sums to 1. In proportion to area * luminance.
     reached : (k,) float64
-        Sum of the chances up to each.
+        Sum of the chances of being aimed at, up to each. They sum to 1, in proportion to area * luminance.
     density : (t,) float32
         Chance over area for every triangle of the mesh: density of aimed points per square metre; 0 if not bright.
     """
@@ -34,12 +31,11 @@ class BrightTriangles:
     edge_u: np.ndarray
     edge_v: np.ndarray
     normal: np.ndarray
-    chance: np.ndarray
     reached: np.ndarray
     density: np.ndarray
 
     def __len__(self) -> int:
-        return len(self.chance)
+        return len(self.triangle)
 
 
 def triangle_luminance(field: LightField) -> np.ndarray:
@@ -65,7 +61,7 @@ def bright_triangles(field: LightField) -> BrightTriangles:
 
 def shining(field: LightField, above: float = 0.0) -> BrightTriangles:
     """The triangles of a luminance above this: those that give most light, if there are too many."""
-    normal, area = triangle_geometry(field.mesh)
+    normal, area = field.mesh.geometry
     luminance = triangle_luminance(field)
     bright = np.flatnonzero((luminance > above) & (luminance * area > 0))
     power = luminance[bright] * area[bright]
@@ -76,9 +72,7 @@ def shining(field: LightField, above: float = 0.0) -> BrightTriangles:
     density[bright] = chance / area[bright]
     corners = field.mesh.vertices[field.mesh.triangles[bright]].astype(np.float32)
     corner, edge_u, edge_v = corners[:, 0].copy(), corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return BrightTriangles(
-        bright.astype(np.int32), corner, edge_u, edge_v, normal[bright], chance, np.cumsum(chance), density
-    )
+    return BrightTriangles(bright.astype(np.int32), corner, edge_u, edge_v, normal[bright], np.cumsum(chance), density)
 
 
 def aimed_at(

@@ -99,7 +99,7 @@ class Environment:
 
         Near what was seen the neighbours' radiance is as good a guess as any.
         """
-        return (1 - np.exp(-self._to_seen()[0] / NEAR)).astype(np.float32)
+        return (1 - np.exp(-self._to(self.observations > 0)[0] / NEAR)).astype(np.float32)
 
     @cached_property
     def unfamiliar(self) -> np.ndarray:
@@ -120,9 +120,6 @@ class Environment:
         """Those of some directions ((h, 2h) bool) that are of spots at least three cells wide."""
         width = chosen.shape[1]  # directions wrap around
         return ndimage.binary_opening(np.concatenate([chosen] * 3, 1), np.ones((3, 3)))[:, width:-width]
-
-    def _to_seen(self) -> tuple[np.ndarray, np.ndarray]:
-        return self._to(self.observations > 0)
 
     def _to(self, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Radians from each direction to the nearest that was `seen` ((h, 2h) bool), and its flat index."""
@@ -226,7 +223,7 @@ class Environment:
 
     def __call__(self, directions: np.ndarray) -> np.ndarray:
         """Radiance from unit `directions` ((n, 3) float32, away from the room): (n, 3) float32."""
-        return self.radiance.reshape(-1, 3).take(_bin(directions, self.radiance.shape[0]), 0)
+        return self.at(self.radiance, directions)
 
     @property
     def directions(self) -> np.ndarray:
@@ -235,9 +232,8 @@ class Environment:
         row, column = np.mgrid[:height, :width] + 0.5
         around, up = (0.5 - column / width) * 2 * np.pi, (row / height - 0.5) * np.pi
         level = np.cos(up)
-        return (
-            np.stack([level * np.cos(around), level * np.sin(around), np.sin(up)], -1).reshape(-1, 3).astype(np.float32)
-        )
+        away = np.stack([level * np.cos(around), level * np.sin(around), np.sin(up)], -1)
+        return away.reshape(-1, 3).astype(np.float32)
 
     def refilled(self, radiance: np.ndarray) -> Environment:
         """The map with another `radiance` where frames saw it; the rest is filled in from that."""
@@ -245,8 +241,7 @@ class Environment:
 
     def known(self, directions: np.ndarray) -> np.ndarray:
         """Whether frames tell the radiance from unit `directions` ((n, 3)), (n,) bool."""
-        cell = _bin(directions, self.radiance.shape[0])
-        return self.told.ravel()[cell]
+        return self.at(self.told, directions)
 
 
 def _bin(directions: np.ndarray, height: int) -> np.ndarray:

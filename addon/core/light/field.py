@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ..scene.atlas import Atlas
-from ..scene.elements import ElementLookup, triangle_geometry
+from ..scene.elements import ElementLookup
 from ..scene.model import Mesh
 from ..scene.rays import Hits, RayScene
 from .environment import Environment
@@ -47,7 +49,7 @@ class LightField:
     ):
         self.mesh, self.atlas, self.scene, self.environment = mesh, atlas, scene, environment
         self.radiance = np.ascontiguousarray(radiance, np.float32)
-        self.normal, _ = triangle_geometry(mesh)
+        self.normal, _ = mesh.geometry
         self._say_lamps(lamps)
         self.mirrors: tuple[Mirror, ...] = ()
         self.sun: Sun | None = None
@@ -77,12 +79,16 @@ class LightField:
         self, radiance: np.ndarray, environment: Environment | None = None, lamps: Iterable[int] | None = None
     ) -> LightField:
         """The same room with another L_d and, if given, another environment and other lamps."""
-        other = object.__new__(LightField)
-        other.__dict__.update(self.__dict__)
-        other.radiance = np.ascontiguousarray(radiance, np.float32)
-        other.environment = environment or self.environment
+        other = self._with(
+            radiance=np.ascontiguousarray(radiance, np.float32), environment=environment or self.environment
+        )
         if lamps is not None:
             other._say_lamps(lamps)
+        return other
+
+    def _with(self, **changed: Any) -> LightField:
+        other = copy.copy(self)
+        vars(other).update(changed)
         return other
 
     def _say_lamps(self, lamps: Iterable[int]) -> None:
@@ -94,34 +100,26 @@ class LightField:
 
     def with_mirrors(self, mirrors: tuple[Mirror, ...]) -> LightField:
         """The same room with flat mirrors that rays go on from."""
-        other = self.with_light(self.radiance)
-        other.mirrors = mirrors
-        other.mirror_of = np.full(len(self.mesh.triangles), -1, np.int8)
+        mirror_of = np.full(len(self.mesh.triangles), -1, np.int8)
         for i, mirror in enumerate(mirrors):
             flat = np.abs(self.normal @ mirror.normal) > FLAT
-            other.mirror_of[flat & (self.mesh.object_id == mirror.object_id)] = i
-        return other
+            mirror_of[flat & (self.mesh.object_id == mirror.object_id)] = i
+        return self._with(mirrors=mirrors, mirror_of=mirror_of)
 
     def with_sun(self, sun: Sun | None) -> LightField:
         """The same room with a sun, or without one. Rays don't meet it: its part of E is `sun.sunlight`."""
-        other = self.with_light(self.radiance)
-        other.sun = sun
-        return other
+        return self._with(sun=sun)
 
     def with_unseen(self, radiance: np.ndarray) -> LightField:
         """The same room with what is likely sent, (n, 3) float32, where no frame looked and so its own is dark."""
-        other = self.with_light(self.radiance)
-        other.unseen = radiance
-        return other
+        return self._with(unseen=radiance)
 
     def with_openings(self, openings: Openings | None) -> LightField:
         """The same room with light that comes in by its openings.
 
         For rays from inside they stand in place of the environment, where no frame saw that nor nearly so.
         """
-        other = self.with_light(self.radiance)
-        other.openings = openings
-        return other
+        return self._with(openings=openings)
 
     def outside(self, origins: np.ndarray | None, directions: np.ndarray) -> np.ndarray:
         """Radiance that comes in along rays that leave the mesh, (n, 3) float32; `origins` as in `arriving`."""
@@ -191,9 +189,7 @@ class LightField:
                 radiance[seen] = self._mirrored(hits.part(seen), directions.take(seen, 0), dark_in_mirrors)
         return radiance
 
-    def _sent(
-        self, hits: Hits, element: np.ndarray, directions: np.ndarray, origins: np.ndarray | None = None
-    ) -> np.ndarray:
+    def _sent(self, hits: Hits, element: np.ndarray, directions: np.ndarray, origins: np.ndarray | None) -> np.ndarray:
         """L_d at hits, the environment where rays escape; lamps are dark from behind."""
         radiance = self.radiance.take(element, 0)  # indexing by arrays takes several times as long
         escaped = np.flatnonzero(element < 0)

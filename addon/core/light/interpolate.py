@@ -6,11 +6,12 @@ coarse to fine: every element whose bound is above `allowed` asks for a new one 
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..groups import cell_of
 from ..kinds import Block
 from ..parallel import for_blocks
 from ..scene.atlas import room_box
@@ -22,8 +23,7 @@ REACH = 2 * GATHER.allowed
 BLOCK: Block[int] = 1 << 15
 
 
-@dataclass
-class _Points:
+class _Points(NamedTuple):
     position: np.ndarray
     normal: np.ndarray
     value: np.ndarray
@@ -32,12 +32,8 @@ class _Points:
 
 def _one_per_cell(position: np.ndarray, normal: np.ndarray, spacing: float) -> np.ndarray:
     """Index of one element for each occupied cell of a grid over place and main direction of the normal."""
-    cell = np.floor(position / spacing).astype(np.int64)
-    cell -= cell.min(0)
     side = np.round(normal * 1.5).astype(np.int64) + 2  # 5 steps an axis: cells of about 40 degrees
-    extent = cell.max(0) + 1
-    key = ((cell[:, 0] * extent[1] + cell[:, 1]) * extent[2] + cell[:, 2]) * 125
-    key += (side[:, 0] * 5 + side[:, 1]) * 5 + side[:, 2]
+    key = cell_of(position, spacing) * 125 + (side[:, 0] * 5 + side[:, 1]) * 5 + side[:, 2]
     # The element nearest the middle of the cell stands for it.
     middle = np.abs(position / spacing - np.floor(position / spacing) - 0.5).sum(1)
     order = np.lexsort((middle, key))
@@ -98,10 +94,7 @@ def interpolated(
         # A lone close hit must not ask for endless points.
         radius = np.maximum(radius, finest / GATHER.allowed)
         batch = _Points(position[new], normal[new], value, radius)
-        names = ("position", "normal", "value", "radius")
-        points = batch if points is None else _Points(
-            *(np.concatenate([getattr(points, name), getattr(batch, name)]) for name in names)
-        )  # fmt: skip
+        points = batch if points is None else _Points(*map(np.concatenate, zip(points, batch, strict=True)))
         chosen = np.concatenate([chosen, new])
         if result is None:
             result = np.empty((len(position), value.shape[1]), np.float32)

@@ -9,6 +9,7 @@ different places, which lets the smooth part be gathered at few points and inter
 import numpy as np
 
 from ..kinds import Block
+from ..parallel import blocks
 from .directions import PATTERNS, cosine_patterns, shifted, sobol, turned
 from .emitters import BrightTriangles, aimed_at, sample_bright
 from .field import LightField
@@ -58,9 +59,7 @@ def gather(
     portal_rays = portal_rays if portals is not None else 0
     total = np.zeros((len(position), 3), np.float32)
     radius, escaped = np.zeros(len(position), np.float32), np.zeros(len(position), np.float32)
-    step = max(RAYS_AT_ONCE // rays, 1)
-    for start in range(0, len(position), step):
-        part = slice(start, start + step)
+    for part in blocks(len(position), max(RAYS_AT_ONCE // rays, 1)):
         p, n = position[part], normal[part]
         directions, cosine = turned(patterns, n, rng)
         directions, cosine = directions.reshape(-1, 3), cosine.ravel()
@@ -108,9 +107,7 @@ def from_outside(
     total = np.zeros((len(position), 3), np.float32)
     rng = np.random.default_rng([seed, 1])
     patterns = shifted(sobol(portal_rays, seed), PATTERNS, rng)
-    step = max(RAYS_AT_ONCE // portal_rays, 1)
-    for start in range(0, len(position), step):
-        part = slice(start, start + step)
+    for part in blocks(len(position), max(RAYS_AT_ONCE // portal_rays, 1)):
         p, n = position[part], normal[part]
         origins = field.scene.off_surface(p, n)
         square = patterns[rng.integers(0, PATTERNS, len(p))]
@@ -165,9 +162,7 @@ def direct(
     outward = bright.normal[pick.index].reshape(PATTERNS, emitter_rays, 3)
     density = pick.density.reshape(PATTERNS, emitter_rays)
     one_sided = field.one_sided[pick.triangle].reshape(PATTERNS, emitter_rays)
-    step = max(RAYS_AT_ONCE // emitter_rays, 1)
-    for start in range(0, len(position), step):
-        part = slice(start, start + step)
+    for part in blocks(len(position), max(RAYS_AT_ONCE // emitter_rays, 1)):
         n = normal[part]
         pattern = rng.integers(0, PATTERNS, len(n))
         origin = field.scene.off_surface(position[part], n)

@@ -7,7 +7,6 @@ import numpy as np
 
 from ..groups import by_number
 from ..luminance import LUMINANCE
-from ..scene.elements import triangle_geometry
 from ..scene.model import Instance, Mesh, class_names
 from ..significance import LEVELS
 from .params import LIGHT_FIT
@@ -130,7 +129,7 @@ def radius_of_gyration(mesh: Mesh) -> np.ndarray:
 
     A scan's noise changes it less than an area, as that grows with every triangle that is tilted.
     """
-    area, middle = triangle_geometry(mesh)[1], mesh.vertices[mesh.triangles].mean(1, dtype=np.float64)
+    area, middle = mesh.geometry[1], mesh.vertices[mesh.triangles].mean(1, dtype=np.float64)
     total = np.maximum(np.bincount(mesh.object_id, area), 1e-30)
     centroid = np.stack([np.bincount(mesh.object_id, area * middle[:, k]) / total for k in range(3)], 1)
     off = ((middle - centroid[mesh.object_id]) ** 2).sum(1)

@@ -9,16 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from ..groups import cell_of
 from ..scene.atlas import Atlas
 from .params import LIGHT_FIT
 
 
 def on_flat(atlas: Atlas) -> np.ndarray:
     """Elements around which the normals of their object agree, (n,) bool."""
-    cell = np.floor(atlas.position / LIGHT_FIT.flat_cell).astype(np.int64)
-    cell -= cell.min(0, initial=0)
-    extent = cell.max(0, initial=0) + 1
-    key = ((cell[:, 0] * extent[1] + cell[:, 1]) * extent[2] + cell[:, 2]) * (int(atlas.object_id.max(initial=0)) + 1)
+    key = cell_of(atlas.position, LIGHT_FIT.flat_cell) * (int(atlas.object_id.max(initial=0)) + 1)
     _, group, count = np.unique(key + atlas.object_id, return_inverse=True, return_counts=True)
     total = np.stack([np.bincount(group, atlas.normal[:, k], len(count)) for k in range(3)], 1)
     return (np.linalg.norm(total, axis=1) >= LIGHT_FIT.flat * count)[group]
@@ -53,13 +51,11 @@ class Sample:
         count = np.bincount(self.group)
         self._middle = np.cumsum(count) - count + (count - 1) // 2
 
-    def _medians(self, values: np.ndarray) -> np.ndarray:
-        """Of each value ((m,)), its object's median: a value, the lower of two in the middle."""
-        return values[np.lexsort((values, self.group))[self._middle]][self.group]
-
     def spread(self, log_albedo: np.ndarray) -> float:
         """Mean absolute deviation of log albedo ((m,)) from its object's median, each held at a cap."""
-        return float(np.minimum(np.abs(log_albedo - self._medians(log_albedo)), LIGHT_FIT.cap).mean())
+        # A value each, the lower of two in the middle.
+        medians = log_albedo[np.lexsort((log_albedo, self.group))[self._middle]]
+        return float(np.minimum(np.abs(log_albedo - medians[self.group]), LIGHT_FIT.cap).mean())
 
     def spread_under(self, log_sent: np.ndarray, received: np.ndarray) -> float:
         """The spread of log albedo under an E, (m,), of the logarithm of what is sent, (m,) (`log_of`)."""

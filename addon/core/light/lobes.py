@@ -4,7 +4,7 @@ Rays are drawn from a few lobes of different width (by visible normals, weights 
 balance heuristic over all of them makes the same rays serve any phi in between. Every observation is computed twice,
 with rays of its own each time: what the two differ by tells the noise of their mean, which the fit takes out.
 
-Rays aimed at the openings to the outside (`shading/portals.py`) were tried as well: of the same number of rays the
+Rays aimed at the openings to the outside (`portals`) were tried as well: of the same number of rays the
 noise of A stayed as it was for broad lobes (0.43 to 0.40 of the radiance on the living room's floor, 0.13 to 0.14 on a
 panel) and grew by 15 to 40 % for narrow ones.
 """
@@ -21,8 +21,8 @@ from ..brdf import ggx
 from ..brdf.fresnel import rise
 from ..brdf.model import Microfacets
 from ..kinds import Block, Code
+from ..paper.brdf import G1
 from ..parallel import for_blocks
-from ..progress import Progress
 from ..scene.tangent_frame import tangent_frame
 from .emitters import BrightTriangles, aimed_density, sample_bright
 from .field import LightField
@@ -106,7 +106,6 @@ def reflected_light(
     microfacets: Microfacets = ggx.GGX,
     threads: int = 0,
     seed: int = 0,
-    progress: Progress | None = None,
 ) -> LobeLight:
     """A and B of every observation.
 
@@ -161,12 +160,12 @@ def reflected_light(
         for phi in proposals:
             a = np.float32(phi * phi)
             base = sin2_h + a * (1 - sin2_h)
-            density += each * a / (2 * np.float32(np.pi)) * ggx.G1(n_wo, phi) / (base * base)
+            density += each * a / (2 * np.float32(np.pi)) * G1(n_wo, phi) / (base * base)
         L *= (n_w / np.maximum(density, 1e-12))[..., None]
         weighted = np.concatenate([L * (1 - s)[..., None], L * s[..., None]], -1)
         both[part] = (microfacets.lobes(n_w, n_wo, sin2_h, grid) @ weighted).reshape(-1, 2, p, 6)
 
-    for_blocks(run, m, max(RAYS_AT_ONCE // max(rays, 1), 1), threads, progress)
+    for_blocks(run, m, max(RAYS_AT_ONCE // max(rays, 1), 1), threads)
     mean, noise = both.mean(1), (both[:, 0] - both[:, 1]) / 2
     return LobeLight(mean[..., :3], mean[..., 3:], noise[..., :3], noise[..., 3:], np.asarray(grid, np.float32))
 
@@ -228,12 +227,7 @@ def _dot(planes: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def _stratified(count: int, each: int, rng: np.random.Generator) -> np.ndarray:
-    """`each` points of the unit square for each of `count` observations, one in each stratum of either axis.
-
-    Returns
-    -------
-    (2, count, each) float32
-    """
+    """`each` points of the unit square, one in each stratum of either axis, `count` times: (2, count, each) float32."""
     first = (np.arange(each, dtype=np.float32) + rng.random((count, each), np.float32)) / each
     second = (rng.permuted(np.tile(np.arange(each, dtype=np.float32), (count, 1)), axis=1) + 0.5) / each
     return np.stack([first, second]).astype(np.float32)

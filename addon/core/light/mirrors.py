@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from ..scene.elements import triangle_geometry
 from ..scene.model import KnownMirror, Mesh
 from ..scene.weld import one_place, ring_of, same_place
 
@@ -52,7 +51,7 @@ class Mirror:
 
 def known_mirror(known: KnownMirror, mesh: Mesh) -> Mirror:
     """The mirror that a capture tells of, its normal turned to its object's front."""
-    normal, _ = triangle_geometry(mesh)
+    normal, _ = mesh.geometry
     turn = -1.0 if (normal[mesh.object_id == known.object_id] @ known.normal).sum() < 0 else 1.0
     return Mirror(
         known.object_id,
@@ -78,7 +77,7 @@ def in_their_planes(mesh: Mesh, mirrors: tuple[Mirror, ...]) -> np.ndarray:
     -------
     (v, 3) float64
     """
-    normal, area = triangle_geometry(mesh)
+    normal, area = mesh.geometry
     vertices = mesh.vertices.copy()
     sheets = [] if mesh.backs is None else np.unique(mesh.object_id[mesh.backs])
     for mirror in mirrors:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..kinds import Block
+from ..parallel import blocks
 from .directions import shifted, sobol
 from .emitters import BrightTriangles, sample_bright
 from .field import LightField
@@ -22,7 +23,6 @@ def direct_over_mirrors(
 
     Parameters
     ----------
-    field : LightField
     position, normal : (n, 3) float32
     emitter_rays : int
         For each point and mirror.
@@ -36,8 +36,8 @@ def direct_over_mirrors(
     for mirror in field.mirrors:
         rng = np.random.default_rng([seed, mirror.object_id])
         front = np.flatnonzero((position - mirror.point) @ mirror.normal > field.scene.offset)
-        for start in range(0, len(front), step):
-            at = front[start : start + step]
+        for part in blocks(len(front), step):
+            at = front[part]
             p, n = position[at], normal[at]
             pick = sample_bright(bright, shifted(pattern, len(at), rng))
             image = pick.point - 2 * ((pick.point - mirror.point) @ mirror.normal)[:, None] * mirror.normal

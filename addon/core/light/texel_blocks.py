@@ -24,10 +24,8 @@ class TexelBlocks:
 
     Parameters
     ----------
-    atlas : Atlas
     element : (m,) int
         Those wanted; results are in their order.
-    threads : int
     """
 
     def __init__(self, atlas: Atlas, element: np.ndarray, threads: int = 0):

@@ -10,7 +10,6 @@ from ..parallel import ordered_map
 from ..progress import Progress, Rounds
 from ..scene.atlas import Atlas
 from ..scene.element_groups import ElementGroups
-from ..scene.elements import triangle_geometry
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Frame, Mesh, Pixels
 from ..scene.params import VISIBILITY
@@ -95,7 +94,6 @@ def accumulate(
     InterruptedRun
         From `progress`.
     """
-    normal, _ = triangle_geometry(mesh)
     groups = groups or ElementGroups(atlas)
     estimators = {tier: make_estimator(median, len(atlas), folder, threads) for tier in (CLEAN, EDGE, SATURATED)}
     wanted, each = frame_order(len(frames), seed), bytes_of_frame(frame.camera for frame in frames)
@@ -103,7 +101,7 @@ def accumulate(
     def look(index: int) -> tuple[int, FrameView, Pixels, Observations]:
         frame = frames[index]
         pixels = read(frame)
-        view = view_frame(frame.camera, mesh, scene, normal)
+        view = view_frame(frame.camera, mesh, scene)
         pixels = pixels if change is None else change(frame, view, pixels)
         known = groups.seen(frame.camera, pixels.valid)
         asked = groups.candidates(view) if known is None else known

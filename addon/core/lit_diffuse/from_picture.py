@@ -13,13 +13,11 @@ from ..kinds import Block
 from ..parallel import blocks
 from ..progress import Progress
 from ..scene.atlas import Atlas
-from ..scene.elements import triangle_geometry
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Mesh
-from ..scene.params import VISIBILITY
 from ..scene.stored_light import LitTexture, StoredPicture
-from ..scene.visibility import CLEAN, SATURATED
-from .from_texture import barycentric, interpolated
+from ..weighted import weighted_median
+from .from_texture import barycentric, interpolated, of_sums
 
 AT_ONCE: Block[int] = 1 << 18
 
@@ -49,7 +47,7 @@ BAKED = BakedParams()
 def texel_edge(mesh: Mesh, lit: LitTexture) -> float:
     """Edge in metres of an element for a baked texture: some texels of the usual triangle, by area."""
     with np.errstate(invalid="ignore"):
-        _, area = triangle_geometry(mesh)
+        _, area = mesh.geometry
     (ux, uy), (vx, vy) = (np.moveaxis(lit.uv[:, i] - lit.uv[:, 0], 1, 0).astype(np.float64) for i in (1, 2))
     texels = np.abs(ux * vy - uy * vx) / 2
     for i, one in enumerate(lit.pictures):
@@ -61,9 +59,7 @@ def texel_edge(mesh: Mesh, lit: LitTexture) -> float:
         raise BadInputError(
             f"The coordinates of texture {_named(lit)} span nothing; unwrap the mesh and bake it again."
         )
-    per, weight = area[known] / texels[known], area[known]
-    order = np.argsort(per)
-    usual = per[order][np.searchsorted(weight[order].cumsum(), weight.sum() / 2)]
+    usual = weighted_median(area[known] / texels[known], area[known])
     return float(max(BAKED.texels * np.sqrt(usual), np.sqrt(area.sum() / BAKED.elements)))
 
 
@@ -88,16 +84,9 @@ def lit_from_picture(mesh: Mesh, lit: LitTexture, atlas: Atlas, progress: Progre
             sums[own[part]] = _sums(mesh, lit, atlas, own[part], stored)
         if progress is not None:
             progress.update(0.9 * (i + 1) / len(lit.pictures))
-    weight = sums[:, 3]
-    seen = weight > 0
-    if not seen.any():
+    if not sums[:, 3].any():
         raise BadInputError(f"Texture {_named(lit)} is black all over; bake or export it again.")
-    radiance = np.full((len(atlas), 3), np.nan, np.float32)
-    radiance[seen] = sums[seen, :3] / weight[seen, None]
-    share = (sums[:, 4] / np.maximum(weight, 1)).astype(np.float32)
-    tier = np.where(seen, np.where(share > 0.5, SATURATED, CLEAN), -1).astype(np.int8)
-    none = np.zeros_like(radiance)
-    return LitDiffuse(radiance, none, np.where(seen, VISIBILITY.enough, 0).astype(np.int32), tier, share)
+    return of_sums(sums)
 
 
 def _named(lit: LitTexture) -> str:

@@ -1,5 +1,7 @@
 """L_d from light that the capture stores on its mesh, where there are no frames to take the median of."""
 
+from itertools import pairwise
+
 import numpy as np
 
 from ..errors import BadInputError
@@ -8,7 +10,6 @@ from ..kinds import Block
 from ..parallel import blocks
 from ..progress import Progress
 from ..scene.atlas import Atlas
-from ..scene.elements import triangle_geometry
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Mesh
 from ..scene.params import VISIBILITY
@@ -68,13 +69,18 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
         sums[own] = _window_sums(texels, local, place[own] * lit.size, width[own], lit.size)
         if progress is not None:
             progress.update(0.9 * part.stop / len(tiles))
-    weight, clipped = sums[:, 3], sums[:, 4]
-    seen = weight > 0
-    if not seen.any():
+    if not sums[:, 3].any():
         raise BadInputError("The textures on the mesh hold no light at all; copy them again.")
-    radiance = np.full((n, 3), np.nan, np.float32)
+    return of_sums(sums)
+
+
+def of_sums(sums: np.ndarray) -> LitDiffuse:
+    """L_d of sums of R, G, B, number and number of clipped texels over each element, (n, 5)."""
+    weight = sums[:, 3]
+    seen = weight > 0
+    radiance = np.full((len(sums), 3), np.nan, np.float32)
     radiance[seen] = sums[seen, :3] / weight[seen, None]
-    share = np.where(seen, clipped / np.maximum(weight, 1e-30), 0).astype(np.float32)
+    share = (sums[:, 4] / np.maximum(weight, 1)).astype(np.float32)
     tier = np.where(seen, np.where(share > 0.5, SATURATED, CLEAN), -1).astype(np.int8)
     none = np.zeros_like(radiance)
     return LitDiffuse(radiance, none, np.where(seen, VISIBILITY.enough, 0).astype(np.int32), tier, share)
@@ -82,7 +88,7 @@ def lit_from_tiles(mesh: Mesh, atlas: Atlas, progress: Progress | None = None) -
 
 def _tiles(mesh: Mesh, lit: LitTiles) -> tuple[np.ndarray, np.ndarray]:
     """A number for each triangle's tile, (t,), and the surface that each tile covers, square metres."""
-    _, area = triangle_geometry(mesh)
+    _, area = mesh.geometry
     of_triangle = np.unique(lit.picture.astype(np.int64) * (1 << 32) + lit.tile, return_inverse=True)[1].ravel()
     return of_triangle, np.bincount(of_triangle, area)
 
@@ -113,14 +119,12 @@ def interpolated(corner: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray
 
 def _runs(picture: np.ndarray, most: int) -> list[slice]:
     """Slices of at most so many tiles, each within one picture."""
-    result: list[slice] = []
-    at = 0
-    changes = np.append(np.flatnonzero(np.diff(picture)) + 1, len(picture))
-    for end in changes.tolist():
-        while at < end:
-            result.append(slice(at, min(at + most, end)))
-            at = result[-1].stop
-    return result
+    ends = [*(np.flatnonzero(np.diff(picture)) + 1).tolist(), len(picture)]
+    return [
+        slice(first + part.start, first + part.stop)
+        for first, end in pairwise([0, *ends])
+        for part in blocks(end - first, most)
+    ]
 
 
 def _read(lit: LitTiles, picture: int, number: np.ndarray) -> np.ndarray:
@@ -136,16 +140,9 @@ def _read(lit: LitTiles, picture: int, number: np.ndarray) -> np.ndarray:
 
 
 def _window_sums(texels: np.ndarray, tile: np.ndarray, centre: np.ndarray, width: np.ndarray, size: int) -> np.ndarray:
-    """Sums of R, G, B, number and number of clipped texels over a square around each place, (n, 5).
+    """Sums of R, G, B, number and number of clipped texels ((k, size, size, 3)) over squares of some tiles, (n, 5).
 
-    Parameters
-    ----------
-    texels : (k, size, size, 3) float32
-    tile : (n,) int
-    centre : (n, 2) float
-        x and y in texels.
-    width : (n,) float
-        Edge of the square in texels; it is moved to lie within the tile.
+    Their `centre` ((n, 2) x and y) and `width` ((n,)) are in texels; they are moved to lie within the tile ((n,) int).
     """
     known = np.isfinite(texels).all(-1) & (texels >= 0).all(-1) & (texels > 0).any(-1)
     over = np.isposinf(texels).any(-1)

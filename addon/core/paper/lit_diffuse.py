@@ -11,7 +11,6 @@ from ..parallel import ordered_map
 from ..progress import Progress, Rounds
 from ..scene.atlas import Atlas
 from ..scene.element_groups import ElementGroups
-from ..scene.elements import triangle_geometry
 from ..scene.model import Frame, Mesh, Pixels
 from ..scene.rays import RayScene
 from ..scene.visibility import FrameView, Observations, bytes_of_frame, observe, view_frame
@@ -55,13 +54,12 @@ def lit_diffuse(
     InterruptedRun
         From `progress`.
     """
-    normal, _ = triangle_geometry(mesh)
     groups, each = ElementGroups(atlas), bytes_of_frame(frame.camera for frame in frames)
     median = PSquare(len(atlas))
 
     def look(index: int) -> Seen:
         pixels = read(frames[index])
-        view = view_frame(frames[index].camera, mesh, scene, normal)
+        view = view_frame(frames[index].camera, mesh, scene)
         return index, view, pixels, observe(view, pixels, atlas, scene, groups.candidates(view))
 
     for index, view, pixels, seen in ordered_map(look, range(len(frames)), threads, each=each):

@@ -29,7 +29,6 @@ from ..passes.pose_refinement.poses import Poses, Texture, refine_poses
 from ..passes.radiometric_calibration.calibrate import Calibration, calibrate
 from ..passes.sharpening.sharpen import sharpened
 from ..progress import Progress, Rounds
-from ..scene.elements import triangle_geometry
 from ..scene.lit_diffuse import LitDiffuse
 from ..scene.model import Capture, Frame, Pixels
 from ..scene.samples import SampleCollector, Samples
@@ -194,9 +193,7 @@ class Passes:
         """
         frames = poses.of(frames)
         sky = EnvironmentAccumulator(float(np.median([f.camera.pixel_angle for f in frames])))
-        kept = SampleCollector(
-            self.surface.atlas, len(frames), self.settings.seed, triangle_geometry(self.surface.mesh)[0]
-        )
+        kept = SampleCollector(self.surface.atlas, len(frames), self.settings.seed, self.surface.mesh.geometry[0])
 
         def also(index, view, pixels, seen):
             sky.add(view, pixels)

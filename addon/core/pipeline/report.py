@@ -10,7 +10,6 @@ from ..origin import of_thing
 from ..passes.albedo.albedo import MEASURED, above_one, quotient, without_emitters
 from ..passes.missing_light.params import MISSING
 from ..passes.registry import following
-from ..scene.elements import triangle_geometry
 from ..scene.visibility import SATURATED
 from .corrected import Corrected
 
@@ -74,7 +73,7 @@ def _evidence_figures(run: Corrected) -> dict[str, float]:
 
 def _report_surface(run: Corrected, figures: dict[str, Any], warnings: list[str]) -> None:
     surface = run.surface()
-    _, area = triangle_geometry(surface.mesh)
+    _, area = surface.mesh.geometry
     figures["two_sided_share"] = float(area[surface.backs].sum() / area.sum())
     figures["mesh_noise_metres"] = surface.noise
     closed = float(area[surface.mesh.closed].sum()) if surface.mesh.closed is not None else 0.0

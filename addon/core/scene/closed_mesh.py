@@ -8,7 +8,6 @@ from scipy.spatial import cKDTree
 
 from ..significance import LEVELS
 from .closing import plane_axes
-from .elements import triangle_geometry
 from .model import Capture, Mesh
 from .params import CLOSING, PARTS
 from .rays import RayScene
@@ -48,9 +47,9 @@ def settled(mesh: Mesh) -> Mesh:
         return mesh
     scan = as_scanned(mesh)
     gap = plane_gap(scan.vertices)
-    centre, facing = scan.vertices[scan.triangles].mean(1).astype(np.float64), triangle_geometry(scan)[0]
+    centre, facing = scan.vertices[scan.triangles].mean(1).astype(np.float64), scan.geometry[0]
     tree, vertices = cKDTree(centre), mesh.vertices.copy()
-    closing, turned = mesh.triangles[mesh.closed], triangle_geometry(mesh)[0][mesh.closed]
+    closing, turned = mesh.triangles[mesh.closed], mesh.geometry[0][mesh.closed]
     label = connected(closing)
     for piece in range(int(label.max()) + 1):
         faces = label == piece

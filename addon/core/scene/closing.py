@@ -14,7 +14,6 @@ import numpy as np
 from scipy import ndimage
 
 from ..significance import LEVELS
-from .elements import triangle_geometry
 from .model import Frame, Mesh, Pixels
 from .params import CLOSING, PARTS
 from .rays import RayScene
@@ -114,7 +113,6 @@ def close_holes(
     triangles : (t, 3) int
     parts : Parts
         Of this mesh.
-    frames : sequence of Frame
     read : callable
         Gives a frame's pixels, none of them valid where it is damaged; called where frames look out of the mesh.
     """
@@ -158,7 +156,7 @@ def _shut(
     closed = 2 * sight.through < np.maximum(sight.through + sight.out, 1)
     looked_at = closed & (sight.out > 0)
     if looked_at.any():
-        normal, area = triangle_geometry(mesh)
+        normal, area = mesh.geometry
         some = np.random.default_rng(0).choice(len(triangles), LEVELS.sample, p=area / area.sum())
         shown = colours(frames, read, sight, scene, vertices[triangles[some]].mean(1), normal[some], gap)
         outside = looked_at & _outside(sight, _groups(sheets, looked_at), shown, gap)

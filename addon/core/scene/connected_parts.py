@@ -1,12 +1,11 @@
 """Objects for a mesh that tells of none: its connected parts."""
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..significance import LEVELS
 from .params import SURFACE
+from .uv_islands import connected
 from .weld import weld
 
 
@@ -24,10 +23,7 @@ def connected_parts(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """
     used, corners = np.unique(triangles.ravel(), return_inverse=True)
     faces = weld(vertices[used])[corners.ravel()].reshape(-1, 3)
-    count = int(faces.max()) + 1
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
-    graph = sparse.coo_matrix((np.ones(len(edges), np.int8), edges.T), (count, count))
-    part = connected_components(graph, directed=False)[1][faces[:, 0]]
+    part = connected(faces)
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     surface = np.bincount(part, area)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from .atlas import Atlas
-from .elements import triangle_geometry
 from .model import Mesh
 from .params import CREASES
 from .two_sides import fronts, other_way
@@ -36,7 +35,7 @@ def edge_angles(mesh: Mesh, wanted: np.ndarray | None = None) -> np.ndarray:
 
 def _angles(mesh: Mesh, points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """`edge_angles` of a mesh whose triangles are `faces` of welded `points`."""
-    normal, area = triangle_geometry(mesh)
+    normal, area = mesh.geometry
     corners = mesh.vertices[mesh.triangles]
     longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
     sliver = np.repeat(2 * area < CREASES.thin * longest**2, 3)

@@ -4,6 +4,7 @@ import zlib
 
 import numpy as np
 
+from ..groups import cell_of
 from ..kinds import Block, Unit
 from ..memory import BUDGET
 from .atlas import Atlas
@@ -27,12 +28,9 @@ class ElementGroups:
 
     def __init__(self, atlas: Atlas):
         spacing = CELL * atlas.texel_edge if len(atlas) else 1.0
-        cell = np.floor(atlas.position / max(spacing, 1e-12)).astype(np.int64)
-        cell -= cell.min(0, initial=0)
         side = 2 * np.abs(atlas.normal).argmax(1)
         side += np.take_along_axis(atlas.normal, (side // 2)[:, None], 1)[:, 0] > 0
-        extent = cell.max(0, initial=0) + 1
-        key = ((cell[:, 0] * extent[1] + cell[:, 1]) * extent[2] + cell[:, 2]) * 6 + side
+        key = cell_of(atlas.position, max(spacing, 1e-12)) * 6 + side
         order = np.lexsort((atlas.object_id, key))
         key, object_id = key[order], atlas.object_id[order]
         new = np.concatenate([[True], (np.diff(key) != 0) | (np.diff(object_id) != 0)])[: len(key)]

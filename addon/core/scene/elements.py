@@ -1,7 +1,7 @@
 """Surface elements: the atlas's texels with their place on the surface."""
 
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
@@ -13,7 +13,8 @@ from ..parallel import blocks, for_blocks
 from .atlas import Atlas
 from .model import Mesh
 from .rays import Hits, RayScene
-from .uv_islands import connected, corner_ids
+from .seen_cells import SeenCells
+from .uv_islands import areas, connected, corner_ids
 
 # Where in a texel it is asked which triangle covers it: the centre first, so that a texel which only touches a
 # triangle still gets an element at its border, and thin triangles are not lost.
@@ -25,18 +26,10 @@ SUBSAMPLES = np.array(
 ROWS_AT_ONCE: Block[int] = 128
 
 
-def triangle_geometry(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """`Mesh.geometry`: unit normals ((t, 3) float32, by the winding) and areas ((t,) float64, square metres)."""
-    return mesh.geometry
-
-
 def uv_scale(mesh: Mesh, uv: np.ndarray) -> float:
     """Atlas units for one metre: root of UV area over surface area, over the whole mesh."""
-    _, area = triangle_geometry(mesh)
-    p = uv.astype(np.float64)
-    e, f = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    uv_area = np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]).sum() / 2
-    return float(np.sqrt(uv_area / max(area.sum(), 1e-30)))
+    _, area = mesh.geometry
+    return float(np.sqrt(areas(uv).sum() / max(area.sum(), 1e-30)))
 
 
 class Unwrapped:
@@ -96,12 +89,6 @@ def _cover(uv: np.ndarray, size: int, threads: int) -> tuple[np.ndarray, np.ndar
     return texel, triangle[texel], u[texel], v[texel]
 
 
-def _padding(element: np.ndarray) -> np.ndarray:
-    """The nearest element of every texel, (size * size,) int32, of an image with -1 where there is none."""
-    nearest = ndimage.distance_transform_edt(element < 0, return_distances=False, return_indices=True)
-    return element[nearest[0], nearest[1]].ravel()
-
-
 class Elements(NamedTuple):
     """What takes time to find of an atlas's elements: fields of `Atlas`."""
 
@@ -129,18 +116,13 @@ class Crumbs(NamedTuple):
     corner: np.ndarray
 
 
-class Coarse(Protocol):
-    """Where one element stands for many texels (`seen_cells.SeenCells`)."""
-
-    def seen(self, position: np.ndarray, triangle: np.ndarray) -> np.ndarray:
-        """Points ((n, 3) float, of triangles (n,) int) that have elements of their own, (n,) bool."""
-
-    def coarse(self, position: np.ndarray, triangle: np.ndarray) -> np.ndarray:
-        """A number for each of the others, (n,) uint64: those alike share an element."""
-
-
 def find_elements(
-    mesh: Mesh, uv: np.ndarray, size: int, coarse: Coarse | None = None, crumbs: Crumbs | None = None, threads: int = 0
+    mesh: Mesh,
+    uv: np.ndarray,
+    size: int,
+    coarse: SeenCells | None = None,
+    crumbs: Crumbs | None = None,
+    threads: int = 0,
 ) -> Elements:
     """The elements at the texels that `uv` covers.
 
@@ -148,7 +130,7 @@ def find_elements(
     ----------
     mesh, uv, size
         See `make_atlas`.
-    coarse : Coarse, optional
+    coarse : SeenCells, optional
         Where one element stands for many texels; not given: each texel has its own.
     crumbs : Crumbs, optional
         Triangles that have elements together.
@@ -165,7 +147,7 @@ def find_elements(
     del u, v
     # Each triangle's surface is shared out between its texels; what no texel covers is left out.
     count = np.bincount(triangle, minlength=len(mesh.triangles))
-    area = triangle_geometry(mesh)[1]
+    area = mesh.geometry[1]
     shared = (area[triangle] / count[triangle]).astype(np.float32)
     element = np.full(size * size, -1, np.int32)
     element[texel] = np.arange(len(texel), dtype=np.int32)
@@ -175,7 +157,9 @@ def find_elements(
         at = more[0][:, None] + np.array([0, 1, size, size + 1])
         element[at] = len(texel) + np.arange(len(at), dtype=np.int32)[:, None]
         found = tuple(np.concatenate(both) for both in zip(found, more, strict=True))
-    return _merged(Elements(*found, _padding(element.reshape(size, size))), len(texel), coarse)
+    element = element.reshape(size, size)
+    row, column = ndimage.distance_transform_edt(element < 0, return_distances=False, return_indices=True)
+    return _merged(Elements(*found, element[row, column].ravel()), len(texel), coarse)
 
 
 def _of_crumbs(mesh, size, area, crumbs):
@@ -196,7 +180,7 @@ def _nearest_to_middle(position: np.ndarray, group: np.ndarray) -> np.ndarray:
     return order[np.cumsum(count) - count]
 
 
-def _merged(found: Elements, count: int, coarse: Coarse | None) -> Elements:
+def _merged(found: Elements, count: int, coarse: SeenCells | None) -> Elements:
     """Elements, by rising texel, of which one stands for all of its coarse cell; the first `count` are asked."""
     own = np.ones(len(found.texel), bool)
     if coarse is not None:
@@ -222,7 +206,6 @@ def make_atlas(mesh: Mesh, uv: np.ndarray, size: int, known: Elements | None = N
 
     Parameters
     ----------
-    mesh : Mesh
     uv : (t, 3, 2) float32
         Atlas coordinates in [0, 1], without overlap.
     size : int
@@ -231,7 +214,7 @@ def make_atlas(mesh: Mesh, uv: np.ndarray, size: int, known: Elements | None = N
         Of the same atlas; not given: each texel has its own.
     """
     found = known or find_elements(mesh, uv, size)
-    normal, _ = triangle_geometry(mesh)
+    normal, _ = mesh.geometry
     return Atlas(
         size=size,
         uv=uv,
@@ -289,13 +272,7 @@ def shown_uv(mesh: Mesh, atlas: Atlas) -> np.ndarray:
 
 
 class ElementLookup:
-    """The element at points on the surface, made ready for many millions of them.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    atlas : Atlas
-    """
+    """The element at points on the surface, made ready for many millions of them."""
 
     def __init__(self, mesh: Mesh, atlas: Atlas):
         self._atlas, self._object_id = atlas, mesh.object_id

@@ -15,13 +15,6 @@ def _radius(points: np.ndarray) -> np.ndarray:
     return np.hypot(points[:, 0], points[:, 1])
 
 
-def _at_angle(points: np.ndarray, sine: np.ndarray, cosine: np.ndarray) -> np.ndarray:
-    """Unit rays at given angles from z, towards image points: (n, 3)."""
-    radius = _radius(points)
-    scale = sine / np.maximum(radius, TINY)
-    return np.stack([points[:, 0] * scale, points[:, 1] * scale, cosine], -1)
-
-
 @dataclass(frozen=True)
 class FieldOfView:
     """r_d = atan(2 r tan(omega / 2)) / omega, r = tan(theta).
@@ -53,10 +46,12 @@ class FieldOfView:
 
     def unproject(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         points = np.asarray(points, np.float64)
-        angle = _radius(points) * self.omega
+        radius = _radius(points)
+        angle = radius * self.omega
         seen = angle < math.pi / 2
         theta = np.arctan(np.tan(np.where(seen, angle, 0)) / (2 * math.tan(self.omega / 2)))
-        return ahead(_at_angle(points, np.sin(theta), np.cos(theta)), seen), seen
+        scale = np.sin(theta) / np.maximum(radius, TINY)
+        return ahead(np.stack([points[:, 0] * scale, points[:, 1] * scale, np.cos(theta)], -1), seen), seen
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,13 @@ Their inverses are found by Newton's method, in the disc on which the model is o
 
 import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..kinds import Block, Unit
+from ..parallel import blocks
 from .lens import ahead
 
 STEEPEST = math.tan(math.radians(89.99))
@@ -46,8 +47,15 @@ def _slope(coefficients: tuple[float, ...], s: np.ndarray) -> np.ndarray:
     return value
 
 
-def _blocks(count: int) -> Iterator[slice]:
-    return (slice(start, start + BLOCK) for start in range(0, count, BLOCK))
+def _by_blocks(
+    function: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], values: np.ndarray, width: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """What a function of rows ((n, k)) gives, (n, width) and (n,) bool, asked for `BLOCK` of them at a time."""
+    values = np.asarray(values, np.float64)
+    result, seen = np.empty((len(values), width)), np.empty(len(values), bool)
+    for block in blocks(len(values), BLOCK):
+        result[block], seen[block] = function(values[block])
+    return result, seen
 
 
 @dataclass(frozen=True)
@@ -147,11 +155,7 @@ class Polynomial:
                       e[2] * j[0] + e[3] * j[2], e[2] * j[1] + e[3] * j[3])  # fmt: skip
 
     def project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        rays = np.asarray(rays, np.float64)
-        points, seen = np.empty((len(rays), 2)), np.empty(len(rays), bool)
-        for block in _blocks(len(rays)):
-            points[block], seen[block] = self._project(rays[block])
-        return points, seen
+        return _by_blocks(self._project, rays, 2)
 
     def _project(self, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         x, y, z = rays.T
@@ -169,11 +173,7 @@ class Polynomial:
         return np.stack([u, v], -1), seen
 
     def unproject(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        points = np.asarray(points, np.float64)
-        rays, seen = np.empty((len(points), 3)), np.empty(len(points), bool)
-        for block in _blocks(len(points)):
-            rays[block], seen[block] = self._unproject(points[block])
-        return rays, seen
+        return _by_blocks(self._unproject, points, 3)
 
     def _unproject(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         u, v = points.T

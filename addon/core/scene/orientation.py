@@ -30,16 +30,12 @@ class Sides(NamedTuple):
     both: np.ndarray
 
 
-def seen_sides(mesh: Mesh, normal: np.ndarray, scene: RayScene, cameras: Sequence[Camera]) -> Sides:
+def seen_sides(mesh: Mesh, cameras: Sequence[Camera]) -> Sides:
     """Turn normals towards the cameras that see them.
 
     Triangles that no ray meets follow the majority of their object.
-
-    Parameters
-    ----------
-    normal : (t, 3) float32
-        By the winding.
     """
+    normal, scene = mesh.geometry[0], RayScene(mesh.vertices, mesh.triangles)
     votes = np.zeros(len(mesh.triangles))
     sides = np.zeros((2, len(votes)), np.int64)  # rays that met the front, and the back
     footprints = []

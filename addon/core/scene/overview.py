@@ -55,6 +55,6 @@ def _worth(camera: Camera, scene: RayScene, normal: np.ndarray) -> float:
     across = (np.arange(SEEN) + 0.5) / SEEN
     pixels = np.stack(np.meshgrid(across * camera.width, across * camera.height), -1).reshape(-1, 2)
     directions = camera.directions(pixels)
-    hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
+    hits = scene.intersect(camera.centre, directions)
     front = (hits.triangle >= 0) & (np.einsum("ij,ij->i", normal[hits.triangle], directions) < 0)
     return float(np.where(front, np.minimum(hits.distance, scene.diagonal), 0).mean())

@@ -170,16 +170,12 @@ def lay_out(
         page, tile, offset = _in_blocks(blocks, place)
     else:
         page, tile, offset = _in_few_tiles(blocks, place, box, largest)
-    edge = max(one.x + one.width for one in page), max(one.y + one.height for one in page)
-    sheet = -(-max(edge) // SURFACE.step) * SURFACE.step
-    place += np.array([(page[k].x, page[k].y) for k in tile]) + offset
+    origin, extents = np.array([(one.x, one.y, one.width, one.height) for one in page]).reshape(-1, 2, 2).swapaxes(0, 1)
+    sheet = -(-int((origin + extents).max()) // SURFACE.step) * SURFACE.step
+    place += origin[tile] + offset
     factor = np.array([scale[int(number)] for number in owner])
     on_sheet = (uv * size - corner[island][:, None]) * factor[island][:, None, None] + place[island][:, None]
-    origin, extents = (
-        np.array([[getattr(one, a), getattr(one, b)] for one in page], np.float64)
-        for a, b in (("x", "y"), ("width", "height"))
-    )
-    of_page = np.asarray(tile)[island]
+    of_page = tile[island]
     own_uv = (on_sheet - origin[of_page][:, None]) / extents[of_page][:, None]
     if kind == UDIM:
         number = np.array([one.number - 1001 for one in page])[of_page]
@@ -188,7 +184,7 @@ def lay_out(
         tuple(page),
         own_uv.astype(np.float32),
         (on_sheet / sheet).astype(np.float32),
-        int(sheet),
+        sheet,
         scale,
         np.concatenate([corner, place, box], 1),
         owner,

@@ -57,12 +57,11 @@ class RayScene:
         # Far from the origin float32 itself is coarser than that: 1 mm at 10 km.
         self._coarse = 4 * float(np.spacing(np.float32(np.abs([low, high]).max())))
         self.offset = max(RELATIVE_OFFSET * self.diagonal, self._coarse)
-        self.triangle_count = len(triangles)
         self._sides: tuple[np.ndarray, np.ndarray] | None = None  # of each triangle: its second side, and its normal
         if backs is not None and len(backs):
             triangles = triangles[: len(triangles) - len(backs)]
             back = np.full(len(triangles), -1, np.int32)
-            back[backs] = np.arange(len(triangles), self.triangle_count)
+            back[backs] = len(triangles) + np.arange(len(backs))
             a, b, c = (vertices[triangles[:, i]] for i in range(3))
             self._sides = back, np.cross(b - a, c - a).astype(np.float32)
         self._scene = EmbreeScene()
@@ -76,19 +75,20 @@ class RayScene:
         self.offset = max(RELATIVE_OFFSET * min(self.diagonal, 2 * extent), self._coarse)
 
     def _run(self, origins, directions, **options):
-        return self._scene.run(
-            np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32), **options
-        )
+        origins = np.ascontiguousarray(np.broadcast_to(origins, directions.shape), np.float32)
+        return self._scene.run(origins, np.ascontiguousarray(directions, np.float32), **options)
 
     def intersect(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
         """First hit of each ray.
 
         Parameters
         ----------
-        origins, directions : (n, 3) float32
-            Directions of unit length.
+        origins : (n, 3) or (3,) float
+            Where each starts, or all of them.
+        directions : (n, 3) float32
+            Of unit length.
         """
-        if len(origins) == 0:
+        if len(directions) == 0:
             none = np.zeros(0, np.float32)
             return Hits(np.zeros(0, np.int32), none, none, none)
         found = self._run(origins, directions, output=True)

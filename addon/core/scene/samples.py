@@ -51,11 +51,10 @@ def choose_elements(atlas: Atlas, seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
     key = rng.random(len(atlas))
     order = np.lexsort((key, atlas.object_id))
-    objects = atlas.object_id[order]
-    start = np.concatenate([[0], np.flatnonzero(np.diff(objects)) + 1])
-    rank = np.arange(len(order)) - np.repeat(start, np.diff(np.concatenate([start, [len(order)]])))
+    _, start, count = np.unique(atlas.object_id[order], return_index=True, return_counts=True)
+    rank = np.arange(len(order)) - np.repeat(start, count)
     limit = LEVELS.sample
-    while limit > 16 and np.minimum(np.diff(np.concatenate([start, [len(order)]])), limit).sum() > SAMPLES.in_all:
+    while limit > 16 and np.minimum(count, limit).sum() > SAMPLES.in_all:
         limit //= 2
     return np.sort(order[rank < limit])
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..kinds import Block
 from ..parallel import blocks, ordered_map
-from .elements import triangle_geometry
 from .model import Camera, Mesh
 from .params import SPARSE
 from .rays import RayScene
@@ -35,12 +34,11 @@ class SeenCells:
         At least one.
     texel : float
         Edge of an element in metres.
-    threads : int
     """
 
     def __init__(self, mesh: Mesh, scene: RayScene, cameras: Sequence[Camera], texel: float, threads: int = 0):
         self._edge = SPARSE.cell * texel
-        self._label, area = sides(mesh), triangle_geometry(mesh)[1]
+        self._label, area = sides(mesh), mesh.geometry[1]
         centres = np.array([camera.centre for camera in cameras])
         self._low, self._high = centres.min(0), centres.max(0)
 
@@ -109,7 +107,7 @@ class SeenCells:
 
 def sides(mesh: Mesh) -> np.ndarray:
     """A number for each triangle's object and the side that it faces, alike where both are, (t,) int64."""
-    normal, _ = triangle_geometry(mesh)
+    normal, _ = mesh.geometry
     side = 2 * np.abs(normal).argmax(1)
     side += np.take_along_axis(normal, (side // 2)[:, None], 1)[:, 0] > 0
     label = (mesh.object_id.astype(np.int64) * 6 + side) * 2

@@ -11,14 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .connected_parts import connected_parts, to_nearest
-from .elements import triangle_geometry
 from .model import Mesh
 from .params import PARTS, SURFACE
 from .sphere import fibonacci
+from .uv_islands import components
 from .weld import weld
 
 
@@ -81,20 +80,16 @@ class _Faces:
 
     def _filtered(self, normal: np.ndarray) -> np.ndarray:
         """Bilateral filter of the normals, which keeps creases (Zheng et al., 2011)."""
+        pairs = np.concatenate([self.a, self.b]), np.concatenate([self.b, self.a])
         for _ in range(PARTS.rounds):
             weight = np.exp(-0.5 * (self._angles(normal) / PARTS.crease) ** 2)
-            normal = self._graph(weight * self.area[self.b], weight * self.area[self.a]) @ normal + (
-                self.area[:, None] * normal
-            )
+            areas = np.concatenate([weight * self.area[self.b], weight * self.area[self.a]])
+            normal = sparse.csr_matrix((areas, pairs), (self.count, self.count)) @ normal + self.area[:, None] * normal
             normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
         return normal
 
     def _angles(self, normal: np.ndarray) -> np.ndarray:
         return np.arccos(np.clip((normal[self.a] * normal[self.b]).sum(1), -1, 1))
-
-    def _graph(self, there: np.ndarray, back: np.ndarray) -> sparse.csr_matrix:
-        pairs = np.concatenate([self.a, self.b]), np.concatenate([self.b, self.a])
-        return sparse.csr_matrix((np.concatenate([there, back]), pairs), (self.count, self.count))
 
     def bends(self) -> np.ndarray:
         """Angle at each pair's edge, above 0 where it is convex, (p,)."""
@@ -103,8 +98,7 @@ class _Faces:
 
     def pieces(self, joined: np.ndarray) -> np.ndarray:
         """The piece of each triangle, where the pairs that are `joined` hang together, (t,) int from 0."""
-        graph = sparse.coo_matrix((np.ones(joined.sum(), bool), (self.a[joined], self.b[joined])), (self.count,) * 2)
-        return connected_components(graph, directed=False)[1]
+        return components(self.a[joined], self.b[joined], self.count)
 
     def largest(self, chosen: np.ndarray) -> np.ndarray:
         """Those of some triangles ((k,) int) that hang together and have the most surface, (n,) int."""
@@ -114,8 +108,7 @@ class _Faces:
         number[chosen] = np.arange(len(chosen))
         a, b = number[self.a], number[self.b]
         both = (a >= 0) & (b >= 0)
-        graph = sparse.coo_matrix((np.ones(both.sum(), bool), (a[both], b[both])), (len(chosen),) * 2)
-        piece = connected_components(graph, directed=False)[1]
+        piece = components(a[both], b[both], len(chosen))
         return chosen[piece == np.bincount(piece, self.area[chosen]).argmax()]
 
 
@@ -197,8 +190,7 @@ def _without_crumbs(faces: _Faces, piece: np.ndarray) -> np.ndarray:
             return np.unique(piece, return_inverse=True)[1].ravel()
         small = np.flatnonzero(crumb & ~alone)
         neighbour = np.asarray(border.argmax(1)).ravel()[small]
-        graph = sparse.coo_matrix((np.ones(len(small), bool), (small, neighbour)), border.shape)
-        piece = connected_components(graph, directed=False)[1][piece]
+        piece = components(small, neighbour, len(crumb))[piece]
 
 
 def _over_convex_edges(faces: _Faces, piece: np.ndarray, flat: np.ndarray) -> np.ndarray:
@@ -207,8 +199,7 @@ def _over_convex_edges(faces: _Faces, piece: np.ndarray, flat: np.ndarray) -> np
     bend = _borders(faces, piece, faces.length * faces.bends()).tocoo()
     mean = bend.data / np.asarray(border[bend.row, bend.col]).ravel()
     joined = (mean > -PARTS.concave) & ~flat[bend.row] & ~flat[bend.col]
-    graph = sparse.coo_matrix((np.ones(joined.sum(), bool), (bend.row[joined], bend.col[joined])), border.shape)
-    return connected_components(graph, directed=False)[1][piece]
+    return components(bend.row[joined], bend.col[joined], len(flat))[piece]
 
 
 def _name(plane: Plane, faces: _Faces, gap: float) -> str:
@@ -269,7 +260,7 @@ def parts_of(vertices: np.ndarray, triangles: np.ndarray) -> Parts:
         At least one; vertices used are finite.
     """
     part, names, planes = Parts(connected_parts(vertices, triangles), {})
-    area = triangle_geometry(Mesh(vertices, triangles, part))[1]
+    area = Mesh(vertices, triangles, part).geometry[1]
     if 2 * area[part == 0].sum() > area.sum():
         used, corner = np.unique(triangles.ravel(), return_inverse=True)
         place = weld(vertices[used])[corner.ravel()]

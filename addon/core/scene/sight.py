@@ -82,8 +82,7 @@ def sight_of(cameras: Sequence[Camera], scene: RayScene, points: np.ndarray, nor
     rows: list[tuple[np.ndarray, ...]] = []
     for number, camera in enumerate(cameras):
         at, pixel, direction, distance = _seen(camera, points, normals)
-        origin = np.broadcast_to(camera.centre.astype(np.float32), direction.shape)
-        hits = scene.intersect(origin, direction)
+        hits = scene.intersect(camera.centre, direction)
         escapes = hits.triangle < 0
         beyond = np.where(escapes, 0, hits.distance) - distance
         height = beyond * (direction * normals[at]).sum(1)  # of what is met over the plane
@@ -110,8 +109,7 @@ def colours(
     shown = np.full((len(used), len(points), 3), np.nan)
     for number, frame in enumerate(frames):
         at, pixel, direction, distance = _seen(frame.camera, points, normals)
-        origin = np.broadcast_to(frame.camera.centre.astype(np.float32), direction.shape)
-        met = np.abs(scene.intersect(origin, direction).distance - distance) < gap
+        met = np.abs(scene.intersect(frame.camera.centre, direction).distance - distance) < gap
         views[at[met]] += 1
         row = int(np.searchsorted(used, number))
         if row == len(used) or used[row] != number:

@@ -22,7 +22,7 @@ def sparse_hits(scene: RayScene, camera: Camera, step: int = SIDES.pixel_step) -
     directions, led = camera.rays(pixels)
     if not led.all():
         pixels, directions = pixels[led], directions[led]
-    hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
+    hits = scene.intersect(camera.centre, directions)
     met = np.flatnonzero(hits.triangle >= 0)
     return pixels[met], directions[met], hits.part(met)
 

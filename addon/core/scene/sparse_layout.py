@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .elements import Crumbs, triangle_geometry
+from .elements import Crumbs
 from .model import Mesh
 from .pages import shelves
 from .params import SPARSE, SURFACE
@@ -43,8 +43,6 @@ class Sparse:
 
     Parameters
     ----------
-    mesh : Mesh
-    cells : SeenCells
     texel : float
         Edge of the room's elements, metres.
     """
@@ -57,7 +55,7 @@ class Sparse:
         seen = cells.met.copy()
         for point in (self._middle, *corner.transpose(1, 0, 2)):
             seen |= cells.seen(point, every)
-        _, area = triangle_geometry(mesh)
+        _, area = mesh.geometry
         side = np.sqrt(area)
         # Half a cell, so that a triangle apart is about as fine as the cells are.
         edge = np.where(seen, texel, cells.coarse_edge(self._middle) / 2)

@@ -44,7 +44,6 @@ class StoredPicture:
 
     Attributes
     ----------
-    path : Path
     begin, length : int
         Its bytes within the file; a length of 0 is the whole file.
     """
@@ -60,7 +59,6 @@ class LitTexture:
 
     Attributes
     ----------
-    pictures : tuple of StoredPicture
     picture : (t,) int32
         Which of them each triangle shows; -1 none.
     uv : (t, 3, 2) float32

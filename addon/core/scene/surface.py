@@ -9,9 +9,9 @@ import numpy as np
 from ..errors import BadInputError
 from .atlas import Atlas
 from .element_groups import ElementGroups
-from .elements import Crumbs, ElementLookup, Elements, find_elements, make_atlas, shown_uv, triangle_geometry, uv_scale
+from .elements import Crumbs, ElementLookup, Elements, find_elements, make_atlas, shown_uv, uv_scale
 from .model import Camera, Mesh
-from .orientation import Sides, seen_sides
+from .orientation import seen_sides
 from .params import SURFACE
 from .rays import RayScene
 from .seen_cells import SeenCells
@@ -84,12 +84,6 @@ def turned(corners: np.ndarray, sign: np.ndarray) -> np.ndarray:
     return result
 
 
-def oriented(mesh: Mesh, cameras: Sequence[Camera]) -> Sides:
-    """What the cameras see of each triangle."""
-    normal, _ = triangle_geometry(mesh)
-    return seen_sides(mesh, normal, RayScene(mesh.vertices, mesh.triangles), cameras)
-
-
 def without_triangles(mesh: Mesh, which: np.ndarray) -> Mesh:
     """What an unwrap needs of a mesh's other triangles; second sides count as any."""
     left = np.ones(len(mesh.triangles), bool)
@@ -156,7 +150,7 @@ def build_surface(
     BadInputError
         No camera looks at the mesh.
     """
-    sides = oriented(mesh, cameras)
+    sides = seen_sides(mesh, cameras)
     if sides.footprint <= 0 and (cameras or not texel_size):
         raise BadInputError(
             "No camera of the capture looks at the mesh; check that transforms.json and mesh.ply share one frame."
@@ -177,7 +171,7 @@ def _laid_out(
     """Atlas coordinates, the atlas's edge in texels, edge of a texel in metres, and what shares texels."""
     sparse = Sparse(mesh, cells, texel) if cells is not None and takes_parts(unwrap) else None
     part = mesh if sparse is None or not len(sparse.triangle) else without_triangles(mesh, sparse.triangle)
-    _, area = triangle_geometry(part)
+    _, area = part.geometry
     uv = unwrap(part, atlas_size(float(area.sum()), texel, largest))
     # The islands' true scale sets the size that makes a texel as large as wished.
     scale = max(uv_scale(part, uv), 1e-12)

@@ -9,13 +9,11 @@ between the two has to be larger than some other distance. Renderers need one: `
 from dataclasses import replace
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from ..significance import LEVELS
-from .elements import triangle_geometry
 from .model import Mesh
 from .params import SIDES
+from .uv_islands import components
 from .weld import point_normals, welded
 
 
@@ -32,7 +30,6 @@ def two_sided(mesh: Mesh, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Parameters
     ----------
-    mesh : Mesh
     rays : (2, t) int
         How many rays of the frames met the front, by the winding, and the back of each triangle.
 
@@ -57,9 +54,7 @@ def two_sided(mesh: Mesh, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     # Either way round of each triangle is a node; neighbours run along their common edge in opposite directions.
     alike = (corner[one, 0] != corner[two, 0]).astype(np.int64)
     one, two = owner[one], owner[two]
-    rows, columns = np.r_[one, one + count], np.r_[two + count * (1 - alike), two + count * alike]
-    graph = sparse.coo_matrix((np.ones(len(rows), np.int8), (rows, columns)), (2 * count, 2 * count))
-    part = connected_components(graph, directed=False)[1]
+    part = components(np.r_[one, one + count], np.r_[two + count * (1 - alike), two + count * alike], 2 * count)
     up, down = part[:count], part[count:]
     sheet = np.minimum(up, down)
     ways = np.where(up == sheet, 1, -1)
@@ -77,7 +72,7 @@ def two_sided(mesh: Mesh, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def worth_it(mesh: Mesh, both: np.ndarray) -> np.ndarray:
     """Those of the triangles `both` that are a substantial part of their object or of the room, (t,) bool."""
-    _, area = triangle_geometry(mesh)
+    _, area = mesh.geometry
     count = int(mesh.object_id.max()) + 1
     own, sheets = (np.bincount(mesh.object_id, weight, count) for weight in (area, area * both))
     large = (sheets >= SIDES.least_of_object * own) | (sheets >= SIDES.least_of_room * area.sum())

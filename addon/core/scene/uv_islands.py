@@ -29,6 +29,12 @@ def corner_ids(triangles: np.ndarray, uv: np.ndarray) -> np.ndarray:
     return ids.reshape(-1, 3)
 
 
+def components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
+    """The piece that each of `count` nodes is of where pairs `a`, `b` ((p,) int) hang together, (count,) int from 0."""
+    graph = coo_matrix((np.ones(len(a), bool), (a, b)), (count, count))
+    return connected_components(graph, directed=False)[1]
+
+
 def connected(corners: np.ndarray, label: np.ndarray | None = None) -> np.ndarray:
     """Number the connected pieces of triangles that share a corner and a label.
 
@@ -46,10 +52,8 @@ def connected(corners: np.ndarray, label: np.ndarray | None = None) -> np.ndarra
     if label is not None:
         corners = corners + label[:, None] * (corners.max(initial=0) + 1)
     names, node = np.unique(corners.ravel(), return_inverse=True)
-    node = node.reshape(-1, 3)
-    rows, columns = np.r_[node[:, 0], node[:, 1]], np.r_[node[:, 1], node[:, 2]]
-    graph = coo_matrix((np.ones(len(rows), np.int8), (rows, columns)), shape=(len(names), len(names)))
-    piece = connected_components(graph, directed=False)[1][node[:, 0]]
+    a, b, c = node.reshape(-1, 3).T
+    piece = components(np.r_[a, b], np.r_[b, c], len(names))[a]
     return np.unique(piece, return_inverse=True)[1].reshape(-1)
 
 

@@ -110,13 +110,8 @@ def _dot(planes: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return planes[0] * vector[0] + planes[1] * vector[1] + planes[2] * vector[2]
 
 
-def view_frame(camera: Camera, mesh: Mesh, scene: RayScene, triangle_normal: np.ndarray) -> FrameView:
-    """Trace the camera's pixels and find the depth edges.
-
-    Parameters
-    ----------
-    triangle_normal : (t, 3) float32
-    """
+def view_frame(camera: Camera, mesh: Mesh, scene: RayScene) -> FrameView:
+    """Trace the camera's pixels and find the depth edges."""
     height, width = camera.height, camera.width
     led = np.ones((height, width), bool)  # to by a ray of the lens
     rays = np.empty((3, height, width), np.float32)
@@ -128,7 +123,7 @@ def view_frame(camera: Camera, mesh: Mesh, scene: RayScene, triangle_normal: np.
         local, seen = rays_of_rows(camera, rows)
         own = np.stack([_dot(local, row) for row in camera.camera_to_world[:3, :3].tolist()]).astype(np.float32)
         directions = np.ascontiguousarray(own.T)
-        hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
+        hits = scene.intersect(camera.centre, directions)
         rays[:, rows] = own.reshape(3, -1, width)
         met = hits.triangle.reshape(-1, width)
         if seen is not None:
@@ -142,7 +137,7 @@ def view_frame(camera: Camera, mesh: Mesh, scene: RayScene, triangle_normal: np.
     for rows in blocks(height, step):
         # With the rows beside them, whose pixels are neighbours.
         wide = slice(max(rows.start - 1, 0), min(rows.stop + 1, height))
-        found = _clean(triangle[wide], surface_id[wide], distance[wide], rays[:, wide], triangle_normal)
+        found = _clean(triangle[wide], surface_id[wide], distance[wide], rays[:, wide], mesh.geometry[0])
         clean[rows] = found[rows.start - wide.start :][: rows.stop - rows.start]
     clean &= led
     object_id[~led] = -1

@@ -49,17 +49,16 @@ def vote(
     step = max(int(np.ceil(np.sqrt(total / SIDES.max_rays))), 1)
     problems: list[str] = []
     votes: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-    packed: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for frame in frames:
         try:
             votes.append(_votes(scene, frame, read(frame), step))
         except BadInputError as error:
             problems.append(str(error))
-        if len(votes) == PACK:
-            packed, votes = [_summed([*packed, *votes])], []
+        if len(votes) > PACK:
+            votes = [_summed(votes)]
     if problems and len(problems) == len(frames):
         raise BadInputError(f"No picture of object ids can be used; the first: {problems[0]}")
-    triangle, ids, count = _summed([*packed, *votes])
+    triangle, ids, count = _summed(votes)
     if not len(triangle):
         raise BadInputError("No picture of object ids shows any of the mesh; check the poses and the mesh.")
     # The last of a triangle's entries in this order has most votes; of equal ones the lowest id.
@@ -94,7 +93,7 @@ def _votes(scene: RayScene, frame: Frame, ids: np.ndarray, step: int) -> tuple[n
     y, x = np.nonzero(same & chosen)
     directions, ok = camera.rays(np.stack([x + 0.5, y + 0.5], -1))
     y, x, directions = y[ok], x[ok], directions[ok]
-    hits = scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
+    hits = scene.intersect(camera.centre, directions)
     hit = hits.triangle >= 0
     triangle, seen = hits.triangle[hit].astype(np.int64), ids[y[hit], x[hit]]
     return _summed([(triangle, seen, np.ones(len(triangle), np.int64))])

@@ -14,7 +14,6 @@ from addon.core.agreement.overlay import LINE, overlay
 from addon.core.agreement.params import AGREEMENT
 from addon.core.errors import BadInputError
 from addon.core.io.conventions import Convention, matrix, parse
-from addon.core.scene.elements import triangle_geometry
 from addon.core.scene.model import AUTO, Capture, Instance, Pixels
 from addon.core.scene.rays import RayScene
 from tests.core.synthetic import synthetic_capture
@@ -97,7 +96,7 @@ def test_bends_of_a_fused_mesh_are_no_edges(room):
     camera = capture.frames[0].camera
 
     def edges(mesh, bends):
-        return shown(camera, triangle_geometry(mesh)[0], RayScene(mesh.vertices, mesh.triangles), bends).edge
+        return shown(camera, mesh, RayScene(mesh.vertices, mesh.triangles), bends).edge
 
     assert edges(rough, True).mean() > 1.3 * edges(capture.mesh, True).mean()
     steps = edges(capture.mesh, False)

@@ -18,7 +18,6 @@ from addon.benchmark.run import Options, SkippedStage, describe_machine, run_ben
 from addon.benchmark.table import Table
 from addon.core.errors import BadInputError, InterruptedRun
 from addon.core.progress import Progress
-from addon.core.scene.elements import triangle_geometry
 from tests.core.on_disk import CHEAP
 from tests.core.rooms import cut_in_four, lit_box, make_room
 
@@ -173,6 +172,6 @@ def test_cutting_triangles_keeps_the_surface():
     mesh = make_room(lit_box(), 0.5).mesh
     cut = cut_in_four(mesh, 2)
     assert len(cut.triangles) == 16 * len(mesh.triangles)
-    areas = [triangle_geometry(one)[1].sum() for one in (mesh, cut)]
+    areas = [one.geometry[1].sum() for one in (mesh, cut)]
     assert areas[0] == pytest.approx(areas[1])
     assert np.array_equal(np.bincount(cut.object_id), 16 * np.bincount(mesh.object_id))

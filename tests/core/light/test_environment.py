@@ -22,7 +22,7 @@ def centres(height: int) -> np.ndarray:
 
 
 def add(accumulator, room, camera, image, **masks):
-    view = view_frame(camera, room.mesh, room.scene, room.normals)
+    view = view_frame(camera, room.mesh, room.scene)
     accumulator.add(view, pixels_of(image, **masks))
     return view
 
@@ -93,7 +93,7 @@ def test_what_hits_the_mesh_or_is_masked_is_not_sky():
     image = np.ones((30, 30, 3))
     valid = np.ones((30, 30), bool)
     valid[:3], image[:3] = False, 77
-    view = view_frame(camera, room.mesh, room.scene, room.normals)
+    view = view_frame(camera, room.mesh, room.scene)
     image[view.triangle >= 0] = 99
     accumulator.add(view, pixels_of(image, valid))
     assert (view.triangle >= 0).any()

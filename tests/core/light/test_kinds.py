@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from addon.core.light.lamps import lamp_kinds, radius_of_gyration
-from addon.core.scene.elements import triangle_geometry
 from addon.core.scene.model import Instance, Mesh
 from tests.core.rooms import make_room, quad
 
@@ -58,4 +57,4 @@ def test_radius_of_gyration():
     smooth, noisy = balls([0.05]), balls([0.05], noise=0.005)
     assert radius_of_gyration(smooth) == pytest.approx([0.05], rel=0.02)
     assert radius_of_gyration(noisy) == pytest.approx([0.05], rel=0.05)
-    assert triangle_geometry(noisy)[1].sum() > 1.3 * triangle_geometry(smooth)[1].sum()
+    assert noisy.geometry[1].sum() > 1.3 * smooth.geometry[1].sum()

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from addon.core.brdf import ggx as brdf
 from addon.core.light.emitters import bright_triangles
 from addon.core.light.lobes import GRID, reflected_light
+from addon.core.paper import brdf as paper
 from tests.core.brdf.test_brdf import sphere
 from tests.core.glossy_box import Box, fresnel_rise
 from tests.core.rooms import box_sides, make_room, quad
@@ -25,7 +25,7 @@ def albedo_of_lobe(cosine: float, phi: float) -> tuple[float, float]:
     w_z = 2 * c * h[:, 2] - wo[2]
     up = (w_z > 0) & (c > 0)
     c, n_h, n_w = c[up], h[up, 2], w_z[up]
-    share = brdf.G(n_w, np.full(len(n_w), cosine), phi) * 4 * c * n_w / n_h / len(h)
+    share = paper.G(n_w, np.full(len(n_w), cosine), phi) * 4 * c * n_w / n_h / len(h)
     s = fresnel_rise(c)
     return float(((1 - s) * share).sum()), float((s * share).sum())
 
@@ -53,7 +53,7 @@ def test_the_reference_is_sound():
     w, step = sphere(600, 200)
     wo = np.array([0.8, 0, 0.6])
     h = (w + wo) / np.linalg.norm(w + wo, axis=1, keepdims=True)
-    f = brdf.f_nd(w[:, 2], np.full(len(w), 0.6), h[:, 2], (w * h).sum(1), 0.47, 1.0)
+    f = paper.f_nd(w[:, 2], np.full(len(w), 0.6), h[:, 2], (w * h).sum(1), 0.47, 1.0)
     assert sum(albedo_of_lobe(0.6, 0.47)) == pytest.approx((f * w[:, 2] * step).sum(), rel=2e-3)
 
 
@@ -79,7 +79,7 @@ def test_a_small_lamps_highlight(phi):
         r2 = (w**2).sum(1)
         w /= np.sqrt(r2)[:, None]
         h = (w + wo) / np.linalg.norm(w + wo, axis=1, keepdims=True)
-        f = brdf.G(w[:, 2], np.full(len(w), wo[2]), phi) * brdf.D(h[:, 2], phi)
+        f = paper.G(w[:, 2], np.full(len(w), wo[2]), phi) * paper.D(h[:, 2], phi)
         s = fresnel_rise((w * h).sum(1))
         step = w[:, 2] * w[:, 2] / r2 * 100 * 0.01 / 400
         A[i], B[i] = (f * (1 - s) * step).sum(), (f * s * step).sum()

@@ -73,7 +73,7 @@ def test_groups_drop_no_visible_element(name):
     groups = ElementGroups(room.atlas)
     dropped = 0
     for camera in cameras(name, EYES[:2]):
-        view = view_frame(camera, room.mesh, room.scene, room.normals)
+        view = view_frame(camera, room.mesh, room.scene)
         pixels = pixels_of(np.ones((camera.height, camera.width, 3)))
         everything = observe(view, pixels, room.atlas, room.scene)
         candidates = groups.candidates(view)
@@ -91,7 +91,7 @@ def test_elements_show_what_lies_at_their_place(name):
     radiance = room.by_object({i: 1.0 + i for i in range(7)})
     tiers = []
     for camera in cameras(name, EYES[:1]):
-        view = view_frame(camera, room.mesh, room.scene, room.normals)
+        view = view_frame(camera, room.mesh, room.scene)
         seen = observe(view, picture(room, camera, radiance), room.atlas, room.scene)
         clean = seen.tier == CLEAN
         np.testing.assert_allclose(seen.radiance[clean], radiance[seen.element[clean]], rtol=1e-5)
@@ -110,7 +110,7 @@ def test_a_gradient_is_met_to_a_fraction_of_a_pixel():
         hits = room.scene.intersect(np.broadcast_to(camera.centre.astype(np.float32), directions.shape), directions)
         where = camera.centre + np.maximum(hits.distance, 0)[:, None] * directions
         where[hits.triangle < 0] = 0
-        view = view_frame(camera, room.mesh, room.scene, room.normals)
+        view = view_frame(camera, room.mesh, room.scene)
         got = observe(view, pixels_of(where.reshape(camera.height, camera.width, 3) + 10), room.atlas, room.scene)
         clean = got.tier == CLEAN
         off = np.linalg.norm(got.radiance[clean] - 10 - room.atlas.position[got.element[clean]], axis=1)
@@ -127,7 +127,7 @@ def test_pixels_without_rays_say_nothing(tmp_path):
     assert (pixels.radiance[~pixels.valid] == 0).all()
 
     room = make_room(lit_box()[:4], 0.2)  # two sides are open
-    view = view_frame(camera, room.mesh, room.scene, room.normals)
+    view = view_frame(camera, room.mesh, room.scene)
     assert (view.triangle[~pixels.valid] == -1).all() and not view.clean[~pixels.valid].any()
     sky = EnvironmentAccumulator(camera.pixel_angle)
     blind = replace(pixels, valid=~pixels.valid)  # even where nobody marked them
@@ -140,8 +140,8 @@ def test_footprint_is_that_of_the_pixels():
     room = make_room(lit_box(), 0.1)
     pinhole = look_at((2, 1.5, 1.2), (2, 3, 1.2), 64, 64, 20)
     fisheye = replace(pinhole, lens=polynomial("FISHEYE", fisheye=True))
-    plain, bent = (seen_sides(room.mesh, room.normals, room.scene, [c]) for c in (pinhole, fisheye))
+    plain, bent = (seen_sides(room.mesh, [c]) for c in (pinhole, fisheye))
     assert bent.footprint == pytest.approx(plain.footprint, rel=0.03)
     around = next(cameras("panorama", EYES[:1]))
-    far = seen_sides(room.mesh, room.normals, room.scene, [around])
+    far = seen_sides(room.mesh, [around])
     assert 0.3 < far.footprint / (math.radians(360 / 160) * 1.2) < 2

@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 
 from addon.core.scene.atlas import Atlas
-from addon.core.scene.elements import (
-    Crumbs,
-    ElementLookup,
-    find_elements,
-    make_atlas,
-    shown_uv,
-    triangle_geometry,
-    uv_scale,
-)
+from addon.core.scene.elements import Crumbs, ElementLookup, find_elements, make_atlas, shown_uv, uv_scale
 from addon.core.scene.model import Mesh
 from tests.core.rooms import box_sides, make_room, quad
 
@@ -35,7 +27,7 @@ def barycentric(mesh: Mesh, triangle, points):
 
 def test_every_square_metre_is_shared_out(room):
     sums = np.bincount(room.atlas.triangle, room.atlas.area, len(room.mesh.triangles))
-    assert np.allclose(sums, triangle_geometry(room.mesh)[1], rtol=1e-4)
+    assert np.allclose(sums, room.mesh.geometry[1], rtol=1e-4)
     assert room.atlas.area.sum() == pytest.approx(2 * (12 + 10 + 7.5), rel=1e-4)
 
 
@@ -68,9 +60,9 @@ def test_uv_scale_is_texels_over_metres(room):
     assert uv_scale(room.mesh, room.uv) * room.size == pytest.approx(10, rel=1e-5)
 
 
-def test_triangle_geometry_of_a_known_triangle():
+def test_geometry_of_a_known_triangle():
     mesh = Mesh(np.array([[0.0, 0, 0], [0, 2, 0], [0, 0, 3]]), np.array([[0, 1, 2]], np.int32), np.zeros(1, np.int32))
-    normal, area = triangle_geometry(mesh)
+    normal, area = mesh.geometry
     assert normal.tolist() == [[1, 0, 0]] and area.tolist() == [3]
 
 
@@ -191,4 +183,4 @@ def test_a_mesh_of_crumbs_alone():
 
     found = find_elements(room.mesh, room.uv, 64, AllSeen(), Crumbs(np.arange(count), np.arange(count), corner))
     assert sorted(found.triangle) == list(range(count))
-    assert found.area.sum() == pytest.approx(triangle_geometry(room.mesh)[1].sum(), rel=1e-5)
+    assert found.area.sum() == pytest.approx(room.mesh.geometry[1].sum(), rel=1e-5)

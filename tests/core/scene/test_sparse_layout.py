@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from addon.core.pipeline.surface import from_store, to_store
-from addon.core.scene.elements import ElementLookup, triangle_geometry
+from addon.core.scene.elements import ElementLookup
 from addon.core.scene.model import Mesh
 from addon.core.scene.pages import OBJECT, lay_out, shelves
 from addon.core.scene.params import SPARSE
@@ -29,7 +29,7 @@ GROUND, BEADS = 20, 21
 def one_by_one(mesh: Mesh, size: int) -> np.ndarray:
     """Each triangle by itself, at one scale."""
     flat = flattened(mesh.vertices[mesh.triangles])
-    unit = float(np.sqrt(triangle_geometry(mesh)[1].sum())) / size * 2
+    unit = float(np.sqrt(mesh.geometry[1].sum())) / size * 2
     box = np.ceil(flat.max(1) / unit) + 3
     width = int(np.sqrt(box.prod(1).sum()) * 1.2) + int(box[:, 0].max())
     place, across, up = shelves(box, width)
@@ -90,7 +90,7 @@ def test_no_two_triangles_overlap_and_each_keeps_its_object(around):
 
 
 def test_all_surface_is_some_elements(around):
-    _, area = triangle_geometry(around.mesh)
+    _, area = around.mesh.geometry
     for one in np.unique(around.mesh.object_id):
         told = around.atlas.area[around.atlas.object_id == one].sum()
         assert told == pytest.approx(area[around.mesh.object_id == one].sum(), rel=1e-4)

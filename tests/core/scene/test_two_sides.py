@@ -10,7 +10,7 @@ from addon.core.light.field import LightField
 from addon.core.light.irradiance import direct, gather
 from addon.core.passes.albedo.albedo import FILLED, fill
 from addon.core.scene.creases import edge_angles
-from addon.core.scene.elements import make_atlas, triangle_geometry
+from addon.core.scene.elements import make_atlas
 from addon.core.scene.model import Mesh
 from addon.core.scene.orientation import seen_sides
 from addon.core.scene.rays import RayScene
@@ -44,7 +44,7 @@ def laid_out(mesh: Mesh, size: int) -> np.ndarray:
 
 def outwards(mesh: Mesh) -> np.ndarray:
     """How far each triangle faces away from the Z axis, (t,)."""
-    return (triangle_geometry(mesh)[0] * (mesh.vertices[mesh.triangles].mean(1) * (1, 1, 0))).sum(1)
+    return (mesh.geometry[0] * (mesh.vertices[mesh.triangles].mean(1) * (1, 1, 0))).sum(1)
 
 
 def shade_views():
@@ -54,8 +54,7 @@ def shade_views():
 
 def test_a_shade_is_a_sheet_though_each_triangle_shows_one_side():
     mesh = tube(flip=(3, 30))
-    scene = RayScene(mesh.vertices, mesh.triangles)
-    sides = seen_sides(mesh, triangle_geometry(mesh)[0], scene, shade_views())
+    sides = seen_sides(mesh, shade_views())
     assert sides.both.all()
     facing = outwards(mesh) * sides.sign
     assert (facing > 0).all() or (facing < 0).all()
@@ -109,7 +108,7 @@ def test_little_of_an_object_and_of_the_room_is_left_as_it_is():
 
 def test_backs_lie_on_their_fronts_and_face_the_other_way():
     mesh = with_backs(tube(), np.arange(4, 20))
-    normal, area = triangle_geometry(mesh)
+    normal, area = mesh.geometry
     np.testing.assert_allclose(normal[-16:], -normal[4:20], atol=1e-6)
     assert len(mesh.triangles) == 2 * ROUND + 16 and mesh.backs.tolist() == list(range(4, 20))
     single, sheet = fronts(mesh)
@@ -126,7 +125,7 @@ def test_rays_meet_the_side_that_they_come_from():
     directions = np.stack([np.cos(angle), np.sin(angle), 0.3 * np.cos(7 * angle)], 1)
     directions = (directions / np.linalg.norm(directions, axis=1, keepdims=True)).astype(np.float32)
     middle = np.broadcast_to(np.float32([0.05, 0.1, 0.5]), directions.shape)
-    normal = triangle_geometry(mesh)[0]
+    normal = mesh.geometry[0]
     for origins, way in ((middle, directions), (middle + 3 * directions, -directions)):
         hits = scene.intersect(origins, way)
         assert (hits.triangle >= 0).all()
@@ -186,7 +185,7 @@ def test_laid_apart_leaves_fronts_and_moves_backs_behind_them(shift):
     found = laid_apart(mesh, vertices)
     count = 2 * ROUND
     np.testing.assert_array_equal(found.vertices[found.triangles[:count]], vertices[mesh.triangles[:count]])
-    normal = triangle_geometry(found)[0]
+    normal = found.geometry[0]
     apart = found.vertices[found.triangles[:count]].mean(1) - found.vertices[found.triangles[count:]].mean(1)
     gap = (apart * normal[:count]).sum(1)
     least = 4e-5 * np.linalg.norm(np.ptp(vertices, axis=0))

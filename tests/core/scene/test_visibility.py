@@ -17,7 +17,7 @@ CAMERA = look_at((0, 0, 0), (1, 0, 0), 60, 40, 60)
 
 
 def sees(room, camera, pixels=None, elements=None):
-    view = view_frame(camera, room.mesh, room.scene, room.normals)
+    view = view_frame(camera, room.mesh, room.scene)
     if pixels is None:
         pixels = pixels_of(np.ones((camera.height, camera.width, 3)))
     return view, observe(view, pixels, room.atlas, room.scene, elements)
@@ -99,7 +99,7 @@ def test_a_thin_occluder_between_pixel_and_element_hides():
 def test_pixels_of_another_object_are_rejected(board):
     """A board beside the wall's own place: wherever the pixel shows it, the wall takes nothing."""
     image = np.ones((40, 60, 3))
-    view = view_frame(CAMERA, board.mesh, board.scene, board.normals)
+    view = view_frame(CAMERA, board.mesh, board.scene)
     image[view.object_id == 1] = 100
     _, seen = sees(board, CAMERA, pixels_of(image))
     own = board.atlas.object_id[seen.element] == 0

@@ -11,7 +11,6 @@ from scipy.ndimage import gaussian_filter, maximum_filter, minimum_filter
 from ...agreement.views import sees
 from ...parallel import ordered_map
 from ...progress import Progress, Rounds
-from ...scene.elements import triangle_geometry
 from ...scene.model import Frame, Mesh, Pixels
 from ...scene.params import SMALL, VISIBILITY
 from ...scene.rays import RayScene
@@ -87,7 +86,7 @@ def _places(mesh: Mesh, scene: RayScene, frames: Sequence[Frame], seed: int) -> 
     """World positions and unit normals, (n, 3) each, of first hits through random pixels."""
     rng = np.random.default_rng(seed)
     each = max(CALIBRATION.points // len(frames), CALIBRATION.least_points)
-    normal, _ = triangle_geometry(mesh)
+    normal, _ = mesh.geometry
     places, normals = [], []
     for frame in frames:
         camera = frame.camera

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from addon.core.passes.mesh_denoising.denoise import denoised, dihedral, hinges_of, without_noise
-from addon.core.scene.elements import triangle_geometry
 from addon.core.scene.mesh_noise import noise_of
 from addon.core.scene.model import Mesh
 from addon.core.scene.weld import point_normals, welded
@@ -60,7 +59,7 @@ def noisy(mesh: Mesh, noise: float = NOISE, seed: int = 0) -> Mesh:
 
 def tilted(mesh: Mesh, true: Mesh) -> np.ndarray:
     """Degrees between the triangles' normals."""
-    a, b = triangle_geometry(mesh)[0], triangle_geometry(true)[0]
+    a, b = mesh.geometry[0], true.geometry[0]
     return np.degrees(np.arccos(np.clip((a * b).sum(1), -1, 1)))
 
 

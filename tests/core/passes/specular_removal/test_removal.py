@@ -108,7 +108,6 @@ def test_a_black_floor_is_not_hidden():
 def test_large_pictures_lose_a_mirror_image_by_no_more_rays(floor, monkeypatch):
     """A picture of three times the edge, of which as many pixels are traced, shows the same highlight."""
     from addon.core.passes.specular_removal import removal
-    from addon.core.scene.elements import triangle_geometry
     from addon.core.scene.visibility import view_frame
 
     room, small = floor.box.room, floor.cameras[0]
@@ -123,8 +122,7 @@ def test_large_pictures_lose_a_mirror_image_by_no_more_rays(floor, monkeypatch):
     monkeypatch.setattr(removal, "highlight", counted)
     monkeypatch.setattr(removal, "REMOVAL", replace(REMOVAL, pixels=28 * 21))
     part = SpecularPart(floor.box.field, [material], rays=128)
-    normal = triangle_geometry(room.mesh)[0]
-    shown = [part(view_frame(camera, room.mesh, room.scene, normal), 0) for camera in (small, large)]
+    shown = [part(view_frame(camera, room.mesh, room.scene), 0) for camera in (small, large)]
     assert traced[1] < 1.1 * traced[0]
     means = shown[1].reshape(21, 3, 28, 3, 3).mean((1, 3))
     assert np.abs(means - shown[0]).mean() < 0.1 * shown[0].mean()
