@@ -138,9 +138,8 @@ def write_exr(path: Path | str, array: np.ndarray, half: bool = False) -> None:
     if array.size == 0 or (array.ndim == 3 and array.shape[2] != len(names)) or not names:
         raise ValueError(f"write_exr takes (h, w), (h, w, 3) or (h, w, 4), not {array.shape}")
     if half:
-        finite = np.isfinite(array)
-        array = np.where(finite, np.clip(array, -HALF_MAX, HALF_MAX, where=finite, out=array.copy()), array)
-        array = array.astype(np.float16)
+        held = np.clip(array, -HALF_MAX, HALF_MAX, where=np.isfinite(array), out=array.copy())
+        array = held.astype(np.float16)
     planes = {name: np.ascontiguousarray(array[..., i] if array.ndim == 3 else array) for i, name in enumerate(names)}
     # Through memory: the library swallows a full disk when it writes its table of chunks last.
     stream = io.BytesIO()

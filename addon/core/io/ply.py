@@ -43,10 +43,6 @@ class PlyMesh(NamedTuple):
     corner: np.ndarray
 
 
-class _Damaged(Exception):
-    """The text is the second half of a sentence."""
-
-
 def read_ply(path: Path | str) -> PlyMesh:
     """Read the mesh `path`.
 
@@ -63,7 +59,7 @@ def read_ply(path: Path | str) -> PlyMesh:
         if what := absence(path):
             raise BadInputError(f"Mesh '{path}' {what}; a capture needs its mesh there.")
         return _parse(read_bytes(path, "Mesh "))
-    except (_Damaged, ValueError) as error:
+    except ValueError as error:  # its text is the second half of a sentence
         raise BadInputError(f"Mesh '{path}' {error}; export it again.") from error
     except MemoryError as error:
         raise BadInputError(f"Mesh '{path}' does not fit in memory; simplify it.") from error
@@ -82,10 +78,10 @@ def _parse(content: bytes) -> PlyMesh:
         if {"vertex", "face"} <= found.keys():
             break
     if "vertex" not in found:
-        raise _Damaged("holds no vertices")
+        raise ValueError("holds no vertices")
     place, *pairs = (found["vertex"].columns(names) for names in (("x", "y", "z"), *UV_NAMES))
     if place is None:
-        raise _Damaged("has vertices without x, y and z")
+        raise ValueError("has vertices without x, y and z")
     vertices = place.astype(np.float64)
     if "face" not in found:
         none = np.zeros((0, 3), np.int32)
@@ -94,7 +90,7 @@ def _parse(content: bytes) -> PlyMesh:
     faces = found["face"]
     name = next((n for n in INDEX_NAMES if n in faces.counts), None)
     if name is None:
-        raise _Damaged("has faces without vertex_indices")
+        raise ValueError("has faces without vertex_indices")
     triangles, source, corner = _triangles(faces.counts[name], faces.entries(name), vertices)
     ids = faces.columns(("object_id",))
     if ids is not None:
@@ -113,7 +109,7 @@ def _numbers(text: bytes) -> np.ndarray:
         try:
             return np.fromstring(text.decode("latin-1"), np.float64, sep=" ")
         except ValueError as error:  # newer NumPy raises where the older stops
-            raise _Damaged("holds something that is no number") from error
+            raise ValueError("holds something that is no number") from error
 
 
 class _Records:
@@ -134,7 +130,7 @@ class _Records:
         n, own = element.count, [self._kind(p.count_kind or p.kind).itemsize for p in element.properties]
         if n * max(sum(own), 1) > data.size - at:
             what = f"claims {n} of '{element.name}' but ends before them"
-            raise _Damaged(f"{what}: it is cut off, or its header is wrong")
+            raise ValueError(f"{what}: it is cut off, or its header is wrong")
         lists = [p for p in element.properties if p.count_kind]
         self.counts = dict(zip((p.name for p in lists), self._lengths(lists, at).T))
         entries = {p.name: self.counts[p.name] * self._kind(p.kind).itemsize for p in lists}
@@ -142,7 +138,7 @@ class _Records:
         place = at + np.cumsum(size) - size
         self.end = at + int(size.sum())
         if self.end > data.size:
-            raise _Damaged(f"ends within its '{element.name}' records, or they are damaged")
+            raise ValueError(f"ends within its '{element.name}' records, or they are damaged")
         self.places: dict[str, np.ndarray] = {}
         for p, bytes_of_it in zip(element.properties, own):
             self.places[p.name] = place + bytes_of_it if p.count_kind else place
@@ -209,12 +205,12 @@ class _Records:
                     at += before
                     (count,) = read_length(self._data.data, at)
                     if not 0 <= count <= size or count != int(count):
-                        raise _Damaged(f"holds a list of {count} entries in '{name}': it is damaged")
+                        raise ValueError(f"holds a list of {count} entries in '{name}': it is damaged")
                     found.append(int(count))
                     at += own + int(count) * each
                 at += gap
         except struct.error:
-            raise _Damaged(f"ends within its '{name}' records: it is cut off") from None
+            raise ValueError(f"ends within its '{name}' records: it is cut off") from None
         return np.array(found, np.int64).reshape(records, len(steps)), at - begin
 
 
@@ -235,7 +231,7 @@ def _triangles(
     bad = ~((entries >= 0) & (entries < len(vertices)) & (entries == np.floor(entries))) & (counts[of_entry] >= 3)
     if bad.any():
         one = int(bad.argmax())
-        raise _Damaged(f"has a face ({of_entry[one]}) that points to vertex {entries[one]} of {len(vertices)}")
+        raise ValueError(f"has a face ({of_entry[one]}) that points to vertex {entries[one]} of {len(vertices)}")
     first, pieces = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
     face = np.repeat(np.arange(len(counts)), pieces)
     later = (1 + np.arange(len(face)) - np.repeat(np.cumsum(pieces) - pieces, pieces)).astype(np.int32)
