@@ -10,9 +10,9 @@ from .exif import exif_orientation
 from .exr import exr_note, read_exr, read_header
 from .files import check_picture, read_bytes
 from .heif import HEIC, heif_header, heif_orientation, is_heif, read_heif
-from .icc import profile_to_rec709
 from .oiio import CODED, TIFF, coded_header, coded_orientation, read_coded
 from .picture import Picture, turn
+from .primaries import profile_to_rec709
 from .radiance_hdr import hdr_size, read_hdr
 from .raw import DNG, is_dng, raw_size, read_raw
 from .transfer import decode
