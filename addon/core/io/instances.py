@@ -49,12 +49,6 @@ def read_instances(path: Path | str) -> dict[int, str]:
     return names
 
 
-def names_in(root: Path) -> dict[int, str] | None:
-    """As `read_instances`, of the file in the capture `root`; None where there is none."""
-    path = root / FILE
-    return read_instances(path) if path.exists() else None
-
-
 def assign(
     object_id: np.ndarray, names: dict[int, str] | None, names_file: str = FILE
 ) -> tuple[np.ndarray, tuple[Instance, ...], list[str]]:

@@ -90,10 +90,7 @@ def picture_bits(path: Path) -> int:
     BadInputError
         As `picture_size`.
     """
-    return _coded_bits(path, picture_kind(path))
-
-
-def _coded_bits(path: Path, kind: str) -> int:
+    kind = picture_kind(path)
     return heif_header(path).bits if kind == HEIC else coded_header(path).bits if kind in CODED else 0
 
 
@@ -125,7 +122,7 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
     if kind == DNG:
         rgb = read_raw(path).rgb
         return Picture(turn(rgb, picture_orientation(path)) if turned else rgb, None)
-    if not transfer and _coded_bits(path, kind):
+    if not transfer and picture_bits(path):
         raise BadInputError(unstated(path))
     colour, alpha, profile = read_heif(path) if kind == HEIC else read_coded(path)
     if turned:

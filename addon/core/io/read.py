@@ -54,8 +54,9 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
         raise BadInputError(f"Capture '{root}' {what}; give the folder that holds the mesh and the poses.")
     reader = reader_for(root, reading.format)
     layout = reader.read(root, reading)
-    if layout.names is None:
-        layout = replace(layout, names=instances.names_in(root))
+    listed = root / instances.FILE
+    if layout.names is None and listed.exists():
+        layout = replace(layout, names=instances.read_instances(listed))
     # Told before any header is looked at: of a hundred thousand frames that takes minutes.
     missing = [(frame.path, what) for frame in layout.frames if (what := absence(frame.path))]
     absent = [f"Picture '{path}' {what}; check the capture's paths." for path, what in missing]

@@ -36,12 +36,6 @@ def read(root: Path, reading: Reading) -> Layout:
     BadInputError
         The poses, the camera, the mesh or the list of objects can't be read, or there are no pictures.
     """
-    frames, problems, notes = read_frames(root)
-    return Layout(frames, _mesh(root, reading), problems=problems, notes=notes)
-
-
-def read_frames(root: Path) -> tuple[list[Frame], list[str], list[str]]:
-    """The frames, sentences on those that can't be used, and on what may mean something else."""
     camera = _camera(root)
     lines = _lines(root / POSES)
     pictures = _pictures(root / FOLDER)
@@ -60,7 +54,7 @@ def read_frames(root: Path) -> tuple[list[Frame], list[str], list[str]]:
     frames, problems = usable(partial(frame, *one) for one in sorted(pictures.items()))
     idle = len(lines) - len(set(pictures) & set(range(len(lines))))
     notes = [f"{idle} of {len(lines)} lines of {POSES} have no picture."] if idle else []
-    return frames, problems, notes
+    return Layout(frames, _mesh(root, reading), problems=problems, notes=notes)
 
 
 def _camera(root: Path) -> Camera:
