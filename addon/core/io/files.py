@@ -72,6 +72,15 @@ def read_json(path: Path) -> dict[str, Any]:
     return value
 
 
+def json_if_sound(path: Path) -> dict[str, Any]:
+    """The object in the JSON file `path`; empty where it is absent, can't be read, or holds something else."""
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return value if isinstance(value, dict) else {}
+
+
 def inside(root: Path, value: Any, name: str, outside: bool = False, folder: Path | None = None) -> Path:
     """What a file calls `value`, as a path.
 
