@@ -30,6 +30,7 @@ from ..core.scene.unwrap import by_xatlas
 from ..core.settings import PRESETS, Settings
 from ..core.stages import RUN_STAGES, STAGES, WRITE
 from .rerender import rerender_psnr
+from .run import make_folder
 from .truth_materials import score_materials
 from .truth_views import pairs, psnr, views
 
@@ -125,12 +126,7 @@ def run_ablation(asked: Ablation, tell: Callable[[str], None] = lambda text: Non
         if not (room / "truth" / "transforms.json").is_file():
             raise BadInputError(f"Room '{room}' has no truth/transforms.json; the ablation needs rooms with truth.")
     names = asked.names
-    try:
-        asked.out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInputError(
-            f"Folder '{asked.out}' can't be made ({error.strerror or error}); choose another."
-        ) from error
+    make_folder(asked.out)
     path = asked.out / LINES
     lines = read_lines([path]) if path.exists() else []
     source = digest(Path(corrected.__file__))[:16]
