@@ -17,7 +17,7 @@ from .primaries import REC709, to_rec709, to_rgb
 HALF_MAX: Unit[float] = 65504.0
 
 
-def read_header(path: Path | str) -> tuple[int, int]:
+def read_header(path: Path) -> tuple[int, int]:
     """Width and height of the picture that `read_exr` would give; cheap, and finds a file that was cut off.
 
     Raises
@@ -25,10 +25,10 @@ def read_header(path: Path | str) -> tuple[int, int]:
     BadInputError
         As `read_exr`, but for damage within the compressed pixels.
     """
-    return _supported(Path(path))[0].header.size
+    return _supported(path)[0].header.size
 
 
-def exr_note(path: Path | str) -> str:
+def exr_note(path: Path) -> str:
     """Which layer or view `read_exr` takes, as the end of a sentence; '' where the file has no other.
 
     Raises
@@ -36,10 +36,10 @@ def exr_note(path: Path | str) -> str:
     BadInputError
         As `read_header`.
     """
-    return _supported(Path(path))[1]
+    return _supported(path)[1]
 
 
-def read_exr(path: Path | str) -> Picture:
+def read_exr(path: Path) -> Picture:
     """Read the picture `path`: half, float or uint; RGB, luminance and chroma, or Y; scan lines, tiles or parts.
 
     The picture is the display window, and the layer is `exr_layers.choose_layer`'s. A file with other primaries than
@@ -50,7 +50,6 @@ def read_exr(path: Path | str) -> Picture:
     BadInputError
         The file is absent, damaged, cut off, or of a kind that isn't supported.
     """
-    path = Path(path)
     layer, _ = _supported(path)
     header = layer.header
     names = (*layer.colour, *([layer.alpha] if layer.alpha else []))
@@ -78,7 +77,7 @@ def read_exr(path: Path | str) -> Picture:
     return Picture(rgb, alpha)
 
 
-def read_numbers(path: Path | str) -> np.ndarray:
+def read_numbers(path: Path) -> np.ndarray:
     """The numbers of the picture `path` as they are stored, not taken as colours: (h, w, c) in their own type.
 
     Raises
@@ -86,7 +85,6 @@ def read_numbers(path: Path | str) -> np.ndarray:
     BadInputError
         As `read_exr`, or the data window is not the display window.
     """
-    path = Path(path)
     headers = parse_headers(path)
     if len(headers) == 1 and list(headers[0].channels.values()) == [(1, 1)]:  # one channel of any name
         header, part, names = headers[0], 0, tuple(headers[0].channels)

@@ -14,7 +14,7 @@ FILE = "info_semantic.json"
 MAX_ID: Limit[int] = 2**31 - 2
 
 
-def read_instances(path: Path | str) -> dict[int, str]:
+def read_instances(path: Path) -> dict[int, str]:
     """Class name of each object that the file `path` lists.
 
     Takes `objects[]{id, class_name}`, and Replica's `objects[]{id, class_id}` with `classes[]{id, name}`. An object
@@ -25,7 +25,6 @@ def read_instances(path: Path | str) -> dict[int, str]:
     BadInputError
         The file is not JSON, or has no list of objects with ids.
     """
-    path = Path(path)
     value = read_json(path)
     objects, classes = value.get("objects"), value.get("classes", [])
     if not isinstance(objects, list):

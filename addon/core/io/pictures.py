@@ -22,7 +22,7 @@ ENDINGS = (".exr", ".hdr", ".pic", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".h
 """Of files that can be pictures, in the order in which a missing ending is tried."""
 
 
-def picture_kind(path: Path | str) -> str:
+def picture_kind(path: Path) -> str:
     """One of the kinds above, of `oiio`, `heif.HEIC` or `raw.DNG`.
 
     Raises
@@ -30,7 +30,6 @@ def picture_kind(path: Path | str) -> str:
     BadInputError
         The file is absent, empty, or of a kind that isn't known.
     """
-    path = Path(path)
     check_picture(path)
     head = read_bytes(path, "Picture ", 16)
     if not head:
@@ -136,7 +135,7 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
     return Picture(decode(colour, transfer), None if alpha is None else alpha / scale, profile_to_rec709(profile))
 
 
-def unstated(path: Path | str) -> str:
+def unstated(path: Path) -> str:
     """The sentence on a picture of codes whose curve nobody told."""
     return (
         f"Picture '{path}' holds 8 or 16-bit codes among frames of floats; make all frames alike, or give the codes' "

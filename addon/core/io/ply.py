@@ -68,7 +68,7 @@ class PlyMesh(NamedTuple):
     corner: np.ndarray
 
 
-def read_ply(path: Path | str) -> PlyMesh:
+def read_ply(path: Path) -> PlyMesh:
     """Read the mesh `path`.
 
     Polygons become triangles: quads along their shorter diagonal, longer ones as a fan; faces of fewer than 3 corners
@@ -79,7 +79,6 @@ def read_ply(path: Path | str) -> PlyMesh:
     BadInputError
         The file is absent, damaged, cut off, holds no mesh, or points to vertices that it doesn't hold.
     """
-    path = Path(path)
     try:
         if what := absence(path):
             raise BadInputError(f"Mesh '{path}' {what}; a capture needs its mesh there.")
