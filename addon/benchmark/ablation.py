@@ -199,16 +199,15 @@ class Bench:
                 if name != WHOLE and TOGETHER not in name and stage == first and self._same(stage, store):
                     same = True
                     break
-            figures = dict(self._whole["figures"]) if same else {}
-            if not same:
+            if same:
+                memory, figures = peak_memory(), dict(self._whole["figures"])
+            else:
                 started = time.process_time()
                 recovery.base_color()
                 seconds[WRITE] = round(time.process_time() - started, 2)
                 memory = peak_memory()
                 figures = self._figures(recovery, store)
                 same = name != WHOLE and figures == self._whole["figures"]
-            else:
-                memory = peak_memory()
         return {
             "room": self.room.name, "preset": self._asked.preset, "seed": self._seed, "without": name, "same": same,
             "figures": figures, "seconds": seconds, "peak_mib": None if memory is None else round(memory / 2**20),
