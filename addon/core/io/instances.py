@@ -29,11 +29,8 @@ def read_instances(path: Path) -> dict[int, str]:
     objects, classes = value.get("objects"), value.get("classes", [])
     if not isinstance(objects, list):
         raise BadInputError(f"'{path}' has no list 'objects'; export it again or take it away.")
-    class_names = (
-        {c["id"]: c.get("name") for c in classes if isinstance(c, dict) and isinstance(c.get("id"), int)}
-        if isinstance(classes, list)
-        else {}
-    )
+    known = [one for one in classes if isinstance(one, dict)] if isinstance(classes, list) else []
+    class_names = {one["id"]: one.get("name") for one in known if isinstance(one.get("id"), int)}
     names: dict[int, str] = {}
     for i, item in enumerate(objects):
         number = item.get("id") if isinstance(item, dict) else None
