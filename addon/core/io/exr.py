@@ -29,13 +29,7 @@ def read_header(path: Path) -> tuple[int, int]:
 
 
 def exr_note(path: Path) -> str:
-    """Which layer or view `read_exr` takes, as the end of a sentence; '' where the file has no other.
-
-    Raises
-    ------
-    BadInputError
-        As `read_header`.
-    """
+    """Which layer or view `read_exr` takes, to end a sentence; '' where there is no other. Raises as `read_header`."""
     return _supported(path)[1]
 
 

@@ -85,13 +85,7 @@ def coded_header(path: Path) -> Header:
 
 
 def coded_orientation(path: Path) -> int:
-    """EXIF's number of how the camera was held that took the PNG, JPEG or TIFF `path`; 1: as it is stored.
-
-    Raises
-    ------
-    BadInputError
-        As `coded_header`.
-    """
+    """EXIF's number of how the camera was held; 1: as it is stored. Raises as `coded_header`."""
     return int(_open(path).spec().get_int_attribute("Orientation", 1))
 
 

@@ -68,13 +68,7 @@ def picture_size(path: Path, turned: bool = False) -> tuple[int, int]:
 
 
 def picture_orientation(path: Path) -> int:
-    """EXIF's number of how a camera was held, 1 to 8; 1 where the file does not tell: as it is stored.
-
-    Raises
-    ------
-    BadInputError
-        As `picture_size`.
-    """
+    """EXIF's number of how a camera was held, 1 (as it is stored, or untold) to 8. Raises as `picture_size`."""
     kind = picture_kind(path)
     if kind in CODED:
         return coded_orientation(path)
@@ -82,13 +76,7 @@ def picture_orientation(path: Path) -> int:
 
 
 def picture_bits(path: Path) -> int:
-    """Bits of a channel where numbers are codes of a curve, 8 or 16; 0 where they are linear floats.
-
-    Raises
-    ------
-    BadInputError
-        As `picture_size`.
-    """
+    """Bits of a channel that holds codes of a curve, 8 or 16; 0 of linear floats. Raises as `picture_size`."""
     kind = picture_kind(path)
     return heif_header(path).bits if kind == HEIC else coded_header(path).bits if kind in CODED else 0
 
@@ -144,12 +132,6 @@ def unstated(path: Path) -> str:
 
 
 def read_mask(path: Path) -> np.ndarray:
-    """(h, w) bool: False where the mask is black.
-
-    Raises
-    ------
-    BadInputError
-        As `read_picture`.
-    """
+    """(h, w) bool: False where the mask is black. Raises as `read_picture`."""
     colour = read_coded(path).colour if picture_kind(path) in CODED else read_picture(path).rgb
     return (colour > 0).any(-1)

@@ -93,13 +93,7 @@ def read(root: Path, reading: Reading) -> Layout:
 
 
 def _alignment(root: Path) -> np.ndarray | None:
-    """From the mesh's coordinates to those of the cameras, (4, 4); None where they are the same.
-
-    Raises
-    ------
-    BadInputError
-        `mesh_info.json` says what is no such transform.
-    """
+    """From the mesh's coordinates to those of the cameras, (4, 4); None where they are the same."""
     if not (root / MESH_INFO).is_file():
         return None
     told: Any = read_json(root / MESH_INFO).get("alignmentTransform")
