@@ -5,7 +5,6 @@ COLMAP's world has no up and, unless it was given measures, no metres; it is tak
 
 import math
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -100,7 +99,7 @@ def frames_of(
         seen.add(image.name)
         return made
 
-    frames, problems = usable(partial(frame, one) for one in sorted(model.images, key=lambda one: one.name))
+    frames, problems = usable(frame, sorted(model.images, key=lambda one: one.name))
     return frames, problems, _notes(model, frames)
 
 

@@ -7,7 +7,6 @@ the whole file is raised.
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -95,7 +94,7 @@ def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], l
         used[made.path] = entry
         return made
 
-    frames, more = usable(partial(frame, entry) for entry in listed)
+    frames, more = usable(frame, listed)
     frames, said = _with_settings(frames, list(used.values()))
     return frames, problems + more, list(dict.fromkeys(notes + said))
 

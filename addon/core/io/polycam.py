@@ -6,7 +6,6 @@ Source: Polycam's polyform, README.md (format); nerfstudio's process_data/polyca
 """
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +73,7 @@ def read(root: Path, reading: Reading) -> Layout:
             margin=round(BORDER * camera.width) if corrected else 0,
         )
 
-    frames, problems = usable(partial(frame, file) for file in listed)
+    frames, problems = usable(frame, listed)
     notes = []
     if not corrected:
         notes.append(

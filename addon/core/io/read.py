@@ -2,7 +2,6 @@
 
 from collections import Counter
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -165,7 +164,7 @@ def _usable(root: Path, layout: Layout, outside: bool) -> tuple[list[Frame], lis
         _check_frame(frame)
         return frame
 
-    good, more = usable(partial(checked, frame) for frame in layout.frames)
+    good, more = usable(checked, layout.frames)
     problems, warnings = [*layout.problems, *more], list(layout.notes)
     if problems:
         total, few = _refuse_too_many(root, layout, problems)

@@ -7,7 +7,6 @@ are not looked at. (Sucar et al., iMAP, ICCV 2021; Zhu et al., NICE-SLAM, CVPR 2
 
 import re
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +50,7 @@ def read(root: Path, reading: Reading) -> Layout:
         pose = check_pose(_matrix(lines[index], name), name)
         return Frame(name, path, replace(camera, camera_to_world=pose @ TO_OPENGL))
 
-    frames, problems = usable(partial(frame, *one) for one in sorted(pictures.items()))
+    frames, problems = usable(lambda one: frame(*one), sorted(pictures.items()))
     idle = len(lines) - len(set(pictures) & set(range(len(lines))))
     notes = [f"{idle} of {len(lines)} lines of {POSES} have no picture."] if idle else []
     return Layout(frames, _mesh(root, reading), problems=problems, notes=notes)
