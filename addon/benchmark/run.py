@@ -64,13 +64,6 @@ def check_stages(stages: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in STAGES if name in stages or not stages)
 
 
-def measure(stage: str, options: Options) -> Table:
-    """The table of a stage, which takes what the command's help needs not."""
-    from . import stages
-
-    return stages.run(stage, options)
-
-
 @contextmanager
 def room_and_scratch(options: Options) -> Iterator[tuple[Path, Path]]:
     """The capture that is measured on, the demo's room where none is given; and a folder that goes at the end."""
@@ -113,6 +106,8 @@ def run_benchmark(stages: Sequence[str], options: Options) -> dict[str, Table | 
     if options.capture is not None and not options.capture.is_dir():
         raise BadInputError(f"There is no capture folder '{options.capture}'; give one that holds transforms.json.")
     make_folder(options.out)
+    from .stages import run as measure  # not earlier: it takes what the command's help needs not
+
     plots = plots_are_possible()
     results: dict[str, Table | str] = {}
     seconds: dict[str, float] = {}
@@ -122,7 +117,7 @@ def run_benchmark(stages: Sequence[str], options: Options) -> dict[str, Table | 
         try:
             results[stage] = table = measure(stage, options)
             table.write_csv(options.out / f"{table.stage}.csv")
-            table.write_markdown(options.out / f"{table.stage}.md")
+            write_bytes(options.out / f"{table.stage}.md", table.markdown().encode())
             if plots:
                 from .plot import write_plot
 

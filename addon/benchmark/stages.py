@@ -24,7 +24,7 @@ from ..core.settings import PRESETS, Settings
 from ..core.stages import STAGES
 from .run import Options, SkippedStage, room_and_scratch
 from .table import BASELINE, Table
-from .truth_materials import found_kind, true_kind, true_roughness, written_roughness
+from .truth_materials import true_kind, true_roughness, written_roughness
 from .truth_views import psnr, views
 
 Changes = dict[str, Any]
@@ -136,7 +136,7 @@ def _against_truth(folder: Path) -> Callable[[Recovery], tuple]:
         known = [(m, truth[m.object_id]) for m in one.materials() if m.object_id in truth]
         pairs = [(written_roughness(m), true_roughness(t)) for m, t in known]
         off = [abs(found - true) for found, true in pairs if true is not None]
-        right = sum(found_kind(m) == true_kind(t) for m, t in known)
+        right = sum(m.model.name == true_kind(t) for m, t in known)
         albedo = psnr(views(folder, one), one.base_color()) if has_views else None
         memory = peak_memory()
         return float(np.mean(off)), f"{right} of {len(known)}", albedo, None if memory is None else memory / 2**20
