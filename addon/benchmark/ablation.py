@@ -245,7 +245,6 @@ def _unwrap() -> Callable:
 
 
 def _stored(store: Store, stage: str) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Arrays and meta of a stage."""
     key = store.stored_key(stage) or ""
     return store.load(stage, key) or {}, store.load_meta(stage, key) or {}
 

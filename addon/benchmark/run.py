@@ -144,7 +144,6 @@ def plots_are_possible() -> bool:
 
 
 def _index(results: dict[str, Table | str], seconds: dict[str, float], options: Options, plots: bool) -> str:
-    """index.md: the machine, the settings, all tables."""
     lines = ["# Benchmark", "", *(f"- {name}: {text}" for name, text in describe_machine().items()), ""]
     lines += [
         f"- capture: {options.capture.resolve().name if options.capture else 'none given'}",

@@ -169,7 +169,6 @@ def submit_command(arguments: argparse.Namespace, stream: TextIO) -> int:
 
 
 def _hand_over(arguments: argparse.Namespace, room: Room) -> str:
-    """Give a room to the engine; what to tell of it."""
     if arguments.engine == "slurm":
         from . import slurm
 

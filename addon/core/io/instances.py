@@ -98,5 +98,4 @@ def assign(
 
 
 def _few(items: list[str]) -> str:
-    """The first items, and how many more."""
     return ", ".join(items[:3]) + (f" and {len(items) - 3} more" if len(items) > 3 else "")

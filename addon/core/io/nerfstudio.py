@@ -148,7 +148,6 @@ def _name(entry: dict[str, Any], index: int) -> str:
 
 
 def _frame(root: Path, entry: Entry, reading: Reading) -> Frame:
-    """One frame; raises `BadInputError` where it can't be used."""
     name, mask = entry.name, entry.own.get("mask_path")
     path = _ended(inside(root, entry.own.get("file_path"), name, reading.outside), name)
     check_picture(path)  # first: of a hundred thousand frames the rest takes many seconds

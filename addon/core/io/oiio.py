@@ -143,7 +143,6 @@ def _library(path: Path) -> Any:
 
 
 def _open(path: Path) -> Any:
-    """The file as an ImageInput."""
     library = _library(path)
     wishes = library.ImageSpec()
     wishes.attribute("oiio:UnassociatedAlpha", 1)  # else colours are multiplied by alpha

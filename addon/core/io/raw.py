@@ -73,7 +73,6 @@ def read_raw(path: Path) -> Picture:
 
 @contextmanager
 def _open(path: Path) -> Iterator[Any]:
-    """The file; what the library raises becomes one sentence."""
     try:
         import rawpy
     except ImportError as error:

@@ -149,7 +149,6 @@ def _pixels(frame: Frame) -> Pixels:
 
 
 def _with(mesh: RawMesh, added: Closing) -> RawMesh:
-    """A mesh with the faces that close its holes."""
     triangles = np.concatenate([mesh.triangles, added.triangles + len(mesh.vertices)]).astype(np.int32)
     uv = None if mesh.uv is None else np.concatenate([mesh.uv, np.zeros((len(added.triangles), 3, 2), np.float32)])
     return replace(mesh, vertices=np.concatenate([mesh.vertices, added.vertices]), triangles=triangles, uv=uv)

@@ -73,7 +73,6 @@ def read(root: Path, reading: Reading) -> Layout:
 
 
 def _parts(root: Path) -> tuple[Path, Path] | None:
-    """The metadata and the folder of pictures, where both are there."""
     metadata = next((root / name for name in METADATA if (root / name).is_file()), None)
     folder = next((root / name for name in FOLDERS if (root / name).is_dir()), None)
     return None if metadata is None or folder is None else (metadata, folder)

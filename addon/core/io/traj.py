@@ -70,7 +70,6 @@ def _camera(root: Path) -> Camera:
 
 
 def _lines(path: Path) -> list[str]:
-    """The lines that hold anything."""
     lines = [line for line in read_text(path).splitlines() if line.strip()]
     if not lines:
         raise BadInputError(f"'{path}' holds no poses; export it again.")

@@ -126,7 +126,6 @@ def _sharpest(video: Path, windows: Sequence[np.ndarray]) -> Iterator[tuple[int,
 
 @contextmanager
 def _opened(video: Path) -> Iterator[tuple[Any, Any]]:
-    """The container and its stream of pictures."""
     try:
         import av
     except ImportError as error:
