@@ -42,7 +42,7 @@ class Element:
 
     name: str
     count: int
-    properties: tuple[Property, ...]
+    properties: list[Property]
 
 
 class PlyMesh(NamedTuple):
@@ -149,7 +149,7 @@ def parse_header(content: bytes) -> tuple[str, list[Element], int]:
     if end < 0 or not start:
         raise ValueError("ends within its header, or has none")
     order = None
-    elements: list[tuple[str, int, list[Property]]] = []
+    elements: list[Element] = []
     for line in content[3:end].decode("latin-1").splitlines():
         words = line.split()
         if not words or words[0] in ("comment", "obj_info"):
@@ -158,22 +158,22 @@ def parse_header(content: bytes) -> tuple[str, list[Element], int]:
             if words[0] == "format":
                 order = FORMATS[words[1]]
             elif words[0] == "element":
-                elements.append((words[1], int(words[2]), []))
-                if elements[-1][1] < 0:
+                elements.append(Element(words[1], int(words[2]), []))
+                if elements[-1].count < 0:
                     raise ValueError
             elif words[0] == "property" and words[1] == "list":
                 if KINDS[words[2]][0] == "f":
                     raise ValueError
-                elements[-1][2].append(Property(words[4], KINDS[words[3]], KINDS[words[2]]))
+                elements[-1].properties.append(Property(words[4], KINDS[words[3]], KINDS[words[2]]))
             elif words[0] == "property":
-                elements[-1][2].append(Property(words[2], KINDS[words[1]]))
+                elements[-1].properties.append(Property(words[2], KINDS[words[1]]))
             else:
                 raise ValueError
         except (IndexError, KeyError, ValueError):
             raise ValueError(f"has a header line that means nothing: '{line.strip()[:60]}'") from None
     if order is None:
         raise ValueError("does not say whether it is text or binary")
-    return order, [Element(name, count, tuple(properties)) for name, count, properties in elements], start
+    return order, elements, start
 
 
 def _numbers(text: bytes) -> np.ndarray:
