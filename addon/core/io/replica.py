@@ -53,9 +53,8 @@ def read(root: Path, reading: Reading) -> Layout:
     if (root / SEMANTIC).is_file():
         ids, far = _object_id(root / SEMANTIC, ply)
         mesh = replace(mesh, object_id=ids)
-        notes += (
-            [f"{far:.1%} of the triangles have no face of '{SEMANTIC}' near; they belong to no object."] if far else []
-        )
+        if far:
+            notes.append(f"{far:.1%} of the triangles have no face of '{SEMANTIC}' near; they belong to no object.")
     elif (root / FILE).is_file():
         names_file = FILE
     if (root / names_file).is_file():
