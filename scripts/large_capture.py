@@ -22,8 +22,7 @@ from scipy.ndimage import map_coordinates
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from addon.core.io.exr import read_exr, write_exr
-from addon.core.io.ply import read_ply
-from addon.core.io.ply_write import ply_bytes
+from addon.core.io.ply import ply_bytes, read_ply
 
 SHARES = (0.7, 1.0)
 """Edges of the windows, of the frame's."""

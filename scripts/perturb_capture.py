@@ -32,8 +32,7 @@ from scipy.spatial.transform import Rotation
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from addon.core.io.exr import read_exr, write_exr
-from addon.core.io.ply import read_ply
-from addon.core.io.ply_header import parse_header
+from addon.core.io.ply import parse_header, read_ply
 from addon.core.scene.weld import point_normals, same_place
 
 WAVES = 200

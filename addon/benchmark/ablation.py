@@ -30,6 +30,7 @@ from ..core.scene.unwrap import by_xatlas
 from ..core.settings import PRESETS, Settings
 from ..core.stages import RUN_STAGES, STAGES, WRITE
 from .rerender import rerender_psnr
+from .run import make_folder
 from .truth_materials import score_materials
 from .truth_views import pairs, psnr, views
 
@@ -125,12 +126,7 @@ def run_ablation(asked: Ablation, tell: Callable[[str], None] = lambda text: Non
         if not (room / "truth" / "transforms.json").is_file():
             raise BadInputError(f"Room '{room}' has no truth/transforms.json; the ablation needs rooms with truth.")
     names = asked.names
-    try:
-        asked.out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadInputError(
-            f"Folder '{asked.out}' can't be made ({error.strerror or error}); choose another."
-        ) from error
+    make_folder(asked.out)
     path = asked.out / LINES
     lines = read_lines([path]) if path.exists() else []
     source = digest(Path(corrected.__file__))[:16]
@@ -203,16 +199,15 @@ class Bench:
                 if name != WHOLE and TOGETHER not in name and stage == first and self._same(stage, store):
                     same = True
                     break
-            figures = dict(self._whole["figures"]) if same else {}
-            if not same:
+            if same:
+                memory, figures = peak_memory(), dict(self._whole["figures"])
+            else:
                 started = time.process_time()
                 recovery.base_color()
                 seconds[WRITE] = round(time.process_time() - started, 2)
                 memory = peak_memory()
                 figures = self._figures(recovery, store)
                 same = name != WHOLE and figures == self._whole["figures"]
-            else:
-                memory = peak_memory()
         return {
             "room": self.room.name, "preset": self._asked.preset, "seed": self._seed, "without": name, "same": same,
             "figures": figures, "seconds": seconds, "peak_mib": None if memory is None else round(memory / 2**20),
@@ -250,7 +245,6 @@ def _unwrap() -> Callable:
 
 
 def _stored(store: Store, stage: str) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Arrays and meta of a stage."""
     key = store.stored_key(stage) or ""
     return store.load(stage, key) or {}, store.load_meta(stage, key) or {}
 

@@ -219,7 +219,6 @@ def _was_run(name: str, runs: Mapping[tuple, Line]) -> bool:
 
 
 def _acts(name: str, runs: Mapping[tuple, Line]) -> bool:
-    """Whether leaving a pass out changed anything anywhere."""
     return any(left_out == name and not line["same"] for (_, _, left_out), line in runs.items())
 
 
@@ -286,7 +285,6 @@ def _signed(value: float, digits: int = 2, error: float | None = None) -> str:
 
 
 def _plot(runs: Mapping[tuple, Line], path: Path) -> None:
-    """Gain of albedo over seconds, a point a pass."""
     from .plot import write_points
 
     points = []

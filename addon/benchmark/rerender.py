@@ -15,9 +15,10 @@ from ..core.pipeline.recover import Recovery
 PIXELS: Workload[int] = 1500
 """Of each view."""
 RAYS: Workload[int] = 64
+SEED: Workload[int] = 0
 
 
-def rerender_psnr(recovery: Recovery, seen: list[dict], seed: int = 0) -> float:
+def rerender_psnr(recovery: Recovery, seen: list[dict]) -> float:
     """Mean PSNR (dB) in display values of `truth_views.views` as the result would show them.
 
     The exposure puts each view's median luminance to middle grey. Lamps, glass and pixels at edges are left out. Where
@@ -25,7 +26,7 @@ def rerender_psnr(recovery: Recovery, seen: list[dict], seed: int = 0) -> float:
     """
     materials = {m.object_id: m for m in recovery.materials()}
     left_out = [i for i, m in materials.items() if m.model.gives_light or m.model.see_through]
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(SEED)
     element, direction, true, levels = [], [], [], []
     for one in seen:
         usable = np.flatnonzero(one["inside"] & ~np.isin(one["found"], left_out) & np.isfinite(one["image"]).all(1))
@@ -37,14 +38,14 @@ def rerender_psnr(recovery: Recovery, seen: list[dict], seed: int = 0) -> float:
         levels.append(np.full(len(chosen), level, np.float32))
     number = np.repeat(np.arange(len(levels)), [len(own) for own in levels])
     element, direction, true, level = (np.concatenate(x) for x in (element, direction, true, levels))
-    shown = _shown(recovery, materials, element, np.asarray(direction, np.float32), seed)
+    shown = _shown(recovery, materials, element, np.asarray(direction, np.float32))
     if any(frame.uncalibrated for frame in recovery.capture.frames):
         shown = shown * np.median(true.mean(1) / np.maximum(shown.mean(1), 1e-12))
     error = np.mean((srgb(shown * level[:, None]) - srgb(true * level[:, None])) ** 2, axis=1)
     return float(np.mean([-10 * np.log10(max(float(np.mean(error[number == n])), 1e-12)) for n in range(len(seen))]))
 
 
-def _shown(recovery: Recovery, materials: dict, element: np.ndarray, direction: np.ndarray, seed: int) -> np.ndarray:
+def _shown(recovery: Recovery, materials: dict, element: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Radiance of elements towards a camera, (m, 3)."""
     field = recovery.field
     object_id = field.atlas.object_id[element]
@@ -57,7 +58,7 @@ def _shown(recovery: Recovery, materials: dict, element: np.ndarray, direction: 
         own = np.flatnonzero(object_id == i)
         lobe = highlight(
             field, bright, element[own], direction[own], m.alpha, m.f0, m.model.microfacets, rays=RAYS,
-            threads=recovery.settings.threads, seed=seed,
+            threads=recovery.settings.threads, seed=SEED,
         )  # fmt: skip
         shown[own] = shown[own] + lobe if m.model.has_diffuse else lobe
     return shown

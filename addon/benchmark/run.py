@@ -64,13 +64,6 @@ def check_stages(stages: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in STAGES if name in stages or not stages)
 
 
-def measure(stage: str, options: Options) -> Table:
-    """The table of a stage, which takes what the command's help needs not."""
-    from . import stages
-
-    return stages.run(stage, options)
-
-
 @contextmanager
 def room_and_scratch(options: Options) -> Iterator[tuple[Path, Path]]:
     """The capture that is measured on, the demo's room where none is given; and a folder that goes at the end."""
@@ -112,11 +105,9 @@ def run_benchmark(stages: Sequence[str], options: Options) -> dict[str, Table | 
     stages = check_stages(stages)
     if options.capture is not None and not options.capture.is_dir():
         raise BadInputError(f"There is no capture folder '{options.capture}'; give one that holds transforms.json.")
-    try:
-        options.out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = error.strerror or error
-        raise BadInputError(f"Folder '{options.out}' can't be made ({reason}); choose another.") from error
+    make_folder(options.out)
+    from .stages import run as measure  # not earlier: it takes what the command's help needs not
+
     plots = plots_are_possible()
     results: dict[str, Table | str] = {}
     seconds: dict[str, float] = {}
@@ -125,7 +116,12 @@ def run_benchmark(stages: Sequence[str], options: Options) -> dict[str, Table | 
         options.progress.stage(stage)
         try:
             results[stage] = table = measure(stage, options)
-            _write(table, options.out, plots)
+            table.write_csv(options.out / f"{table.stage}.csv")
+            write_bytes(options.out / f"{table.stage}.md", table.markdown().encode())
+            if plots:
+                from .plot import write_plot
+
+                write_plot(table, options.out / f"{table.stage}.png")
         except SkippedStage as reason:
             results[stage] = str(reason)
         options.progress.done()
@@ -134,23 +130,20 @@ def run_benchmark(stages: Sequence[str], options: Options) -> dict[str, Table | 
     return results
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder; raises `BadInputError`."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInputError(f"Folder '{folder}' can't be made ({error.strerror or error}); choose another.") from error
+
+
 def plots_are_possible() -> bool:
     """Whether matplotlib is there."""
     return importlib.util.find_spec("matplotlib") is not None
 
 
-def _write(table: Table, folder: Path, plots: bool) -> None:
-    """A table's files."""
-    table.write_csv(folder / f"{table.stage}.csv")
-    table.write_markdown(folder / f"{table.stage}.md")
-    if plots:
-        from .plot import write_plot
-
-        write_plot(table, folder / f"{table.stage}.png")
-
-
 def _index(results: dict[str, Table | str], seconds: dict[str, float], options: Options, plots: bool) -> str:
-    """index.md: the machine, the settings, all tables."""
     lines = ["# Benchmark", "", *(f"- {name}: {text}" for name, text in describe_machine().items()), ""]
     lines += [
         f"- capture: {options.capture.resolve().name if options.capture else 'none given'}",

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from ..core.settings import PRESETS, Settings
 from ..core.stages import STAGES
 from .run import Options, SkippedStage, room_and_scratch
 from .table import BASELINE, Table
-from .truth_materials import found_kind, true_kind, true_roughness, written_roughness
+from .truth_materials import true_kind, true_roughness, written_roughness
 from .truth_views import psnr, views
 
 Changes = dict[str, Any]
@@ -66,22 +66,6 @@ ERRORS = {
 }
 
 
-class Timing(NamedTuple):
-    """Seconds by the clock on the wall; of all threads of this process, which others disturb less; what came back."""
-
-    seconds: float
-    cpu_seconds: float
-    value: Any
-
-
-def once(function: Callable[[], Any]) -> Timing:
-    """One call, timed."""
-    gc.collect()  # not in the middle, at one alternative's expense
-    started, cpu_started = time.perf_counter(), time.process_time()
-    value = function()
-    return Timing(time.perf_counter() - started, time.process_time() - cpu_started, value)
-
-
 def run(stage: str, options: Options) -> Table:
     """The table of a stage of `ALTERNATIVES`."""
     columns = ("capture", "alternative", BASELINE, "settings", ERRORS[stage], "seconds", "CPU seconds")
@@ -100,21 +84,26 @@ def _rows(stage: str, folder: Path, scratch: Path, options: Options) -> Iterator
     base = replace(Settings(**ALONE.get(stage, {})), detail=2.0 if options.large else 1.0)
     measured = STAGES if stage == WHOLE else (stage,)
 
-    def under(changes: Changes) -> tuple[Recovery, Timing]:
+    def under(changes: Changes) -> tuple[Recovery, float, float]:
+        """Seconds by the clock on the wall, and of all threads of this process, which others disturb less."""
         with Store(scratch / "stages") as store:
             store.drop(measured)
             settings = replace(base, **changes | {"threads": options.threads, "seed": options.seed})
             recovery = Recovery(capture, store, settings, Progress(), unwrap)
             for one in STAGES[: STAGES.index(measured[0])]:
                 getattr(recovery, one)()
-            return recovery, once(lambda: [getattr(recovery, one)() for one in measured])
+            gc.collect()  # not in the middle, at one alternative's expense
+            started, cpu_started = time.perf_counter(), time.process_time()
+            for one in measured:
+                getattr(recovery, one)()
+            return recovery, time.perf_counter() - started, time.process_time() - cpu_started
 
     judge = _against_truth(folder) if stage in AGAINST_TRUTH else _against(stage, under(FINEST[stage])[0])
     for done, (name, changes) in enumerate(ALTERNATIVES[stage]):
-        recovery, timing = under(changes)
+        recovery, seconds, cpu_seconds = under(changes)
         told = "" if stage == WHOLE else ", ".join(f"{key} {value}" for key, value in changes.items())
         error, *more = judge(recovery)
-        yield folder.name, name, name == PAPERS, told, error, timing.seconds, timing.cpu_seconds, *more
+        yield folder.name, name, name == PAPERS, told, error, seconds, cpu_seconds, *more
         options.progress.update((done + 1) / len(ALTERNATIVES[stage]))
 
 
@@ -147,7 +136,7 @@ def _against_truth(folder: Path) -> Callable[[Recovery], tuple]:
         known = [(m, truth[m.object_id]) for m in one.materials() if m.object_id in truth]
         pairs = [(written_roughness(m), true_roughness(t)) for m, t in known]
         off = [abs(found - true) for found, true in pairs if true is not None]
-        right = sum(found_kind(m) == true_kind(t) for m, t in known)
+        right = sum(m.model.name == true_kind(t) for m, t in known)
         albedo = psnr(views(folder, one), one.base_color()) if has_views else None
         memory = peak_memory()
         return float(np.mean(off)), f"{right} of {len(known)}", albedo, None if memory is None else memory / 2**20

@@ -62,10 +62,6 @@ class Table:
             writer.writerow(["" if cell is None else cell for cell in record.values()])
         write_bytes(path, text.getvalue().encode())
 
-    def write_markdown(self, path: Path | str) -> None:
-        """Title, table and notes."""
-        write_bytes(path, self.markdown().encode())
-
     def markdown(self) -> str:
         """Title, table and notes; floats to `DIGITS` significant digits."""
         lines = [f"## {self.title}", "", _line(self.columns), _line(["---"] * len(self.columns))]

@@ -41,13 +41,8 @@ class MaterialScores:
         return sum(n for name, n in self.models.items() if len(set(name.split(" as "))) == 1)
 
 
-def found_kind(material: ObjectMaterial) -> str:
-    """The model's name."""
-    return material.model.name
-
-
 def true_kind(known: Mapping[str, Any]) -> str:
-    """The same of an object of truth/materials.json."""
+    """The name of the model of an object of truth/materials.json."""
     if known["emission"]:
         return "emitter"
     if known["metallic"]:
@@ -101,7 +96,7 @@ def score_materials(
             weights.append(seen)
         by_kind: Counter[str] = Counter()
         for i, n in by_part.items():
-            by_kind[found_kind(found[i])] += n
+            by_kind[found[i].model.name] += n
         models[f"{true_kind(known)} as {by_kind.most_common(1)[0][0]}"] += 1
     if not errors:
         return MaterialScores(float("nan"), float("nan"), models)

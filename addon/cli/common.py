@@ -71,7 +71,6 @@ def settings_from(arguments: argparse.Namespace) -> Settings:
 
 
 def _add_leash(parser: argparse.ArgumentParser) -> None:
-    """Options for programs that start a run and follow it."""
     add = parser.add_argument_group("for programs that start a run").add_argument
     lines = "json: one line of JSON for each event instead of text (default text)"
     add("--progress", choices=("text", "json"), default="text", help=lines)

@@ -71,13 +71,7 @@ def _grey(text: str) -> str:
 
 
 def run_from(arguments: argparse.Namespace, **stages) -> Callable[..., dict[str, Any]]:
-    """The run that was asked for: called with capture, result, settings and progress.
-
-    Parameters
-    ----------
-    stages
-        Fields of `Asked`.
-    """
+    """The run that was asked for, `stages` as fields of `Asked`: called with capture, result, settings and progress."""
     if arguments.unwrap and arguments.scene:
         raise BadInputError("Option --unwrap goes with --no-scene: the scene is laid out by Blender.")
     reading = reading_from(arguments)

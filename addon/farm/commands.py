@@ -169,11 +169,11 @@ def submit_command(arguments: argparse.Namespace, stream: TextIO) -> int:
 
 
 def _hand_over(arguments: argparse.Namespace, room: Room) -> str:
-    """Give a room to the engine; what to tell of it."""
     if arguments.engine == "slurm":
         from . import slurm
 
-        limits = slurm.Limits(arguments.partition, arguments.time, arguments.mem, arguments.cpus)
+        limits = {"partition": arguments.partition, "time": arguments.time, "mem": arguments.mem}
+        limits["cpus-per-task"] = str(arguments.cpus or "")
         return f"jobs {', '.join(slurm.submit(room, limits))}"
     if arguments.engine == "flamenco":
         from . import flamenco

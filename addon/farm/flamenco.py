@@ -5,7 +5,6 @@ import platform
 import urllib.error
 import urllib.parse
 import urllib.request
-from dataclasses import dataclass
 from http.client import HTTPException
 from pathlib import Path
 from typing import Any
@@ -23,56 +22,30 @@ SECONDS: Shown[float] = 30.0
 PATHS = ("mesh", "exposures", "override")
 LONGEST: Shown[int] = 1 << 24
 """Bytes of an answer that are read."""
-
-
 NO_MANAGER = "What answers at {} is no manager of Flamenco 3; check --manager."
 
 
-@dataclass(frozen=True)
-class Manager:
-    """A manager, by its address."""
-
-    address: str
-
-    def job_type(self) -> dict[str, Any]:
-        """What the manager knows of our job type. Raises `BadInputError`."""
-        try:
-            return self._ask(f"api/v3/jobs/type/{JOB_TYPE}")
-        except LookupError as error:
-            raise BadInputError(
-                f"Flamenco's manager at {self.address} has no job type '{JOB_TYPE}'; put {SCRIPT} into its folder "
-                "'scripts' and start it anew."
-            ) from error
-
-    def submit(self, job: dict[str, Any]) -> str:
-        """Hand a job over; returns its number. Raises `BadInputError`."""
-        try:
-            return str(self._ask("api/v3/jobs", job)["id"])
-        except (LookupError, TypeError) as error:
-            raise BadInputError(NO_MANAGER.format(self.address)) from error
-
-    def _ask(self, way: str, content: dict[str, Any] | None = None) -> Any:
-        """The manager's answer; LookupError where it knows no such way."""
-        data = None if content is None else json.dumps(content).encode()
-        headers = {"Content-Type": "application/json", "Accept": "application/json"}
-        try:
-            if urllib.parse.urlsplit(self.address).scheme not in ("http", "https"):
-                raise BadInputError(f"'{self.address}' is no manager's address; give --manager as {MANAGER}.")
-            address = urllib.parse.urljoin(self.address.rstrip("/") + "/", way)
-            request = urllib.request.Request(address, data, headers)
-            with urllib.request.urlopen(request, timeout=SECONDS) as answer:
-                return json.loads(answer.read(LONGEST))
-        except urllib.error.HTTPError as error:
-            with error:
-                told = _message(error.read(LONGEST))
-            if error.code == 404:
-                raise LookupError(told) from error
-            raise BadInputError(f"Flamenco's manager at {self.address} refused ({error.code}): {told}.") from error
-        except OSError as error:
-            reason = getattr(error, "reason", error)
-            raise BadInputError(f"Flamenco's manager at {self.address} can't be reached ({reason}).") from error
-        except (ValueError, HTTPException) as error:
-            raise BadInputError(NO_MANAGER.format(self.address)) from error
+def _ask(address: str, way: str, content: dict[str, Any] | None = None) -> Any:
+    """The manager's answer; LookupError where it knows no such way."""
+    data = None if content is None else json.dumps(content).encode()
+    headers = {"Content-Type": "application/json", "Accept": "application/json"}
+    try:
+        if urllib.parse.urlsplit(address).scheme not in ("http", "https"):
+            raise BadInputError(f"'{address}' is no manager's address; give --manager as {MANAGER}.")
+        request = urllib.request.Request(urllib.parse.urljoin(address.rstrip("/") + "/", way), data, headers)
+        with urllib.request.urlopen(request, timeout=SECONDS) as answer:
+            return json.loads(answer.read(LONGEST))
+    except urllib.error.HTTPError as error:
+        with error:
+            told = _message(error.read(LONGEST))
+        if error.code == 404:
+            raise LookupError(told) from error
+        raise BadInputError(f"Flamenco's manager at {address} refused ({error.code}): {told}.") from error
+    except OSError as error:
+        reason = getattr(error, "reason", error)
+        raise BadInputError(f"Flamenco's manager at {address} can't be reached ({reason}).") from error
+    except (ValueError, HTTPException) as error:
+        raise BadInputError(NO_MANAGER.format(address)) from error
 
 
 def _message(content: bytes) -> str:
@@ -103,7 +76,16 @@ def job_of(room: Room, etag: str = "", priority: int = 50) -> dict[str, Any]:
 
 def submit(room: Room, address: str = "", priority: int = 50) -> str:
     """Hand a room to the manager at an address; returns the job's number. Raises `BadInputError`."""
-    manager = Manager(address or MANAGER)
-    known = manager.job_type()
+    address = address or MANAGER
+    try:
+        known = _ask(address, f"api/v3/jobs/type/{JOB_TYPE}")
+    except LookupError as error:
+        raise BadInputError(
+            f"Flamenco's manager at {address} has no job type '{JOB_TYPE}'; put {SCRIPT} into its folder "
+            "'scripts' and start it anew."
+        ) from error
     etag = str(known.get("etag", "")) if isinstance(known, dict) else ""
-    return manager.submit(job_of(room, etag, priority))
+    try:
+        return str(_ask(address, "api/v3/jobs", job_of(room, etag, priority))["id"])
+    except (LookupError, TypeError) as error:
+        raise BadInputError(NO_MANAGER.format(address)) from error

@@ -49,11 +49,6 @@ def template(room: Room) -> dict[str, Any]:
 
 
 def write(room: Room) -> Path:
-    """Write the room's template, and the values of its parameters beside it, into its farm folder.
-
-    Raises
-    ------
-    StorageError
-    """
+    """Write the room's template and its parameters' values into its farm folder; raises `StorageError`."""
     room.write(PARAMETERS, {"Capture": str(room.capture), "Result": str(room.result), "Blocks": room.blocks})
     return room.write(TEMPLATE, template(room))

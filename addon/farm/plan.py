@@ -150,12 +150,8 @@ def rooms_from(
         Their result folders are called as they are, below `results`.
     listed : Path, optional
         File with a capture in each line, and behind a tab its result folder, if it is another.
-    results : Path
-    blocks : int
     program : str
         As a shell would split it.
-    options : list of str
-    divided : tuple of str
 
     Raises
     ------

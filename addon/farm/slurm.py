@@ -3,27 +3,21 @@
 import re
 import shlex
 import subprocess
-from dataclasses import dataclass
 
 from ..core.errors import BadInputError, ScanRelightError
 from .plan import Room, Task
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What jobs ask for, as sbatch takes it; '' and 0 leave it to the partition."""
-
-    partition: str = ""
-    time: str = ""
-    memory: str = ""
-    cpus: int = 0
-
-
-def submit(room: Room, limits: Limits = Limits()) -> list[str]:
+def submit(room: Room, limits: dict[str, str]) -> list[str]:
     """Submit a room as a chain of jobs; returns their numbers.
 
     Their scripts and logs lie in the room's farm folder. A room is a chain of its own: where one of its jobs fails, its
     later ones are taken off, and no other room's are.
+
+    Parameters
+    ----------
+    limits : dict of str to str
+        What jobs ask for, by sbatch's options; '' leaves it to the partition.
 
     Raises
     ------
@@ -54,12 +48,10 @@ def _first(task: Task) -> str | None:
     return None if task.block is None or task.block[0] == 1 else task.name.replace(f"-{task.block[0]}-of", "-1-of")
 
 
-def script_of(room: Room, task: Task, limits: Limits) -> str:
+def script_of(room: Room, task: Task, limits: dict[str, str]) -> str:
     """The batch script of a unit of work, or of all blocks of a stage."""
-    asked = {"partition": limits.partition, "time": limits.time, "mem": limits.memory}
-    asked["cpus-per-task"] = str(limits.cpus or "")
     log = f"{room.farm}/{task.stage}".replace("%", "%%") + "-%j.log"
-    asked |= {"job-name": f"{_plain(room.name)}:{task.name if not task.block else task.stage}", "output": log}
+    asked = limits | {"job-name": f"{_plain(room.name)}:{task.name if not task.block else task.stage}", "output": log}
     if task.block:
         asked["array"] = f"1-{task.block[1]}"
     for value in asked.values():

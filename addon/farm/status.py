@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..core.io.files import json_if_sound
 from ..core.io.folder import REPORT
 from ..core.results.lock import owner
 from ..core.stages import LABELS, RUN_STAGES, WRITE
 from .plan import FOLDER
-from .unit import mark, stored_key
+from .unit import stored_key
 
 DONE, FAILED, RUNNING, WAITING, UNKNOWN = "done", "failed", "running", "waiting", "no plan"
 COST = {"surface": 5, "lit_diffuse": 8, "shading": 17, "specular": 16, WRITE: 5}
@@ -77,7 +78,7 @@ def look(result: Path) -> RoomState:
 
 
 def _unit(result: Path, name: str, stage: str) -> UnitState:
-    told = mark(result, name)
+    told = json_if_sound(result / FOLDER / f"{name}.json")
     who, error = owner(result / FOLDER / f"{name}.lock"), str(told.get("error", ""))
     if who:
         return UnitState(name, stage, RUNNING, who)

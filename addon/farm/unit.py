@@ -53,14 +53,5 @@ def stored_key(result: Path, name: str) -> str | None:
         return None
 
 
-def mark(result: Path, name: str) -> dict[str, Any]:
-    """What a unit left as its mark; empty where there is none that can be read."""
-    try:
-        told = json.loads((result / FOLDER / f"{name}.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return told if isinstance(told, dict) else {}
-
-
 def _mark(folder: Path, name: str, told: dict[str, Any]) -> None:
     write_bytes(folder / f"{name}.json", json.dumps(told, ensure_ascii=False).encode() + b"\n")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from addon.benchmark.truth_materials import found_kind, found_roughness, score_materials, true_kind, true_roughness
+from addon.benchmark.truth_materials import found_roughness, score_materials, true_kind, true_roughness
 from addon.benchmark.truth_views import pairs, psnr, views
 from addon.core.io.exr import read_exr
 from addon.core.io.read import read_capture
@@ -104,7 +104,7 @@ def compare(capture: Path, result: Path) -> dict:
             "id": i, "class_name": true["class_name"], "pixels": pixels[i], "share": share.get(i, 0.0),
             **{k: ratios.get(i, {}).get(k) for k in split},
             "measured": float(measured[own].mean()) if own.any() else 0.0,
-            "model": found_kind(mine), "true_model": true_kind(true),
+            "model": mine.model.name, "true_model": true_kind(true),
             "roughness": found_roughness(mine), "true_roughness": true_roughness(true),
             "f0": mine.f0,
             "true_f0": true["base_color"] if true["metallic"] and "base_color" in true else None,

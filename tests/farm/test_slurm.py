@@ -162,7 +162,7 @@ def test_the_script_holds_names_of_all_kinds(tmp_path):
     room = Room(Path("/c a"), Path("/r `x`"), 3, (str(program),), ("--convention=$(x);\\",), ("specular",))
     for task in room.tasks():
         script = tmp_path / "script.sh"
-        script.write_text(slurm.script_of(room, task, slurm.Limits(memory="4G")))
+        script.write_text(slurm.script_of(room, task, {"mem": "4G"}))
         told = subprocess.run(
             ["sh", script], capture_output=True, text=True, env={"SLURM_ARRAY_TASK_ID": "2"}, check=True
         )

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core.io.ply_write import ply_bytes
+from ...core.io.ply import ply_bytes
 from ...core.kinds import Workload
 
 SIZE: Workload[tuple[float, float, float]] = (4.4, 3.6, 2.6)

@@ -19,7 +19,7 @@ from ...core.errors import BadInputError, MissingStageError
 from ...core.io.layout import RawMesh
 from ...core.io.mesh_repair import repair
 from ...core.io.nerfstudio_camera import OWN_LENS
-from ...core.io.ply_write import ply_bytes
+from ...core.io.ply import ply_bytes
 from ...core.kinds import Shown
 from ...core.scene.lenses_told import told_lens
 from ...core.scene.model import Mesh

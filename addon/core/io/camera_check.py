@@ -79,7 +79,6 @@ def check_size(frame: Frame, path: Path, size: tuple[int, int]) -> None:
 
 
 def _numbers(lens: object) -> Iterator[float]:
-    """All numbers that a lens holds."""
     if dataclasses.is_dataclass(lens):
         for field in dataclasses.fields(lens):
             yield from _numbers(getattr(lens, field.name))

@@ -3,17 +3,18 @@
 COLMAP's world has no up and, unless it was given measures, no metres; it is taken as it is.
 """
 
-from functools import partial
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import BadInputError
 from ..kinds import Limit
-from ..scene.lenses_colmap import Intrinsics, intrinsics
+from ..scene.lenses_colmap import intrinsics
 from ..scene.model import Camera, Frame
 from ..scene.pose import MAX_DISTANCE, check_pose, rotation_of
-from .colmap_model import ColmapImage, ColmapModel, is_pose, model_files, read_model
+from .colmap_model import ColmapImage, ColmapModel, model_files, read_model
 from .files import inside
 from .formats import FORMATS
 from .layout import Layout, RawMesh, Reader, Reading, usable
@@ -94,11 +95,11 @@ def frames_of(
                 f"Frame '{name}' has camera {image.camera}, which '{model.cameras_file}' does not "
                 "list; export cameras and images together."
             )
-        made = _frame(image, name, *cameras[image.camera], root, folder, reading)
+        made = _frame(image, name, cameras[image.camera], root, folder, reading)
         seen.add(image.name)
         return made
 
-    frames, problems = usable(partial(frame, one) for one in sorted(model.images, key=lambda one: one.name))
+    frames, problems = usable(frame, sorted(model.images, key=lambda one: one.name))
     return frames, problems, _notes(model, frames)
 
 
@@ -110,7 +111,8 @@ def camera_to_world(image: ColmapImage, name: str) -> np.ndarray:
     BadInputError
         Not finite, no direction, or too far off.
     """
-    if not is_pose(image):
+    finite = all(map(math.isfinite, (*image.quaternion, *image.translation)))
+    if not finite or not math.hypot(*image.quaternion) > 1e-9:
         raise BadInputError(
             f"Frame '{name}' has a pose that is not finite or whose quaternion is 0; export the model again."
         )
@@ -123,33 +125,23 @@ def camera_to_world(image: ColmapImage, name: str) -> np.ndarray:
     return check_pose(pose, name)
 
 
-def _cameras(model: ColmapModel) -> tuple[dict[int, tuple[int, int, Intrinsics]], dict[int, str]]:
-    """Size and intrinsics of each camera, and what is wrong with the others."""
+def _cameras(model: ColmapModel) -> tuple[dict[int, Camera], dict[int, str]]:
+    """Each camera, without a pose, and what is wrong with the others."""
     good, wrong = {}, {}
     for number, (name, width, height, parameters) in model.cameras.items():
         try:
             if not (0 < width <= MAX_SIZE and 0 < height <= MAX_SIZE):
                 raise BadInputError(f"its size is {width} x {height}")
-            good[number] = width, height, intrinsics(name, parameters, width, height)
+            fx, fy, cx, cy, lens = intrinsics(name, parameters, width, height)
+            good[number] = Camera(width, height, fx, fy, cx, cy, np.eye(4), lens)
         except BadInputError as error:
             wrong[number] = str(error)
     return good, wrong
 
 
-def _frame(
-    image: ColmapImage,
-    name: str,
-    width: int,
-    height: int,
-    values: Intrinsics,
-    root: Path,
-    folder: Path,
-    reading: Reading,
-) -> Frame:
+def _frame(image: ColmapImage, name: str, camera: Camera, root: Path, folder: Path, reading: Reading) -> Frame:
     named = inside(root, image.name, name, reading.outside, folder)
-    camera = Camera(
-        width, height, values.fx, values.fy, values.cx, values.cy, camera_to_world(image, name), values.lens
-    )
+    camera = replace(camera, camera_to_world=camera_to_world(image, name))
     path = next((hdr for hdr in map(named.with_suffix, HDR) if hdr.is_file()), named)
     masks = []
     if named.is_relative_to(folder):

@@ -4,7 +4,6 @@ Formats: COLMAP's documentation (doc/format.rst) and src/colmap/scene/reconstruc
 points are not looked at.
 """
 
-import math
 import mmap
 import struct
 from collections.abc import Iterator
@@ -215,8 +214,3 @@ def _binary_images(path: Path) -> list[ColmapImage]:
             images.append(ColmapImage(number, tuple(pose[:4]), tuple(pose[4:]), camera, name))
             at = end + 9 + 24 * points
     return images
-
-
-def is_pose(image: ColmapImage) -> bool:
-    """Whether the pose is finite and its quaternion has a direction."""
-    return all(map(math.isfinite, (*image.quaternion, *image.translation))) and math.hypot(*image.quaternion) > 1e-9

@@ -59,12 +59,7 @@ def _plain(key: str) -> str:
 
 
 def parse_number(value: Any, key: str, name: str) -> float:
-    """A number above 0 from `value`: itself, '1/60', 'f/2.8', '1/60 s' or [1, 60].
-
-    Raises
-    ------
-    BadInputError
-    """
+    """A number above 0 from `value`: itself, '1/60', 'f/2.8', '1/60 s' or [1, 60]; else raises `BadInputError`."""
     number = math.nan
     try:
         if isinstance(value, str):
@@ -131,12 +126,7 @@ def from_settings(
 
 
 def from_exif(frames: Sequence[Frame]) -> tuple[list[Frame], list[str]]:
-    """Use what the own EXIF of JPEG, TIFF, DNG and HEIC frames tells, where no exposure is stated and all of them tell.
-
-    Returns
-    -------
-    As `from_settings`.
-    """
+    """As `from_settings`, by the EXIF of JPEG, TIFF, DNG and HEIC, where no exposure is stated and all of them tell."""
     if any(frame.exposure != 1 or frame.brackets for frame in frames):
         return list(frames), []
     settings: list[Settings | None] = []

@@ -17,7 +17,7 @@ from .primaries import REC709, to_rec709, to_rgb
 HALF_MAX: Unit[float] = 65504.0
 
 
-def read_header(path: Path | str) -> tuple[int, int]:
+def read_header(path: Path) -> tuple[int, int]:
     """Width and height of the picture that `read_exr` would give; cheap, and finds a file that was cut off.
 
     Raises
@@ -25,21 +25,15 @@ def read_header(path: Path | str) -> tuple[int, int]:
     BadInputError
         As `read_exr`, but for damage within the compressed pixels.
     """
-    return _supported(Path(path))[0].header.size
+    return _supported(path)[0].header.size
 
 
-def exr_note(path: Path | str) -> str:
-    """Which layer or view `read_exr` takes, as the end of a sentence; '' where the file has no other.
-
-    Raises
-    ------
-    BadInputError
-        As `read_header`.
-    """
-    return _supported(Path(path))[1]
+def exr_note(path: Path) -> str:
+    """Which layer or view `read_exr` takes, to end a sentence; '' where there is no other. Raises as `read_header`."""
+    return _supported(path)[1]
 
 
-def read_exr(path: Path | str) -> Picture:
+def read_exr(path: Path) -> Picture:
     """Read the picture `path`: half, float or uint; RGB, luminance and chroma, or Y; scan lines, tiles or parts.
 
     The picture is the display window, and the layer is `exr_layers.choose_layer`'s. A file with other primaries than
@@ -50,7 +44,6 @@ def read_exr(path: Path | str) -> Picture:
     BadInputError
         The file is absent, damaged, cut off, or of a kind that isn't supported.
     """
-    path = Path(path)
     layer, _ = _supported(path)
     header = layer.header
     names = (*layer.colour, *([layer.alpha] if layer.alpha else []))
@@ -78,7 +71,7 @@ def read_exr(path: Path | str) -> Picture:
     return Picture(rgb, alpha)
 
 
-def read_numbers(path: Path | str) -> np.ndarray:
+def read_numbers(path: Path) -> np.ndarray:
     """The numbers of the picture `path` as they are stored, not taken as colours: (h, w, c) in their own type.
 
     Raises
@@ -86,7 +79,6 @@ def read_numbers(path: Path | str) -> np.ndarray:
     BadInputError
         As `read_exr`, or the data window is not the display window.
     """
-    path = Path(path)
     headers = parse_headers(path)
     if len(headers) == 1 and list(headers[0].channels.values()) == [(1, 1)]:  # one channel of any name
         header, part, names = headers[0], 0, tuple(headers[0].channels)
@@ -138,9 +130,8 @@ def write_exr(path: Path | str, array: np.ndarray, half: bool = False) -> None:
     if array.size == 0 or (array.ndim == 3 and array.shape[2] != len(names)) or not names:
         raise ValueError(f"write_exr takes (h, w), (h, w, 3) or (h, w, 4), not {array.shape}")
     if half:
-        finite = np.isfinite(array)
-        array = np.where(finite, np.clip(array, -HALF_MAX, HALF_MAX, where=finite, out=array.copy()), array)
-        array = array.astype(np.float16)
+        held = np.clip(array, -HALF_MAX, HALF_MAX, where=np.isfinite(array), out=array.copy())
+        array = held.astype(np.float16)
     planes = {name: np.ascontiguousarray(array[..., i] if array.ndim == 3 else array) for i, name in enumerate(names)}
     # Through memory: the library swallows a full disk when it writes its table of chunks last.
     stream = io.BytesIO()

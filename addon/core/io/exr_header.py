@@ -97,7 +97,6 @@ def parse_headers(path: Path) -> tuple[ExrHeader, ...]:
     BadInputError
         Absent, not a file, not OpenEXR, damaged, cut off, or deep.
     """
-    path = Path(path)
     try:
         check_picture(path)
         with readable(f"Picture '{path}'"), open(path, "rb") as file:

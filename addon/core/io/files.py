@@ -72,6 +72,21 @@ def read_json(path: Path) -> dict[str, Any]:
     return value
 
 
+def json_if_sound(path: Path) -> dict[str, Any]:
+    """The object in the JSON file `path`; empty where it is absent, can't be read, or holds something else."""
+    try:
+        value = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return value if isinstance(value, dict) else {}
+
+
+def leads_out(name: str) -> bool:
+    """Whether a path is absolute or holds '..', as either kind of system writes it: captures travel between them."""
+    kinds = PurePosixPath(name), PureWindowsPath(name)
+    return any(kind.is_absolute() or kind.drive or kind.root or ".." in kind.parts for kind in kinds)
+
+
 def inside(root: Path, value: Any, name: str, outside: bool = False, folder: Path | None = None) -> Path:
     """What a file calls `value`, as a path.
 
@@ -95,15 +110,11 @@ def inside(root: Path, value: Any, name: str, outside: bool = False, folder: Pat
     """
     if not isinstance(value, str) or not value.strip() or "\0" in value:
         raise BadInputError(f"Frame '{name}' names no picture; give its file_path.")
-    if not outside:
-        # Both ways of writing paths: a capture made on the other system must not lead out either.
-        for kind in (PurePosixPath, PureWindowsPath):
-            path = kind(value)
-            if path.is_absolute() or path.drive or path.root or ".." in path.parts:
-                raise EscapesError(
-                    f"Frame '{name}' has the path '{value}', which leads out of the capture '{root}'; "
-                    "give paths within it, or allow others with --outside."
-                )
+    if not outside and leads_out(value):
+        raise EscapesError(
+            f"Frame '{name}' has the path '{value}', which leads out of the capture '{root}'; "
+            "give paths within it, or allow others with --outside."
+        )
     if PureWindowsPath(value).drive:  # written on Windows: there alone it may lead anywhere
         return Path(value)
     return (folder or root) / PurePosixPath(value.replace("\\", "/"))

@@ -8,7 +8,6 @@ the list, `train/segmentation/000.exr` ...; its camera has x left, y up and look
 
 import math
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +43,7 @@ def _read(
         path, ids = folder / "Image" / f"{name}_0001.exr", folder / "segmentation" / f"{name}.exr"
         return Frame(name, path, make(told, path, name), id_path=ids if ids.is_file() else None)
 
-    frames, problems = usable(partial(frame, *one) for one in enumerate(cameras))
+    frames, problems = usable(lambda one: frame(*one), enumerate(cameras))
     return Layout(frames, mesh, problems=problems)
 
 

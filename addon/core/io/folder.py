@@ -1,11 +1,11 @@
 """What a folder or file that an artist has chosen is: a capture, a finished result, or the way to one of them."""
 
-import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..kinds import Limit, Shown
+from .files import json_if_sound
 
 CAPTURE, RESULT, WAY, EMPTY, OTHER, ABSENT = "capture", "result", "way", "empty", "other", "absent"
 MATERIALS, REPORT, SCENE = "materials.json", "report.json", "scene.blend"
@@ -58,9 +58,9 @@ def is_result(folder: Path) -> bool:
 def capture_name(result: Path) -> str:
     """Name of the capture that a result was made from; its folder's own where it does not tell."""
     for name in (MATERIALS, REPORT):
-        told = _json(result / name)
-        if isinstance(told, dict) and isinstance(told.get("capture"), str) and told["capture"]:
-            return told["capture"]
+        told = json_if_sound(result / name).get("capture")
+        if isinstance(told, str) and told:
+            return told
     return result.name
 
 
@@ -159,10 +159,3 @@ def _other(name: str, names: list[str]) -> str:
             "add them and their frames."
         )
     return f"Folder '{name}' holds no scan: cameras (such as 'transforms.json'), frames and a mesh."
-
-
-def _json(path: Path) -> object:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None

@@ -29,7 +29,7 @@ def is_heif(head: bytes) -> bool:
     return head[4:8] == BOX and head[8:12] in BRANDS
 
 
-def heif_header(path: Path | str) -> Header:
+def heif_header(path: Path) -> Header:
     """What the header of `path` says.
 
     Raises
@@ -38,19 +38,19 @@ def heif_header(path: Path | str) -> Header:
         Damaged, larger than any picture, or there is no pillow-heif.
     """
     with decoding(path):
-        return _checked(_open(path), Path(path))
+        return _checked(_open(path), path)
 
 
-def heif_exif(path: Path | str) -> bytes:
+def heif_exif(path: Path) -> bytes:
     """The EXIF of `path`, a TIFF; empty where it has none. Raises as `heif_header`."""
     with decoding(path):
         found = _open(path).info.get("exif") or b""
         return found.removeprefix(b"Exif\0\0")
 
 
-def heif_orientation(path: Path | str) -> int:
+def heif_orientation(path: Path) -> int:
     """EXIF's number for turning what the file shows back to what the sensor gave, 6 or 8; 1 where sizes can't tell."""
-    data = read_bytes(Path(path), "Picture ", HEAD)
+    data = read_bytes(path, "Picture ", HEAD)
     at = data.find(b"irot") + 4
     header = heif_header(path)
     if at < 4 or at >= len(data) or header.width == header.height:
@@ -58,7 +58,7 @@ def heif_orientation(path: Path | str) -> int:
     return {1: 6, 3: 8}.get(data[at] & 3, 1)
 
 
-def read_heif(path: Path | str) -> Stored:
+def read_heif(path: Path) -> Stored:
     """Read the pixels of `path`: uint8 codes, or uint16 where they have 10 or 12 bits, scaled to 0...65535.
 
     Raises
@@ -68,7 +68,7 @@ def read_heif(path: Path | str) -> Stored:
     """
     with decoding(path):
         file = _open(path)
-        header = _checked(file, Path(path))
+        header = _checked(file, path)
         pixels = np.asarray(file)
         if pixels.ndim == 2:
             pixels = pixels[..., None]
@@ -82,7 +82,7 @@ def read_heif(path: Path | str) -> Stored:
         return Stored(colour, pixels[..., -1] if has_alpha else None, file.info.get("icc_profile") or b"")
 
 
-def _open(path: Path | str) -> Any:
+def _open(path: Path) -> Any:
     try:
         import pillow_heif
     except ImportError as error:

@@ -41,7 +41,7 @@ def read_ids(frame: Frame) -> np.ndarray:
     """
     if frame.id_path is None:
         raise BadInputError(f"Frame '{frame.name}' has no picture of ids; give it one.")
-    path = Path(frame.id_path)
+    path = frame.id_path
     if picture_kind(path) == EXR:
         return _whole(read_numbers(path), path)
     if picture_kind(path) != PNG:

@@ -14,7 +14,7 @@ FILE = "info_semantic.json"
 MAX_ID: Limit[int] = 2**31 - 2
 
 
-def read_instances(path: Path | str) -> dict[int, str]:
+def read_instances(path: Path) -> dict[int, str]:
     """Class name of each object that the file `path` lists.
 
     Takes `objects[]{id, class_name}`, and Replica's `objects[]{id, class_id}` with `classes[]{id, name}`. An object
@@ -25,16 +25,12 @@ def read_instances(path: Path | str) -> dict[int, str]:
     BadInputError
         The file is not JSON, or has no list of objects with ids.
     """
-    path = Path(path)
     value = read_json(path)
     objects, classes = value.get("objects"), value.get("classes", [])
     if not isinstance(objects, list):
         raise BadInputError(f"'{path}' has no list 'objects'; export it again or take it away.")
-    class_names = (
-        {c["id"]: c.get("name") for c in classes if isinstance(c, dict) and isinstance(c.get("id"), int)}
-        if isinstance(classes, list)
-        else {}
-    )
+    known = [one for one in classes if isinstance(one, dict)] if isinstance(classes, list) else []
+    class_names = {one["id"]: one.get("name") for one in known if isinstance(one.get("id"), int)}
     names: dict[int, str] = {}
     for i, item in enumerate(objects):
         number = item.get("id") if isinstance(item, dict) else None
@@ -47,12 +43,6 @@ def read_instances(path: Path | str) -> dict[int, str]:
         if 0 <= number <= MAX_ID:
             names[number] = str(name) if name else f"object_{number}"
     return names
-
-
-def names_in(root: Path) -> dict[int, str] | None:
-    """As `read_instances`, of the file in the capture `root`; None where there is none."""
-    path = root / FILE
-    return read_instances(path) if path.exists() else None
 
 
 def assign(
@@ -108,5 +98,4 @@ def assign(
 
 
 def _few(items: list[str]) -> str:
-    """The first items, and how many more."""
     return ", ".join(items[:3]) + (f" and {len(items) - 3} more" if len(items) > 3 else "")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -115,8 +115,8 @@ class Layout:
     mirrors: list[KnownMirror] = field(default_factory=list)
 
 
-def usable(makers: Iterable[Callable[[], Frame]]) -> tuple[list[Frame], list[str]]:
-    """The frames that can be made, in their order, and a sentence on each of the others.
+def usable(make: Callable[[Any], Frame], told: Iterable[Any]) -> tuple[list[Frame], list[str]]:
+    """The frames that `make` makes of what is told of each, in their order, and a sentence on each that can't be made.
 
     Raises
     ------
@@ -124,9 +124,9 @@ def usable(makers: Iterable[Callable[[], Frame]]) -> tuple[list[Frame], list[str
         A path leads out of the capture: no slip of one frame.
     """
     frames, problems = [], []
-    for make in makers:
+    for one in told:
         try:
-            frames.append(make())
+            frames.append(make(one))
         except EscapesError:
             raise
         except BadInputError as error:

@@ -5,8 +5,8 @@ the whole file is raised.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -15,15 +15,16 @@ import numpy as np
 from ..errors import BadInputError
 from ..json_values import is_number
 from ..kinds import Code
-from ..scene.model import Frame
+from ..scene.model import Frame, Shot
 from ..scene.pose import check_pose
 from .conventions import AS_READ
+from .exposures import EXPOSURE, Settings, from_settings, settings_of
 from .files import check_picture, inside, read_json
 from .formats import FORMATS
 from .layout import Layout, RawMesh, Reader, Reading, usable
 from .meshes import MESH, find_mesh, read_mesh
 from .nerfstudio_camera import Entry, check_model, lens_notes, read_camera
-from .nerfstudio_exposures import ended, read_brackets, with_settings
+from .pictures import ENDINGS
 
 FILE = "transforms.json"
 SPLITS = ("transforms_train.json", "transforms_val.json")
@@ -93,8 +94,8 @@ def read_frames(root: Path, reading: Reading) -> tuple[list[Frame], list[str], l
         used[made.path] = entry
         return made
 
-    frames, more = usable(partial(frame, entry) for entry in listed)
-    frames, said = with_settings(frames, list(used.values()))
+    frames, more = usable(frame, listed)
+    frames, said = _with_settings(frames, list(used.values()))
     return frames, problems + more, list(dict.fromkeys(notes + said))
 
 
@@ -147,16 +148,68 @@ def _name(entry: dict[str, Any], index: int) -> str:
 
 
 def _frame(root: Path, entry: Entry, reading: Reading) -> Frame:
-    """One frame; raises `BadInputError` where it can't be used."""
     name, mask = entry.name, entry.own.get("mask_path")
-    path = ended(inside(root, entry.own.get("file_path"), name, reading.outside), name)
+    path = _ended(inside(root, entry.own.get("file_path"), name, reading.outside), name)
     check_picture(path)  # first: of a hundred thousand frames the rest takes many seconds
     pose = check_pose(entry.own.get("transform_matrix"), name)
     exposure, saturation = entry.positive("exposure", 1.0), entry.positive("saturation", math.inf)
     camera = read_camera(entry, path, pose)
     mask_path = None if mask in (None, "") else inside(root, mask, name, reading.outside)
-    brackets = read_brackets(root, entry, reading.outside)
+    brackets = _brackets(root, entry, reading.outside)
     return Frame(name, path, camera, mask_path, exposure, saturation, brackets=brackets)
+
+
+def _ended(path: Path, name: str) -> Path:
+    """`path`, or with the ending that it lacks, as in the NeRF-synthetic scenes."""
+    try:
+        if path.is_file() or path.suffix.lower() in ENDINGS:
+            return path
+        found = [full for full in (path.with_name(path.name + ending) for ending in ENDINGS) if full.is_file()]
+    except (OSError, ValueError) as error:  # a name that the system can't even ask for
+        raise BadInputError(f"Frame '{name}' has a file_path that can't be a file; mend it.") from error
+    if found:
+        return found[0]
+    return path if path.suffix else path.with_name(path.name + ENDINGS[0])
+
+
+# What is told of exposures: our own keys, and those that cameras' settings go by
+
+
+def _brackets(root: Path, entry: Entry, outside: bool) -> tuple[Shot, ...]:
+    """Further exposures of a frame: its `brackets`, a list of {file_path, exposure, saturation}."""
+    listed, name = entry.own.get("brackets"), entry.name
+    if listed in (None, []):
+        return ()
+    if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
+        raise BadInputError(
+            f"Frame '{name}' has brackets that are no list of objects; give file_path and exposure of each."
+        )
+    if any(one.get(EXPOSURE) is None for one in listed):
+        raise BadInputError(f"Frame '{name}' has brackets without an exposure; give each its own.")
+    saturation = {"saturation": entry.get("saturation")}
+    return tuple(
+        Shot(
+            _ended(inside(root, one.own.get("file_path"), name, outside), name),
+            one.positive(EXPOSURE, 1.0),
+            one.positive("saturation", math.inf),
+        )
+        for one in (Entry(saturation, told, name) for told in listed)
+    )
+
+
+def _with_settings(frames: Sequence[Frame], told: Sequence[Entry]) -> tuple[list[Frame], list[str]]:
+    """As `exposures.from_settings`, by what each frame's entry tells, unless any of them states an exposure."""
+    if any(keys.get(EXPOSURE) is not None for one in told for keys in (one.top, one.own)):
+        return list(frames), []
+    return from_settings(frames, [_settings(one) for one in told], "the camera's settings in the poses' file")
+
+
+def _settings(entry: Entry) -> Settings | None:
+    """What the camera was set to; None also where what is told is no number (`auto`)."""
+    try:
+        return settings_of(entry.own, entry.name)
+    except BadInputError:
+        return None
 
 
 # The mesh's world

@@ -73,7 +73,7 @@ class Stored(NamedTuple):
     profile: bytes = b""
 
 
-def coded_header(path: Path | str) -> Header:
+def coded_header(path: Path) -> Header:
     """What the header of the PNG, JPEG or TIFF `path` says, its pixels left alone.
 
     Raises
@@ -81,21 +81,15 @@ def coded_header(path: Path | str) -> Header:
     BadInputError
         Absent, damaged, larger than any picture, or of a depth that isn't supported; or there is no OpenImageIO.
     """
-    return _checked(_open(path), Path(path))
+    return _checked(_open(path), path)
 
 
-def coded_orientation(path: Path | str) -> int:
-    """EXIF's number of how the camera was held that took the PNG, JPEG or TIFF `path`; 1: as it is stored.
-
-    Raises
-    ------
-    BadInputError
-        As `coded_header`.
-    """
+def coded_orientation(path: Path) -> int:
+    """EXIF's number of how the camera was held; 1: as it is stored. Raises as `coded_header`."""
     return int(_open(path).spec().get_int_attribute("Orientation", 1))
 
 
-def read_coded(path: Path | str) -> Stored:
+def read_coded(path: Path) -> Stored:
     """Read the pixels of the PNG, JPEG or TIFF `path`.
 
     As stored: what the file says of colour spaces and of how the camera was held is not heeded here.
@@ -105,7 +99,6 @@ def read_coded(path: Path | str) -> Stored:
     BadInputError
         As `coded_header`, and where the pixels are damaged or cut off.
     """
-    path = Path(path)
     file = _open(path)
     spec = file.spec()
     width, height, _ = _checked(file, path)
@@ -149,9 +142,8 @@ def _library(path: Path) -> Any:
     return OpenImageIO
 
 
-def _open(path: Path | str) -> Any:
-    """The file as an ImageInput."""
-    library = _library(Path(path))
+def _open(path: Path) -> Any:
+    library = _library(path)
     wishes = library.ImageSpec()
     wishes.attribute("oiio:UnassociatedAlpha", 1)  # else colours are multiplied by alpha
     name: str | bytes = (text := os.fspath(path))

@@ -45,7 +45,7 @@ def check_claim(path: Path, width: int, height: int, stored: int, most: float = 
 
 
 @contextmanager
-def decoding(path: Path | str, what: str = "Picture") -> Iterator[None]:
+def decoding(path: Path, what: str = "Picture") -> Iterator[None]:
     """Turn whatever a library raises at the picture (`what`) `path` into one sentence, a `BadInputError`."""
     try:
         yield

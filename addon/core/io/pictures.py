@@ -10,9 +10,9 @@ from .exif import exif_orientation
 from .exr import exr_note, read_exr, read_header
 from .files import check_picture, read_bytes
 from .heif import HEIC, heif_header, heif_orientation, is_heif, read_heif
-from .icc import profile_to_rec709
 from .oiio import CODED, TIFF, coded_header, coded_orientation, read_coded
 from .picture import Picture, turn
+from .primaries import profile_to_rec709
 from .radiance_hdr import hdr_size, read_hdr
 from .raw import DNG, is_dng, raw_size, read_raw
 from .transfer import decode
@@ -22,7 +22,7 @@ ENDINGS = (".exr", ".hdr", ".pic", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".h
 """Of files that can be pictures, in the order in which a missing ending is tried."""
 
 
-def picture_kind(path: Path | str) -> str:
+def picture_kind(path: Path) -> str:
     """One of the kinds above, of `oiio`, `heif.HEIC` or `raw.DNG`.
 
     Raises
@@ -30,7 +30,6 @@ def picture_kind(path: Path | str) -> str:
     BadInputError
         The file is absent, empty, or of a kind that isn't known.
     """
-    path = Path(path)
     check_picture(path)
     head = read_bytes(path, "Picture ", 16)
     if not head:
@@ -69,13 +68,7 @@ def picture_size(path: Path, turned: bool = False) -> tuple[int, int]:
 
 
 def picture_orientation(path: Path) -> int:
-    """EXIF's number of how a camera was held, 1 to 8; 1 where the file does not tell: as it is stored.
-
-    Raises
-    ------
-    BadInputError
-        As `picture_size`.
-    """
+    """EXIF's number of how a camera was held, 1 (as it is stored, or untold) to 8. Raises as `picture_size`."""
     kind = picture_kind(path)
     if kind in CODED:
         return coded_orientation(path)
@@ -83,17 +76,8 @@ def picture_orientation(path: Path) -> int:
 
 
 def picture_bits(path: Path) -> int:
-    """Bits of a channel where numbers are codes of a curve, 8 or 16; 0 where they are linear floats.
-
-    Raises
-    ------
-    BadInputError
-        As `picture_size`.
-    """
-    return _coded_bits(path, picture_kind(path))
-
-
-def _coded_bits(path: Path, kind: str) -> int:
+    """Bits of a channel that holds codes of a curve, 8 or 16; 0 of linear floats. Raises as `picture_size`."""
+    kind = picture_kind(path)
     return heif_header(path).bits if kind == HEIC else coded_header(path).bits if kind in CODED else 0
 
 
@@ -125,7 +109,7 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
     if kind == DNG:
         rgb = read_raw(path).rgb
         return Picture(turn(rgb, picture_orientation(path)) if turned else rgb, None)
-    if not transfer and _coded_bits(path, kind):
+    if not transfer and picture_bits(path):
         raise BadInputError(unstated(path))
     colour, alpha, profile = read_heif(path) if kind == HEIC else read_coded(path)
     if turned:
@@ -139,7 +123,7 @@ def read_picture(path: Path, transfer: str = "", turned: bool = False) -> Pictur
     return Picture(decode(colour, transfer), None if alpha is None else alpha / scale, profile_to_rec709(profile))
 
 
-def unstated(path: Path | str) -> str:
+def unstated(path: Path) -> str:
     """The sentence on a picture of codes whose curve nobody told."""
     return (
         f"Picture '{path}' holds 8 or 16-bit codes among frames of floats; make all frames alike, or give the codes' "
@@ -148,12 +132,6 @@ def unstated(path: Path | str) -> str:
 
 
 def read_mask(path: Path) -> np.ndarray:
-    """(h, w) bool: False where the mask is black.
-
-    Raises
-    ------
-    BadInputError
-        As `read_picture`.
-    """
+    """(h, w) bool: False where the mask is black. Raises as `read_picture`."""
     colour = read_coded(path).colour if picture_kind(path) in CODED else read_picture(path).rgb
     return (colour > 0).any(-1)

@@ -6,17 +6,43 @@ kinds are read alike. Nothing is allocated before the counts that the header cla
 
 import struct
 import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import BadInputError
+from ..kinds import Limit
 from .files import absence, read_bytes
-from .ply_header import Element, Property, parse_header
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"))
 INDEX_NAMES = ("vertex_indices", "vertex_index")
+MAX_HEADER: Limit[int] = 1 << 20
+KINDS = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
+    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
+    "double": "f8", "float64": "f8",
+}  # fmt: skip
+FORMATS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+
+
+class Property(NamedTuple):
+    """One property; `count_kind` is the type of a list's length, empty where it is no list."""
+
+    name: str
+    kind: str
+    count_kind: str = ""
+
+
+@dataclass(frozen=True)
+class Element:
+    """One element: `count` records, each with all `properties` in their order."""
+
+    name: str
+    count: int
+    properties: list[Property]
 
 
 class PlyMesh(NamedTuple):
@@ -43,11 +69,7 @@ class PlyMesh(NamedTuple):
     corner: np.ndarray
 
 
-class _Damaged(Exception):
-    """The text is the second half of a sentence."""
-
-
-def read_ply(path: Path | str) -> PlyMesh:
+def read_ply(path: Path) -> PlyMesh:
     """Read the mesh `path`.
 
     Polygons become triangles: quads along their shorter diagonal, longer ones as a fan; faces of fewer than 3 corners
@@ -58,12 +80,11 @@ def read_ply(path: Path | str) -> PlyMesh:
     BadInputError
         The file is absent, damaged, cut off, holds no mesh, or points to vertices that it doesn't hold.
     """
-    path = Path(path)
     try:
         if what := absence(path):
             raise BadInputError(f"Mesh '{path}' {what}; a capture needs its mesh there.")
         return _parse(read_bytes(path, "Mesh "))
-    except (_Damaged, ValueError) as error:
+    except ValueError as error:  # its text is the second half of a sentence
         raise BadInputError(f"Mesh '{path}' {error}; export it again.") from error
     except MemoryError as error:
         raise BadInputError(f"Mesh '{path}' does not fit in memory; simplify it.") from error
@@ -82,10 +103,10 @@ def _parse(content: bytes) -> PlyMesh:
         if {"vertex", "face"} <= found.keys():
             break
     if "vertex" not in found:
-        raise _Damaged("holds no vertices")
+        raise ValueError("holds no vertices")
     place, *pairs = (found["vertex"].columns(names) for names in (("x", "y", "z"), *UV_NAMES))
     if place is None:
-        raise _Damaged("has vertices without x, y and z")
+        raise ValueError("has vertices without x, y and z")
     vertices = place.astype(np.float64)
     if "face" not in found:
         none = np.zeros((0, 3), np.int32)
@@ -94,7 +115,7 @@ def _parse(content: bytes) -> PlyMesh:
     faces = found["face"]
     name = next((n for n in INDEX_NAMES if n in faces.counts), None)
     if name is None:
-        raise _Damaged("has faces without vertex_indices")
+        raise ValueError("has faces without vertex_indices")
     triangles, source, corner = _triangles(faces.counts[name], faces.entries(name), vertices)
     ids = faces.columns(("object_id",))
     if ids is not None:
@@ -105,6 +126,56 @@ def _parse(content: bytes) -> PlyMesh:
     return PlyMesh(vertices, triangles, ids, uv, source, corner)
 
 
+def parse_header(content: bytes) -> tuple[str, list[Element], int]:
+    """Parse the head of `content`.
+
+    Returns
+    -------
+    order : str
+        '<', '>' or '' for text.
+    elements : list of Element
+    start : int
+        Position of the first byte behind the header.
+
+    Raises
+    ------
+    ValueError
+        The text is the second half of a sentence that begins with the file's name.
+    """
+    if content[:3] != b"ply":
+        raise ValueError("is empty" if not content else "is not a PLY file")
+    end = content.find(b"end_header", 0, MAX_HEADER)
+    start = content.find(b"\n", end) + 1
+    if end < 0 or not start:
+        raise ValueError("ends within its header, or has none")
+    order = None
+    elements: list[Element] = []
+    for line in content[3:end].decode("latin-1").splitlines():
+        words = line.split()
+        if not words or words[0] in ("comment", "obj_info"):
+            continue
+        try:
+            if words[0] == "format":
+                order = FORMATS[words[1]]
+            elif words[0] == "element":
+                elements.append(Element(words[1], int(words[2]), []))
+                if elements[-1].count < 0:
+                    raise ValueError
+            elif words[0] == "property" and words[1] == "list":
+                if KINDS[words[2]][0] == "f":
+                    raise ValueError
+                elements[-1].properties.append(Property(words[4], KINDS[words[3]], KINDS[words[2]]))
+            elif words[0] == "property":
+                elements[-1].properties.append(Property(words[2], KINDS[words[1]]))
+            else:
+                raise ValueError
+        except (IndexError, KeyError, ValueError):
+            raise ValueError(f"has a header line that means nothing: '{line.strip()[:60]}'") from None
+    if order is None:
+        raise ValueError("does not say whether it is text or binary")
+    return order, elements, start
+
+
 def _numbers(text: bytes) -> np.ndarray:
     """All numbers of `text`, up to the first thing that is none, as (n,) float64."""
     with warnings.catch_warnings():
@@ -113,7 +184,7 @@ def _numbers(text: bytes) -> np.ndarray:
         try:
             return np.fromstring(text.decode("latin-1"), np.float64, sep=" ")
         except ValueError as error:  # newer NumPy raises where the older stops
-            raise _Damaged("holds something that is no number") from error
+            raise ValueError("holds something that is no number") from error
 
 
 class _Records:
@@ -134,7 +205,7 @@ class _Records:
         n, own = element.count, [self._kind(p.count_kind or p.kind).itemsize for p in element.properties]
         if n * max(sum(own), 1) > data.size - at:
             what = f"claims {n} of '{element.name}' but ends before them"
-            raise _Damaged(f"{what}: it is cut off, or its header is wrong")
+            raise ValueError(f"{what}: it is cut off, or its header is wrong")
         lists = [p for p in element.properties if p.count_kind]
         self.counts = dict(zip((p.name for p in lists), self._lengths(lists, at).T))
         entries = {p.name: self.counts[p.name] * self._kind(p.kind).itemsize for p in lists}
@@ -142,7 +213,7 @@ class _Records:
         place = at + np.cumsum(size) - size
         self.end = at + int(size.sum())
         if self.end > data.size:
-            raise _Damaged(f"ends within its '{element.name}' records, or they are damaged")
+            raise ValueError(f"ends within its '{element.name}' records, or they are damaged")
         self.places: dict[str, np.ndarray] = {}
         for p, bytes_of_it in zip(element.properties, own):
             self.places[p.name] = place + bytes_of_it if p.count_kind else place
@@ -209,12 +280,12 @@ class _Records:
                     at += before
                     (count,) = read_length(self._data.data, at)
                     if not 0 <= count <= size or count != int(count):
-                        raise _Damaged(f"holds a list of {count} entries in '{name}': it is damaged")
+                        raise ValueError(f"holds a list of {count} entries in '{name}': it is damaged")
                     found.append(int(count))
                     at += own + int(count) * each
                 at += gap
         except struct.error:
-            raise _Damaged(f"ends within its '{name}' records: it is cut off") from None
+            raise ValueError(f"ends within its '{name}' records: it is cut off") from None
         return np.array(found, np.int64).reshape(records, len(steps)), at - begin
 
 
@@ -235,7 +306,7 @@ def _triangles(
     bad = ~((entries >= 0) & (entries < len(vertices)) & (entries == np.floor(entries))) & (counts[of_entry] >= 3)
     if bad.any():
         one = int(bad.argmax())
-        raise _Damaged(f"has a face ({of_entry[one]}) that points to vertex {entries[one]} of {len(vertices)}")
+        raise ValueError(f"has a face ({of_entry[one]}) that points to vertex {entries[one]} of {len(vertices)}")
     first, pieces = np.cumsum(counts) - counts, np.maximum(counts - 2, 0)
     face = np.repeat(np.arange(len(counts)), pieces)
     later = (1 + np.arange(len(face)) - np.repeat(np.cumsum(pieces) - pieces, pieces)).astype(np.int32)
@@ -249,3 +320,29 @@ def _triangles(
     corner[turned & (later == 1)] = 0, 1, 3
     corner[turned & (later == 2)] = 1, 2, 3
     return entries[first[face, None] + corner].astype(np.int32), face, corner
+
+
+def ply_bytes(vertices: np.ndarray, faces: Sequence[tuple[np.ndarray, np.ndarray | int]]) -> bytes:
+    """The content of a little-endian PLY file with an object on each face, as `read_ply` reads it.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float32 or float64
+        Stored in that precision.
+    faces : sequence of (index, object_id)
+        Index is (f, k) int, polygons of k corners each; the object is one of each, (f,) int, or of all.
+    """
+    kind = {4: "float", 8: "double"}[vertices.itemsize]
+    records = []
+    for index, object_id in faces:
+        record = np.empty(len(index), [("n", "u1"), ("v", "<i4", index.shape[1]), ("object_id", "<i4")])
+        record["n"], record["v"], record["object_id"] = index.shape[1], index, object_id
+        records.append(record)
+    header = (
+        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertices)}\n"
+        f"property {kind} x\nproperty {kind} y\nproperty {kind} z\n"
+        f"element face {sum(map(len, records))}\nproperty list uchar int vertex_indices\nproperty int object_id\n"
+        "end_header\n"
+    )
+    places = vertices.astype(f"<f{vertices.itemsize}")
+    return b"".join([header.encode(), places.tobytes(), *(record.tobytes() for record in records)])

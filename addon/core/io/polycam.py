@@ -6,7 +6,6 @@ Source: Polycam's polyform, README.md (format); nerfstudio's process_data/polyca
 """
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +73,7 @@ def read(root: Path, reading: Reading) -> Layout:
             margin=round(BORDER * camera.width) if corrected else 0,
         )
 
-    frames, problems = usable(partial(frame, file) for file in listed)
+    frames, problems = usable(frame, listed)
     notes = []
     if not corrected:
         notes.append(
@@ -93,13 +92,7 @@ def read(root: Path, reading: Reading) -> Layout:
 
 
 def _alignment(root: Path) -> np.ndarray | None:
-    """From the mesh's coordinates to those of the cameras, (4, 4); None where they are the same.
-
-    Raises
-    ------
-    BadInputError
-        `mesh_info.json` says what is no such transform.
-    """
+    """From the mesh's coordinates to those of the cameras, (4, 4); None where they are the same."""
     if not (root / MESH_INFO).is_file():
         return None
     told: Any = read_json(root / MESH_INFO).get("alignmentTransform")

@@ -2,7 +2,10 @@
 
 Source: SMPTE RP 177 (primaries and white to XYZ); K. M. Lam's linear Bradford transform (white to white), as ICC.1:2022
 Annex E gives it. Luminance and chroma as OpenEXR stores them: openexr.com, "Technical Introduction"; `ImfRgbaYca`.
+Profiles: ICC.1:2022, 7.2 (header), 7.3 (tag table), 9.2 (redMatrixColumnTag and its like), 10.31 (XYZType).
 """
+
+import struct
 
 import numpy as np
 
@@ -16,6 +19,11 @@ CIE_XYZ: Code[tuple[float, ...]] = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
 MAX_GAIN: Limit[int] = 5000
 """Primaries that need a greater factor span no colours."""
+PROFILE_HEADER: Code[int] = 128
+SAME: Limit[float] = 5e-3
+"""Difference of coefficients up to which a profile is taken for sRGB's: their writers round."""
+FARTHEST: Limit[float] = 10.0
+"""No primaries of cameras or displays are farther from Rec.709's."""
 TAPS = np.array([0.002128, -0.007540, 0.019597, -0.043159, 0.087929, -0.186077, 0.627123])
 """Weights of the stored samples at the distances 13, 11, ... 1 from a pixel between two of them, on each side."""
 
@@ -56,6 +64,37 @@ def to_rec709(rgb: np.ndarray, chromaticities: tuple[float, ...], name: object) 
         raise BadInputError(f"Picture '{name}' names primaries that span no colours; write it in linear Rec.709.")
     with np.errstate(all="ignore"):
         return rgb @ matrix.T.astype(np.float32)
+
+
+def profile_to_rec709(profile: bytes) -> np.ndarray | None:
+    """(3, 3) float32 from linear RGB of an ICC `profile` to Rec.709; None where they are the same or it doesn't tell.
+
+    iPhones write Display P3, which is read as Rec.709 a tenth too pale. Only the primaries are taken: the curve is what
+    `--transfer` says, or is estimated.
+    """
+    try:
+        columns = np.stack([_column(profile, name) for name in (b"rXYZ", b"gXYZ", b"bXYZ")], 1)
+    except (ValueError, struct.error):
+        return None
+    if np.linalg.matrix_rank(columns) < 3:  # they span no colours
+        return None
+    with np.errstate(all="ignore"):
+        matrix = xyz_to_rec709(columns)
+    if not np.abs(matrix).max() <= FARTHEST or np.allclose(matrix, np.eye(3), atol=SAME):
+        return None
+    return matrix.astype(np.float32)
+
+
+def _column(profile: bytes, name: bytes) -> np.ndarray:
+    """A primary's X, Y, Z. Raises ValueError where there is none, struct.error where the profile is cut off."""
+    (count,) = struct.unpack_from(">I", profile, PROFILE_HEADER)
+    for k in range(min(count, len(profile) // 12)):
+        signature, offset, _ = struct.unpack_from(">4sII", profile, PROFILE_HEADER + 4 + 12 * k)
+        if signature == name:
+            kind, *xyz = struct.unpack_from(">4s4x3i", profile, offset)
+            if kind == b"XYZ ":
+                return np.array(xyz) / 65536
+    raise ValueError("no such tag")
 
 
 def to_rgb(y: np.ndarray, ry: np.ndarray, by: np.ndarray, chromaticities: tuple[float, ...]) -> np.ndarray:

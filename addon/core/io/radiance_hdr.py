@@ -67,12 +67,12 @@ class _Header:
             raise BadInputError(f"Picture '{path}' states an EXPOSURE or COLORCORR that can't be; write it again.")
 
 
-def hdr_size(path: Path | str) -> tuple[int, int]:
+def hdr_size(path: Path) -> tuple[int, int]:
     """Width and height in pixels, from the header alone; raises `BadInputError`."""
-    return _Header(read_bytes(Path(path), "Picture ", HEADER_BYTES), Path(path)).size
+    return _Header(read_bytes(path, "Picture ", HEADER_BYTES), path).size
 
 
-def read_hdr(path: Path | str) -> Picture:
+def read_hdr(path: Path) -> Picture:
     """Read the picture `path`: RGBE or XYZE, flat or run-length coded, lines in any of the eight orders.
 
     EXPOSURE and COLORCORR are divided out; colours come as linear Rec.709, which a file without PRIMARIES is taken for.
@@ -82,7 +82,6 @@ def read_hdr(path: Path | str) -> Picture:
     BadInputError
         The file is absent, damaged, cut off, or of another kind.
     """
-    path = Path(path)
     content = read_bytes(path, "Picture ")
     header = _Header(content[:HEADER_BYTES], path)
     lines = _lines(content, header, path)

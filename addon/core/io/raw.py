@@ -26,15 +26,15 @@ TOP: Code[int] = 65535
 """LibRaw's greatest value, at which the sensor clips."""
 
 
-def is_dng(path: Path | str) -> bool:
+def is_dng(path: Path) -> bool:
     """Whether a file that begins as a TIFF is a DNG."""
     try:
-        return DNG_VERSION in exif.read_tags(read_bytes(Path(path), "Picture ", HEAD))
+        return DNG_VERSION in exif.read_tags(read_bytes(path, "Picture ", HEAD))
     except ValueError:  # of another order, or its directory lies behind the pixels
         return False
 
 
-def raw_size(path: Path | str) -> tuple[int, int]:
+def raw_size(path: Path) -> tuple[int, int]:
     """Width and height as stored, in pixels.
 
     Raises
@@ -46,7 +46,7 @@ def raw_size(path: Path | str) -> tuple[int, int]:
         return int(file.sizes.width), int(file.sizes.height)
 
 
-def read_raw(path: Path | str) -> Picture:
+def read_raw(path: Path) -> Picture:
     """Read the DNG `path` as stored, not turned: 1 is where the sensor clips.
 
     Raises
@@ -72,8 +72,7 @@ def read_raw(path: Path | str) -> Picture:
 
 
 @contextmanager
-def _open(path: Path | str) -> Iterator[Any]:
-    """The file; what the library raises becomes one sentence."""
+def _open(path: Path) -> Iterator[Any]:
     try:
         import rawpy
     except ImportError as error:
@@ -83,5 +82,5 @@ def _open(path: Path | str) -> Iterator[Any]:
         ) from error
     with decoding(path), rawpy.imread(str(path)) as file:
         width, height = file.sizes.width, file.sizes.height
-        check_claim(Path(path), width, height, 2 * width * height)
+        check_claim(path, width, height, 2 * width * height)
         yield file

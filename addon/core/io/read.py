@@ -2,7 +2,6 @@
 
 from collections import Counter
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -54,8 +53,9 @@ def read_capture(folder: Path | str, reading: Reading = AS_FOUND) -> Capture:
         raise BadInputError(f"Capture '{root}' {what}; give the folder that holds the mesh and the poses.")
     reader = reader_for(root, reading.format)
     layout = reader.read(root, reading)
-    if layout.names is None:
-        layout = replace(layout, names=instances.names_in(root))
+    listed = root / instances.FILE
+    if layout.names is None and listed.exists():
+        layout = replace(layout, names=instances.read_instances(listed))
     # Told before any header is looked at: of a hundred thousand frames that takes minutes.
     missing = [(frame.path, what) for frame in layout.frames if (what := absence(frame.path))]
     absent = [f"Picture '{path}' {what}; check the capture's paths." for path, what in missing]
@@ -149,7 +149,6 @@ def _pixels(frame: Frame) -> Pixels:
 
 
 def _with(mesh: RawMesh, added: Closing) -> RawMesh:
-    """A mesh with the faces that close its holes."""
     triangles = np.concatenate([mesh.triangles, added.triangles + len(mesh.vertices)]).astype(np.int32)
     uv = None if mesh.uv is None else np.concatenate([mesh.uv, np.zeros((len(added.triangles), 3, 2), np.float32)])
     return replace(mesh, vertices=np.concatenate([mesh.vertices, added.vertices]), triangles=triangles, uv=uv)
@@ -164,7 +163,7 @@ def _usable(root: Path, layout: Layout, outside: bool) -> tuple[list[Frame], lis
         _check_frame(frame)
         return frame
 
-    good, more = usable(partial(checked, frame) for frame in layout.frames)
+    good, more = usable(checked, layout.frames)
     problems, warnings = [*layout.problems, *more], list(layout.notes)
     if problems:
         total, few = _refuse_too_many(root, layout, problems)

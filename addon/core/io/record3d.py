@@ -5,7 +5,6 @@ Source: marek-simonik/record3d, issues 27, 33, 36, 64, 83, 93; nerfstudio's proc
 """
 
 import re
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +64,7 @@ def read(root: Path, reading: Reading) -> Layout:
         pose = read_pose(poses[index] if isinstance(poses[index], list) else [], f"{index}")
         return Frame(f"{index:06d}", pictures[index], _camera(told, index, pose, path))
 
-    frames, problems = usable(partial(frame, index) for index in chosen)
+    frames, problems = usable(frame, chosen)
     notes = [UP]
     if len(chosen) < len(pictures):
         notes.append(f"{len(chosen)} of {len(pictures)} frames were taken, evenly: others show nearly the same.")
@@ -74,7 +73,6 @@ def read(root: Path, reading: Reading) -> Layout:
 
 
 def _parts(root: Path) -> tuple[Path, Path] | None:
-    """The metadata and the folder of pictures, where both are there."""
     metadata = next((root / name for name in METADATA if (root / name).is_file()), None)
     folder = next((root / name for name in FOLDERS if (root / name).is_dir()), None)
     return None if metadata is None or folder is None else (metadata, folder)

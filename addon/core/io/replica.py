@@ -18,12 +18,11 @@ from ..kinds import Code, Limit
 from ..scene.model import KnownMirror
 from ..scene.stored_light import LitTiles
 from . import nerfstudio, traj
-from .files import read_json
+from .files import read_bytes, read_json
 from .formats import FORMATS
 from .instances import FILE, read_instances
 from .layout import Layout, RawMesh, Reader, Reading, holding
 from .ply import PlyMesh, read_ply
-from .ptex import read_sorted_faces
 from .replica_glass import FILE as GLASS
 from .replica_glass import mirrors_of, read_panes
 
@@ -54,9 +53,8 @@ def read(root: Path, reading: Reading) -> Layout:
     if (root / SEMANTIC).is_file():
         ids, far = _object_id(root / SEMANTIC, ply)
         mesh = replace(mesh, object_id=ids)
-        notes += (
-            [f"{far:.1%} of the triangles have no face of '{SEMANTIC}' near; they belong to no object."] if far else []
-        )
+        if far:
+            notes.append(f"{far:.1%} of the triangles have no face of '{SEMANTIC}' near; they belong to no object.")
     elif (root / FILE).is_file():
         names_file = FILE
     if (root / names_file).is_file():
@@ -91,7 +89,7 @@ def _tiles(root: Path, ply: PlyMesh) -> LitTiles:
     quads[ply.face[:, None], ply.corner] = ply.triangles
     if split > 0 and not (root / ORDER).is_file():
         raise BadInputError(f"'{root / ORDER}' is needed to tell whose texture is whose, but is missing; copy it, too.")
-    chunks = read_sorted_faces(root / ORDER, faces) if split > 0 else [np.arange(faces)]
+    chunks = _sorted_faces(root / ORDER, faces) if split > 0 else [np.arange(faces)]
     paths, sides = [], []
     picture, tile = np.zeros(faces, np.int32), np.zeros(faces, np.int32)
     for i, chunk in enumerate(chunks):
@@ -105,6 +103,31 @@ def _tiles(root: Path, ply: PlyMesh) -> LitTiles:
             "that came with them."
         )
     return LitTiles(tuple(paths), tuple(sides), size, picture[ply.face], tile[ply.face], CORNERS[ply.corner])
+
+
+def _sorted_faces(path: Path, faces: int) -> list[np.ndarray]:
+    """Faces of each chunk in its order, from a file: how many chunks (u64); of each, how many faces (u64), which (u32).
+
+    Chunk N's squares are the picture `N-color-ptex.hdr`, row by row in that order, which an unstable sort happened to
+    leave. Raises `BadInputError` where the file does not list each of `faces` faces once.
+    Source: Habitat, `PTexMeshData.cpp`.
+    """
+    content = read_bytes(path, most=64 + 12 * faces)  # more than a chunk for each face takes
+    words = np.frombuffer(content[: len(content) // 4 * 4], "<u4").astype(np.int64)
+    chunks, at = [], 2
+    while at + 2 <= len(words):
+        end = at + 2 + (int(words[at]) | int(words[at + 1]) << 32)
+        if end > len(words):
+            break
+        chunks.append(words[at + 2 : end])
+        at = end
+    listed = np.concatenate(chunks) if chunks else np.zeros(0, np.int64)
+    whole = len(listed) == faces and listed.max(initial=0) < faces and len(np.unique(listed)) == faces
+    if at != len(words) or not whole or len(chunks) != words[0] + (words[1] << 32):
+        raise BadInputError(
+            f"'{path}' does not list each of the mesh's {faces} faces once; take it away or copy it again."
+        )
+    return chunks
 
 
 def _parameters(path: Path) -> tuple[float, int]:

@@ -112,7 +112,6 @@ def objects_of(root: Path, mesh: RawMesh) -> tuple[np.ndarray, dict[int, str]]:
 
 
 def _group(group: Any, i: int, root: Path) -> tuple[int, list[int]]:
-    """Id and segments of an object."""
     number = group.get("objectId", group.get("id")) if isinstance(group, dict) else None
     own = group.get("segments") if isinstance(group, dict) else None
     good = isinstance(own, list) and all(isinstance(one, int) and abs(one) < 2**62 for one in own)
@@ -125,7 +124,6 @@ def _group(group: Any, i: int, root: Path) -> tuple[int, list[int]]:
 
 
 def _undistorted(frames: list[Frame], root: Path) -> list[Frame]:
-    """The frames with the pinhole camera of the undistorted pictures."""
     path = root / PINHOLE
     camera = pinhole(read_json(path), ("w", "h", "fl_x", "fl_y", "cx", "cy"), path)
     return [replace(frame, camera=replace(camera, camera_to_world=frame.camera.camera_to_world)) for frame in frames]

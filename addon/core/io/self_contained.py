@@ -11,7 +11,7 @@ import json
 import re
 import shutil
 import struct
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
@@ -19,6 +19,7 @@ import numpy as np
 
 from ..errors import BadInputError
 from ..kinds import Block, Limit
+from .files import leads_out
 from .gltf_nodes import Placed, is_index, placed_meshes
 
 MAX_JSON: Limit[int] = 1 << 28
@@ -175,13 +176,7 @@ def _count(value: Any) -> float:
 def beside(path: Path, uri: Any, what: str) -> Path:
     """The file that `uri` names, which has to lie in the folder of `path` or below; `what` it is, for messages."""
     name = unquote(uri) if isinstance(uri, str) else ""
-    kinds = PurePosixPath(name), PureWindowsPath(name)
-    if (
-        not name
-        or "\0" in name
-        or "://" in name
-        or any(kind.is_absolute() or kind.drive or kind.root or ".." in kind.parts for kind in kinds)
-    ):
+    if not name or "\0" in name or "://" in name or leads_out(name):
         raise BadInputError(
             f"Mesh '{path}' names the {what} {str(uri)[:80]!r}, which does not lie beside it; "
             "export it as one GLB file."

@@ -6,7 +6,6 @@ its confidence and accelerations are not looked at.
 Source: strayrobots/scanner, docs/format.md, OdometryEncoder.swift, DatasetEncoder.swift, VideoEncoder.swift.
 """
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +62,7 @@ def read(root: Path, reading: Reading) -> Layout:
         pose = read_pose([values.get(key) for key in POSE], name) @ TO_OPENGL
         return Frame(name, picture, Camera(width, height, fx, fy, cx, cy, pose))
 
-    frames, problems = usable(partial(frame, *one) for one in pictures.items())
+    frames, problems = usable(lambda one: frame(*one), pictures.items())
     folder = next(iter(pictures.values())).parent.name
     notes = [
         f"{len(frames)} of {len(rows)} frames are used, of each part of the recording the sharpest; see '{folder}'."

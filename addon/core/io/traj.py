@@ -7,7 +7,6 @@ are not looked at. (Sucar et al., iMAP, ICCV 2021; Zhu et al., NICE-SLAM, CVPR 2
 
 import re
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,12 +35,6 @@ def read(root: Path, reading: Reading) -> Layout:
     BadInputError
         The poses, the camera, the mesh or the list of objects can't be read, or there are no pictures.
     """
-    frames, problems, notes = read_frames(root)
-    return Layout(frames, _mesh(root, reading), problems=problems, notes=notes)
-
-
-def read_frames(root: Path) -> tuple[list[Frame], list[str], list[str]]:
-    """The frames, sentences on those that can't be used, and on what may mean something else."""
     camera = _camera(root)
     lines = _lines(root / POSES)
     pictures = _pictures(root / FOLDER)
@@ -57,10 +50,10 @@ def read_frames(root: Path) -> tuple[list[Frame], list[str], list[str]]:
         pose = check_pose(_matrix(lines[index], name), name)
         return Frame(name, path, replace(camera, camera_to_world=pose @ TO_OPENGL))
 
-    frames, problems = usable(partial(frame, *one) for one in sorted(pictures.items()))
+    frames, problems = usable(lambda one: frame(*one), sorted(pictures.items()))
     idle = len(lines) - len(set(pictures) & set(range(len(lines))))
     notes = [f"{idle} of {len(lines)} lines of {POSES} have no picture."] if idle else []
-    return frames, problems, notes
+    return Layout(frames, _mesh(root, reading), problems=problems, notes=notes)
 
 
 def _camera(root: Path) -> Camera:
@@ -77,7 +70,6 @@ def _camera(root: Path) -> Camera:
 
 
 def _lines(path: Path) -> list[str]:
-    """The lines that hold anything."""
     lines = [line for line in read_text(path).splitlines() if line.strip()]
     if not lines:
         raise BadInputError(f"'{path}' holds no poses; export it again.")

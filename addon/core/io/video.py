@@ -77,7 +77,7 @@ def frames(video: Path, windows: Sequence[np.ndarray]) -> dict[int, Path]:
     StorageError
         The pictures can't be put beside it.
     """
-    with _storing(video):
+    try:
         folder = video.with_name(f"{video.name}-{video.stat().st_size}")
         if not folder.is_dir():
             with tempfile.TemporaryDirectory(dir=video.parent, prefix=TEMPORARY) as scratch:
@@ -88,13 +88,6 @@ def frames(video: Path, windows: Sequence[np.ndarray]) -> dict[int, Path]:
                 if not folder.is_dir():  # another run was not faster
                     os.replace(taken, folder)
         return {int(path.stem): path for path in sorted(folder.glob("*.png")) if path.stem.isdecimal()}
-
-
-@contextmanager
-def _storing(video: Path) -> Iterator[None]:
-    """Turn what the system refuses as pictures are put beside `video` into one sentence."""
-    try:
-        yield
     except OSError as error:
         raise StorageError(
             f"The frames of '{video}' can't be put beside it ({error.strerror or error}); copy the capture to where "
@@ -133,7 +126,6 @@ def _sharpest(video: Path, windows: Sequence[np.ndarray]) -> Iterator[tuple[int,
 
 @contextmanager
 def _opened(video: Path) -> Iterator[tuple[Any, Any]]:
-    """The container and its stream of pictures."""
     try:
         import av
     except ImportError as error:

@@ -45,7 +45,6 @@ def white_of(text: str, capture: Capture) -> White:
 
 
 def _part(name: str, capture: Capture) -> int:
-    """The object_id of a part."""
     wanted = name.casefold()
     whole = [one for one in capture.instances if one.name.casefold() == wanted]
     found = whole or [one for one in capture.instances if wanted in (one.class_name.casefold(), str(one.object_id))]

@@ -22,6 +22,7 @@ from typing import Any
 from ..brdf.model import Brdf
 from ..brdf.registry import find, models
 from ..errors import BadInputError
+from ..io.files import readable
 from ..json_values import is_number, key
 
 OVERRIDES = "overrides.json"
@@ -196,7 +197,6 @@ def read_overrides(path: Path, known: Iterable[int]) -> Overrides:
 
     Parameters
     ----------
-    path : Path
     known : iterable of int
         The capture's objects.
 
@@ -209,9 +209,8 @@ def read_overrides(path: Path, known: Iterable[int]) -> Overrides:
     if not path.is_file():
         raise BadInputError(f"'{path}' is no file; give the JSON file with what is to be overridden.")
     try:
-        told = json.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise BadInputError(f"'{path}' can't be read ({error.strerror or error}); give one that can.") from error
+        with readable(f"'{path}'", "give one that can"):
+            told = json.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise BadInputError(f"'{path}' is not valid JSON ({error}); mend it there.") from error
     return parse(told, f"'{path}'", known)
@@ -232,7 +231,6 @@ def heeded(folder: Path, known: Iterable[int], file: Path | None = None, keep: b
         The result folder.
     known : iterable of int
         The capture's objects.
-    file : Path, optional
     keep : bool
         False leaves out what the folder keeps.
 

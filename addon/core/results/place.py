@@ -55,10 +55,8 @@ def own_folder(parent: Path | str, capture: Path | str) -> Path:
     It is the one that holds the capture's result already, or else does not exist or is empty; it is not made here.
     """
     capture = Path(capture).absolute()
-    for folder in _numbered(Path(parent), capture.name or "room"):
-        if is_free(folder) or capture in captures(folder):
-            return folder
-    raise AssertionError("count() has no end")
+    folders = _numbered(Path(parent), capture.name or "room")
+    return next(folder for folder in folders if is_free(folder) or capture in captures(folder))
 
 
 def free_folder(parent: Path | str, name: str) -> Path:

@@ -14,6 +14,7 @@ import numpy as np
 from ..brdf.material import ObjectMaterial
 from ..brdf.material import from_json as material
 from ..errors import BadInputError, MissingStageError
+from ..io.files import json_if_sound
 from ..scene.lenses_told import lens_of, told_lens
 from ..scene.model import Camera, Capture, Frame, Instance, Mesh, Shot
 from .archive import Damaged, read_archive, write_archive
@@ -64,23 +65,14 @@ def layout_of(folder: Path | str) -> str:
 
 
 def _told(folder: Path | str, name: str) -> str:
-    key = _materials(folder).get(name)
+    key = json_if_sound(Path(folder) / MATERIALS).get(name)
     return key if isinstance(key, str) else ""
-
-
-def _materials(folder: Path | str) -> dict[str, Any]:
-    """What `MATERIALS` tells; nothing where it is absent or damaged."""
-    try:
-        told = json.loads((Path(folder) / MATERIALS).read_text(encoding="utf-8"))
-    except DAMAGE:
-        return {}
-    return told if isinstance(told, dict) else {}
 
 
 def objects_of(folder: Path | str) -> set[int]:
     """The objects of a folder's result, lamps that the run found by itself among them; none where there is none."""
     try:
-        return {int(one["object_id"]) for one in _materials(folder).get("objects", ())}
+        return {int(one["object_id"]) for one in json_if_sound(Path(folder) / MATERIALS).get("objects", ())}
     except DAMAGE:
         return set()
 

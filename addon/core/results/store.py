@@ -168,7 +168,7 @@ class Store:
         return path
 
     def write_exr(self, name: str, array: np.ndarray, half: bool = False) -> Path:
-        """Write the picture `name` (row 0 = top); see `capture.exr.write_exr`. Raises `StorageError`."""
+        """Write the picture `name` (row 0 = top); see `io.exr.write_exr`. Raises `StorageError`."""
         from ..io.exr import write_exr  # not earlier: Blender's start, which knows the store, waits for no library
 
         path = self._parent(name)

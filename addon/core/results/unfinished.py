@@ -24,7 +24,6 @@ def goes_on_with(result: Path | str) -> str:
 
 
 def _time(path: Path) -> float:
-    """When a file was written; 0 where it is absent."""
     try:
         return path.stat().st_mtime
     except OSError:

@@ -51,7 +51,6 @@ def unpacked(told: Any, arrays: Mapping[str, np.ndarray], kinds: Mapping[str, ty
     ----------
     told
         As JSON has it.
-    arrays : mapping of str to array
     kinds : mapping of str to type
         The frozen values that may be in it, by name.
 

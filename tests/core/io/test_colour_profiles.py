@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.io.icc import profile_to_rec709
 from addon.core.io.oiio import _library, read_coded
 from addon.core.io.pictures import read_picture
 from addon.core.io.pixels import as_codes, read_pixels
+from addon.core.io.primaries import profile_to_rec709
 from addon.core.scene.model import AUTO, Camera, Frame
 
 SRGB = [(0.43607, 0.22249, 0.01392), (0.38515, 0.71687, 0.09708), (0.14307, 0.06061, 0.71410)]

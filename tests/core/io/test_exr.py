@@ -308,13 +308,14 @@ def test_what_is_no_picture(tmp_path):
 
 DAMAGED = """
 import resource, sys, time
+from pathlib import Path
 from addon.core.io.exr import read_exr
 from addon.core.errors import BadInputError
 resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
 for path in sys.argv[1:]:
     started = time.monotonic()
     try:
-        read_exr(path)
+        read_exr(Path(path))
     except BadInputError as error:
         assert path in str(error) and str(error).endswith(".") and "\\n" not in str(error), str(error)
     assert time.monotonic() - started < 10, path  # hangs, not slowness

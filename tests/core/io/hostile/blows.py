@@ -27,6 +27,7 @@ READERS = {
 """What a kind of picture is read with, the reader of its pixels last."""
 CHILD = """
 import resource, signal, sys
+from pathlib import Path
 from addon.core.errors import BadInputError
 {imports}
 resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
@@ -37,7 +38,7 @@ for path in sys.argv[1:]:
     signal.alarm(10)  # a hang ends the process
     for read in readers:
         try:
-            read(path)
+            read(Path(path))
             good += read is readers[-1]
         except BadInputError as error:
             assert path in str(error) and str(error).endswith(".") and "\\n" not in str(error), str(error)
