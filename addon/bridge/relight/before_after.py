@@ -23,7 +23,6 @@ from .setup import captured_light
 NAME = "Before and After"
 """Name of the image in Blender."""
 COPY = "scene.blend"
-WEIGHTS = {"before": 1, "after": 1}
 
 
 def render_pair(scene: bpy.types.Scene, out: Path, progress: Progress | None = None) -> None:
