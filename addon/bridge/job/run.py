@@ -129,8 +129,7 @@ def refit(
 def write_recovered(done: Recovery | Refit, facing: Capture, fresh: bool) -> tuple[str, ...]:
     """Write scene.blend of what was recovered; `facing`: the capture with the mesh that is written."""
     uv, materials, folder = done.surface().shown_uv, done.materials(), done.store.folder
-    how = {"fresh": fresh, "facing": True, "parts": done.parts}
-    return write_scene(folder / SCENE, facing, uv, materials, folder, done.median_radiance, **how)
+    return write_scene(folder / SCENE, facing, uv, materials, folder, done.median_radiance, fresh, done.parts)
 
 
 def versions() -> dict[str, str]:

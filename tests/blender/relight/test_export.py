@@ -15,7 +15,6 @@ from addon.bridge.data.arrays import make_mesh  # noqa: E402
 from addon.bridge.data.images import image_array, load_image  # noqa: E402
 from addon.bridge.data.materials import make_material  # noqa: E402
 from addon.bridge.data.mesh_objects import ATLAS_UV, PARTS_UV  # noqa: E402
-from addon.bridge.data.nodes import set_world  # noqa: E402
 from addon.bridge.export import export as exporting  # noqa: E402
 from addon.bridge.light import lamps  # noqa: E402
 from addon.bridge.marks import OBJECT_ID, UV_MAP  # noqa: E402
@@ -28,6 +27,7 @@ from addon.core.brdf.metal import METAL  # noqa: E402
 from addon.core.errors import BadInputError, StorageError  # noqa: E402
 from addon.core.io.exr import write_exr  # noqa: E402
 from addon.core.photo import encoded  # noqa: E402
+from tests.blender.conftest import set_world  # noqa: E402
 
 COLOUR = (0.5, 0.1, 0.02)
 UV = np.float32([[0.1, 0.1], [0.9, 0.1], [0.9, 0.8]])
