@@ -35,19 +35,13 @@ class Brought:
         Where the room is to be seen: the scene that was named, or the room's own.
     collection : bpy.types.Collection
         The room's.
-    updated : bool
-        It was in the file already.
     warnings : tuple of str
         What was left as the artist has it, one sentence each.
-    changes : tuple of dict
-        Objects that were found to be notably different from last time: `object_id`, `name` and `text`, the sentence.
     """
 
     scene: bpy.types.Scene
     collection: bpy.types.Collection
-    updated: bool = False
     warnings: tuple[str, ...] = ()
-    changes: tuple[dict, ...] = ()
 
 
 def bringing(
@@ -131,10 +125,9 @@ def bringing(
     made.remove_unused(steps.replaced if steps is not None else ())
     for one, label in steps.names if steps is not None else ():
         one.name = label
-    brought = Brought(place, top, steps is not None, (*warnings, *kept), differences)
     yield 0.98
     ready(place)
-    return brought
+    return Brought(place, top, (*warnings, *kept))
 
 
 def ready(scene: bpy.types.Scene) -> None:
