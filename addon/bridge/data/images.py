@@ -21,7 +21,7 @@ DATA = "Non-Color"
 
 
 def load_image(
-    path: Path | str, name: str | None = None, colour_space: str = RADIANCE, packed: bool = False, keep: bool = True
+    path: Path | str, name: str | None = None, colour_space: str = RADIANCE, keep: bool = True
 ) -> bpy.types.Image:
     """Link an image file of a result folder; it is marked (`marks.IMAGE`) with where it came from.
 
@@ -33,8 +33,6 @@ def load_image(
         Name of the image in Blender; the file's stem if left out.
     colour_space : str
         `RADIANCE` or `DATA`.
-    packed : bool
-        Store the file's bytes within the .blend.
     keep : bool
         Give it a fake user, so that it is saved although no material shows it.
 
@@ -66,8 +64,6 @@ def load_image(
     layout = layout_of(result_of(path))
     if layout:
         image[LAYOUT] = layout
-    if packed:
-        image.pack()
     return image
 
 
