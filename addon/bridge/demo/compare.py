@@ -60,7 +60,7 @@ def seen_albedo(capture: Capture) -> dict[int, np.ndarray]:
     scene = RayScene(capture.mesh.vertices, capture.mesh.triangles)
     means = {}
     for thing in room():
-        points, colours, share = thing.samples(max(64, 6000 // len(thing.quads)))
+        points, colours, share = thing.samples()
         normals = np.repeat(thing.normals(), points.shape[1], 0)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         points = points.reshape(-1, 3) + 1e-4 * normals

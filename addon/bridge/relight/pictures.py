@@ -24,6 +24,8 @@ FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32"), ".jpg": ("JPEG", "8
 CYCLES, EEVEE = "CYCLES", "EEVEE"
 _SLOT = "Scan Relight"
 """Name of the slot of Blender's Render Result for pictures that only measure something."""
+_SMALL = 64
+"""Pixels of their width."""
 _RENDER = (
     "engine filepath resolution_x resolution_y resolution_percentage pixel_aspect_x pixel_aspect_y film_transparent "
     "use_border use_file_extension use_compositing use_sequencer use_overwrite use_placeholder"
@@ -128,15 +130,15 @@ def shoot(scene: bpy.types.Scene, path: Path | str) -> None:
             )
 
 
-def small_median(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 16, width: int = 64) -> float:
+def small_median(scene: bpy.types.Scene, engine: str = CYCLES, samples: int = 16) -> float:
     """Median luminance of a small picture through the scene's camera, linear; the scene's settings stay."""
     from ...core.io.exr import read_exr  # not earlier: Blender's start should not wait for OpenEXR
 
     with tempfile.TemporaryDirectory(prefix="scan_relight_") as folder, result_kept(), settings_kept(scene):
         prepare(scene, engine, samples)
         render = scene.render
-        render.resolution_y = max(round(width * render.resolution_y / render.resolution_x), 8)
-        render.resolution_x, render.resolution_percentage = width, 100
+        render.resolution_y = max(round(_SMALL * render.resolution_y / render.resolution_x), 8)
+        render.resolution_x, render.resolution_percentage = _SMALL, 100
         if engine == CYCLES:
             scene.cycles.use_denoising = False
         shoot(scene, Path(folder) / "small.exr")
