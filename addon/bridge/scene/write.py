@@ -1,4 +1,4 @@
-"""The recovered room as a Blender scene: built into any scene, or saved as a file that renders when opened."""
+"""The recovered room as a Blender scene, saved as a file that renders when opened."""
 
 import errno
 import math
@@ -39,45 +39,16 @@ SCENE_FILES = "scene.blend", _WRITING
 """A result's own file of its room; what it is called while it is written."""
 
 
-def build_scene(
+def _build(
     scene: bpy.types.Scene,
     capture: Capture,
     atlas_uv: np.ndarray,
     materials: Iterable[ObjectMaterial],
-    result_folder: Path | str,
-    median_radiance: float = 0.0,
-    parts: "Parts | None" = None,
+    folder: Path,
+    median_radiance: float,
+    parts: "Parts | None",
 ) -> tuple[list[bpy.types.Image], tuple[str, ...]]:
-    """Make an empty scene that of the recovered room: a collection "Scan Relight", world, camera, engine, exposure.
-
-    Parameters
-    ----------
-    capture : Capture
-        The mesh's normals face the frames: a lamp that is an open sheet shines on that side only, as it was seen.
-    atlas_uv : (t, 3, 2) float32
-        What `unwrap` gave.
-    materials : iterable of ObjectMaterial
-        An instance without one becomes lambertian.
-    result_folder : Path or str
-        Holds the images, see `BASE_COLOR` and its neighbours.
-    median_radiance : float
-        Of the frames; the exposure is set so that this becomes middle grey. 0: unknown.
-    parts : Parts, optional
-        Images that the materials show instead of the room's one; that is there all the same.
-
-    Returns
-    -------
-    images : list of bpy.types.Image
-        All that refer to files of the result folder.
-    warnings : tuple of str
-        One sentence each.
-
-    Raises
-    ------
-    BadInputError
-        An image of the result folder can't be read.
-    """
-    folder = Path(result_folder).absolute()
+    """Make an empty scene that of the room; returns the images that it refers to, and warnings."""
     images = {
         name: load_image(folder / name, image_name(capture.root.name, name), keep=name != ENVIRONMENT)
         for name in (BASE_COLOR, ALBEDO, SHADING, ENVIRONMENT)
@@ -166,11 +137,21 @@ def write_scene(
     ----------
     path : Path or str
         Best within `result_folder`, so that both are moved together.
-    capture, atlas_uv, materials, result_folder, median_radiance, parts
-        See `build_scene`.
+    capture : Capture
+        The mesh's normals face the frames: a lamp that is an open sheet shines on that side only, as it was seen.
+    atlas_uv : (t, 3, 2) float32
+        What `unwrap` gave.
+    materials : iterable of ObjectMaterial
+        An instance without one becomes lambertian.
+    result_folder : Path or str
+        Holds the images, see `BASE_COLOR` and its neighbours.
+    median_radiance : float
+        Of the frames; the exposure is set so that this becomes middle grey. 0: unknown.
     fresh : bool
         Start from an empty file; what is open in this process is lost. False: build next to what is open, save that
         part alone and take it away again.
+    parts : Parts, optional
+        Images that the materials show instead of the room's one; that is there all the same.
 
     Returns
     -------
@@ -194,7 +175,9 @@ def write_scene(
         made = Made()
         scene = bpy.data.scenes.new("Scan Relight")
     try:
-        images, warnings = build_scene(scene, capture, atlas_uv, materials, result_folder, median_radiance, parts)
+        images, warnings = _build(
+            scene, capture, atlas_uv, materials, Path(result_folder).absolute(), median_radiance, parts
+        )
         for image in images:
             relative_to(image, path.parent)
         _save_whole(path, scene, images, fresh)
