@@ -1,6 +1,7 @@
 """Data that is added to the open file: so that it can be taken away again, and in collections of its own."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 import bpy
 
@@ -40,6 +41,16 @@ class Made:
                 and not one.library
             ]:
                 bpy.data.batch_remove(found)
+
+
+@contextmanager
+def scene_apart(name: str) -> Iterator[tuple[bpy.types.Scene, Made]]:
+    """A scene of its own; it goes with all that came into the file meanwhile, and nothing else changes."""
+    made = Made()
+    try:
+        yield bpy.data.scenes.new(name), made
+    finally:
+        made.remove()
 
 
 def _known(scene: bpy.types.Scene, name: str) -> bpy.types.Collection | None:

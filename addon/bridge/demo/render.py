@@ -11,7 +11,7 @@ from ...core.brdf.compensation import ior_of
 from ...core.io.exr import read_header
 from ...core.kinds import Workload
 from ...core.progress import Progress
-from ..data.added import Made
+from ..data.added import scene_apart
 from ..data.arrays import set_layer
 from ..data.images import array_image
 from ..data.materials import BASE_COLOR, plain_material, principled, texture
@@ -72,9 +72,7 @@ def stamp_of(size: str) -> dict:
 
 def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int], samples: int, progress: Progress):
     """Render the room from every pose into the capture `folder`, as half-float EXR in linear Rec.709."""
-    made = Made()
-    scene = bpy.data.scenes.new("demo")
-    try:
+    with scene_apart("demo") as (scene, _):
         for thing in things:
             scene.collection.objects.link(build(thing))
         camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
@@ -91,8 +89,6 @@ def render_frames(folder: Path, things, poses: np.ndarray, size: tuple[int, int]
             bpy.ops.render.render(write_still=True, scene=scene.name)
             read_header(folder / frame_path(k))  # raises where it is absent or cut off
         progress.update(1.0)
-    finally:
-        made.remove()
 
 
 def set_up_cycles(scene, size: tuple[int, int], samples: int) -> None:
