@@ -25,7 +25,9 @@ def set_world(scene, path, strength=1.0):
     from addon.bridge.data.images import load_image
     from addon.bridge.data.nodes import make_world
 
-    scene.world = make_world("Scan Relight", path and load_image(path, keep=False), strength)
+    scene.world = make_world(
+        "Scan Relight", path and load_image(path, "Scan Relight environment", keep=False), strength
+    )
     return scene.world
 
 
