@@ -30,15 +30,14 @@ class View:
     ----------
     camera : Camera
         In the pixels of the picture; its pose in Blender's units.
-    exposure, saturation : float or None
-        The camera's custom properties of these names; see `core.scene.model.Frame`.
+    told : dict of str to float
+        `exposure` and `saturation`, where the camera's `PROPERTIES` say them; see `core.scene.model.Frame`.
     """
 
     name: str
     camera: Camera
     path: Path
-    exposure: float | None = None
-    saturation: float | None = None
+    told: dict[str, float]
 
 
 def pixel_lens(data: bpy.types.Camera, width: float, height: float, aspect: float = 1.0) -> tuple[float, ...]:
@@ -199,7 +198,7 @@ def _view(scene, depsgraph, thing, moment, name) -> View:
         raise BadInputError(f"The background of camera '{thing.name}' is moved, scaled, turned or flipped; reset it.")
     path = picture(back, moment, thing.name)
     camera = camera_of(thing.evaluated_get(depsgraph), read_header(path), frame_size(scene, thing), back.frame_method)
-    return View(name, camera, path, **{name: float(thing[key]) for key, name in PROPERTIES if key in thing})
+    return View(name, camera, path, {told: float(thing[key]) for key, told in PROPERTIES if key in thing})
 
 
 def picture(back: bpy.types.CameraBackgroundImage, moment: int, owner: str) -> Path:

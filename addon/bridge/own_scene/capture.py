@@ -172,8 +172,7 @@ def _write(folder: Path, mesh: SceneMesh, parts: list[Part], views: list[scene_c
         frame |= {"cx": camera.cx, "cy": camera.cy, "transform_matrix": pose.tolist()}
         if camera.lens is not None:
             frame[OWN_LENS] = told_lens(camera.lens)
-        known = {key: getattr(view, key) for key in ("exposure", "saturation")}
-        frames.append(frame | {key: value for key, value in known.items() if value is not None})
+        frames.append(frame | view.told)
     _json(folder / "transforms.json", {"camera_model": "PINHOLE", "frames": frames})
     told = [
         Source(one.object_id, one.name, one.thing.name, one.own, one.topology, mesh.corner_start[one.object_id])
