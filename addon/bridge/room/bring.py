@@ -22,7 +22,6 @@ from ..scene.parts import dress, find_room, hide_cameras, imported, own_scene, r
 from .update import commit, note_known, plan
 
 SCENE_FILE = "scene.blend"
-__all__ = ["Brought", "bringing", "link_room", "rooms"]
 
 
 @dataclass(frozen=True)
