@@ -1,7 +1,6 @@
 """What a new light or thing has to know of the room: its bounds, what is looked at, what is hit, how bright it is."""
 
 import math
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import bpy
@@ -69,14 +68,6 @@ def leaves(scene: bpy.types.Scene, origin: Vector, direction: Vector) -> bool:
             return False
         origin = hit.place + direction.normalized() * 1e-4
     return False
-
-
-def sphere(count: int) -> Iterator[Vector]:
-    """Unit directions, spread evenly over all of them."""
-    for k in range(count):
-        angle, z = math.pi * (3 - math.sqrt(5)) * k, 1 - (2 * k + 1) / count
-        level = math.sqrt(1 - z * z)
-        yield Vector((level * math.cos(angle), level * math.sin(angle), z))
 
 
 def depsgraph_of(scene: bpy.types.Scene) -> bpy.types.Depsgraph:

@@ -16,11 +16,12 @@ import numpy as np
 from mathutils import Vector
 
 from ...core.brdf.lambertian import USUAL_ALBEDO
+from ...core.scene.sphere import fibonacci
 from ..data.arrays import triangles_of, vertices_of
 from ..light import lamps as relight_lamps
 from ..light import outside
 from ..light.kelvin import luminance
-from ..light.room import PICTURE, bounds, cast, leaves, picture_ray, sphere
+from ..light.room import PICTURE, bounds, cast, leaves, picture_ray
 from ..light.units import LUMENS_PER_WATT, efficacy
 
 _AROUND, _ON_LAMP = 64, 6
@@ -118,7 +119,7 @@ def _places(scene) -> tuple[list, int, np.ndarray]:
     seen = len(hits := [hit for ray in rays if (hit := cast(scene, *ray)) and not _is_lamp(hit.thing)])
     areas = []
     for start in (scene.camera.matrix_world.translation, sum(bounds(scene), Vector()) / 2):
-        for direction in sphere(_AROUND):
+        for direction in map(Vector, fibonacci(_AROUND)):
             hit = cast(scene, start, direction)
             if hit is not None and not _is_lamp(hit.thing):
                 hits.append(hit)
