@@ -243,8 +243,7 @@ def _track(old: bpy.types.Object, new: bpy.types.Object, steps: Steps) -> None:
         steps.replaced.append(animated.action.session_uid)
         steps.names.append((new.animation_data.action, animated.action.name))
     animated.action = new.animation_data.action
-    if hasattr(animated, "action_slot"):
-        animated.action_slot = new.animation_data.action_slot
+    animated.action_slot = new.animation_data.action_slot
 
 
 def atlas_onto(data: bpy.types.Mesh, place: Matrix, source: bpy.types.Mesh, source_place: Matrix) -> None:
