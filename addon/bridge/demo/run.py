@@ -8,6 +8,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.atomic import write_bytes
+from ...core.io.folder import SCENE
 from ...core.kinds import Workload
 from ...core.pipeline.run import WEIGHTS
 from ...core.progress import Progress, ProgressEvent
@@ -62,7 +63,7 @@ def run_demo(
     progress.done(stored)
     run(capture, out, settings, progress)
     progress.stage("pictures")
-    bpy.ops.wm.open_mainfile(filepath=str((out / "scene.blend").absolute()))
+    bpy.ops.wm.open_mainfile(filepath=str((out / SCENE).absolute()))
     table = comparison(capture, out)
     write_bytes(out / "comparison.txt", f"{table}\n".encode())
     pictures(out, size, progress)

@@ -7,13 +7,13 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import BadInputError
+from ...core.io.folder import SCENE
 from ...core.progress import Progress
 from ..data.cameras import frame_cameras, use_camera
 from ..light import lamps as relight_lamps
 from ..light import outside
 from ..light.kelvin import rgb_of
 from ..render_device import use_device
-from .before_after import COPY as SCENE
 from .before_after import render_pair
 from .lights import SOFTBOX, SPOT, SUN, WINDOW, add_light
 from .pictures import CYCLES, check_format, prepare, seconds_expected, settings_kept, shoot, ticking

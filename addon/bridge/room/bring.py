@@ -11,6 +11,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import BadInputError, MissingStageError
+from ...core.io.folder import SCENE
 from ...core.results.room_file import ROOM, root_of, run_of
 from ..data.added import Made
 from ..data.cameras import show_camera
@@ -20,8 +21,6 @@ from ..results import images
 from ..scene.as_made import stamp, stamp_tree
 from ..scene.parts import dress, find_room, hide_cameras, imported, own_scene, rooms, scene_name, take_settings
 from .update import commit, note_known, plan
-
-SCENE_FILE = "scene.blend"
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ def bringing(
     made = Made()
     try:
         yield 0.0
-        shell = _append(folder / SCENE_FILE)
+        shell = _append(folder / SCENE)
         yield 0.4
         fresh = next(iter(rooms(shell)), shell.collection.children[0])  # an older one is not marked
         run = run_of(folder)

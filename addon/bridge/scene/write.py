@@ -13,6 +13,7 @@ import numpy as np
 
 from ...core.brdf.emitter import EMITTER
 from ...core.brdf.material import ObjectMaterial, undescribed
+from ...core.io.folder import SCENE
 from ...core.luminance import rgb
 from ...core.photo import MIDDLE_GREY
 from ...core.results.room_file import openings_of, run_of
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 BASE_COLOR, ALBEDO, SHADING, ENVIRONMENT = "base_color.exr", "albedo.exr", "shading.exr", "environment.exr"
 """Files of the result folder that the scene shows; a missing one is left out."""
 _WRITING = ".scene-being-written.blend"
-SCENE_FILES = "scene.blend", _WRITING
+SCENE_FILES = SCENE, _WRITING
 """A result's own file of its room; what it is called while it is written."""
 
 
