@@ -172,11 +172,7 @@ def reapply(thing: bpy.types.Object) -> list[str]:
     """Bring back what the artist did to an object whose mesh or material a run has just made anew.
 
     Its corrected values, its painted image, its smooth shading. For whoever updates a room, at the end of each object.
-
-    Returns
-    -------
-    list of str
-        Sentences on what no longer fits.
+    Returns sentences on what no longer fits.
     """
     if thing.type == "MESH" and SMOOTH in thing and not thing.data.library:
         _shade(thing.data, thing[SMOOTH])
@@ -192,12 +188,7 @@ def smooth(things: Iterable[bpy.types.Object], angle: float) -> int:
     """Shade objects smooth but for edges sharper than `angle` radians; 0 makes them flat again.
 
     The scan's geometric normals are what the light was divided by; smoothing changes how it is shown, not what was
-    found.
-
-    Returns
-    -------
-    int
-        How many meshes were changed.
+    found. Returns how many meshes were changed.
     """
     changed = set()
     for thing in things:

@@ -108,13 +108,7 @@ def restore(things: Iterable[bpy.types.Object], discard: bool = False) -> int:
 
 
 def reapply(thing: bpy.types.Object) -> list[str]:
-    """Show what was painted on an object again whose mesh or material a run has just made anew.
-
-    Returns
-    -------
-    list of str
-        Sentences on what no longer fits.
-    """
+    """Show what was painted on an object again whose mesh or material is new; sentences on what no longer fits."""
     image, node = painted(thing), texture_node(thing)
     if image is None or node is None or node.image == image:
         return []

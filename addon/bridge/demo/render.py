@@ -23,13 +23,12 @@ from .room import FIELD_OF_VIEW, Paint, Thing, frame_path, room, tour, write_all
 SIZES = {"tiny": (10, 64, 48, 24), "small": (36, 160, 120, 24), "large": (64, 320, 240, 128)}
 """Frames, width, height and samples for each pixel."""
 
-FORMAT: Workload[int] = (
-    3  # raise when the room or its rendering changes, so that an older capture is not taken for this one
-)
+FORMAT: Workload[int] = 3
+"""Raised when the room or its rendering changes, so that an older capture is not taken for this one."""
 
 
 def render_capture(folder: Path, size: str = "small", progress: Progress | None = None) -> Path:
-    """Render the demo's room into `folder`, unless it is there already.
+    """Render the demo's room into `folder`, unless it is there already; returns `folder`.
 
     Parameters
     ----------
@@ -38,11 +37,6 @@ def render_capture(folder: Path, size: str = "small", progress: Progress | None 
         only the demo's comparison reads.
     size : str
         One of `SIZES`.
-
-    Returns
-    -------
-    Path
-        `folder`.
     """
     folder, progress = Path(folder), progress or Progress()
     if is_rendered(folder, size):

@@ -105,13 +105,7 @@ def dress(scene: bpy.types.Scene) -> None:
 
 
 def take_settings(scene: bpy.types.Scene, shell: bpy.types.Scene) -> list[str]:
-    """Bring a room's own scene up to date with the scene of a new result; what the artist changed stays.
-
-    Returns
-    -------
-    list of str
-        One sentence on each thing that stays hers.
-    """
+    """Bring a room's own scene up to date with a new result's; a sentence on each thing that stays the artist's."""
     kept = []
     if EXPOSURE not in scene:  # the capture was imported, no more
         for name in _RENDER:
