@@ -79,7 +79,7 @@ def unwrap(mesh: Mesh, size: int = 4096, margin_texels: float = 2.0, polygons: P
         polygons = polygons._replace(corner=polygons.corner[whole])
     if len(triangles):
         uv[whole] = _unwrapped(mesh.vertices, triangles, object_id, size, margin_texels, polygons)
-    return np.clip(np.nan_to_num(uv, nan=0.0, posinf=0.0, neginf=0.0), 0, 1)
+    return np.clip(uv, 0, 1)
 
 
 def _with_more(polygons, triangles):

@@ -7,6 +7,7 @@ import bpy
 from ...core.errors import MissingStageError
 from ..light import outside
 from ..marks import CAPTURE, OWN_SCENE
+from ..render_device import preferences_of_cycles
 from .as_made import WRITTEN, is_corrected
 
 ROOM, LAMPS, CAMERAS = "Room", "Lamps", "Cameras"
@@ -98,9 +99,8 @@ _RENDER = ("engine", "resolution_x", "resolution_y", "resolution_percentage", "p
 def dress(scene: bpy.types.Scene) -> None:
     """Prepare a room's own scene for this artist: her graphics card, a viewport that calms down quickly."""
     scene[EXPOSURE] = scene.view_settings.exposure
-    addon = bpy.context.preferences.addons.get("cycles")
-    card = addon is not None and addon.preferences is not None and addon.preferences.has_active_device()
-    scene.cycles.device = "GPU" if card else "CPU"
+    preferences = preferences_of_cycles()
+    scene.cycles.device = "GPU" if preferences is not None and preferences.has_active_device() else "CPU"
     scene.cycles.use_preview_denoising = True
 
 
