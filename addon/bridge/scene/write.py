@@ -4,7 +4,7 @@ import errno
 import math
 import os
 from collections.abc import Iterable
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ from ...core.luminance import rgb
 from ...core.photo import MIDDLE_GREY
 from ...core.results.room_file import openings_of, run_of
 from ...core.scene.model import Capture
-from ..data.added import Made
+from ..data.added import scene_apart
 from ..data.arrays import make_mesh
 from ..data.cameras import best_view, differing, make_cameras, make_track, make_view, unlike, use_camera
 from ..data.images import image_name, load_image, load_parts, relative_to
@@ -170,21 +170,13 @@ def write_scene(
     if fresh:
         # Not read_factory_settings: that would disable the running extension itself.
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        scene = bpy.context.scene
-        scene.name = "Scan Relight"
-    else:
-        made = Made()
-        scene = bpy.data.scenes.new("Scan Relight")
-    try:
+    with nullcontext((bpy.context.scene, None)) if fresh else scene_apart("Scan Relight") as (scene, _):
         images, warnings = _build(
             scene, capture, atlas_uv, materials, Path(result_folder).absolute(), median_radiance, parts
         )
         for image in images:
             relative_to(image, path.parent)
         _save_whole(path, scene, images, fresh)
-    finally:
-        if not fresh:
-            made.remove()
     return warnings
 
 
