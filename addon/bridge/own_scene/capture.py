@@ -20,18 +20,16 @@ from ...core.io.layout import RawMesh
 from ...core.io.mesh_repair import repair
 from ...core.io.nerfstudio_camera import OWN_LENS
 from ...core.io.ply_write import ply_bytes
-from ...core.kinds import Shown
 from ...core.scene.lenses_told import told_lens
 from ...core.scene.model import Mesh
 from ..data.unwrap import Polygons
-from ..refused import whole_folder
+from ..refused import MAX_TOLD, sentences, whole_folder
 from . import cameras as scene_cameras
 from .mesh import Part, SceneMesh, gather, joined
 
 FOLDER = "scene_capture"
 """Where a result folder keeps the capture that was made of the open scene."""
 OBJECTS, FACES = "scene.json", "faces.npz"
-MAX_TOLD: Shown[int] = 3
 
 
 @dataclass(frozen=True)
@@ -140,21 +138,6 @@ def _doubts(parts: list[Part]) -> tuple[str, ...]:
     return sentences(
         (made, "modifiers or instances make the faces, so the materials can only go onto a copy"),
         (linked, f"linked from another file, so the materials can't go there; {local}"),
-    )
-
-
-def sentences(*told: tuple[list[str], str]) -> tuple[str, ...]:
-    """One on all objects of which the same is to be said, by their names; none where there are none."""
-    return tuple(f"{few(names)}: {what}." for names, what in told if names)
-
-
-def few(names: list[str]) -> str:
-    """The objects of these names, for a sentence: the first ones, and how many more."""
-    shown = ", ".join(f"'{name}'" for name in names[:MAX_TOLD])
-    return (
-        f"Objects {shown} and {len(names) - MAX_TOLD} more"
-        if len(names) > MAX_TOLD
-        else f"Object{'s' if len(names) > 1 else ''} {shown}"
     )
 
 

@@ -22,8 +22,9 @@ from ..data.materials import MODEL, make_material
 from ..data.mesh_objects import ATLAS_UV
 from ..light.room import depsgraph_of
 from ..marks import OBJECT_ID, RESULT, RUN, mark
+from ..refused import sentences
 from ..results import images
-from .capture import Source, check_own, polygons_of, sentences, sources
+from .capture import Source, check_own, polygons_of, sources
 from .mesh import Part, gather, same_topology, topology_hash
 
 BEFORE = "scan_relight_before"
