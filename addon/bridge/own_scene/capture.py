@@ -27,8 +27,6 @@ from ..refused import MAX_TOLD, sentences, whole_folder
 from . import cameras as scene_cameras
 from .mesh import Part, SceneMesh, gather, joined
 
-FOLDER = "scene_capture"
-"""Where a result folder keeps the capture that was made of the open scene."""
 OBJECTS, FACES = "scene.json", "faces.npz"
 
 

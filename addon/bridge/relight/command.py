@@ -32,7 +32,7 @@ class Light:
     hdri : Path or None
         Picture to put around the room.
     added : dict of str to (float, str)
-        Strength of each new light and its unit (`light.units.UNITS`), by `relight.lights.PRESETS`.
+        Strength of each new light and its unit (`light.units.ROOM` and its neighbours), by `relight.lights.PRESETS`.
     kelvin : float or None
         Temperature of the new lights; None: what suits each.
     """
