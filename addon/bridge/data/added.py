@@ -67,9 +67,8 @@ def own_collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
     return part
 
 
-def remove_own(scene: bpy.types.Scene, name: str, things: Iterable[bpy.types.Object]) -> int:
+def remove_own(scene: bpy.types.Scene, name: str, things: list[bpy.types.Object]) -> int:
     """Take things away with their data, and the collection `name` once it is empty; returns how many."""
-    things = list(things)
     data = {thing.data for thing in things}
     bpy.data.batch_remove(things)
     bpy.data.batch_remove([one for one in data if not one.users])

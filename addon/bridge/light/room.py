@@ -17,8 +17,8 @@ from ..marks import OBJECT_ID
 
 ROOM_LIGHT = "scan_relight_room_light"
 """Custom property of the scene: median irradiance of the scanned room, in the frames' unit."""
-PICTURE = 11
-"""Rays along a side of the picture, where what it shows is looked at."""
+PICTURE = tuple(((k % 11 + 0.5) / 11, (k // 11 + 0.5) / 11) for k in range(11 * 11))
+"""Places of the picture, as `picture_ray` takes them, at which what it shows is looked at."""
 VIEW, CURSOR, OBJECT = "VIEW", "CURSOR", "OBJECT"
 
 

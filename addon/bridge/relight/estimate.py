@@ -114,8 +114,7 @@ def _rounded(thing) -> tuple:
 
 def _places(scene) -> tuple[list, int, np.ndarray]:
     """The first fields of `Known`; no place is on a lamp."""
-    corners = [(k + 0.5) / PICTURE for k in range(PICTURE)]
-    rays = [picture_ray(scene, x, y) for y in corners for x in corners]
+    rays = [picture_ray(scene, *place) for place in PICTURE]
     seen = len(hits := [hit for ray in rays if (hit := cast(scene, *ray)) and not _is_lamp(hit.thing)])
     areas = []
     for start in (scene.camera.matrix_world.translation, sum(bounds(scene), Vector()) / 2):

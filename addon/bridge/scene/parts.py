@@ -49,8 +49,7 @@ def scene_name(capture_folder: Path | str) -> str:
 
 def part_of(top: bpy.types.Collection, name: str) -> bpy.types.Collection:
     """One of a room's parts; the room's own collection where the artist took it away."""
-    found = [part for part in top.children_recursive if part.get(PART, part.name.split(".")[0]) == name]
-    return found[0] if found else top
+    return next((part for part in top.children_recursive if part.get(PART, part.name.split(".")[0]) == name), top)
 
 
 def rooms(scene: bpy.types.Scene) -> list[bpy.types.Collection]:
