@@ -24,11 +24,12 @@ NAME = "Before and After"
 """Name of the image in Blender."""
 
 
-def render_pair(scene: bpy.types.Scene, out: Path, progress: Progress) -> None:
+def render_pair(scene: bpy.types.Scene, out: Path, progress: Progress | None = None) -> None:
     """Render both pictures, one after the other, and save them side by side; within `pictures.settings_kept`."""
     ending = check_format(out)
     if scene.camera is None:
         raise BadInputError("The scene has no camera to render through; choose a frame of the capture first.")
+    progress = progress or Progress()
     with refused(f"'{out}' can't be written", "choose another folder"):
         out.parent.mkdir(parents=True, exist_ok=True)
         scratch = tempfile.TemporaryDirectory(
