@@ -218,19 +218,14 @@ def beside(left: Path, right: Path, out: Path) -> None:
     images = [bpy.data.images.load(str(Path(path).absolute())) for path in (left, right)]
     pixels = [image_array(image) for image in images]
     gap = np.ones((pixels[0].shape[0], max(pixels[0].shape[1] // 80, 1), 4), np.float32)
-    joined = np.concatenate([_rgba(pixels[0]), gap, _rgba(pixels[1])], 1)
+    joined = np.concatenate([pixels[0], gap, pixels[1]], 1)
+    joined[..., 3] = 1.0
     kind = FORMATS[check_format(out)][0]
     made = bpy.data.images.new("before_after", joined.shape[1], joined.shape[0], float_buffer=kind == "OPEN_EXR")
     try:
-        made.pixels.foreach_set(joined.astype(np.float32).ravel())
+        made.pixels.foreach_set(joined.ravel())
         with saving(Path(out)) as temporary:
             made.filepath_raw, made.file_format = str(temporary.absolute()), kind
             made.save()
     finally:
         bpy.data.batch_remove([*images, made])
-
-
-def _rgba(pixels: np.ndarray) -> np.ndarray:
-    out = np.ones((*pixels.shape[:2], 4), np.float32)
-    out[..., :3] = pixels[..., :3]
-    return out
