@@ -7,13 +7,10 @@ import numpy as np
 
 from ...core.brdf.material import from_json
 from ...core.io.read import read_capture
-from ...core.kinds import Workload
 from ...core.scene.model import Capture
+from ...core.scene.params import VISIBILITY
 from ...core.scene.rays import RayScene
 from .room import room
-
-MIN_COSINE: Workload[float] = 0.2
-"""More slanting views count as none, as in the method."""
 
 
 def comparison(capture: Path, result: Path) -> str:
@@ -70,7 +67,7 @@ def seen_albedo(capture: Capture) -> dict[int, np.ndarray]:
             pixels, depth = camera.project(points)
             ray = camera.centre - points
             distance = np.linalg.norm(ray, axis=1)
-            facing = (ray * normals).sum(1) > MIN_COSINE * distance
+            facing = (ray * normals).sum(1) > VISIBILITY.min_cosine * distance
             inside = ((pixels >= 0) & (pixels < (camera.width, camera.height))).all(1) & (depth > 0)
             ask = np.flatnonzero(facing & inside & ~seen)
             seen[ask] = ~scene.occluded(
