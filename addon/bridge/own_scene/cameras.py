@@ -141,11 +141,11 @@ def views(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
     things: list[bpy.types.Object],
+    problems: list[str],
     how: str = AUTO,
     first: int | None = None,
     last: int | None = None,
     step: int = 1,
-    problems: list[str] | None = None,
 ) -> Iterator[View]:
     """Every picture with the camera that took it.
 
@@ -155,15 +155,14 @@ def views(
         With `ANIMATION` its frame is changed; the caller sets it back.
     things : list of bpy.types.Object
         See `cameras_with_pictures`.
+    problems : list of str
+        Gets one sentence for each picture that can't be used.
     how : str
         `OBJECTS`: one frame for each camera. `ANIMATION`: one for each frame of the scene's animation, through the
         active camera, or the only one. `AUTO`: an animation where the one camera has a sequence or a clip behind it.
     first, last, step : int, optional
         Frames of the animation; the scene's where left out.
-    problems : list of str
-        Gets one sentence for each picture that can't be used.
     """
-    problems = [] if problems is None else problems
     if how == AUTO:
         back = background(things[0].data)
         moving = back.source == "MOVIE_CLIP" or back.image.source in ("SEQUENCE", "MOVIE")

@@ -111,7 +111,7 @@ def capture_scene(
     now = scene.frame_current, scene.frame_subframe
     try:
         views = list(
-            scene_cameras.views(scene, context.evaluated_depsgraph_get(), cameras, how, first, last, step, problems)
+            scene_cameras.views(scene, context.evaluated_depsgraph_get(), cameras, problems, how, first, last, step)
         )
     finally:
         if (scene.frame_current, scene.frame_subframe) != now:
