@@ -20,6 +20,7 @@ from ..data.cameras import kept_lens
 PROPERTIES = (("frame_exposure", "exposure"), ("exposure", "exposure"), ("saturation", "saturation"))
 """Custom properties of a camera and what they say of its frame; `make_cameras` leaves the first."""
 AUTO, ANIMATION, OBJECTS = "AUTO", "ANIMATION", "OBJECTS"
+_DIGITS = re.compile(r"(\d+)(?!.*\d)")
 
 
 @dataclass(frozen=True)
@@ -178,7 +179,8 @@ def views(
         if moment is not None:
             scene.frame_set(moment)
         for thing in things:
-            name = _plain(thing.name) + ("" if moment is None else f"_{moment:04d}")
+            plain = re.sub(r"[^\w.-]+", "_", thing.name).strip("._") or "camera"  # in a file's name on every system
+            name = plain + ("" if moment is None else f"_{moment:04d}")
             while name.lower() in taken:
                 name += "_"
             try:
@@ -241,11 +243,3 @@ def picture(back: bpy.types.CameraBackgroundImage, moment: int, owner: str) -> P
     if problem:
         raise BadInputError(problem)
     return path
-
-
-_DIGITS = re.compile(r"(\d+)(?!.*\d)")
-
-
-def _plain(name: str) -> str:
-    """`name` as part of a file's name on every system."""
-    return re.sub(r"[^\w.-]+", "_", name).strip("._") or "camera"

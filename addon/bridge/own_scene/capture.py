@@ -67,8 +67,6 @@ def capture_scene(
 
     Parameters
     ----------
-    context : bpy.types.Context
-        Its scene and view layer.
     folder : Path or str
         Replaced as a whole where an earlier capture of a scene is there.
     things : iterable of bpy.types.Object
