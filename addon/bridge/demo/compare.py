@@ -22,8 +22,6 @@ def comparison(capture: Path, result: Path) -> str:
     ----------
     capture : Path
         The demo's, with its truth.
-    result : Path
-        The result folder.
     """
     truth = json.loads((capture / "truth" / "materials.json").read_text())
     true_colours = seen_albedo(read_capture(capture))

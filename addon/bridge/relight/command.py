@@ -62,8 +62,6 @@ def relight(
 
     Parameters
     ----------
-    result : Path
-        A result folder.
     out : Path
         Ends in .png, .jpg or .exr.
     camera : str, optional

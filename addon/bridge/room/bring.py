@@ -31,8 +31,6 @@ class Brought:
     ----------
     scene : bpy.types.Scene
         Where the room is to be seen: the scene that was named, or the room's own.
-    collection : bpy.types.Collection
-        The room's.
     warnings : tuple of str
         What was left as the artist has it, one sentence each.
     """
@@ -191,8 +189,6 @@ def link_room(top: bpy.types.Collection, scene: bpy.types.Scene, outside: bpy.ty
 
     Parameters
     ----------
-    top : bpy.types.Collection
-        The room's.
     outside : bpy.types.Scene, optional
         Give `scene` the world and the exposure of this one, too.
     """
