@@ -111,14 +111,13 @@ def array_image(name: str, pixels: np.ndarray, colour_space: str = RADIANCE) -> 
     colour_space : str
         `RADIANCE` or `DATA`.
     """
-    height, width = pixels.shape[:2]
+    pixels = np.atleast_3d(pixels)
+    height, width, channels = pixels.shape
     image = bpy.data.images.new(name, width, height, float_buffer=True, is_data=colour_space == DATA)
     # The colour space comes first: setting it afterwards would throw the pixels away.
     image.colorspace_settings.name = colour_space
     rgba = np.ones((height, width, 4), np.float32)
-    rgba[..., :3] = (pixels if pixels.ndim == 3 else pixels[..., None])[..., :3]
-    if pixels.ndim == 3 and pixels.shape[2] == 4:
-        rgba[..., 3] = pixels[..., 3]
+    rgba[..., : max(channels, 3)] = pixels
     image.pixels.foreach_set(rgba.ravel())
     image.update()
     image.pack()
